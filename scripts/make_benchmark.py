@@ -1,0 +1,67 @@
+"""Make the benchmark set: one goal in each tile of what several learners reached together (section 5.2 of the paper).
+
+Random, SAGG-RIAC and SGIM-D each live for some seeds; their landing points are pooled; the tiles' side is chosen so that
+about 358 of them, the paper's number, were reached; one goal is drawn at random in each.
+"""
+
+from __future__ import annotations
+
+import argparse
+from concurrent.futures import ProcessPoolExecutor
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+from tqdm import tqdm
+
+from sgimd_torch.algorithms import random_exploration, sagg_riac, sgim_d
+from sgimd_torch.demonstrations import load_demonstrations
+from sgimd_torch.evaluation import SHIPPED, Benchmark, save_benchmark, tile_goals
+from sgimd_torch.fishing_rod import FishingRod
+from sgimd_torch.session import run
+from sgimd_torch.spaces import Array, stream
+from sgimd_torch.teachers import PeriodicTeacher
+
+
+def outcomes_of(algorithm: str, seed: int, movements: int) -> Array:
+    """``(movements, 2)`` m, where the float landed in one life."""
+    rod = FishingRod(threads=1)
+    teacher = None
+    if algorithm == "random":
+        learner = random_exploration(rod, seed)
+    elif algorithm == "sagg-riac":
+        learner = sagg_riac(rod, seed)
+    else:
+        learner = sgim_d(rod, seed, correspondence=rod.primitive.correspondence)
+        teacher = PeriodicTeacher(load_demonstrations(), stream(seed, "teacher"))
+    for _ in run(learner, rod, seed, movements=movements, teacher=teacher):
+        pass
+    return learner.memory.outcomes
+
+
+def main() -> None:
+    """Run the learners, pool, tile, draw, write."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--out", type=Path, default=SHIPPED, help="file to write (default: the shipped one)")
+    parser.add_argument("--seed", type=int, default=2000, help="first seed of the runs, and of the draw (default: 2000)")
+    parser.add_argument("--runs", type=int, default=4, help="runs of each learner (default: %(default)s)")
+    parser.add_argument("--movements", type=int, default=5000, help="of each run (default: %(default)s)")
+    parser.add_argument("--tiles", type=int, default=358, help="how many are wanted, about (default: %(default)s)")
+    parser.add_argument("--processes", type=int, default=2, help="(default: %(default)s)")
+    options = parser.parse_args()
+    lives = list(product(("random", "sagg-riac", "sgim-d"), range(options.seed, options.seed + options.runs)))
+    with ProcessPoolExecutor(options.processes) as pool:
+        pending = [pool.submit(outcomes_of, *life, options.movements) for life in lives]
+        pooled = np.concatenate([future.result() for future in tqdm(pending, desc="learning")])
+    box = FishingRod().outcomes
+
+    def goals(side: float) -> Array:
+        return tile_goals(pooled, box, side, stream(options.seed, "benchmark"))
+
+    side = min(np.linspace(0.05, 0.2, 301), key=lambda side: abs(len(goals(side)) - options.tiles))
+    save_benchmark(options.out, Benchmark("FishingRod", goals(side), float(side)))
+    print(f"{len(goals(side))} tiles of {side:.4f} m reached by {len(pooled)} movements: {options.out}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,84 @@
+"""Make the shipped demonstrations of demonstrator 3: simulated kinesthetic recordings on the fishing rod.
+
+The paper's demonstrator 3 was a person who led the arm by hand. These recordings are *simulated* in that person's manner as
+the paper describes it: every joint moves monotonically from the start configuration to an end posture, all with the same
+shape, scaled; end postures come from one habit, with the variation of a hand, and are chosen so that the landing points
+spread evenly over the plane. The pace wavers smoothly, as a hand's does, so no recording is exactly a motor primitive.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+from tqdm import tqdm
+
+from sgimd_torch.demonstrations import SHIPPED, save_demonstrations
+from sgimd_torch.fishing_rod import JOINT_RANGES, FishingRod
+from sgimd_torch.spaces import Array, Demonstration, stream
+
+RATE = 50  # Hz
+DURATIONS = (1.0, 1.4)  # s
+HAND = 0.04  # rad, how much a hand's end postures vary
+TREMOR = 0.15  # part of the pace that wavers
+
+
+def end_posture(turn: float, stretch: float) -> Array:
+    """``(6,)`` rad, the teacher's habit: ``turn`` in [-1, 1] from right to left, ``stretch`` in [-1, 1] from far behind to
+    far ahead. Yaw and wrist share the turn; shoulder, elbow and wrist share the stretch."""
+    middle = (JOINT_RANGES.low + JOINT_RANGES.high) / 2
+    sideways = np.array([1.5, 0.0, 0.0, 0.0, 0.0, 1.2])
+    ahead = np.array([0.0, -0.65, 0.1, 0.0, -0.75, 0.0])
+    return JOINT_RANGES.clip(middle + turn * sideways + stretch * ahead)
+
+
+def lead(end: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+    """The arm led from the start configuration to ``end``: times ``(n,)`` s and angles ``(n, 6)`` rad at 50 Hz."""
+    start = (JOINT_RANGES.low + JOINT_RANGES.high) / 2
+    n = int(round(rng.uniform(*DURATIONS) * RATE)) + 1
+    times = np.arange(n) / RATE
+    phase = times / times[-1]
+    pace = (phase * (1 - phase)) ** 2  # minimum jerk: bell-shaped speed
+    waver = sum(
+        rng.normal(0, TREMOR / 2, (1, 6)) * np.sin(2 * np.pi * (f * times[:, None] + rng.random((1, 6))))
+        for f in (2.0, 3.5, 5.0, 7.0)
+    )
+    speed = pace[:, None] * np.maximum(1 + waver, 0.1)  # never backwards: the movement is monotone
+    share = np.concatenate([np.zeros((1, 6)), np.cumsum((speed[1:] + speed[:-1]) / 2, axis=0)])
+    return times, start + share / share[-1] * (end - start)
+
+
+def farthest_points(points: Array, n: int) -> list[int]:
+    """Rows of ``n`` of the ``points``, each as far as can be from those before it, from the one nearest the mean on."""
+    chosen = [int(np.linalg.norm(points - points.mean(axis=0), axis=1).argmin())]
+    distances = np.full(len(points), np.inf)
+    while len(chosen) < n:
+        distances = np.minimum(distances, np.linalg.norm(points - points[chosen[-1]], axis=1))
+        chosen.append(int(distances.argmax()))
+    return chosen
+
+
+def main() -> None:
+    """Record many movements, keep those that spread evenly."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--out", type=Path, default=SHIPPED, help="file to write (default: the shipped one)")
+    parser.add_argument("--n", type=int, default=127, help="demonstrations, 127 in the paper (default: %(default)s)")
+    parser.add_argument("--candidates", type=int, default=4000, help="recordings to choose from (default: %(default)s)")
+    parser.add_argument("--seed", type=int, default=2014, help="(default: %(default)s)")
+    options = parser.parse_args()
+    rod, rng = FishingRod(noise=0.0), stream(options.seed, "demonstrator 3")
+    recordings: list[Demonstration] = []
+    for _ in tqdm(range(options.candidates), desc="recording"):
+        end = JOINT_RANGES.clip(end_posture(*rng.uniform(-1, 1, 2)) + rng.normal(0, HAND, 6))
+        times, trajectory = lead(end, rng)
+        outcome = rod.replay(times, trajectory)
+        if rod.outcomes.contains(outcome):
+            recordings.append(Demonstration(np.zeros(0), times, trajectory, outcome))
+    chosen = farthest_points(np.stack([recording.outcome for recording in recordings]), options.n)
+    save_demonstrations(options.out, [recordings[row] for row in chosen])
+    print(f"{len(chosen)} demonstrations of {len(recordings)} recordings inside T: {options.out}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,171 @@
+"""The five learners of the paper, each a few lines: which strategy in which slot?
+
+Section 5.1 of Nguyen & Oudeyer (2014). Every part is a keyword, so an ablation is one changed word:
+    learner = sgim_d(environment, seed, correspondence=environment.primitive.correspondence, goals=UniformGoals)
+Parts are given as constructors, since they need boxes, the memory and random streams that only a builder knows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import TypedDict, Unpack
+
+import numpy as np
+
+from sgimd_torch.competence import AttemptCompetence, Competence, Performance, performance
+from sgimd_torch.environment import Environment
+from sgimd_torch.interest import Goals, InterestMap
+from sgimd_torch.inverse_model import LocalInverse
+from sgimd_torch.learner import Learner
+from sgimd_torch.memory import Memory
+from sgimd_torch.search import nelder_mead
+from sgimd_torch.spaces import Array, Box, Estimate, Search, stream
+from sgimd_torch.strategies import Babble, Emulate, GoalBabbling, Imitate, Judge, Remember, Rest, SocialStrategy
+
+Correspondence = Callable[[Array, Array], Array]
+MakeGoals = Callable[[Box, Box, np.random.Generator], Goals]
+MakeInverse = Callable[[Memory], Callable[[Array, Array], Estimate]]
+MakeSearch = Callable[[Box, np.random.Generator], Search]
+MakeJudge = Callable[[Memory, Performance], Judge]
+MakeSocial = Callable[[GoalBabbling, Box, np.random.Generator], SocialStrategy]
+
+
+class Parts(TypedDict, total=False):
+    """The keywords of ``goal_babbling``, where they are explained."""
+
+    goals: MakeGoals
+    inverse: MakeInverse
+    search: MakeSearch
+    judge: MakeJudge
+    measure: Performance | None
+    budget: int
+    tolerance: float | None
+    global_range: tuple[float, float]
+
+
+def random_exploration(environment: Environment, seed: int) -> Learner:
+    """Random: uniform movements."""
+    return Learner(_memory(environment), Babble(environment.policies, stream(seed, "babble")))
+
+
+def sagg_riac(environment: Environment, seed: int, **parts: Unpack[Parts]) -> Learner:
+    """SAGG-RIAC: active goal babbling, without a teacher."""
+    memory = _memory(environment)
+    return Learner(memory, goal_babbling(environment, seed, memory, **parts))
+
+
+def observation(environment: Environment, seed: int, *, correspondence: Correspondence) -> Learner:
+    """Observation: watches and remembers, never moves."""
+    memory = _memory(environment)
+    return Learner(memory, Rest(), social=Remember(memory), correspondence=correspondence)
+
+
+def imitation(
+    environment: Environment, seed: int, *, correspondence: Correspondence, epsilon: float = 0.05
+) -> Learner:
+    """Imitation: repeats the last demonstration with small variations until the next one."""
+    imitate = Imitate(environment.policies, stream(seed, "imitate"), repeats=None, epsilon=epsilon)
+    return Learner(_memory(environment), Rest(), social=imitate, correspondence=correspondence)
+
+
+def imitating(
+    babbling: GoalBabbling, outcomes: Box, rng: np.random.Generator, *, repeats: int = 10, epsilon: float = 0.05
+) -> Imitate:
+    """How SGIM-D answers a demonstration: a short imitation, then emulation of the goal."""
+    return Imitate(
+        babbling.policies,
+        rng,
+        repeats=repeats,
+        epsilon=epsilon,
+        goals=babbling.goals,
+        judge=babbling.judge,
+        outcomes=outcomes,
+    )
+
+
+def emulating(babbling: GoalBabbling, outcomes: Box, rng: np.random.Generator) -> Emulate:
+    """A swap for ``imitating``: the teacher's goals without his movements."""
+    return Emulate(babbling, outcomes)
+
+
+def sgim_d(
+    environment: Environment,
+    seed: int,
+    *,
+    correspondence: Correspondence,
+    social: MakeSocial = imitating,
+    **parts: Unpack[Parts],
+) -> Learner:
+    """SGIM-D: SAGG-RIAC, interrupted by a short imitation whenever the teacher demonstrates.
+
+    Args:
+        environment, seed, parts: as ``goal_babbling``.
+        correspondence: (times, trajectory) -> theta_d, eq. (6).
+        social: (goal babbling, T, rng) -> the answer to a demonstration.
+    """
+    memory = _memory(environment)
+    babbling = goal_babbling(environment, seed, memory, **parts)
+    answer = social(babbling, environment.outcomes, stream(seed, "imitate"))
+    return Learner(memory, babbling, social=answer, correspondence=correspondence)
+
+
+def remembered(memory: Memory, measure: Performance) -> Judge:
+    """The paper's reading of competence, eq. (2): the best that memory holds."""
+    return Competence(memory, measure)
+
+
+def attempted(memory: Memory, measure: Performance) -> Judge:
+    """SAGG-RIAC's own reading: the best of this attempt."""
+    return AttemptCompetence(measure)
+
+
+def goal_babbling(
+    environment: Environment,
+    seed: int,
+    memory: Memory,
+    *,
+    goals: MakeGoals = InterestMap,
+    inverse: MakeInverse = LocalInverse,
+    search: MakeSearch = nelder_mead,
+    judge: MakeJudge = attempted,
+    measure: Performance | None = None,
+    budget: int = 20,
+    tolerance: float | None = None,
+    global_range: tuple[float, float] = (0.05, 0.95),
+) -> GoalBabbling:
+    """The paper's autonomous strategy, put together from its parts.
+
+    Args:
+        environment: its boxes, rest and outcome noise are read; it is not executed.
+        seed: of every stream of this learner.
+        memory: what the learner remembers.
+        goals: (contexts, outcomes, rng) -> where goals come from.
+        inverse: (memory) -> the inverse model.
+        search: (policies, rng) -> the refinement of its estimate.
+        judge: (memory, measure) -> which competence enters the interest map.
+        measure: J; None for eq. (7), relative to the distance from rest.
+        budget: movements for one goal, at most.
+        tolerance: distance (m) at which a goal counts as reached; None for the outcome noise, .02 m at least.
+        global_range: least and greatest probability of the global exploration regime.
+    """
+    near = max(environment.outcome_noise, 0.02) if tolerance is None else tolerance
+    if measure is None:
+        measure = partial(performance, rest=environment.rest, d_min=near)
+    return GoalBabbling(
+        environment.policies,
+        memory,
+        goals(environment.contexts, environment.outcomes, stream(seed, "goals")),
+        inverse(memory),
+        search(environment.policies, stream(seed, "search")),
+        Competence(memory, measure),
+        judge(memory, measure),
+        stream(seed, "regime"),
+        budget=budget,
+        tolerance=near,
+        global_range=global_range,
+    )
+
+
+def _memory(environment: Environment) -> Memory:
+    return Memory(environment.contexts.dim, environment.policies.dim, environment.outcomes.dim)

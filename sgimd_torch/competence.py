@@ -1,0 +1,88 @@
+"""Performance and competence: how well is a goal met, and how well could it be met by now?
+
+Section 4.3 and eqs. (2) and (7) of Nguyen & Oudeyer (2014).
+    measure = partial(performance, rest=environment.rest, d_min=0.02)
+    competence = Competence(memory, measure); competence(context, goal)   # -1 never came near ... 0 reached
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from sgimd_torch.memory import Memory
+from sgimd_torch.spaces import Array
+
+Performance = Callable[[Array, Array], Array]
+"""J: ``(goal, outcome)`` ``(..., outcome_dim)`` -> ``(...)`` in [-1, 0], falling as they part for a given goal."""
+
+
+def performance(goal: Array, outcome: Array, rest: Array, d_min: float) -> Array:
+    """How nearly an outcome meets a goal: 0 when met, -1 when no better than not moving.
+
+    Eq. (7): the distance left, relative to how far the goal lies from where the float rests.
+
+    Args:
+        goal: ``(..., outcome_dim)`` metres on the water plane.
+        outcome: ``(..., outcome_dim)``; leading axes broadcast with ``goal``.
+        rest: ``(outcome_dim,)`` where the float lands without moving, the paper's tau_org.
+        d_min: metres, > 0, the standard deviation of the noise, say. Deviation: eq. (7) is 0/0 for a goal at ``rest``,
+            and near it noise alone scores -1, so goals nearer than ``d_min`` are judged as if they lay at ``d_min``.
+
+    Returns:
+        ``(...)`` in [-1, 0].
+
+    Raises:
+        ValueError: ``d_min`` is not positive.
+    """
+    return -np.minimum(1.0, _distance(goal, outcome) / np.maximum(_distance(goal, rest), _positive("d_min", d_min)))
+
+
+def absolute_performance(goal: Array, outcome: Array, d_ref: float) -> Array:
+    """As :func:`performance`, but every goal is judged by the same ``d_ref`` > 0, metres: -1 from there on."""
+    return -np.minimum(1.0, _distance(goal, outcome) / _positive("d_ref", d_ref))
+
+
+class Competence:
+    """gamma of eq. (2), the `memory` reading: the best performance remembered. It never falls for a goal.
+
+    Deviation: the paper prints the minimum over memory, but J is negative, so the best is the maximum. J falls with
+    distance, hence the best is the nearest outcome's; where contexts differ, the nearest in (context, outcome).
+    """
+
+    def __init__(self, memory: Memory, performance: Performance) -> None:
+        self.memory = memory
+        self.performance = performance
+
+    def __call__(self, context: Array, goal: Array, outcomes: Array | None = None) -> float:
+        """In [-1, 0], and -1 for an empty memory. ``outcomes`` of the attempt are not needed: memory holds them."""
+        nearest = self.memory.near_outcomes(context, goal, k=1)
+        return _best(self.performance, goal, self.memory.outcomes[nearest])
+
+
+class AttemptCompetence:
+    """The `attempt` reading, SAGG-RIAC's own: the best performance of this attempt alone. It can fall, when a movement
+    stops working, and the interest measure then sees that something changes."""
+
+    def __init__(self, performance: Performance) -> None:
+        self.performance = performance
+
+    def __call__(self, context: Array, goal: Array, outcomes: Array) -> float:
+        """In [-1, 0] from the ``outcomes`` ``(n, outcome_dim)`` of this attempt, and -1 if nothing was executed."""
+        return _best(self.performance, goal, outcomes)
+
+
+def _best(performance: Performance, goal: Array, outcomes: Array) -> float:
+    return float(np.max(performance(goal, outcomes), initial=-1.0))
+
+
+def _distance(a: Array, b: Array) -> Array:
+    difference = np.subtract(a, b, dtype=np.float64)
+    return np.sqrt((difference * difference).sum(axis=-1))
+
+
+def _positive(name: str, value: float) -> float:
+    if not 0 < value < np.inf:
+        raise ValueError(f"{name} must be positive and finite, got {value}; without it a goal at rest divides by zero")
+    return value

@@ -1,0 +1,125 @@
+"""Demonstrations on disk: recorded joint trajectories, their times and where the float landed.
+
+One ``.npz`` file without pickle, so that any numpy reads it; n recordings of different lengths stand end to end:
+    version          ()                   1
+    lengths          (n,) int             samples of each recording, 2 or more
+    times            (sum,) s             from 0, increasing within each recording
+    trajectories     (sum, n_joints) rad
+    outcomes         (n, outcome_dim) m   where the float landed
+    contexts         (n, context_dim)     (n, 0) in the fishing task
+``save_demonstrations`` writes it, so your own recordings need no more than a list of ``Demonstration``.
+"""
+
+from __future__ import annotations
+
+import os
+import zipfile
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from sgimd_torch.spaces import Array, Demonstration
+
+VERSION = 1
+SHIPPED = Path(__file__).with_name("data") / "demonstrator_3.npz"
+_FIELDS = ("lengths", "times", "trajectories", "outcomes", "contexts")
+
+
+def save_demonstrations(path: str | os.PathLike[str], demonstrations: Sequence[Demonstration]) -> None:
+    """Write a file that ``load_demonstrations`` reads; the file appears whole or not at all.
+
+    Raises:
+        ValueError: no demonstration, or one that ``load_demonstrations`` would refuse.
+    """
+    if not demonstrations:
+        raise ValueError("there is no demonstration to save")
+    path = Path(path)
+    fields: dict[str, Array | np.ndarray] = {
+        "lengths": np.array([len(d.times) for d in demonstrations]),
+        "times": np.concatenate([d.times for d in demonstrations]),
+        "trajectories": np.concatenate([d.trajectory for d in demonstrations]),
+        "outcomes": np.stack([d.outcome for d in demonstrations]),
+        "contexts": np.stack([d.context for d in demonstrations]),
+    }
+    _check(str(path), fields)
+    partial = path.with_name(path.name + ".part")
+    with partial.open("wb") as file:
+        np.savez_compressed(file, allow_pickle=False, version=np.array(VERSION), **fields)
+    partial.replace(path)
+
+
+def load_demonstrations(
+    path: str | os.PathLike[str] = SHIPPED,
+    *,
+    n_joints: int | None = None,
+    outcome_dim: int | None = None,
+    context_dim: int | None = None,
+) -> list[Demonstration]:
+    """Read recordings; the shipped ones of the (simulated) human demonstrator 3 unless told otherwise.
+
+    Args:
+        path: a ``.npz`` file as described above.
+        n_joints, outcome_dim, context_dim: what the robot expects; None accepts any.
+
+    Raises:
+        ValueError: not such a file, or empty, truncated, not numeric, unsorted in time, not finite, or made for another
+            robot; the message names the file and the recording.
+        FileNotFoundError: there is no file.
+    """
+    source = str(path)
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            if not isinstance(archive, np.lib.npyio.NpzFile):
+                raise ValueError("it holds a single array")
+            missing = {"version", *_FIELDS} - set(archive.files)
+            if missing:
+                raise ValueError(f"it lacks {sorted(missing)}")
+            version = archive["version"]
+            fields = {name: archive[name] for name in _FIELDS}
+    except FileNotFoundError:
+        raise
+    except (ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
+        raise ValueError(f"{source} is no demonstration file ({error}); was it written by save_demonstrations?") from error
+    if version.shape != () or version != VERSION:
+        raise ValueError(f"{source} has version {version}, this library reads {VERSION}")
+    _check(source, fields)
+    for name, field, wanted in (
+        ("joints", "trajectories", n_joints),
+        ("outcome dimensions", "outcomes", outcome_dim),
+        ("context dimensions", "contexts", context_dim),
+    ):
+        found = fields[field].shape[1]
+        if wanted is not None and found != wanted:
+            raise ValueError(f"{source} has {found} {name}, the robot has {wanted}; was it recorded on another robot?")
+    ends = np.cumsum(fields["lengths"])
+    return [
+        Demonstration(context, fields["times"][end - length : end], fields["trajectories"][end - length : end], outcome)
+        for context, outcome, end, length in zip(
+            fields["contexts"], fields["outcomes"], ends, fields["lengths"], strict=True
+        )
+    ]
+
+
+def _check(source: str, fields: dict[str, np.ndarray]) -> None:
+    for name, field in fields.items():
+        if not np.issubdtype(field.dtype, np.integer if name == "lengths" else np.floating):
+            raise ValueError(f"{source}: {name} must be numbers, got {field.dtype}; was text or a list of objects saved?")
+        if field.ndim != (1 if name in ("lengths", "times") else 2):
+            raise ValueError(f"{source}: {name} has {field.ndim} axes, shape {field.shape}")
+        if not np.isfinite(field).all():
+            raise ValueError(f"{source}: {name} holds NaN or infinity; did the recording drop samples?")
+    lengths, times = fields["lengths"], fields["times"]
+    n = len(lengths)
+    if n == 0:
+        raise ValueError(f"{source} holds no demonstration")
+    if (lengths < 2).any():
+        raise ValueError(f"{source}: recording {int(np.argmax(lengths < 2))} has fewer than 2 samples")
+    if not len(fields["outcomes"]) == len(fields["contexts"]) == n:
+        raise ValueError(f"{source}: {n} recordings, {len(fields['outcomes'])} outcomes, {len(fields['contexts'])} contexts")
+    if not len(times) == len(fields["trajectories"]) == lengths.sum():
+        rows = f"{len(times)} times, {len(fields['trajectories'])} postures"
+        raise ValueError(f"{source}: lengths add up to {lengths.sum()} samples, but there are {rows}; is it truncated?")
+    for k, part in enumerate(np.split(times, np.cumsum(lengths)[:-1])):
+        if part[0] != 0 or not (np.diff(part) > 0).all():
+            raise ValueError(f"{source}: times of recording {k} must increase from 0; were its rows shuffled?")

@@ -1,0 +1,222 @@
+"""The world as the learner meets it: observe a context, execute a movement, see its outcome.
+
+Section 2.1 of Nguyen & Oudeyer (2014): M(c, theta) = tau. An environment of your own needs the six members of
+`Environment`. `PlanarArm` is one whose reachable set and inverse are known exactly, for tests and first steps:
+``arm = PlanarArm(); outcome = arm.execute(arm.observe(rng), theta, rng)``
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import root_scalar
+
+from sgimd_torch.spaces import Array, Box, check_vector
+
+
+class Environment(Protocol):
+    """What a learner can move and see. Nothing carries over from one movement to the next."""
+
+    @property
+    def contexts(self) -> Box:
+        """C; ``dim`` 0 when every movement starts alike."""
+        ...
+
+    @property
+    def policies(self) -> Box:
+        """Pi."""
+        ...
+
+    @property
+    def outcomes(self) -> Box:
+        """T, from which goals are drawn. Outcomes may fall outside."""
+        ...
+
+    @property
+    def rest(self) -> Array:
+        """tau_org ``(outcome_dim,)`` in T, the outcome of not moving."""
+        ...
+
+    @property
+    def outcome_noise(self) -> float:
+        """Typical standard deviation (m), per dimension, of an outcome executed again; 0 if it is always the same."""
+        ...
+
+    def observe(self, rng: np.random.Generator) -> Array:
+        """``(context_dim,)`` in which the next movement will start."""
+        ...
+
+    def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
+        """``(outcome_dim,)`` of one movement, tau = M(c, theta); noise comes from ``rng`` alone.
+
+        Raises:
+            ValueError: ``context`` is not one point of C or ``theta`` not one of Pi; see `check_movement`.
+            SimulationError: there is no finite outcome.
+        """
+        ...
+
+
+@runtime_checkable
+class BatchEnvironment(Environment, Protocol):
+    """An environment that executes many movements faster together than one by one."""
+
+    def execute_many(self, contexts: Array, thetas: Array, rngs: Sequence[np.random.Generator]) -> Array:
+        """``(n, outcome_dim)``, row i equal to ``execute(contexts[i], thetas[i], rngs[i])`` bit for bit."""
+        ...
+
+
+class SimulationError(RuntimeError):
+    """A simulation gave no usable outcome; ``theta`` ``(theta_dim,)`` is what was being executed."""
+
+    def __init__(self, theta: Array, reason: str) -> None:
+        super().__init__(theta, reason)  # both in args, or it could not travel between processes
+        self.theta, self.reason = theta, reason
+
+    def __str__(self) -> str:
+        return f"{self.reason}; theta={np.asarray(self.theta).tolist()}"
+
+
+def execute_many(
+    environment: Environment, contexts: ArrayLike, thetas: ArrayLike, rngs: Sequence[np.random.Generator]
+) -> Array:
+    """Many movements: together if the environment can, else one by one, with the same outcomes.
+
+    Args:
+        environment: any; a `BatchEnvironment` is asked once.
+        contexts: ``(n, context_dim)`` in C.
+        thetas: ``(n, theta_dim)`` in Pi.
+        rngs: n streams, one for each movement, so that no outcome depends on what else is in the batch.
+
+    Returns:
+        ``(n, outcome_dim)``, row i equal to ``environment.execute(contexts[i], thetas[i], rngs[i])`` bit for bit.
+
+    Raises:
+        ValueError: the numbers of rows differ, or a row lies outside C or Pi.
+        SimulationError: a movement has no finite outcome.
+    """
+    contexts = environment.contexts.check("contexts", contexts)
+    thetas = environment.policies.check("thetas", thetas, "were goals passed instead?")
+    if not contexts.ndim == thetas.ndim == 2 or not len(contexts) == len(thetas) == len(rngs):
+        raise ValueError(f"needs n contexts, thetas, rngs, got {contexts.shape}, {thetas.shape} and {len(rngs)} rngs")
+    if len(thetas) == 0:
+        return np.empty((0, environment.outcomes.dim))
+    if isinstance(environment, BatchEnvironment):
+        return environment.execute_many(contexts, thetas, rngs)
+    return np.stack([environment.execute(*movement) for movement in zip(contexts, thetas, rngs, strict=True)])
+
+
+def check_movement(environment: Environment, context: ArrayLike, theta: ArrayLike) -> tuple[Array, Array]:
+    """One point of C and one of Pi, as float64: the first line of an ``execute``.
+
+    Raises:
+        ValueError: another shape, NaN or infinity, or a point outside its box.
+    """
+    context = environment.contexts.check("context", context, "was theta passed first?")
+    theta = environment.policies.check("theta", theta, "was a goal passed instead?")
+    if not context.ndim == theta.ndim == 1:
+        raise ValueError(f"execute() takes one movement, got {context.shape} and {theta.shape}; is it execute_many()?")
+    return context, theta
+
+
+class PlanarArm:
+    """An arm of equal links in the plane; the outcome is where its end stands.
+
+    ``theta`` in [0, 1]^n_joints is scaled to joint angles, .5 being 0: the first joint turns in [-pi, pi], the others
+    bend in [-max_angle, max_angle]. What it can reach is exactly the ring ``min_radius`` <= radius <= ``length``.
+
+    Args:
+        n_joints: at least 2.
+        length: of the whole arm, m.
+        max_angle: rad, in (0, pi]; None means 2 pi / n_joints, the least that leaves no hole in the ring.
+        noise: standard deviation of every joint angle, rad; what it does to the outcome depends on the movement.
+        context: whether a context turns the whole arm, by an angle in [-pi/4, pi/4]; ``rest`` is that of context 0.
+        outcomes: T; None means the square around the ring.
+
+    Raises:
+        ValueError: a number out of its range, or ``outcomes`` that do not contain ``rest``.
+    """
+
+    def __init__(
+        self,
+        n_joints: int = 7,
+        *,
+        length: float = 1.0,
+        max_angle: float | None = None,
+        noise: float = 0.0,
+        context: bool = False,
+        outcomes: Box | None = None,
+    ) -> None:
+        if n_joints < 2:
+            raise ValueError(f"n_joints must be at least 2, got {n_joints}")
+        if max_angle is None:
+            max_angle = 2 * np.pi / n_joints
+        if not (0 < length < np.inf and 0 < max_angle <= np.pi and 0 <= noise < np.inf):
+            raise ValueError(f"needs length > 0, 0 < max_angle <= pi, noise >= 0, got {length}, {max_angle}, {noise}")
+        self.contexts = Box.cube(-np.pi / 4, np.pi / 4, int(context))
+        self.policies = Box.cube(0.0, 1.0, n_joints)
+        self.outcomes = Box.cube(-length, length, 2) if outcomes is None else outcomes
+        self.rest = self.outcomes.check("rest, where the straight arm ends,", [length, 0.0], "T has 2 dimensions")
+        self.rest.flags.writeable = False
+        self.length, self.noise = length, noise
+        self._limits = np.array([np.pi] + [max_angle] * (n_joints - 1))
+        # Among bends up to max_angle, equal ones bring the end closest (Cauchy's arm lemma), until they close a circle.
+        self._max_bend = min(max_angle, 2 * np.pi / n_joints)
+        self.min_radius = max(0.0, self._radius(self._max_bend))
+        self.outcome_noise = self._mean_outcome_noise()
+
+    def observe(self, rng: np.random.Generator) -> Array:
+        """``(context_dim,)`` uniform in C."""
+        return self.contexts.sample(rng)
+
+    def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
+        """``(2,)`` m, where the end stands after one movement.
+
+        Raises:
+            ValueError: ``context`` is not one point of C, or ``theta`` not one of Pi.
+        """
+        context, theta = check_movement(self, context, theta)
+        angles = (2 * theta - 1) * self._limits
+        angles = angles + self.noise * rng.standard_normal(len(theta))  # drawn without noise too: it moves no stream
+        directions = np.cumsum(angles) + context.sum()  # an empty context sums to 0
+        return self.length / len(theta) * np.array([np.cos(directions).sum(), np.sin(directions).sum()])
+
+    def reachable(self, points: ArrayLike) -> NDArray[np.bool_]:
+        """``(...)`` whether some theta without noise reaches each of ``points`` ``(..., 2)``, to rounding."""
+        radius = np.linalg.norm(check_vector("points", points, 2), axis=-1)
+        rounding = 1e-12 * self.length
+        is_reachable: NDArray[np.bool_] = (self.min_radius - rounding <= radius) & (radius <= self.length + rounding)
+        return is_reachable
+
+    def solve(self, context: ArrayLike, goal: ArrayLike) -> Array:
+        """``(n_joints,)`` a theta that reaches ``goal`` without noise: equal bends, the first joint for the direction.
+
+        Raises:
+            ValueError: ``goal`` is not one reachable point ``(2,)``, or ``context`` not one of C.
+        """
+        context, _ = check_movement(self, context, np.full(self.policies.dim, 0.5))
+        goal = check_vector("goal", goal, 2, "was theta passed instead?")
+        if goal.ndim != 1 or not self.reachable(goal):
+            raise ValueError(f"goal must be one point from {self.min_radius} to {self.length} m away, got {goal}")
+        n = self.policies.dim
+        radius = np.clip(np.linalg.norm(goal), self._radius(self._max_bend), self._radius(0.0))
+        bend = root_scalar(lambda bend: self._radius(bend) - radius, bracket=(0.0, self._max_bend), xtol=1e-15).root
+        first = np.arctan2(goal[1], goal[0]) - context.sum() - (n - 1) / 2 * bend  # the chord halves the total turn
+        angles = np.array([np.angle(np.exp(1j * first))] + [bend] * (n - 1))
+        return self.policies.clip((angles / self._limits + 1) / 2)
+
+    def _radius(self, bend: float) -> float:
+        """How far the end is when all joints but the first bend alike: falls from the length to 0 at a full turn."""
+        n = self.policies.dim
+        return float(self.length / n * np.cos((np.arange(n) - (n - 1) / 2) * bend).sum())
+
+    def _mean_outcome_noise(self) -> float:
+        """Root mean square, over uniform thetas, of an outcome's deviation per dimension, to first order in noise."""
+        n, straightness = self.policies.dim, np.sinc(self._limits[1] / np.pi)  # the mean cosine of a bend
+        apart = np.abs(np.subtract.outer(np.arange(n), np.arange(n)))
+        alignment = straightness**apart  # (n, n) the mean cosine between two links
+        # A joint moves the end by its angle times its distance to the end, the length of the links beyond it.
+        levers = [alignment[joint:, joint:].sum() for joint in range(n)]
+        return float(self.noise * self.length / n * np.sqrt(np.sum(levers) / 2))

@@ -1,0 +1,240 @@
+"""The fishing rod: a six-joint arm casts a float on the water, simulated by MuJoCo.
+
+Section 4 of Nguyen & Oudeyer (2014); the model is ``fishing_rod.xml``. A movement is open loop, so its whole sequence of
+commands, noise included, is computed first and then run in C.    outcome = FishingRod().execute(context, theta, rng)
+
+Where the float lands: at the first point where it meets the water (z = 0), on the line between two steps. If it has not
+met the water ``HOLD`` seconds after the movement's end, the line is let out: the float flies on freely with the velocity it
+has, the wind pushing it, and lands where its parabola meets the water. So every movement has exactly one landing point.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from mujoco import rollout
+from numpy.typing import ArrayLike
+from scipy.signal import lfilter
+
+from sgimd_torch.environment import SimulationError
+from sgimd_torch.motor_primitives import GaussianPrimitive
+from sgimd_torch.spaces import Array, Box, check_vector
+
+JOINTS = ("yaw", "shoulder", "elbow", "forearm_roll", "wrist_pitch", "wrist_yaw")
+JOINT_RANGES = Box(np.array([-1.6, 0.1, -1.2, -0.6, -0.4, -1.4]), np.array([1.6, 1.5, 0.8, 0.6, 1.4, 1.4]))  # rad
+DURATIONS = (0.8, 1.6)  # s, of a movement
+HOLD = 0.15  # s, the last posture is held before the line is let out
+CORRELATION = 0.96  # of the motor noise from one step to the next
+TOP_SPEED = 500.0  # rad/s; 100,000 random movements stay far below, a diverging simulation runs through it
+
+_STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
+_CHUNK = 40  # steps run in C before looking whether the float has landed
+
+
+class FishingRod:
+    """theta in [0, 1]^25 to the landing point of the float (m) on the water plane.
+
+    Args:
+        noise: motor noise (s): standard deviation of the command (rad) for each rad/s of commanded speed; 0 for none.
+        outcomes: T, the task space (m); [-1, 1]^2 in the paper, [-100, 100]^2 in its large-space experiment.
+        max_yaw: half range of the base's yaw offset (rad), a context; 0 leaves it out.
+        max_wind: half range of a side wind on the float along x (N), a context; 0 leaves it out. The float weighs 0.2 N.
+        threads: for ``execute_many``; None for one a core.
+
+    Raises:
+        ValueError: a negative or non-finite noise or range.
+    """
+
+    def __init__(
+        self,
+        *,
+        noise: float = 0.03,
+        outcomes: Box | None = None,
+        max_yaw: float = 0.0,
+        max_wind: float = 0.0,
+        threads: int | None = None,
+    ) -> None:
+        for name, value in (("noise", noise), ("max_yaw", max_yaw), ("max_wind", max_wind)):
+            if not (np.isfinite(value) and value >= 0):
+                raise ValueError(f"{name} must be finite and >= 0, got {value}")
+        self.noise = noise
+        self.primitive = GaussianPrimitive(JOINT_RANGES, DURATIONS, sharpness=6.0)
+        self.policies = self.primitive.policies
+        self.outcomes = Box.cube(-1.0, 1.0, 2) if outcomes is None else outcomes
+        self.outcome_noise = 0.04 if noise else 0.0
+        ranges = np.array([max_yaw, max_wind])
+        self._context_columns = np.flatnonzero(ranges)
+        self.contexts = Box(-ranges[self._context_columns], ranges[self._context_columns])
+
+        self.model = mujoco.MjModel.from_xml_path(str(Path(__file__).with_name("fishing_rod.xml")))
+        self._threads = threads if threads is not None else os.cpu_count() or 1
+        self._data = mujoco.MjData(self.model)
+        self._pools: dict[int, tuple[rollout.Rollout, list[mujoco.MjData]]] = {}
+        self._home = self._settle()
+        self.rest = self._data.sensordata[:2].copy()
+
+    def observe(self, rng: np.random.Generator) -> Array:
+        """``(context_dim,)`` the context of the next movement, uniform over ``contexts``; empty in the fishing task."""
+        return self.contexts.sample(rng)
+
+    def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
+        """Run one movement.
+
+        Args:
+            context: ``(context_dim,)`` inside ``contexts``.
+            theta: ``(25,)`` in [0, 1].
+            rng: of the motor noise; draws the same number of values whatever theta is.
+
+        Returns:
+            ``(2,)`` m, where the float landed.
+
+        Raises:
+            ValueError: shapes, values that are not finite or outside their box.
+            SimulationError: the simulation diverged; the message names theta.
+        """
+        return self.execute_many(np.asarray(context)[None], np.asarray(theta)[None], [rng])[0]
+
+    def execute_many(self, contexts: ArrayLike, thetas: ArrayLike, rngs: Sequence[np.random.Generator]) -> Array:
+        """Run many movements side by side on threads; row i equals ``execute(contexts[i], thetas[i], rngs[i])`` bit for bit.
+
+        Args:
+            contexts: ``(n, context_dim)``.
+            thetas: ``(n, 25)``.
+            rngs: n streams.
+
+        Returns:
+            ``(n, 2)`` m.
+
+        Raises:
+            ValueError, SimulationError: as ``execute``.
+        """
+        thetas = self.policies.check("theta", thetas, "was a goal passed instead?")
+        contexts = self.contexts.check("context", contexts)
+        if not len(thetas) == len(contexts) == len(rngs):
+            raise ValueError(f"got {len(contexts)} contexts, {len(thetas)} thetas and {len(rngs)} rngs; want one of each")
+        commands = [self._commands(theta, rng) for theta, rng in zip(thetas, rngs, strict=True)]
+        ends = np.array([self.primitive.duration(theta) + HOLD for theta in thetas])
+        landings, diverged = self._cast(contexts, commands, ends)
+        if diverged.any():
+            row = int(np.flatnonzero(diverged)[0])
+            raise SimulationError(thetas[row], f"the simulation diverged in context {contexts[row].tolist()}")
+        return landings
+
+    def replay(self, times: ArrayLike, trajectory: ArrayLike) -> Array:
+        """Where the float lands when the arm is led along a recorded trajectory, without noise, in the zero context.
+
+        Args:
+            times: ``(n_times,)`` s, increasing from 0.
+            trajectory: ``(n_times, 6)`` rad.
+
+        Returns:
+            ``(2,)`` m.
+
+        Raises:
+            ValueError: shapes or values that are not finite.
+            SimulationError: the simulation diverged.
+        """
+        trajectory = check_vector("trajectory", trajectory, len(JOINTS), "one column for each joint, in rad")
+        times = check_vector("times", times, len(trajectory))
+        end = float(times[-1]) + HOLD
+        steps = self._times(end)
+        commands = np.stack([np.interp(steps, times, column) for column in trajectory.T], axis=1)
+        landings, diverged = self._cast(np.zeros((1, self.contexts.dim)), [commands], np.array([end]))
+        if diverged.any():
+            raise SimulationError(trajectory[-1], "the simulation of a recorded trajectory diverged")
+        return landings[0]
+
+    def _times(self, end: float) -> Array:
+        step = self.model.opt.timestep
+        return step * np.arange(1, int(np.ceil(end / step)) + 1)
+
+    def _commands(self, theta: Array, rng: np.random.Generator) -> Array:
+        """``(n_steps, 6)`` rad: the trajectory of theta with motor noise in proportion to its speed."""
+        times = self._times(self.primitive.duration(theta) + HOLD)
+        trajectory = self.primitive.at(theta, times)
+        if not self.noise:
+            return trajectory
+        # As many draws for a short movement as for a long one: movement i meets the same noise whatever came before.
+        draws = rng.standard_normal((len(self._times(DURATIONS[1] + HOLD)), len(JOINTS)))
+        draws[1:] *= np.sqrt(1 - CORRELATION**2)
+        noise = lfilter([1.0], [1.0, -CORRELATION], draws, axis=0)[: len(times)]  # AR(1) of unit variance
+        speed = np.abs(np.gradient(trajectory, self.model.opt.timestep, axis=0))
+        return trajectory + self.noise * speed * noise
+
+    def _settle(self) -> Array:
+        """c_org, the start configuration: joints in the middle of their ranges, the line hanging still."""
+        middle = (JOINT_RANGES.low + JOINT_RANGES.high) / 2
+        self._data.qpos[:6] = middle
+        self._data.qpos[6] = -(middle[1] + middle[2] + middle[4])  # undoes the rod's pitch: the line hangs plumb
+        self._data.act[:6] = self._data.ctrl[:6] = middle
+        mujoco.mj_step(self.model, self._data, nstep=1000)
+        self._data.qvel[:] = 0
+        self._data.time = 0
+        mujoco.mj_forward(self.model, self._data)
+        home = np.zeros(mujoco.mj_stateSize(self.model, _STATE))
+        mujoco.mj_getState(self.model, self._data, home, _STATE)
+        return home
+
+    def _cast(self, contexts: Array, commands: list[Array], ends: Array) -> tuple[Array, np.ndarray]:
+        """``(n, 2)`` landing points of n command sequences, the line being let out at ``ends`` (s), and who diverged."""
+        n = len(commands)
+        yaw_wind = np.zeros((n, 2))
+        yaw_wind[:, self._context_columns] = contexts
+        steps = np.array([len(c) for c in commands])
+        controls = np.zeros((n, int(steps.max()), self.model.nu))
+        for row, sequence in enumerate(commands):
+            controls[row, : len(sequence), :6] = sequence
+            controls[row, len(sequence) :, :6] = sequence[-1]
+        controls[:, :, 0] += yaw_wind[:, None, 0]
+        controls[:, :, 6] = yaw_wind[:, None, 1]
+
+        states = np.repeat(self._home[None], n, axis=0)
+        states[:, 1] += yaw_wind[:, 0]  # time comes first, then the angles: yaw is the first
+        states[:, 1 + self.model.nq + self.model.nv] += yaw_wind[:, 0]  # and the yaw servo's own state
+        floats = np.repeat(self._data.sensordata[None], n, axis=0)
+        landings, diverged = np.full((n, 2), np.nan), np.zeros(n, dtype=bool)
+        speeds = slice(1 + self.model.nq, 1 + self.model.nq + self.model.nv)
+        flying = np.arange(n)
+        for start in range(0, int(steps.max()), _CHUNK):
+            stop = min(start + _CHUNK, int(steps[flying].max()))
+            run, seen = self._rollout(states[flying], controls[flying, start:stop])
+            for k, row in enumerate(flying):
+                last = min(stop, steps[row]) - start
+                track = np.concatenate([floats[row][None], seen[k, :last]])
+                if not np.abs(run[k, :last, speeds]).max() < TOP_SPEED:  # also when it is NaN
+                    diverged[row] = True
+                elif (wet := np.flatnonzero(track[1:, 2] <= 0)).size:
+                    landings[row] = _crossing(track[wet[0]], track[wet[0] + 1])
+                elif start + last == steps[row]:
+                    landings[row] = self._let_out(track, float(ends[row]), int(steps[row]), float(yaw_wind[row, 1]))
+            states[flying], floats[flying] = run[:, -1], seen[:, -1]
+            flying = flying[np.isnan(landings[flying, 0]) & ~diverged[flying]]
+            if not flying.size:
+                break
+        return landings, diverged
+
+    def _let_out(self, track: Array, end: float, steps: int, wind: float) -> Array:
+        """Free flight from where the float is at ``end``, between the last two steps."""
+        after = steps - end / self.model.opt.timestep  # share of a step
+        position, velocity = np.split(track[-1] + after * (track[-2] - track[-1]), 2)
+        gravity = -self.model.opt.gravity[2]
+        flight = (velocity[2] + np.sqrt(velocity[2] ** 2 + 2 * gravity * max(position[2], 0.0))) / gravity
+        drift = np.array([wind / self.model.body("float").mass[0], 0.0]) * flight**2 / 2
+        return position[:2] + velocity[:2] * flight + drift
+
+    def _rollout(self, states: Array, controls: Array) -> tuple[Array, Array]:
+        threads = min(self._threads, len(states))
+        if threads not in self._pools:
+            data = [mujoco.MjData(self.model) for _ in range(threads)]
+            self._pools[threads] = (rollout.Rollout(nthread=threads if threads > 1 else 0), data)
+        pool, data = self._pools[threads]
+        return pool.rollout(self.model, data, states, controls)
+
+
+def _crossing(above: Array, below: Array) -> Array:
+    share = above[2] / (above[2] - below[2])
+    return above[:2] + share * (below[:2] - above[:2])

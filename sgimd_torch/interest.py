@@ -1,0 +1,304 @@
+"""Goal interest mapping and deciding a goal: where in C x T does competence change fastest?
+
+Sections 3.2.1 and 3.2.2 of Nguyen & Oudeyer (2014). Regions of C x T split as goals accumulate, so as to tell areas of
+different competence progress apart, eq. (3); goals are drawn where progress is high, eq. (4).
+``goals = InterestMap(contexts, outcomes, rng); goal = goals.sample(context); goals.add(context, goal, competence)``
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sgimd_torch.spaces import Array, Box, check_vector
+
+Progress = Callable[[Array], float]
+"""The competences ``(n,)`` of a window, oldest first, n >= 4 -> how much they change."""
+
+
+class Goals(Protocol):
+    """Which goal to aim at next, given what came of the earlier ones. What is invalid raises as in `InterestMap`."""
+
+    def sample(self, context: ArrayLike) -> Array:
+        """``(outcome_dim,)`` a goal in T for this ``context`` ``(context_dim,)``."""
+        ...
+
+    def add(self, context: ArrayLike, goal: ArrayLike, competence: float, strategy: str = "autonomous") -> None:
+        """Competence in [-1, 0] was measured at this goal, which ``strategy`` had chosen."""
+        ...
+
+
+def absolute_progress(competences: Array) -> float:
+    """Eq. (3): |newer half - older half| over the number of values; an odd window loses its oldest."""
+    return abs(_rise(competences))
+
+
+def signed_progress(competences: Array) -> float:
+    """Eq. (3) without its absolute value: competence that falls is of no interest."""
+    return max(0.0, _rise(competences))
+
+
+def _rise(competences: Array) -> float:
+    # Deviation: the paper's two sums share their middle term; these halves are disjoint and of equal length.
+    half = len(competences) // 2
+    newer, older = competences[-half:], competences[-2 * half : -half]
+    return float(newer.sum() - older.sum()) / (2 * half)
+
+
+def interest_of(competences: Array, *, window: int, progress: Progress) -> float:
+    """Progress over the last ``window`` of ``competences`` ``(n,)``; 0 while fewer than 4 are known."""
+    return progress(competences[-window:]) if len(competences) >= 4 else 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Region:
+    """R_i, a leaf of the tree as it stood when it was read: later goals make a new Region.
+
+    ``path`` leads from the root: "R", then "R0" below and "R1" above its cut, "R01" ... It never changes meaning.
+    ``low`` and ``high`` are its corners in C x T. In order of time: ``points`` ``(n, context_dim + outcome_dim)``,
+    ``competences`` ``(n,)``, ``strategies`` ``(n,)`` names. ``attempts`` counts the goals met here, those since
+    forgotten too, but not those a parent had forgotten before it was cut. Arrays are read-only.
+    """
+
+    path: str
+    low: Array
+    high: Array
+    context_dim: int
+    points: Array
+    competences: Array
+    strategies: NDArray[np.str_]
+    attempts: int
+    measure: Callable[[Array], float]
+
+    def __post_init__(self) -> None:
+        for name in ("low", "high", "points", "competences", "strategies"):
+            view = getattr(self, name).view()
+            view.flags.writeable = False
+            object.__setattr__(self, name, view)
+
+    @property
+    def contexts(self) -> Array:
+        """``(n, context_dim)`` in which the goals were attempted."""
+        return self.points[:, : self.context_dim]
+
+    @property
+    def goals(self) -> Array:
+        """``(n, outcome_dim)`` in order of time."""
+        return self.points[:, self.context_dim :]
+
+    def interest(self, strategy: str | None = None) -> float:
+        """Local competence progress, eq. (3); with a ``strategy``, over the goals chosen by it alone."""
+        if strategy is None:
+            return self._interest
+        return self.measure(self.competences[self.strategies == strategy])
+
+    @cached_property
+    def _interest(self) -> float:
+        return self.measure(self.competences)
+
+    def extend(self, point: Array, competence: float, strategy: str) -> Region:
+        """This region with one more goal."""
+        return replace(
+            self,
+            points=np.vstack((self.points, point)),
+            competences=np.append(self.competences, competence),
+            strategies=np.append(self.strategies, strategy),
+            attempts=self.attempts + 1,
+        )
+
+    def keep(self, rows: NDArray[np.bool_] | slice) -> Region:
+        """This region with some of its goals, in their order."""
+        points, competences, strategies = self.points[rows], self.competences[rows], self.strategies[rows]
+        return replace(self, points=points, competences=competences, strategies=strategies)
+
+    def split(self, axis: int, cut: float) -> tuple[Region, Region]:
+        """The halves below and above a cut; goals on the cut belong above."""
+        is_below = self.points[:, axis] < cut
+        low, high = self.low.copy(), self.high.copy()
+        low[axis] = high[axis] = cut
+        below = replace(self.keep(is_below), path=f"{self.path}0", high=high, attempts=int(is_below.sum()))
+        above = replace(self.keep(~is_below), path=f"{self.path}1", low=low, attempts=int((~is_below).sum()))
+        return below, above
+
+
+class InterestMap:
+    """The interest map over C x T, a tree of regions, and the choice of goals from it.
+
+    Args:
+        contexts: C; ``dim`` 0 when there is only one context.
+        outcomes: T.
+        rng: the only source of draws; reading ``regions`` draws nothing.
+        g_max: a region that holds more goals than this is cut in two.
+        window: the paper's zeta, how many recent competences eq. (3) looks at; even, at least 4, at most ``g_max``.
+        modes: probabilities of a goal (1) in a region of high interest, (2) anywhere, (3) near a region's worst goal.
+        cuts: candidate cuts for each dimension, at equal counts of goals.
+        near: mode 3 stays this close to the worst goal, as a part of the region's sides.
+        min_side: the least side of a new region as a part of its *parent's*: an absolute bound would stop the zoom into
+            a task space 100 times larger than what can be reached.
+        max_aspect: a side this many times shorter than another that can be cut, both as parts of C x T, is cut no
+            further; inf, the paper's rule, may end in slivers when goals crowd in a small part of a large space.
+        progress: what counts as progress: `absolute_progress`, eq. (3), or `signed_progress`, or yours.
+
+    Raises:
+        ValueError: a number out of its range.
+    """
+
+    def __init__(
+        self,
+        contexts: Box,
+        outcomes: Box,
+        rng: np.random.Generator,
+        *,
+        g_max: int = 50,
+        window: int = 24,
+        modes: tuple[float, float, float] = (0.7, 0.2, 0.1),
+        cuts: int = 20,
+        near: float = 0.05,
+        min_side: float = 1 / 15,
+        max_aspect: float = np.inf,
+        progress: Progress = absolute_progress,
+    ) -> None:
+        if window % 2 or not 4 <= window <= g_max:
+            raise ValueError(f"window must be even, from 4 to g_max={g_max}, got {window}")
+        if min(modes) < 0 or not np.isclose(sum(modes), 1):
+            raise ValueError(f"modes must be three probabilities that sum to 1, got {modes}")
+        if cuts < 1 or not 0 < near <= 1 or not 0 < min_side <= 0.5 or not max_aspect >= 1:
+            wanted = "cuts >= 1, near in (0, 1], min_side in (0, .5], max_aspect >= 1"
+            raise ValueError(f"needs {wanted}, got {cuts}, {near}, {min_side}, {max_aspect}")
+        self.contexts, self.outcomes = contexts, outcomes
+        self.box = Box(np.concatenate((contexts.low, outcomes.low)), np.concatenate((contexts.high, outcomes.high)))
+        self.g_max, self.modes, self.cuts, self.near = g_max, modes, cuts, near
+        self.min_side, self.max_aspect = min_side, max_aspect
+        self._rng = rng
+        measure = partial(interest_of, window=window, progress=progress)
+        nothing = np.empty((0, self.box.dim)), np.empty(0), np.empty(0, dtype=np.str_)
+        self._plant([Region("R", self.box.low, self.box.high, contexts.dim, *nothing, 0, measure)])
+
+    @property
+    def regions(self) -> list[Region]:
+        """The leaves, which tile C x T, in the order of the tree: a region's halves stand where it stood."""
+        return list(self._regions)
+
+    def sample(self, context: ArrayLike) -> Array:
+        """Decide a goal, section 3.2.2: ``(outcome_dim,)`` in T.
+
+        Raises:
+            ValueError: ``context`` is not one point of C.
+        """
+        context = _one_point(self.contexts, "context", context)
+        mode = 1 + self._rng.choice(3, p=self.modes)
+        if mode == 2:
+            return self.outcomes.sample(self._rng)
+        region = self._choose(context)
+        low, high = region.low[self.contexts.dim :], region.high[self.contexts.dim :]
+        if mode == 1 or len(region.goals) == 0:
+            return self._rng.uniform(low, high)
+        # Ties are common, competence being -1 wherever nothing came near: the first would be tried again and again.
+        worst = self._rng.choice(np.flatnonzero(region.competences == region.competences.min()))
+        step = self.near * (high - low)
+        return Box(low, high).clip(region.goals[worst] + self._rng.uniform(-step, step))
+
+    def add(self, context: ArrayLike, goal: ArrayLike, competence: float, strategy: str = "autonomous") -> None:
+        """Goal interest mapping, section 3.2.1: competence was measured at a goal, attempted or emulated.
+
+        Raises:
+            ValueError: ``context`` is not one point of C, ``competence`` not in [-1, 0], or ``goal`` not one point of
+                T: a demonstrated outcome may lie outside, so ask ``outcomes.contains`` first.
+        """
+        point = _one_attempt(self.contexts, self.outcomes, context, goal, competence)
+        index = int(self._around(point).argmax())
+        region = self._regions[index].extend(point, competence, strategy)
+        self._regions[index] = region
+        if len(region.goals) <= self.g_max:
+            return
+        cut = self._best_cut(region)
+        if cut is None:
+            self._regions[index] = region.keep(slice(len(region.goals) // 4, None))
+        else:
+            self._plant([*self._regions[:index], *region.split(*cut), *self._regions[index + 1 :]])
+
+    def _plant(self, regions: list[Region]) -> None:
+        self._regions = regions
+        self._lows = np.stack([region.low for region in regions])
+        self._highs = np.stack([region.high for region in regions])
+        # Regions are half open, [low, high), but closed at the border of C x T: each point is in exactly one.
+        self._ends = np.where(self._highs == self.box.high, np.inf, self._highs)
+
+    def _around(self, point: Array) -> NDArray[np.bool_]:
+        """Which regions contain a point, given by its first coordinates: a context, or a context and a goal."""
+        dim = len(point)
+        inside = (self._lows[:, :dim] <= point) & (point < self._ends[:, :dim])  # (n_regions, dim)
+        is_around: NDArray[np.bool_] = np.all(inside, axis=1)
+        return is_around
+
+    def _choose(self, context: Array) -> Region:
+        """A region with the probability of eq. (4), among those that contain the context."""
+        here = np.flatnonzero(self._around(context))
+        interests = np.array([self._regions[index].interest() for index in here])
+        weights = interests - interests.min()  # eq. (4)
+        if not weights.any():  # no region stands out: their shares of T, which makes goals uniform
+            sides = (self._highs - self._lows)[here, self.contexts.dim :]
+            weights = (sides / self.outcomes.sides).prod(axis=1)
+        return self._regions[int(self._rng.choice(here, p=weights / weights.sum()))]
+
+    def _best_cut(self, region: Region) -> tuple[int, float] | None:
+        """(axis, cut) that tells interests apart best, n1 * n2 * |interest1 - interest2|; None when no cut is valid."""
+        n, side = len(region.points), region.high - region.low
+        cuts = np.quantile(region.points, np.arange(1, self.cuts + 1) / (self.cuts + 1), axis=0)  # (cuts, dim)
+        is_below = region.points[:, None] < cuts  # (n, cuts, dim)
+        n_below = is_below.sum(axis=0)
+        few = np.minimum(n_below, n - n_below) < self.g_max / 20
+        thin = np.minimum(cuts - region.low, region.high - cuts) < self.min_side * side
+        valid, shares = ~few & ~thin, side / self.box.sides
+        valid &= shares * self.max_aspect >= shares.max(where=valid.any(axis=0), initial=0.0)
+
+        def score(candidate: tuple[int, int]) -> tuple[float, float, int]:
+            below = is_below[:, candidate[0], candidate[1]]
+            balance = int(n_below[candidate]) * (n - int(n_below[candidate]))
+            difference = abs(region.measure(region.competences[below]) - region.measure(region.competences[~below]))
+            # When no cut tells interests apart (all competences -1, say), the region is halved across its longest side
+            # rather than kept: progress that starts in a small part of a large space shows up in a small region only.
+            return balance * difference, float(shares[candidate[1]]), balance
+
+        candidates = [(int(row), int(axis)) for row, axis in np.argwhere(valid)]
+        if not candidates:
+            return None
+        row, axis = max(candidates, key=score)
+        return axis, float(cuts[row, axis])
+
+
+class UniformGoals:
+    """Goals anywhere in T, whatever was learnt: takes `InterestMap`'s place to show what interest is worth."""
+
+    def __init__(self, contexts: Box, outcomes: Box, rng: np.random.Generator) -> None:
+        self.contexts, self.outcomes, self._rng = contexts, outcomes, rng
+
+    def sample(self, context: ArrayLike) -> Array:
+        """``(outcome_dim,)`` uniform in T."""
+        _one_point(self.contexts, "context", context)
+        return self.outcomes.sample(self._rng)
+
+    def add(self, context: ArrayLike, goal: ArrayLike, competence: float, strategy: str = "autonomous") -> None:
+        """Checked like `InterestMap.add`, then forgotten."""
+        _one_attempt(self.contexts, self.outcomes, context, goal, competence)
+
+
+def _one_point(box: Box, name: str, value: ArrayLike, hint: str = "was a goal passed instead?") -> Array:
+    point = check_vector(name, value, box.dim, hint)
+    if point.ndim != 1 or not box.contains(point):
+        raise ValueError(f"{name} must be one point of [{box.low}, {box.high}], got {point}; {hint}")
+    return point
+
+
+def _one_attempt(contexts: Box, outcomes: Box, context: ArrayLike, goal: ArrayLike, competence: float) -> Array:
+    """The point (context, goal) of C x T."""
+    point = _one_point(contexts, "context", context)
+    goal = _one_point(outcomes, "goal", goal, "ask outcomes.contains before a demonstrated outcome becomes a goal")
+    if not -1 <= competence <= 0:  # NaN too
+        raise ValueError(f"competence must lie in [-1, 0], got {competence}; was a distance passed instead?")
+    return np.concatenate((point, goal))

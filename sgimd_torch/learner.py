@@ -1,0 +1,133 @@
+"""The learner: whose turn is it, the learner's own curiosity or the answer to its teacher?
+
+Algorithm 1 of Nguyen & Oudeyer (2014), rebuilt. All five learners of the paper are this class with two slots, an autonomous
+and a social strategy. The caller owns the loop: ``move = learner.ask(context)``, execute it, ``learner.tell(outcome)``;
+``learner.watch(demonstration)`` whenever the teacher shows something.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sgimd_torch.memory import Memory
+from sgimd_torch.spaces import Array, Attempt, Demonstration, Move, check_vector
+from sgimd_torch.strategies import SocialStrategy, Strategy
+
+
+class Learner:
+    """Alternates between its own exploration and what a teacher shows.
+
+    Args:
+        memory: keeps every exemplar that is told.
+        autonomous: what to do on its own.
+        social: how to answer a demonstration; None for a learner that cannot be taught.
+        correspondence: (times, trajectory) -> theta_d, eq. (6); needed with ``social``.
+
+    Raises:
+        ValueError: ``social`` without ``correspondence``.
+    """
+
+    def __init__(
+        self,
+        memory: Memory,
+        autonomous: Strategy,
+        *,
+        social: SocialStrategy | None = None,
+        correspondence: Callable[[Array, Array], Array] | None = None,
+    ) -> None:
+        if social is not None and correspondence is None:
+            raise ValueError("a social strategy needs a correspondence, which translates trajectories into theta")
+        self.memory = memory
+        self.autonomous = autonomous
+        self.social = social
+        self.correspondence = correspondence
+        self._attempt: Attempt | None = None
+        self._context: Array = np.zeros(0)
+        self._move: Move | None = None  # the next movement of the attempt, not yet told
+        self._asked = False
+
+    @property
+    def idle(self) -> bool:
+        """Nothing is under way: the next ``ask`` begins something new, and may do so in a new context."""
+        return self._attempt is None
+
+    def ask(self, context: ArrayLike) -> Move | None:
+        """The next movement, or None to stay still for this one (then there is nothing to tell).
+
+        Args:
+            context: ``(context_dim,)`` in which it will be executed. What is under way goes on in the context in which
+                it began; ``idle`` says when a new one can come.
+
+        Raises:
+            RuntimeError: the last movement's outcome has not been told, or the context changed while not ``idle``.
+            ValueError: a context of another shape, or not finite.
+        """
+        context = check_vector("context", context, self.memory.contexts.shape[1])
+        if self._asked:
+            raise RuntimeError("ask() again needs the outcome of the last movement; was tell() forgotten?")
+        if self._attempt is None:
+            self._begin(self.autonomous.attempt(context), context)
+            if self._attempt is None:
+                raise RuntimeError(f"{type(self.autonomous).__name__}.attempt() has to yield at least once")
+        elif not np.array_equal(context, self._context):
+            raise RuntimeError(f"the attempt under way began in context {self._context}, got {context}; see idle")
+        if self._move is None:
+            self.interrupt()
+            return None
+        self._asked = True
+        return self._move
+
+    def tell(self, outcome: ArrayLike) -> None:
+        """What the movement that was asked for led to; it enters memory.
+
+        Args:
+            outcome: ``(outcome_dim,)``.
+
+        Raises:
+            RuntimeError: no movement was asked for.
+            ValueError: an outcome of another shape, or not finite; nothing is remembered and the learner still waits.
+        """
+        if not self._asked or self._attempt is None or self._move is None:
+            raise RuntimeError("tell() needs the outcome of a movement, but ask() has not proposed one")
+        hint = f"theta was {self._move.theta.tolist()}"
+        outcome = check_vector("outcome", outcome, self.memory.outcomes.shape[1], hint)
+        self.memory.add(self._context, self._move.theta, outcome)
+        self._asked = False
+        try:
+            self._move = self._attempt.send(outcome)
+        except StopIteration:
+            self._attempt = self._move = None
+
+    def watch(self, demonstration: Demonstration) -> None:
+        """See a demonstration: what is under way ends here, and the social strategy answers from the next ``ask`` on.
+
+        Raises:
+            RuntimeError: this learner has no social strategy, or the last movement's outcome has not been told.
+            ValueError: a demonstration that does not fit the spaces or the correspondence.
+        """
+        if self.social is None or self.correspondence is None:
+            raise RuntimeError("this learner has no social strategy, so there is nothing to teach it")
+        if self._asked:
+            raise RuntimeError("watch() needs the outcome of the last movement first; was tell() forgotten?")
+        context = check_vector("context of the demonstration", demonstration.context, self.memory.contexts.shape[1])
+        check_vector("outcome of the demonstration", demonstration.outcome, self.memory.outcomes.shape[1])
+        theta_d = self.correspondence(demonstration.times, demonstration.trajectory)
+        self.interrupt()
+        self._begin(self.social.attempt(context, theta_d, demonstration), context)
+
+    def interrupt(self) -> None:
+        """End what is under way; what was learnt until here counts. An outcome not yet told is no longer waited for."""
+        if self._attempt is not None:
+            self._attempt.close()
+        self._attempt = self._move = None
+        self._asked = False
+
+    def _begin(self, attempt: Attempt, context: Array) -> None:
+        self._context = context
+        try:
+            self._attempt, self._move = attempt, next(attempt)
+        except StopIteration:
+            self._attempt = self._move = None

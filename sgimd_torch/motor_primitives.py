@@ -1,0 +1,129 @@
+"""Motor primitives and the correspondence problem: theta to joint trajectories, and back.
+
+Section 4.1 of Nguyen & Oudeyer (2014). Each joint has four knots, its positions at 0, delta/3, 2 delta/3 and delta; a
+trajectory is their Gaussian distance weighting (eq. 5). A demonstrated trajectory is translated to the theta that
+reproduces it closest (eq. 6).     times, trajectory = primitive.trajectory(theta)
+                                   theta_d = primitive.correspondence(times_d, trajectory_d)
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sgimd_torch.spaces import Array, Box, check_vector
+
+
+class GaussianPrimitive:
+    """Joint trajectories by Gaussian distance weighting of knots, eq. (5).
+
+    theta in [0, 1]^(n_joints * n_knots + 1) holds the knots joint by joint, scaled to the joint ranges, then the duration.
+
+    Args:
+        joints: ``(n_joints,)`` box of joint ranges (rad).
+        durations: shortest and longest duration delta (s), above 0.
+        n_knots: knots per joint, 4 in the paper.
+        sharpness: s in sigma = s / delta^2. Below 5 the fit is ill-conditioned, above 12 movements are jerky.
+
+    Raises:
+        ValueError: durations that are not 0 < shortest < longest, fewer than two knots, or sharpness not above 0.
+    """
+
+    def __init__(self, joints: Box, durations: tuple[float, float], *, n_knots: int = 4, sharpness: float = 9.0) -> None:
+        if not 0 < durations[0] < durations[1]:
+            raise ValueError(f"durations must be 0 < shortest < longest in seconds, got {durations}")
+        if n_knots < 2 or not sharpness > 0:
+            raise ValueError(f"need n_knots >= 2 and sharpness > 0, got {n_knots} and {sharpness}")
+        self.joints = joints
+        self.durations = durations
+        self.n_knots = n_knots
+        self.sharpness = sharpness
+        self.policies = Box.cube(0.0, 1.0, joints.dim * n_knots + 1)
+
+    def duration(self, theta: Array) -> float:
+        """delta (s) of one ``(theta_dim,)`` theta."""
+        shortest, longest = self.durations
+        return shortest + float(theta[-1]) * (longest - shortest)
+
+    def at(self, theta: Array, times: Array) -> Array:
+        """``(n_times, n_joints)`` joint angles (rad) at ``times`` (s); after delta the last posture is held."""
+        phases = np.minimum(times / self.duration(theta), 1.0)
+        return self._weights(phases) @ self._knots(theta).T
+
+    def trajectory(self, theta: ArrayLike, rate: float = 50.0) -> tuple[Array, Array]:
+        """The whole movement as a recording: ``(n_times,)`` s from 0 to delta, and ``(n_times, n_joints)`` rad.
+
+        Args:
+            theta: ``(theta_dim,)`` in [0, 1].
+            rate: samples a second, at least; the last sample falls on delta.
+
+        Raises:
+            ValueError: theta has another shape or leaves the box.
+        """
+        theta = self.policies.check("theta", theta, "was a goal passed instead?")
+        duration = self.duration(theta)
+        times = np.linspace(0.0, duration, max(2, int(np.ceil(duration * rate)) + 1))
+        return times, self.at(theta, times)
+
+    def correspondence(self, times: ArrayLike, trajectory: ArrayLike) -> Array:
+        """theta_d, the policy that reproduces a demonstrated trajectory closest, eq. (6).
+
+        The demonstration's own duration is delta; one shorter or longer than ``durations`` is fitted in its shape and
+        played at the nearest pace allowed. For a fixed delta eq. (5) is linear in the knots, so each joint is one bounded
+        linear least squares (trust-region reflective, the paper's algorithm), exact up to its tolerance.
+
+        Args:
+            times: ``(n_times,)`` s, increasing, at least ``n_knots`` of them.
+            trajectory: ``(n_times, n_joints)`` rad.
+
+        Returns:
+            ``(theta_dim,)`` in [0, 1].
+
+        Raises:
+            ValueError: shapes that do not fit, too few samples, values that are not finite, or unsorted times.
+        """
+        from scipy.optimize import lsq_linear  # takes longer to import than this whole library
+
+        times, trajectory = self._check_recording(times, trajectory)
+        span = times[-1] - times[0]
+        weights = self._weights((times - times[0]) / span)
+        low, sides = self.joints.low, self.joints.sides
+        scaled = (trajectory - low) / sides
+        # Free least squares first: exact where the knots stay inside, which lsq_linear only approaches.
+        knots = np.linalg.lstsq(weights, scaled, rcond=None)[0]
+        for joint in np.flatnonzero(((knots < 0) | (knots > 1)).any(axis=0)):
+            knots[:, joint] = lsq_linear(weights, scaled[:, joint], bounds=(0.0, 1.0), method="trf", tol=1e-12).x
+        shortest, longest = self.durations
+        pace = (np.clip(span, shortest, longest) - shortest) / (longest - shortest)
+        return self.policies.clip(np.append(knots.T.ravel(), pace))
+
+    def residual(self, theta: ArrayLike, times: ArrayLike, trajectory: ArrayLike) -> float:
+        """What of a demonstration theta does not reproduce: d of eq. (6) as root mean square over samples and joints (rad).
+
+        Raises:
+            ValueError: as ``correspondence``.
+        """
+        theta = self.policies.check("theta", theta)
+        times, trajectory = self._check_recording(times, trajectory)
+        phases = (times - times[0]) / (times[-1] - times[0])
+        return float(np.sqrt(np.mean((self._weights(phases) @ self._knots(theta).T - trajectory) ** 2)))
+
+    def _knots(self, theta: Array) -> Array:
+        knots = theta[:-1].reshape(self.joints.dim, self.n_knots)
+        return self.joints.low[:, None] + knots * self.joints.sides[:, None]
+
+    def _weights(self, phases: Array) -> Array:
+        # Deviation: the paper prints exp(+sigma |.|^2) and five terms; the sign and i = 0..3 are ours. With
+        # sigma = s / delta^2 the weights depend on the phase t / delta alone.
+        centres = np.arange(self.n_knots) / (self.n_knots - 1)
+        weights = np.exp(-self.sharpness * (phases[:, None] - centres) ** 2)  # eq. (5)
+        return weights / weights.sum(axis=1, keepdims=True)
+
+    def _check_recording(self, times: ArrayLike, trajectory: ArrayLike) -> tuple[Array, Array]:
+        trajectory = check_vector("trajectory", trajectory, self.joints.dim, "one column for each joint, in rad")
+        if trajectory.ndim != 2 or len(trajectory) < self.n_knots:
+            raise ValueError(f"trajectory needs {self.n_knots} samples or more in rows, got shape {trajectory.shape}")
+        times = check_vector("times", times, len(trajectory), "one time in s for each row of the trajectory")
+        if times.ndim != 1 or not (np.diff(times) > 0).all():
+            raise ValueError(f"times must increase from sample to sample, got {times}; were the rows shuffled?")
+        return times, trajectory

@@ -1,0 +1,238 @@
+"""Searches: given a first guess, which movement to try next so that the outcome comes nearer the goal?
+
+Section 4.4.2 of Nguyen & Oudeyer (2014), local optimisation: Nelder & Mead's simplex (Lagarias et al. 1998), and the
+field's simplest alternative. A search is a generator, so it can be paused, counted and interrupted at any movement:
+    search = nelder_mead(policies)(estimate, goal); theta = next(search); theta = search.send(outcome) ...
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator
+from typing import TypeVar
+
+import numpy as np
+
+from sgimd_torch.spaces import Array, Box, Estimate, Search
+
+Movement = TypeVar("Movement")
+
+
+def nelder_mead(
+    policies: Box,
+    rng: np.random.Generator | None = None,
+    *,
+    step: float = 0.05,
+    complete: bool = True,
+    adaptive: bool = False,
+    xatol: float = 1e-4,
+    fatol: float = 1e-4,
+) -> Search:
+    """Downhill simplex on the distance to the goal, around theta_g and its neighbours.
+
+    It executes theta_g first. The neighbours are vertices with the outcomes they already have: remembering costs no
+    movement. Those that lie on a line, plane ... through better vertices are left out, as a flat simplex cannot turn.
+
+    Args:
+        policies: Pi; nothing outside is proposed.
+        rng: not needed, as nothing is drawn; taken so that every search is built alike.
+        step: length of the coordinate steps that stand in for missing neighbours, in sides of ``policies``.
+        complete: fill the simplex up to theta_dim + 1 vertices, the paper's 26, at one movement each. False: only up to
+            outcome_dim + 1, so that with some neighbours the first reflection is the second movement. The search then
+            stays in the flat through its vertices, where, theta being redundant, the goal usually can be met as well.
+        adaptive: Gao & Han's coefficients (2012), gentler in high dimensions.
+        xatol, fatol: it ends when all vertices are this near the best, in theta and in metres from the goal.
+
+    Raises:
+        ValueError: ``step`` is not in (0, 0.5].
+    """
+    if not 0 < step <= 0.5:
+        raise ValueError(f"step must lie in (0, 0.5], got {step}; it is a fraction of the sides of Pi")
+
+    def search(start: Estimate, goal: Array) -> Generator[Array, Array, None]:
+        theta = policies.check("theta of the estimate", start.theta)
+        vertices = [theta]
+        values = [math.dist(goal, (yield theta))]
+        flat = _Flat(theta, xatol)
+        distances = np.linalg.norm(start.outcomes - goal, axis=1)
+        for k in distances.argsort(kind="stable"):
+            if flat.lacks(start.thetas[k]):
+                flat.widen(start.thetas[k])
+                vertices.append(policies.check("a theta of the estimate", start.thetas[k]))
+                values.append(float(distances[k]))
+        n_vertices = 1 + (policies.dim if complete else min(policies.dim, len(goal)))
+        while len(vertices) < n_vertices:
+            vertex = _step_inwards(policies, theta, flat.farthest_axis(), step)
+            flat.widen(vertex)
+            vertices.append(vertex)
+            values.append(math.dist(goal, (yield vertex)))
+        simplex = np.array(vertices), np.array(values)
+        yield from _towards(goal, simplex_descent(*simplex, box=policies, adaptive=adaptive, xatol=xatol, fatol=fatol))
+
+    return search
+
+
+def perturb(policies: Box, rng: np.random.Generator, *, sd: float = 0.05) -> Search:
+    """Gaussian noise around the best theta so far, remembered or executed here, clipped to ``policies``; never ends.
+
+    It executes theta_g first where that is new: a copy of a remembered theta has its outcome already.
+
+    Args:
+        sd: of the noise, in sides of ``policies``.
+
+    Raises:
+        ValueError: ``sd`` is not positive.
+    """
+    if not sd > 0:
+        raise ValueError(f"sd must be positive, got {sd}; without noise nothing new is tried")
+
+    def vary(theta: Array) -> Array:
+        return policies.clip(rng.normal(theta, sd * policies.sides))
+
+    def search(start: Estimate, goal: Array) -> Generator[Array, Array, None]:
+        distances = np.linalg.norm(start.outcomes - goal, axis=1)
+        best, shortest = start.thetas[distances.argmin()], float(distances.min())
+        remembered = (start.thetas == start.theta).all(axis=1).any()
+        theta = vary(best) if remembered else policies.check("theta of the estimate", start.theta)
+        while True:
+            distance = math.dist(goal, (yield theta))
+            if distance < shortest:
+                best, shortest = theta, distance
+            theta = vary(best)
+
+    return search
+
+
+def limit(attempt: Generator[Movement, Array, None], n: int) -> Generator[Movement, Array, None]:
+    """The first ``n`` movements of ``attempt``, which is then closed; closing this one closes it, too.
+
+    All ``n`` outcomes reach ``attempt``; whatever it proposes after the last is dropped.
+
+    Raises:
+        ValueError: ``n`` is negative.
+    """
+    if n < 0:
+        raise ValueError(f"n must be >= 0 movements, got {n}")
+    return _first(attempt, n)
+
+
+def simplex_descent(
+    vertices: Array,
+    values: Array,
+    *,
+    box: Box | None = None,
+    adaptive: bool = False,
+    xatol: float = 1e-4,
+    fatol: float = 1e-4,
+) -> Generator[Array, float, None]:
+    """Nelder & Mead's method from a simplex with known values: yields points, is sent their values.
+
+    It visits the points that ``scipy.optimize.minimize(method="Nelder-Mead")`` visits after its first simplex, bit for
+    bit (among equal values the newest ranks last, as Lagarias et al. ask; scipy leaves that to its unstable sort).
+
+    Args:
+        vertices: ``(n + 1, dim)``. With n < dim the search stays in the n-dimensional flat through them, but for
+            clipping.
+        values: ``(n + 1,)``.
+        box: points are clipped to it. A simplex whose vertices all lie on one face cannot leave it.
+        adaptive: coefficients that depend on n.
+        xatol, fatol: it ends when all vertices are this near the best, in every coordinate and in value.
+    """
+    if len(vertices) < 2 or len(values) != len(vertices):
+        raise ValueError(f"a simplex needs two vertices or more, a value each, got {len(vertices)} and {len(values)}")
+    order = values.argsort(kind="stable")
+    vertices, values = vertices[order], values[order]
+    n = len(vertices) - 1
+    expansion, contraction, shrinkage = (1 + 2 / n, 0.75 - 1 / (2 * n), 1 - 1 / n) if adaptive else (2.0, 0.5, 0.5)
+
+    def beyond(centre: Array, distance: float) -> Array:
+        """On the line from the worst vertex through the ``centre`` of the others; -1 is the worst, 0 the centre."""
+        point = (1 + distance) * centre - distance * vertices[-1]
+        return point if box is None else box.clip(point)
+
+    while np.abs(vertices[1:] - vertices[0]).max() > xatol or np.abs(values[0] - values[1:]).max() > fatol:
+        centre = np.add.reduce(vertices[:-1], axis=0) / n
+        reflected = beyond(centre, 1)
+        value = yield reflected
+        better: tuple[Array, float] | None = None
+        if value < values[0]:
+            expanded = beyond(centre, expansion)
+            value_expanded = yield expanded
+            better = (expanded, value_expanded) if value_expanded < value else (reflected, value)
+        elif value < values[-2]:
+            better = reflected, value
+        else:
+            outside = value < values[-1]
+            contracted = beyond(centre, contraction if outside else -contraction)
+            value_contracted = yield contracted
+            if value_contracted <= value if outside else value_contracted < values[-1]:
+                better = contracted, value_contracted
+        if better is not None:
+            vertices[-1], values[-1] = better
+        else:
+            for j in range(1, n + 1):
+                shrunk = vertices[0] + shrinkage * (vertices[j] - vertices[0])
+                vertices[j] = shrunk if box is None else box.clip(shrunk)
+                values[j] = yield vertices[j]
+        order = values.argsort(kind="stable")
+        vertices, values = vertices[order], values[order]
+
+
+class _Flat:
+    """The affine hull of a simplex under construction: which points or axes lead out of it?"""
+
+    _SINE = 0.1  # a vertex less steep above the flat than 6 degrees makes a simplex that hardly turns
+
+    def __init__(self, origin: Array, shortest: float) -> None:
+        self._origin = origin
+        self._shortest = shortest
+        self._basis = np.empty((0, len(origin)))  # orthonormal rows
+
+    def lacks(self, point: Array) -> bool:
+        """Whether ``point`` lies clearly outside, and so may become a vertex."""
+        edge = point - self._origin
+        outside, length = np.linalg.norm(self._across(edge)), np.linalg.norm(edge)
+        return bool(outside > self._shortest and outside > self._SINE * length)
+
+    def widen(self, point: Array) -> None:
+        """Make ``point`` a vertex."""
+        across = self._across(point - self._origin)
+        self._basis = np.vstack((self._basis, across / np.linalg.norm(across)))
+
+    def farthest_axis(self) -> int:
+        """The coordinate axis that leads out most steeply, the first of equals."""
+        return int(np.linalg.norm(self._across(np.eye(len(self._origin))), axis=1).round(9).argmax())
+
+    def _across(self, edges: Array) -> Array:
+        return edges - edges @ self._basis.T @ self._basis
+
+
+def _step_inwards(policies: Box, theta: Array, axis: int, step: float) -> Array:
+    """``theta`` moved along ``axis``: down where up would leave the box, since clipping would flatten the simplex."""
+    length = step * policies.sides[axis]
+    vertex = theta.copy()
+    vertex[axis] += length if theta[axis] + length <= policies.high[axis] else -length
+    return vertex
+
+
+def _towards(goal: Array, descent: Generator[Array, float, None]) -> Generator[Array, Array, None]:
+    """``descent`` sent the distances to ``goal`` of the outcomes that this one is sent."""
+    try:
+        theta = next(descent)
+        while True:
+            theta = descent.send(math.dist(goal, (yield theta)))
+    except StopIteration:
+        return
+
+
+def _first(attempt: Generator[Movement, Array, None], n: int) -> Generator[Movement, Array, None]:
+    try:
+        if n:
+            movement = next(attempt)
+            for _ in range(n - 1):
+                movement = attempt.send((yield movement))
+            attempt.send((yield movement))
+    except StopIteration:
+        return
+    finally:
+        attempt.close()

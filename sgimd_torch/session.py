@@ -1,0 +1,103 @@
+"""A learner's life in an environment, movement by movement; live, or replayed from what was recorded.
+
+The main loop of algorithm 1 of Nguyen & Oudeyer (2014).
+    for episode in run(learner, environment, seed, movements=5000, teacher=teacher): ...
+Movement i draws its noise from a stream of its own, so it meets the same noise whatever came before it, and a replayed
+movement need not be executed to leave the next one's noise as it was.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from sgimd_torch.environment import Environment
+from sgimd_torch.learner import Learner
+from sgimd_torch.spaces import Array, Episode, stream
+from sgimd_torch.teachers import Teacher
+
+Execute = Callable[[int, Array, Array], Array]
+"""(index, context, theta) -> outcome of movement ``index``."""
+
+
+class Recorded(NamedTuple):
+    """A movement that was executed once: ``theta`` and ``outcome``, both None if the learner rested."""
+
+    theta: Array | None
+    outcome: Array | None
+
+
+class ReplayError(RuntimeError):
+    """The learner does not do again what was recorded: another library version, processor or configuration."""
+
+
+def run(
+    learner: Learner,
+    environment: Environment,
+    seed: int,
+    *,
+    movements: int,
+    teacher: Teacher | None = None,
+    execute: Execute | None = None,
+) -> Iterator[Episode]:
+    """Let ``learner`` live for ``movements`` movements, those at rest counted.
+
+    A context is observed when the learner begins something new and holds until it ends; a demonstration brings its own.
+
+    Args:
+        learner: asked, told and shown; stop iterating at any time and it stays usable.
+        environment: observed and executed.
+        seed: of the environment's streams.
+        movements: in all.
+        teacher: asked before every movement whether it demonstrates.
+        execute: stands in for the environment, see ``live`` and ``replay``.
+
+    Yields:
+        Every episode, once the learner has been told its outcome.
+    """
+    execute = live(environment, seed) if execute is None else execute
+    context = np.zeros(environment.contexts.dim)
+    for index in range(movements):
+        demonstration = teacher.offer(index, learner.memory) if teacher is not None else None
+        if demonstration is not None:
+            learner.watch(demonstration)
+            context = demonstration.context
+        elif learner.idle:
+            context = environment.observe(stream(seed, "context", index))
+        move, outcome = learner.ask(context), None
+        if move is not None:
+            outcome = execute(index, context, move.theta)
+            learner.tell(outcome)
+        yield Episode(index, context, move, outcome, demonstration)
+
+
+def live(environment: Environment, seed: int) -> Execute:
+    """Execute in ``environment``, movement i with the noise of stream i."""
+
+    def execute(index: int, context: Array, theta: Array) -> Array:
+        return environment.execute(context, theta, stream(seed, "environment", index))
+
+    return execute
+
+
+def replay(recorded: Sequence[Recorded], then: Execute) -> Execute:
+    """Give the outcomes that were ``recorded``, without executing; after them, ``then``.
+
+    Raises (when called):
+        ReplayError: the learner proposes another theta than the recorded one.
+    """
+
+    def execute(index: int, context: Array, theta: Array) -> Array:
+        if index >= len(recorded):
+            return then(index, context, theta)
+        record = recorded[index]
+        if record.theta is None or record.outcome is None or not np.array_equal(record.theta, theta):
+            raise ReplayError(
+                f"movement {index} was recorded with theta {record.theta}, the learner now proposes {theta}; "
+                "was it recorded by another version, on another processor or with another configuration?"
+            )
+        return record.outcome
+
+    return execute

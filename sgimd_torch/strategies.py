@@ -1,0 +1,230 @@
+"""Policy space exploration: what the robot does next, for itself or after its teacher.
+
+Sections 3.1, 4.2 and 4.4 of Nguyen & Oudeyer (2014). A strategy is a generator: it yields a movement and is sent the
+outcome, so each reads like the paper's pseudo-code, and a demonstration can interrupt any of them at any movement.
+    autonomous: Babble, Rest, GoalBabbling          social: Imitate, Emulate, Remember
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+
+from sgimd_torch.competence import Competence
+from sgimd_torch.interest import Goals
+from sgimd_torch.memory import Memory
+from sgimd_torch.spaces import Array, Attempt, Box, Demonstration, Estimate, Move, Search
+
+Judge = Callable[[Array, Array, Array], float]
+"""(context, goal, outcomes of the attempt) -> the competence to remember for the goal, in [-1, 0]."""
+
+
+class Strategy(Protocol):
+    """What a learner does on its own, in one context until the attempt ends. It has to yield at least once."""
+
+    def attempt(self, context: Array) -> Attempt:
+        """Movements for one goal, or one movement for none."""
+        ...
+
+
+class SocialStrategy(Protocol):
+    """How a learner answers a demonstration. It may yield nothing."""
+
+    def attempt(self, context: Array, theta_d: Array, demonstration: Demonstration) -> Attempt:
+        """Movements after ``demonstration``, which corresponds to the policy ``theta_d``."""
+        ...
+
+
+class Babble:
+    """Random exploration of the policy space: one uniform theta."""
+
+    def __init__(self, policies: Box, rng: np.random.Generator) -> None:
+        self.policies = policies
+        self.rng = rng
+
+    def attempt(self, context: Array) -> Attempt:
+        """One movement."""
+        yield Move(self.policies.sample(self.rng), None, "babble")
+
+
+class Rest:
+    """Do nothing for one movement: the learner by observation, and the learner by imitation before its first lesson."""
+
+    def attempt(self, context: Array) -> Attempt:
+        """No movement."""
+        yield None
+
+
+class GoalBabbling:
+    """Goal-directed policy optimisation, section 4.4: choose a goal, then search for a movement that reaches it.
+
+    Args:
+        policies: Pi.
+        memory: read for what has been reached so far.
+        goals: where goals come from, and where the competence at them goes.
+        inverse: the local inverse model, (context, goal) -> estimate.
+        search: refines the estimate movement by movement.
+        competence: gamma, of what is remembered; decides between the regimes.
+        judge: the competence that an attempt leaves with its goal.
+        rng: draws the regimes and the movements of the global one.
+        budget: movements for one goal, at most.
+        tolerance: distance (m) at which a goal counts as reached.
+        global_range: least and greatest probability of the global exploration regime.
+    """
+
+    def __init__(
+        self,
+        policies: Box,
+        memory: Memory,
+        goals: Goals,
+        inverse: Callable[[Array, Array], Estimate],
+        search: Search,
+        competence: Competence,
+        judge: Judge,
+        rng: np.random.Generator,
+        *,
+        budget: int = 20,
+        tolerance: float = 0.02,
+        global_range: tuple[float, float] = (0.05, 0.95),
+    ) -> None:
+        if budget < 1:
+            raise ValueError(f"budget must be at least one movement for each goal, got {budget}")
+        self.policies = policies
+        self.memory = memory
+        self.goals = goals
+        self.inverse = inverse
+        self.search = search
+        self.competence = competence
+        self.judge = judge
+        self.rng = rng
+        self.budget = budget
+        self.tolerance = tolerance
+        self.global_range = global_range
+
+    def attempt(self, context: Array) -> Attempt:
+        """Choose a goal and pursue it."""
+        yield from self.pursue(context, self.goals.sample(context))
+
+    def pursue(self, context: Array, goal: Array, strategy: str = "autonomous") -> Attempt:
+        """Search until ``goal`` is reached, the budget is spent or a demonstration interrupts."""
+        outcomes: list[Array] = []
+        moves = self._explore(context, goal)
+        move = next(moves)
+        try:
+            while True:
+                outcome = yield move
+                outcomes.append(outcome)
+                if len(outcomes) == self.budget or np.linalg.norm(outcome - goal) <= self.tolerance:
+                    return
+                move = moves.send(outcome)
+        finally:  # reached, exhausted or interrupted: what was learnt counts
+            if outcomes:
+                self.goals.add(context, goal, self.judge(context, goal, np.stack(outcomes)), strategy)
+
+    def _explore(self, context: Array, goal: Array) -> Attempt:
+        """Movements without end, in the global exploration or the local optimisation regime."""
+        while True:
+            if self.rng.random() < self._global_probability(context, goal):
+                yield Move(self.policies.sample(self.rng), goal, "global")
+            else:
+                yield from self._optimise(context, goal)
+
+    def _global_probability(self, context: Array, goal: Array) -> float:
+        """The farther the goal from all that was reached, the likelier is global exploration."""
+        if len(self.memory) == 0:
+            return 1.0
+        return float(np.clip(-self.competence(context, goal), *self.global_range))
+
+    def _optimise(self, context: Array, goal: Array) -> Attempt:
+        """From the local inverse model's estimate, the search's movements, until it ends by itself."""
+        search = self.search(self.inverse(context, goal), goal)
+        theta = next(search, None)
+        while theta is not None:
+            outcome = yield Move(theta, goal, "local")
+            try:
+                theta = search.send(outcome)
+            except StopIteration:
+                return
+
+
+class Imitate:
+    """Imitate a policy, section 4.2: repeat theta_d with small variations, the first time exactly.
+
+    Args:
+        policies: Pi.
+        rng: draws the variations.
+        repeats: movements for one demonstration; None until the next one.
+        epsilon: bound of the variation in each parameter, |theta_rand| < epsilon.
+        goals, judge: where the competence at the demonstrated outcome goes afterwards, and how it is judged (emulate a
+            goal, section 3.2.3); None to imitate only. A demonstrated outcome outside T is imitated, but is no goal.
+        outcomes: T; needed with ``goals``.
+    """
+
+    def __init__(
+        self,
+        policies: Box,
+        rng: np.random.Generator,
+        *,
+        repeats: int | None = 10,
+        epsilon: float = 0.05,
+        goals: Goals | None = None,
+        judge: Judge | None = None,
+        outcomes: Box | None = None,
+    ) -> None:
+        if (goals is None) != (judge is None) or (goals is None) != (outcomes is None):
+            raise ValueError("Imitate needs goals, judge and outcomes together, or none of them")
+        self.policies = policies
+        self.rng = rng
+        self.repeats = repeats
+        self.epsilon = epsilon
+        self.goals = goals
+        self.judge = judge
+        self.outcomes = outcomes
+
+    def attempt(self, context: Array, theta_d: Array, demonstration: Demonstration) -> Attempt:
+        """theta_d, then its variations."""
+        outcomes: list[Array] = []
+        try:
+            for repeat in range(self.repeats) if self.repeats is not None else itertools.count():
+                theta = theta_d if repeat == 0 else self._vary(theta_d)
+                outcomes.append((yield Move(theta, demonstration.outcome, "imitate")))
+        finally:  # also when the next demonstration cuts in
+            self._emulate(context, demonstration.outcome, outcomes)
+
+    def _vary(self, theta_d: Array) -> Array:
+        return self.policies.clip(theta_d + self.rng.uniform(-self.epsilon, self.epsilon, theta_d.shape))
+
+    def _emulate(self, context: Array, goal: Array, outcomes: list[Array]) -> None:
+        if self.goals is None or self.judge is None or self.outcomes is None:
+            return
+        if outcomes and self.outcomes.contains(goal):
+            self.goals.add(context, goal, self.judge(context, goal, np.stack(outcomes)), "social")
+
+
+class Emulate:
+    """Take over the teacher's goal, not his movement: pursue the demonstrated outcome by one's own search."""
+
+    def __init__(self, babbling: GoalBabbling, outcomes: Box) -> None:
+        self.babbling = babbling
+        self.outcomes = outcomes
+
+    def attempt(self, context: Array, theta_d: Array, demonstration: Demonstration) -> Attempt:
+        """Movements towards the demonstrated outcome; none if it lies outside T."""
+        if self.outcomes.contains(demonstration.outcome):
+            yield from self.babbling.pursue(context, demonstration.outcome, "social")
+
+
+class Remember:
+    """Learn by observation: keep (theta_d, tau_d) as if it were one's own, and move not at all."""
+
+    def __init__(self, memory: Memory) -> None:
+        self.memory = memory
+
+    def attempt(self, context: Array, theta_d: Array, demonstration: Demonstration) -> Attempt:
+        """No movement."""
+        self.memory.add(context, theta_d, demonstration.outcome)
+        return
+        yield  # makes this a generator

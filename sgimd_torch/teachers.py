@@ -1,0 +1,150 @@
+"""Teachers: who demonstrates what, and when?
+
+Sections 2.3 and 5.3 of Nguyen & Oudeyer (2014). The paper's teacher watches what the learner has reached and, every 30
+movements, demonstrates something from a tile chosen at random among those the learner has reached least.
+    teacher = PeriodicTeacher(load_demonstrations(), stream(seed, "teacher")); teacher.offer(index, memory)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+import numpy as np
+
+from sgimd_torch.memory import Memory
+from sgimd_torch.spaces import Array, Demonstration
+
+
+class Teacher(Protocol):
+    """Offers demonstrations to a learner whose memory it can see; the paper's What, How and When in one call."""
+
+    def offer(self, index: int, memory: Memory) -> Demonstration | None:
+        """A demonstration before movement ``index`` (0, 1, ...), or None."""
+        ...
+
+
+Choose = Callable[[Sequence[Demonstration], Memory, np.random.Generator], Demonstration]
+"""Which demonstration to give, seeing what the learner has reached."""
+
+
+def at_random(demonstrations: Sequence[Demonstration], memory: Memory, rng: np.random.Generator) -> Demonstration:
+    """Any of them, alike."""
+    return demonstrations[rng.integers(len(demonstrations))]
+
+
+def least_explored(
+    demonstrations: Sequence[Demonstration], memory: Memory, rng: np.random.Generator, *, tiles: int = 10
+) -> Demonstration:
+    """One from a tile chosen at random among those, of all with demonstrations, that the learner has reached least.
+
+    Args:
+        tiles: in each dimension of the box around the demonstrated outcomes.
+    """
+    demonstrated = np.stack([demonstration.outcome for demonstration in demonstrations])
+    low = demonstrated.min(axis=0)
+    side = np.maximum(demonstrated.max(axis=0) - low, np.finfo(np.float64).tiny) / tiles
+
+    def tile_of(outcomes: Array) -> np.ndarray:
+        inside = np.clip((outcomes - low) / side, -1, tiles)  # -1: below the box; its upper border belongs to the last tile
+        cells = np.where(outcomes == low + side * tiles, tiles - 1, np.floor(inside)).astype(np.int64) + 1
+        return np.ravel_multi_index(tuple(cells.T), (tiles + 2,) * outcomes.shape[1])
+
+    ours = tile_of(demonstrated)
+    candidates = np.unique(ours)
+    reached = np.bincount(tile_of(memory.outcomes), minlength=candidates[-1] + 1)[candidates]
+    tile = rng.choice(candidates[reached == reached.min()])
+    return demonstrations[rng.choice(np.flatnonzero(ours == tile))]
+
+
+class PeriodicTeacher:
+    """Demonstrates at a fixed frequency, the paper's choice: before the movements ``every``, 2 ``every``, ..."""
+
+    def __init__(
+        self,
+        demonstrations: Sequence[Demonstration],
+        rng: np.random.Generator,
+        *,
+        every: int = 30,
+        choose: Choose = least_explored,
+    ) -> None:
+        self.demonstrations = _some(demonstrations)
+        self.rng = rng
+        self.every = _at_least_one("every", every)
+        self.choose = choose
+
+    def offer(self, index: int, memory: Memory) -> Demonstration | None:
+        """See ``Teacher``."""
+        if index == 0 or index % self.every:
+            return None
+        return self.choose(self.demonstrations, memory, self.rng)
+
+
+class InitialTeacher:
+    """Gives all its demonstrations at the start, each once, in random order, one before every ``every`` movements."""
+
+    def __init__(
+        self, demonstrations: Sequence[Demonstration], rng: np.random.Generator, *, every: int = 10
+    ) -> None:
+        self.demonstrations = _some(demonstrations)
+        self.every = _at_least_one("every", every)
+        self._order = rng.permutation(len(demonstrations))
+
+    def offer(self, index: int, memory: Memory) -> Demonstration | None:
+        """See ``Teacher``."""
+        lesson, rest = divmod(index, self.every)
+        if rest or lesson >= len(self._order):
+            return None
+        return self.demonstrations[self._order[lesson]]
+
+
+class AskedTeacher:
+    """Demonstrates when the learner's competence stalls, as if asked.
+
+    Every ``patience`` movements it looks how near the learner has come to each demonstrated outcome; if the mean
+    distance fell by less than ``threshold`` of itself since the last look, it demonstrates.
+    """
+
+    def __init__(
+        self,
+        demonstrations: Sequence[Demonstration],
+        rng: np.random.Generator,
+        *,
+        patience: int = 30,
+        threshold: float = 0.01,
+        choose: Choose = least_explored,
+    ) -> None:
+        self.demonstrations = _some(demonstrations)
+        self.rng = rng
+        self.patience = _at_least_one("patience", patience)
+        self.threshold = threshold
+        self.choose = choose
+        self._distance = np.inf
+
+    def offer(self, index: int, memory: Memory) -> Demonstration | None:
+        """See ``Teacher``."""
+        if index == 0 or index % self.patience or len(memory) == 0:
+            return None
+        before, self._distance = self._distance, self._distance_left(memory)
+        if self._distance < (1 - self.threshold) * before:
+            return None
+        return self.choose(self.demonstrations, memory, self.rng)
+
+    def _distance_left(self, memory: Memory) -> float:
+        distances = [
+            np.linalg.norm(memory.outcomes[memory.near_outcomes(d.context, d.outcome, 1)] - d.outcome)
+            for d in self.demonstrations
+        ]
+        return float(np.mean(distances))
+
+
+def _some(demonstrations: Sequence[Demonstration]) -> Sequence[Demonstration]:
+    if not demonstrations:
+        raise ValueError("a teacher needs at least one demonstration; use no teacher to learn alone")
+    return demonstrations
+
+
+def _at_least_one(name: str, movements: int) -> int:
+    if movements < 1:
+        raise ValueError(f"{name} must be at least one movement, got {movements}")
+    return movements

@@ -1,0 +1,113 @@
+"""Eqs. (7) and (2): numbers worked by hand, the paper's own scale argument, and what the two readings remember."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+
+from sgimd_torch.competence import AttemptCompetence, Competence, absolute_performance, performance
+from sgimd_torch.memory import Memory
+from sgimd_torch.spaces import Array, stream
+
+NO_CONTEXT = np.zeros(0)
+REST = np.array([0.0, 0.5])
+relative = partial(performance, rest=REST, d_min=0.01)
+
+
+def from_rest(x: float, y: float) -> Array:
+    return REST + np.array([x, y])
+
+
+def memory_of(*outcomes: tuple[float, float]) -> Memory:
+    memory = Memory(0, 1, 2)
+    for outcome in outcomes:
+        memory.add(NO_CONTEXT, np.zeros(1), np.array(outcome))
+    return memory
+
+
+@pytest.mark.parametrize(
+    ("outcome", "expected"),
+    [
+        ((3.0, 4.5), 0.0),  # met
+        ((0.0, 0.5), -1.0),  # not moved
+        ((3.0, 2.0), -0.5),  # 2.5 m short of a goal 5 m from rest
+        ((0.0, 4.5), -0.6),  # 3 m short
+        ((-3.0, -3.5), -1.0),  # 10 m off scores no less than not moving
+    ],
+)
+def test_performance_is_the_distance_left_relative_to_the_distance_from_rest(
+    outcome: tuple[float, float], expected: float
+) -> None:
+    assert relative(np.array([3.0, 4.5]), np.array(outcome)) == pytest.approx(expected, abs=1e-15)
+
+
+def test_a_goal_ten_times_farther_missed_ten_times_more_scores_the_same() -> None:
+    near = relative(from_rest(100.0, 0.0), from_rest(90.0, 0.0))
+    far = relative(from_rest(1000.0, 0.0), from_rest(900.0, 0.0))
+    assert near == pytest.approx(-0.1)
+    assert far == pytest.approx(near)
+
+
+def test_a_goal_at_rest_is_judged_by_the_noise_instead_of_dividing_by_zero() -> None:
+    assert relative(REST, REST) == 0
+    assert relative(REST, from_rest(0.004, 0.0)) == pytest.approx(-0.4)
+    assert relative(from_rest(0.002, 0.0), REST) == pytest.approx(-0.2)
+
+
+def test_absolute_performance_judges_near_and_far_goals_alike() -> None:
+    for goal in (REST, from_rest(50.0, 0.0)):
+        assert absolute_performance(goal, goal + np.array([0.3, 0.4]), d_ref=2.0) == pytest.approx(-0.25)
+        assert absolute_performance(goal, goal + np.array([3.0, 0.0]), d_ref=2.0) == -1
+
+
+@pytest.mark.parametrize("measure", [relative, partial(absolute_performance, d_ref=0.7)])
+def test_leading_axes_broadcast_and_agree_with_one_at_a_time(measure: partial[Array]) -> None:
+    rng = stream(0, "test")
+    goals, outcomes = rng.normal(size=(3, 1, 2)), rng.normal(size=(4, 2))
+    together = measure(goals, outcomes)
+    assert together.shape == (3, 4)
+    for i in range(3):
+        for j in range(4):
+            assert together[i, j] == measure(goals[i, 0], outcomes[j])
+
+
+@pytest.mark.parametrize("wrong", [0.0, -1.0, np.nan, np.inf])
+def test_scales_that_are_not_positive_are_refused(wrong: float) -> None:
+    with pytest.raises(ValueError, match="d_min"):
+        performance(REST, REST, REST, d_min=wrong)
+    with pytest.raises(ValueError, match="d_ref"):
+        absolute_performance(REST, REST, d_ref=wrong)
+
+
+def test_nothing_remembered_is_no_competence() -> None:
+    assert Competence(memory_of(), relative)(NO_CONTEXT, np.array([0.3, 0.2])) == -1
+    assert AttemptCompetence(relative)(NO_CONTEXT, np.array([0.3, 0.2]), np.zeros((0, 2))) == -1
+
+
+@pytest.mark.parametrize("measure", [relative, partial(absolute_performance, d_ref=0.7)])
+def test_competence_is_the_best_performance_over_all_of_memory(measure: partial[Array]) -> None:
+    rng = stream(1, "test")
+    memory = memory_of(*rng.uniform(-1, 1, (60, 2)))
+    competence = Competence(memory, measure)
+    for goal in rng.uniform(-2, 2, (30, 2)):
+        assert competence(NO_CONTEXT, goal) == max(measure(goal, outcome) for outcome in memory.outcomes)
+
+
+def test_competence_never_falls_while_the_attempt_reading_can() -> None:
+    goal = np.array([1.0, 0.5])
+    memory = memory_of((0.9, 0.5))
+    remembered, attempted = Competence(memory, relative), AttemptCompetence(relative)
+    good, bad = np.array([[0.2, 0.5], [0.9, 0.5]]), np.array([[0.2, 0.5], [0.4, 0.5]])
+    assert remembered(NO_CONTEXT, goal, bad) == pytest.approx(-0.1)
+    assert attempted(NO_CONTEXT, goal, good) == pytest.approx(-0.1)
+    assert attempted(NO_CONTEXT, goal, bad) == pytest.approx(-0.6)
+
+
+def test_competence_belongs_to_a_context() -> None:
+    memory = Memory(1, 1, 2)
+    memory.add(np.array([0.0]), np.zeros(1), np.array([1.0, 0.5]))
+    memory.add(np.array([9.0]), np.zeros(1), np.array([0.0, 0.5]))
+    competence = Competence(memory, relative)
+    goal = np.array([1.0, 0.5])
+    assert competence(np.array([0.0]), goal) == 0
+    assert competence(np.array([9.0]), goal) == -1

@@ -1,0 +1,279 @@
+"""Memory: neighbours are those of exact arithmetic, exemplars stay as lived, and files survive or say why not."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sgimd_torch.memory import Memory
+from sgimd_torch.spaces import Array, stream
+
+NO_CONTEXT = np.zeros(0)
+
+
+def remember(thetas: Array, outcomes: Array, contexts: Array | None = None, *, context_weight: float = 1.0) -> Memory:
+    contexts = np.zeros((len(thetas), 0)) if contexts is None else contexts
+    memory = Memory(contexts.shape[1], thetas.shape[1], outcomes.shape[1], context_weight=context_weight)
+    for exemplar in zip(contexts, thetas, outcomes, strict=True):
+        memory.add(*exemplar)
+    return memory
+
+
+def nearest(points: Array, query: Array | float, k: int, within: float = np.inf) -> list[int]:
+    """The oracle: sort all rows by (distance, row number)."""
+    squared = ((points - query) ** 2).sum(axis=1)
+    return [
+        row for row in sorted(range(len(points)), key=lambda row: (squared[row], row)) if squared[row] <= within**2
+    ][:k]
+
+
+def random_memory(n: int, seed: int = 0) -> Memory:
+    rng = stream(seed, "test memory")
+    return remember(rng.uniform(0, 1, (n, 25)), rng.uniform(-1, 1, (n, 2)))
+
+
+@pytest.fixture(scope="module")
+def large() -> Memory:
+    return random_memory(3000)
+
+
+@pytest.mark.parametrize("far", [0.0, 1.0, 3.0, 100.0, 1e4, 1e7])
+def test_near_outcomes_are_those_of_brute_force_however_far_the_goal(large: Memory, far: float) -> None:
+    rng = stream(1, "goals")
+    for _ in range(40):
+        angle = rng.uniform(0, 2 * np.pi)
+        goal = far * np.array([np.cos(angle), np.sin(angle)])
+        assert large.near_outcomes(NO_CONTEXT, goal, 10).tolist() == nearest(large.outcomes, goal, 10)
+
+
+def test_outcomes_that_float32_cannot_tell_apart_are_still_ranked_by_float64() -> None:
+    n = 200
+    outcomes = np.zeros((n, 2))
+    outcomes[:, 0] = 1 + 1e-12 * stream(0, "order").permutation(n)
+    memory = remember(np.zeros((n, 1)), outcomes)
+    assert memory.near_outcomes(NO_CONTEXT, np.zeros(2), 10).tolist() == nearest(outcomes, np.zeros(2), 10)
+
+
+def test_ties_go_to_the_older_exemplar_even_among_many_copies() -> None:
+    grid = np.stack(np.meshgrid([-1.0, 0.0, 1.0], [-1.0, 0.0, 1.0]), axis=-1).reshape(-1, 2)
+    outcomes = np.tile(grid, (30, 1))[stream(0, "order").permutation(270)]
+    memory = remember(np.zeros((270, 1)), outcomes)
+    for k in (1, 5, 40, 200):
+        assert memory.near_outcomes(NO_CONTEXT, np.zeros(2), k).tolist() == nearest(outcomes, np.zeros(2), k)
+
+
+def test_mirror_images_that_float32_rounds_apart_are_still_ties() -> None:
+    rng = stream(0, "mirror")
+    goal, shifts = rng.integers(2**38, 2**40) * 2.0**-40, rng.integers(2**38, 2**40, 100) * 2.0**-40
+    outcomes = np.concatenate((goal + shifts, goal - shifts))[rng.permutation(200), None]
+    memory = remember(np.zeros((200, 1)), outcomes)
+    assert memory.near_outcomes(NO_CONTEXT, [goal], 150).tolist() == nearest(outcomes, goal, 150)
+
+
+def test_outcomes_too_far_for_float32_do_not_hide_the_near_ones() -> None:
+    outcomes = np.concatenate((np.full((40, 2), 1e30), stream(0, "near").uniform(-1, 1, (12, 2))))
+    memory = remember(np.zeros((52, 1)), outcomes)
+    for goal in (outcomes[-1], np.full(2, 1e25)):
+        assert memory.near_outcomes(NO_CONTEXT, goal, 10).tolist() == nearest(outcomes, goal, 10)
+
+
+@pytest.mark.parametrize("n", [0, 1, 4, 12])
+def test_asking_for_more_than_there_is_gives_all_nearest_first(n: int) -> None:
+    memory = random_memory(n)
+    goal = np.array([0.2, 0.1])
+    assert memory.near_outcomes(NO_CONTEXT, goal, 12).tolist() == nearest(memory.outcomes, goal, 12)
+
+
+@pytest.mark.parametrize("within", [0.0, 0.9, 1.2, np.inf])
+def test_near_policies_are_those_of_brute_force_within_the_radius(large: Memory, within: float) -> None:
+    for row in range(0, 3000, 150):
+        theta = large.thetas[row]
+        found = large.near_policies(NO_CONTEXT, theta, 10, within=within).tolist()
+        assert found == nearest(large.thetas, theta, 10, within)
+        assert found[0] == row
+
+
+def test_the_radius_includes_its_own_border_and_may_hold_nobody() -> None:
+    memory = remember(np.array([[0.0], [0.5], [1.0]]), np.zeros((3, 2)))
+    assert memory.near_policies(NO_CONTEXT, np.array([0.0]), 3, within=0.5).tolist() == [0, 1]
+    assert memory.near_policies(NO_CONTEXT, np.array([2.0]), 3, within=0.5).tolist() == []
+
+
+def test_neighbourhoods_ask_for_many_rows_what_near_policies_asks_for_one() -> None:
+    rng = stream(2, "test memory")
+    memory = remember(rng.uniform(0, 1, (400, 3)), rng.uniform(0, 1, (400, 2)), rng.uniform(0, 1, (400, 2)))
+    rows = np.arange(0, 400, 7)
+    for row, found in zip(rows, memory.neighbourhoods(rows, 5, within=0.2), strict=True):
+        assert found.tolist() == memory.near_policies(memory.contexts[row], memory.thetas[row], 5, within=0.2).tolist()
+
+
+@pytest.mark.parametrize("weight", [0.0, 0.1, 10.0])
+def test_context_counts_by_its_weight_on_both_sides(weight: float) -> None:
+    rng = stream(3, "test memory")
+    contexts, thetas, outcomes = (rng.uniform(-1, 1, (500, dim)) for dim in (2, 3, 2))
+    memory = remember(thetas, outcomes, contexts, context_weight=weight)
+    context, goal, theta = rng.uniform(-1, 1, 2), rng.uniform(-1, 1, 2), rng.uniform(-1, 1, 3)
+    expected = nearest(np.hstack((weight * contexts, outcomes)), np.append(weight * context, goal), 10)
+    assert memory.near_outcomes(context, goal, 10).tolist() == expected
+    expected = nearest(np.hstack((weight * contexts, thetas)), np.append(weight * context, theta), 10)
+    assert memory.near_policies(context, theta, 10).tolist() == expected
+
+
+def test_exemplars_are_kept_in_order_and_in_full_precision() -> None:
+    rng = stream(4, "test memory")
+    contexts, thetas, outcomes = (rng.normal(size=(150, dim)) for dim in (1, 4, 2))
+    memory = remember(thetas, outcomes, contexts)
+    assert len(memory) == 150
+    assert np.array_equal(memory.contexts, contexts)
+    assert np.array_equal(memory.thetas, thetas)
+    assert np.array_equal(memory.outcomes, outcomes)
+
+
+def test_what_is_handed_out_is_read_only_and_what_came_in_may_change_afterwards() -> None:
+    memory = random_memory(3)
+    for view in (memory.contexts, memory.thetas, memory.outcomes):
+        with pytest.raises(ValueError, match="read-only"):
+            view[0] = 7.0
+    outcome = np.array([0.5, 0.5])
+    memory.add(NO_CONTEXT, np.zeros(25), outcome)
+    outcome[:] = 9.0
+    assert memory.outcomes[-1].tolist() == [0.5, 0.5]
+
+
+def test_a_view_taken_before_keeps_what_it_showed_while_memory_outgrows_its_room() -> None:
+    memory = random_memory(5)
+    before, copy = memory.thetas, memory.thetas.copy()
+    for _ in range(300):
+        memory.add(NO_CONTEXT, np.ones(25), np.zeros(2))
+    assert np.array_equal(before, copy)
+    assert np.array_equal(memory.thetas[:5], copy)
+
+
+@pytest.mark.parametrize(
+    ("context", "theta", "outcome", "named"),
+    [
+        (np.zeros(1), np.zeros(3), np.zeros(2), "context"),
+        (np.zeros(0), np.zeros(2), np.zeros(3), "theta"),
+        (np.zeros(0), np.zeros((1, 3)), np.zeros(2), "theta"),
+        (np.zeros(0), np.zeros(3), np.array([0.0, np.nan]), "outcome .*theta"),
+        (np.zeros(0), np.array([0.0, np.inf, 0.0]), np.zeros(2), "theta"),
+        (np.zeros(0), np.zeros(3), np.float64(1.0), "outcome"),
+    ],
+)
+def test_a_wrong_exemplar_is_refused_by_name_and_nothing_of_it_is_kept(
+    context: Array, theta: Array, outcome: Array, named: str
+) -> None:
+    memory = Memory(0, 3, 2)
+    with pytest.raises(ValueError, match=named):
+        memory.add(context, theta, outcome)
+    assert (len(memory), len(memory.contexts), len(memory.outcomes)) == (0, 0, 0)
+    memory.add(np.zeros(0), np.ones(3), np.ones(2))
+    assert memory.near_outcomes(NO_CONTEXT, np.ones(2), 5).tolist() == [0]
+    assert memory.near_policies(NO_CONTEXT, np.ones(3), 5).tolist() == [0]
+
+
+def test_wrong_questions_are_refused() -> None:
+    memory = random_memory(2)
+    with pytest.raises(ValueError, match="theta passed instead"):
+        memory.near_outcomes(NO_CONTEXT, np.zeros(25), 1)
+    with pytest.raises(ValueError, match="finite"):
+        memory.near_policies(NO_CONTEXT, np.full(25, np.nan), 1)
+    with pytest.raises(ValueError, match="k must be at least 1"):
+        memory.near_outcomes(NO_CONTEXT, np.zeros(2), 0)
+    with pytest.raises(ValueError, match="theta_dim"):
+        Memory(0, 0, 2)
+    with pytest.raises(ValueError, match="context_weight"):
+        Memory(0, 1, 2, context_weight=-1.0)
+
+
+@pytest.mark.parametrize("n", [0, 100])
+def test_a_loaded_memory_holds_and_answers_the_same(tmp_path: Path, n: int) -> None:
+    rng = stream(5, "test memory")
+    contexts, thetas, outcomes = (rng.normal(size=(n, dim)) for dim in (1, 4, 2))
+    saved = remember(thetas, outcomes, contexts, context_weight=0.3)
+    saved.save(tmp_path / "memory.npz")
+    loaded = Memory.load(tmp_path / "memory.npz")
+    assert loaded.context_weight == 0.3
+    for name in ("contexts", "thetas", "outcomes"):
+        assert np.array_equal(getattr(loaded, name), getattr(saved, name))
+    for memory in (saved, loaded):
+        memory.add(np.zeros(1), np.zeros(4), np.zeros(2))
+    query = np.ones(1), np.ones(2), 20
+    assert np.array_equal(loaded.near_outcomes(*query), saved.near_outcomes(*query))
+
+
+def test_saving_replaces_the_old_file_and_leaves_no_other(tmp_path: Path) -> None:
+    path = tmp_path / "memory"
+    random_memory(3).save(path)
+    random_memory(4).save(path)
+    assert len(Memory.load(path)) == 4
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_disk_that_fills_up_while_saving_leaves_the_old_file(tmp_path: Path) -> None:
+    resource = pytest.importorskip("resource")
+    path = tmp_path / "memory.npz"
+    random_memory(3).save(path)
+    larger = random_memory(100)
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (4096, hard))
+    try:
+        with pytest.raises(OSError, match="too large"):
+            larger.save(path)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert len(Memory.load(path)) == 3
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_file_cut_short_anywhere_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "memory.npz"
+    random_memory(20).save(path)
+    whole = path.read_bytes()
+    for n_bytes in range(0, len(whole), 97):
+        path.write_bytes(whole[:n_bytes])
+        with pytest.raises(ValueError, match="cannot be read as a saved Memory"):
+            Memory.load(path)
+
+
+def test_a_flipped_bit_in_the_arrays_is_noticed(tmp_path: Path) -> None:
+    path = tmp_path / "memory.npz"
+    random_memory(20).save(path)
+    damaged = bytearray(path.read_bytes())
+    damaged[len(damaged) // 2] ^= 1
+    path.write_bytes(damaged)
+    with pytest.raises(ValueError, match="cannot be read"):
+        Memory.load(path)
+
+
+@pytest.mark.parametrize(
+    ("change", "complaint"),
+    [
+        ({"version": 2}, "version 2"),
+        ({"version": "one"}, "version"),
+        ({"outcomes": None}, "outcomes"),
+        ({"outcomes": np.zeros((4, 2))}, "equal length"),
+        ({"outcomes": np.zeros(3)}, "three float64 tables"),
+        ({"outcomes": np.zeros((3, 2), dtype=np.float32)}, "float32"),
+        ({"thetas": np.full((3, 1), np.nan)}, "finite"),
+        ({"thetas": np.array([[{}]] * 3)}, "cannot be read"),
+        ({"context_weight": -1.0}, "context_weight"),
+        ({"context_weight": np.ones(2)}, "a number"),
+    ],
+)
+def test_a_file_whose_content_does_not_fit_is_refused(tmp_path: Path, change: dict[str, Array], complaint: str) -> None:
+    fields = {"version": 1, "context_weight": 1.0, "contexts": np.zeros((3, 0)), "thetas": np.zeros((3, 1))}
+    fields |= {"outcomes": np.zeros((3, 2))} | change
+    np.savez(tmp_path / "memory.npz", **{name: value for name, value in fields.items() if value is not None})
+    with pytest.raises(ValueError, match=complaint):
+        Memory.load(tmp_path / "memory.npz")
+
+
+def test_what_is_not_npz_or_not_there_is_told_apart(tmp_path: Path) -> None:
+    np.save(tmp_path / "array.npy", np.zeros(3))
+    (tmp_path / "text").write_text("theta, outcome\n")
+    for name in ("array.npy", "text"):
+        with pytest.raises(ValueError, match="cannot be read as a saved Memory"):
+            Memory.load(tmp_path / name)
+    with pytest.raises(FileNotFoundError):
+        Memory.load(tmp_path / "nothing")
