@@ -1,7 +1,7 @@
 """Make the benchmark set: one goal in each tile of what several learners reached together (section 5.2 of the paper).
 
-Random, SAGG-RIAC and SGIM-D each live for some seeds; their landing points are pooled; the tiles' side is chosen so that
-about 358 of them, the paper's number, were reached; one goal is drawn at random in each.
+Random, SAGG-RIAC and SGIM-D each live for some seeds; their landing points are pooled; the tiles' side is chosen so
+that about 358 of them, the paper's number, were reached; one goal is drawn at random in each.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def main() -> None:
     """Run the learners, pool, tile, draw, write."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, default=SHIPPED, help="file to write (default: the shipped one)")
-    parser.add_argument("--seed", type=int, default=2000, help="first seed of the runs, and of the draw (default: 2000)")
+    parser.add_argument("--seed", type=int, default=2000, help="first seed of runs and draw (default: %(default)s)")
     parser.add_argument("--runs", type=int, default=4, help="runs of each learner (default: %(default)s)")
     parser.add_argument("--movements", type=int, default=5000, help="of each run (default: %(default)s)")
     parser.add_argument("--tiles", type=int, default=358, help="how many are wanted, about (default: %(default)s)")

@@ -1,9 +1,10 @@
 """Make the shipped demonstrations of demonstrator 3: simulated kinesthetic recordings on the fishing rod.
 
-The paper's demonstrator 3 was a person who led the arm by hand. These recordings are *simulated* in that person's manner as
-the paper describes it: every joint moves monotonically from the start configuration to an end posture, all with the same
-shape, scaled; end postures come from one habit, with the variation of a hand, and are chosen so that the landing points
-spread evenly over the plane. The pace wavers smoothly, as a hand's does, so no recording is exactly a motor primitive.
+The paper's demonstrator 3 was a person who led the arm by hand. These recordings are *simulated* in that person's
+manner as the paper describes it: every joint moves monotonically from the start configuration to an end posture, all
+with the same shape, scaled; end postures come from one habit, with the variation of a hand, and are chosen so that the
+landing points spread evenly over the plane. The pace wavers smoothly, as a hand's does, so no recording is exactly a
+motor primitive.
 """
 
 from __future__ import annotations
@@ -25,8 +26,8 @@ TREMOR = 0.15  # part of the pace that wavers
 
 
 def end_posture(turn: float, stretch: float) -> Array:
-    """``(6,)`` rad, the teacher's habit: ``turn`` in [-1, 1] from right to left, ``stretch`` in [-1, 1] from far behind to
-    far ahead. Yaw and wrist share the turn; shoulder, elbow and wrist share the stretch."""
+    """``(6,)`` rad, the teacher's habit: ``turn`` in [-1, 1] from right to left, ``stretch`` in [-1, 1] from far behind
+    to far ahead. Yaw and wrist share the turn; shoulder, elbow and wrist share the stretch."""
     middle = (JOINT_RANGES.low + JOINT_RANGES.high) / 2
     sideways = np.array([1.5, 0.0, 0.0, 0.0, 0.0, 1.2])
     ahead = np.array([0.0, -0.65, 0.1, 0.0, -0.75, 0.0])
@@ -36,7 +37,7 @@ def end_posture(turn: float, stretch: float) -> Array:
 def lead(end: Array, rng: np.random.Generator) -> tuple[Array, Array]:
     """The arm led from the start configuration to ``end``: times ``(n,)`` s and angles ``(n, 6)`` rad at 50 Hz."""
     start = (JOINT_RANGES.low + JOINT_RANGES.high) / 2
-    n = int(round(rng.uniform(*DURATIONS) * RATE)) + 1
+    n = round(rng.uniform(*DURATIONS) * RATE) + 1
     times = np.arange(n) / RATE
     phase = times / times[-1]
     pace = (phase * (1 - phase)) ** 2  # minimum jerk: bell-shaped speed

@@ -24,7 +24,7 @@ from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
 from sgimd_torch.environment import Environment, PlanarArm, SimulationError
 from sgimd_torch.evaluation import Benchmark, Evaluation, evaluate, load_benchmark, save_benchmark
 from sgimd_torch.interest import InterestMap, UniformGoals
-from sgimd_torch.inverse_model import LocallyLinear, LocalInverse, NearestNeighbour
+from sgimd_torch.inverse_model import LocalInverse, LocallyLinear, NearestNeighbour
 from sgimd_torch.learner import Learner
 from sgimd_torch.memory import Memory
 from sgimd_torch.motor_primitives import GaussianPrimitive
@@ -37,6 +37,46 @@ if TYPE_CHECKING:
     from sgimd_torch.fishing_rod import FishingRod
 
 __version__ = "0.1.0"
+__all__ = [
+    "AskedTeacher",
+    "Benchmark",
+    "Box",
+    "Demonstration",
+    "Environment",
+    "Episode",
+    "Estimate",
+    "Evaluation",
+    "FishingRod",
+    "GaussianPrimitive",
+    "InitialTeacher",
+    "InterestMap",
+    "Learner",
+    "LocalInverse",
+    "LocallyLinear",
+    "Memory",
+    "Move",
+    "NearestNeighbour",
+    "PeriodicTeacher",
+    "PlanarArm",
+    "SimulationError",
+    "UniformGoals",
+    "absolute_performance",
+    "evaluate",
+    "imitation",
+    "load_benchmark",
+    "load_demonstrations",
+    "nelder_mead",
+    "observation",
+    "performance",
+    "perturb",
+    "random_exploration",
+    "run",
+    "sagg_riac",
+    "save_benchmark",
+    "save_demonstrations",
+    "sgim_d",
+    "stream",
+]
 
 
 def __getattr__(name: str) -> object:

@@ -61,16 +61,14 @@ def observation(environment: Environment, seed: int, *, correspondence: Correspo
     return Learner(memory, Rest(), social=Remember(memory), correspondence=correspondence)
 
 
-def imitation(
-    environment: Environment, seed: int, *, correspondence: Correspondence, epsilon: float = 0.05
-) -> Learner:
+def imitation(environment: Environment, seed: int, *, correspondence: Correspondence, epsilon: float = 0.05) -> Learner:
     """Imitation: repeats the last demonstration with small variations until the next one."""
     imitate = Imitate(environment.policies, stream(seed, "imitate"), repeats=None, epsilon=epsilon)
     return Learner(_memory(environment), Rest(), social=imitate, correspondence=correspondence)
 
 
 def imitating(
-    babbling: GoalBabbling, outcomes: Box, rng: np.random.Generator, *, repeats: int = 10, epsilon: float = 0.05
+    babbling: GoalBabbling, outcomes: Box, rng: np.random.Generator, *, repeats: int = 20, epsilon: float = 0.05
 ) -> Imitate:
     """How SGIM-D answers a demonstration: a short imitation, then emulation of the goal."""
     return Imitate(
@@ -128,9 +126,9 @@ def goal_babbling(
     goals: MakeGoals = InterestMap,
     inverse: MakeInverse = LocalInverse,
     search: MakeSearch = nelder_mead,
-    judge: MakeJudge = attempted,
+    judge: MakeJudge = remembered,
     measure: Performance | None = None,
-    budget: int = 20,
+    budget: int = 15,
     tolerance: float | None = None,
     global_range: tuple[float, float] = (0.05, 0.95),
 ) -> GoalBabbling:

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import os
 import zipfile
+import zlib
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -23,6 +24,8 @@ from sgimd_torch.spaces import Array, Demonstration
 
 VERSION = 1
 SHIPPED = Path(__file__).with_name("data") / "demonstrator_3.npz"
+UNREADABLE = (ValueError, TypeError, KeyError, OSError, EOFError, RuntimeError, zipfile.BadZipFile, zlib.error)
+"""What numpy raises at a broken ``.npz`` file."""
 _FIELDS = ("lengths", "times", "trajectories", "outcomes", "contexts")
 
 
@@ -35,6 +38,9 @@ def save_demonstrations(path: str | os.PathLike[str], demonstrations: Sequence[D
     if not demonstrations:
         raise ValueError("there is no demonstration to save")
     path = Path(path)
+    for k, d in enumerate(demonstrations):
+        if len(d.times) != len(d.trajectory):
+            raise ValueError(f"recording {k} has {len(d.times)} times, but {len(d.trajectory)} postures")
     fields: dict[str, Array | np.ndarray] = {
         "lengths": np.array([len(d.times) for d in demonstrations]),
         "times": np.concatenate([d.times for d in demonstrations]),
@@ -69,9 +75,7 @@ def load_demonstrations(
     """
     source = str(path)
     try:
-        with np.load(path, allow_pickle=False) as archive:
-            if not isinstance(archive, np.lib.npyio.NpzFile):
-                raise ValueError("it holds a single array")
+        with open(path, "rb") as file, np.load(file, allow_pickle=False) as archive:
             missing = {"version", *_FIELDS} - set(archive.files)
             if missing:
                 raise ValueError(f"it lacks {sorted(missing)}")
@@ -79,8 +83,9 @@ def load_demonstrations(
             fields = {name: archive[name] for name in _FIELDS}
     except FileNotFoundError:
         raise
-    except (ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
-        raise ValueError(f"{source} is no demonstration file ({error}); was it written by save_demonstrations?") from error
+    except UNREADABLE as error:
+        slip = "was it written by save_demonstrations, and whole?"
+        raise ValueError(f"{source} is no demonstration file ({error}); {slip}") from error
     if version.shape != () or version != VERSION:
         raise ValueError(f"{source} has version {version}, this library reads {VERSION}")
     _check(source, fields)
@@ -104,7 +109,8 @@ def load_demonstrations(
 def _check(source: str, fields: dict[str, np.ndarray]) -> None:
     for name, field in fields.items():
         if not np.issubdtype(field.dtype, np.integer if name == "lengths" else np.floating):
-            raise ValueError(f"{source}: {name} must be numbers, got {field.dtype}; was text or a list of objects saved?")
+            wanted = "integers" if name == "lengths" else "floating-point numbers"
+            raise ValueError(f"{source}: {name} must be {wanted}, got {field.dtype}; was text or a list saved?")
         if field.ndim != (1 if name in ("lengths", "times") else 2):
             raise ValueError(f"{source}: {name} has {field.ndim} axes, shape {field.shape}")
         if not np.isfinite(field).all():
@@ -116,7 +122,8 @@ def _check(source: str, fields: dict[str, np.ndarray]) -> None:
     if (lengths < 2).any():
         raise ValueError(f"{source}: recording {int(np.argmax(lengths < 2))} has fewer than 2 samples")
     if not len(fields["outcomes"]) == len(fields["contexts"]) == n:
-        raise ValueError(f"{source}: {n} recordings, {len(fields['outcomes'])} outcomes, {len(fields['contexts'])} contexts")
+        rows = f"{len(fields['outcomes'])} outcomes, {len(fields['contexts'])} contexts"
+        raise ValueError(f"{source}: {n} recordings, but {rows}")
     if not len(times) == len(fields["trajectories"]) == lengths.sum():
         rows = f"{len(times)} times, {len(fields['trajectories'])} postures"
         raise ValueError(f"{source}: lengths add up to {lengths.sum()} samples, but there are {rows}; is it truncated?")

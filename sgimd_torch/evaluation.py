@@ -8,13 +8,13 @@ remembering, with random streams of its own.
 from __future__ import annotations
 
 import os
-import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from sgimd_torch.demonstrations import UNREADABLE
 from sgimd_torch.environment import Environment, execute_many
 from sgimd_torch.spaces import Array, Box, Estimate, check_vector, stream
 
@@ -88,10 +88,12 @@ def evaluate(
         repeats: 0 leaves the noise out.
 
     Raises:
-        ValueError: goals of another dimension, or not finite.
+        ValueError: no goals, of another dimension, or not finite.
         RuntimeError: the memory behind ``inverse`` is empty.
     """
     goals = check_vector("goals", goals, environment.outcomes.dim)
+    if goals.ndim != 2 or len(goals) == 0:
+        raise ValueError(f"goals must have shape (n, outcome_dim) with n > 0, got {goals.shape}")
     if context is None:
         context = (environment.contexts.low + environment.contexts.high) / 2
     thetas = np.stack([inverse(context, goal).theta for goal in goals])
@@ -145,19 +147,21 @@ def load_benchmark(path: str | os.PathLike[str] = SHIPPED) -> Benchmark:
     """Read a benchmark; the shipped one for ``FishingRod`` unless told otherwise.
 
     Raises:
-        ValueError: not such a file, truncated, of another version, without goals, or with goals that are not finite.
+        ValueError: not such a file, truncated, of another version, without goals, or with numbers that are not finite.
         FileNotFoundError: there is no file.
     """
     try:
-        with np.load(path, allow_pickle=False) as archive:
+        with open(path, "rb") as file, np.load(file, allow_pickle=False) as archive:
             version, name, side = archive["version"], str(archive["environment"]), float(archive["side"])
             goals = archive["goals"]
     except FileNotFoundError:
         raise
-    except (ValueError, OSError, EOFError, KeyError, TypeError, IndexError, zipfile.BadZipFile) as error:
+    except UNREADABLE as error:
         raise ValueError(f"{path} is no benchmark ({error}); was it written by scripts/make_benchmark.py?") from error
-    if version != VERSION:
+    if version.shape != () or version != VERSION:
         raise ValueError(f"{path} has version {version}, this library reads {VERSION}")
     if goals.ndim != 2 or len(goals) == 0:
         raise ValueError(f"{path}: goals must have shape (n, outcome_dim) with n > 0, got {goals.shape}")
+    if not 0 < side < np.inf:
+        raise ValueError(f"{path}: the side of the tiles must be positive, got {side}")
     return Benchmark(name, check_vector(f"{path}: goals", goals, goals.shape[1]), side)

@@ -1,15 +1,17 @@
 """The fishing rod: a six-joint arm casts a float on the water, simulated by MuJoCo.
 
-Section 4 of Nguyen & Oudeyer (2014); the model is ``fishing_rod.xml``. A movement is open loop, so its whole sequence of
-commands, noise included, is computed first and then run in C.    outcome = FishingRod().execute(context, theta, rng)
+Section 4 of Nguyen & Oudeyer (2014); the model is ``fishing_rod.xml``. A movement is open loop, so its whole sequence
+of commands, noise included, is computed first and then run in C.    outcome = FishingRod().execute(context, theta, rng)
 
-Where the float lands: at the first point where it meets the water (z = 0), on the line between two steps. If it has not
-met the water ``HOLD`` seconds after the movement's end, the line is let out: the float flies on freely with the velocity it
-has, the wind pushing it, and lands where its parabola meets the water. So every movement has exactly one landing point.
+Where the float lands: at the first point where it meets the water (z = 0), on the line between two steps. If it has
+not met the water ``HOLD`` seconds after the movement's end, the line is let out: the float flies on freely with the
+velocity it has, the wind pushing it, and lands where its parabola meets the water. So every movement has exactly one
+landing point.
 """
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -20,7 +22,7 @@ from mujoco import rollout
 from numpy.typing import ArrayLike
 from scipy.signal import lfilter
 
-from sgimd_torch.environment import SimulationError
+from sgimd_torch.environment import SimulationError, check_movement
 from sgimd_torch.motor_primitives import GaussianPrimitive
 from sgimd_torch.spaces import Array, Box, check_vector
 
@@ -32,7 +34,7 @@ CORRELATION = 0.96  # of the motor noise from one step to the next
 TOP_SPEED = 500.0  # rad/s; 100,000 random movements stay far below, a diverging simulation runs through it
 
 _STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
-_CHUNK = 40  # steps run in C before looking whether the float has landed
+_CHUNK = 90  # steps run in C before looking whether the float has landed
 
 
 class FishingRod:
@@ -42,11 +44,12 @@ class FishingRod:
         noise: motor noise (s): standard deviation of the command (rad) for each rad/s of commanded speed; 0 for none.
         outcomes: T, the task space (m); [-1, 1]^2 in the paper, [-100, 100]^2 in its large-space experiment.
         max_yaw: half range of the base's yaw offset (rad), a context; 0 leaves it out.
-        max_wind: half range of a side wind on the float along x (N), a context; 0 leaves it out. The float weighs 0.2 N.
+        max_wind: half range of a side wind on the float along x (N), a context; 0 leaves it out. The float weighs
+            0.2 N.
         threads: for ``execute_many``; None for one a core.
 
     Raises:
-        ValueError: a negative or non-finite noise or range.
+        ValueError: a negative or non-finite noise or range, no thread, or ``outcomes`` that do not contain ``rest``.
     """
 
     def __init__(
@@ -61,11 +64,13 @@ class FishingRod:
         for name, value in (("noise", noise), ("max_yaw", max_yaw), ("max_wind", max_wind)):
             if not (np.isfinite(value) and value >= 0):
                 raise ValueError(f"{name} must be finite and >= 0, got {value}")
+        if threads is not None and threads < 1:
+            raise ValueError(f"threads must be at least 1, got {threads}")
         self.noise = noise
         self.primitive = GaussianPrimitive(JOINT_RANGES, DURATIONS, sharpness=6.0)
         self.policies = self.primitive.policies
         self.outcomes = Box.cube(-1.0, 1.0, 2) if outcomes is None else outcomes
-        self.outcome_noise = 0.04 if noise else 0.0
+        self.outcome_noise = 1.15 * noise  # m for each s, see scripts/check_physics.py
         ranges = np.array([max_yaw, max_wind])
         self._context_columns = np.flatnonzero(ranges)
         self.contexts = Box(-ranges[self._context_columns], ranges[self._context_columns])
@@ -74,8 +79,16 @@ class FishingRod:
         self._threads = threads if threads is not None else os.cpu_count() or 1
         self._data = mujoco.MjData(self.model)
         self._pools: dict[int, tuple[rollout.Rollout, list[mujoco.MjData]]] = {}
+        self.steps = 0
+        """Physics steps simulated so far, of all movements together."""
+        self._gravity = -float(self.model.opt.gravity[2])
+        self._float_mass = float(self.model.body("float").mass[0])
+        self._draws = len(self._times(DURATIONS[1] + HOLD))  # of the motor noise, for each joint
         self._home = self._settle()
-        self.rest = self._data.sensordata[:2].copy()
+        self.rest = self.outcomes.check(
+            "rest, below the hanging float,", self._data.sensordata[:2].copy(), "is T in m?"
+        )
+        self.rest.flags.writeable = False
 
     def observe(self, rng: np.random.Generator) -> Array:
         """``(context_dim,)`` the context of the next movement, uniform over ``contexts``; empty in the fishing task."""
@@ -96,10 +109,11 @@ class FishingRod:
             ValueError: shapes, values that are not finite or outside their box.
             SimulationError: the simulation diverged; the message names theta.
         """
-        return self.execute_many(np.asarray(context)[None], np.asarray(theta)[None], [rng])[0]
+        context, theta = check_movement(self, context, theta)
+        return self._execute(context[None], theta[None], [rng])[0]
 
     def execute_many(self, contexts: ArrayLike, thetas: ArrayLike, rngs: Sequence[np.random.Generator]) -> Array:
-        """Run many movements side by side on threads; row i equals ``execute(contexts[i], thetas[i], rngs[i])`` bit for bit.
+        """Run many movements side by side on threads; row i equals ``execute`` of row i bit for bit.
 
         Args:
             contexts: ``(n, context_dim)``.
@@ -114,15 +128,10 @@ class FishingRod:
         """
         thetas = self.policies.check("theta", thetas, "was a goal passed instead?")
         contexts = self.contexts.check("context", contexts)
-        if not len(thetas) == len(contexts) == len(rngs):
-            raise ValueError(f"got {len(contexts)} contexts, {len(thetas)} thetas and {len(rngs)} rngs; want one of each")
-        commands = [self._commands(theta, rng) for theta, rng in zip(thetas, rngs, strict=True)]
-        ends = np.array([self.primitive.duration(theta) + HOLD for theta in thetas])
-        landings, diverged = self._cast(contexts, commands, ends)
-        if diverged.any():
-            row = int(np.flatnonzero(diverged)[0])
-            raise SimulationError(thetas[row], f"the simulation diverged in context {contexts[row].tolist()}")
-        return landings
+        if not thetas.ndim == contexts.ndim == 2 or not 0 < len(thetas) == len(contexts) == len(rngs):
+            rows = f"{contexts.shape}, {thetas.shape} and {len(rngs)} rngs"
+            raise ValueError(f"needs n > 0 contexts, thetas and rngs, got {rows}; is it one movement, for execute()?")
+        return self._execute(contexts, thetas, rngs)
 
     def replay(self, times: ArrayLike, trajectory: ArrayLike) -> Array:
         """Where the float lands when the arm is led along a recorded trajectory, without noise, in the zero context.
@@ -135,11 +144,15 @@ class FishingRod:
             ``(2,)`` m.
 
         Raises:
-            ValueError: shapes or values that are not finite.
+            ValueError: shapes that do not fit, values that are not finite, or times that do not increase from 0.
             SimulationError: the simulation diverged.
         """
         trajectory = check_vector("trajectory", trajectory, len(JOINTS), "one column for each joint, in rad")
-        times = check_vector("times", times, len(trajectory))
+        times = check_vector("times", times, len(trajectory), "one time in s for each row of the trajectory")
+        if trajectory.ndim != 2 or times.ndim != 1 or len(times) < 2:
+            raise ValueError(f"needs (n,) times and (n, 6) angles, n > 1, got {times.shape} and {trajectory.shape}")
+        if times[0] != 0 or not (np.diff(times) > 0).all():
+            raise ValueError(f"times must increase from 0, got {times}; were the rows shuffled?")
         end = float(times[-1]) + HOLD
         steps = self._times(end)
         commands = np.stack([np.interp(steps, times, column) for column in trajectory.T], axis=1)
@@ -147,6 +160,15 @@ class FishingRod:
         if diverged.any():
             raise SimulationError(trajectory[-1], "the simulation of a recorded trajectory diverged")
         return landings[0]
+
+    def _execute(self, contexts: Array, thetas: Array, rngs: Sequence[np.random.Generator]) -> Array:
+        commands = [self._commands(theta, rng) for theta, rng in zip(thetas, rngs, strict=True)]
+        ends = np.array([self.primitive.duration(theta) + HOLD for theta in thetas])
+        landings, diverged = self._cast(contexts, commands, ends)
+        if diverged.any():
+            row = int(np.flatnonzero(diverged)[0])
+            raise SimulationError(thetas[row], f"the simulation diverged in context {contexts[row].tolist()}")
+        return landings
 
     def _times(self, end: float) -> Array:
         step = self.model.opt.timestep
@@ -159,10 +181,10 @@ class FishingRod:
         if not self.noise:
             return trajectory
         # As many draws for a short movement as for a long one: movement i meets the same noise whatever came before.
-        draws = rng.standard_normal((len(self._times(DURATIONS[1] + HOLD)), len(JOINTS)))
-        draws[1:] *= np.sqrt(1 - CORRELATION**2)
-        noise = lfilter([1.0], [1.0, -CORRELATION], draws, axis=0)[: len(times)]  # AR(1) of unit variance
-        speed = np.abs(np.gradient(trajectory, self.model.opt.timestep, axis=0))
+        draws = rng.standard_normal((self._draws, len(JOINTS)))[: len(times)]
+        draws[1:] *= math.sqrt(1 - CORRELATION**2)
+        noise = lfilter([1.0], [1.0, -CORRELATION], draws, axis=0)  # AR(1) of unit variance
+        speed = np.abs(np.diff(trajectory, axis=0, append=trajectory[-1:])) / self.model.opt.timestep
         return trajectory + self.noise * speed * noise
 
     def _settle(self) -> Array:
@@ -180,15 +202,15 @@ class FishingRod:
         return home
 
     def _cast(self, contexts: Array, commands: list[Array], ends: Array) -> tuple[Array, np.ndarray]:
-        """``(n, 2)`` landing points of n command sequences, the line being let out at ``ends`` (s), and who diverged."""
+        """``(n, 2)`` landing points of n command sequences, the line let out at ``ends`` (s), and who diverged."""
         n = len(commands)
         yaw_wind = np.zeros((n, 2))
         yaw_wind[:, self._context_columns] = contexts
         steps = np.array([len(c) for c in commands])
         controls = np.zeros((n, int(steps.max()), self.model.nu))
-        for row, sequence in enumerate(commands):
-            controls[row, : len(sequence), :6] = sequence
-            controls[row, len(sequence) :, :6] = sequence[-1]
+        for k, sequence in enumerate(commands):
+            controls[k, : len(sequence), :6] = sequence
+            controls[k, len(sequence) :, :6] = sequence[-1]
         controls[:, :, 0] += yaw_wind[:, None, 0]
         controls[:, :, 6] = yaw_wind[:, None, 1]
 
@@ -202,12 +224,13 @@ class FishingRod:
         for start in range(0, int(steps.max()), _CHUNK):
             stop = min(start + _CHUNK, int(steps[flying].max()))
             run, seen = self._rollout(states[flying], controls[flying, start:stop])
+            diverged[flying] = ~(np.abs(run[:, :, speeds]).max(axis=(1, 2)) < TOP_SPEED)  # also when it is NaN
             for k, row in enumerate(flying):
-                last = min(stop, steps[row]) - start
+                last = min(stop, int(steps[row])) - start
                 track = np.concatenate([floats[row][None], seen[k, :last]])
-                if not np.abs(run[k, :last, speeds]).max() < TOP_SPEED:  # also when it is NaN
-                    diverged[row] = True
-                elif (wet := np.flatnonzero(track[1:, 2] <= 0)).size:
+                if diverged[row]:
+                    continue
+                if (wet := np.flatnonzero(track[1:, 2] <= 0)).size:
                     landings[row] = _crossing(track[wet[0]], track[wet[0] + 1])
                 elif start + last == steps[row]:
                     landings[row] = self._let_out(track, float(ends[row]), int(steps[row]), float(yaw_wind[row, 1]))
@@ -217,14 +240,12 @@ class FishingRod:
                 break
         return landings, diverged
 
-    def _let_out(self, track: Array, end: float, steps: int, wind: float) -> Array:
+    def _let_out(self, track: Array, end: float, steps: int, wind: float) -> tuple[float, float]:
         """Free flight from where the float is at ``end``, between the last two steps."""
         after = steps - end / self.model.opt.timestep  # share of a step
-        position, velocity = np.split(track[-1] + after * (track[-2] - track[-1]), 2)
-        gravity = -self.model.opt.gravity[2]
-        flight = (velocity[2] + np.sqrt(velocity[2] ** 2 + 2 * gravity * max(position[2], 0.0))) / gravity
-        drift = np.array([wind / self.model.body("float").mass[0], 0.0]) * flight**2 / 2
-        return position[:2] + velocity[:2] * flight + drift
+        x, y, z, dx, dy, dz = (track[-1] + after * (track[-2] - track[-1])).tolist()
+        flight = (dz + math.sqrt(dz * dz + 2 * self._gravity * max(z, 0.0))) / self._gravity
+        return x + (dx + wind / self._float_mass * flight / 2) * flight, y + dy * flight
 
     def _rollout(self, states: Array, controls: Array) -> tuple[Array, Array]:
         threads = min(self._threads, len(states))
@@ -232,7 +253,13 @@ class FishingRod:
             data = [mujoco.MjData(self.model) for _ in range(threads)]
             self._pools[threads] = (rollout.Rollout(nthread=threads if threads > 1 else 0), data)
         pool, data = self._pools[threads]
-        return pool.rollout(self.model, data, states, controls)
+        n, n_steps = controls.shape[:2]
+        self.steps += n * n_steps
+        run = np.empty((n, n_steps, states.shape[1]))
+        seen = np.empty((n, n_steps, self.model.nsensordata))
+        # The wrapper's own checks and copies would cost as much as four steps; shapes are right by construction.
+        pool.rollout([self.model] * n, data, states, controls, state=run, sensordata=seen, nstep=n_steps, skip_checks=True)
+        return run, seen
 
 
 def _crossing(above: Array, below: Array) -> Array:

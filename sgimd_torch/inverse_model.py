@@ -22,7 +22,8 @@ class LocalInverse:
         dist_n: the paper's distN, radius of a neighbourhood in policy space. None: 0.6 in 25 dimensions, and
             growing with the square root of their number, as distances in a unit cube do.
         alpha: what a metre of spread costs, in metres of distance to the goal.
-        width: least width of the Gaussian of eq. (9), metres.
+        width: of the Gaussian of eq. (9), in mean distances between the neighbourhood's outcomes and the goal. Wide, it
+            averages the neighbourhood; narrow, it follows the exemplar nearest to the goal.
     """
 
     def __init__(
@@ -33,8 +34,10 @@ class LocalInverse:
         k_max: int = 10,
         dist_n: float | None = None,
         alpha: float = 0.5,
-        width: float = 1e-3,
+        width: float = 0.25,
     ) -> None:
+        if not width > 0:
+            raise ValueError(f"width must be positive, got {width}; it is in mean distances to the goal")
         self.memory = memory
         self.h_max = h_max
         self.k_max = k_max
@@ -101,7 +104,7 @@ class LocallyLinear:
         k_max: int = 10,
         dist_n: float | None = None,
         alpha: float = 0.5,
-        width: float = 1e-3,
+        width: float = 1.0,
     ) -> None:
         if not ridge > 0:
             raise ValueError(f"ridge must be positive, got {ridge}; outcomes on a line have no slope across it")
@@ -132,11 +135,12 @@ class LocallyLinear:
 def gaussian_weights(goal: Array, outcomes: Array, width: float) -> Array:
     """beta of eq. (9): ``(k,)``, summing to one, a Gaussian of each distance between ``outcomes`` and ``goal``.
 
-    The paper leaves the Gaussian's width open: it is the mean distance, and at least ``width``.
+    The paper leaves the Gaussian's width open: here ``width`` mean distances, and at least a millimetre.
     """
     distances = _distances(outcomes, goal)
-    weights = np.exp(-0.5 * (distances / max(width, distances.mean())) ** 2)
-    return weights / weights.sum()  # no goal is so far that all underflow: the nearest lies within one width
+    scaled = distances / max(1e-3, width * distances.mean())
+    weights = np.exp(0.5 * (scaled.min() ** 2 - scaled**2))  # the nearest weighs 1 before normalising: none underflow
+    return weights / weights.sum()
 
 
 _COINCIDENT = 1e-12  # metres: outcomes spread less than this are one outcome, and have no slope

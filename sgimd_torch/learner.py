@@ -1,8 +1,8 @@
 """The learner: whose turn is it, the learner's own curiosity or the answer to its teacher?
 
-Algorithm 1 of Nguyen & Oudeyer (2014), rebuilt. All five learners of the paper are this class with two slots, an autonomous
-and a social strategy. The caller owns the loop: ``move = learner.ask(context)``, execute it, ``learner.tell(outcome)``;
-``learner.watch(demonstration)`` whenever the teacher shows something.
+Algorithm 1 of Nguyen & Oudeyer (2014), rebuilt. All five learners of the paper are this class with two slots, an
+autonomous and a social strategy. The caller owns the loop: ``move = learner.ask(context)``, execute it,
+``learner.tell(outcome)``; ``learner.watch(demonstration)`` whenever the teacher shows something.
 """
 
 from __future__ import annotations

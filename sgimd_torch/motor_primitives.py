@@ -17,7 +17,8 @@ from sgimd_torch.spaces import Array, Box, check_vector
 class GaussianPrimitive:
     """Joint trajectories by Gaussian distance weighting of knots, eq. (5).
 
-    theta in [0, 1]^(n_joints * n_knots + 1) holds the knots joint by joint, scaled to the joint ranges, then the duration.
+    theta in [0, 1]^(n_joints * n_knots + 1) holds the knots joint by joint, scaled to the joint ranges, then the
+    duration.
 
     Args:
         joints: ``(n_joints,)`` box of joint ranges (rad).
@@ -29,7 +30,9 @@ class GaussianPrimitive:
         ValueError: durations that are not 0 < shortest < longest, fewer than two knots, or sharpness not above 0.
     """
 
-    def __init__(self, joints: Box, durations: tuple[float, float], *, n_knots: int = 4, sharpness: float = 9.0) -> None:
+    def __init__(
+        self, joints: Box, durations: tuple[float, float], *, n_knots: int = 4, sharpness: float = 9.0
+    ) -> None:
         if not 0 < durations[0] < durations[1]:
             raise ValueError(f"durations must be 0 < shortest < longest in seconds, got {durations}")
         if n_knots < 2 or not sharpness > 0:
@@ -69,8 +72,8 @@ class GaussianPrimitive:
         """theta_d, the policy that reproduces a demonstrated trajectory closest, eq. (6).
 
         The demonstration's own duration is delta; one shorter or longer than ``durations`` is fitted in its shape and
-        played at the nearest pace allowed. For a fixed delta eq. (5) is linear in the knots, so each joint is one bounded
-        linear least squares (trust-region reflective, the paper's algorithm), exact up to its tolerance.
+        played at the nearest pace allowed. For a fixed delta eq. (5) is linear in the knots, so each joint is one
+        bounded linear least squares (trust-region reflective, the paper's algorithm), exact up to its tolerance.
 
         Args:
             times: ``(n_times,)`` s, increasing, at least ``n_knots`` of them.
@@ -89,16 +92,16 @@ class GaussianPrimitive:
         weights = self._weights((times - times[0]) / span)
         low, sides = self.joints.low, self.joints.sides
         scaled = (trajectory - low) / sides
-        # Free least squares first: exact where the knots stay inside, which lsq_linear only approaches.
+        # Free least squares first: exact where the knots stay inside, but for rounding; lsq_linear only comes near.
         knots = np.linalg.lstsq(weights, scaled, rcond=None)[0]
-        for joint in np.flatnonzero(((knots < 0) | (knots > 1)).any(axis=0)):
+        for joint in np.flatnonzero((np.abs(knots - 0.5) > 0.5 + 1e-9).any(axis=0)):
             knots[:, joint] = lsq_linear(weights, scaled[:, joint], bounds=(0.0, 1.0), method="trf", tol=1e-12).x
         shortest, longest = self.durations
         pace = (np.clip(span, shortest, longest) - shortest) / (longest - shortest)
         return self.policies.clip(np.append(knots.T.ravel(), pace))
 
     def residual(self, theta: ArrayLike, times: ArrayLike, trajectory: ArrayLike) -> float:
-        """What of a demonstration theta does not reproduce: d of eq. (6) as root mean square over samples and joints (rad).
+        """What of a demonstration theta does not reproduce: d of eq. (6), as root mean square (rad).
 
         Raises:
             ValueError: as ``correspondence``.

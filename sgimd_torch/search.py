@@ -20,13 +20,13 @@ Movement = TypeVar("Movement")
 
 def nelder_mead(
     policies: Box,
-    rng: np.random.Generator | None = None,
+    rng: np.random.Generator,
     *,
-    step: float = 0.05,
-    complete: bool = True,
+    step: float = 0.1,
+    complete: bool = False,
     adaptive: bool = False,
-    xatol: float = 1e-4,
-    fatol: float = 1e-4,
+    xatol: float = 0.1,
+    fatol: float = 0.05,
 ) -> Search:
     """Downhill simplex on the distance to the goal, around theta_g and its neighbours.
 
@@ -35,13 +35,17 @@ def nelder_mead(
 
     Args:
         policies: Pi; nothing outside is proposed.
-        rng: not needed, as nothing is drawn; taken so that every search is built alike.
-        step: length of the coordinate steps that stand in for missing neighbours, in sides of ``policies``.
+        rng: draws the directions of the steps that stand in for missing neighbours.
+        step: size of those steps, root mean square over the parameters, in sides of ``policies``. Deviation: the usual
+            first simplex steps along one coordinate at a time, but one knot of one joint often moves the float hardly
+            at all; these steps go in random directions.
         complete: fill the simplex up to theta_dim + 1 vertices, the paper's 26, at one movement each. False: only up to
             outcome_dim + 1, so that with some neighbours the first reflection is the second movement. The search then
             stays in the flat through its vertices, where, theta being redundant, the goal usually can be met as well.
+            Deviation: False is the default, as 25 steps would be the whole budget of a goal.
         adaptive: Gao & Han's coefficients (2012), gentler in high dimensions.
-        xatol, fatol: it ends when all vertices are this near the best, in theta and in metres from the goal.
+        xatol, fatol: it ends when all vertices are this near the best, in theta and in metres from the goal. Below the
+            noise of the outcomes a simplex cannot tell better from worse; it is better begun anew.
 
     Raises:
         ValueError: ``step`` is not in (0, 0.5].
@@ -62,7 +66,7 @@ def nelder_mead(
                 values.append(float(distances[k]))
         n_vertices = 1 + (policies.dim if complete else min(policies.dim, len(goal)))
         while len(vertices) < n_vertices:
-            vertex = _step_inwards(policies, theta, flat.farthest_axis(), step)
+            vertex = _step_inwards(policies, theta, flat.direction_out(rng), step)
             flat.widen(vertex)
             vertices.append(vertex)
             values.append(math.dist(goal, (yield vertex)))
@@ -199,20 +203,22 @@ class _Flat:
         across = self._across(point - self._origin)
         self._basis = np.vstack((self._basis, across / np.linalg.norm(across)))
 
-    def farthest_axis(self) -> int:
-        """The coordinate axis that leads out most steeply, the first of equals."""
-        return int(np.linalg.norm(self._across(np.eye(len(self._origin))), axis=1).round(9).argmax())
+    def direction_out(self, rng: np.random.Generator) -> Array:
+        """A random unit vector at right angles to the flat."""
+        across = self._across(rng.standard_normal(len(self._origin)))
+        return across / np.linalg.norm(across)
 
     def _across(self, edges: Array) -> Array:
         return edges - edges @ self._basis.T @ self._basis
 
 
-def _step_inwards(policies: Box, theta: Array, axis: int, step: float) -> Array:
-    """``theta`` moved along ``axis``: down where up would leave the box, since clipping would flatten the simplex."""
-    length = step * policies.sides[axis]
-    vertex = theta.copy()
-    vertex[axis] += length if theta[axis] + length <= policies.high[axis] else -length
-    return vertex
+def _step_inwards(policies: Box, theta: Array, direction: Array, step: float) -> Array:
+    """``theta`` moved along ``direction``, mirrored in the coordinates that would leave the box: clipping them would
+    flatten the simplex."""
+    change = step * np.sqrt(policies.dim) * policies.sides * direction
+    forth, back = theta + change, theta - change
+    outside = (forth < policies.low) | (forth > policies.high)
+    return policies.clip(np.where(outside, back, forth))
 
 
 def _towards(goal: Array, descent: Generator[Array, float, None]) -> Generator[Array, Array, None]:

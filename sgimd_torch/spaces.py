@@ -102,7 +102,7 @@ class Box:
     def contains(self, points: ArrayLike) -> NDArray[np.bool_]:
         """``(...)`` whether each point of ``(..., dim)`` lies inside, the border included."""
         points = np.asarray(points, dtype=np.float64)
-        return ((points >= self.low) & (points <= self.high)).all(axis=-1)
+        return np.all((points >= self.low) & (points <= self.high), axis=-1)
 
     def check(self, name: str, points: ArrayLike, hint: str = "") -> Array:
         """``points`` as float64 ``(..., dim)``, all inside.

@@ -86,7 +86,7 @@ class GoalBabbling:
         judge: Judge,
         rng: np.random.Generator,
         *,
-        budget: int = 20,
+        budget: int = 15,
         tolerance: float = 0.02,
         global_range: tuple[float, float] = (0.05, 0.95),
     ) -> None:
@@ -168,7 +168,7 @@ class Imitate:
         policies: Box,
         rng: np.random.Generator,
         *,
-        repeats: int | None = 10,
+        repeats: int | None = 20,
         epsilon: float = 0.05,
         goals: Goals | None = None,
         judge: Judge | None = None,
@@ -226,5 +226,4 @@ class Remember:
     def attempt(self, context: Array, theta_d: Array, demonstration: Demonstration) -> Attempt:
         """No movement."""
         self.memory.add(context, theta_d, demonstration.outcome)
-        return
-        yield  # makes this a generator
+        yield from ()  # makes this a generator

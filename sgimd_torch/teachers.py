@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, Demonstration
@@ -30,7 +31,7 @@ Choose = Callable[[Sequence[Demonstration], Memory, np.random.Generator], Demons
 
 def at_random(demonstrations: Sequence[Demonstration], memory: Memory, rng: np.random.Generator) -> Demonstration:
     """Any of them, alike."""
-    return demonstrations[rng.integers(len(demonstrations))]
+    return demonstrations[int(rng.integers(len(demonstrations)))]
 
 
 def least_explored(
@@ -42,19 +43,20 @@ def least_explored(
         tiles: in each dimension of the box around the demonstrated outcomes.
     """
     demonstrated = np.stack([demonstration.outcome for demonstration in demonstrations])
-    low = demonstrated.min(axis=0)
-    side = np.maximum(demonstrated.max(axis=0) - low, np.finfo(np.float64).tiny) / tiles
+    low, high = demonstrated.min(axis=0), demonstrated.max(axis=0)
+    side = np.maximum(high - low, 1e-9) / tiles  # demonstrations on a line span no box across it
 
-    def tile_of(outcomes: Array) -> np.ndarray:
-        inside = np.clip((outcomes - low) / side, -1, tiles)  # -1: below the box; its upper border belongs to the last tile
-        cells = np.where(outcomes == low + side * tiles, tiles - 1, np.floor(inside)).astype(np.int64) + 1
+    def tile_of(outcomes: Array) -> NDArray[np.int64]:
+        inside = np.clip((outcomes - low) / side, -1, tiles)  # -1: below the box; tiles: above it
+        # The upper border belongs to the last tile, or the farthest demonstrations would stand alone.
+        cells = np.where(outcomes == high, tiles - 1, np.floor(inside)).astype(np.int64) + 1
         return np.ravel_multi_index(tuple(cells.T), (tiles + 2,) * outcomes.shape[1])
 
     ours = tile_of(demonstrated)
     candidates = np.unique(ours)
     reached = np.bincount(tile_of(memory.outcomes), minlength=candidates[-1] + 1)[candidates]
     tile = rng.choice(candidates[reached == reached.min()])
-    return demonstrations[rng.choice(np.flatnonzero(ours == tile))]
+    return demonstrations[int(rng.choice(np.flatnonzero(ours == tile)))]
 
 
 class PeriodicTeacher:
@@ -83,9 +85,7 @@ class PeriodicTeacher:
 class InitialTeacher:
     """Gives all its demonstrations at the start, each once, in random order, one before every ``every`` movements."""
 
-    def __init__(
-        self, demonstrations: Sequence[Demonstration], rng: np.random.Generator, *, every: int = 10
-    ) -> None:
+    def __init__(self, demonstrations: Sequence[Demonstration], rng: np.random.Generator, *, every: int = 10) -> None:
         self.demonstrations = _some(demonstrations)
         self.every = _at_least_one("every", every)
         self._order = rng.permutation(len(demonstrations))
@@ -123,7 +123,7 @@ class AskedTeacher:
 
     def offer(self, index: int, memory: Memory) -> Demonstration | None:
         """See ``Teacher``."""
-        if index == 0 or index % self.patience or len(memory) == 0:
+        if index == 0 or index % self.patience:
             return None
         before, self._distance = self._distance, self._distance_left(memory)
         if self._distance < (1 - self.threshold) * before:
@@ -131,6 +131,8 @@ class AskedTeacher:
         return self.choose(self.demonstrations, memory, self.rng)
 
     def _distance_left(self, memory: Memory) -> float:
+        if len(memory) == 0:  # a learner that has yet to move stalls, too
+            return np.inf
         distances = [
             np.linalg.norm(memory.outcomes[memory.near_outcomes(d.context, d.outcome, 1)] - d.outcome)
             for d in self.demonstrations

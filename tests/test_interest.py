@@ -307,12 +307,13 @@ COORDINATE = st.one_of(st.sampled_from([-1.0, -0.5, 0.0, 0.5, 1.0]), st.floats(-
 POINTS = st.lists(st.tuples(COORDINATE, COORDINATE, COORDINATE), min_size=30, max_size=120)
 
 
-@given(points=POINTS, seed=st.integers(0, 99), max_aspect=st.sampled_from([np.inf, 2.0]))
-@settings(max_examples=40, deadline=None, derandomize=True)
-def test_leaves_tile_the_box_and_keep_each_goal_once_whatever_is_added(points, seed, max_aspect):
+@given(points=POINTS, seed=st.integers(0, 99), max_aspect=st.sampled_from([np.inf, 2.0]), cuts=st.sampled_from([3, 20]))
+@settings(max_examples=60, deadline=None, derandomize=True)
+def test_leaves_tile_the_box_and_keep_each_goal_once_whatever_is_added(points, seed, max_aspect, cuts):
     box, rng = Box.cube(-1, 1, 3), stream(seed, "planted")
     contexts, outcomes = Box.cube(-1, 1, 1), Box.cube(-1, 1, 2)
-    goals = InterestMap(contexts, outcomes, stream(seed, "goals"), g_max=8, window=4, max_aspect=max_aspect)
+    options = {"max_aspect": max_aspect, "cuts": cuts}  # few cuts fall on goals, many between them
+    goals = InterestMap(contexts, outcomes, stream(seed, "goals"), g_max=8, window=4, **options)
     competences = -rng.permutation(len(points)) / len(points)  # each its own
     kept, after = 0, goals.regions
     for point, competence in zip(np.array(points), competences, strict=True):

@@ -42,15 +42,24 @@ def random_memory(n: int, theta_dim: int = 25) -> Memory:
 
 def test_theta_is_the_gaussian_weighted_mean_of_the_neighbourhood() -> None:
     memory = line({0.0: 0.0, 0.1: 1.0})
-    theta = LocalInverse(memory)(NO_CONTEXT, np.array([0.25])).theta
     # Distances 1/4 and 3/4, width their mean 1/2: weights exp(-1/8) and exp(-9/8), that is 1 : 1/e.
+    theta = LocalInverse(memory, width=1.0)(NO_CONTEXT, np.array([0.25])).theta
     assert theta[0] == pytest.approx(0.1 / (1 + np.e))
+    # Half as wide: exp(-1/2) and exp(-9/2), that is 1 : 1/e^4.
+    theta = LocalInverse(memory, width=0.5)(NO_CONTEXT, np.array([0.25])).theta
+    assert theta[0] == pytest.approx(0.1 / (1 + np.e**4))
 
 
-def test_the_width_of_the_gaussian_has_a_floor() -> None:
-    memory = line({0.0: 0.0, 0.1: 1.0})
-    theta = LocalInverse(memory, width=1e6)(NO_CONTEXT, np.array([0.0])).theta
-    assert theta[0] == pytest.approx(0.05)
+def test_a_wide_gaussian_averages_and_a_narrow_one_follows_the_nearest() -> None:
+    memory = line({0.0: 0.1, 0.1: 0.9})
+    for width, theta in ((1e6, 0.05), (1e-6, 0.0)):
+        assert LocalInverse(memory, width=width)(NO_CONTEXT, np.zeros(1)).theta[0] == pytest.approx(theta)
+
+
+def test_the_width_of_the_gaussian_has_a_floor_of_a_millimetre() -> None:
+    memory = line({0.0: 0.0, 0.1: 1e-3})
+    theta = LocalInverse(memory, width=1e-6)(NO_CONTEXT, np.zeros(1)).theta
+    assert theta[0] == pytest.approx(0.1 / (1 + np.exp(0.5)))  # a millimetre off weighs exp(-1/2)
     copies = line({0.0: 0.5, 0.1: 0.5})
     assert LocalInverse(copies)(NO_CONTEXT, np.array([0.5])).theta[0] == pytest.approx(0.05)
 
@@ -123,9 +132,9 @@ def linear_world(noise: float = 0.0) -> tuple[Memory, Array, Box]:
 def test_where_outcomes_are_linear_in_theta_the_linear_model_meets_the_goal_exactly() -> None:
     memory, jacobian, policies = linear_world()
     goal = memory.outcomes.mean(axis=0) + np.array([0.1, -0.05])
-    linear = LocallyLinear(memory, policies=policies, ridge=1e-12)(NO_CONTEXT, goal)
+    linear = LocallyLinear(memory, policies=policies, ridge=1e-12, width=1.0)(NO_CONTEXT, goal)
     assert linear.theta @ jacobian == pytest.approx(goal, abs=1e-9)
-    local = LocalInverse(memory)(NO_CONTEXT, goal)
+    local = LocalInverse(memory, width=1.0)(NO_CONTEXT, goal)
     assert np.linalg.norm(local.theta @ jacobian - goal) > 0.01  # an average alone stays among what was reached
     assert np.array_equal(linear.thetas, local.thetas)
 
@@ -133,8 +142,8 @@ def test_where_outcomes_are_linear_in_theta_the_linear_model_meets_the_goal_exac
 def test_a_strong_ridge_leaves_the_weighted_mean() -> None:
     memory, _, policies = linear_world(noise=0.02)
     goal = np.array([0.3, 0.2])
-    ridged = LocallyLinear(memory, policies=policies, ridge=1e12)(NO_CONTEXT, goal)
-    assert ridged.theta == pytest.approx(LocalInverse(memory)(NO_CONTEXT, goal).theta)
+    ridged = LocallyLinear(memory, policies=policies, ridge=1e12, width=1.0)(NO_CONTEXT, goal)
+    assert ridged.theta == pytest.approx(LocalInverse(memory, width=1.0)(NO_CONTEXT, goal).theta)
 
 
 def test_the_linear_model_does_not_care_in_which_unit_outcomes_are_measured() -> None:
@@ -221,6 +230,12 @@ def test_the_neighbours_of_another_context_do_not_count() -> None:
         memory.add(np.array([context]), np.array([theta]), np.zeros(1))
     assert LocalInverse(memory)(np.array([0.0]), np.zeros(1)).theta[0] == pytest.approx(0.105)
     assert LocalInverse(memory)(np.array([5.0]), np.zeros(1)).theta[0] == pytest.approx(0.905)
+
+
+def test_a_gaussian_without_width_is_refused() -> None:
+    for width in (0.0, -1.0, np.nan):
+        with pytest.raises(ValueError, match="width"):
+            LocalInverse(line({0.0: 0.0}), width=width)
 
 
 def test_a_ridge_of_nothing_is_refused() -> None:

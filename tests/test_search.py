@@ -1,6 +1,7 @@
 """Searches: scipy's Nelder-Mead point for point, remembered outcomes at no cost, and movements that can be counted."""
 
 from collections.abc import Callable, Generator
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
@@ -114,6 +115,13 @@ class World:
         return drive(search(self.start, self.goal), self.execute, n)
 
 
+def rng() -> np.random.Generator:
+    return stream(0, "search")
+
+
+simplex_search = partial(nelder_mead, step=0.05, complete=True, adaptive=False, xatol=1e-4, fatol=1e-4)
+
+
 def reflection(world: World, vertices: Array) -> Array:
     """The worst vertex mirrored at the mean of the others."""
     order = np.argsort([world.distance(vertex) for vertex in vertices])
@@ -122,7 +130,7 @@ def reflection(world: World, vertices: Array) -> Array:
 
 def test_with_enough_neighbours_the_first_reflection_is_the_second_movement() -> None:
     world = World(dim=6, k=6)
-    executed = world.run(nelder_mead(world.policies), n=2)
+    executed = world.run(simplex_search(world.policies, rng()), n=2)
     assert np.array_equal(executed[0], world.theta)
     assert executed[1] == pytest.approx(reflection(world, np.vstack((world.theta, world.thetas))))
 
@@ -131,28 +139,46 @@ def test_remembered_outcomes_are_used_as_they_are_and_not_executed_again() -> No
     world = World(dim=6, k=6)
     lucky = world.execute(world.thetas)
     lucky[2] = world.goal + 10  # what memory says of the third, though it would now land elsewhere
-    search = nelder_mead(world.policies)(Estimate(world.theta, world.thetas, lucky), world.goal)
+    search = simplex_search(world.policies, rng())(Estimate(world.theta, world.thetas, lucky), world.goal)
     executed = drive(search, world.execute, 30)
     others = np.vstack((world.theta, np.delete(world.thetas, 2, axis=0)))
     assert executed[1] == pytest.approx(2 * others.mean(axis=0) - world.thetas[2])
     assert not any((theta == world.thetas).all(axis=1).any() for theta in executed)
 
 
-def test_missing_neighbours_are_replaced_by_coordinate_steps_to_a_simplex_that_is_not_flat() -> None:
+def test_missing_neighbours_are_replaced_by_random_steps_at_right_angles_to_a_simplex_that_is_not_flat() -> None:
     world = World(dim=6, k=3)
-    executed = np.array(world.run(nelder_mead(world.policies, step=0.04), n=5))
+    executed = np.array(world.run(simplex_search(world.policies, rng(), step=0.04), n=5))
     steps = executed[1:4] - world.theta
-    assert np.sort(np.abs(steps), axis=1)[:, -2:] == pytest.approx(np.tile([0, 0.04], (3, 1)))
-    vertices = np.vstack((executed[:4], world.thetas))
-    assert np.linalg.matrix_rank(vertices[1:] - vertices[0], tol=1e-3) == 6
-    assert executed[4] == pytest.approx(reflection(world, vertices))
+    assert np.sqrt((steps**2).mean(axis=1)) == pytest.approx([0.04] * 3)
+    assert np.count_nonzero(steps) == 18  # no coordinate stands still
+    edges = np.vstack((world.thetas - world.theta, steps))
+    assert edges @ steps.T == pytest.approx(np.vstack((np.zeros((3, 3)), 6 * 0.04**2 * np.eye(3))))
+    assert executed[4] == pytest.approx(reflection(world, np.vstack((executed[:4], world.thetas))))
+
+
+def test_random_steps_are_as_long_in_sides_of_a_box_of_unequal_sides() -> None:
+    policies = Box(np.zeros(3), np.array([1.0, 10.0, 1000.0]))
+    start = Estimate(policies.sides / 2, np.empty((0, 3)), np.empty((0, 2)))
+    search = simplex_search(policies, rng(), step=0.04)(start, np.zeros(2))
+    executed = np.array(drive(search, lambda theta: np.ones(2), 2))
+    assert np.sqrt((((executed[1] - executed[0]) / policies.sides) ** 2).mean()) == pytest.approx(0.04)
+
+
+def test_other_streams_step_in_other_directions_and_the_same_stream_in_the_same() -> None:
+    world = World(dim=4, k=0)
+    first, same, other = (
+        np.array(world.run(simplex_search(world.policies, stream(seed, "search")), n=20)) for seed in (1, 1, 2)
+    )
+    assert np.array_equal(first, same)
+    assert not np.isclose(first[1], other[1]).any()
 
 
 def test_neighbours_that_would_flatten_the_simplex_are_left_out_the_worst_first() -> None:
     world = World(dim=5, k=3)
     world.theta = np.array([0.5, 0.3, 0.2]) @ world.thetas  # a mean, as the inverse model makes it: one is redundant
     world.thetas = np.array(sorted(world.thetas, key=world.distance, reverse=True))
-    executed = world.run(nelder_mead(world.policies, complete=False), n=2)
+    executed = world.run(simplex_search(world.policies, rng(), complete=False), n=2)
     assert executed[1] == pytest.approx(reflection(world, np.vstack((world.theta, world.thetas[1:]))))
 
 
@@ -161,16 +187,16 @@ def test_neighbours_nearly_on_a_line_or_nearly_at_its_origin_make_no_vertex() ->
     edge = world.thetas[0] - world.theta
     askew = world.theta - 0.9 * edge + 0.05 * np.cross(edge, [0, 0, 1])
     beside = world.theta + np.array([0, 0, 1e-6])
-    alone = world.run(nelder_mead(world.policies), n=5)
+    alone = world.run(simplex_search(world.policies, rng()), n=5)
     world.thetas = np.vstack((world.thetas, askew, beside))
     world.goal = world.execute(world.thetas[0])  # so that the best neighbour is the one that was alone
-    assert np.array_equal(world.run(nelder_mead(world.policies), n=3), alone[:3])
+    assert np.array_equal(world.run(simplex_search(world.policies, rng()), n=3), alone[:3])
 
 
 def test_copies_of_one_movement_make_one_vertex() -> None:
     world = World(dim=3, k=1)
     world.thetas = np.vstack((np.tile(world.thetas, (4, 1)), world.theta))
-    executed = np.array(world.run(nelder_mead(world.policies), n=4))
+    executed = np.array(world.run(simplex_search(world.policies, rng()), n=4))
     vertices = np.vstack((executed[:3], world.thetas[:1]))
     assert np.linalg.matrix_rank(vertices[1:] - vertices[0], tol=1e-3) == 3
     assert executed[3] == pytest.approx(reflection(world, vertices))
@@ -178,7 +204,7 @@ def test_copies_of_one_movement_make_one_vertex() -> None:
 
 def test_an_incomplete_simplex_stays_in_the_flat_of_its_vertices_and_still_meets_the_goal() -> None:
     world = World(dim=25, k=4)
-    executed = np.array(world.run(nelder_mead(world.policies, complete=False), n=80))
+    executed = np.array(world.run(simplex_search(world.policies, rng(), complete=False), n=80))
     flat = np.linalg.qr((world.thetas - world.theta).T)[0]
     edges = executed - world.theta
     assert np.abs(edges - edges @ flat @ flat.T).max() < 1e-12
@@ -187,8 +213,7 @@ def test_an_incomplete_simplex_stays_in_the_flat_of_its_vertices_and_still_meets
 
 def test_an_incomplete_simplex_without_neighbours_steps_once_per_outcome_dimension() -> None:
     world = World(dim=25, k=0)
-    executed = np.array(world.run(nelder_mead(world.policies, complete=False), n=60))
-    assert [np.count_nonzero(theta - world.theta) for theta in executed[:3]] == [0, 1, 1]
+    executed = np.array(world.run(simplex_search(world.policies, rng(), complete=False), n=60))
     assert executed[3] == pytest.approx(reflection(world, executed[:3]))
     assert np.linalg.matrix_rank(executed - world.theta, tol=1e-9) == 2
 
@@ -196,16 +221,16 @@ def test_an_incomplete_simplex_without_neighbours_steps_once_per_outcome_dimensi
 @pytest.mark.parametrize("complete", [True, False])
 def test_the_simplex_ends_on_the_goal_where_nothing_is_random(complete: bool) -> None:
     world = World(dim=4, k=2)
-    executed = world.run(nelder_mead(world.policies, complete=complete))
+    executed = world.run(simplex_search(world.policies, rng(), complete=complete))
     assert 5 < len(executed) < 300  # it ended by itself
     assert min(world.distance(theta) for theta in executed) < 1e-3
 
 
 def searches(policies: Box, rng: np.random.Generator) -> dict[str, Search]:
     return {
-        "complete": nelder_mead(policies, step=0.5),
-        "incomplete": nelder_mead(policies, complete=False),
-        "adaptive": nelder_mead(policies, adaptive=True),
+        "complete": simplex_search(policies, rng, step=0.5),
+        "incomplete": simplex_search(policies, rng, complete=False),
+        "adaptive": simplex_search(policies, rng, adaptive=True),
         "perturb": perturb(policies, rng, sd=0.5),
     }
 
@@ -224,14 +249,17 @@ def test_no_search_leaves_the_policy_space_even_from_its_corners_towards_noise(n
 @pytest.mark.parametrize("corner", [0.0, 1.0])
 def test_a_simplex_begun_in_a_corner_steps_inwards_and_is_not_flat(corner: float) -> None:
     world = World(dim=5, k=0, centre=np.full(5, corner))
-    executed = np.array(world.run(nelder_mead(world.policies), n=6))
+    executed = np.array(world.run(simplex_search(world.policies, rng(), step=0.05), n=6))
     assert np.linalg.matrix_rank(executed[1:] - executed[0], tol=1e-3) == 5
+    assert np.sqrt(((executed[1:] - executed[0]) ** 2).mean(axis=1)) == pytest.approx(
+        [0.05] * 5
+    )  # mirrored, not clipped
 
 
 def test_a_start_outside_the_policy_space_is_refused() -> None:
     world = World(dim=2, k=2)
     outside = world.start._replace(theta=np.array([0.5, 1.5]))
-    for search in (nelder_mead(world.policies), perturb(world.policies, stream(0, "search"))):
+    for search in (simplex_search(world.policies, rng()), perturb(world.policies, stream(0, "search"))):
         with pytest.raises(ValueError, match="must lie in"):
             next(search(outside, world.goal))
 
@@ -239,7 +267,7 @@ def test_a_start_outside_the_policy_space_is_refused() -> None:
 def test_wrong_steps_and_noise_are_refused() -> None:
     for step in (0.0, 0.6, np.nan):
         with pytest.raises(ValueError, match="step"):
-            nelder_mead(Box.cube(0, 1, 2), step=step)
+            simplex_search(Box.cube(0, 1, 2), rng(), step=step)
     with pytest.raises(ValueError, match="sd"):
         perturb(Box.cube(0, 1, 2), stream(0, "search"), sd=0.0)
 
@@ -335,6 +363,6 @@ def test_a_negative_limit_is_refused_before_anything_runs() -> None:
 
 def test_a_limited_search_is_a_search_cut_short() -> None:
     world = World(dim=6, k=3)
-    whole = world.run(nelder_mead(world.policies))
-    search = nelder_mead(world.policies)(world.start, world.goal)
+    whole = world.run(simplex_search(world.policies, rng()))
+    search = simplex_search(world.policies, rng())(world.start, world.goal)
     assert np.array_equal(drive(limit(search, 12), world.execute), whole[:12])

@@ -1,0 +1,246 @@
+"""What a run is made of: one documented field for each choice; the command line of ``run.py`` is made from them.
+
+Each default is read off the library, where it is explained, and each option is an ablation of one changed word.
+    config, resume = parse(["--algorithm", "sagg-riac", "--goals", "uniform", "--resume"])
+"""
+
+from __future__ import annotations
+
+import argparse
+import difflib
+import inspect
+import math
+import re
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, fields
+from functools import partial
+from pathlib import Path
+from typing import Any, Final, NoReturn
+
+import jsonargparse
+
+from sgimd_torch.algorithms import MakeSearch, attempted, emulating, goal_babbling, imitating, remembered
+from sgimd_torch.environment import Environment
+from sgimd_torch.evaluation import evaluate
+from sgimd_torch.fishing_rod import FishingRod
+from sgimd_torch.interest import InterestMap, UniformGoals, absolute_progress, signed_progress
+from sgimd_torch.inverse_model import LocalInverse, LocallyLinear, NearestNeighbour
+from sgimd_torch.memory import Memory
+from sgimd_torch.search import nelder_mead, perturb
+from sgimd_torch.spaces import Array, Estimate
+from sgimd_torch.teachers import AskedTeacher, InitialTeacher, PeriodicTeacher, at_random, least_explored
+
+Inverse = Callable[[Array, Array], Estimate]
+
+
+def _linear(memory: Memory, environment: Environment) -> Inverse:
+    return LocallyLinear(memory, policies=environment.policies)
+
+
+ALGORITHMS: Final = ("random", "sagg-riac", "imitation", "observation", "sgim-d")
+TAUGHT: Final = ("imitation", "observation", "sgim-d")
+GOALS: Final = {"interest-map": InterestMap, "uniform": UniformGoals}
+PROGRESS: Final = {"absolute": absolute_progress, "signed": signed_progress}
+SEARCHES: Final[dict[str, MakeSearch]] = {
+    "nelder-mead": nelder_mead,
+    "nelder-mead-complete": partial(nelder_mead, complete=True),
+    "perturb": perturb,
+}
+INVERSES: Final[dict[str, Callable[[Memory, Environment], Inverse]]] = {
+    "paper": lambda memory, _: LocalInverse(memory),
+    "nearest": lambda memory, _: NearestNeighbour(memory),
+    "linear": _linear,
+}
+COMPETENCES: Final = {"memory": remembered, "attempt": attempted}
+ANSWERS: Final = {"imitate": imitating, "emulate": emulating}
+TEACHERS: Final = {"periodic": PeriodicTeacher, "initial": InitialTeacher, "asked": AskedTeacher}
+CHOICES: Final = {"least-explored": least_explored, "random": at_random}
+
+
+def _default(function: Callable[..., Any], name: str) -> Any:
+    return inspect.signature(function).parameters[name].default
+
+
+def _name_of(table: dict[str, Any], function: Callable[..., object], name: str) -> str:
+    return next(key for key, part in table.items() if part is _default(function, name))
+
+
+@dataclass(frozen=True)
+class Config:
+    """One run.
+
+    Args:
+        algorithm: Who learns: random, sagg-riac, imitation, observation or sgim-d.
+        seed: Seed of all random streams of the run, at least 0; the same seed gives the same files, byte for byte.
+        movements: Length of the learner's life, movements at rest counted.
+        out: Directory for runs; this one goes to OUT/NAME/seed-003.
+        name: NAME in that path, to keep a variant apart; null is the algorithm's name.
+        noise: Motor noise (s), standard deviation of the command (rad) for each rad/s of commanded speed; 0 is none.
+        task_space: Half the side (m) of the square that goals come from; 100 in the paper's large-space experiment.
+        goals: Where goals come from (sagg-riac, sgim-d): interest-map, or uniform, the same everywhere.
+        window: How many competences of a region its interest is measured over, the paper's zeta; even.
+        progress: What is interesting: absolute progress, as in the paper, or signed, which ignores falling competence.
+        competence: What a goal's competence is judged by: attempt, the movements made for it, or memory, all ever made.
+        search: How a movement is refined (sagg-riac, sgim-d): nelder-mead, in the plane of the neighbours;
+            nelder-mead-complete, which first fills up the paper's simplex of 26; perturb, the best so far plus noise.
+        budget: Movements for one goal, at most (sagg-riac, sgim-d).
+        inverse: Which movement is inferred for a goal, when learning and in evaluations: paper, nearest or linear.
+        social: How sgim-d answers a demonstration: imitate it, or emulate, pursue its outcome in the learner's own way.
+        imitations: Movements that sgim-d spends on imitating a demonstration.
+        epsilon: Bound of the variation in each parameter of theta when imitating (imitation, sgim-d).
+        teacher: When demonstrations come: periodic, initial (all at the start) or asked (when the learner stalls).
+        every: Movements from one demonstration to the next, or from one look at the learner to the next (asked); null
+            is that teacher's own number.
+        choice: Which demonstration comes (periodic, asked): least-explored by the learner, or random.
+        demonstrations: File of recorded demonstrations; null is the shipped one.
+        evaluate_at: Movements after which to evaluate, besides the end, such as 250,500; null is 250, 500 and every
+            1000; [] never evaluates, not at the end either. Evaluating changes nothing in the run.
+        repeats: How many times an evaluation executes each chosen movement again to measure the noise, at least 2; 0
+            leaves the noise out.
+        benchmark: File of the goals to evaluate on; null is the shipped one.
+        threads: Threads that an evaluation may use; results do not depend on it.
+    """
+
+    algorithm: str = "sgim-d"
+    seed: int = 0
+    movements: int = 5000
+    out: Path = Path("runs")
+    name: str | None = None
+    noise: float = _default(FishingRod, "noise")
+    task_space: float = 1.0
+    goals: str = _name_of(GOALS, goal_babbling, "goals")
+    window: int = _default(InterestMap, "window")
+    progress: str = _name_of(PROGRESS, InterestMap, "progress")
+    competence: str = _name_of(COMPETENCES, goal_babbling, "judge")
+    search: str = _name_of(SEARCHES, goal_babbling, "search")
+    budget: int = _default(goal_babbling, "budget")
+    inverse: str = "paper"
+    social: str = "imitate"
+    imitations: int = _default(imitating, "repeats")
+    epsilon: float = _default(imitating, "epsilon")
+    teacher: str = "periodic"
+    every: int | None = None
+    choice: str = _name_of(CHOICES, PeriodicTeacher, "choose")
+    demonstrations: Path | None = None
+    evaluate_at: tuple[int, ...] | None = None
+    repeats: int = _default(evaluate, "repeats")
+    benchmark: Path | None = None
+    threads: int = 1
+
+    def __post_init__(self) -> None:
+        for name, known in (
+            ("algorithm", ALGORITHMS),
+            ("goals", GOALS),
+            ("progress", PROGRESS),
+            ("competence", COMPETENCES),
+            ("search", SEARCHES),
+            ("inverse", INVERSES),
+            ("social", ANSWERS),
+            ("teacher", TEACHERS),
+            ("choice", CHOICES),
+        ):
+            check_known(name, getattr(self, name), known)
+        for name, least in (
+            ("seed", 0),
+            ("movements", 1),
+            ("budget", 1),
+            ("imitations", 1),
+            ("repeats", 0),
+            ("threads", 1),
+        ):
+            _check_least(name, getattr(self, name), least)
+        if self.repeats == 1:
+            raise ValueError("repeats must be 0 or at least 2, got 1; one landing point does not scatter")
+        if self.every is not None:
+            _check_least("every", self.every, 1)
+        for movements in self.evaluate_at or ():
+            _check_least("evaluate_at", movements, 1)
+        for name in ("noise", "epsilon"):
+            if not 0 <= getattr(self, name) < math.inf:
+                raise ValueError(f"{name} must be finite and at least 0, got {getattr(self, name)}")
+        if not 0 < self.task_space < math.inf:
+            raise ValueError(f"task_space must be a length in metres above 0, got {self.task_space}")
+        if self.variant in ("", ".", "..") or any(sign in self.variant for sign in "/\\\0"):
+            raise ValueError(f"name must be that of one directory, got {self.variant!r}; is the path for --out?")
+
+    @property
+    def variant(self) -> str:
+        """What the run's directory and its curve are called."""
+        return self.algorithm if self.name is None else self.name
+
+    @property
+    def directory(self) -> Path:
+        """Where the run is written."""
+        return self.out / self.variant / f"seed-{self.seed:03d}"
+
+    @property
+    def evaluations(self) -> list[int]:
+        """The numbers of movements after which to evaluate, in order."""
+        if self.evaluate_at == ():
+            return []
+        standard = (250, 500, *range(1000, self.movements, 1000))
+        chosen = standard if self.evaluate_at is None else self.evaluate_at
+        return sorted({movements for movements in chosen if movements < self.movements} | {self.movements})
+
+
+def parse(argv: Sequence[str], description: str | None = None) -> tuple[Config, bool]:
+    """The run that a command line asks for, and whether to resume it.
+
+    Raises:
+        SystemExit: with code 2 and a message on stderr when it makes no sense, 0 after ``--help``.
+    """
+    parser = _Parser(
+        prog="run.py", usage="%(prog)s [--OPTION VALUE ...] [--resume]", description=description, formatter_class=_Help
+    )
+    parser.add_class_arguments(Config)
+    parser.add_argument(
+        "--resume", action="store_true", help="Go on with a stopped or killed run, or lengthen a finished one."
+    )
+    options = {f"--{field.name}" for field in fields(Config)} | {"--resume", "--help"}
+    arguments: list[str] = []
+    for argument in argv:
+        name, equals, value = argument.partition("=")
+        if name.startswith("--"):  # --task-space is --task_space
+            name = name.replace("-", "_").replace("__", "--", 1)
+            if name not in options:
+                near = difflib.get_close_matches(name, options, 1)
+                parser.error(f"unknown option {argument}" + (f"; did you mean {near[0]}?" if near else ""))
+            argument = name + equals + value
+        elif arguments and arguments[-1] == "--evaluate_at" and re.fullmatch(r"\d+(,\d+)*", argument):
+            argument = f"[{argument}]"
+        arguments.append(argument)
+    values = parser.parse_args(arguments).as_dict()
+    resume = values.pop("resume")
+    try:
+        return Config(**values), resume
+    except ValueError as error:
+        parser.error(str(error))
+
+
+class _Help(jsonargparse.DefaultHelpFormatter, argparse.RawDescriptionHelpFormatter):
+    """Keeps the lines of the examples."""
+
+
+class _Parser(jsonargparse.ArgumentParser):
+    def error(self, message: str, ex: Exception | None = None) -> NoReturn:
+        print(f"error: {message}\n--help lists all options", file=sys.stderr)
+        raise SystemExit(2)
+
+
+def check_known(what: str, name: str, known: Iterable[str]) -> None:
+    """Refuse a name that is not ``known``, suggesting the nearest.
+
+    Raises:
+        ValueError: the name is unknown.
+    """
+    known = list(known)
+    if name not in known:
+        near = difflib.get_close_matches(name.lower().replace("_", "-"), known, 1, 0.5)
+        slip = f"; did you mean {near[0]}?" if near else ""
+        raise ValueError(f"unknown {what} {name!r}, known are {', '.join(known)}{slip}")
+
+
+def _check_least(name: str, value: int, least: int) -> None:
+    if value < least:
+        raise ValueError(f"{name} must be at least {least}, got {value}")

@@ -1,0 +1,128 @@
+"""The composition root: from a ``Config`` to the parts of a run. Each option gets its meaning here.
+
+parts = build(Config(seed=3)); for episode in run(parts.learner, parts.environment, 3, teacher=parts.teacher, ...): ...
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from config import (
+    CHOICES,
+    COMPETENCES,
+    INVERSES,
+    PROGRESS,
+    SEARCHES,
+    TAUGHT,
+    Config,
+    Inverse,
+)
+from sgimd_torch import algorithms
+from sgimd_torch.algorithms import MakeGoals, MakeSocial, Parts, emulating, imitating
+from sgimd_torch.demonstrations import SHIPPED as SHIPPED_DEMONSTRATIONS
+from sgimd_torch.demonstrations import load_demonstrations
+from sgimd_torch.evaluation import SHIPPED as SHIPPED_BENCHMARK
+from sgimd_torch.evaluation import Benchmark, load_benchmark
+from sgimd_torch.fishing_rod import JOINTS, FishingRod
+from sgimd_torch.interest import InterestMap, UniformGoals
+from sgimd_torch.learner import Learner
+from sgimd_torch.spaces import Box, Demonstration, stream
+from sgimd_torch.teachers import AskedTeacher, InitialTeacher, PeriodicTeacher, Teacher
+
+
+@dataclass(frozen=True, eq=False)
+class RunParts:
+    """What a run needs. ``inverse`` reads the learner's memory for evaluations; ``teacher`` is None, and
+    ``demonstrations`` are empty, for who learns alone. ``data`` holds checksums of the files that were read."""
+
+    environment: FishingRod
+    learner: Learner
+    teacher: Teacher | None
+    demonstrations: Sequence[Demonstration]
+    inverse: Inverse
+    benchmark: Benchmark
+    data: dict[str, str | None]
+
+
+def build(config: Config) -> RunParts:
+    """Put a run together; nothing is executed yet.
+
+    Raises:
+        ValueError: a part refuses its option, or a file does not fit the robot.
+        FileNotFoundError: there is no such file.
+    """
+    half_side = config.task_space
+    environment = FishingRod(noise=config.noise, outcomes=Box.cube(-half_side, half_side, 2), threads=config.threads)
+    benchmark_path = _existing("benchmark", config.benchmark or SHIPPED_BENCHMARK)
+    benchmark = load_benchmark(benchmark_path)
+    benchmark.check(environment)
+    demonstrations: Sequence[Demonstration] = []
+    data: dict[str, str | None] = {"demonstrations_crc32": None, "benchmark_crc32": _checksum(benchmark_path)}
+    teacher = None
+    if config.algorithm in TAUGHT:
+        path = _existing("demonstrations", config.demonstrations or SHIPPED_DEMONSTRATIONS)
+        demonstrations = load_demonstrations(
+            path,
+            n_joints=len(JOINTS),
+            outcome_dim=environment.outcomes.dim,
+            context_dim=environment.contexts.dim,
+        )
+        data["demonstrations_crc32"] = _checksum(path)
+        teacher = _teacher(config, demonstrations)
+    learner = _learner(config, environment)
+    inverse = INVERSES[config.inverse](learner.memory, environment)
+    return RunParts(environment, learner, teacher, demonstrations, inverse, benchmark, data)
+
+
+def _learner(config: Config, environment: FishingRod) -> Learner:
+    correspondence = environment.primitive.correspondence
+    goals: MakeGoals = UniformGoals
+    if config.goals == "interest-map":
+        goals = partial(InterestMap, window=config.window, progress=PROGRESS[config.progress])
+    social: MakeSocial = emulating
+    if config.social == "imitate":
+        social = partial(imitating, repeats=config.imitations, epsilon=config.epsilon)
+    make_inverse = INVERSES[config.inverse]
+    parts: Parts = {
+        "goals": goals,
+        "inverse": lambda memory: make_inverse(memory, environment),
+        "search": SEARCHES[config.search],
+        "judge": COMPETENCES[config.competence],
+        "budget": config.budget,
+    }
+    match config.algorithm:
+        case "random":
+            return algorithms.random_exploration(environment, config.seed)
+        case "sagg-riac":
+            return algorithms.sagg_riac(environment, config.seed, **parts)
+        case "observation":
+            return algorithms.observation(environment, config.seed, correspondence=correspondence)
+        case "imitation":
+            return algorithms.imitation(environment, config.seed, correspondence=correspondence, epsilon=config.epsilon)
+    return algorithms.sgim_d(environment, config.seed, correspondence=correspondence, social=social, **parts)
+
+
+def _teacher(config: Config, demonstrations: Sequence[Demonstration]) -> Teacher:
+    rng, choose = stream(config.seed, "teacher"), CHOICES[config.choice]
+    every = {} if config.every is None else {"every": config.every}
+    match config.teacher:
+        case "initial":
+            return InitialTeacher(demonstrations, rng, **every)
+        case "asked":
+            patience = {} if config.every is None else {"patience": config.every}
+            return AskedTeacher(demonstrations, rng, choose=choose, **patience)
+    return PeriodicTeacher(demonstrations, rng, choose=choose, **every)
+
+
+def _existing(what: str, path: Path) -> Path:
+    if not path.is_file():
+        raise FileNotFoundError(f"{what}: there is no file {path}")
+    return path
+
+
+def _checksum(path: Path) -> str:
+    return f"{zlib.crc32(path.read_bytes()):08x}"

@@ -1,0 +1,232 @@
+"""Let one learner live, evaluate it now and then, and write everything to one run directory, OUT/NAME/seed-003.
+
+Examples:
+  python experiments/run.py --algorithm sgim-d --seed 3
+  python experiments/run.py --algorithm sgim-d --seed 3 --resume              after Ctrl-C, or with more --movements
+  python experiments/run.py --algorithm sagg-riac --goals uniform --name uniform-goals --movements 2000
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+import platform
+import shlex
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import sgimd_torch
+from config import Config, parse
+from parts import RunParts, build
+from rundir import Columns, RunDirectory
+from sgimd_torch.environment import SimulationError
+from sgimd_torch.evaluation import evaluate
+from sgimd_torch.interest import InterestMap, Region
+from sgimd_torch.session import ReplayError, live, replay, run
+from sgimd_torch.strategies import GoalBabbling
+from supervise import Progress, Seconds, Stopped, Stopping, metres, say
+
+# These may change when a run is resumed: they say how long it lasts, where it lies and how it is looked at. Files count
+# by their content, which is recorded as a checksum.
+FREE: Final = (
+    *("movements", "out", "name", "evaluate_at", "repeats", "threads"),
+    *("benchmark", "benchmark_crc32", "demonstrations"),
+)
+EVALUATION_SETTINGS: Final = ("repeats", "benchmark_crc32")  # all evaluations of a run share these
+FLUSH_EVERY = 1.0  # s, what a killed run loses at most
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run from the command line.
+
+    Returns:
+        The exit code: 0 finished; 2 the request is wrong; 1 it failed under way; 130 or 143 a signal stopped it.
+    """
+    argv = sys.argv[1:] if argv is None else argv
+    try:
+        config, resume = parse(argv, __doc__)
+    except SystemExit as end:  # --help, or an option that cannot be
+        return int(end.code or 0)
+    with Stopping() as stopping:
+        try:
+            with stopping.at_once():
+                parts = build(config)
+            directory = open_directory(config, parts, resume)
+        except (ValueError, OSError) as error:  # RunError, too
+            return _fail(error, 2)
+        except Stopped as stop:
+            return stop.exit_code
+        try:
+            with directory:
+                say(*directory.notes)
+                report = run_in(directory, config, parts, stopping)
+        except Stopped as stop:
+            again = shlex.join(["python", "experiments/run.py", *argv, *([] if resume else ["--resume"])])
+            say(f"stopped after {directory.summary.get('movements', 0)} movements; to go on: {again}")
+            return stop.exit_code
+        except ReplayError as error:
+            return _fail(error, 2)
+        except SimulationError as error:
+            return _fail(error, 1)
+        except OSError as error:
+            return _fail(f"{directory.path} cannot be written: {error}; is the disk full? --resume goes on", 1)
+    print(report)
+    return 0
+
+
+def run_in(directory: RunDirectory, config: Config, parts: RunParts, stopping: Stopping) -> str:
+    """Replay what the directory's log holds, live on to the end, and say what came out.
+
+    Seconds: physics and evaluations of a resumed run add to those of its summary, which is at most ``FLUSH_EVERY`` old
+    if it was killed; the learner's are counted from movement 0 on, since a replay lets it do all its work again.
+    """
+    rows = {id(demonstration): row for row, demonstration in enumerate(parts.demonstrations)}
+    recorded = [directory.columns.recorded(line) for line in directory.lines]
+    seconds = Seconds(directory.summary)
+    execute = replay(recorded, seconds.of_physics(live(parts.environment, config.seed)))
+    evaluations = set(config.evaluations)
+    movements, flushed = 0, time.monotonic()
+
+    def summarise(*, finished: bool = False) -> None:
+        directory.flush()
+        last = directory.last_evaluation
+        directory.summarise(
+            movements=movements,
+            mean_error_m=last.get("mean_error_m"),
+            noise_floor_m=last.get("noise_floor_m"),
+            **seconds.summary(),
+            finished=finished,
+        )
+
+    episodes = run(
+        parts.learner,
+        parts.environment,
+        config.seed,
+        movements=config.movements,
+        teacher=parts.teacher,
+        execute=execute,
+    )
+    finished = False
+    with Progress(f"{config.variant} seed {config.seed}", len(recorded), config.movements) as progress:
+        try:
+            for episode in seconds.of_learner(episodes):
+                demonstration = episode.demonstration
+                line = directory.columns.line(episode, None if demonstration is None else rows[id(demonstration)])
+                if episode.index >= len(recorded):
+                    directory.append(line)
+                elif line != directory.lines[episode.index]:
+                    raise ReplayError(_differs(episode.index, directory.lines[episode.index], line))
+                movements = episode.index + 1
+                if movements in evaluations and not directory.has_evaluation(movements):
+                    directory.flush()
+                    with seconds.of_evaluation():
+                        evaluate_in(directory, config, parts, movements, stopping)
+                if movements > len(recorded) and time.monotonic() - flushed >= FLUSH_EVERY:
+                    summarise()
+                    flushed = time.monotonic()
+                progress.show(movements, directory.last_evaluation.get("mean_error_m"))
+                stopping.check()
+            finished = True
+        finally:
+            if movements >= len(recorded):  # else the summary found is the newer one
+                summarise(finished=finished)
+    error, floor = (directory.summary[name] for name in ("mean_error_m", "noise_floor_m"))
+    found = "not evaluated" if error is None else f"mean error {error:.4f} m, noise floor {metres(floor)}"
+    return f"{directory.path}: {movements} movements, {found}"
+
+
+def evaluate_in(directory: RunDirectory, config: Config, parts: RunParts, movements: int, stopping: Stopping) -> None:
+    """Evaluate the learner as it is now, with streams that the run does not use.
+
+    Before its first exemplar there is nothing to infer a movement from, as for the learner by observation before its
+    first demonstration: such an evaluation is left out.
+    """
+    if len(parts.learner.memory) == 0:
+        return
+    goals = parts.benchmark.goals
+    with stopping.at_once():
+        found = evaluate(parts.inverse, parts.environment, goals, config.seed, movements, repeats=config.repeats)
+    directory.evaluated(movements, found, regions_of(parts))
+
+
+def regions_of(parts: RunParts) -> list[Region]:
+    """Of the learner's interest map; none if it has no such map."""
+    autonomous = parts.learner.autonomous
+    if isinstance(autonomous, GoalBabbling) and isinstance(autonomous.goals, InterestMap):
+        return autonomous.goals.regions
+    return []
+
+
+def open_directory(config: Config, parts: RunParts, resume: bool) -> RunDirectory:
+    """The directory of this run; of an earlier part's evaluations it keeps those that the whole run would have.
+
+    Raises:
+        RunError: see ``RunDirectory``; or its log is longer than the run is to be.
+    """
+    environment, regions = parts.environment, regions_of(parts)
+    settings = {**_plain(config), **parts.data}
+    directory = RunDirectory(
+        config.directory,
+        settings,
+        free=FREE,
+        columns=Columns(environment.contexts.dim, environment.policies.dim, environment.outcomes.dim),
+        region_dims=len(regions[0].low) if regions else None,
+        versions=versions(),
+        resume=resume,
+        movements=config.movements,
+    )
+    same = directory.before is not None and all(
+        directory.before.get(key) == settings[key] for key in EVALUATION_SETTINGS
+    )
+    directory.keep_evaluations(m for m in config.evaluations if same and m <= len(directory.lines))
+    return directory
+
+
+def versions() -> dict[str, Any]:
+    """What runs here; ``commit`` is None outside a git repository and ends in "-dirty" when files were changed."""
+    packages = {"numpy": "numpy", "scipy": "scipy", "faiss": "faiss-cpu", "mujoco": "mujoco"}
+    describe = [
+        "git",
+        "-C",
+        str(Path(__file__).parent),
+        "describe",
+        "--always",
+        "--dirty",
+        "--abbrev=40",
+        "--exclude=*",
+    ]
+    try:
+        commit = subprocess.run(describe, capture_output=True, text=True, check=True, timeout=10).stdout.strip()
+    except (OSError, subprocess.SubprocessError):
+        commit = None
+    return {
+        "python": platform.python_version(),
+        **{name: importlib.metadata.version(package) for name, package in packages.items()},
+        "sgimd_torch": sgimd_torch.__version__,
+        "platform": platform.platform(),
+        "commit": commit,
+    }
+
+
+def _plain(config: Config) -> dict[str, Any]:
+    plain = {name: str(value) if isinstance(value, Path) else value for name, value in vars(config).items()}
+    return {name: list(value) if isinstance(value, tuple) else value for name, value in plain.items()}
+
+
+def _differs(index: int, recorded: bytes, now: bytes) -> str:
+    return (
+        f"movement {index} was recorded as\n  {recorded.decode().strip()}\nbut the replay makes it\n  "
+        f"{now.decode().strip()}\nwas it recorded by another version, or on another processor?"
+    )
+
+
+def _fail(error: Exception | str, code: int) -> int:
+    say(f"error: {error}")
+    return code
+
+
+if __name__ == "__main__":
+    sys.exit(main())

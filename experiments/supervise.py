@@ -1,0 +1,159 @@
+"""What goes along with a run: signals that stop it cleanly, a clock for its parts, a line that shows how far it is."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import Any, Self
+
+from tqdm import tqdm
+
+from sgimd_torch.session import Execute
+from sgimd_torch.spaces import Array, Episode
+
+REPORT_EVERY = 10.0  # s, from one line to the next where there is no terminal
+
+
+class Seconds:
+    """Where the time goes, counted on from the ``before`` of a resumed run."""
+
+    def __init__(self, before: dict[str, Any]) -> None:
+        self.physics: float = before.get("seconds_physics", 0.0)
+        self.evaluation: float = before.get("seconds_evaluation", 0.0)
+        self.learner = 0.0
+
+    def of_physics(self, execute: Execute) -> Execute:
+        """``execute``, timed; what it takes is not the learner's."""
+
+        def timed(index: int, context: Array, theta: Array) -> Array:
+            begun = time.perf_counter()
+            try:
+                return execute(index, context, theta)
+            finally:
+                taken = time.perf_counter() - begun
+                self.physics += taken
+                self.learner -= taken
+
+        return timed
+
+    def of_learner(self, episodes: Iterator[Episode]) -> Iterator[Episode]:
+        """``episodes``, timed: asking, telling, watching and the teacher's choice."""
+        begun = time.perf_counter()
+        for episode in episodes:
+            self.learner += time.perf_counter() - begun
+            yield episode
+            begun = time.perf_counter()
+
+    @contextmanager
+    def of_evaluation(self) -> Iterator[None]:
+        """Times an evaluation and its writing."""
+        begun = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.evaluation += time.perf_counter() - begun
+
+    def summary(self) -> dict[str, float]:
+        """As summary.json has them."""
+        named = {"physics": self.physics, "learner": self.learner, "evaluation": self.evaluation}
+        return {f"seconds_{name}": round(seconds, 3) for name, seconds in named.items()}
+
+
+class Stopped(Exception):
+    """A signal asked the run to stop."""
+
+    def __init__(self, signum: int) -> None:
+        super().__init__(signum)
+        self.exit_code = 128 + signum
+
+
+class Stopping:
+    """Ctrl-C and SIGTERM, heard between two movements, or at once where that breaks nothing."""
+
+    def __init__(self) -> None:
+        self._signum = 0
+        self._at_once = False
+        self._handlers: dict[int, Any] = {}
+
+    def __enter__(self) -> Self:
+        if threading.current_thread() is threading.main_thread():
+            for signum in (signal.SIGINT, signal.SIGTERM):
+                self._handlers[signum] = signal.signal(signum, self._hear)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for signum, handler in self._handlers.items():
+            signal.signal(signum, handler)
+
+    def _hear(self, signum: int, frame: FrameType | None) -> None:
+        self._signum = signum
+        if self._at_once:
+            self._at_once = False
+            raise Stopped(signum)
+
+    def check(self) -> None:
+        """Raise ``Stopped`` if a signal has come."""
+        if self._signum:
+            raise Stopped(self._signum)
+
+    @contextmanager
+    def at_once(self) -> Iterator[None]:
+        """Within, a signal raises ``Stopped`` where it strikes."""
+        self._at_once = True
+        try:
+            self.check()
+            yield
+        finally:
+            self._at_once = False
+
+
+class Progress:
+    """A live line on a terminal; elsewhere a plain one now and then."""
+
+    def __init__(self, title: str, recorded: int, total: int) -> None:
+        self._title, self._recorded, self._total = title, recorded, total
+        self._bar = self._start("replaying" if recorded else title, 0, recorded or total)
+        self._begun = self._reported = time.monotonic()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._bar.close()
+
+    def show(self, movements: int, error: float | None) -> None:
+        """So many movements are done; the last evaluation's mean error was ``error`` (m)."""
+        self._bar.update()
+        if error is not None:
+            self._bar.set_postfix_str(f"error {error:.4f} m", refresh=False)
+        if movements == self._recorded < self._total:  # the rate is that of living, not of replaying
+            self._bar.close()
+            self._bar = self._start(self._title, movements, self._total)
+            self._begun = self._reported = time.monotonic()
+        now = time.monotonic()
+        if self._bar.disable and now - self._reported >= REPORT_EVERY and movements > self._recorded:
+            self._reported = now
+            rate = (movements - self._recorded) / (now - self._begun)
+            left = (self._total - movements) / rate
+            parts = [f"{movements} of {self._total} movements", f"{rate:.0f}/s", f"{left:.0f} s left"]
+            say(f"{self._title}: {', '.join(parts)}, error {metres(error)}")
+
+    def _start(self, title: str, initial: int, total: int) -> Any:
+        silent = not sys.stderr.isatty()
+        return tqdm(desc=title, initial=initial, total=total, unit=" movements", disable=silent, dynamic_ncols=True)
+
+
+def metres(length: float | None) -> str:
+    """A length for people."""
+    return "not known" if length is None else f"{length:.4f} m"
+
+
+def say(*messages: str) -> None:
+    """On stderr, at once."""
+    for message in messages:
+        print(message, file=sys.stderr, flush=True)

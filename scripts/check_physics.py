@@ -1,0 +1,112 @@
+"""Measure the fishing rod: is it stable, quick, smooth and noisy as it should be, and where does its float fall?
+
+Prints one line for each property with what is wanted, and ends with exit code 1 if any is missed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+
+import mujoco
+import numpy as np
+from tqdm import tqdm
+
+from sgimd_torch.environment import SimulationError
+from sgimd_torch.evaluation import load_benchmark
+from sgimd_torch.fishing_rod import FishingRod
+from sgimd_torch.spaces import Array, stream
+
+SEED = 1
+
+
+def execute(rod: FishingRod, thetas: Array, name: str, start: int = 0) -> Array:
+    """``(n, 2)`` m, each movement with a noise stream of its own."""
+    rngs = [stream(SEED, name, start + row) for row in range(len(thetas))]
+    return rod.execute_many(np.zeros((len(thetas), 0)), thetas, rngs)
+
+
+def divergences(rod: FishingRod, movements: int) -> tuple[int, Array]:
+    """How many of many random movements diverge, a tenth of them on corners of the box; and where the others landed."""
+    diverged, landed, batch = 0, [], 500
+    for start in tqdm(range(0, movements, batch), desc="random movements", unit_scale=batch, unit="movement"):
+        thetas = stream(SEED, "thetas", start).random((min(batch, movements - start), 25))
+        corners = start % (10 * batch) == 0
+        try:
+            outcomes = execute(rod, thetas.round() if corners else thetas, "noise", start)
+        except SimulationError as error:
+            diverged += 1
+            print(error)
+        else:
+            if not corners:
+                landed.append(outcomes)
+    return diverged, np.concatenate(landed)
+
+
+def cost(rod: FishingRod, movements: int = 300) -> tuple[float, float]:
+    """Median time (ms) of executing one movement, and median ratio to C stepping alone over the same number of steps."""
+    data, times, ratios = mujoco.MjData(rod.model), [], []
+    for row, theta in enumerate(stream(SEED, "cost").random((movements, 25))):
+        rng, before = stream(SEED, "noise", row), rod.steps
+        begin = time.perf_counter()
+        rod.execute(np.zeros(0), theta, rng)
+        middle = time.perf_counter()
+        mujoco.mj_resetData(rod.model, data)
+        mujoco.mj_step(rod.model, data, nstep=rod.steps - before)
+        times.append(middle - begin)
+        ratios.append((middle - begin) / (time.perf_counter() - middle))
+    return 1e3 * float(np.median(times)), float(np.median(ratios))
+
+
+def main() -> int:
+    """Measure everything and judge it."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--movements", type=int, default=100_000, help="random movements (default: %(default)s)")
+    movements = parser.parse_args().movements
+    rod, still = FishingRod(), FishingRod(noise=0.0)
+    milliseconds, ratio = cost(FishingRod(threads=1))
+
+    thetas = stream(SEED, "smoothness").random((500, 25))
+    steps = stream(SEED, "steps").normal(0, 0.005, thetas.shape)
+    moved = execute(still, np.clip(thetas + steps, 0, 1), "none") - execute(still, thetas, "none")
+    smoothness = float(np.median(np.linalg.norm(moved, axis=1)))
+
+    repeated = execute(rod, np.repeat(thetas[:200], 20, axis=0), "repeat").reshape(200, 20, 2)
+    deviations = repeated.std(axis=1, ddof=1)
+    ordered = np.sort(deviations.mean(axis=1))
+    spread = float(ordered[-20:].mean() / ordered[:20].mean())
+    # Were all movements' outcomes one Gaussian about their means, standardised deviations would have kurtosis 3.
+    pooled = ((repeated - repeated.mean(axis=1, keepdims=True)) / deviations.mean()).ravel()
+    kurtosis = float((pooled**4).mean() / (pooled**2).mean() ** 2)
+
+    diverged, landed = divergences(rod, movements)
+    benchmark = load_benchmark()
+
+    def tiles(points: Array) -> Array:
+        return np.floor((points - rod.outcomes.low) / benchmark.side).astype(int)
+
+    cells, counts = np.unique(tiles(landed), axis=0, return_counts=True)
+    natural = rod.outcomes.low + (cells[counts.argmax()] + 0.5) * benchmark.side
+    share = {tuple(cell): count / len(landed) for cell, count in zip(cells, counts, strict=True)}
+    rare = float(np.mean([share.get(tuple(cell), 0.0) < 0.001 for cell in tiles(benchmark.goals)]))
+
+    sd = float(deviations.mean())
+    off = float(np.linalg.norm(natural - [0.0, 0.5]))
+    rows = [
+        (f"{diverged} of {movements} movements diverged", "0", diverged == 0),
+        (f"a movement takes {milliseconds:.2f} ms (median)", "<= 15", milliseconds <= 15),
+        (f"{ratio:.3f} times C stepping alone (median)", "<= 1.15", ratio <= 1.15),
+        (f"a step of sd .005 moves the landing by {smoothness:.4f} m (median)", "<= .03", smoothness <= 0.03),
+        (f"noise sd {sd:.4f} m a dimension (mean)", ".03 to .075", 0.03 <= sd <= 0.075),
+        (f"noisiest tenth {spread:.1f} times the quietest", ">= 5", spread >= 5),
+        (f"kurtosis of the pooled noise {kurtosis:.1f}", "> 4, a Gaussian has 3", kurtosis > 4),
+        (f"densest tile at ({natural[0]:.2f}, {natural[1]:.2f}), {off:.2f} m from (0, .5)", "<= .25", off <= 0.25),
+        (f"{100 * rare:.0f} % of benchmark tiles get < .1 % of random movements", ">= 33 %", rare >= 1 / 3),
+    ]
+    for measured, wanted, good in rows:
+        print(f"{'ok  ' if good else 'MISS'} {measured:72s} wanted: {wanted}")
+    return 0 if all(good for *_, good in rows) else 1
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

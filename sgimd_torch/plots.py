@@ -1,0 +1,214 @@
+"""Figures: how the error falls, where the float landed, where competence changes.
+
+Sections 5.2 and 6 of Nguyen & Oudeyer (2014). Each function draws on the axis it is given and returns what it drew; the
+caller owns the figure, its size and its file.   error_curves(ax, {"sgim-d": curves}); landing_points(ax, outcomes, box)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import reduce
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.collections import PatchCollection, PolyCollection, QuadMesh
+from matplotlib.colorbar import Colorbar
+from matplotlib.colors import ListedColormap, LogNorm
+from matplotlib.lines import Line2D
+from matplotlib.patches import Rectangle
+from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
+
+from sgimd_torch.spaces import Array, Box
+
+COLOURS = {  # after Okabe & Ito: told apart with any colour vision, and in grey
+    "random": "#7f7f7f",
+    "sagg-riac": "#0072b2",
+    "observation": "#cc79a7",
+    "imitation": "#009e73",
+    "sgim-d": "#d55e00",
+}
+NAMES = {
+    "random": "Random",
+    "sagg-riac": "SAGG-RIAC",
+    "observation": "Observation",
+    "imitation": "Imitation",
+    "sgim-d": "SGIM-D",
+}
+
+
+class Curve(NamedTuple):
+    """The evaluations of one run: ``movements`` ``(n,)`` when, ``mean_errors`` and ``noise_floors`` ``(n,)`` m."""
+
+    movements: Array
+    mean_errors: Array
+    noise_floors: Array
+
+
+class DrawnCurve(NamedTuple):
+    """The mean over seeds, its noise floor, and the band of one standard deviation if there are several seeds."""
+
+    mean: Line2D
+    noise_floor: Line2D
+    band: PolyCollection | None
+
+
+def error_curves(ax: Axes, runs: Mapping[str, Sequence[Curve]]) -> dict[str, DrawnCurve]:
+    """Mean benchmark error (m) against movements, +- one standard deviation over seeds; noise floors dashed.
+
+    Args:
+        ax: drawn on.
+        runs: algorithm -> one curve for each seed. Drawn where all seeds of an algorithm were evaluated.
+
+    Returns:
+        What was drawn for each algorithm.
+
+    Raises:
+        ValueError: an algorithm that has no colour, or whose seeds were never evaluated at the same movement.
+    """
+    drawn = {}
+    for algorithm, curves in runs.items():
+        if algorithm not in COLOURS:
+            raise ValueError(f"algorithm must be one of {sorted(COLOURS)}, got {algorithm!r}")
+        movements = reduce(np.intersect1d, [curve.movements for curve in curves])
+        if not len(movements):
+            raise ValueError(f"the {len(curves)} seeds of {algorithm} were never evaluated after the same movement")
+        shared = [np.searchsorted(curve.movements, movements) for curve in curves]
+        errors = np.stack([curve.mean_errors[rows] for curve, rows in zip(curves, shared, strict=True)])
+        floors = np.stack([curve.noise_floors[rows] for curve, rows in zip(curves, shared, strict=True)])
+        colour, seeds = COLOURS[algorithm], f"{len(curves)} seed{'s' * (len(curves) > 1)}"
+        mean = errors.mean(axis=0)
+        (line,) = ax.plot(movements, mean, "o-", color=colour, markersize=4, label=f"{NAMES[algorithm]} ({seeds})")
+        (floor,) = ax.plot(movements, floors.mean(axis=0), "--", color=colour, linewidth=1.2)
+        band = None
+        if len(curves) > 1:
+            deviation = errors.std(axis=0, ddof=1)
+            band = ax.fill_between(movements, mean - deviation, mean + deviation, color=colour, alpha=0.2, linewidth=0)
+        drawn[algorithm] = DrawnCurve(line, floor, band)
+    handles = [*(curve.mean for curve in drawn.values()), Line2D([], [], color="black", linestyle="--", linewidth=1.2)]
+    ax.legend(handles, [*(str(curve.mean.get_label()) for curve in drawn.values()), "noise floor of each"])
+    ax.set(xlabel="movements executed", ylabel="mean distance to benchmark goals (m)")
+    ax.set_xlim(left=0)
+    ax.set_ylim(bottom=0)
+    ax.grid(alpha=0.3)
+    return drawn
+
+
+def landing_points(
+    ax: Axes,
+    outcomes: Array,
+    box: Box,
+    *,
+    demonstrated: Array | None = None,
+    side: float = 0.05,
+    most: float | None = None,
+) -> QuadMesh:
+    """How often the float landed where: a histogram on a logarithmic scale, empty tiles white.
+
+    Args:
+        ax: drawn on, and given a colour bar.
+        outcomes: ``(n, 2)`` m; how many lie outside ``box`` is written in the corner.
+        box: T, the part of the plane that is shown.
+        demonstrated: ``(n, 2)`` m, drawn as crosses.
+        side: of a tile, m.
+        most: the count at the end of the colour scale, so that two histograms can share it; None for their own.
+
+    Returns:
+        The tiles; their array holds the counts, ``(n_y, n_x)``, masked where 0.
+
+    Raises:
+        ValueError: ``box`` is not of the plane.
+    """
+    tiles = np.ma.masked_equal(tile_counts(outcomes, box, side), 0)
+    x, y = _edges(box, side)
+    norm = LogNorm(1, max(2, float(tiles.filled(0).max()) if most is None else most))
+    blues = ListedColormap(colormaps["Blues"](np.linspace(0.25, 1.0, 256)))  # a single movement is seen against white
+    mesh = ax.pcolormesh(x, y, tiles, norm=norm, cmap=blues)
+    bar = _colour_bar(ax, mesh, f"movements on a tile of {100 * side:g} cm")
+    bar.ax.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    bar.ax.yaxis.set_major_formatter("{x:.0f}")
+    bar.ax.yaxis.set_minor_locator(NullLocator())
+    if demonstrated is not None:
+        label = f"{len(demonstrated)} demonstrated outcomes"
+        ax.plot(*demonstrated.T, "x", color=COLOURS["sgim-d"], markersize=5, markeredgewidth=1.3, label=label)
+    outside = len(outcomes) - int(box.contains(outcomes).sum())
+    if outside:
+        text = f"{outside} of {len(outcomes)} landed outside"
+        white = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 2}
+        ax.text(0.5, 0.015, text, transform=ax.transAxes, ha="center", va="bottom", fontsize="small", bbox=white)
+    _water_plane(ax, box)
+    return mesh
+
+
+def tile_counts(outcomes: Array, box: Box, side: float = 0.05) -> Array:
+    """``(n_y, n_x)`` how many of the ``outcomes`` ``(n, 2)`` lie on each tile of the plane.
+
+    Raises:
+        ValueError: ``box`` is not of the plane.
+    """
+    x, y = _edges(box, side)
+    return np.histogram2d(outcomes[:, 0], outcomes[:, 1], bins=(x, y))[0].T
+
+
+def interest_map(
+    ax: Axes, lows: Array, highs: Array, interests: Array, *, goals: Array | None = None
+) -> PatchCollection:
+    """The regions of the interest map, coloured by interest, eq. (3); recent goals as points.
+
+    Args:
+        ax: drawn on, and given a colour bar.
+        lows, highs: ``(n_regions, 2)`` m, the corners of the regions.
+        interests: ``(n_regions,)``.
+        goals: ``(n, 2)`` m.
+
+    Returns:
+        One rectangle for each region, in their order; their array holds the interests.
+
+    Raises:
+        ValueError: regions that are not of the plane, as when contexts are part of them, or numbers that do not match.
+    """
+    if lows.shape != highs.shape or lows.shape != (len(interests), 2):
+        raise ValueError(
+            f"regions must be (n, 2), (n, 2) and (n,), got {lows.shape}, {highs.shape}, {interests.shape}; "
+            "a map over contexts too has to be cut at one context first"
+        )
+    patches = [Rectangle((low[0], low[1]), *(high - low)) for low, high in zip(lows, highs, strict=True)]
+    regions = PatchCollection(patches, cmap="Oranges", edgecolor="0.35", linewidth=0.8)
+    regions.set_array(interests)
+    regions.set_clim(0, max(float(interests.max()), 1e-6))
+    ax.add_collection(regions)
+    _colour_bar(ax, regions, "interest: recent change of competence")
+    if goals is not None:
+        ax.plot(*goals.T, ".", color="#0072b2", markersize=4, label=f"last {len(goals)} goals")
+    _water_plane(ax, Box(lows.min(axis=0), highs.max(axis=0)))
+    return regions
+
+
+def _edges(box: Box, side: float) -> tuple[Array, Array]:
+    if box.dim != 2:
+        raise ValueError(f"the water plane has 2 dimensions, got a box of {box.dim}")
+    x, y = (
+        np.linspace(low, high, max(1, round((high - low) / side)) + 1)
+        for low, high in zip(box.low, box.high, strict=True)
+    )
+    return x, y
+
+
+def _colour_bar(ax: Axes, drawn: QuadMesh | PatchCollection, label: str) -> Colorbar:
+    figure = ax.get_figure()
+    assert figure is not None
+    return figure.colorbar(drawn, ax=ax, label=label)
+
+
+def _water_plane(ax: Axes, box: Box) -> None:
+    """Axes in metres, equal aspect, all of ``box`` in sight and the robot's base marked."""
+    ax.plot(0, 0, "^", color="black", markeredgecolor="white", markersize=10, label="base of the arm")
+    ax.set(
+        xlim=(box.low[0], box.high[0]), ylim=(box.low[1], box.high[1]), aspect="equal", xlabel="x (m)", ylabel="y (m)"
+    )
+    ax.xaxis.set_major_locator(MaxNLocator(4))
+    ax.yaxis.set_major_locator(MaxNLocator(4))
+    ax.legend(
+        loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, frameon=False, borderaxespad=0.2, handletextpad=0.2
+    )

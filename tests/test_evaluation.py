@@ -1,0 +1,235 @@
+"""Eq. (10): errors worked out on an arm, a noise floor that is known analytically, and a benchmark that fits or not."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sgimd_torch.environment import PlanarArm
+from sgimd_torch.evaluation import Benchmark, Evaluation, evaluate, load_benchmark, save_benchmark, tile_goals
+from sgimd_torch.inverse_model import LocalInverse, NearestNeighbour
+from sgimd_torch.memory import Memory
+from sgimd_torch.spaces import Array, Box, Estimate, stream
+
+NO_CONTEXT = np.zeros(0)
+
+
+def perfect(arm: PlanarArm):
+    """The inverse that cannot be improved upon."""
+
+    def inverse(context: Array, goal: Array) -> Estimate:
+        theta = arm.solve(context, goal)
+        return Estimate(theta, theta[None], goal[None])
+
+    return inverse
+
+
+def knowing(arm: PlanarArm, *thetas: list[float]) -> Memory:
+    memory = Memory(0, arm.policies.dim, 2)
+    for theta in thetas:
+        memory.add(NO_CONTEXT, theta, arm.execute(NO_CONTEXT, theta, stream(0, "remembered")))
+    return memory
+
+
+def test_errors_are_the_distances_between_goals_and_where_the_best_movements_end() -> None:
+    # Two links of .5 m: straight ahead at (1, 0), a first joint at +pi/2 (theta .75) ends at (0, 1).
+    arm = PlanarArm(2)
+    memory = knowing(arm, [0.5, 0.5], [0.75, 0.5])
+    goals = np.array([[1.0, 0.0], [0.7, 0.4], [0.3, 1.4]])
+    evaluation = evaluate(NearestNeighbour(memory), arm, goals, 0, 1000, repeats=0)
+    assert evaluation.errors == pytest.approx([0.0, 0.5, 0.5])
+    assert evaluation.mean_error == pytest.approx(1 / 3)
+    assert evaluation.outcomes == pytest.approx(np.array([[1.0, 0.0], [1.0, 0.0], [0.0, 1.0]]))
+    assert evaluation.thetas.tolist() == [[0.5, 0.5], [0.5, 0.5], [0.75, 0.5]]
+
+
+def test_a_perfect_inverse_makes_no_error_in_any_context() -> None:
+    arm = PlanarArm(5, context=True)
+    goals = stream(0, "goals").uniform(-0.6, 0.6, (20, 2))
+    for context in (None, np.array([0.0]), np.array([0.7])):
+        evaluation = evaluate(perfect(arm), arm, goals, 0, 0, context=context, repeats=0)
+        assert evaluation.errors == pytest.approx(np.zeros(20), abs=1e-9)
+
+
+def test_without_repeats_there_is_no_noise_floor_and_without_noise_it_is_zero() -> None:
+    arm, goals = PlanarArm(5), np.array([[0.5, 0.5], [-0.3, 0.2]])
+    assert np.isnan(evaluate(perfect(arm), arm, goals, 0, 0, repeats=0).noise_floor)
+    assert evaluate(perfect(arm), arm, goals, 0, 0, repeats=10).noise_floor == pytest.approx(0, abs=1e-15)
+
+
+def test_the_noise_floor_is_the_mean_distance_to_the_mean_landing_point() -> None:
+    # Stretched out along y, joint noise s moves the end along x by s times the distances of the joints to the end,
+    # 1, .8, .6, .4, .2: sd s sqrt(2.2). Mean distance of a Gaussian sd sqrt(2 / pi), less of 10 samples to their mean.
+    arm = PlanarArm(5, noise=0.001)
+    evaluation = evaluate(perfect(arm), arm, np.tile([0.0, 1.0], (400, 1)), 0, 0, repeats=10)
+    expected = 0.001 * np.sqrt(2.2) * np.sqrt(2 / np.pi) * np.sqrt(9 / 10)
+    # Its standard error is about .76 / sqrt(4000) of it, so five of them are 6 %.
+    assert evaluation.noise_floor == pytest.approx(expected, rel=0.06)
+    assert evaluation.mean_error == pytest.approx(0.001 * np.sqrt(2.2) * np.sqrt(2 / np.pi), rel=5 * 0.76 / 20)
+
+
+def test_bias_raises_the_error_and_leaves_the_noise_floor() -> None:
+    arm = PlanarArm(5, noise=0.001)
+    goals = np.tile([0.0, 0.5], (50, 1))
+
+    def biased(context: Array, goal: Array) -> Estimate:
+        return perfect(arm)(context, goal + np.array([0.3, 0.0]))
+
+    evaluation = evaluate(biased, arm, goals, 0, 0, repeats=10)
+    assert evaluation.mean_error == pytest.approx(0.3, abs=0.01)
+    assert evaluation.noise_floor < 0.01
+
+
+def test_the_repeats_leave_the_errors_of_eq_10_of_a_noise_free_arm_as_they_were() -> None:
+    arm, goals = PlanarArm(5), np.array([[0.5, 0.5], [-0.3, 0.2]])
+    memory = knowing(arm, [0.5] * 5, [0.6] * 5)
+    few, many = (evaluate(LocalInverse(memory), arm, goals, 0, 0, repeats=repeats) for repeats in (0, 5))
+    assert np.array_equal(few.errors, many.errors)
+
+
+def test_the_same_streams_see_the_same_and_every_evaluation_of_a_run_has_its_own() -> None:
+    arm, goals = PlanarArm(5, noise=0.05), np.array([[0.5, 0.5], [-0.3, 0.2]])
+
+    def look(seed: int, movements: int) -> Evaluation:
+        return evaluate(perfect(arm), arm, goals, seed, movements, repeats=2)
+
+    first, same, later, other = look(0, 1000), look(0, 1000), look(0, 2000), look(1, 1000)
+    assert np.array_equal(first.outcomes, same.outcomes)
+    assert np.array_equal(first.scatter, same.scatter)
+    assert not np.isclose(first.outcomes, later.outcomes).any()
+    assert not np.isclose(first.outcomes, other.outcomes).any()
+
+
+def test_no_two_executions_of_an_evaluation_share_their_noise() -> None:
+    arm = PlanarArm(5, noise=0.05)
+    evaluation = evaluate(perfect(arm), arm, np.tile([0.0, 0.5], (20, 1)), 0, 0, repeats=2)
+    assert len(np.unique(evaluation.outcomes, axis=0)) == 20
+    assert (evaluation.scatter > 0).all()
+
+
+def test_looking_remembers_nothing() -> None:
+    arm = PlanarArm(5)
+    memory = knowing(arm, [0.5] * 5, [0.6] * 5)
+    evaluate(LocalInverse(memory), arm, np.array([[0.5, 0.5]]), 0, 0)
+    assert len(memory) == 2
+
+
+def test_nothing_can_be_evaluated_before_the_first_movement() -> None:
+    arm = PlanarArm(5)
+    with pytest.raises(RuntimeError, match="empty"):
+        evaluate(LocalInverse(Memory(0, 5, 2)), arm, np.array([[0.5, 0.5]]), 0, 0)
+
+
+@pytest.mark.parametrize("goals", [np.zeros((3, 3)), np.full((3, 2), np.nan), np.zeros(2), np.zeros((0, 2))])
+def test_what_are_no_goals_is_refused(goals: Array) -> None:
+    arm = PlanarArm(5)
+    with pytest.raises(ValueError, match="goals must"):
+        evaluate(perfect(arm), arm, goals, 0, 0)
+
+
+def test_a_context_that_is_none_is_refused() -> None:
+    arm = PlanarArm(5, context=True)
+    memory = Memory(1, 5, 2)
+    memory.add([0.0], np.full(5, 0.5), [1.0, 0.0])
+    with pytest.raises(ValueError, match="context"):
+        evaluate(LocalInverse(memory), arm, np.zeros((1, 2)), 0, 0, context=np.array([0.1, 0.2]))
+
+
+def test_one_goal_is_drawn_in_each_tile_that_was_reached() -> None:
+    box = Box.cube(-1, 1, 2)  # tiles of .5 m, 4 x 4
+    outcomes = np.array([[-0.9, -0.9], [-0.6, -0.6], [0.1, 0.1], [0.9, -0.9]])
+    goals = tile_goals(outcomes, box, 0.5, stream(0, "benchmark"), at_least=1)
+    assert np.floor((goals + 1) / 0.5).tolist() == [[0, 0], [2, 2], [3, 0]]
+
+
+def test_a_tile_reached_less_often_than_asked_for_gets_no_goal_nor_does_one_outside_the_task_space() -> None:
+    outcomes = np.array([[-0.9, -0.9], [-0.6, -0.6], [0.1, 0.1], [1.2, 0.0], [1.3, 0.0]])
+    goals = tile_goals(outcomes, Box.cube(-1, 1, 2), 0.5, stream(0, "benchmark"), at_least=2)
+    assert np.floor((goals + 1) / 0.5).tolist() == [[0, 0]]
+
+
+def test_goals_are_uniform_in_their_tile_and_come_from_the_stream() -> None:
+    box, middle = Box.cube(-1, 1, 2), np.array([[0.1, -0.4]])
+    goals = np.concatenate([tile_goals(middle, box, 0.5, stream(seed, "benchmark"), at_least=1) for seed in range(400)])
+    assert np.array_equal(goals[:1], tile_goals(middle, box, 0.5, stream(0, "benchmark"), at_least=1))
+    # Of a side of .5: mean .25, sd .144; five standard errors of 400 draws are .036.
+    assert goals.mean(axis=0) == pytest.approx([0.25, -0.25], abs=0.036)
+    assert goals.std(axis=0) == pytest.approx([0.144, 0.144], abs=0.02)
+
+
+BENCHMARK = Benchmark("PlanarArm", np.array([[0.5, 0.5], [-0.3, 0.2]]), 0.1)
+
+
+def test_a_benchmark_is_loaded_as_it_was_saved(tmp_path: Path) -> None:
+    save_benchmark(tmp_path / "goals.npz", BENCHMARK)
+    loaded = load_benchmark(tmp_path / "goals.npz")
+    assert (loaded.environment, loaded.side) == ("PlanarArm", 0.1)
+    assert np.array_equal(loaded.goals, BENCHMARK.goals)
+    assert [path.name for path in tmp_path.iterdir()] == ["goals.npz"]
+
+
+def test_a_benchmark_of_another_environment_is_refused() -> None:
+    BENCHMARK.check(PlanarArm(5))
+    with pytest.raises(ValueError, match=r"made for FishingRod .* got PlanarArm"):
+        Benchmark("FishingRod", BENCHMARK.goals, 0.1).check(PlanarArm(5))
+    with pytest.raises(ValueError, match="3 outcome dimensions"):
+        Benchmark("PlanarArm", np.zeros((4, 3)), 0.1).check(PlanarArm(5))
+
+
+def test_a_benchmark_file_cut_short_or_corrupt_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "goals.npz"
+    save_benchmark(path, BENCHMARK)
+    content = path.read_bytes()
+    for length in range(0, len(content), 11):
+        path.write_bytes(content[:length])
+        with pytest.raises(ValueError, match=r"goals\.npz is no benchmark"):
+            load_benchmark(path)
+    for position in range(len(content)):
+        path.write_bytes(content[:position] + bytes([content[position] ^ 0x55]) + content[position + 1 :])
+        try:
+            loaded = load_benchmark(path)
+        except ValueError as error:
+            loaded, message = None, str(error)
+        if loaded is None:
+            assert "goals.npz" in message
+        else:
+            assert np.array_equal(loaded.goals, BENCHMARK.goals)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"version": np.array(2)}, "version 2"),
+        ({"version": np.array([1, 1])}, "version"),
+        ({"goals": np.zeros((0, 2))}, "n > 0"),
+        ({"goals": np.zeros(2)}, "n > 0"),
+        ({"goals": np.full((2, 2), np.nan)}, "finite"),
+        ({"goals": np.full((2, 2), "far")}, "numeric"),
+        ({"goals": np.full((2, 2), None)}, "no benchmark"),
+        ({"side": np.array(0.0)}, "side"),
+        ({"side": np.array(np.nan)}, "side"),
+        ({"side": np.array("wide")}, "no benchmark"),
+    ],
+)
+def test_a_benchmark_that_cannot_be_right_is_refused(
+    tmp_path: Path, change: dict[str, np.ndarray], message: str
+) -> None:
+    right = {
+        "version": np.array(1),
+        "environment": np.array("PlanarArm"),
+        "goals": np.zeros((3, 2)),
+        "side": np.array(0.1),
+    }
+    np.savez(tmp_path / "goals.npz", **(right | change))
+    with pytest.raises(ValueError, match=message):
+        load_benchmark(tmp_path / "goals.npz")
+
+
+def test_what_is_no_benchmark_is_refused(tmp_path: Path) -> None:
+    np.savez(tmp_path / "other.npz", goals=np.zeros((3, 2)))
+    np.save(tmp_path / "one.npy", np.zeros((3, 2)))
+    for name in ("other.npz", "one.npy"):
+        with pytest.raises(ValueError, match="no benchmark"):
+            load_benchmark(tmp_path / name)
+    with pytest.raises(FileNotFoundError):
+        load_benchmark(tmp_path / "none.npz")

@@ -1,0 +1,232 @@
+"""The learner: ask, execute, tell; a demonstration interrupts; what cannot be right is refused and changes nothing."""
+
+import numpy as np
+import pytest
+
+from sgimd_torch.environment import PlanarArm
+from sgimd_torch.learner import Learner
+from sgimd_torch.memory import Memory
+from sgimd_torch.spaces import Array, Attempt, Demonstration, Move, stream
+from sgimd_torch.strategies import Imitate, Remember, Rest
+from worlds import NO_CONTEXT, demonstrate, last_posture
+
+ARM = PlanarArm(4)
+LESSON, SECOND = demonstrate(ARM, [-0.5, 0.5]), demonstrate(ARM, [0.2, -0.6])
+
+
+class Pursuit:
+    """A strategy of ``n`` movements at a time that notes contexts, outcomes and how often its attempts ended."""
+
+    def __init__(self, n: int = 3) -> None:
+        self.n = n
+        self.contexts: list[Array] = []
+        self.outcomes: list[list[float]] = []
+        self.n_ended = 0
+
+    def attempt(self, context: Array) -> Attempt:
+        self.contexts.append(context)
+        try:
+            for k in range(self.n):
+                outcome = yield Move(np.full(4, k / 10), None, "pursuit")
+                self.outcomes.append(outcome.tolist())
+        finally:
+            self.n_ended += 1
+
+
+def learner(pursuit: Pursuit, *, context_dim: int = 0, repeats: int | None = 2) -> Learner:
+    imitate = Imitate(ARM.policies, stream(0, "imitate"), repeats=repeats, epsilon=0.05)
+    return Learner(Memory(context_dim, 4, 2), pursuit, social=imitate, correspondence=last_posture)
+
+
+def step(robot: Learner, outcome: tuple[float, float] = (0.1, 0.2), context: Array = NO_CONTEXT) -> Move | None:
+    move = robot.ask(context)
+    if move is not None:
+        robot.tell(outcome)
+    return move
+
+
+def test_every_outcome_reaches_memory_and_the_strategy_that_asked_for_it() -> None:
+    pursuit = Pursuit(n=2)
+    robot = learner(pursuit)
+    for k in range(5):
+        step(robot, (k, -k))
+    assert robot.memory.outcomes.tolist() == pursuit.outcomes == [[k, -k] for k in range(5)]
+    assert robot.memory.thetas[:, 0].tolist() == [0.0, 0.1, 0.0, 0.1, 0.0]
+    assert pursuit.n_ended == 2
+
+
+def test_after_an_attempt_the_learner_is_idle_and_begins_another() -> None:
+    pursuit = Pursuit(n=2)
+    robot = learner(pursuit)
+    idle = [robot.idle]
+    for _ in range(4):
+        step(robot)
+        idle.append(robot.idle)
+    assert idle == [True, False, True, False, True]
+    assert len(pursuit.contexts) == 2
+
+
+def test_ask_and_tell_alternate() -> None:
+    robot = learner(Pursuit())
+    with pytest.raises(RuntimeError, match="ask"):
+        robot.tell([0.0, 0.0])
+    robot.ask(NO_CONTEXT)
+    with pytest.raises(RuntimeError, match="tell"):
+        robot.ask(NO_CONTEXT)
+    with pytest.raises(RuntimeError, match="tell"):
+        robot.watch(LESSON)
+    robot.tell([0.0, 0.0])
+    with pytest.raises(RuntimeError, match="ask"):
+        robot.tell([0.0, 0.0])
+    assert len(robot.memory) == 1
+
+
+@pytest.mark.parametrize("outcome", [[np.nan, 0.0], [np.inf, 0.0], [0.0], [0.0, 0.0, 0.0], "far", None, [[0.0, 0.0]]])
+def test_an_outcome_that_is_none_changes_nothing_and_is_still_waited_for(outcome: object) -> None:
+    pursuit = Pursuit()
+    robot = learner(pursuit)
+    step(robot)
+    robot.ask(NO_CONTEXT)
+    with pytest.raises(ValueError, match="outcome"):
+        robot.tell(outcome)
+    assert len(robot.memory) == 1
+    assert len(pursuit.outcomes) == 1
+    robot.tell([0.3, 0.4])  # the same movement, executed again
+    assert robot.memory.thetas[:, 0].tolist() == [0.0, 0.1]
+    assert pursuit.n_ended == 0
+
+
+def test_the_error_of_a_nan_outcome_names_its_theta() -> None:
+    robot = learner(Pursuit())
+    step(robot)
+    robot.ask(NO_CONTEXT)
+    with pytest.raises(ValueError, match=r"theta was \[0\.1, 0\.1, 0\.1, 0\.1\]"):
+        robot.tell([np.nan, 0.0])
+
+
+def test_a_demonstration_interrupts_a_search_after_any_movement() -> None:
+    for n in range(3):
+        pursuit = Pursuit(n=3)
+        robot = learner(pursuit)
+        for _ in range(n):
+            step(robot)
+        robot.watch(LESSON)
+        assert pursuit.n_ended == (1 if n else 0)
+        assert np.array_equal(step(robot).theta, LESSON.trajectory[-1])
+        assert len(pursuit.outcomes) == n
+        assert len(robot.memory) == n + 1
+
+
+def test_after_the_imitation_the_learner_is_on_its_own_again_with_a_new_attempt() -> None:
+    pursuit = Pursuit(n=3)
+    robot = learner(pursuit, repeats=2)
+    step(robot)
+    robot.watch(LESSON)
+    origins = [step(robot).origin for _ in range(4)]
+    assert origins == ["imitate", "imitate", "pursuit", "pursuit"]
+    assert robot.memory.thetas[-2:, 0].tolist() == [0.0, 0.1]
+
+
+def test_a_demonstration_cuts_into_the_imitation_of_the_one_before() -> None:
+    robot = learner(Pursuit(), repeats=None)
+    robot.watch(LESSON)
+    for _ in range(5):
+        step(robot)
+    robot.watch(SECOND)
+    moves = [step(robot) for _ in range(5)]
+    assert all(np.array_equal(move.goal, SECOND.outcome) for move in moves)
+    assert np.array_equal(moves[0].theta, SECOND.trajectory[-1])
+
+
+def test_a_demonstration_is_not_remembered_unless_the_strategy_does() -> None:
+    robot = learner(Pursuit())
+    robot.watch(LESSON)
+    assert len(robot.memory) == 0
+    memory = Memory(0, 4, 2)
+    observer = Learner(memory, Rest(), social=Remember(memory), correspondence=last_posture)
+    observer.watch(LESSON)
+    assert observer.memory.outcomes.tolist() == [LESSON.outcome.tolist()]
+    assert observer.idle
+    assert observer.ask(NO_CONTEXT) is None
+
+
+def test_after_resting_there_is_nothing_to_tell_and_the_next_ask_may_follow() -> None:
+    robot = Learner(Memory(0, 4, 2), Rest())
+    assert robot.ask(NO_CONTEXT) is None
+    assert robot.ask(NO_CONTEXT) is None
+    with pytest.raises(RuntimeError, match="ask"):
+        robot.tell([0.0, 0.0])
+
+
+def test_an_attempt_keeps_its_context_until_it_ends() -> None:
+    pursuit = Pursuit(n=2)
+    robot = learner(pursuit, context_dim=1)
+    one, other = np.array([0.1]), np.array([0.2])
+    step(robot, context=one)
+    with pytest.raises(RuntimeError, match="idle"):
+        robot.ask(other)
+    step(robot, context=one)
+    step(robot, context=other)
+    assert pursuit.contexts == [one, other]
+    assert robot.memory.contexts.ravel().tolist() == [0.1, 0.1, 0.2]
+
+
+def test_a_demonstration_brings_its_own_context() -> None:
+    robot = learner(Pursuit(), context_dim=1)
+    step(robot, context=np.array([0.1]))
+    robot.watch(Demonstration(np.array([0.7]), LESSON.times, LESSON.trajectory, LESSON.outcome))
+    with pytest.raises(RuntimeError, match="context"):
+        robot.ask(np.array([0.1]))
+    step(robot, context=np.array([0.7]))
+    assert robot.memory.contexts.ravel().tolist() == [0.1, 0.7]
+
+
+def test_an_interrupted_learner_forgets_what_it_asked_for_and_begins_anew() -> None:
+    pursuit = Pursuit(n=3)
+    robot = learner(pursuit)
+    step(robot)
+    robot.ask(NO_CONTEXT)
+    robot.interrupt()
+    robot.interrupt()
+    assert pursuit.n_ended == 1
+    with pytest.raises(RuntimeError, match="ask"):
+        robot.tell([0.0, 0.0])
+    assert step(robot).theta[0] == 0.0
+    assert len(robot.memory) == 2
+
+
+@pytest.mark.parametrize("context", [[0.0, 0.0], [np.nan], 0.0, "north"])
+def test_a_context_that_is_none_is_refused(context: object) -> None:
+    with pytest.raises(ValueError, match="context"):
+        learner(Pursuit(), context_dim=1).ask(context)
+
+
+def test_a_demonstration_that_does_not_fit_is_refused_and_interrupts_nothing() -> None:
+    pursuit = Pursuit()
+    robot = learner(pursuit)
+    step(robot)
+    times, trajectory, outcome = LESSON.times, LESSON.trajectory, LESSON.outcome
+    for bad in (
+        Demonstration(np.zeros(1), times, trajectory, outcome),
+        Demonstration(NO_CONTEXT, times, trajectory, np.full(2, np.nan)),
+        Demonstration(NO_CONTEXT, times, trajectory, np.zeros(3)),
+    ):
+        with pytest.raises(ValueError, match="of the demonstration"):
+            robot.watch(bad)
+    assert pursuit.n_ended == 0
+    assert step(robot).theta[0] == 0.1
+
+
+def test_a_learner_without_a_social_strategy_cannot_be_taught() -> None:
+    with pytest.raises(RuntimeError, match="social"):
+        Learner(Memory(0, 4, 2), Pursuit()).watch(LESSON)
+
+
+def test_a_social_strategy_without_a_correspondence_is_refused() -> None:
+    with pytest.raises(ValueError, match="correspondence"):
+        Learner(Memory(0, 4, 2), Pursuit(), social=Imitate(ARM.policies, stream(0, "imitate")))
+
+
+def test_a_strategy_of_no_movement_at_all_is_an_error_not_an_endless_loop() -> None:
+    with pytest.raises(RuntimeError, match="yield"):
+        learner(Pursuit(n=0)).ask(NO_CONTEXT)

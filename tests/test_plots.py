@@ -1,0 +1,131 @@
+"""The drawn data, read back from the axes. How it looks is for eyes."""
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from sgimd_torch.interest import InterestMap
+from sgimd_torch.plots import COLOURS, NAMES, Curve, error_curves, interest_map, landing_points
+from sgimd_torch.spaces import Box, stream
+
+T = Box.cube(-1.0, 1.0, 2)
+
+
+@pytest.fixture
+def ax():
+    return Figure().add_subplot()
+
+
+def curve(*errors, movements=(1000, 2000)):
+    return Curve(np.array(movements), np.array(errors), np.full(len(errors), 0.04))
+
+
+def test_every_algorithm_has_a_name_and_a_colour_of_its_own():
+    assert set(COLOURS) == set(NAMES) == {"random", "sagg-riac", "imitation", "observation", "sgim-d"}
+    assert len(set(COLOURS.values())) == len(COLOURS)
+
+
+def test_an_error_curve_of_one_seed_shows_its_errors_and_noise_floor(ax):
+    drawn = error_curves(ax, {"sgim-d": [curve(0.3, 0.2)]})["sgim-d"]
+    np.testing.assert_array_equal(drawn.mean.get_xydata(), [[1000, 0.3], [2000, 0.2]])
+    np.testing.assert_array_equal(drawn.noise_floor.get_xydata(), [[1000, 0.04], [2000, 0.04]])
+    assert drawn.noise_floor.get_linestyle() == "--"
+    assert drawn.band is None
+    assert drawn.mean.get_color() == COLOURS["sgim-d"]
+
+
+def test_several_seeds_are_averaged_with_a_band_of_one_standard_deviation_and_counted(ax):
+    drawn = error_curves(ax, {"random": [curve(0.3, 0.1), curve(0.5, 0.3)]})["random"]
+    np.testing.assert_allclose(drawn.mean.get_ydata(), [0.4, 0.2])
+    heights = drawn.band.get_paths()[0].vertices[:, 1]
+    half = 0.1 * np.sqrt(2)  # sd of two values .2 apart, n - 1
+    assert heights.max() == pytest.approx(0.4 + half)
+    assert heights.min() == pytest.approx(0.2 - half)
+    assert drawn.mean.get_label() == "Random (2 seeds)"
+
+
+def test_seeds_of_different_length_are_compared_where_both_were_evaluated(ax):
+    long = curve(0.3, 0.2, 0.1, movements=(1000, 2000, 3000))
+    drawn = error_curves(ax, {"random": [long, curve(0.4, 0.2, movements=(500, 2000))]})["random"]
+    np.testing.assert_allclose(drawn.mean.get_xydata(), [[2000, 0.2]])
+    with pytest.raises(ValueError, match="never evaluated after the same movement"):
+        error_curves(ax, {"random": [long, curve(0.4, movements=(500,))]})
+
+
+def test_an_algorithm_without_a_colour_is_refused(ax):
+    with pytest.raises(ValueError, match="got 'sgimd'"):
+        error_curves(ax, {"sgimd": [curve(0.3, 0.2)]})
+
+
+def test_each_landing_point_inside_is_counted_on_its_tile_and_those_outside_are_told(ax):
+    outcomes = np.array([[-0.9, 0.9], [-0.8, 0.8], [0.9, -0.9], [3.0, 0.0]])
+    counts = landing_points(ax, outcomes, T, side=1.0).get_array()
+    np.testing.assert_array_equal(counts.filled(0), [[0, 1], [2, 0]])  # rows are y, from below
+    assert [text.get_text() for text in ax.texts] == ["1 of 4 landed outside"]
+
+
+def test_two_histograms_can_share_their_scale(ax):
+    mesh = landing_points(ax, np.zeros((3, 2)), T, most=50)
+    assert (mesh.norm.vmin, mesh.norm.vmax) == (1, 50)
+
+
+def test_no_landing_point_leaves_an_empty_plane(ax):
+    assert landing_points(ax, np.empty((0, 2)), T).get_array().mask.all()
+
+
+def test_demonstrated_outcomes_are_crosses_and_the_base_is_at_the_origin(ax):
+    demonstrated = np.array([[0.1, 0.2], [-0.3, 0.4]])
+    landing_points(ax, np.zeros((3, 2)), T, demonstrated=demonstrated)
+    crosses, base = ax.lines
+    np.testing.assert_array_equal(crosses.get_xydata(), demonstrated)
+    np.testing.assert_array_equal(base.get_xydata(), [[0, 0]])
+
+
+def test_landing_points_need_a_plane(ax):
+    with pytest.raises(ValueError, match="2 dimensions, got a box of 3"):
+        landing_points(ax, np.zeros((3, 3)), Box.cube(-1, 1, 3))
+
+
+def test_the_rectangles_of_an_interest_map_are_its_regions_and_tile_the_task_space(ax):
+    goals, rng = InterestMap(Box.cube(0, 1, 0), T, stream(0, "goals")), stream(0, "test")
+    for _ in range(400):
+        goal = T.sample(rng)
+        goals.add([], goal, -rng.random() if goal[0] > 0 else -1.0)
+    regions = goals.regions
+    assert len(regions) > 4
+    lows, highs = np.stack([region.low for region in regions]), np.stack([region.high for region in regions])
+    interests = np.array([region.interest() for region in regions])
+    drawn = interest_map(ax, lows, highs, interests, goals=regions[0].goals)
+    corners = np.stack([path.vertices for path in drawn.get_paths()])
+    np.testing.assert_allclose(corners.min(axis=1), lows)
+    np.testing.assert_allclose(corners.max(axis=1), highs)
+    np.testing.assert_array_equal(drawn.get_array(), interests)
+    points = T.low + rng.random((500, 2)) * T.sides
+    inside = (corners.min(axis=1)[:, None] <= points) & (points < corners.max(axis=1)[:, None])
+    assert (inside.all(axis=2).sum(axis=0) == 1).all()
+    np.testing.assert_array_equal(ax.lines[0].get_xydata(), regions[0].goals)
+
+
+def test_a_map_without_any_interest_can_be_drawn(ax):
+    drawn = interest_map(ax, T.low[None], T.high[None], np.zeros(1))
+    assert drawn.get_clim()[1] > 0
+
+
+def test_an_interest_map_over_contexts_is_refused(ax):
+    with pytest.raises(ValueError, match="cut at one context"):
+        interest_map(ax, np.zeros((1, 3)), np.ones((1, 3)), np.zeros(1))
+
+
+@pytest.mark.parametrize("draw", ["error_curves", "landing_points", "interest_map"])
+def test_axes_carry_names_with_units_and_the_water_plane_is_not_distorted(ax, draw):
+    if draw == "error_curves":
+        error_curves(ax, {"random": [curve(0.3, 0.2)]})
+        assert "(m)" in ax.get_ylabel()
+        assert "movements" in ax.get_xlabel()
+        return
+    if draw == "landing_points":
+        landing_points(ax, np.zeros((3, 2)), T)
+    else:
+        interest_map(ax, T.low[None], T.high[None], np.zeros(1))
+    assert (ax.get_xlabel(), ax.get_ylabel(), ax.get_aspect()) == ("x (m)", "y (m)", 1.0)
+    assert ax.get_xlim() == ax.get_ylim() == (-1, 1)

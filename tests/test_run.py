@@ -1,0 +1,460 @@
+"""Whole runs on the fishing rod: what they write, that they can be repeated, stopped, resumed, and refuse nonsense."""
+
+import fcntl
+import json
+import os
+import re
+import shlex
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import sgimd_torch
+from config import ALGORITHMS, ANSWERS, CHOICES, COMPETENCES, GOALS, INVERSES, PROGRESS, SEARCHES, TEACHERS, Config
+from parts import build
+from run import main
+from rundir import read_run
+from sgimd_torch.evaluation import Benchmark, save_benchmark
+from sgimd_torch.fishing_rod import FishingRod
+from sgimd_torch.spaces import stream
+
+ROOT = Path(sgimd_torch.__file__).parents[1]
+MOVEMENTS = 90
+CSV = ("episodes.csv", "evaluation.csv", "regions.csv")
+# Every movement goes to disk at once, so that a test can wait for the k-th.
+EAGER = "import run, sys; run.FLUSH_EVERY = 0; sys.exit(run.main(sys.argv[1:]))"
+
+
+@pytest.fixture(scope="session")
+def benchmark(tmp_path_factory):
+    path = tmp_path_factory.mktemp("benchmark") / "tiny.npz"
+    save_benchmark(path, Benchmark("FishingRod", np.array([[0.0, 0.6], [0.3, 0.5], [-0.4, 0.4]]), 0.1))
+    return path
+
+
+@pytest.fixture(scope="session")
+def go(benchmark):
+    """Run in this process; later options win. Returns the exit code."""
+
+    def go(out, *options):
+        return main([*arguments(out, benchmark), *map(str, options)])
+
+    return go
+
+
+@pytest.fixture(scope="session")
+def reference(tmp_path_factory, go):
+    """The files of the uninterrupted run, by name."""
+    out = tmp_path_factory.mktemp("reference")
+    assert go(out) == 0
+    return csv_of(out / "sgim-d" / "seed-003")
+
+
+def arguments(out, benchmark):
+    fixed = f"--seed 3 --movements {MOVEMENTS} --evaluate_at 30,60 --repeats 2".split()
+    return [*fixed, "--benchmark", str(benchmark), "--out", str(out)]
+
+
+def csv_of(directory):
+    return {name: (directory / name).read_bytes() for name in CSV if (directory / name).exists()}
+
+
+def start(program, *options, limit=""):
+    """Another process; ``limit`` is for ``ulimit``."""
+    paths = [str(ROOT / "experiments"), str(ROOT), os.environ.get("PYTHONPATH", "")]
+    command = shlex.join([sys.executable, "-c", program, *map(str, options)])
+    return subprocess.Popen(
+        ["bash", "-c", f"{f'ulimit {limit}; ' if limit else ''}exec {command}"],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def signal_after(process, log, lines, signum):
+    """Send ``signum`` once the log has so many ``lines``; returns (exit code, stderr)."""
+    while process.poll() is None and not (log.exists() and log.read_bytes().count(b"\n") >= lines):
+        time.sleep(0.001)
+    assert process.poll() is None, process.communicate()
+    process.send_signal(signum)
+    _, errors = process.communicate()
+    return process.returncode, errors
+
+
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+def test_every_algorithm_writes_a_whole_run_directory(tmp_path, go, capsys, algorithm):
+    assert go(tmp_path, "--algorithm", algorithm) == 0
+    directory = tmp_path / algorithm / "seed-003"
+    assert str(directory) in capsys.readouterr().out
+    run = read_run(directory)
+    assert run.index.tolist() == list(range(MOVEMENTS))
+    assert run.thetas.shape == (MOVEMENTS, 25)
+    assert (run.regions is not None) == (algorithm in ("sagg-riac", "sgim-d"))
+    header = (directory / "evaluation.csv").read_text().splitlines()[0]
+    assert header == "movements,mean_error_m,median_error_m,p90_error_m,noise_floor_m"
+    # Observation has seen nothing before movement 30, so it has nothing to be evaluated by after 30 movements.
+    wanted = [60, 90] if algorithm in ("observation", "imitation") else [30, 60, 90]
+    assert run.evaluation["movements"].tolist() == wanted
+    assert list(run.summary)[:3] == ["movements", "mean_error_m", "noise_floor_m"]
+    assert {"seconds_physics", "seconds_learner", "seconds_evaluation"} < set(run.summary)
+    assert run.summary["movements"] == MOVEMENTS
+    assert run.summary["finished"] is True
+    assert run.summary["mean_error_m"] == run.evaluation["mean_error_m"][-1]
+    assert run.config["algorithm"] == algorithm
+    assert {"python", "numpy", "scipy", "faiss", "mujoco", "sgimd_torch", "platform", "commit"} == set(run.versions)
+    assert not list(directory.glob("*.part"))
+
+
+def test_the_log_shows_who_rested_imitated_and_was_taught(tmp_path, go):
+    assert go(tmp_path, "--algorithm", "imitation") == 0
+    run = read_run(tmp_path / "imitation" / "seed-003")
+    assert np.flatnonzero(run.demonstration >= 0).tolist() == [30, 60]
+    assert run.origin.tolist() == [""] * 30 + ["imitate"] * 60
+    assert np.isnan(run.outcomes[:30]).all()
+    assert not np.isnan(run.outcomes[30:]).any()
+
+
+def test_the_same_seed_makes_the_same_bytes(tmp_path, go, reference):
+    assert go(tmp_path) == 0
+    assert csv_of(tmp_path / "sgim-d" / "seed-003") == reference
+
+
+def test_another_seed_makes_another_run(tmp_path, go, reference):
+    assert go(tmp_path, "--seed", 4) == 0
+    assert csv_of(tmp_path / "sgim-d" / "seed-004")["episodes.csv"] != reference["episodes.csv"]
+
+
+@pytest.mark.parametrize("evaluations", ["[]", "[1,2,7,30,31,89]"])
+def test_evaluating_more_or_not_at_all_leaves_the_log_as_it_is(tmp_path, go, reference, evaluations):
+    assert go(tmp_path, "--evaluate_at", evaluations) == 0
+    written = csv_of(tmp_path / "sgim-d" / "seed-003")
+    assert written["episodes.csv"] == reference["episodes.csv"]
+    assert written["evaluation.csv"].count(b"\n") == (1 if evaluations == "[]" else 8)
+
+
+def test_threads_change_no_byte(tmp_path, go, reference):
+    assert go(tmp_path, "--threads", 2) == 0
+    assert csv_of(tmp_path / "sgim-d" / "seed-003") == reference
+
+
+def test_with_and_without_the_teacher_the_environment_makes_the_same_noise(tmp_path, go):
+    assert go(tmp_path, "--algorithm", "sagg-riac") == go(tmp_path, "--algorithm", "sgim-d") == 0
+    alone, taught = (read_run(tmp_path / name / "seed-003") for name in ("sagg-riac", "sgim-d"))
+    assert np.array_equal(alone.outcomes[:30], taught.outcomes[:30])  # until the first demonstration they are one
+    assert not np.array_equal(alone.thetas[30:], taught.thetas[30:])
+    rod = FishingRod(threads=1)
+    for run in (alone, taught):
+        for k in (40, 75):
+            noise = stream(3, "environment", k)
+            assert np.array_equal(rod.execute(run.contexts[k], run.thetas[k], noise), run.outcomes[k])
+
+
+@pytest.mark.parametrize(
+    ("signum", "lines", "code"), [(signal.SIGKILL, 20, -9), (signal.SIGKILL, 64, -9), (signal.SIGINT, 40, 130)]
+)
+def test_a_run_that_is_stopped_and_resumed_ends_as_if_it_never_was(
+    tmp_path, go, benchmark, reference, capsys, signum, lines, code
+):
+    directory = tmp_path / "sgim-d" / "seed-003"
+    process = start(EAGER, *arguments(tmp_path, benchmark))
+    found, errors = signal_after(process, directory / "episodes.csv", lines, signum)
+    assert found == code
+    assert "Traceback" not in errors
+    assert ("--resume" in errors) == (signum == signal.SIGINT)
+    before = (directory / "episodes.csv").read_bytes()
+    assert lines <= before.count(b"\n") < MOVEMENTS
+    assert go(tmp_path) == 2  # without --resume nothing is touched
+    assert "--resume" in capsys.readouterr().err
+    assert (directory / "episodes.csv").read_bytes() == before
+    assert go(tmp_path, "--resume") == 0
+    assert csv_of(directory) == reference
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("algorithm", ["random", "imitation", "sgim-d"])
+def test_a_run_killed_five_times_at_random_ends_as_if_it_never_was(tmp_path, go, benchmark, algorithm):
+    options = ("--algorithm", algorithm, "--movements", 900, "--evaluate_at", "200,400,600,800")
+    assert go(tmp_path / "whole", *options) == 0
+    directory = tmp_path / "killed" / algorithm / "seed-003"
+    for lines in sorted(stream(0, "kills").integers(2, 880, size=5)):
+        process = start(EAGER, *arguments(tmp_path / "killed", benchmark), *options, "--resume")
+        signal_after(process, directory / "episodes.csv", lines, signal.SIGKILL)
+    assert go(tmp_path / "killed", *options, "--resume") == 0
+    assert csv_of(directory) == csv_of(tmp_path / "whole" / algorithm / "seed-003")
+
+
+@pytest.mark.parametrize("algorithm", ["sgim-d", "observation"])
+def test_a_finished_run_made_longer_equals_a_long_run(tmp_path, go, algorithm):
+    options = ("--algorithm", algorithm)
+    assert go(tmp_path / "long", *options) == 0
+    assert go(tmp_path / "extended", *options, "--movements", 50) == 0  # evaluated after 50, which the long one is not
+    assert go(tmp_path / "extended", *options, "--resume") == 0
+    extended = tmp_path / "extended" / algorithm / "seed-003"
+    assert csv_of(extended) == csv_of(tmp_path / "long" / algorithm / "seed-003")
+    assert read_run(extended).config["movements"] == MOVEMENTS
+
+
+def test_resuming_a_finished_run_changes_nothing_but_what_is_asked_of_its_evaluation(tmp_path, go, reference):
+    directory = tmp_path / "sgim-d" / "seed-003"
+    assert go(tmp_path) == 0
+    assert go(tmp_path, "--resume") == 0
+    assert csv_of(directory) == reference
+    assert go(tmp_path, "--resume", "--evaluate_at", "45", "--repeats", 3) == 0
+    assert read_run(directory).evaluation["movements"].tolist() == [45, 90]
+    assert go(tmp_path, "--resume") == 0
+    assert csv_of(directory) == reference
+
+
+def tear(content):
+    return content[:-100]
+
+
+def zero(content):
+    return content[:-1500] + bytes(1500)
+
+
+def flip(content):
+    digit = content.index(b"\n40,") + 60
+    return content[:digit] + (b"7" if content[digit : digit + 1] != b"7" else b"8") + content[digit + 1 :]
+
+
+def lose_newline(content):
+    return content[:-1]
+
+
+def append_garbage(content):
+    return content + b"\xff\x00 90,,,"
+
+
+def repeat_last_line(content):
+    return content + content.splitlines(keepends=True)[-1]
+
+
+@pytest.mark.parametrize(
+    ("damage", "kept"),
+    [(tear, 89), (zero, 87), (flip, 40), (lose_newline, 89), (append_garbage, 90), (repeat_last_line, 90)],
+)
+def test_of_a_damaged_log_what_is_whole_is_kept_and_the_rest_lived_again(tmp_path, go, reference, capsys, damage, kept):
+    directory = tmp_path / "sgim-d" / "seed-003"
+    assert go(tmp_path) == 0
+    log = directory / "episodes.csv"
+    damaged = damage(log.read_bytes())
+    log.write_bytes(damaged)
+    assert len(read_run(directory).index) == kept
+    capsys.readouterr()
+    assert go(tmp_path, "--resume") == 0
+    dropped = len(damaged) - sum(map(len, reference["episodes.csv"].splitlines(keepends=True)[: kept + 1]))
+    messages = capsys.readouterr().err
+    assert f"episodes.csv: dropped {dropped} bytes" in messages
+    assert f"{kept} movements are kept" in messages
+    assert csv_of(directory) == reference
+
+
+@pytest.mark.parametrize("name", ["evaluation.csv", "regions.csv"])
+@pytest.mark.parametrize("damage", [tear, lose_newline, append_garbage, lambda content: bytes(len(content))])
+def test_damaged_evaluations_are_done_again(tmp_path, go, reference, capsys, name, damage):
+    directory = tmp_path / "sgim-d" / "seed-003"
+    assert go(tmp_path) == 0
+    (directory / name).write_bytes(damage((directory / name).read_bytes()))
+    capsys.readouterr()
+    assert go(tmp_path, "--resume") == 0
+    assert f"{name}: dropped" in capsys.readouterr().err
+    assert csv_of(directory) == reference
+
+
+def test_a_run_killed_before_its_config_was_written_starts_afresh(tmp_path, go, reference, capsys):
+    directory = tmp_path / "sgim-d" / "seed-003"
+    directory.mkdir(parents=True)
+    for name in ("lock", "versions.json", "config.json.part"):
+        (directory / name).touch()
+    assert go(tmp_path, "--resume") == 0
+    assert "no run yet" in capsys.readouterr().err
+    assert csv_of(directory) == reference
+    assert not list(directory.glob("*.part"))
+
+
+def test_a_log_that_another_learner_wrote_is_not_continued(tmp_path, go, capsys):
+    assert go(tmp_path) == go(tmp_path, "--seed", 4) == 0
+    other = (tmp_path / "sgim-d" / "seed-004" / "episodes.csv").read_bytes()
+    (tmp_path / "sgim-d" / "seed-003" / "episodes.csv").write_bytes(other)
+    capsys.readouterr()
+    assert go(tmp_path, "--resume") == 2
+    message = capsys.readouterr().err
+    assert "movement 0" in message
+    assert "Traceback" not in message
+
+
+def test_a_run_is_resumed_with_its_own_configuration_only(tmp_path, go, capsys):
+    assert go(tmp_path, "--movements", 10) == 0
+    before = (tmp_path / "sgim-d" / "seed-003" / "config.json").read_bytes()
+    assert go(tmp_path, "--resume", "--budget", 7, "--goals", "uniform") == 2
+    message = capsys.readouterr().err
+    assert "goals was interest-map, now uniform" in message
+    assert f"budget was {Config().budget}, now 7" in message
+    assert "epsilon" not in message
+    assert (tmp_path / "sgim-d" / "seed-003" / "config.json").read_bytes() == before
+
+
+def test_a_run_is_not_made_shorter(tmp_path, go, capsys):
+    assert go(tmp_path, "--movements", 10) == 0
+    assert go(tmp_path, "--movements", 9, "--resume") == 2
+    assert "10 movements already" in capsys.readouterr().err
+    assert go(tmp_path, "--movements", 10, "--resume") == 0
+
+
+def test_a_run_that_another_process_writes_is_left_alone(tmp_path, go, capsys):
+    assert go(tmp_path, "--movements", 10) == 0
+    with (tmp_path / "sgim-d" / "seed-003" / "lock").open("r+") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        assert go(tmp_path, "--resume") == 2
+    assert "in use by another process" in capsys.readouterr().err
+    assert go(tmp_path, "--resume") == 0
+
+
+def test_a_directory_with_other_files_is_left_alone(tmp_path, go, capsys):
+    directory = tmp_path / "sgim-d" / "seed-003"
+    directory.mkdir(parents=True)
+    (directory / "thesis.tex").touch()
+    assert go(tmp_path) == go(tmp_path, "--resume") == 2
+    assert "thesis.tex" in capsys.readouterr().err
+    assert os.listdir(directory) == ["thesis.tex"]
+
+
+def test_a_damaged_config_is_named(tmp_path, go, capsys):
+    assert go(tmp_path, "--movements", 10) == 0
+    (tmp_path / "sgim-d" / "seed-003" / "config.json").write_text('{"algorithm": ')
+    assert go(tmp_path, "--resume") == 2
+    assert "config.json cannot be read" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ("--algorithm sgimd", "unknown algorithm 'sgimd', known are random, sagg-riac, .* did you mean sgim-d"),
+        ("--algorithm 'sgim d'", "did you mean sgim-d"),
+        ("--algorithm ''", "unknown algorithm"),
+        ("--sede 3", "unknown option --sede; did you mean --seed"),
+        ("--see 3", "unknown option --see"),
+        ("--search gradient", "unknown search 'gradient', known are nelder-mead"),
+        ("--seed -1", "seed must be at least 0, got -1"),
+        ("--seed three", "seed.*\n.*three"),
+        ("--seed", "seed.*expected one argument"),
+        ("--movements 0", "movements must be at least 1, got 0"),
+        ("--movements 1e3", "movements"),
+        ("--task_space 0", "task_space must be a length in metres above 0, got 0"),
+        ("--task-space .nan", "task_space must be a length"),
+        ("--noise -0.1", "noise must be finite and at least 0"),
+        ("--epsilon .inf", "epsilon must be finite"),
+        ("--repeats 1", "one landing point does not scatter"),
+        ("--every 0", "every must be at least 1, got 0"),
+        ("--evaluate_at 0,3", "evaluate_at must be at least 1, got 0"),
+        ("--evaluate_at soon", "evaluate_at"),
+        ("--window 7", "window must be even"),
+        ("--name a/b", "name must be that of one directory"),
+        ("--benchmark nowhere.npz", "benchmark: there is no file nowhere.npz"),
+        ("--benchmark {text}", "is no benchmark"),
+        ("--demonstrations nowhere.npz", "demonstrations: there is no file nowhere.npz"),
+        ("--demonstrations {text}", "is no demonstration file"),
+        ("--out {text}", "Not a directory|File exists"),
+        ("stray", "stray"),
+    ],
+)
+def test_what_makes_no_sense_is_refused_clearly_and_leaves_nothing_behind(tmp_path, go, capsys, options, message):
+    text = tmp_path / "text"
+    text.write_text("not what you look for")
+    assert go(tmp_path / "out", *shlex.split(options.format(text=text))) == 2
+    errors = capsys.readouterr().err
+    assert len(errors) < 1000
+    assert "Traceback" not in errors
+    assert "error: " in errors
+    assert re.search(message, errors)
+    assert os.listdir(tmp_path) == ["text"]
+
+
+def test_a_benchmark_for_another_environment_is_refused(tmp_path, go, capsys):
+    save_benchmark(tmp_path / "arm.npz", Benchmark("PlanarArm", np.zeros((3, 2)), 0.1))
+    assert go(tmp_path / "out", "--benchmark", tmp_path / "arm.npz") == 2
+    assert "made for PlanarArm" in capsys.readouterr().err
+
+
+def test_a_diverging_simulation_is_reported_with_its_theta_and_leaves_a_whole_log(tmp_path, go, capsys):
+    assert go(tmp_path, "--noise", "1e4") == 1  # commands of thousands of rad
+    errors = capsys.readouterr().err
+    assert "theta=[0." in errors
+    assert "Traceback" not in errors
+    directory = tmp_path / "sgim-d" / "seed-003"
+    lines = (directory / "episodes.csv").read_bytes().count(b"\n")
+    assert len(read_run(directory).index) == lines - 1 < MOVEMENTS
+    assert read_run(directory).summary["finished"] is False
+
+
+def test_a_full_disk_is_reported_and_the_run_can_go_on(tmp_path, go, benchmark, reference):
+    directory = tmp_path / "sgim-d" / "seed-003"
+    process = start(EAGER, *arguments(tmp_path, benchmark), limit="-f 24")  # KiB a file may have
+    _, errors = process.communicate()
+    assert process.returncode == 1
+    assert "cannot be written" in errors
+    assert "Traceback" not in errors
+    assert (directory / "episodes.csv").stat().st_size == 24 * 1024
+    assert go(tmp_path, "--resume") == 0
+    assert csv_of(directory) == reference
+
+
+def test_help_names_every_choice_and_every_field_has_a_sentence(capsys):
+    assert main(["--help"]) == 0
+    text = " ".join(capsys.readouterr().out.split()).replace("- ", "-")
+    tables = (GOALS, PROGRESS, COMPETENCES, SEARCHES, INVERSES, ANSWERS, TEACHERS, CHOICES)
+    for choice in (*ALGORITHMS, *(name for table in tables for name in table)):
+        assert choice in text
+    for field in Config.__dataclass_fields__:
+        _, _, sentence = text.partition(f"--{field} {field.upper()} ")
+        assert sentence[0].isupper(), field
+
+
+@pytest.mark.parametrize(
+    ("option", "table"),
+    [
+        ("goals", GOALS),
+        ("progress", PROGRESS),
+        ("competence", COMPETENCES),
+        ("search", SEARCHES),
+        ("inverse", INVERSES),
+        ("social", ANSWERS),
+        ("teacher", TEACHERS),
+        ("choice", CHOICES),
+    ],
+)
+def test_every_choice_lives_and_none_is_another_by_a_new_name(tmp_path, go, option, table):
+    logs = set()
+    # Short attempts and a short window, so that the map is split, and has its say, before the run is over.
+    common = ("--every", 20, "--budget", 3, "--imitations", 3, "--window", 4, "--movements", 240, "--evaluate_at", "[]")
+    for choice in table:
+        assert go(tmp_path, "--name", choice, f"--{option}", choice, *common) == 0
+        logs.add((tmp_path / choice / "seed-003" / "episodes.csv").read_bytes())
+    assert len(logs) == len(table)
+
+
+def test_config_defaults_are_the_librarys(benchmark):
+    learner = build(Config(benchmark=benchmark)).learner
+    shipped = sgimd_torch.sgim_d(FishingRod(), 0, correspondence=FishingRod().primitive.correspondence)
+    for name in ("budget", "tolerance", "global_range"):
+        assert getattr(learner.autonomous, name) == getattr(shipped.autonomous, name)
+    for part in ("goals", "inverse", "judge"):
+        assert type(getattr(learner.autonomous, part)) is type(getattr(shipped.autonomous, part))
+    for name in ("repeats", "epsilon"):
+        assert getattr(learner.social, name) == getattr(shipped.social, name)
+
+
+def test_json_files_are_plain_json(tmp_path, go):
+    assert go(tmp_path, "--repeats", 0, "--movements", 10) == 0  # no repeats: no noise floor, NaN in the csv
+    directory = tmp_path / "sgim-d" / "seed-003"
+    for path in directory.glob("*.json"):
+        json.loads(path.read_text(), parse_constant=pytest.fail)  # called for NaN, which is no json
+    assert read_run(directory).summary["noise_floor_m"] is None
+    assert np.isnan(read_run(directory).evaluation["noise_floor_m"]).all()

@@ -1,0 +1,281 @@
+"""A life in an environment: five learners, exact counts, independent streams, and replays that execute nothing."""
+
+from collections.abc import Sequence
+from functools import partial
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from numpy.typing import ArrayLike
+
+from sgimd_torch.algorithms import attempted, emulating, imitating, imitation, remembered, sagg_riac, sgim_d
+from sgimd_torch.environment import PlanarArm
+from sgimd_torch.evaluation import evaluate
+from sgimd_torch.interest import UniformGoals
+from sgimd_torch.inverse_model import LocalInverse, LocallyLinear, NearestNeighbour
+from sgimd_torch.search import perturb
+from sgimd_torch.session import Recorded, ReplayError, live, replay, run
+from sgimd_torch.spaces import Array, Episode, stream
+from sgimd_torch.teachers import InitialTeacher, PeriodicTeacher
+from worlds import ALGORITHMS, TAUGHT, demonstrations, last_posture, make
+
+every_algorithm = pytest.mark.parametrize("name", ALGORITHMS)
+
+
+class CountingArm(PlanarArm):
+    """Counts its movements, and what it has been asked."""
+
+    def __init__(self, **options: object) -> None:
+        super().__init__(5, **options)
+        self.executed: list[tuple[Array, Array]] = []
+
+    def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
+        self.executed.append((np.asarray(context), np.asarray(theta)))
+        return super().execute(context, theta, rng)
+
+
+def teacher_of(arm: PlanarArm, every: int = 30) -> PeriodicTeacher:
+    return PeriodicTeacher(demonstrations(arm), stream(0, "teacher"), every=every)
+
+
+def life(name: str, arm: PlanarArm, movements: int = 200, seed: int = 0, **options: object) -> list[Episode]:
+    teacher = teacher_of(arm) if name in TAUGHT else None
+    return list(run(make(name, arm, seed), arm, seed, movements=movements, teacher=teacher, **options))
+
+
+def summary(episodes: Sequence[Episode]) -> list[tuple[object, ...]]:
+    return [
+        (e.index, e.context.tobytes(), e.move and e.move.theta.tobytes(), e.outcome is not None and e.outcome.tobytes())
+        for e in episodes
+    ]
+
+
+def recorded(episodes: Sequence[Episode]) -> list[Recorded]:
+    return [Recorded(e.move.theta if e.move is not None else None, e.outcome) for e in episodes]
+
+
+@every_algorithm
+def test_a_life_has_exactly_as_many_movements_as_asked_for(name: str) -> None:
+    arm = PlanarArm(5, noise=0.01)
+    learner = make(name, arm)
+    teacher = teacher_of(arm) if name in TAUGHT else None
+    episodes = list(run(learner, arm, 0, movements=200, teacher=teacher))
+    assert [episode.index for episode in episodes] == list(range(200))
+    n_executed = sum(episode.move is not None for episode in episodes)
+    assert n_executed == {"observation": 0, "imitation": 170}.get(name, 200)  # imitation rests before its first lesson
+    assert len(learner.memory) == (6 if name == "observation" else n_executed)
+    executed = np.array([episode.outcome for episode in episodes if episode.move is not None]).reshape(-1, 2)
+    if name != "observation":
+        assert np.array_equal(learner.memory.outcomes, executed)
+
+
+@every_algorithm
+def test_a_demonstration_comes_every_thirty_movements(name: str) -> None:
+    given = [e.index for e in life(name, PlanarArm(5)) if e.demonstration is not None]
+    assert given == ([30, 60, 90, 120, 150, 180] if name in TAUGHT else [])
+
+
+@every_algorithm
+def test_all_movements_stay_inside_the_policy_space(name: str) -> None:
+    arm = PlanarArm(5, noise=0.05)
+    thetas = [e.move.theta for e in life(name, arm) if e.move is not None]
+    assert all(arm.policies.contains(theta) for theta in thetas)
+
+
+@every_algorithm
+def test_the_same_seed_lives_the_same_life_and_another_seed_another(name: str) -> None:
+    arm = PlanarArm(5, noise=0.01)
+    first, again, other = (summary(life(name, arm, 100, seed)) for seed in (1, 1, 2))
+    assert first == again
+    if name != "observation":
+        assert first != other
+
+
+def test_sgim_d_imitates_exactly_first_and_then_returns_to_its_own_goals() -> None:
+    arm = PlanarArm(5)
+    learner = sgim_d(arm, 0, correspondence=last_posture, social=partial(imitating, repeats=7))
+    episodes = list(run(learner, arm, 0, movements=120, teacher=teacher_of(arm)))
+    for episode in episodes[30::30]:
+        assert np.array_equal(episode.move.theta, episode.demonstration.trajectory[-1])
+    imitated = [e.index for e in episodes if e.move.origin == "imitate"]
+    assert imitated == [*range(30, 37), *range(60, 67), *range(90, 97)]
+
+
+def test_imitation_repeats_the_last_demonstration_until_the_next() -> None:
+    arm = PlanarArm(5)
+    episodes = list(
+        run(imitation(arm, 0, correspondence=last_posture, epsilon=0.02), arm, 0, movements=90, teacher=teacher_of(arm))
+    )
+    assert all(e.move is None for e in episodes[:30])
+    for first in (30, 60):
+        theta_d = episodes[first].demonstration.trajectory[-1]
+        assert all(np.abs(e.move.theta - theta_d).max() <= 0.02 for e in episodes[first : first + 30])
+
+
+def test_observation_executes_nothing_but_remembers_what_it_saw() -> None:
+    arm = CountingArm()
+    learner = make("observation", arm)
+    teacher = teacher_of(arm)
+    arm.executed.clear()
+    seen = [e.demonstration for e in run(learner, arm, 0, movements=100, teacher=teacher) if e.demonstration]
+    assert arm.executed == []
+    assert np.array_equal(learner.memory.outcomes, [d.outcome for d in seen])
+    assert np.array_equal(learner.memory.thetas, [d.trajectory[-1] for d in seen])
+
+
+@every_algorithm
+def test_evaluating_does_not_disturb_learning(name: str) -> None:
+    def watched(every: int | None) -> list[tuple[object, ...]]:
+        arm = PlanarArm(5, noise=0.01)
+        learner = make(name, arm)
+        teacher = teacher_of(arm) if name in TAUGHT else None
+        episodes = []
+        for episode in run(learner, arm, 0, movements=150, teacher=teacher):
+            episodes.append(episode)
+            if every and (episode.index + 1) % every == 0 and len(learner.memory):
+                evaluate(LocalInverse(learner.memory), arm, np.eye(2) / 2, 0, episode.index + 1, repeats=3)
+        return summary(episodes)
+
+    assert watched(every=None) == watched(every=10)
+
+
+@every_algorithm
+def test_a_replay_proposes_every_theta_again_without_executing(name: str) -> None:
+    arm = CountingArm(noise=0.01)
+    first = life(name, arm, 150)
+    arm.executed.clear()
+    teacher_of(arm)
+    n_for_the_teacher = len(arm.executed)
+    arm.executed.clear()
+    again = life(name, arm, 150, execute=replay(recorded(first), live(arm, 0)))
+    assert summary(again) == summary(first)
+    assert len(arm.executed) == (n_for_the_teacher if name in TAUGHT else 0)
+
+
+@every_algorithm
+@pytest.mark.parametrize("stopped", [1, 37, 95])
+def test_a_life_resumed_from_its_record_ends_as_if_never_stopped(name: str, stopped: int) -> None:
+    arm = PlanarArm(5, noise=0.01)
+    whole = life(name, arm, 150)
+    resumed = life(name, arm, 150, execute=replay(recorded(whole)[:stopped], live(arm, 0)))
+    assert summary(resumed) == summary(whole)
+
+
+def test_a_replay_that_proposes_another_theta_is_an_error() -> None:
+    arm = PlanarArm(5)
+    record = recorded(life("sgim-d", arm, 50))
+    record[20] = Recorded(record[20].theta + 1e-15, record[20].outcome)
+    learner = make("sgim-d", arm)
+    with pytest.raises(ReplayError, match="movement 20"):
+        list(run(learner, arm, 0, movements=50, teacher=teacher_of(arm), execute=replay(record, live(arm, 0))))
+    assert len(learner.memory) == 20
+
+
+def test_a_replay_of_another_seed_is_an_error_from_the_first_movement_on() -> None:
+    arm = PlanarArm(5)
+    with pytest.raises(ReplayError, match="movement 0"):
+        life("random", arm, 10, seed=2, execute=replay(recorded(life("random", arm, 10, seed=1)), live(arm, 2)))
+
+
+def test_a_movement_where_the_record_has_rest_is_an_error() -> None:
+    arm = PlanarArm(5)
+    with pytest.raises(ReplayError, match="movement 0"):
+        life("random", arm, 10, execute=replay([Recorded(None, None)] * 10, live(arm, 0)))
+
+
+def test_a_movement_meets_the_same_noise_whatever_was_done_before_it() -> None:
+    def noises_met(name: str, every: int) -> dict[int, object]:
+        met: dict[int, object] = {}
+
+        class Listening(PlanarArm):
+            def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
+                met[len(met) + resting] = rng.bit_generator.state
+                return super().execute(context, theta, rng)
+
+        arm, quiet = Listening(5, noise=0.05), PlanarArm(5)
+        resting = every if name == "imitation" else 0
+        teacher = teacher_of(quiet, every) if name in TAUGHT else None
+        list(run(make(name, arm), arm, 0, movements=60, teacher=teacher))
+        return met
+
+    alone = noises_met("sagg-riac", 30)
+    assert len({str(state) for state in alone.values()}) == 60  # another one for each movement
+    assert noises_met("random", 30) == noises_met("sgim-d", 30) == noises_met("sgim-d", 7) == alone
+    assert noises_met("imitation", 20) == {index: alone[index] for index in range(20, 60)}
+
+
+def test_random_exploration_makes_the_same_movements_whatever_the_noise() -> None:
+    noisy, quiet = (
+        [e.move.theta.tolist() for e in life("random", PlanarArm(5, noise=noise), 50)] for noise in (0.1, 0.0)
+    )
+    assert noisy == quiet
+
+
+@every_algorithm
+def test_a_context_holds_from_the_first_movement_of_an_attempt_to_its_last(name: str) -> None:
+    arm = PlanarArm(5, context=True)
+    lessons = demonstrations(PlanarArm(5))
+    in_context = [type(d)(np.array([0.3]), d.times, d.trajectory, d.outcome) for d in lessons]
+    teacher = PeriodicTeacher(in_context, stream(0, "teacher")) if name in TAUGHT else None
+    learner = make(name, arm)
+    episodes = list(run(learner, arm, 0, movements=150, teacher=teacher))
+    for before, after in pairwise(episodes):
+        if after.demonstration is None and before.move is not None and after.move is not None:
+            same_goal = after.move.goal is not None and np.array_equal(before.move.goal, after.move.goal)
+            assert np.array_equal(before.context, after.context) or not same_goal
+    assert all(e.context.tolist() == [0.3] for e in episodes if e.demonstration is not None)
+    contexts = np.array([e.context for e in episodes if e.move is not None]).reshape(-1, 1)
+    if name != "observation":
+        assert np.array_equal(learner.memory.contexts, contexts)
+        assert len(np.unique(contexts)) > 1 or name == "imitation"
+
+
+def test_a_life_may_be_left_at_any_time_and_gone_on_with() -> None:
+    arm = PlanarArm(5)
+    learner = make("sagg-riac", arm)
+    for episode in run(learner, arm, 0, movements=100):
+        if episode.index == 16:
+            break
+    assert len(learner.memory) == 17
+    list(run(learner, arm, 1, movements=10))
+    assert len(learner.memory) == 27
+
+
+def test_a_learner_that_cannot_be_taught_says_so_to_a_teacher() -> None:
+    arm = PlanarArm(5)
+    with pytest.raises(RuntimeError, match="social"):
+        list(run(make("random", arm), arm, 0, movements=40, teacher=teacher_of(arm)))
+
+
+def test_all_initial_demonstrations_reach_the_learner_before_it_is_left_alone() -> None:
+    arm = PlanarArm(5)
+    teacher = InitialTeacher(demonstrations(arm, n=4), stream(0, "teacher"), every=10)
+    learner = sgim_d(arm, 0, correspondence=last_posture)
+    episodes = list(run(learner, arm, 0, movements=80, teacher=teacher))
+    assert [e.index for e in episodes if e.demonstration is not None] == [0, 10, 20, 30]
+
+
+@pytest.mark.parametrize(
+    "part",
+    [
+        {"goals": UniformGoals},
+        {"inverse": NearestNeighbour},
+        {"inverse": lambda memory: LocallyLinear(memory, policies=PlanarArm(5).policies)},
+        {"search": partial(perturb, sd=0.1)},
+        {"judge": attempted},
+        {"judge": remembered},
+        {"budget": 3, "tolerance": 0.1, "global_range": (0.0, 0.2)},
+        {"social": emulating},
+    ],
+)
+def test_every_part_of_sgim_d_can_be_swapped_by_one_word(part: dict[str, object]) -> None:
+    arm = PlanarArm(5)
+    learner = sgim_d(arm, 0, correspondence=last_posture, **part)
+    list(run(learner, arm, 0, movements=90, teacher=teacher_of(arm)))
+    assert len(learner.memory) == 90
+
+
+def test_sgim_d_without_a_teacher_is_sagg_riac() -> None:
+    arm = PlanarArm(5, noise=0.01)
+    alone = run(sgim_d(arm, 0, correspondence=last_posture), arm, 0, movements=150)
+    assert summary(list(alone)) == summary(list(run(sagg_riac(arm, 0), arm, 0, movements=150)))

@@ -1,0 +1,322 @@
+"""Strategies: movements inside Pi, one goal remembered for each attempt however it ends, and the paper's regimes."""
+
+from collections.abc import Callable, Generator, Iterator
+from functools import partial
+
+import numpy as np
+import pytest
+
+from sgimd_torch.competence import AttemptCompetence, Competence, performance
+from sgimd_torch.environment import PlanarArm
+from sgimd_torch.inverse_model import NearestNeighbour
+from sgimd_torch.memory import Memory
+from sgimd_torch.search import nelder_mead, perturb
+from sgimd_torch.spaces import Array, Attempt, Box, Demonstration, Estimate, Move, Search, stream
+from sgimd_torch.strategies import Babble, Emulate, GoalBabbling, Imitate, Remember, Rest
+from worlds import NO_CONTEXT, demonstrate
+
+ARM = PlanarArm(5)
+MEASURE = partial(performance, rest=ARM.rest, d_min=0.02)
+FAR = np.array([-0.9, 0.3])
+
+
+class Diary:
+    """Goals that are always the same one, and a list of what came of them."""
+
+    def __init__(self, goal: Array = FAR) -> None:
+        self.goal = goal
+        self.entries: list[tuple[Array, float, str]] = []
+
+    def sample(self, context: Array) -> Array:
+        return self.goal
+
+    def add(self, context: Array, goal: Array, competence: float, strategy: str = "autonomous") -> None:
+        self.entries.append((goal, competence, strategy))
+
+
+def remembering(n: int) -> Memory:
+    """``n`` random movements of the arm."""
+    memory, rng = Memory(0, 5, 2), stream(0, "remembered")
+    for _ in range(n):
+        theta = ARM.policies.sample(rng)
+        memory.add(NO_CONTEXT, theta, ARM.execute(NO_CONTEXT, theta, rng))
+    return memory
+
+
+def babbling(
+    memory: Memory,
+    goals: Diary,
+    *,
+    search: Search | None = None,
+    budget: int = 12,
+    tolerance: float = 1e-9,
+    global_range: tuple[float, float] = (0.0, 0.0),
+    seed: int = 0,
+) -> GoalBabbling:
+    return GoalBabbling(
+        ARM.policies,
+        memory,
+        goals,
+        NearestNeighbour(memory),
+        perturb(ARM.policies, stream(seed, "search"), sd=0.05) if search is None else search,
+        Competence(memory, MEASURE),
+        AttemptCompetence(MEASURE),
+        stream(seed, "regime"),
+        budget=budget,
+        tolerance=tolerance,
+        global_range=global_range,
+    )
+
+
+def execute(move: Move) -> Array:
+    return ARM.execute(NO_CONTEXT, move.theta, stream(0, "environment"))
+
+
+def live(attempt: Attempt, memory: Memory | None = None, n: int = 10_000) -> list[Move | None]:
+    """The first ``n`` movements, executed; with ``memory``, as a learner remembers them."""
+    moves: list[Move | None] = []
+    try:
+        move = next(attempt)
+        while True:
+            moves.append(move)
+            if len(moves) == n:
+                return moves
+            outcome = execute(move) if move is not None else np.zeros(2)
+            if memory is not None and move is not None:
+                memory.add(NO_CONTEXT, move.theta, outcome)
+            move = attempt.send(outcome)
+    except StopIteration:
+        return moves
+
+
+def plan(*thetas: Array) -> Search:
+    """A search that executes these, whatever comes of them."""
+
+    def search(start: Estimate, goal: Array) -> Generator[Array, Array, None]:
+        for theta in thetas:  # noqa: UP028 - a tuple takes no outcomes
+            yield theta
+
+    return search
+
+
+LESSON = demonstrate(ARM, [-0.5, 0.5])
+THETA_D = LESSON.trajectory[-1]
+
+
+def imitation(goals: Diary, repeats: int | None = 4, **options: object) -> Imitate:
+    return Imitate(
+        ARM.policies,
+        stream(0, "imitate"),
+        repeats=repeats,
+        goals=goals,
+        judge=AttemptCompetence(MEASURE),
+        outcomes=ARM.outcomes,
+        **options,
+    )
+
+
+def attempts(goals: Diary) -> Iterator[tuple[str, Callable[[], Attempt]]]:
+    """Every strategy that moves, ready to begin, as a learner with 50 movements behind it would."""
+    memory = remembering(50)
+    simplex = nelder_mead(ARM.policies, stream(0, "search"), step=0.3)
+    yield "goal babbling", lambda: babbling(memory, goals, global_range=(0.5, 0.5)).attempt(NO_CONTEXT)
+    yield "simplex", lambda: babbling(memory, goals, search=simplex, budget=40).attempt(NO_CONTEXT)
+    yield "imitate", lambda: imitation(goals, epsilon=0.6).attempt(NO_CONTEXT, THETA_D, LESSON)
+    yield "emulate", lambda: Emulate(babbling(memory, goals), ARM.outcomes).attempt(NO_CONTEXT, THETA_D, LESSON)
+
+
+NAMES = [name for name, _ in attempts(Diary())]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_movements_stay_inside_the_policy_space_and_say_what_they_are_for(name: str) -> None:
+    goals = Diary()
+    moves = live(dict(attempts(goals))[name]())
+    assert len(moves) >= 4
+    for move in moves:
+        assert ARM.policies.contains(move.theta)
+        assert np.array_equal(move.goal, goals.entries[0][0])
+        assert move.origin in {"global", "local", "imitate"}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_an_attempt_that_ends_by_itself_leaves_one_goal(name: str) -> None:
+    goals = Diary()
+    moves = live(dict(attempts(goals))[name]())
+    assert len(goals.entries) == 1
+    best = max(float(MEASURE(goals.entries[0][0], execute(move))) for move in moves)
+    assert goals.entries[0][1] == pytest.approx(best)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_an_interrupted_attempt_leaves_one_goal_judged_by_what_was_executed(name: str) -> None:
+    goals = Diary()
+    attempt = dict(attempts(goals))[name]()
+    moves = live(attempt, n=3)  # the third is proposed, not executed
+    assert goals.entries == []
+    attempt.close()
+    attempt.close()
+    assert len(goals.entries) == 1
+    best = max(float(MEASURE(goals.entries[0][0], execute(move))) for move in moves[:2])
+    assert goals.entries[0][1] == pytest.approx(best)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_an_attempt_of_which_nothing_was_executed_leaves_no_goal(name: str) -> None:
+    goals = Diary()
+    attempt = dict(attempts(goals))[name]()
+    next(attempt)
+    attempt.close()
+    assert goals.entries == []
+
+
+def test_babbling_is_one_uniform_movement_without_a_goal() -> None:
+    box, rng = Box.cube(2, 3, 4), stream(0, "babble")
+    moves = [list(Babble(box, rng).attempt(NO_CONTEXT)) for _ in range(300)]
+    assert {len(attempt) for attempt in moves} == {1}
+    thetas = np.array([attempt[0].theta for attempt in moves])
+    assert box.contains(thetas).all()
+    # Standard error of a uniform mean: 0.289 / sqrt(300) = 0.017; five of them fail once in a million.
+    assert thetas.mean(axis=0) == pytest.approx(np.full(4, 2.5), abs=5 * 0.017)
+    assert all(attempt[0].goal is None and attempt[0].origin == "babble" for attempt in moves)
+
+
+def test_resting_is_one_movement_of_none() -> None:
+    assert live(Rest().attempt(NO_CONTEXT)) == [None]
+
+
+@pytest.mark.parametrize("budget", [1, 2, 7])
+def test_goal_babbling_spends_exactly_its_budget_on_a_goal_it_does_not_reach(budget: int) -> None:
+    for global_range in ((0.0, 0.0), (0.5, 0.5), (1.0, 1.0)):
+        strategy = babbling(remembering(20), Diary(), budget=budget, global_range=global_range)
+        assert len(live(strategy.attempt(NO_CONTEXT))) == budget
+
+
+def test_goal_babbling_stops_with_the_movement_that_reaches_the_goal() -> None:
+    goals = Diary(np.array([0.3, -0.4]))
+    third_time_lucky = plan(np.full(5, 0.5), np.full(5, 0.6), ARM.solve(NO_CONTEXT, goals.goal), np.full(5, 0.7))
+    moves = live(babbling(remembering(20), goals, search=third_time_lucky, tolerance=0.01).attempt(NO_CONTEXT))
+    assert len(moves) == 3
+    assert goals.entries[0][1] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_the_tolerance_is_a_distance_in_metres() -> None:
+    memory, outcome = remembering(20), execute(Move(np.full(5, 0.6), None, "test"))
+    once_or_twice = plan(np.full(5, 0.6), np.full(5, 0.5))
+    for tolerance, n in ((0.051, 1), (0.049, 2)):
+        goals = Diary(outcome + np.array([0.03, 0.04]))  # 0.05 m away
+        strategy = babbling(memory, goals, search=once_or_twice, tolerance=tolerance, budget=2)
+        assert len(live(strategy.attempt(NO_CONTEXT))) == n
+
+
+def test_with_an_empty_memory_the_first_movement_is_global_however_unlikely() -> None:
+    for seed in range(20):
+        strategy = babbling(Memory(0, 5, 2), Diary(), global_range=(0.0, 0.0), seed=seed)
+        assert next(strategy.attempt(NO_CONTEXT)).origin == "global"
+
+
+@pytest.mark.parametrize(("reached", "probability"), [(1.0, 0.05), (0.6, 0.4), (0.0, 0.95), (-5.0, 0.95)])
+def test_the_less_competent_the_likelier_a_movement_is_global(reached: float, probability: float) -> None:
+    # The goal lies 1 m from rest, and what is remembered ``reached`` of it: competence is reached - 1, and at least -1.
+    memory = Memory(0, 5, 2)
+    memory.add(NO_CONTEXT, np.full(5, 0.5), ARM.rest + np.array([reached, 0.0]))
+    strategy = babbling(memory, Diary(ARM.rest + np.array([1.0, 0.0])), global_range=(0.05, 0.95))
+    origins = [next(strategy.attempt(NO_CONTEXT)).origin for _ in range(2000)]
+    # Standard error at most 0.011; five of them fail once in a million.
+    assert origins.count("global") / 2000 == pytest.approx(probability, abs=5 * 0.011)
+
+
+def test_a_search_that_ends_before_the_budget_is_begun_anew_from_what_is_known_by_then() -> None:
+    memory, starts = remembering(20), []
+
+    def one_movement(start: Estimate, goal: Array) -> Generator[Array, Array, None]:
+        starts.append(start)
+        yield ARM.policies.clip(start.theta + 0.01)
+
+    live(babbling(memory, Diary(), search=one_movement, budget=5).attempt(NO_CONTEXT), memory)
+    assert len(starts) == 5
+    assert len(memory) == 25
+
+
+def test_a_budget_of_nothing_is_refused() -> None:
+    with pytest.raises(ValueError, match="budget"):
+        babbling(Memory(0, 5, 2), Diary(), budget=0)
+
+
+def test_imitation_is_exact_first_and_then_varied_by_less_than_epsilon() -> None:
+    theta_d = np.full(5, 0.5)
+    imitate = Imitate(ARM.policies, stream(0, "imitate"), repeats=200, epsilon=0.05)
+    thetas = np.array([move.theta for move in live(imitate.attempt(NO_CONTEXT, theta_d, LESSON))])
+    assert np.array_equal(thetas[0], theta_d)
+    variations = thetas[1:] - theta_d
+    assert len(variations) == 199
+    assert np.abs(variations).max() <= 0.05
+    assert np.abs(variations).max() > 0.049
+    assert (variations.min(axis=0) < -0.04).all()  # in every parameter, both ways
+    assert (variations.max(axis=0) > 0.04).all()
+
+
+def test_imitation_of_a_policy_on_the_border_is_clipped_to_the_policy_space() -> None:
+    imitate = Imitate(ARM.policies, stream(0, "imitate"), repeats=50, epsilon=0.05)
+    thetas = np.array([move.theta for move in live(imitate.attempt(NO_CONTEXT, np.array([0, 1, 0, 1, 0.5]), LESSON))])
+    assert ARM.policies.contains(thetas).all()
+    assert (thetas[:, :4] == [0, 1, 0, 1]).mean() == pytest.approx(0.5, abs=0.2)  # half of the variations lead outside
+
+
+def test_imitation_without_a_number_of_repeats_never_ends() -> None:
+    assert len(live(imitation(Diary(), repeats=None).attempt(NO_CONTEXT, THETA_D, LESSON), n=1000)) == 1000
+
+
+def test_a_demonstrated_outcome_becomes_a_goal_of_the_social_strategy_after_its_imitation() -> None:
+    goals = Diary()
+    live(imitation(goals, repeats=3).attempt(NO_CONTEXT, THETA_D, LESSON))
+    ((goal, competence, strategy),) = goals.entries
+    assert np.array_equal(goal, LESSON.outcome)
+    assert competence == pytest.approx(0, abs=1e-9)  # imitated exactly where nothing is random
+    assert strategy == "social"
+
+
+def outside(lesson: Demonstration) -> Demonstration:
+    return Demonstration(lesson.context, lesson.times, lesson.trajectory, np.array([1.5, 0.0]))
+
+
+def test_a_demonstrated_outcome_outside_the_task_space_is_imitated_but_is_no_goal() -> None:
+    goals = Diary()
+    assert len(live(imitation(goals, repeats=3).attempt(NO_CONTEXT, THETA_D, outside(LESSON)))) == 3
+    assert goals.entries == []
+
+
+def test_imitation_without_goals_only_imitates() -> None:
+    imitate = Imitate(ARM.policies, stream(0, "imitate"), repeats=3)
+    assert len(live(imitate.attempt(NO_CONTEXT, THETA_D, LESSON))) == 3
+
+
+def test_imitation_takes_goals_judge_and_task_space_together_or_none() -> None:
+    with pytest.raises(ValueError, match="together"):
+        Imitate(ARM.policies, stream(0, "imitate"), goals=Diary())
+    with pytest.raises(ValueError, match="together"):
+        Imitate(ARM.policies, stream(0, "imitate"), goals=Diary(), judge=AttemptCompetence(MEASURE))
+
+
+def test_emulation_pursues_the_demonstrated_outcome_and_not_the_learners_own_goal() -> None:
+    goals = Diary(FAR)
+    moves = live(Emulate(babbling(remembering(20), goals), ARM.outcomes).attempt(NO_CONTEXT, THETA_D, LESSON))
+    assert all(np.array_equal(move.goal, LESSON.outcome) for move in moves)
+    assert not any(np.array_equal(move.theta, THETA_D) for move in moves)
+    ((goal, _, strategy),) = goals.entries
+    assert np.array_equal(goal, LESSON.outcome)
+    assert strategy == "social"
+
+
+def test_emulation_of_an_outcome_outside_the_task_space_does_nothing() -> None:
+    goals = Diary()
+    emulate = Emulate(babbling(remembering(20), goals), ARM.outcomes)
+    assert live(emulate.attempt(NO_CONTEXT, THETA_D, outside(LESSON))) == []
+    assert goals.entries == []
+
+
+def test_remembering_stores_the_demonstrated_pair_and_moves_not_at_all() -> None:
+    memory = Memory(0, 5, 2)
+    assert live(Remember(memory).attempt(NO_CONTEXT, THETA_D, LESSON)) == []
+    assert memory.thetas.tolist() == [THETA_D.tolist()]
+    assert memory.outcomes.tolist() == [LESSON.outcome.tolist()]

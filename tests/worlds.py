@@ -1,0 +1,49 @@
+"""What the tests of the learning side share: a planar arm, demonstrations on it, and the five learners of the paper."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from sgimd_torch.algorithms import imitation, observation, random_exploration, sagg_riac, sgim_d
+from sgimd_torch.environment import PlanarArm
+from sgimd_torch.learner import Learner
+from sgimd_torch.spaces import Array, Demonstration, stream
+
+NO_CONTEXT = np.zeros(0)
+
+
+def last_posture(times: Array, trajectory: Array) -> Array:
+    """The correspondence of an arm whose outcome is where it ends: theta_d is the last posture of the recording."""
+    return trajectory[-1]
+
+
+def demonstrate(arm: PlanarArm, goal: Sequence[float] | Array, context: Array = NO_CONTEXT) -> Demonstration:
+    """The arm led from its middle posture to where it reaches ``goal``."""
+    theta = arm.solve(context, goal)
+    times = np.linspace(0, 1, 5)
+    trajectory = 0.5 + np.outer(times, theta - 0.5)
+    return Demonstration(context, times, trajectory, arm.execute(context, theta, stream(0, "demonstration")))
+
+
+def demonstrations(arm: PlanarArm, n: int = 20, seed: int = 0) -> list[Demonstration]:
+    """``n`` of them in the directions of a whole turn, all within reach."""
+    rng = stream(seed, "demonstrations")
+    radii = np.sqrt(rng.uniform(0.1, 0.9, n)) * arm.length
+    turns = rng.uniform(-np.pi, np.pi, n)
+    goals = radii[:, None] * np.stack([np.cos(turns), np.sin(turns)], axis=1)
+    return [demonstrate(arm, goal) for goal in goals]
+
+
+ALGORITHMS = {
+    "random": lambda arm, seed: random_exploration(arm, seed),
+    "sagg-riac": lambda arm, seed: sagg_riac(arm, seed),
+    "observation": lambda arm, seed: observation(arm, seed, correspondence=last_posture),
+    "imitation": lambda arm, seed: imitation(arm, seed, correspondence=last_posture),
+    "sgim-d": lambda arm, seed: sgim_d(arm, seed, correspondence=last_posture),
+}
+TAUGHT = {"observation", "imitation", "sgim-d"}
+
+
+def make(name: str, arm: PlanarArm, seed: int = 0) -> Learner:
+    """One of the five learners."""
+    return ALGORITHMS[name](arm, seed)
