@@ -112,6 +112,8 @@ def run_in(directory: RunDirectory, config: Config, parts: RunParts, stopping: S
     finished = False
     with Progress(f"{config.variant} seed {config.seed}", len(recorded), config.movements) as progress:
         try:
+            if not recorded:
+                directory.begin()
             for episode in seconds.of_learner(episodes):
                 demonstration = episode.demonstration
                 line = directory.columns.line(episode, None if demonstration is None else rows[id(demonstration)])
@@ -124,6 +126,8 @@ def run_in(directory: RunDirectory, config: Config, parts: RunParts, stopping: S
                     directory.flush()
                     with seconds.of_evaluation():
                         evaluate_in(directory, config, parts, movements, stopping)
+                if movements == len(recorded):
+                    directory.begin()
                 if movements > len(recorded) and time.monotonic() - flushed >= FLUSH_EVERY:
                     summarise()
                     flushed = time.monotonic()
@@ -131,7 +135,7 @@ def run_in(directory: RunDirectory, config: Config, parts: RunParts, stopping: S
                 stopping.check()
             finished = True
         finally:
-            if movements >= len(recorded):  # else the summary found is the newer one
+            if movements >= len(recorded):  # else the summary that was found counts for more
                 summarise(finished=finished)
     error, floor = (directory.summary[name] for name in ("mean_error_m", "noise_floor_m"))
     found = "not evaluated" if error is None else f"mean error {error:.4f} m, noise floor {metres(floor)}"

@@ -116,7 +116,7 @@ class Columns:
 
 
 class RunDirectory:
-    """Where one run is written, by one process at a time; a context manager.
+    """Where one run is written, from ``begin`` on, by one process at a time; a context manager.
 
     Args:
         path: made when missing.
@@ -167,16 +167,15 @@ class RunDirectory:
                 self.summary = _read_json(path / "summary.json", missing={})
             elif resume:
                 self.notes.append(f"{path} holds no run yet: it starts from the beginning")
-            kept = self._read_log()
+            self._kept = self._read_log()
             if len(self.lines) > movements:
                 raise RunError(f"{path} has {len(self.lines)} movements already, asked for were {movements}")
-            write_json(path / "versions.json", versions)
-            write_json(path / "config.json", settings)  # from here on it counts as a run
-            self._log = self._open_log(kept)
+            self._settings, self._versions = dict(settings), versions
             self._evaluation = _Table(path / "evaluation.csv", EVALUATION, self.notes)
             self._regions = None
             if region_dims is not None:
                 self._regions = _Table(path / "regions.csv", _region_columns(region_dims), self.notes)
+            self._log: int | None = None
         except BaseException:
             os.close(self._lock)
             raise
@@ -194,8 +193,20 @@ class RunDirectory:
             if error is None:
                 raise
         finally:
-            os.close(self._log)
+            if self._log is not None:
+                os.close(self._log)
             os.close(self._lock)
+
+    def begin(self) -> None:
+        """Start to write. Until then what was found stays as it is, so that a replay that fails does no harm."""
+        write_json(self.path / "versions.json", self._versions)
+        write_json(self.path / "config.json", self._settings)  # from here on it counts as a run
+        self._log = os.open(self.path / "episodes.csv", os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
+        os.ftruncate(self._log, self._kept)
+        if not self._kept:
+            self.append(self.columns.header)
+        for table in filter(None, (self._regions, self._evaluation)):
+            table.begin()
 
     def append(self, line: bytes) -> None:
         """One more line for the log, on disk with the next ``flush``."""
@@ -203,7 +214,7 @@ class RunDirectory:
 
     def flush(self) -> None:
         """Hand the log to the operating system: a killed process then loses nothing of it."""
-        while self._pending:
+        while self._pending and self._log is not None:
             del self._pending[: os.write(self._log, self._pending)]
 
     def keep_evaluations(self, movements: Iterable[int]) -> None:
@@ -283,35 +294,32 @@ class RunDirectory:
             self.notes.append(_dropped(path, content[kept:], f"{len(self.lines)} movements are kept"))
         return kept
 
-    def _open_log(self, kept: int) -> int:
-        log = os.open(self.path / "episodes.csv", os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
-        os.ftruncate(log, kept)
-        if not kept:
-            self.append(self.columns.header)
-        return log
-
 
 class _Table:
-    """A small csv file whose first column is the number of movements, replaced whole at every change."""
+    """A small csv file whose first column is the number of movements; once begun, it is replaced at every change."""
 
     def __init__(self, path: Path, names: Sequence[str], notes: list[str]) -> None:
         self.path = path
         self.header = ",".join(names)
         self.rows: dict[int, list[str]] = {}
+        self._begun = False
         if path.exists():
             content = path.read_bytes()
             self.rows, whole = _read_rows(content, self.header)
             if whole < len(content):
                 notes.append(_dropped(path, content[whole:], "it will be evaluated again"))
+
+    def begin(self) -> None:
+        self._begun = True
         self._write()
 
     def keep(self, movements: set[int]) -> None:
         self.rows = {key: rows for key, rows in self.rows.items() if key in movements}
-        self._write()
 
     def put(self, movements: int, rows: list[list[str]]) -> None:
         self.rows[movements] = [",".join([str(movements), *fields]) for fields in rows]
-        self._write()
+        if self._begun:
+            self._write()
 
     def _write(self) -> None:
         lines = [self.header, *(line for key in sorted(self.rows) for line in self.rows[key])]

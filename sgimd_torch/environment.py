@@ -1,6 +1,6 @@
 """The world as the learner meets it: observe a context, execute a movement, see its outcome.
 
-Section 2.1 of Nguyen & Oudeyer (2014): M(c, theta) = tau. An environment of your own needs the six members of
+Section 2.1 of Nguyen & Oudeyer (2014): M(c, theta) = tau. An environment of your own needs the seven members of
 `Environment`. `PlanarArm` is one whose reachable set and inverse are known exactly, for tests and first steps:
 ``arm = PlanarArm(); outcome = arm.execute(arm.observe(rng), theta, rng)``
 """

@@ -68,7 +68,7 @@ def test_a_reproducible_movement_farther_away_beats_an_erratic_one_on_the_goal()
     # The erratic pair: standard deviation 0.4 / sqrt(2) = 0.28, so 0 + 0.14 against 0.12 + 0 for the reliable pair.
     memory = line({0.10: 0.0, 0.11: 0.4, 0.90: 0.12, 0.91: 0.12})
     goal = np.array([0.0])
-    assert LocalInverse(memory)(NO_CONTEXT, goal).theta[0] == pytest.approx(0.905)
+    assert LocalInverse(memory, alpha=0.5)(NO_CONTEXT, goal).theta[0] == pytest.approx(0.905)
     assert LocalInverse(memory, alpha=0.4)(NO_CONTEXT, goal).theta[0] < 0.11  # 0.11 against 0.12
 
 
@@ -76,11 +76,10 @@ def test_a_movement_without_neighbours_is_trusted_as_the_median_of_the_others() 
     # Standard deviations of the pairs 0, 0.4 / sqrt(2) = 0.28 and 1.4: median 0.28, so 0 + 0.14 for the loner.
     loner, reliable = {0.5: 0.0}, {0.10: 0.12, 0.11: 0.12}
     erratic, wild = {0.90: 1.0, 0.91: 1.4}, {0.30: 2.0, 0.31: 4.0}
-    assert LocalInverse(line(loner | reliable | erratic | wild))(NO_CONTEXT, np.zeros(1)).theta[0] == pytest.approx(
-        0.105
-    )
+    near = LocalInverse(line(loner | reliable | erratic | wild), alpha=0.5)
+    assert near(NO_CONTEXT, np.zeros(1)).theta[0] == pytest.approx(0.105)
     farther = {0.10: 0.16, 0.11: 0.16}
-    assert LocalInverse(line(loner | farther | erratic | wild))(NO_CONTEXT, np.zeros(1)).theta[0] == 0.5
+    assert LocalInverse(line(loner | farther | erratic | wild), alpha=0.5)(NO_CONTEXT, np.zeros(1)).theta[0] == 0.5
 
 
 def test_where_no_movement_has_neighbours_the_nearest_to_the_goal_is_repeated() -> None:

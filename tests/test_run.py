@@ -281,13 +281,16 @@ def test_a_run_killed_before_its_config_was_written_starts_afresh(tmp_path, go, 
 
 def test_a_log_that_another_learner_wrote_is_not_continued(tmp_path, go, capsys):
     assert go(tmp_path) == go(tmp_path, "--seed", 4) == 0
+    directory = tmp_path / "sgim-d" / "seed-003"
     other = (tmp_path / "sgim-d" / "seed-004" / "episodes.csv").read_bytes()
-    (tmp_path / "sgim-d" / "seed-003" / "episodes.csv").write_bytes(other)
+    (directory / "episodes.csv").write_bytes(other + b"torn")
+    before = {path.name: path.read_bytes() for path in directory.iterdir()}
     capsys.readouterr()
-    assert go(tmp_path, "--resume") == 2
+    assert go(tmp_path, "--resume", "--evaluate_at", "10", "--movements", 95) == 2
     message = capsys.readouterr().err
     assert "movement 0" in message
     assert "Traceback" not in message
+    assert {path.name: path.read_bytes() for path in directory.iterdir()} == before
 
 
 def test_a_run_is_resumed_with_its_own_configuration_only(tmp_path, go, capsys):
