@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import signal
 import sys
 import threading
@@ -150,7 +151,7 @@ class Progress:
 
 def metres(length: float | None) -> str:
     """A length for people."""
-    return "not known" if length is None else f"{length:.4f} m"
+    return "not measured" if length is None or math.isnan(length) else f"{length:.4f} m"
 
 
 def say(*messages: str) -> None:

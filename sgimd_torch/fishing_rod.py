@@ -34,6 +34,7 @@ CORRELATION = 0.96  # of the motor noise from one step to the next
 TOP_SPEED = 500.0  # rad/s; 100,000 random movements stay far below, a diverging simulation runs through it
 
 _STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
+_BLOCK = 128  # movements side by side, so that memory stays small and Ctrl-C is heard
 _CHUNK = 90  # steps run in C before looking whether the float has landed
 
 
@@ -131,7 +132,8 @@ class FishingRod:
         if not thetas.ndim == contexts.ndim == 2 or not 0 < len(thetas) == len(contexts) == len(rngs):
             rows = f"{contexts.shape}, {thetas.shape} and {len(rngs)} rngs"
             raise ValueError(f"needs n > 0 contexts, thetas and rngs, got {rows}; is it one movement, for execute()?")
-        return self._execute(contexts, thetas, rngs)
+        blocks = [slice(start, start + _BLOCK) for start in range(0, len(thetas), _BLOCK)]
+        return np.concatenate([self._execute(contexts[block], thetas[block], rngs[block]) for block in blocks])
 
     def replay(self, times: ArrayLike, trajectory: ArrayLike) -> Array:
         """Where the float lands when the arm is led along a recorded trajectory, without noise, in the zero context.
@@ -258,7 +260,9 @@ class FishingRod:
         run = np.empty((n, n_steps, states.shape[1]))
         seen = np.empty((n, n_steps, self.model.nsensordata))
         # The wrapper's own checks and copies would cost as much as four steps; shapes are right by construction.
-        pool.rollout([self.model] * n, data, states, controls, state=run, sensordata=seen, nstep=n_steps, skip_checks=True)
+        pool.rollout(
+            [self.model] * n, data, states, controls, state=run, sensordata=seen, nstep=n_steps, skip_checks=True
+        )
         return run, seen
 
 

@@ -68,6 +68,12 @@ def test_the_noise_floor_is_the_mean_distance_to_the_mean_landing_point() -> Non
     assert evaluation.mean_error == pytest.approx(0.001 * np.sqrt(2.2) * np.sqrt(2 / np.pi), rel=5 * 0.76 / 20)
 
 
+def test_the_movement_that_is_judged_is_not_one_of_its_own_repeats() -> None:
+    arm = PlanarArm(5, noise=0.05)
+    once_more = evaluate(perfect(arm), arm, np.array([[0.0, 0.5], [0.5, 0.0]]), 0, 0, repeats=1)
+    assert once_more.scatter.tolist() == [0.0, 0.0]  # one landing point is its own mean
+
+
 def test_bias_raises_the_error_and_leaves_the_noise_floor() -> None:
     arm = PlanarArm(5, noise=0.001)
     goals = np.tile([0.0, 0.5], (50, 1))

@@ -22,8 +22,13 @@ class Pursuit:
         self.contexts: list[Array] = []
         self.outcomes: list[list[float]] = []
         self.n_ended = 0
+        self._held: list[Attempt] = []  # what nobody holds, Python would close by itself
 
     def attempt(self, context: Array) -> Attempt:
+        self._held.append(self._pursue(context))
+        return self._held[-1]
+
+    def _pursue(self, context: Array) -> Attempt:
         self.contexts.append(context)
         try:
             for k in range(self.n):

@@ -172,6 +172,11 @@ def test_the_asked_teacher_looks_only_when_its_patience_is_over() -> None:
     assert list(course(teacher, reached([0.0, 0.0]), 60)) == [20, 30, 40, 50]  # the first look only compares
 
 
+def test_the_asked_teacher_does_not_take_a_learner_that_rests_for_one_that_progresses() -> None:
+    teacher = AskedTeacher([lesson(1.0, 0.0)], stream(0, "teacher"), patience=10)
+    assert list(course(teacher, reached(), 40)) == [10, 20, 30]
+
+
 def test_the_asked_teacher_judges_by_all_its_demonstrations() -> None:
     teacher = AskedTeacher([lesson(1.0, 0.0), lesson(-1.0, 0.0)], stream(0, "teacher"), patience=1, threshold=0.2)
     memory = reached([0.0, 0.0])
