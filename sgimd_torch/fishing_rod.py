@@ -173,8 +173,9 @@ class FishingRod:
         return landings
 
     def _times(self, end: float) -> Array:
+        """When the commands up to ``end`` (s) are given; one more, as sensors show the state *before* each step."""
         step = self.model.opt.timestep
-        return step * np.arange(1, int(np.ceil(end / step)) + 1)
+        return step * np.arange(int(np.ceil(end / step)) + 1)
 
     def _commands(self, theta: Array, rng: np.random.Generator) -> Array:
         """``(n_steps, 6)`` rad: the trajectory of theta with motor noise in proportion to its speed."""
@@ -226,13 +227,12 @@ class FishingRod:
         for start in range(0, int(steps.max()), _CHUNK):
             stop = min(start + _CHUNK, int(steps[flying].max()))
             run, seen = self._rollout(states[flying], controls[flying, start:stop])
-            diverged[flying] = ~(np.abs(run[:, :, speeds]).max(axis=(1, 2)) < TOP_SPEED)  # also when it is NaN
             for k, row in enumerate(flying):
                 last = min(stop, int(steps[row])) - start
                 track = np.concatenate([floats[row][None], seen[k, :last]])
-                if diverged[row]:
-                    continue
-                if (wet := np.flatnonzero(track[1:, 2] <= 0)).size:
+                if not np.abs(run[k, :last, speeds]).max() < TOP_SPEED:  # also when it is NaN
+                    diverged[row] = True
+                elif (wet := np.flatnonzero(track[1:, 2] <= 0)).size:
                     landings[row] = _crossing(track[wet[0]], track[wet[0] + 1])
                 elif start + last == steps[row]:
                     landings[row] = self._let_out(track, float(ends[row]), int(steps[row]), float(yaw_wind[row, 1]))
@@ -244,7 +244,7 @@ class FishingRod:
 
     def _let_out(self, track: Array, end: float, steps: int, wind: float) -> tuple[float, float]:
         """Free flight from where the float is at ``end``, between the last two steps."""
-        after = steps - end / self.model.opt.timestep  # share of a step
+        after = steps - 1 - end / self.model.opt.timestep  # share of a step
         x, y, z, dx, dy, dz = (track[-1] + after * (track[-2] - track[-1])).tolist()
         flight = (dz + math.sqrt(dz * dz + 2 * self._gravity * max(z, 0.0))) / self._gravity
         return x + (dx + wind / self._float_mass * flight / 2) * flight, y + dy * flight

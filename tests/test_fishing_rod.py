@@ -70,9 +70,10 @@ def step_through(rod: FishingRod, theta: Array, see: Callable[[mujoco.MjData], N
     data = mujoco.MjData(rod.model)
     mujoco.mj_setState(rod.model, data, rod._home, mujoco.mjtState.mjSTATE_FULLPHYSICS)
     step = rod.model.opt.timestep
-    for k in range(1, int(np.ceil((rod.primitive.duration(theta) + HOLD) / step)) + 1):
+    for k in range(round((rod.primitive.duration(theta) + HOLD) / step)):
         data.ctrl[:6], data.ctrl[6] = rod.primitive.at(theta, np.array([k * step]))[0], wind
         mujoco.mj_step(rod.model, data)
+        mujoco.mj_forward(rod.model, data)  # a step leaves the sensors as they were before it
         see(data)
 
 
@@ -115,7 +116,6 @@ def test_a_float_still_in_the_air_at_the_end_flies_on_as_a_stone_does(wind: floa
         step_through(rod, theta, lambda data, path=path: path.append(data.sensordata.copy()), wind=wind)
         if min(height for _, _, height, *_ in path) <= 0:
             continue
-        # MuJoCo's sensors show the state before a step, so what was seen last is one step before the hold is over.
         position, velocity = np.split(path[-1], 2)
         flight = max(np.roots([-9.81 / 2, velocity[2], position[2]]))  # z + vz t - g t^2 / 2 = 0
         carried = np.array([wind / 0.02, 0.0]) * flight**2 / 2  # the float has 20 g
