@@ -24,9 +24,10 @@ from sgimd_torch.algorithms import MakeSearch, attempted, emulating, goal_babbli
 from sgimd_torch.environment import Environment
 from sgimd_torch.evaluation import evaluate
 from sgimd_torch.fishing_rod import FishingRod
-from sgimd_torch.interest import InterestMap, UniformGoals, absolute_progress, signed_progress
+from sgimd_torch.interest import InterestMap, UniformGoals
 from sgimd_torch.inverse_model import LocalInverse, LocallyLinear, NearestNeighbour
 from sgimd_torch.memory import Memory
+from sgimd_torch.regions import absolute_progress, signed_progress
 from sgimd_torch.search import nelder_mead, perturb
 from sgimd_torch.spaces import Array, Estimate
 from sgimd_torch.teachers import AskedTeacher, InitialTeacher, PeriodicTeacher, at_random, least_explored

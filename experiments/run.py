@@ -24,7 +24,8 @@ from parts import RunParts, build
 from rundir import Columns, RunDirectory
 from sgimd_torch.environment import SimulationError
 from sgimd_torch.evaluation import evaluate
-from sgimd_torch.interest import InterestMap, Region
+from sgimd_torch.interest import InterestMap
+from sgimd_torch.regions import Region
 from sgimd_torch.session import ReplayError, live, replay, run
 from sgimd_torch.strategies import GoalBabbling
 from supervise import Progress, Seconds, Stopped, Stopping, metres, say

@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sgimd_torch.evaluation import Evaluation
-from sgimd_torch.interest import Region
+from sgimd_torch.regions import Region
 from sgimd_torch.session import Recorded
 from sgimd_torch.spaces import Array, Episode
 

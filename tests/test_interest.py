@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 
-from sgimd_torch.interest import InterestMap, UniformGoals, signed_progress
+from sgimd_torch.interest import InterestMap, UniformGoals
+from sgimd_torch.regions import signed_progress
 from sgimd_torch.spaces import Array, Box, stream
 
 NO_CONTEXTS, LINE, SQUARE = Box.cube(0, 1, 0), Box.cube(0, 1, 1), Box.cube(0, 1, 2)

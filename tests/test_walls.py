@@ -12,11 +12,11 @@ import sgimd_torch
 PACKAGE = "sgimd_torch"
 ROWS = [  # a module imports only from the rows before its own
     {"spaces"},
-    {"memory", "motor_primitives", "environment", "search", "demonstrations"},
+    {"memory", "motor_primitives", "environment", "search", "demonstrations", "regions"},
     {"competence", "inverse_model", "interest", "teachers", "forward_model", "fishing_rod"},
     {"strategies"},
     {"learner"},
-    {"session", "evaluation", "algorithms", "board", "plots", "rundir"},
+    {"session", "evaluation", "algorithms", "board", "plots"},
     {"__init__"},
 ]
 ROW = {module: row for row, modules in enumerate(ROWS) for module in modules}
@@ -34,7 +34,7 @@ LIBRARIES = {  # library: the only modules that may import it
 ENVIRONMENTS = {"environment", "fishing_rod"}
 PROTOCOL = (["Environment"], ["execute_many"])  # what works with every environment
 LEARNING = {
-    *{"memory", "search", "competence", "inverse_model", "interest", "teachers", "forward_model"},
+    *{"memory", "search", "regions", "competence", "inverse_model", "interest", "teachers", "forward_model"},
     *{"strategies", "learner"},
 }
 
