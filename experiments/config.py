@@ -1,24 +1,19 @@
 """What a run is made of: one documented field for each choice; the command line of ``run.py`` is made from them.
 
 Each default is read off the library, where it is explained, and each option is an ablation of one changed word.
-    config, resume = parse(["--algorithm", "sagg-riac", "--goals", "uniform", "--resume"])
+    config = Config(algorithm="sagg-riac", goals="uniform", name="uniform-goals")
 """
 
 from __future__ import annotations
 
-import argparse
 import difflib
 import inspect
 import math
-import re
-import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields
 from functools import partial
 from pathlib import Path
-from typing import Any, Final, NoReturn
-
-import jsonargparse
+from typing import Any, Final
 
 from sgimd_torch.algorithms import MakeSearch, attempted, emulating, goal_babbling, imitating, remembered
 from sgimd_torch.environment import Environment
@@ -39,8 +34,16 @@ def _linear(memory: Memory, environment: Environment) -> Inverse:
     return LocallyLinear(memory, policies=environment.policies)
 
 
-ALGORITHMS: Final = ("random", "sagg-riac", "imitation", "observation", "sgim-d")
-TAUGHT: Final = ("imitation", "observation", "sgim-d")
+_GOAL_BABBLING: Final = ("goals", "window", "progress", "competence", "search", "budget")
+_TAUGHT: Final = ("teacher", "every", "choice", "demonstrations")
+# Each with the options that not all of them use.
+ALGORITHMS: Final[dict[str, tuple[str, ...]]] = {
+    "random": (),
+    "sagg-riac": _GOAL_BABBLING,
+    "imitation": (*_TAUGHT, "epsilon"),
+    "observation": _TAUGHT,
+    "sgim-d": (*_GOAL_BABBLING, *_TAUGHT, "social", "imitations", "epsilon"),
+}
 GOALS: Final = {"interest-map": InterestMap, "uniform": UniformGoals}
 PROGRESS: Final = {"absolute": absolute_progress, "signed": signed_progress}
 SEARCHES: Final[dict[str, MakeSearch]] = {
@@ -57,6 +60,23 @@ COMPETENCES: Final = {"memory": remembered, "attempt": attempted}
 ANSWERS: Final = {"imitate": imitating, "emulate": emulating}
 TEACHERS: Final = {"periodic": PeriodicTeacher, "initial": InitialTeacher, "asked": AskedTeacher}
 CHOICES: Final = {"least-explored": least_explored, "random": at_random}
+KNOWN: Final[dict[str, dict[str, Any]]] = {
+    "algorithm": ALGORITHMS,
+    "goals": GOALS,
+    "progress": PROGRESS,
+    "competence": COMPETENCES,
+    "search": SEARCHES,
+    "inverse": INVERSES,
+    "social": ANSWERS,
+    "teacher": TEACHERS,
+    "choice": CHOICES,
+}
+# Choices that leave other options without a use.
+_MOOT: Final = {
+    ("goals", "uniform"): ("window", "progress", "competence"),
+    ("social", "emulate"): ("imitations", "epsilon"),
+    ("teacher", "initial"): ("choice",),
+}
 
 
 def _default(function: Callable[..., Any], name: str) -> Any:
@@ -80,9 +100,12 @@ class Config:
         noise: Motor noise (s), standard deviation of the command (rad) for each rad/s of commanded speed; 0 is none.
         task_space: Half the side (m) of the square that goals come from; 100 in the paper's large-space experiment.
         goals: Where goals come from (sagg-riac, sgim-d): interest-map, or uniform, the same everywhere.
-        window: How many competences of a region its interest is measured over, the paper's zeta; even.
-        progress: What is interesting: absolute progress, as in the paper, or signed, which ignores falling competence.
-        competence: What a goal's competence is judged by: attempt, the movements made for it, or memory, all ever made.
+        window: How many competences of a region its interest is measured over, the paper's zeta; even (sagg-riac,
+            sgim-d).
+        progress: What is interesting (sagg-riac, sgim-d): absolute progress, as in the paper, or signed, which ignores
+            falling competence.
+        competence: What a goal's competence is judged by (sagg-riac, sgim-d): memory, all movements ever made, as in
+            the paper, or attempt, those made for this goal.
         search: How a movement is refined (sagg-riac, sgim-d): nelder-mead, in the plane of the neighbours;
             nelder-mead-complete, which first fills up the paper's simplex of 26; perturb, the best so far plus noise.
         budget: Movements for one goal, at most (sagg-riac, sgim-d).
@@ -90,7 +113,8 @@ class Config:
         social: How sgim-d answers a demonstration: imitate it, or emulate, pursue its outcome in the learner's own way.
         imitations: Movements that sgim-d spends on imitating a demonstration.
         epsilon: Bound of the variation in each parameter of theta when imitating (imitation, sgim-d).
-        teacher: When demonstrations come: periodic, initial (all at the start) or asked (when the learner stalls).
+        teacher: When demonstrations come (imitation, observation, sgim-d): periodic, initial (all at the start) or
+            asked (when the learner stalls).
         every: Movements from one demonstration to the next, or from one look at the learner to the next (asked); null
             is that teacher's own number.
         choice: Which demonstration comes (periodic, asked): least-explored by the learner, or random.
@@ -130,26 +154,10 @@ class Config:
     threads: int = 1
 
     def __post_init__(self) -> None:
-        for name, known in (
-            ("algorithm", ALGORITHMS),
-            ("goals", GOALS),
-            ("progress", PROGRESS),
-            ("competence", COMPETENCES),
-            ("search", SEARCHES),
-            ("inverse", INVERSES),
-            ("social", ANSWERS),
-            ("teacher", TEACHERS),
-            ("choice", CHOICES),
-        ):
-            check_known(name, getattr(self, name), known)
-        for name, least in (
-            ("seed", 0),
-            ("movements", 1),
-            ("budget", 1),
-            ("imitations", 1),
-            ("repeats", 0),
-            ("threads", 1),
-        ):
+        for name, known in KNOWN.items():
+            _check_known(name, getattr(self, name), known)
+        at_least = {"seed": 0, "movements": 1, "budget": 1, "imitations": 1, "repeats": 0, "threads": 1}
+        for name, least in at_least.items():
             _check_least(name, getattr(self, name), least)
         if self.repeats == 1:
             raise ValueError("repeats must be 0 or at least 2, got 1; one landing point does not scatter")
@@ -184,57 +192,19 @@ class Config:
         chosen = standard if self.evaluate_at is None else self.evaluate_at
         return sorted({movements for movements in chosen if movements < self.movements} | {self.movements})
 
-
-def parse(argv: Sequence[str], description: str | None = None) -> tuple[Config, bool]:
-    """The run that a command line asks for, and whether to resume it.
-
-    Raises:
-        SystemExit: with code 2 and a message on stderr when it makes no sense, 0 after ``--help``.
-    """
-    parser = _Parser(
-        prog="run.py", usage="%(prog)s [--OPTION VALUE ...] [--resume]", description=description, formatter_class=_Help
-    )
-    parser.add_class_arguments(Config)
-    parser.add_argument(
-        "--resume", action="store_true", help="Go on with a stopped or killed run, or lengthen a finished one."
-    )
-    options = {f"--{field.name}" for field in fields(Config)} | {"--resume", "--help"}
-    arguments: list[str] = []
-    for argument in argv:
-        name, equals, value = argument.partition("=")
-        if name.startswith("--"):  # --task-space is --task_space
-            name = name.replace("-", "_").replace("__", "--", 1)
-            if name not in options:
-                near = difflib.get_close_matches(name, options, 1)
-                parser.error(f"unknown option {argument}" + (f"; did you mean {near[0]}?" if near else ""))
-            argument = name + equals + value
-        elif arguments and arguments[-1] == "--evaluate_at" and re.fullmatch(r"\d+(,\d+)*", argument):
-            argument = f"[{argument}]"
-        arguments.append(argument)
-    values = parser.parse_args(arguments).as_dict()
-    resume = values.pop("resume")
-    try:
-        return Config(**values), resume
-    except ValueError as error:
-        parser.error(str(error))
+    @property
+    def without_effect(self) -> list[str]:
+        """A note for each option that is not at its default but changes nothing in this run."""
+        used = ALGORITHMS[self.algorithm]
+        why = {name: f"on {self.algorithm}" for name in ALGORITHMS["sgim-d"] if name not in used}
+        for (option, value), moot in _MOOT.items():
+            if option in used and getattr(self, option) == value:
+                why |= dict.fromkeys(moot, f"with --{option} {value}")
+        given = [field.name for field in fields(self) if getattr(self, field.name) != field.default]
+        return [f"--{name} has no effect {why[name]}" for name in given if name in why]
 
 
-class _Help(jsonargparse.DefaultHelpFormatter, argparse.RawDescriptionHelpFormatter):
-    """Keeps the lines of the examples."""
-
-
-class _Parser(jsonargparse.ArgumentParser):
-    def error(self, message: str, ex: Exception | None = None) -> NoReturn:
-        print(f"error: {message}\n--help lists all options", file=sys.stderr)
-        raise SystemExit(2)
-
-
-def check_known(what: str, name: str, known: Iterable[str]) -> None:
-    """Refuse a name that is not ``known``, suggesting the nearest.
-
-    Raises:
-        ValueError: the name is unknown.
-    """
+def _check_known(what: str, name: str, known: Iterable[str]) -> None:
     known = list(known)
     if name not in known:
         near = difflib.get_close_matches(name.lower().replace("_", "-"), known, 1, 0.5)

@@ -11,16 +11,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from config import (
-    CHOICES,
-    COMPETENCES,
-    INVERSES,
-    PROGRESS,
-    SEARCHES,
-    TAUGHT,
-    Config,
-    Inverse,
-)
+from config import ALGORITHMS, CHOICES, COMPETENCES, INVERSES, PROGRESS, SEARCHES, Config, Inverse
 from sgimd_torch import algorithms
 from sgimd_torch.algorithms import MakeGoals, MakeSocial, Parts, emulating, imitating
 from sgimd_torch.demonstrations import SHIPPED as SHIPPED_DEMONSTRATIONS
@@ -63,7 +54,7 @@ def build(config: Config) -> RunParts:
     demonstrations: Sequence[Demonstration] = []
     data: dict[str, str | None] = {"demonstrations_crc32": None, "benchmark_crc32": _checksum(benchmark_path)}
     teacher = None
-    if config.algorithm in TAUGHT:
+    if "teacher" in ALGORITHMS[config.algorithm]:
         path = _existing("demonstrations", config.demonstrations or SHIPPED_DEMONSTRATIONS)
         demonstrations = load_demonstrations(
             path,

@@ -19,9 +19,11 @@ from pathlib import Path
 from typing import Any, Final
 
 import sgimd_torch
-from config import Config, parse
+from command_line import parse
+from config import Config
 from parts import RunParts, build
-from rundir import Columns, RunDirectory
+from rundir import RunDirectory
+from runfiles import Columns
 from sgimd_torch.environment import SimulationError
 from sgimd_torch.evaluation import evaluate
 from sgimd_torch.interest import InterestMap
@@ -62,7 +64,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             return stop.exit_code
         try:
             with directory:
-                say(*directory.notes)
+                say(*config.without_effect, *directory.notes)
                 report = run_in(directory, config, parts, stopping)
         except Stopped as stop:
             again = shlex.join(["python", "experiments/run.py", *argv, *([] if resume else ["--resume"])])
@@ -88,12 +90,12 @@ def run_in(directory: RunDirectory, config: Config, parts: RunParts, stopping: S
     recorded = [directory.columns.recorded(line) for line in directory.lines]
     seconds = Seconds(directory.summary)
     execute = replay(recorded, seconds.of_physics(live(parts.environment, config.seed)))
-    evaluations = set(config.evaluations)
+    wanted = set(config.evaluations)
     movements, flushed = 0, time.monotonic()
 
     def summarise(*, finished: bool = False) -> None:
         directory.flush()
-        last = directory.last_evaluation
+        last = directory.evaluations.last
         directory.summarise(
             movements=movements,
             mean_error_m=last.get("mean_error_m"),
@@ -121,9 +123,9 @@ def run_in(directory: RunDirectory, config: Config, parts: RunParts, stopping: S
                 if episode.index >= len(recorded):
                     directory.append(line)
                 elif line != directory.lines[episode.index]:
-                    raise ReplayError(_differs(episode.index, directory.lines[episode.index], line))
+                    raise ReplayError(_differs(directory.columns, directory.lines[episode.index], line))
                 movements = episode.index + 1
-                if movements in evaluations and not directory.has_evaluation(movements):
+                if movements in wanted and movements not in directory.evaluations:
                     directory.flush()
                     with seconds.of_evaluation():
                         evaluate_in(directory, config, parts, movements, stopping)
@@ -132,7 +134,7 @@ def run_in(directory: RunDirectory, config: Config, parts: RunParts, stopping: S
                 if movements > len(recorded) and time.monotonic() - flushed >= FLUSH_EVERY:
                     summarise()
                     flushed = time.monotonic()
-                progress.show(movements, directory.last_evaluation.get("mean_error_m"))
+                progress.show(movements, directory.evaluations.last.get("mean_error_m"))
                 stopping.check()
             finished = True
         finally:
@@ -154,7 +156,7 @@ def evaluate_in(directory: RunDirectory, config: Config, parts: RunParts, moveme
     goals = parts.benchmark.goals
     with stopping.at_once():
         found = evaluate(parts.inverse, parts.environment, goals, config.seed, movements, repeats=config.repeats)
-    directory.evaluated(movements, found, regions_of(parts))
+    directory.evaluations.add(movements, found, regions_of(parts))
 
 
 def regions_of(parts: RunParts) -> list[Region]:
@@ -172,7 +174,8 @@ def open_directory(config: Config, parts: RunParts, resume: bool) -> RunDirector
         RunError: see ``RunDirectory``; or its log is longer than the run is to be.
     """
     environment, regions = parts.environment, regions_of(parts)
-    settings = {**_plain(config), **parts.data}
+    plain = {name: str(value) if isinstance(value, Path) else value for name, value in vars(config).items()}
+    settings = {**plain, **parts.data}
     directory = RunDirectory(
         config.directory,
         settings,
@@ -186,23 +189,15 @@ def open_directory(config: Config, parts: RunParts, resume: bool) -> RunDirector
     same = directory.before is not None and all(
         directory.before.get(key) == settings[key] for key in EVALUATION_SETTINGS
     )
-    directory.keep_evaluations(m for m in config.evaluations if same and m <= len(directory.lines))
+    directory.evaluations.keep(m for m in config.evaluations if same and m <= len(directory.lines))
     return directory
 
 
 def versions() -> dict[str, Any]:
     """What runs here; ``commit`` is None outside a git repository and ends in "-dirty" when files were changed."""
     packages = {"numpy": "numpy", "scipy": "scipy", "faiss": "faiss-cpu", "mujoco": "mujoco"}
-    describe = [
-        "git",
-        "-C",
-        str(Path(__file__).parent),
-        "describe",
-        "--always",
-        "--dirty",
-        "--abbrev=40",
-        "--exclude=*",
-    ]
+    here = str(Path(__file__).parent)
+    describe = ["git", "-C", here, "describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"]
     try:
         commit = subprocess.run(describe, capture_output=True, text=True, check=True, timeout=10).stdout.strip()
     except (OSError, subprocess.SubprocessError):
@@ -216,15 +211,18 @@ def versions() -> dict[str, Any]:
     }
 
 
-def _plain(config: Config) -> dict[str, Any]:
-    plain = {name: str(value) if isinstance(value, Path) else value for name, value in vars(config).items()}
-    return {name: list(value) if isinstance(value, tuple) else value for name, value in plain.items()}
-
-
-def _differs(index: int, recorded: bytes, now: bytes) -> str:
+def _differs(columns: Columns, recorded: bytes, now: bytes) -> str:
+    """Of two lines: which columns differ, the first three in full."""
+    were, are = (line.decode().split(",")[:-1] for line in (recorded, now))
+    differences = [
+        f"{name} was {old or 'empty'}, now {new or 'empty'}"
+        for name, old, new in zip(columns.names[:-1], were, are, strict=True)
+        if old != new
+    ]
+    more = f"; and {len(differences) - 3} more" if len(differences) > 3 else ""
     return (
-        f"movement {index} was recorded as\n  {recorded.decode().strip()}\nbut the replay makes it\n  "
-        f"{now.decode().strip()}\nwas it recorded by another version, or on another processor?"
+        f"movement {were[0]} is replayed otherwise than recorded: {'; '.join(differences[:3])}{more}. "
+        "Was it recorded by another version, or on another processor?"
     )
 
 

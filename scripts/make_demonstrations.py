@@ -22,7 +22,7 @@ from sgimd_torch.spaces import Array, Demonstration, stream
 RATE = 50  # Hz
 DURATIONS = (1.0, 1.4)  # s
 HAND = 0.04  # rad, how much a hand's end postures vary
-TREMOR = 0.15  # part of the pace that wavers
+TREMOR = 0.4  # part of the pace that wavers
 
 
 def end_posture(turn: float, stretch: float) -> Array:

@@ -68,7 +68,7 @@ def imitation(environment: Environment, seed: int, *, correspondence: Correspond
 
 
 def imitating(
-    babbling: GoalBabbling, outcomes: Box, rng: np.random.Generator, *, repeats: int = 20, epsilon: float = 0.05
+    babbling: GoalBabbling, outcomes: Box, rng: np.random.Generator, *, repeats: int = 10, epsilon: float = 0.05
 ) -> Imitate:
     """How SGIM-D answers a demonstration: a short imitation, then emulation of the goal."""
     return Imitate(
@@ -147,9 +147,9 @@ def goal_babbling(
         tolerance: distance (m) at which a goal counts as reached; None for the outcome noise, .02 m at least.
         global_range: least and greatest probability of the global exploration regime.
     """
-    near = max(environment.outcome_noise, 0.02) if tolerance is None else tolerance
+    noise = max(environment.outcome_noise, 0.02)
     if measure is None:
-        measure = partial(performance, rest=environment.rest, d_min=near)
+        measure = partial(performance, rest=environment.rest, d_min=noise)
     return GoalBabbling(
         environment.policies,
         memory,
@@ -160,7 +160,7 @@ def goal_babbling(
         judge(memory, measure),
         stream(seed, "regime"),
         budget=budget,
-        tolerance=near,
+        tolerance=noise if tolerance is None else tolerance,
         global_range=global_range,
     )
 

@@ -45,10 +45,11 @@ def absolute_performance(goal: Array, outcome: Array, d_ref: float) -> Array:
 
 
 class Competence:
-    """gamma of eq. (2), the `memory` reading: the best performance remembered. It never falls for a goal.
+    """gamma of eq. (2), the `memory` reading: the best performance remembered. In one context it never falls.
 
     Deviation: the paper prints the minimum over memory, but J is negative, so the best is the maximum. J falls with
-    distance, hence the best is the nearest outcome's; where contexts differ, the nearest in (context, outcome).
+    distance, hence the best is the nearest outcome's. Deviation: eq. (2) asks for the very same context, which never
+    comes again where contexts vary; the nearest in (context, outcome) stands in for it.
     """
 
     def __init__(self, memory: Memory, performance: Performance) -> None:

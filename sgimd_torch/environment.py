@@ -12,7 +12,6 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import root_scalar
 
 from sgimd_torch.spaces import Array, Box, check_vector
 
@@ -196,6 +195,8 @@ class PlanarArm:
         Raises:
             ValueError: ``goal`` is not one reachable point ``(2,)``, or ``context`` not one of C.
         """
+        from scipy.optimize import root_scalar  # takes longer to import than this whole library
+
         context, _ = check_movement(self, context, np.full(self.policies.dim, 0.5))
         goal = check_vector("goal", goal, 2, "was theta passed instead?")
         if goal.ndim != 1 or not self.reachable(goal):

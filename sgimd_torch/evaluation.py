@@ -97,14 +97,14 @@ def evaluate(
     if context is None:
         context = (environment.contexts.low + environment.contexts.high) / 2
     thetas = np.stack([inverse(context, goal).theta for goal in goals])
-    copies = np.repeat(thetas, 1 + repeats, axis=0)
+    copies = np.tile(thetas, (1 + repeats, 1))  # all goals once, then all again: row k is judged, whatever repeats
     rngs = [stream(seed, f"evaluation {movements}", row) for row in range(len(copies))]
     landed = execute_many(environment, np.tile(context, (len(copies), 1)), copies, rngs)
-    landed = landed.reshape(len(goals), 1 + repeats, -1)
-    outcomes, again = landed[:, 0], landed[:, 1:]
+    landed = landed.reshape(1 + repeats, *goals.shape)
+    outcomes, again = landed[0], landed[1:]
     scatter = np.full(len(goals), np.nan)
     if repeats:
-        scatter = np.linalg.norm(again - again.mean(axis=1, keepdims=True), axis=2).mean(axis=1)
+        scatter = np.linalg.norm(again - again.mean(axis=0), axis=2).mean(axis=0)
     return Evaluation(np.linalg.norm(outcomes - goals, axis=1), thetas, outcomes, scatter)
 
 

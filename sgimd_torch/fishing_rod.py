@@ -41,6 +41,8 @@ _CHUNK = 90  # steps run in C before looking whether the float has landed
 class FishingRod:
     """theta in [0, 1]^25 to the landing point of the float (m) on the water plane.
 
+    One rod serves one Python thread at a time; its batches use threads of their own.
+
     Args:
         noise: motor noise (s): standard deviation of the command (rad) for each rad/s of commanded speed; 0 for none.
         outcomes: T, the task space (m); [-1, 1]^2 in the paper, [-100, 100]^2 in its large-space experiment.
@@ -56,7 +58,7 @@ class FishingRod:
     def __init__(
         self,
         *,
-        noise: float = 0.03,
+        noise: float = 0.032,
         outcomes: Box | None = None,
         max_yaw: float = 0.0,
         max_wind: float = 0.0,
@@ -250,7 +252,7 @@ class FishingRod:
         return x + (dx + wind / self._float_mass * flight / 2) * flight, y + dy * flight
 
     def _rollout(self, states: Array, controls: Array) -> tuple[Array, Array]:
-        threads = min(self._threads, len(states))
+        threads = self._threads if len(states) > 1 else 1
         if threads not in self._pools:
             data = [mujoco.MjData(self.model) for _ in range(threads)]
             self._pools[threads] = (rollout.Rollout(nthread=threads if threads > 1 else 0), data)

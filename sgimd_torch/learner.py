@@ -54,6 +54,17 @@ class Learner:
         """Nothing is under way: the next ``ask`` begins something new, and may do so in a new context."""
         return self._attempt is None
 
+    @property
+    def context(self) -> Array:
+        """``(context_dim,)`` in which what is under way began, and in which it goes on.
+
+        Raises:
+            RuntimeError: nothing is under way.
+        """
+        if self._attempt is None:
+            raise RuntimeError("nothing is under way, so any context will do; see idle")
+        return self._context
+
     def ask(self, context: ArrayLike) -> Move | None:
         """The next movement, or None to stay still for this one (then there is nothing to tell).
 
@@ -126,7 +137,7 @@ class Learner:
         self._asked = False
 
     def _begin(self, attempt: Attempt, context: Array) -> None:
-        self._context = context
+        self._context = context.copy()
         try:
             self._attempt, self._move = attempt, next(attempt)
         except StopIteration:

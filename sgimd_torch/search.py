@@ -66,7 +66,7 @@ def nelder_mead(
                 values.append(float(distances[k]))
         n_vertices = 1 + (policies.dim if complete else min(policies.dim, len(goal)))
         while len(vertices) < n_vertices:
-            vertex = _step_inwards(policies, theta, flat.direction_out(rng), step)
+            vertex = _step_out(policies, theta, flat, rng, step)
             flat.widen(vertex)
             vertices.append(vertex)
             values.append(math.dist(goal, (yield vertex)))
@@ -212,13 +212,19 @@ class _Flat:
         return edges - edges @ self._basis.T @ self._basis
 
 
-def _step_inwards(policies: Box, theta: Array, direction: Array, step: float) -> Array:
-    """``theta`` moved along ``direction``, mirrored in the coordinates that would leave the box: clipping them would
-    flatten the simplex."""
-    change = step * np.sqrt(policies.dim) * policies.sides * direction
-    forth, back = theta + change, theta - change
-    outside = (forth < policies.low) | (forth > policies.high)
-    return policies.clip(np.where(outside, back, forth))
+def _step_out(policies: Box, theta: Array, flat: _Flat, rng: np.random.Generator, step: float) -> Array:
+    """A random step from ``theta`` that leads out of the flat and stays in the box.
+
+    Coordinates that would leave the box are mirrored, since clipping would flatten the simplex. In a corner of a box of
+    few dimensions mirroring may do so, too; then another direction is drawn.
+    """
+    for _ in range(10):
+        change = step * np.sqrt(policies.dim) * policies.sides * flat.direction_out(rng)
+        forth, back = theta + change, theta - change
+        vertex = policies.clip(np.where((forth < policies.low) | (forth > policies.high), back, forth))
+        if flat.lacks(vertex):
+            break
+    return vertex
 
 
 def _towards(goal: Array, descent: Generator[Array, float, None]) -> Generator[Array, Array, None]:

@@ -39,18 +39,21 @@ def run(
     seed: int,
     *,
     movements: int,
+    first: int = 0,
     teacher: Teacher | None = None,
     execute: Execute | None = None,
 ) -> Iterator[Episode]:
     """Let ``learner`` live for ``movements`` movements, those at rest counted.
 
-    A context is observed when the learner begins something new and holds until it ends; a demonstration brings its own.
+    A context is observed when the learner begins something new and holds until that ends; the answer to a demonstration
+    takes place in the demonstration's.
 
     Args:
         learner: asked, told and shown; stop iterating at any time and it stays usable.
         environment: observed and executed.
         seed: of the environment's streams.
-        movements: in all.
+        movements: in all, those before ``first`` counted.
+        first: number of the first one; where an earlier life stopped, to go on with it.
         teacher: asked before every movement whether it demonstrates.
         execute: stands in for the environment, see ``live`` and ``replay``.
 
@@ -58,14 +61,11 @@ def run(
         Every episode, once the learner has been told its outcome.
     """
     execute = live(environment, seed) if execute is None else execute
-    context = np.zeros(environment.contexts.dim)
-    for index in range(movements):
+    for index in range(first, movements):
         demonstration = teacher.offer(index, learner.memory) if teacher is not None else None
         if demonstration is not None:
             learner.watch(demonstration)
-            context = demonstration.context
-        elif learner.idle:
-            context = environment.observe(stream(seed, "context", index))
+        context = environment.observe(stream(seed, "context", index)) if learner.idle else learner.context
         move, outcome = learner.ask(context), None
         if move is not None:
             outcome = execute(index, context, move.theta)
@@ -89,14 +89,20 @@ def replay(recorded: Sequence[Recorded], then: Execute) -> Execute:
         ReplayError: the learner proposes another theta than the recorded one.
     """
 
+    slip = "was it recorded by another version, on another processor or with another configuration?"
+
     def execute(index: int, context: Array, theta: Array) -> Array:
         if index >= len(recorded):
             return then(index, context, theta)
         record = recorded[index]
-        if record.theta is None or record.outcome is None or not np.array_equal(record.theta, theta):
+        if record.theta is None or record.outcome is None:
+            raise ReplayError(f"movement {index} was recorded as rest, the learner now moves; {slip}")
+        differ = np.flatnonzero(record.theta != theta)
+        if differ.size:
+            k = differ[0]
             raise ReplayError(
-                f"movement {index} was recorded with theta {record.theta}, the learner now proposes {theta}; "
-                "was it recorded by another version, on another processor or with another configuration?"
+                f"movement {index} was recorded with another theta: theta_{k} was {record.theta[k]}, now {theta[k]}; "
+                f"{differ.size} of {theta.size} parameters differ; {slip}"
             )
         return record.outcome
 

@@ -161,7 +161,7 @@ class Episode:
 
 
 Attempt = Generator[Move | None, Array, None]
-"""Yields movements (None: stay still), is sent their outcomes. ``close()`` interrupts it."""
+"""Yields movements, is sent their outcomes; ``close()`` interrupts it. Yielding None, it stays still and so ends."""
 
 Search = Callable[[Estimate, Array], Generator[Array, Array, None]]
 """(start, goal) -> yields thetas to execute, is sent their outcomes ``(outcome_dim,)``."""

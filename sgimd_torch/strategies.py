@@ -168,7 +168,7 @@ class Imitate:
         policies: Box,
         rng: np.random.Generator,
         *,
-        repeats: int | None = 20,
+        repeats: int | None = 10,
         epsilon: float = 0.05,
         goals: Goals | None = None,
         judge: Judge | None = None,

@@ -11,10 +11,9 @@ from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sgimd_torch.memory import Memory
-from sgimd_torch.spaces import Array, Demonstration
+from sgimd_torch.spaces import Demonstration
 
 
 class Teacher(Protocol):
@@ -46,15 +45,13 @@ def least_explored(
     low, high = demonstrated.min(axis=0), demonstrated.max(axis=0)
     side = np.maximum(high - low, 1e-9) / tiles  # demonstrations on a line span no box across it
 
-    def tile_of(outcomes: Array) -> NDArray[np.int64]:
-        inside = np.clip((outcomes - low) / side, -1, tiles)  # -1: below the box; tiles: above it
-        # The upper border belongs to the last tile, or the farthest demonstrations would stand alone.
-        cells = np.where(outcomes == high, tiles - 1, np.floor(inside)).astype(np.int64) + 1
-        return np.ravel_multi_index(tuple(cells.T), (tiles + 2,) * outcomes.shape[1])
-
-    ours = tile_of(demonstrated)
+    outcomes = np.concatenate((demonstrated, memory.outcomes))
+    # The upper border belongs to the last tile, or the farthest demonstrations would stand alone.
+    cells = np.where(outcomes == high, tiles - 1, np.floor((outcomes - low) / side))
+    tile_of = np.unique(cells, axis=0, return_inverse=True)[1].ravel()
+    ours, theirs = np.split(tile_of, [len(demonstrated)])
     candidates = np.unique(ours)
-    reached = np.bincount(tile_of(memory.outcomes), minlength=candidates[-1] + 1)[candidates]
+    reached = np.bincount(theirs, minlength=len(outcomes))[candidates]
     tile = rng.choice(candidates[reached == reached.min()])
     return demonstrations[int(rng.choice(np.flatnonzero(ours == tile)))]
 

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from demo import draw, table
-from rundir import read_run
+from comparison import draw, table
+from read_runs import read_run
 from sgimd_torch.evaluation import Benchmark, save_benchmark
 
 ROOT = Path(__file__).parent.parent

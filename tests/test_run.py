@@ -9,16 +9,17 @@ import signal
 import subprocess
 import sys
 import time
+import zlib
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import sgimd_torch
-from config import ALGORITHMS, ANSWERS, CHOICES, COMPETENCES, GOALS, INVERSES, PROGRESS, SEARCHES, TEACHERS, Config
+from config import ALGORITHMS, KNOWN, Config
 from parts import build
+from read_runs import read_run
 from run import main
-from rundir import read_run
 from sgimd_torch.evaluation import Benchmark, save_benchmark
 from sgimd_torch.fishing_rod import FishingRod
 from sgimd_torch.spaces import stream
@@ -293,6 +294,26 @@ def test_a_log_that_another_learner_wrote_is_not_continued(tmp_path, go, capsys)
     assert {path.name: path.read_bytes() for path in directory.iterdir()} == before
 
 
+def test_a_replay_that_disagrees_names_the_columns(tmp_path, go, capsys):
+    assert go(tmp_path) == 0
+    log = tmp_path / "sgim-d" / "seed-003" / "episodes.csv"
+    header, *lines = log.read_text().splitlines()
+    k = next(k for k, line in enumerate(lines) if line.split(",")[1] == "local")
+    fields = lines[k].split(",")[:-1]
+    column = header.split(",").index("goal_0")
+    goal, fields[column] = fields[column], "0.125"
+    fields[1] = "global"
+    body = ",".join(fields)
+    lines[k] = f"{body},{zlib.crc32(body.encode()):08x}"
+    log.write_text("".join(f"{line}\n" for line in (header, *lines)))
+    capsys.readouterr()
+    assert go(tmp_path, "--resume") == 2
+    message = capsys.readouterr().err
+    assert f"movement {k} " in message
+    assert f"origin was global, now local; goal_0 was 0.125, now {goal}. Was it recorded by another" in message
+    assert len(message) < 300
+
+
 def test_a_run_is_resumed_with_its_own_configuration_only(tmp_path, go, capsys):
     assert go(tmp_path, "--movements", 10) == 0
     before = (tmp_path / "sgim-d" / "seed-003" / "config.json").read_bytes()
@@ -412,27 +433,14 @@ def test_a_full_disk_is_reported_and_the_run_can_go_on(tmp_path, go, benchmark, 
 def test_help_names_every_choice_and_every_field_has_a_sentence(capsys):
     assert main(["--help"]) == 0
     text = " ".join(capsys.readouterr().out.split()).replace("- ", "-")
-    tables = (GOALS, PROGRESS, COMPETENCES, SEARCHES, INVERSES, ANSWERS, TEACHERS, CHOICES)
-    for choice in (*ALGORITHMS, *(name for table in tables for name in table)):
+    for choice in (name for table in KNOWN.values() for name in table):
         assert choice in text
     for field in Config.__dataclass_fields__:
         _, _, sentence = text.partition(f"--{field} {field.upper()} ")
         assert sentence[0].isupper(), field
 
 
-@pytest.mark.parametrize(
-    ("option", "table"),
-    [
-        ("goals", GOALS),
-        ("progress", PROGRESS),
-        ("competence", COMPETENCES),
-        ("search", SEARCHES),
-        ("inverse", INVERSES),
-        ("social", ANSWERS),
-        ("teacher", TEACHERS),
-        ("choice", CHOICES),
-    ],
-)
+@pytest.mark.parametrize(("option", "table"), [item for item in KNOWN.items() if item[0] != "algorithm"])
 def test_every_choice_lives_and_none_is_another_by_a_new_name(tmp_path, go, option, table):
     logs = set()
     # Short attempts and a short window, so that the map is split, and has its say, before the run is over.
@@ -441,6 +449,46 @@ def test_every_choice_lives_and_none_is_another_by_a_new_name(tmp_path, go, opti
         assert go(tmp_path, "--name", choice, f"--{option}", choice, *common) == 0
         logs.add((tmp_path / choice / "seed-003" / "episodes.csv").read_bytes())
     assert len(logs) == len(table)
+
+
+BABBLING = {"window": 4, "progress": "signed", "competence": "attempt", "search": "perturb", "budget": 3}
+TEACHING = {"every": 7, "choice": "random", "imitations": 3, "epsilon": 0.2}
+
+
+@pytest.mark.parametrize(
+    ("options", "moot"),
+    [
+        ("--algorithm random", {*BABBLING, *TEACHING}),
+        ("--algorithm sagg-riac", set(TEACHING)),
+        ("--algorithm sagg-riac --goals uniform --teacher initial", {*TEACHING, *list(BABBLING)[:3], "teacher"}),
+        ("--algorithm imitation --social emulate", {*BABBLING, "imitations", "social"}),
+        ("--algorithm observation", {*BABBLING, "imitations", "epsilon"}),
+        ("--algorithm sgim-d", set()),
+        ("--algorithm sgim-d --goals uniform", {"window", "progress", "competence"}),
+        ("--algorithm sgim-d --social emulate", {"imitations", "epsilon"}),
+        ("--algorithm sgim-d --teacher initial", {"choice"}),
+    ],
+)
+def test_options_that_change_nothing_are_named_and_change_nothing(tmp_path, go, capsys, options, moot):
+    common = (*options.split(), "--name", "run", "--evaluate_at", "[]")
+    changed = BABBLING | TEACHING
+    logs = []
+    for given in (changed, {name: value for name, value in changed.items() if name not in moot}):
+        out = tmp_path / str(len(logs))
+        more = [word for name, value in given.items() for word in (f"--{name}", value)]
+        assert go(out, *common, *more) == 0
+        logs.append((out / "run" / "seed-003" / "episodes.csv").read_bytes())
+        named = set(re.findall(r"--(\w+) has no effect", capsys.readouterr().err))
+        assert named == moot & {*given, "social", "teacher"}
+    assert logs[0] == logs[1]
+
+
+def test_of_options_that_change_nothing_only_those_that_were_changed_are_named(tmp_path, go, capsys):
+    budget = str(Config().budget)
+    assert go(tmp_path, "--algorithm", "random", "--budget", budget, "--inverse", "nearest", "--movements", 5) == 0
+    assert "no effect" not in capsys.readouterr().err
+    assert go(tmp_path, "--algorithm", "random", "--budget", 5, "--name", "five", "--movements", 5) == 0
+    assert "--budget has no effect on random\n" in capsys.readouterr().err
 
 
 def test_config_defaults_are_the_librarys(benchmark):

@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rundir import Columns, RunError, find_runs, read_run
+from read_runs import find_runs, read_run
+from runfiles import Columns, RunError
 from sgimd_torch.spaces import Demonstration, Episode, Move
 
 COLUMNS = Columns(1, 2, 1)
