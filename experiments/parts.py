@@ -21,19 +21,24 @@ from sgimd_torch.evaluation import Benchmark, load_benchmark
 from sgimd_torch.fishing_rod import JOINTS, FishingRod
 from sgimd_torch.interest import InterestMap, UniformGoals
 from sgimd_torch.learner import Learner
+from sgimd_torch.motor_primitives import GaussianPrimitive
 from sgimd_torch.spaces import Box, Demonstration, stream
 from sgimd_torch.teachers import AskedTeacher, InitialTeacher, PeriodicTeacher, Teacher
+
+MISFIT = 0.5  # rad; a worse fit is no movement of this robot
 
 
 @dataclass(frozen=True, eq=False)
 class RunParts:
     """What a run needs. ``inverse`` reads the learner's memory for evaluations; ``teacher`` is None, and
-    ``demonstrations`` are empty, for who learns alone. ``data`` holds checksums of the files that were read."""
+    ``demonstrations`` are empty, for who learns alone. ``residuals`` (rad) say how far each is from what the robot's
+    motor primitive can play. ``data`` holds checksums of the files that were read."""
 
     environment: FishingRod
     learner: Learner
     teacher: Teacher | None
     demonstrations: Sequence[Demonstration]
+    residuals: Sequence[float]
     inverse: Inverse
     benchmark: Benchmark
     data: dict[str, str | None]
@@ -52,6 +57,7 @@ def build(config: Config) -> RunParts:
     benchmark = load_benchmark(benchmark_path)
     benchmark.check(environment)
     demonstrations: Sequence[Demonstration] = []
+    residuals: list[float] = []
     data: dict[str, str | None] = {"demonstrations_crc32": None, "benchmark_crc32": _checksum(benchmark_path)}
     teacher = None
     if "teacher" in ALGORITHMS[config.algorithm]:
@@ -62,11 +68,12 @@ def build(config: Config) -> RunParts:
             outcome_dim=environment.outcomes.dim,
             context_dim=environment.contexts.dim,
         )
+        residuals = _residuals(path, demonstrations, environment.primitive)
         data["demonstrations_crc32"] = _checksum(path)
         teacher = _teacher(config, demonstrations)
     learner = _learner(config, environment)
     inverse = INVERSES[config.inverse](learner.memory, environment)
-    return RunParts(environment, learner, teacher, demonstrations, inverse, benchmark, data)
+    return RunParts(environment, learner, teacher, demonstrations, residuals, inverse, benchmark, data)
 
 
 def _learner(config: Config, environment: FishingRod) -> Learner:
@@ -107,6 +114,23 @@ def _teacher(config: Config, demonstrations: Sequence[Demonstration]) -> Teacher
             patience = {} if config.every is None else {"patience": config.every}
             return AskedTeacher(demonstrations, rng, choose=choose, **patience)
     return PeriodicTeacher(demonstrations, rng, choose=choose, **every)
+
+
+def _residuals(path: Path, demonstrations: Sequence[Demonstration], primitive: GaussianPrimitive) -> list[float]:
+    """What the correspondence leaves of each demonstration, eq. (6), rad; refuses what it cannot translate."""
+    residuals: list[float] = []
+    for row, demonstration in enumerate(demonstrations):
+        try:
+            theta = primitive.correspondence(demonstration.times, demonstration.trajectory)
+        except ValueError as error:
+            raise ValueError(f"{path}: recording {row} cannot be translated: {error}") from error
+        residuals.append(primitive.residual(theta, demonstration.times, demonstration.trajectory))
+        if residuals[-1] > MISFIT:
+            raise ValueError(
+                f"{path}: recording {row} is {residuals[-1]:.2f} rad (root mean square) away from anything that the "
+                "robot can play; was it recorded in degrees, or with the joints in another order?"
+            )
+    return residuals
 
 
 def _existing(what: str, path: Path) -> Path:

@@ -18,6 +18,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
+
 import sgimd_torch
 from command_line import parse
 from config import Config
@@ -64,7 +66,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             return stop.exit_code
         try:
             with directory:
-                say(*config.without_effect, *directory.notes)
+                say(*config.without_effect, *directory.notes, *correspondence_of(parts))
                 report = run_in(directory, config, parts, stopping)
         except Stopped as stop:
             again = shlex.join(["python", "experiments/run.py", *argv, *([] if resume else ["--resume"])])
@@ -157,6 +159,15 @@ def evaluate_in(directory: RunDirectory, config: Config, parts: RunParts, moveme
     with stopping.at_once():
         found = evaluate(parts.inverse, parts.environment, goals, config.seed, movements, repeats=config.repeats)
     directory.evaluations.add(movements, found, regions_of(parts))
+
+
+def correspondence_of(parts: RunParts) -> list[str]:
+    """How well the robot can play what it will be shown; nothing for who learns alone."""
+    if not parts.residuals:
+        return []
+    median, worst = np.median(parts.residuals), max(parts.residuals)
+    n = len(parts.residuals)
+    return [f"{n} demonstrations; correspondence misses them by {median:.4f} rad (median), {worst:.4f} rad at most"]
 
 
 def regions_of(parts: RunParts) -> list[Region]:

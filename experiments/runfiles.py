@@ -4,7 +4,7 @@
     versions.json    of Python, the libraries and this repository; "before": those of earlier parts of a resumed run
     episodes.csv     the log, append-only, a line for each movement:
                          index, origin ("" at rest), demonstration (its row in the file, when one came just before),
-                         context_*, theta_*, goal_*, outcome_*, crc32 of the line before it
+                         context_*, theta_*, goal_*, outcome_*, crc32 of the fields before it
     evaluation.csv   movements, mean_error_m, median_error_m, p90_error_m, noise_floor_m
     regions.csv      the interest map at each evaluation, a line for each region, corners in C x T
     summary.json     movements so far, the last evaluation, seconds spent on physics, learning and evaluating

@@ -144,7 +144,8 @@ class InterestMap:
         here = np.flatnonzero(self._around(context))
         interests = np.array([self._regions[index].interest() for index in here])
         weights = interests - interests.min()  # eq. (4)
-        if not weights.any():  # no region stands out: their shares of T, which makes goals uniform
+        # Deviation: eq. (4) is 0/0 where no region stands out; their shares of T then make goals uniform.
+        if not weights.any():
             sides = (self._highs - self._lows)[here, self.contexts.dim :]
             weights = (sides / self.outcomes.sides).prod(axis=1)
         return self._regions[int(self._rng.choice(here, p=weights / weights.sum()))]

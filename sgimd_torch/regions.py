@@ -37,7 +37,10 @@ def _rise(competences: Array) -> float:
 
 
 def interest_of(competences: Array, *, window: int, progress: Progress) -> float:
-    """Progress over the last ``window`` of ``competences`` ``(n,)``; 0 while fewer than 4 are known."""
+    """Progress over the last ``window`` of ``competences`` ``(n,)``.
+
+    Deviation: 0 while fewer than 4 are known, where eq. (3) has halves of one value or none.
+    """
     return progress(competences[-window:]) if len(competences) >= 4 else 0.0
 
 

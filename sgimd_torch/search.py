@@ -31,7 +31,8 @@ def nelder_mead(
     """Downhill simplex on the distance to the goal, around theta_g and its neighbours.
 
     It executes theta_g first. The neighbours are vertices with the outcomes they already have: remembering costs no
-    movement. Those that lie on a line, plane ... through better vertices are left out, as a flat simplex cannot turn.
+    movement (and takes outcomes of nearby contexts for those of this one). Those that lie on a line, plane ... through
+    better vertices are left out, as a flat simplex cannot turn.
 
     Args:
         policies: Pi; nothing outside is proposed.
@@ -45,7 +46,8 @@ def nelder_mead(
             Deviation: False is the default, as 25 steps would be the whole budget of a goal.
         adaptive: Gao & Han's coefficients (2012), gentler in high dimensions.
         xatol, fatol: it ends when all vertices are this near the best, in theta and in metres from the goal. Below the
-            noise of the outcomes a simplex cannot tell better from worse; it is better begun anew.
+            noise of the outcomes a simplex cannot tell better from worse, so by default it ends early (a deviation: the
+            paper names no such end) and the next one begins from the memory that it has enriched.
 
     Raises:
         ValueError: ``step`` is not in (0, 0.5].
@@ -215,15 +217,18 @@ class _Flat:
 def _step_out(policies: Box, theta: Array, flat: _Flat, rng: np.random.Generator, step: float) -> Array:
     """A random step from ``theta`` that leads out of the flat and stays in the box.
 
-    Coordinates that would leave the box are mirrored, since clipping would flatten the simplex. In a corner of a box of
-    few dimensions mirroring may do so, too; then another direction is drawn.
+    Coordinates that would leave the box are mirrored: clipping them would flatten the simplex. In a corner of a box of
+    few dimensions mirroring may do so, too; then any direction is tried.
     """
-    for _ in range(10):
-        change = step * np.sqrt(policies.dim) * policies.sides * flat.direction_out(rng)
+    direction = flat.direction_out(rng)
+    for _ in range(100):  # in vain for a step no longer than xatol
+        change = step * np.sqrt(policies.dim) * policies.sides * direction
         forth, back = theta + change, theta - change
         vertex = policies.clip(np.where((forth < policies.low) | (forth > policies.high), back, forth))
         if flat.lacks(vertex):
             break
+        direction = rng.standard_normal(policies.dim)
+        direction /= np.linalg.norm(direction)
     return vertex
 
 

@@ -128,6 +128,7 @@ class GoalBabbling:
         """Movements without end, in the global exploration or the local optimisation regime."""
         while True:
             if self.rng.random() < self._global_probability(context, goal):
+                # Deviation: the paper prints "theta in T", which must be Pi.
                 yield Move(self.policies.sample(self.rng), goal, "global")
             else:
                 yield from self._optimise(context, goal)
@@ -136,6 +137,7 @@ class GoalBabbling:
         """The farther the goal from all that was reached, the likelier is global exploration."""
         if len(self.memory) == 0:
             return 1.0
+        # Deviation: the paper's probability is -J itself; kept off 0 and 1, neither regime ever dies out.
         return float(np.clip(-self.competence(context, goal), *self.global_range))
 
     def _optimise(self, context: Array, goal: Array) -> Attempt:
@@ -189,6 +191,7 @@ class Imitate:
         outcomes: list[Array] = []
         try:
             for repeat in range(self.repeats) if self.repeats is not None else itertools.count():
+                # Deviation: the paper varies all repeats; the exact one shows what theta_d itself leads to.
                 theta = theta_d if repeat == 0 else self._vary(theta_d)
                 outcomes.append((yield Move(theta, demonstration.outcome, "imitate")))
         finally:  # also when the next demonstration cuts in

@@ -7,6 +7,7 @@ import pytest
 
 from sgimd_torch.environment import PlanarArm
 from sgimd_torch.evaluation import Benchmark, Evaluation, evaluate, load_benchmark, save_benchmark, tile_goals
+from sgimd_torch.fishing_rod import FishingRod
 from sgimd_torch.inverse_model import LocalInverse, NearestNeighbour
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, Box, Estimate, stream
@@ -239,3 +240,14 @@ def test_what_is_no_benchmark_is_refused(tmp_path: Path) -> None:
             load_benchmark(tmp_path / name)
     with pytest.raises(FileNotFoundError):
         load_benchmark(tmp_path / "none.npz")
+
+
+def test_measuring_the_noise_leaves_the_errors_as_they_are() -> None:
+    rod = FishingRod(threads=1)
+    memory = Memory(0, 25, 2)
+    for theta in stream(0, "thetas").random((5, 25)):
+        memory.add(np.zeros(0), theta, rod.execute(np.zeros(0), theta, stream(0, "environment")))
+    goals = np.array([[0.0, 0.5], [0.3, 0.4], [-0.3, 0.6]])
+    plain, repeated = (evaluate(LocalInverse(memory), rod, goals, 0, 5, repeats=n) for n in (0, 4))
+    assert np.array_equal(plain.errors, repeated.errors)
+    assert (repeated.scatter > 0).all()

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from sgimd_torch.algorithms import sagg_riac
 from sgimd_torch.environment import PlanarArm
 from sgimd_torch.learner import Learner
 from sgimd_torch.memory import Memory
@@ -235,3 +236,19 @@ def test_a_social_strategy_without_a_correspondence_is_refused() -> None:
 def test_a_strategy_of_no_movement_at_all_is_an_error_not_an_endless_loop() -> None:
     with pytest.raises(RuntimeError, match="yield"):
         learner(Pursuit(n=0)).ask(NO_CONTEXT)
+
+
+def test_a_context_is_kept_as_it_was_asked_with() -> None:
+    arm = PlanarArm(4, context=True)
+    learner = sagg_riac(arm, 0)
+    context = np.array([0.1])
+    move = learner.ask(context)
+    context[0] = 0.3
+    assert move is not None
+    learner.tell(arm.rest)
+    assert learner.memory.contexts.tolist() == [[0.1]]
+
+
+def test_there_is_no_context_to_keep_while_nothing_is_under_way() -> None:
+    with pytest.raises(RuntimeError, match="idle"):
+        _ = sagg_riac(PlanarArm(4), 0).context

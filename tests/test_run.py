@@ -20,9 +20,10 @@ from config import ALGORITHMS, KNOWN, Config
 from parts import build
 from read_runs import read_run
 from run import main
+from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
 from sgimd_torch.evaluation import Benchmark, save_benchmark
 from sgimd_torch.fishing_rod import FishingRod
-from sgimd_torch.spaces import stream
+from sgimd_torch.spaces import Demonstration, stream
 
 ROOT = Path(sgimd_torch.__file__).parents[1]
 MOVEMENTS = 90
@@ -509,3 +510,23 @@ def test_json_files_are_plain_json(tmp_path, go):
         json.loads(path.read_text(), parse_constant=pytest.fail)  # called for NaN, which is no json
     assert read_run(directory).summary["noise_floor_m"] is None
     assert np.isnan(read_run(directory).evaluation["noise_floor_m"]).all()
+
+
+def test_the_misfit_of_the_demonstrations_is_reported(tmp_path, go, capsys):
+    assert go(tmp_path) == 0
+    assert re.search(
+        r"127 demonstrations; correspondence misses them by 0\.\d+ rad \(median\)", capsys.readouterr().err
+    )
+
+
+@pytest.mark.parametrize("slip", ["three samples", "degrees"])
+def test_recordings_that_the_robot_cannot_play_are_refused_before_anything_is_written(tmp_path, go, capsys, slip):
+    shown = load_demonstrations()[5]
+    times, trajectory = shown.times, shown.trajectory
+    times, trajectory = (times[:3], trajectory[:3]) if slip == "three samples" else (times, np.degrees(trajectory))
+    save_demonstrations(tmp_path / "own.npz", [shown, Demonstration(shown.context, times, trajectory, shown.outcome)])
+    assert go(tmp_path / "runs", "--demonstrations", tmp_path / "own.npz") == 2
+    said = capsys.readouterr().err
+    assert "own.npz: recording 1" in said
+    assert slip.split()[-1] in said
+    assert not (tmp_path / "runs").exists()

@@ -366,3 +366,14 @@ def test_a_limited_search_is_a_search_cut_short() -> None:
     whole = world.run(simplex_search(world.policies, rng()))
     search = simplex_search(world.policies, rng())(world.start, world.goal)
     assert np.array_equal(drive(limit(search, 12), world.execute), whole[:12])
+
+
+def test_in_a_corner_of_a_small_box_the_simplex_is_not_flat() -> None:
+    policies = Box.cube(0, 1, 2)
+    theta, neighbour = np.array([0.95, 0.05]), np.array([0.45, 0.55])  # mirroring in this corner leads along their line
+    for seed in range(50):
+        search = nelder_mead(policies, stream(seed, "search"), step=0.1, xatol=1e-4)
+        estimate = Estimate(theta, neighbour[None], np.array([[0.0, 1.0]]))
+        executed = drive(search(estimate, np.zeros(2)), lambda x: x, 2)
+        edges = np.array([neighbour, executed[1]]) - theta
+        assert abs(np.linalg.det(edges)) > 1e-4

@@ -223,7 +223,8 @@ def test_a_context_holds_from_the_first_movement_of_an_attempt_to_its_last(name:
         if after.demonstration is None and before.move is not None and after.move is not None:
             same_goal = after.move.goal is not None and np.array_equal(before.move.goal, after.move.goal)
             assert np.array_equal(before.context, after.context) or not same_goal
-    assert all(e.context.tolist() == [0.3] for e in episodes if e.demonstration is not None)
+    answers = [e for e in episodes if e.demonstration is not None and e.move is not None]
+    assert all(e.context.tolist() == [0.3] for e in answers)
     contexts = np.array([e.context for e in episodes if e.move is not None]).reshape(-1, 1)
     if name != "observation":
         assert np.array_equal(learner.memory.contexts, contexts)
@@ -279,3 +280,14 @@ def test_sgim_d_without_a_teacher_is_sagg_riac() -> None:
     arm = PlanarArm(5, noise=0.01)
     alone = run(sgim_d(arm, 0, correspondence=last_posture), arm, 0, movements=150)
     assert summary(list(alone)) == summary(list(run(sagg_riac(arm, 0), arm, 0, movements=150)))
+
+
+@pytest.mark.parametrize("context", [False, True])
+def test_a_life_in_two_parts_is_the_whole_life(context: bool) -> None:
+    arm = PlanarArm(5, noise=0.05, context=context)
+    whole = [e.outcome for e in run(sagg_riac(arm, 0), arm, 0, movements=60)]
+    learner = sagg_riac(arm, 0)
+    parts = [e.outcome for e in run(learner, arm, 0, movements=37)]
+    assert not learner.idle  # the first part ends in mid-search
+    parts += [e.outcome for e in run(learner, arm, 0, movements=60, first=37)]
+    assert np.array_equal(whole, parts)

@@ -1,0 +1,38 @@
+"""The table of what runs came to."""
+
+import numpy as np
+import pytest
+
+from read_runs import read_run
+from run import main as live
+from sgimd_torch.evaluation import Benchmark, save_benchmark
+from table import main
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory):
+    out = tmp_path_factory.mktemp("runs")
+    save_benchmark(out / "tiny.npz", Benchmark("FishingRod", np.array([[0.0, 0.6], [0.3, 0.5]]), 0.1))
+    for algorithm, seed in (("random", 0), ("random", 1), ("sgim-d", 0)):
+        options = f"--algorithm {algorithm} --seed {seed} --movements 40 --repeats 2 --evaluate_at 20"
+        assert live([*options.split(), "--benchmark", str(out / "tiny.npz"), "--out", str(out)]) == 0
+    return out
+
+
+def test_the_table_gives_mean_and_deviation_over_seeds(runs, capsys):
+    assert main([str(runs), "--at", "40"]) == 0
+    lines = {line.split()[0]: line for line in capsys.readouterr().out.splitlines()}
+    errors = [read_run(runs / "random" / f"seed-00{seed}").evaluation["mean_error_m"][-1] for seed in (0, 1)]
+    assert f"{np.mean(errors):.3f} ± {abs(errors[0] - errors[1]) / np.sqrt(2):.3f}" in lines["random"]
+    assert lines["random"].split()[1] == "2"
+    assert "±" not in lines["sgim-d"]
+
+
+def test_a_run_that_is_too_short_is_named(runs, capsys):
+    assert main([str(runs), "--at", "5000"]) == 2
+    assert "seed-000 has no evaluation after 5000 movements" in capsys.readouterr().err
+
+
+def test_a_folder_without_runs_is_refused(tmp_path, capsys):
+    assert main([str(tmp_path)]) == 2
+    assert "holds no runs" in capsys.readouterr().err
