@@ -18,6 +18,7 @@ from sgimd_torch.fishing_rod import FishingRod
 from sgimd_torch.spaces import Array, stream
 
 SEED = 1
+BATCH = 500
 
 
 def execute(rod: FishingRod, thetas: Array, name: str, start: int = 0) -> Array:
@@ -26,20 +27,20 @@ def execute(rod: FishingRod, thetas: Array, name: str, start: int = 0) -> Array:
     return rod.execute_many(np.zeros((len(thetas), 0)), thetas, rngs)
 
 
-def divergences(rod: FishingRod, movements: int) -> tuple[int, Array]:
-    """How many of many random movements diverge, a tenth of them on corners of the box; and where the others landed."""
-    diverged, landed, batch = 0, [], 500
-    for start in tqdm(range(0, movements, batch), desc="random movements", unit_scale=batch, unit="movement"):
-        thetas = stream(SEED, "thetas", start).random((min(batch, movements - start), 25))
-        corners = start % (10 * batch) == 0
+def landings(rod: FishingRod, thetas: Array, name: str) -> tuple[int, Array]:
+    """How many of these movements diverge, and ``(n, 2)`` m where the others landed."""
+    diverged, landed = 0, []
+    for start in tqdm(range(0, len(thetas), BATCH), desc=f"{name} movements", unit_scale=BATCH, unit="movement"):
+        batch = thetas[start : start + BATCH]
         try:
-            outcomes = execute(rod, thetas.round() if corners else thetas, "noise", start)
-        except SimulationError as error:
-            diverged += 1
-            print(error)
-        else:
-            if not corners:
-                landed.append(outcomes)
+            landed.append(execute(rod, batch, name, start))
+        except SimulationError:
+            for row, theta in enumerate(batch):
+                try:
+                    landed.append(execute(rod, theta[None], name, start + row))
+                except SimulationError as error:
+                    diverged += 1
+                    print(error)
     return diverged, np.concatenate(landed)
 
 
@@ -79,7 +80,9 @@ def main() -> int:
     pooled = ((repeated - repeated.mean(axis=1, keepdims=True)) / deviations.mean()).ravel()
     kurtosis = float((pooled**4).mean() / (pooled**2).mean() ** 2)
 
-    diverged, landed = divergences(rod, movements)
+    random = stream(SEED, "thetas").random((movements, 25))
+    diverged, landed = landings(rod, random, "random")
+    diverged_corners, _ = landings(rod, random[: movements // 10].round(), "corner")
     benchmark = load_benchmark()
 
     def tiles(points: Array) -> Array:
@@ -93,11 +96,13 @@ def main() -> int:
     sd = float(deviations.mean())
     off = float(np.linalg.norm(natural - [0.0, 0.5]))
     rows = [
-        (f"{diverged} of {movements} movements diverged", "0", diverged == 0),
+        (f"{diverged} of {movements} uniform random movements diverged", "0", diverged == 0),
+        (f"{diverged_corners} of {movements // 10} on random corners of the box diverged", "0", diverged_corners == 0),
         (f"a movement takes {milliseconds:.2f} ms (median)", "<= 15", milliseconds <= 15),
         (f"{ratio:.3f} times C stepping alone (median)", "<= 1.15", ratio <= 1.15),
         (f"a step of sd .005 moves the landing by {smoothness:.4f} m (median)", "<= .03", smoothness <= 0.03),
         (f"noise sd {sd:.4f} m a dimension (mean)", ".03 to .075", 0.03 <= sd <= 0.075),
+        (f"outcome_noise promises {rod.outcome_noise:.4f} m", "within 10 %", abs(rod.outcome_noise / sd - 1) <= 0.1),
         (f"noisiest tenth {spread:.1f} times the quietest", ">= 5", spread >= 5),
         (f"kurtosis of the pooled noise {kurtosis:.1f}", "> 4, a Gaussian has 3", kurtosis > 4),
         (f"densest tile at ({natural[0]:.2f}, {natural[1]:.2f}), {off:.2f} m from (0, .5)", "<= .25", off <= 0.25),
