@@ -231,23 +231,25 @@ class FishingRod:
             run, seen = self._rollout(states[flying], controls[flying, start:stop])
             for k, row in enumerate(flying):
                 last = min(stop, int(steps[row])) - start
-                track = np.concatenate([floats[row][None], seen[k, :last]])
-                if not np.abs(run[k, :last, speeds]).max() < TOP_SPEED:  # also when it is NaN
+                speed, track = run[k, :last, speeds], seen[k, :last]
+                if not (speed.max() < TOP_SPEED and speed.min() > -TOP_SPEED):  # also when it is NaN
                     diverged[row] = True
-                elif (wet := np.flatnonzero(track[1:, 2] <= 0)).size:
-                    landings[row] = _crossing(track[wet[0]], track[wet[0] + 1])
+                elif track[:, 2].min() <= 0:
+                    wet = int((track[:, 2] <= 0).argmax())
+                    landings[row] = _crossing(track[wet - 1] if wet else floats[row], track[wet])
                 elif start + last == steps[row]:
-                    landings[row] = self._let_out(track, float(ends[row]), int(steps[row]), float(yaw_wind[row, 1]))
+                    before = track[-2] if last > 1 else floats[row]
+                    after = steps[row] - 1 - ends[row] / self.model.opt.timestep  # share of a step
+                    landings[row] = self._let_out(track[-1] + after * (before - track[-1]), float(yaw_wind[row, 1]))
             states[flying], floats[flying] = run[:, -1], seen[:, -1]
             flying = flying[np.isnan(landings[flying, 0]) & ~diverged[flying]]
             if not flying.size:
                 break
         return landings, diverged
 
-    def _let_out(self, track: Array, end: float, steps: int, wind: float) -> tuple[float, float]:
-        """Free flight from where the float is at ``end``, between the last two steps."""
-        after = steps - 1 - end / self.model.opt.timestep  # share of a step
-        x, y, z, dx, dy, dz = (track[-1] + after * (track[-2] - track[-1])).tolist()
+    def _let_out(self, seen: Array, wind: float) -> tuple[float, float]:
+        """Free flight from the float's position and velocity ``(6,)``."""
+        x, y, z, dx, dy, dz = seen.tolist()
         flight = (dz + math.sqrt(dz * dz + 2 * self._gravity * max(z, 0.0))) / self._gravity
         return x + (dx + wind / self._float_mass * flight / 2) * flight, y + dy * flight
 
