@@ -1,16 +1,9 @@
-"""Whole runs on the fishing rod: what they write, that they can be repeated, stopped, resumed, and refuse nonsense."""
+"""Whole runs on the fishing rod: what they write, that they can be repeated, and what they refuse."""
 
-import fcntl
 import json
 import os
 import re
 import shlex
-import signal
-import subprocess
-import sys
-import time
-import zlib
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,73 +13,11 @@ from config import ALGORITHMS, KNOWN, Config
 from parts import build
 from read_runs import read_run
 from run import main
+from runs import MOVEMENTS, csv_of
 from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
 from sgimd_torch.evaluation import Benchmark, save_benchmark
 from sgimd_torch.fishing_rod import FishingRod
 from sgimd_torch.spaces import Demonstration, stream
-
-ROOT = Path(sgimd_torch.__file__).parents[1]
-MOVEMENTS = 90
-CSV = ("episodes.csv", "evaluation.csv", "regions.csv")
-# Every movement goes to disk at once, so that a test can wait for the k-th.
-EAGER = "import run, sys; run.FLUSH_EVERY = 0; sys.exit(run.main(sys.argv[1:]))"
-
-
-@pytest.fixture(scope="session")
-def benchmark(tmp_path_factory):
-    path = tmp_path_factory.mktemp("benchmark") / "tiny.npz"
-    save_benchmark(path, Benchmark("FishingRod", np.array([[0.0, 0.6], [0.3, 0.5], [-0.4, 0.4]]), 0.1))
-    return path
-
-
-@pytest.fixture(scope="session")
-def go(benchmark):
-    """Run in this process; later options win. Returns the exit code."""
-
-    def go(out, *options):
-        return main([*arguments(out, benchmark), *map(str, options)])
-
-    return go
-
-
-@pytest.fixture(scope="session")
-def reference(tmp_path_factory, go):
-    """The files of the uninterrupted run, by name."""
-    out = tmp_path_factory.mktemp("reference")
-    assert go(out) == 0
-    return csv_of(out / "sgim-d" / "seed-003")
-
-
-def arguments(out, benchmark):
-    fixed = f"--seed 3 --movements {MOVEMENTS} --evaluate_at 30,60 --repeats 2".split()
-    return [*fixed, "--benchmark", str(benchmark), "--out", str(out)]
-
-
-def csv_of(directory):
-    return {name: (directory / name).read_bytes() for name in CSV if (directory / name).exists()}
-
-
-def start(program, *options, limit=""):
-    """Another process; ``limit`` is for ``ulimit``."""
-    paths = [str(ROOT / "experiments"), str(ROOT), os.environ.get("PYTHONPATH", "")]
-    command = shlex.join([sys.executable, "-c", program, *map(str, options)])
-    return subprocess.Popen(
-        ["bash", "-c", f"{f'ulimit {limit}; ' if limit else ''}exec {command}"],
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-
-
-def signal_after(process, log, lines, signum):
-    """Send ``signum`` once the log has so many ``lines``; returns (exit code, stderr)."""
-    while process.poll() is None and not (log.exists() and log.read_bytes().count(b"\n") >= lines):
-        time.sleep(0.001)
-    assert process.poll() is None, process.communicate()
-    process.send_signal(signum)
-    _, errors = process.communicate()
-    return process.returncode, errors
 
 
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
@@ -155,191 +86,6 @@ def test_with_and_without_the_teacher_the_environment_makes_the_same_noise(tmp_p
         for k in (40, 75):
             noise = stream(3, "environment", k)
             assert np.array_equal(rod.execute(run.contexts[k], run.thetas[k], noise), run.outcomes[k])
-
-
-@pytest.mark.parametrize(
-    ("signum", "lines", "code"), [(signal.SIGKILL, 20, -9), (signal.SIGKILL, 64, -9), (signal.SIGINT, 40, 130)]
-)
-def test_a_run_that_is_stopped_and_resumed_ends_as_if_it_never_was(
-    tmp_path, go, benchmark, reference, capsys, signum, lines, code
-):
-    directory = tmp_path / "sgim-d" / "seed-003"
-    process = start(EAGER, *arguments(tmp_path, benchmark))
-    found, errors = signal_after(process, directory / "episodes.csv", lines, signum)
-    assert found == code
-    assert "Traceback" not in errors
-    assert ("--resume" in errors) == (signum == signal.SIGINT)
-    before = (directory / "episodes.csv").read_bytes()
-    assert lines <= before.count(b"\n") < MOVEMENTS
-    assert go(tmp_path) == 2  # without --resume nothing is touched
-    assert "--resume" in capsys.readouterr().err
-    assert (directory / "episodes.csv").read_bytes() == before
-    assert go(tmp_path, "--resume") == 0
-    assert csv_of(directory) == reference
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("algorithm", ["random", "imitation", "sgim-d"])
-def test_a_run_killed_five_times_at_random_ends_as_if_it_never_was(tmp_path, go, benchmark, algorithm):
-    options = ("--algorithm", algorithm, "--movements", 900, "--evaluate_at", "200,400,600,800")
-    assert go(tmp_path / "whole", *options) == 0
-    directory = tmp_path / "killed" / algorithm / "seed-003"
-    for lines in sorted(stream(0, "kills").integers(2, 880, size=5)):
-        process = start(EAGER, *arguments(tmp_path / "killed", benchmark), *options, "--resume")
-        signal_after(process, directory / "episodes.csv", lines, signal.SIGKILL)
-    assert go(tmp_path / "killed", *options, "--resume") == 0
-    assert csv_of(directory) == csv_of(tmp_path / "whole" / algorithm / "seed-003")
-
-
-@pytest.mark.parametrize("algorithm", ["sgim-d", "observation"])
-def test_a_finished_run_made_longer_equals_a_long_run(tmp_path, go, algorithm):
-    options = ("--algorithm", algorithm)
-    assert go(tmp_path / "long", *options) == 0
-    assert go(tmp_path / "extended", *options, "--movements", 50) == 0  # evaluated after 50, which the long one is not
-    assert go(tmp_path / "extended", *options, "--resume") == 0
-    extended = tmp_path / "extended" / algorithm / "seed-003"
-    assert csv_of(extended) == csv_of(tmp_path / "long" / algorithm / "seed-003")
-    assert read_run(extended).config["movements"] == MOVEMENTS
-
-
-def test_resuming_a_finished_run_changes_nothing_but_what_is_asked_of_its_evaluation(tmp_path, go, reference):
-    directory = tmp_path / "sgim-d" / "seed-003"
-    assert go(tmp_path) == 0
-    assert go(tmp_path, "--resume") == 0
-    assert csv_of(directory) == reference
-    assert go(tmp_path, "--resume", "--evaluate_at", "45", "--repeats", 3) == 0
-    assert read_run(directory).evaluation["movements"].tolist() == [45, 90]
-    assert go(tmp_path, "--resume") == 0
-    assert csv_of(directory) == reference
-
-
-def tear(content):
-    return content[:-100]
-
-
-def zero(content):
-    return content[:-1500] + bytes(1500)
-
-
-def flip(content):
-    digit = content.index(b"\n40,") + 60
-    return content[:digit] + (b"7" if content[digit : digit + 1] != b"7" else b"8") + content[digit + 1 :]
-
-
-def lose_newline(content):
-    return content[:-1]
-
-
-def append_garbage(content):
-    return content + b"\xff\x00 90,,,"
-
-
-def repeat_last_line(content):
-    return content + content.splitlines(keepends=True)[-1]
-
-
-@pytest.mark.parametrize(
-    ("damage", "kept"),
-    [(tear, 89), (zero, 87), (flip, 40), (lose_newline, 89), (append_garbage, 90), (repeat_last_line, 90)],
-)
-def test_of_a_damaged_log_what_is_whole_is_kept_and_the_rest_lived_again(tmp_path, go, reference, capsys, damage, kept):
-    directory = tmp_path / "sgim-d" / "seed-003"
-    assert go(tmp_path) == 0
-    log = directory / "episodes.csv"
-    damaged = damage(log.read_bytes())
-    log.write_bytes(damaged)
-    assert len(read_run(directory).index) == kept
-    capsys.readouterr()
-    assert go(tmp_path, "--resume") == 0
-    dropped = len(damaged) - sum(map(len, reference["episodes.csv"].splitlines(keepends=True)[: kept + 1]))
-    messages = capsys.readouterr().err
-    assert f"episodes.csv: dropped {dropped} bytes" in messages
-    assert f"{kept} movements are kept" in messages
-    assert csv_of(directory) == reference
-
-
-@pytest.mark.parametrize("name", ["evaluation.csv", "regions.csv"])
-@pytest.mark.parametrize("damage", [tear, lose_newline, append_garbage, lambda content: bytes(len(content))])
-def test_damaged_evaluations_are_done_again(tmp_path, go, reference, capsys, name, damage):
-    directory = tmp_path / "sgim-d" / "seed-003"
-    assert go(tmp_path) == 0
-    (directory / name).write_bytes(damage((directory / name).read_bytes()))
-    capsys.readouterr()
-    assert go(tmp_path, "--resume") == 0
-    assert f"{name}: dropped" in capsys.readouterr().err
-    assert csv_of(directory) == reference
-
-
-def test_a_run_killed_before_its_config_was_written_starts_afresh(tmp_path, go, reference, capsys):
-    directory = tmp_path / "sgim-d" / "seed-003"
-    directory.mkdir(parents=True)
-    for name in ("lock", "versions.json", "config.json.part"):
-        (directory / name).touch()
-    assert go(tmp_path, "--resume") == 0
-    assert "no run yet" in capsys.readouterr().err
-    assert csv_of(directory) == reference
-    assert not list(directory.glob("*.part"))
-
-
-def test_a_log_that_another_learner_wrote_is_not_continued(tmp_path, go, capsys):
-    assert go(tmp_path) == go(tmp_path, "--seed", 4) == 0
-    directory = tmp_path / "sgim-d" / "seed-003"
-    other = (tmp_path / "sgim-d" / "seed-004" / "episodes.csv").read_bytes()
-    (directory / "episodes.csv").write_bytes(other + b"torn")
-    before = {path.name: path.read_bytes() for path in directory.iterdir()}
-    capsys.readouterr()
-    assert go(tmp_path, "--resume", "--evaluate_at", "10", "--movements", 95) == 2
-    message = capsys.readouterr().err
-    assert "movement 0" in message
-    assert "Traceback" not in message
-    assert {path.name: path.read_bytes() for path in directory.iterdir()} == before
-
-
-def test_a_replay_that_disagrees_names_the_columns(tmp_path, go, capsys):
-    assert go(tmp_path) == 0
-    log = tmp_path / "sgim-d" / "seed-003" / "episodes.csv"
-    header, *lines = log.read_text().splitlines()
-    k = next(k for k, line in enumerate(lines) if line.split(",")[1] == "local")
-    fields = lines[k].split(",")[:-1]
-    column = header.split(",").index("goal_0")
-    goal, fields[column] = fields[column], "0.125"
-    fields[1] = "global"
-    body = ",".join(fields)
-    lines[k] = f"{body},{zlib.crc32(body.encode()):08x}"
-    log.write_text("".join(f"{line}\n" for line in (header, *lines)))
-    capsys.readouterr()
-    assert go(tmp_path, "--resume") == 2
-    message = capsys.readouterr().err
-    assert f"movement {k} " in message
-    assert f"origin was global, now local; goal_0 was 0.125, now {goal}. Was it recorded by another" in message
-    assert len(message) < 300
-
-
-def test_a_run_is_resumed_with_its_own_configuration_only(tmp_path, go, capsys):
-    assert go(tmp_path, "--movements", 10) == 0
-    before = (tmp_path / "sgim-d" / "seed-003" / "config.json").read_bytes()
-    assert go(tmp_path, "--resume", "--budget", 7, "--goals", "uniform") == 2
-    message = capsys.readouterr().err
-    assert "goals was interest-map, now uniform" in message
-    assert f"budget was {Config().budget}, now 7" in message
-    assert "epsilon" not in message
-    assert (tmp_path / "sgim-d" / "seed-003" / "config.json").read_bytes() == before
-
-
-def test_a_run_is_not_made_shorter(tmp_path, go, capsys):
-    assert go(tmp_path, "--movements", 10) == 0
-    assert go(tmp_path, "--movements", 9, "--resume") == 2
-    assert "10 movements already" in capsys.readouterr().err
-    assert go(tmp_path, "--movements", 10, "--resume") == 0
-
-
-def test_a_run_that_another_process_writes_is_left_alone(tmp_path, go, capsys):
-    assert go(tmp_path, "--movements", 10) == 0
-    with (tmp_path / "sgim-d" / "seed-003" / "lock").open("r+") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        assert go(tmp_path, "--resume") == 2
-    assert "in use by another process" in capsys.readouterr().err
-    assert go(tmp_path, "--resume") == 0
 
 
 def test_a_directory_with_other_files_is_left_alone(tmp_path, go, capsys):
@@ -417,18 +163,6 @@ def test_a_diverging_simulation_is_reported_with_its_theta_and_leaves_a_whole_lo
     lines = (directory / "episodes.csv").read_bytes().count(b"\n")
     assert len(read_run(directory).index) == lines - 1 < MOVEMENTS
     assert read_run(directory).summary["finished"] is False
-
-
-def test_a_full_disk_is_reported_and_the_run_can_go_on(tmp_path, go, benchmark, reference):
-    directory = tmp_path / "sgim-d" / "seed-003"
-    process = start(EAGER, *arguments(tmp_path, benchmark), limit="-f 24")  # KiB a file may have
-    _, errors = process.communicate()
-    assert process.returncode == 1
-    assert "cannot be written" in errors
-    assert "Traceback" not in errors
-    assert (directory / "episodes.csv").stat().st_size == 24 * 1024
-    assert go(tmp_path, "--resume") == 0
-    assert csv_of(directory) == reference
 
 
 def test_help_names_every_choice_and_every_field_has_a_sentence(capsys):

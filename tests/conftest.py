@@ -1,0 +1,33 @@
+"""A tiny benchmark, a short run on it, and what that run writes when nothing disturbs it."""
+
+import numpy as np
+import pytest
+
+from run import main
+from runs import arguments, csv_of
+from sgimd_torch.evaluation import Benchmark, save_benchmark
+
+
+@pytest.fixture(scope="session")
+def benchmark(tmp_path_factory):
+    path = tmp_path_factory.mktemp("benchmark") / "tiny.npz"
+    save_benchmark(path, Benchmark("FishingRod", np.array([[0.0, 0.6], [0.3, 0.5], [-0.4, 0.4]]), 0.1))
+    return path
+
+
+@pytest.fixture(scope="session")
+def go(benchmark):
+    """Run in this process; later options win. Returns the exit code."""
+
+    def go(out, *options):
+        return main([*arguments(out, benchmark), *map(str, options)])
+
+    return go
+
+
+@pytest.fixture(scope="session")
+def reference(tmp_path_factory, go):
+    """The files of the uninterrupted run, by name."""
+    out = tmp_path_factory.mktemp("reference")
+    assert go(out) == 0
+    return csv_of(out / "sgim-d" / "seed-003")

@@ -1,0 +1,48 @@
+"""What the tests of whole runs share: how a run is started, also in another process, and what it left."""
+
+import os
+import shlex
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import sgimd_torch
+
+ROOT = Path(sgimd_torch.__file__).parents[1]
+MOVEMENTS = 90
+CSV = ("episodes.csv", "evaluation.csv", "regions.csv")
+# Every movement goes to disk at once, so that a test can wait for the k-th.
+EAGER = "import run, sys; run.FLUSH_EVERY = 0; sys.exit(run.main(sys.argv[1:]))"
+
+
+def arguments(out, benchmark):
+    fixed = f"--seed 3 --movements {MOVEMENTS} --evaluate_at 30,60 --repeats 2".split()
+    return [*fixed, "--benchmark", str(benchmark), "--out", str(out)]
+
+
+def csv_of(directory):
+    return {name: (directory / name).read_bytes() for name in CSV if (directory / name).exists()}
+
+
+def start(program, *options, limit=""):
+    """Another process; ``limit`` is for ``ulimit``."""
+    paths = [str(ROOT / "experiments"), str(ROOT), os.environ.get("PYTHONPATH", "")]
+    command = shlex.join([sys.executable, "-c", program, *map(str, options)])
+    return subprocess.Popen(
+        ["bash", "-c", f"{f'ulimit {limit}; ' if limit else ''}exec {command}"],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def signal_after(process, log, lines, signum):
+    """Send ``signum`` once the log has so many ``lines``; returns (exit code, stderr)."""
+    while process.poll() is None and not (log.exists() and log.read_bytes().count(b"\n") >= lines):
+        time.sleep(0.001)
+    assert process.poll() is None, process.communicate()
+    process.send_signal(signum)
+    _, errors = process.communicate()
+    return process.returncode, errors
