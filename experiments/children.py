@@ -16,6 +16,7 @@ from pathlib import Path
 
 from evaluations import EVALUATION
 from sgimd_torch.plots import NAMES
+from supervise import say
 
 
 class ChildFailed(RuntimeError):
@@ -61,7 +62,7 @@ def learn(
             time.sleep(0.3)
     finally:
         if live:
-            print(file=sys.stderr)
+            say("")
         for child in children:
             child.interrupt()
         for child in children:
@@ -132,7 +133,9 @@ class Child:
         words = said[said.rfind("error: ") :] if "error: " in said else said.rpartition("\n")[2] or "it said nothing"
         if code < 0:
             words = f"stopped by {signal.Signals(-code).name}; start the demo again and it goes on"
-        outlook = f"Its whole log: {self.log}. To begin afresh, delete {self.directory} or choose another --out."
+        outlook = f"Its whole log: {self.log}."
+        if "movements already" not in words:  # what was asked for is wrong then, not what is there
+            outlook += f" To begin afresh, delete {self.directory} or choose another --out."
         raise ChildFailed(f"{NAMES[self.algorithm]} failed: {words}\n{outlook}", code if code > 0 else 1)
 
     def interrupt(self) -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import difflib
 import inspect
 import math
+import os
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields
 from functools import partial
@@ -77,6 +78,7 @@ _MOOT: Final = {
     ("social", "emulate"): ("imitations", "epsilon"),
     ("teacher", "initial"): ("choice",),
 }
+_MOST_THREADS: Final = max(64, os.cpu_count() or 1)
 
 
 def _default(function: Callable[..., Any], name: str) -> Any:
@@ -165,11 +167,14 @@ class Config:
             _check_least("every", self.every, 1)
         for movements in self.evaluate_at or ():
             _check_least("evaluate_at", movements, 1)
-        for name in ("noise", "epsilon"):
-            if not 0 <= getattr(self, name) < math.inf:
-                raise ValueError(f"{name} must be finite and at least 0, got {getattr(self, name)}")
-        if not 0 < self.task_space < math.inf:
-            raise ValueError(f"task_space must be a length in metres above 0, got {self.task_space}")
+        if not 0 <= self.noise < math.inf:
+            raise ValueError(f"noise must be finite and at least 0, got {self.noise}")
+        if not 0 <= self.epsilon <= 1:
+            raise ValueError(f"epsilon must be from 0 to 1, the width of theta's box, got {self.epsilon}")
+        if not 0 < self.task_space <= 1e6:
+            raise ValueError(f"task_space must be a length in metres above 0, at most 1e6, got {self.task_space}")
+        if self.threads > _MOST_THREADS:
+            raise ValueError(f"threads must be at most {_MOST_THREADS}, got {self.threads}")
         if self.variant in ("", ".", "..") or any(sign in self.variant for sign in "/\\\0"):
             raise ValueError(f"name must be that of one directory, got {self.variant!r}; is the path for --out?")
 

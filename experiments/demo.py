@@ -12,6 +12,7 @@ Start it again after Ctrl-C or a power cut, and it goes on where it stopped; fin
 from __future__ import annotations
 
 import argparse
+import os
 import shlex
 import signal
 import sys
@@ -19,10 +20,16 @@ import time
 from pathlib import Path
 from types import FrameType
 
+if __name__ == "__main__":  # Ctrl-C while the libraries below are loading
+    signal.signal(signal.SIGINT, lambda *_: os._exit(130))
+
 from children import ChildFailed, learn
+from command_line import parse
 from comparison import draw, table
 from read_runs import read_run
+from runfiles import make_folder
 from sgimd_torch.plots import NAMES
+from supervise import say, with_streams
 
 ALGORITHMS = ("sgim-d", "random")
 EXAMPLES = """examples:
@@ -36,28 +43,26 @@ EXAMPLES = """examples:
 def main() -> int:
     """Learn, draw, tell; the exit status."""
     options = _options()
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     signal.signal(signal.SIGTERM, _interrupt)
     figure_path = options.out / "demo.png"
     began = time.monotonic()
     try:
-        options.out.mkdir(parents=True, exist_ok=True)
-        print(
-            f"SGIM-D and Random, {options.movements} movements each, seed {options.seed}: {options.out}",
-            file=sys.stderr,
-        )
+        make_folder(options.out)
+        say(f"SGIM-D and Random, {options.movements} movements each, seed {options.seed}: {options.out}")
         directories = learn(ALGORITHMS, options.seed, options.movements, options.out, options.run_options)
         runs = {algorithm: read_run(path) for algorithm, path in directories.items()}
         partial = figure_path.with_name("demo.png.part")
         draw(runs).savefig(partial, format="png", dpi=100)
         partial.replace(figure_path)
     except KeyboardInterrupt:
-        print("Stopped; what was learnt is on disk. The same command goes on from here.", file=sys.stderr)
+        say("Stopped; what was learnt is on disk. The same command goes on from here.")
         return 130
     except ChildFailed as failure:
-        print(failure, file=sys.stderr)
+        say(str(failure))
         return failure.code
     except (OSError, ValueError) as error:
-        print(f"demo: {error}", file=sys.stderr)
+        say(f"demo: {error}")
         return 2
     print(f"\nMean distance to the benchmark goals (m) after so many movements, and seconds spent\n\n{table(runs)}\n")
     print(f"Figure    {figure_path}")
@@ -84,6 +89,15 @@ def _options() -> argparse.Namespace:
     options = parser.parse_args()
     if options.seed < 0 or options.movements < 1:
         parser.error(f"--seed must be at least 0 and --movements 1, got {options.seed} and {options.movements}")
+    for word in options.run_options:
+        name = word.partition("=")[0]
+        if name in ("--seed", "--movements", "--out"):
+            parser.error(f"{name} is the demo's own; it goes before --")
+        if name in ("--algorithm", "--name"):
+            parser.error(f"{name} is not free here: the demo compares sgim-d and random by their own names")
+    config, _ = parse(options.run_options)  # refuses what run.py would
+    if config.evaluate_at == ():
+        parser.error("--evaluate_at [] leaves nothing to draw; choose some movements, or leave it out")
     return options
 
 
@@ -105,4 +119,4 @@ def _next_steps(options: argparse.Namespace) -> str:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(with_streams(main))

@@ -6,12 +6,13 @@ Both tables begin each line with the number of movements before the evaluation. 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from runfiles import dropped, numbers, write_whole
+from runfiles import RunError, dropped, numbers, write_whole
 from sgimd_torch.evaluation import Evaluation
 from sgimd_torch.regions import Region
 
@@ -69,10 +70,17 @@ class Evaluations:
 
 
 def read_table(path: Path, names: Sequence[str] | None = None) -> dict[str, np.ndarray] | None:
-    """An array for each column, None if there is no such file; ``names`` None takes those of its first line."""
+    """An array for each column, None if there is no such file; ``names`` None takes those of its first line.
+
+    Raises:
+        RunError: it cannot be read.
+    """
     if not path.exists():
         return None
-    content = path.read_bytes()
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise RunError(f"{path} cannot be read: {error.strerror}") from error
     header = content.partition(b"\n")[0].decode(errors="replace") if names is None else ",".join(names)
     groups, _ = _read_rows(content, header)
     columns = header.split(",")
@@ -132,10 +140,11 @@ def _read_rows(content: bytes, header: str) -> tuple[dict[int, list[str]], int]:
     lines = content.splitlines(keepends=True)
     if not lines or lines[0] != f"{header}\n".encode():
         return {}, 0
+    columns = ["movements", *header.split(",")[1:]]
     groups: dict[int, list[str]] = {}
     for line in lines[1:]:
         fields = line.decode(errors="replace").removesuffix("\n").split(",")
-        if not line.endswith(b"\n") or len(fields) != header.count(",") + 1 or not all(map(_is_value, fields)):
+        if not line.endswith(b"\n") or len(fields) != len(columns) or not all(map(_is_value, columns, fields)):
             break
         groups.setdefault(int(fields[0]), []).append(",".join(fields))
     if header.startswith("movements,path,"):
@@ -144,11 +153,15 @@ def _read_rows(content: bytes, header: str) -> tuple[dict[int, list[str]], int]:
     return groups, len(lines[0]) + kept
 
 
-def _is_value(field: str) -> bool:
+def _is_value(column: str, field: str) -> bool:
+    if column in _WHOLE:
+        return re.fullmatch("0|[1-9][0-9]{0,17}", field) is not None
+    if column == "path":
+        return re.fullmatch("R[01]*", field) is not None
     try:
         float(field)
     except ValueError:
-        return bool(field) and field[0] == "R" and set(field[1:]) <= {"0", "1"}
+        return False
     return True
 
 

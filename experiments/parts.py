@@ -25,6 +25,7 @@ from sgimd_torch.motor_primitives import GaussianPrimitive
 from sgimd_torch.spaces import Box, Demonstration, stream
 from sgimd_torch.teachers import AskedTeacher, InitialTeacher, PeriodicTeacher, Teacher
 
+STRETCH = 3.0  # times longer or shorter than the robot can move is no matter of pace
 MISFIT = 0.5  # rad; a worse fit is no movement of this robot
 
 
@@ -119,7 +120,14 @@ def _teacher(config: Config, demonstrations: Sequence[Demonstration]) -> Teacher
 def _residuals(path: Path, demonstrations: Sequence[Demonstration], primitive: GaussianPrimitive) -> list[float]:
     """What the correspondence leaves of each demonstration, eq. (6), rad; refuses what it cannot translate."""
     residuals: list[float] = []
+    shortest, longest = primitive.durations
     for row, demonstration in enumerate(demonstrations):
+        duration = demonstration.times[-1] - demonstration.times[0]
+        if not shortest / STRETCH <= duration <= longest * STRETCH:
+            raise ValueError(
+                f"{path}: recording {row} lasts {duration:g} s, the robot's movements {shortest:g} to {longest:g} s; "
+                "was it recorded in milliseconds?"
+            )
         try:
             theta = primitive.correspondence(demonstration.times, demonstration.trajectory)
         except ValueError as error:
@@ -134,6 +142,8 @@ def _residuals(path: Path, demonstrations: Sequence[Demonstration], primitive: G
 
 
 def _existing(what: str, path: Path) -> Path:
+    if path.is_dir():
+        raise IsADirectoryError(f"{what}: {path} is a directory, a file was wanted")
     if not path.is_file():
         raise FileNotFoundError(f"{what}: there is no file {path}")
     return path

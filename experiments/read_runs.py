@@ -58,8 +58,14 @@ def read_run(path: str | os.PathLike[str]) -> Run:
         log = (path / "episodes.csv").read_bytes()
     except FileNotFoundError:
         log = b""
+    except OSError as error:
+        raise RunError(f"{path}/episodes.csv cannot be read: {error.strerror}") from error
     header, newline, body = log.partition(b"\n")
-    columns = Columns.of(header + newline) if newline else Columns(0, 0, 0)
+    try:
+        just_begun = not newline and b"index,".startswith(header[:6])
+        columns = Columns(0, 0, 0) if just_begun else Columns.of(header + newline)
+    except RunError as error:
+        raise RunError(f"{path}/episodes.csv: {error}") from error
     rows = [line.decode().rstrip("\n").split(",") for line in columns.whole_lines(body)]
     ends = np.cumsum([3, columns.context_dim, columns.theta_dim, columns.outcome_dim, columns.outcome_dim])
     numbers = np.array([[field or "nan" for field in row[3:-1]] for row in rows], dtype=np.float64)

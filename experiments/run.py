@@ -9,14 +9,19 @@ Examples:
 from __future__ import annotations
 
 import importlib.metadata
+import os
 import platform
 import shlex
+import signal
 import subprocess
 import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
+
+if __name__ == "__main__":  # Ctrl-C while the libraries below are loading
+    signal.signal(signal.SIGINT, lambda *_: os._exit(130))
 
 import numpy as np
 
@@ -32,7 +37,7 @@ from sgimd_torch.interest import InterestMap
 from sgimd_torch.regions import Region
 from sgimd_torch.session import ReplayError, live, replay, run
 from sgimd_torch.strategies import GoalBabbling
-from supervise import Progress, Seconds, Stopped, Stopping, metres, say
+from supervise import Progress, Seconds, Stopped, Stopping, metres, say, with_streams
 
 # These may change when a run is resumed: they say how long it lasts, where it lies and how it is looked at. Files count
 # by their content, which is recorded as a checksum.
@@ -69,12 +74,12 @@ def main(argv: Sequence[str] | None = None) -> int:
                 say(*config.without_effect, *directory.notes, *correspondence_of(parts))
                 report = run_in(directory, config, parts, stopping)
         except Stopped as stop:
-            again = shlex.join(["python", "experiments/run.py", *argv, *([] if resume else ["--resume"])])
+            again = shlex.join([sys.executable, os.path.relpath(__file__), *argv, *([] if resume else ["--resume"])])
             say(f"stopped after {directory.summary.get('movements', 0)} movements; to go on: {again}")
             return stop.exit_code
         except ReplayError as error:
             return _fail(error, 2)
-        except SimulationError as error:
+        except (SimulationError, ValueError) as error:
             return _fail(error, 1)
         except OSError as error:
             return _fail(f"{directory.path} cannot be written: {error}; is the disk full? --resume goes on", 1)
@@ -167,7 +172,20 @@ def correspondence_of(parts: RunParts) -> list[str]:
         return []
     median, worst = np.median(parts.residuals), max(parts.residuals)
     n = len(parts.residuals)
-    return [f"{n} demonstrations; correspondence misses them by {median:.4f} rad (median), {worst:.4f} rad at most"]
+    return [
+        f"{n} demonstrations; correspondence misses them by {median:.4f} rad (median), {worst:.4f} rad at most",
+        *_outside(parts),
+    ]
+
+
+def _outside(parts: RunParts) -> list[str]:
+    box, shown = parts.environment.outcomes, parts.demonstrations
+    outside = [row for row, demonstration in enumerate(shown) if not box.contains(demonstration.outcome)]
+    if not outside:
+        return []
+    place = ", ".join(f"{x:g}" for x in shown[outside[0]].outcome)
+    more = f", as do {len(outside) - 1} more" if len(outside) > 1 else ""
+    return [f"recording {outside[0]} lands at ({place}) m, outside T{more}; were they recorded in cm?"]
 
 
 def regions_of(parts: RunParts) -> list[Region]:
@@ -243,4 +261,4 @@ def _fail(error: Exception | str, code: int) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(with_streams(main))

@@ -15,7 +15,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from evaluations import Evaluations
-from runfiles import Columns, RunError, dropped, read_json, write_json
+from runfiles import Columns, RunError, dropped, make_folder, read_json, write_json
 
 _UNFINISHED = ("lock", "versions.json")  # what a run killed before its config.json may have left, besides *.part
 
@@ -64,13 +64,13 @@ class RunDirectory:
         self.summary: dict[str, Any] = {}
         self._pending = bytearray()
         _refuse_foreign(path)
-        path.mkdir(parents=True, exist_ok=True)
+        make_folder(path)
         self._lock = _lock(path)
         try:
             self.before = self._settings_before(settings, free, resume)
             if self.before is not None:
                 versions = self._with_versions_before(versions)
-                self.summary = read_json(path / "summary.json", missing={})
+                self.summary = self._summary_before()
             elif resume:
                 self.notes.append(f"{path} holds no run yet: it starts from the beginning")
             self._kept = self._read_log()
@@ -143,14 +143,34 @@ class RunDirectory:
         return before
 
     def _with_versions_before(self, versions: dict[str, Any]) -> dict[str, Any]:
-        old: dict[str, Any] = read_json(self.path / "versions.json", missing={})
+        old = self._read_or_note("versions.json")
         earlier = old.pop("before", [])
+        if not isinstance(earlier, list):
+            earlier = []
         differ = [name for name in versions if old.get(name) != versions[name]]
         if old and differ:
             changes = ", ".join(f"{name} {old.get(name)} -> {versions[name]}" for name in differ)
             self.notes.append(f"resumed with other versions: {changes}")
             earlier = [*earlier, old]
         return {**versions, "before": earlier} if earlier else versions
+
+    def _summary_before(self) -> dict[str, Any]:
+        summary = self._read_or_note("summary.json")
+        wrong = [
+            name for name, value in summary.items() if name.startswith("seconds_") and type(value) not in (int, float)
+        ]
+        if wrong:
+            self.notes.append(f"{self.path}/summary.json: {', '.join(wrong)} must be numbers; it counts as missing")
+        return {} if wrong else summary
+
+    def _read_or_note(self, name: str) -> dict[str, Any]:
+        """A file that only says how things went: damaged, it is as good as missing."""
+        try:
+            found: dict[str, Any] = read_json(self.path / name, missing={})
+        except RunError as error:
+            self.notes.append(f"{error}; it counts as missing")
+            return {}
+        return found
 
     def _read_log(self) -> int:
         """Take over the whole lines; returns how many bytes of the log are whole."""

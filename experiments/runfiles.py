@@ -123,17 +123,32 @@ def read_json(path: Path, *, missing: Any) -> Any:
     """A json object; ``missing`` if there is no such file.
 
     Raises:
-        RunError: it is damaged.
+        RunError: it is damaged, or a directory.
     """
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
     except (FileNotFoundError, NotADirectoryError):
         return missing
-    except ValueError as error:
+    except (ValueError, OSError) as error:
         raise RunError(f"{path} cannot be read ({error}); was it edited, or the disk full?") from error
     if not isinstance(content, dict):
         raise RunError(f"{path} must hold a json object, got {type(content).__name__}; was it edited?")
     return content
+
+
+def make_folder(path: Path) -> None:
+    """With its parents, where they are missing.
+
+    Raises:
+        RunError: something is in the way, or it may not be made.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        inside = (place for place in (path, *path.parents) if os.path.lexists(place) and not place.is_dir())
+        blocker = next(inside, None)
+        why = f"{blocker} is no folder" if blocker else f"{error.strerror}"
+        raise RunError(f"{path} cannot be made: {why}; choose another --out") from error
 
 
 def write_json(path: Path, content: Mapping[str, Any]) -> None:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+import os
 import signal
 import sys
 import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import Any, Self
 
@@ -155,6 +156,32 @@ def metres(length: float | None) -> str:
 
 
 def say(*messages: str) -> None:
-    """On stderr, at once."""
-    for message in messages:
-        print(message, file=sys.stderr, flush=True)
+    """On stderr, at once; a stderr that takes nothing stops nobody."""
+    with suppress(OSError):
+        for message in messages:
+            print(message, file=sys.stderr, flush=True)
+
+
+def with_streams(main: Callable[[], int]) -> int:
+    """``main``, whatever becomes of stdout and stderr; the exit code, 1 where stdout could not be written."""
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:  # it was closed
+            setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_WRONLY), "w"))
+        getattr(sys, name).reconfigure(errors="backslashreplace")  # a name that the locale cannot write
+    code, lost = 0, None
+    try:
+        code = main()
+    except SystemExit as end:
+        code = int(end.code or 0)
+    except OSError as error:  # those of files are caught where they are used
+        lost = error
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except OSError as error:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())  # else the interpreter would complain
+            lost = error if stream is sys.stdout else lost
+    if lost is not None and not isinstance(lost, BrokenPipeError):
+        say(f"error: what was to be told is lost: {lost.strerror}")
+        code = code or 1
+    return code

@@ -8,14 +8,20 @@ Example:
 from __future__ import annotations
 
 import argparse
+import os
+import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+
+if __name__ == "__main__":  # Ctrl-C while the libraries below are loading
+    signal.signal(signal.SIGINT, lambda *_: os._exit(130))
 
 import numpy as np
 
 from read_runs import Run, find_runs, read_run
 from runfiles import RunError
+from supervise import with_streams
 
 COLUMNS = ("learner", "seeds", "error at 1000", "at 5000 (m)", "noise floor (m)", "physics (ms)", "learning (ms)")
 
@@ -24,26 +30,36 @@ def row(name: str, runs: Sequence[Run], early: int, late: int) -> list[str]:
     """One learner: means over its runs, and the standard deviation over seeds of the late error.
 
     Raises:
-        RunError: a run was not evaluated after ``late`` movements.
+        RunError: a run was not evaluated after ``late`` movements, or its summary is missing.
     """
     evaluated = [run for run in runs if late in run.evaluation["movements"]]
     if len(evaluated) < len(runs):
         missing = next(run.path for run in runs if late not in run.evaluation["movements"])
         raise RunError(f"{missing} has no evaluation after {late} movements; let it run on with --resume, or see --at")
     errors = _at(runs, late, "mean_error_m")
-    milliseconds = [
-        1e3 * np.mean([run.summary[f"seconds_{part}"] / run.summary["movements"] for run in runs])
-        for part in ("physics", "learner")
-    ]
+    milliseconds = [np.mean([_milliseconds(run, part) for run in runs]) for part in ("physics", "learner")]
     spread = f" ± {errors.std(ddof=1):.3f}" if len(runs) > 1 else ""
     return [
         name,
         str(len(runs)),
-        f"{_at(runs, early, 'mean_error_m').mean():.3f}",
+        _metres(_at(runs, early, "mean_error_m")),
         f"{errors.mean():.3f}{spread}",
-        f"{_at(runs, late, 'noise_floor_m').mean():.3f}",
+        _metres(_at(runs, late, "noise_floor_m")),
         *(f"{value:.2f}" for value in milliseconds),
     ]
+
+
+def _metres(lengths: np.ndarray) -> str:
+    mean = lengths.mean()
+    return f"{mean:.3f}" if np.isfinite(mean) else "-"
+
+
+def _milliseconds(run: Run, part: str) -> float:
+    """Of one movement, on the mean."""
+    try:
+        return 1e3 * float(run.summary[f"seconds_{part}"] / run.summary["movements"])
+    except (KeyError, TypeError, ZeroDivisionError) as error:
+        raise RunError(f"{run.path}: its summary.json is missing or damaged; --resume writes it again") from error
 
 
 def _at(runs: Sequence[Run], movements: int, column: str) -> np.ndarray:
@@ -76,4 +92,4 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(with_streams(main))

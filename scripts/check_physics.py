@@ -12,6 +12,7 @@ import mujoco
 import numpy as np
 from tqdm import tqdm
 
+from options import at_least
 from sgimd_torch.environment import SimulationError
 from sgimd_torch.evaluation import load_benchmark
 from sgimd_torch.fishing_rod import FishingRod
@@ -62,7 +63,9 @@ def cost(rod: FishingRod, movements: int = 300) -> tuple[float, float]:
 def main() -> int:
     """Measure everything and judge it."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--movements", type=int, default=100_000, help="random movements (default: %(default)s)")
+    parser.add_argument(
+        "--movements", type=at_least(10), default=100_000, help="random movements, at least 10 (default: %(default)s)"
+    )
     movements = parser.parse_args().movements
     rod, still = FishingRod(), FishingRod(noise=0.0)
     milliseconds, ratio = cost(FishingRod(threads=1))

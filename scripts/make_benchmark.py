@@ -9,11 +9,11 @@ from __future__ import annotations
 import argparse
 from concurrent.futures import ProcessPoolExecutor
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 from tqdm import tqdm
 
+from options import at_least, writable_file
 from sgimd_torch.algorithms import random_exploration, sagg_riac, sgim_d
 from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.evaluation import SHIPPED, Benchmark, save_benchmark, tile_goals
@@ -42,12 +42,16 @@ def outcomes_of(algorithm: str, seed: int, movements: int) -> Array:
 def main() -> None:
     """Run the learners, pool, tile, draw, write."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=Path, default=SHIPPED, help="file to write (default: the shipped one)")
-    parser.add_argument("--seed", type=int, default=2000, help="first seed of runs and draw (default: %(default)s)")
-    parser.add_argument("--runs", type=int, default=4, help="runs of each learner (default: %(default)s)")
-    parser.add_argument("--movements", type=int, default=5000, help="of each run (default: %(default)s)")
-    parser.add_argument("--tiles", type=int, default=358, help="how many are wanted, about (default: %(default)s)")
-    parser.add_argument("--processes", type=int, default=2, help="(default: %(default)s)")
+    parser.add_argument("--out", type=writable_file, default=SHIPPED, help="file to write (default: the shipped one)")
+    parser.add_argument(
+        "--seed", type=at_least(0), default=2000, help="first seed of runs and draw (default: %(default)s)"
+    )
+    parser.add_argument("--runs", type=at_least(1), default=4, help="runs of each learner (default: %(default)s)")
+    parser.add_argument("--movements", type=at_least(1), default=5000, help="of each run (default: %(default)s)")
+    parser.add_argument(
+        "--tiles", type=at_least(1), default=358, help="how many are wanted, about (default: %(default)s)"
+    )
+    parser.add_argument("--processes", type=at_least(1), default=2, help="(default: %(default)s)")
     options = parser.parse_args()
     lives = list(product(("random", "sagg-riac", "sgim-d"), range(options.seed, options.seed + options.runs)))
     with ProcessPoolExecutor(options.processes) as pool:

@@ -10,11 +10,11 @@ motor primitive.
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 import numpy as np
 from tqdm import tqdm
 
+from options import at_least, writable_file
 from sgimd_torch.demonstrations import SHIPPED, save_demonstrations
 from sgimd_torch.fishing_rod import JOINT_RANGES, FishingRod
 from sgimd_torch.spaces import Array, Demonstration, stream
@@ -63,11 +63,17 @@ def farthest_points(points: Array, n: int) -> list[int]:
 def main() -> None:
     """Record many movements, keep those that spread evenly."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=Path, default=SHIPPED, help="file to write (default: the shipped one)")
-    parser.add_argument("--n", type=int, default=127, help="demonstrations, 127 in the paper (default: %(default)s)")
-    parser.add_argument("--candidates", type=int, default=4000, help="recordings to choose from (default: %(default)s)")
-    parser.add_argument("--seed", type=int, default=2014, help="(default: %(default)s)")
+    parser.add_argument("--out", type=writable_file, default=SHIPPED, help="file to write (default: the shipped one)")
+    parser.add_argument(
+        "--n", type=at_least(1), default=127, help="demonstrations, 127 in the paper (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--candidates", type=at_least(1), default=4000, help="recordings to choose from (default: %(default)s)"
+    )
+    parser.add_argument("--seed", type=at_least(0), default=2014, help="(default: %(default)s)")
     options = parser.parse_args()
+    if options.n > options.candidates:
+        parser.error(f"--n must be at most --candidates, {options.candidates}, got {options.n}")
     rod, rng = FishingRod(noise=0.0), stream(options.seed, "demonstrator 3")
     recordings: list[Demonstration] = []
     for _ in tqdm(range(options.candidates), desc="recording"):
@@ -76,6 +82,10 @@ def main() -> None:
         outcome = rod.replay(times, trajectory)
         if rod.outcomes.contains(outcome):
             recordings.append(Demonstration(np.zeros(0), times, trajectory, outcome))
+    if options.n > len(recordings):
+        parser.error(
+            f"only {len(recordings)} recordings land inside T, too few for --n {options.n}; more --candidates?"
+        )
     chosen = farthest_points(np.stack([recording.outcome for recording in recordings]), options.n)
     save_demonstrations(options.out, [recordings[row] for row in chosen])
     print(f"{len(chosen)} demonstrations of {len(recordings)} recordings inside T: {options.out}")

@@ -13,19 +13,16 @@ One ``.npz`` file without pickle, so that any numpy reads it; n recordings of di
 from __future__ import annotations
 
 import os
-import zipfile
-import zlib
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
-from sgimd_torch.spaces import Array, Demonstration
+from sgimd_torch.archives import read_npz, write_npz
+from sgimd_torch.spaces import Array, Demonstration, first_entry
 
 VERSION = 1
 SHIPPED = Path(__file__).with_name("data") / "demonstrator_3.npz"
-UNREADABLE = (ValueError, TypeError, KeyError, OSError, EOFError, RuntimeError, zipfile.BadZipFile, zlib.error)
-"""What numpy raises at a broken ``.npz`` file."""
 _FIELDS = ("lengths", "times", "trajectories", "outcomes", "contexts")
 
 
@@ -34,10 +31,10 @@ def save_demonstrations(path: str | os.PathLike[str], demonstrations: Sequence[D
 
     Raises:
         ValueError: no demonstration, or one that ``load_demonstrations`` would refuse.
+        OSError: ``path`` is a directory, or cannot be written.
     """
     if not demonstrations:
         raise ValueError("there is no demonstration to save")
-    path = Path(path)
     for k, d in enumerate(demonstrations):
         if len(d.times) != len(d.trajectory):
             raise ValueError(f"recording {k} has {len(d.times)} times, but {len(d.trajectory)} postures")
@@ -49,10 +46,7 @@ def save_demonstrations(path: str | os.PathLike[str], demonstrations: Sequence[D
         "contexts": np.stack([d.context for d in demonstrations]),
     }
     _check(str(path), fields)
-    partial = path.with_name(path.name + ".part")
-    with partial.open("wb") as file:
-        np.savez_compressed(file, allow_pickle=False, version=np.array(VERSION), **fields)
-    partial.replace(path)
+    write_npz(path, {"version": np.array(VERSION), **fields}, compressed=True)
 
 
 def load_demonstrations(
@@ -71,21 +65,11 @@ def load_demonstrations(
     Raises:
         ValueError: not such a file, or empty, truncated, not numeric, unsorted in time, not finite, or made for another
             robot; the message names the file and the recording.
-        FileNotFoundError: there is no file.
+        OSError: there is no file, or it is a directory.
     """
     source = str(path)
-    try:
-        with open(path, "rb") as file, np.load(file, allow_pickle=False) as archive:
-            missing = {"version", *_FIELDS} - set(archive.files)
-            if missing:
-                raise ValueError(f"it lacks {sorted(missing)}")
-            version = archive["version"]
-            fields = {name: archive[name] for name in _FIELDS}
-    except FileNotFoundError:
-        raise
-    except UNREADABLE as error:
-        slip = "was it written by save_demonstrations, and whole?"
-        raise ValueError(f"{source} is no demonstration file ({error}); {slip}") from error
+    version, *arrays = read_npz(path, "demonstration file", "save_demonstrations", ("version", *_FIELDS))
+    fields = dict(zip(_FIELDS, arrays, strict=True))
     if version.shape != () or version != VERSION:
         raise ValueError(f"{source} has version {version}, this library reads {VERSION}")
     _check(source, fields)
@@ -113,8 +97,6 @@ def _check(source: str, fields: dict[str, np.ndarray]) -> None:
             raise ValueError(f"{source}: {name} must be {wanted}, got {field.dtype}; was text or a list saved?")
         if field.ndim != (1 if name in ("lengths", "times") else 2):
             raise ValueError(f"{source}: {name} has {field.ndim} axes, shape {field.shape}")
-        if not np.isfinite(field).all():
-            raise ValueError(f"{source}: {name} holds NaN or infinity; did the recording drop samples?")
     lengths, times = fields["lengths"], fields["times"]
     n = len(lengths)
     if n == 0:
@@ -127,6 +109,13 @@ def _check(source: str, fields: dict[str, np.ndarray]) -> None:
     if not len(times) == len(fields["trajectories"]) == lengths.sum():
         rows = f"{len(times)} times, {len(fields['trajectories'])} postures"
         raise ValueError(f"{source}: lengths add up to {lengths.sum()} samples, but there are {rows}; is it truncated?")
-    for k, part in enumerate(np.split(times, np.cumsum(lengths)[:-1])):
+    starts = np.cumsum(lengths)[:-1]
+    for name in ("times", "trajectories", "outcomes", "contexts"):
+        each = np.split(fields[name], starts) if name in ("times", "trajectories") else fields[name]
+        for k, part in enumerate(each):
+            if not np.isfinite(part).all():
+                entry = first_entry(part, ~np.isfinite(part))
+                raise ValueError(f"{source}: {name} of recording {k}: {entry}; did the recording drop samples?")
+    for k, part in enumerate(np.split(times, starts)):
         if part[0] != 0 or not (np.diff(part) > 0).all():
             raise ValueError(f"{source}: times of recording {k} must increase from 0; were its rows shuffled?")

@@ -13,7 +13,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sgimd_torch.spaces import Array, Box, check_vector
+from sgimd_torch.spaces import Array, Box, check_count, check_vector
 
 
 class Environment(Protocol):
@@ -120,6 +120,17 @@ def check_movement(environment: Environment, context: ArrayLike, theta: ArrayLik
     return context, theta
 
 
+def check_rng(rng: object) -> None:
+    """Refuse what is no random stream, before anything is drawn from it.
+
+    Raises:
+        TypeError: it is not a Generator.
+    """
+    if not isinstance(rng, np.random.Generator):
+        slip = "was the seed passed instead of a Generator, such as stream(seed, name)?"
+        raise TypeError(f"rng must be a numpy.random.Generator, got {type(rng).__name__}; {slip}")
+
+
 class PlanarArm:
     """An arm of equal links in the plane; the outcome is where its end stands.
 
@@ -148,8 +159,7 @@ class PlanarArm:
         context: bool = False,
         outcomes: Box | None = None,
     ) -> None:
-        if n_joints < 2:
-            raise ValueError(f"n_joints must be at least 2, got {n_joints}")
+        n_joints = check_count("n_joints", n_joints, 2)
         if max_angle is None:
             max_angle = 2 * np.pi / n_joints
         if not (0 < length < np.inf and 0 < max_angle <= np.pi and 0 <= noise < np.inf):
@@ -175,8 +185,10 @@ class PlanarArm:
 
         Raises:
             ValueError: ``context`` is not one point of C, or ``theta`` not one of Pi.
+            TypeError: ``rng`` is not a Generator.
         """
         context, theta = check_movement(self, context, theta)
+        check_rng(rng)
         angles = (2 * theta - 1) * self._limits
         angles = angles + self.noise * rng.standard_normal(len(theta))  # drawn without noise too: it moves no stream
         directions = np.cumsum(angles) + context.sum()  # an empty context sums to 0

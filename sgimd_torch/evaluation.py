@@ -14,9 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-from sgimd_torch.demonstrations import UNREADABLE
+from sgimd_torch.archives import read_npz, write_npz
 from sgimd_torch.environment import Environment, execute_many
-from sgimd_torch.spaces import Array, Box, Estimate, check_vector, stream
+from sgimd_torch.spaces import Array, Box, Estimate, check_count, check_vector, first_entry, stream
 
 VERSION = 1
 SHIPPED = Path(__file__).with_name("data") / "benchmark.npz"
@@ -35,13 +35,20 @@ class Benchmark:
         """Refuse an environment that these goals were not made for.
 
         Raises:
-            ValueError: another class, or other outcome dimensions.
+            ValueError: another class, other outcome dimensions, or goals outside its T.
         """
         found = type(environment).__name__
         if found != self.environment or environment.outcomes.dim != self.goals.shape[1]:
             raise ValueError(
                 f"the benchmark was made for {self.environment} with {self.goals.shape[1]} outcome dimensions, got "
                 f"{found} with {environment.outcomes.dim}; make one with scripts/make_benchmark.py"
+            )
+        space = environment.outcomes
+        if not space.contains(self.goals).all():
+            entry = first_entry(self.goals, ~((self.goals >= space.low) & (self.goals <= space.high)))  # NaN too
+            raise ValueError(
+                f"goals of the benchmark must lie in the task space {space.low.tolist()} to {space.high.tolist()} m, "
+                f"but {entry}; were they in cm?"
             )
 
 
@@ -85,15 +92,18 @@ def evaluate(
         goals: ``(n, outcome_dim)`` m.
         seed, movements: name the random streams, so that each evaluation of a run has its own.
         context: ``(context_dim,)`` in which to execute; None for the middle of C.
-        repeats: 0 leaves the noise out.
+        repeats: 0 leaves the noise out; 1 would not, as one landing point does not scatter.
 
     Raises:
-        ValueError: no goals, of another dimension, or not finite.
+        ValueError: no goals, of another dimension, or not finite; repeats or movements out of range.
         RuntimeError: the memory behind ``inverse`` is empty.
     """
     goals = check_vector("goals", goals, environment.outcomes.dim)
     if goals.ndim != 2 or len(goals) == 0:
         raise ValueError(f"goals must have shape (n, outcome_dim) with n > 0, got {goals.shape}")
+    check_count("movements", movements, 0)
+    if check_count("repeats", repeats, 0) == 1:
+        raise ValueError("repeats must be 0 or at least 2, got 1; one landing point does not scatter")
     if context is None:
         context = (environment.contexts.low + environment.contexts.high) / 2
     thetas = np.stack([inverse(context, goal).theta for goal in goals])
@@ -128,19 +138,15 @@ def tile_goals(outcomes: Array, box: Box, side: float, rng: np.random.Generator,
 
 
 def save_benchmark(path: str | os.PathLike[str], benchmark: Benchmark) -> None:
-    """Write an ``.npz`` without pickle; the file appears whole or not at all."""
-    path = Path(path)
-    partial = path.with_name(path.name + ".part")
-    with partial.open("wb") as file:
-        np.savez(
-            file,
-            allow_pickle=False,
-            version=np.array(VERSION),
-            environment=np.array(benchmark.environment),
-            goals=benchmark.goals,
-            side=np.array(benchmark.side),
-        )
-    partial.replace(path)
+    """Write a file that ``load_benchmark`` reads; the file appears whole or not at all.
+
+    Raises:
+        ValueError: a benchmark that ``load_benchmark`` would refuse.
+        OSError: ``path`` is a directory, or cannot be written.
+    """
+    name, goals, side = np.array(benchmark.environment), np.asarray(benchmark.goals), np.array(benchmark.side)
+    right = _checked(str(path), name, goals, side)
+    write_npz(path, {"version": np.array(VERSION), "environment": name, "goals": right.goals, "side": side})
 
 
 def load_benchmark(path: str | os.PathLike[str] = SHIPPED) -> Benchmark:
@@ -148,20 +154,20 @@ def load_benchmark(path: str | os.PathLike[str] = SHIPPED) -> Benchmark:
 
     Raises:
         ValueError: not such a file, truncated, of another version, without goals, or with numbers that are not finite.
-        FileNotFoundError: there is no file.
+        OSError: there is no file, or it is a directory.
     """
-    try:
-        with open(path, "rb") as file, np.load(file, allow_pickle=False) as archive:
-            version, name, side = archive["version"], str(archive["environment"]), float(archive["side"])
-            goals = archive["goals"]
-    except FileNotFoundError:
-        raise
-    except UNREADABLE as error:
-        raise ValueError(f"{path} is no benchmark ({error}); was it written by scripts/make_benchmark.py?") from error
+    names = ("version", "environment", "goals", "side")
+    version, name, goals, side = read_npz(path, "benchmark", "scripts/make_benchmark.py", names)
     if version.shape != () or version != VERSION:
         raise ValueError(f"{path} has version {version}, this library reads {VERSION}")
+    return _checked(str(path), name, goals, side)
+
+
+def _checked(source: str, name: np.ndarray, goals: np.ndarray, side: np.ndarray) -> Benchmark:
+    if name.shape != () or name.dtype.kind != "U":
+        raise ValueError(f"{source}: environment must be the name of a class, got {name.dtype} {name.shape}")
     if goals.ndim != 2 or len(goals) == 0:
-        raise ValueError(f"{path}: goals must have shape (n, outcome_dim) with n > 0, got {goals.shape}")
-    if not 0 < side < np.inf:
-        raise ValueError(f"{path}: the side of the tiles must be positive, got {side}")
-    return Benchmark(name, check_vector(f"{path}: goals", goals, goals.shape[1]), side)
+        raise ValueError(f"{source}: goals must have shape (n, outcome_dim) with n > 0, got {goals.shape}")
+    if side.shape != () or side.dtype.kind not in "iuf" or not 0 < side < np.inf:
+        raise ValueError(f"{source}: the side of the tiles must be a positive number, got {side}")
+    return Benchmark(str(name), check_vector(f"{source}: goals", goals, goals.shape[1]), float(side))

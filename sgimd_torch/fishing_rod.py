@@ -22,15 +22,16 @@ from mujoco import rollout
 from numpy.typing import ArrayLike
 from scipy.signal import lfilter
 
-from sgimd_torch.environment import SimulationError, check_movement
+from sgimd_torch.environment import SimulationError, check_movement, check_rng
 from sgimd_torch.motor_primitives import GaussianPrimitive
-from sgimd_torch.spaces import Array, Box, check_vector
+from sgimd_torch.spaces import Array, Box, check_count, check_vector, first_entry
 
 JOINTS = ("yaw", "shoulder", "elbow", "forearm_roll", "wrist_pitch", "wrist_yaw")
 JOINT_RANGES = Box(np.array([-1.6, 0.1, -1.2, -0.6, -0.4, -1.4]), np.array([1.6, 1.5, 0.8, 0.6, 1.4, 1.4]))  # rad
 DURATIONS = (0.8, 1.6)  # s, of a movement
 HOLD = 0.15  # s, the last posture is held before the line is let out
 CORRELATION = 0.96  # of the motor noise from one step to the next
+LONGEST = 60.0  # s, of a recording to replay
 TOP_SPEED = 500.0  # rad/s; 100,000 random movements stay far below, a diverging simulation runs through it
 
 _STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
@@ -41,7 +42,8 @@ _CHUNK = 90  # steps run in C before looking whether the float has landed
 class FishingRod:
     """theta in [0, 1]^25 to the landing point of the float (m) on the water plane.
 
-    One rod serves one Python thread at a time; its batches use threads of their own.
+    One rod serves one Python thread at a time; its batches use threads of their own. Where a simulation diverges, a
+    ``SimulationError`` is raised, and MuJoCo itself adds a line to ``MUJOCO_LOG.TXT`` in the current directory.
 
     Args:
         noise: motor noise (s): standard deviation of the command (rad) for each rad/s of commanded speed; 0 for none.
@@ -67,8 +69,6 @@ class FishingRod:
         for name, value in (("noise", noise), ("max_yaw", max_yaw), ("max_wind", max_wind)):
             if not (np.isfinite(value) and value >= 0):
                 raise ValueError(f"{name} must be finite and >= 0, got {value}")
-        if threads is not None and threads < 1:
-            raise ValueError(f"threads must be at least 1, got {threads}")
         self.noise = noise
         self.primitive = GaussianPrimitive(JOINT_RANGES, DURATIONS, sharpness=6.0)
         self.policies = self.primitive.policies
@@ -79,7 +79,7 @@ class FishingRod:
         self.contexts = Box(-ranges[self._context_columns], ranges[self._context_columns])
 
         self.model = mujoco.MjModel.from_xml_path(str(Path(__file__).with_name("fishing_rod.xml")))
-        self._threads = threads if threads is not None else os.cpu_count() or 1
+        self._threads = check_count("threads", threads, 1) if threads is not None else os.cpu_count() or 1
         self._data = mujoco.MjData(self.model)
         self._pools: dict[int, tuple[rollout.Rollout, list[mujoco.MjData]]] = {}
         self.steps = 0
@@ -110,6 +110,7 @@ class FishingRod:
 
         Raises:
             ValueError: shapes, values that are not finite or outside their box.
+            TypeError: ``rng`` is not a Generator.
             SimulationError: the simulation diverged; the message names theta.
         """
         context, theta = check_movement(self, context, theta)
@@ -127,7 +128,7 @@ class FishingRod:
             ``(n, 2)`` m.
 
         Raises:
-            ValueError, SimulationError: as ``execute``.
+            ValueError, TypeError, SimulationError: as ``execute``.
         """
         thetas = self.policies.check("theta", thetas, "was a goal passed instead?")
         contexts = self.contexts.check("context", contexts)
@@ -148,7 +149,8 @@ class FishingRod:
             ``(2,)`` m.
 
         Raises:
-            ValueError: shapes that do not fit, values that are not finite, or times that do not increase from 0.
+            ValueError: shapes that do not fit, values that are not finite, or times that do not increase from 0 or
+                go beyond 60 s.
             SimulationError: the simulation diverged.
         """
         trajectory = check_vector("trajectory", trajectory, len(JOINTS), "one column for each joint, in rad")
@@ -156,7 +158,10 @@ class FishingRod:
         if trajectory.ndim != 2 or times.ndim != 1 or len(times) < 2:
             raise ValueError(f"needs (n,) times and (n, 6) angles, n > 1, got {times.shape} and {trajectory.shape}")
         if times[0] != 0 or not (np.diff(times) > 0).all():
-            raise ValueError(f"times must increase from 0, got {times}; were the rows shuffled?")
+            falls = np.append(times[0] != 0, np.diff(times) <= 0)
+            raise ValueError(f"times must increase from 0, but {first_entry(times, falls)}; were the rows shuffled?")
+        if times[-1] > LONGEST:
+            raise ValueError(f"times must end within {LONGEST} s, got {times[-1]}; are they in milliseconds?")
         end = float(times[-1]) + HOLD
         steps = self._times(end)
         commands = np.stack([np.interp(steps, times, column) for column in trajectory.T], axis=1)
@@ -181,6 +186,7 @@ class FishingRod:
 
     def _commands(self, theta: Array, rng: np.random.Generator) -> Array:
         """``(n_steps, 6)`` rad: the trajectory of theta with motor noise in proportion to its speed."""
+        check_rng(rng)
         times = self._times(self.primitive.duration(theta) + HOLD)
         trajectory = self.primitive.at(theta, times)
         if not self.noise:

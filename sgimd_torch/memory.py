@@ -8,15 +8,13 @@ near there?" (H of eq. 8), the policy side "what else have I done like that?" (K
 from __future__ import annotations
 
 import os
-import zipfile
-import zlib
-from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import faiss
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sgimd_torch.archives import read_npz, write_npz
 from sgimd_torch.spaces import Array, check_vector
 
 Rows = NDArray[np.int64]
@@ -85,7 +83,7 @@ class Memory:
         try:
             outcome = _one("outcome", outcome, self.outcome_dim, "did the simulation diverge, or is it a theta?")
         except ValueError as error:
-            raise ValueError(f"{error}; its theta was {theta}") from None
+            raise ValueError(f"{error}; its theta was {theta.tolist()}") from None
         self._append(context[None], theta[None], outcome[None])
 
     def near_outcomes(self, context: ArrayLike, goal: ArrayLike, k: int) -> Rows:
@@ -105,17 +103,8 @@ class Memory:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write an npz file, which no pickle is needed to read; ``path`` holds the old file or the whole new one."""
-        path = Path(path)
-        partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
-        try:
-            with open(partial, "wb") as file:
-                arrays: dict[str, Any] = {"contexts": self.contexts, "thetas": self.thetas, "outcomes": self.outcomes}
-                np.savez(file, version=_VERSION, context_weight=self.context_weight, **arrays)
-                file.flush()
-                os.fsync(file.fileno())
-            os.replace(partial, path)
-        finally:
-            partial.unlink(missing_ok=True)
+        arrays = {"contexts": self.contexts, "thetas": self.thetas, "outcomes": self.outcomes}
+        write_npz(path, {"version": _VERSION, "context_weight": self.context_weight, **arrays})
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Memory:
@@ -123,8 +112,9 @@ class Memory:
 
         Raises:
             ValueError: not such a file, truncated, of another version, or with arrays that do not fit together.
+            OSError: there is no file, or it is a directory.
         """
-        weight, contexts, thetas, outcomes = _read(Path(path))
+        weight, contexts, thetas, outcomes = _read(path)
         memory = cls(contexts.shape[1], thetas.shape[1], outcomes.shape[1], context_weight=weight)
         memory._append(contexts, thetas, outcomes)
         return memory
@@ -219,16 +209,9 @@ def _one(name: str, value: ArrayLike, dim: int, hint: str) -> Array:
     return array
 
 
-def _read(path: Path) -> tuple[float, Array, Array, Array]:
-    try:
-        with open(path, "rb") as file, np.load(file, allow_pickle=False) as saved:
-            version, weight, *tables = (
-                np.asarray(saved[name]) for name in ("version", "context_weight", "contexts", "thetas", "outcomes")
-            )
-    except KeyError as error:
-        raise ValueError(f"{path} is not a saved Memory: {error.args[0]}; is it another npz file?") from error
-    except (ValueError, EOFError, TypeError, zipfile.BadZipFile, zlib.error) as error:
-        raise ValueError(f"{path} cannot be read as a saved Memory ({error}); is it cut short, or not npz?") from error
+def _read(path: str | os.PathLike[str]) -> tuple[float, Array, Array, Array]:
+    names = ("version", "context_weight", "contexts", "thetas", "outcomes")
+    version, weight, *tables = read_npz(path, "saved Memory", "Memory.save", names)
     if version.shape != () or version != _VERSION:
         raise ValueError(f"{path} has version {version}, this code reads {_VERSION}; was it saved by a newer one?")
     if weight.shape != () or any(t.dtype != np.float64 or t.ndim != 2 or len(t) != len(tables[0]) for t in tables):

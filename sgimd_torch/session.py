@@ -15,7 +15,7 @@ import numpy as np
 
 from sgimd_torch.environment import Environment
 from sgimd_torch.learner import Learner
-from sgimd_torch.spaces import Array, Episode, stream
+from sgimd_torch.spaces import Array, Episode, check_count, stream
 from sgimd_torch.teachers import Teacher
 
 Execute = Callable[[int, Array, Array], Array]
@@ -52,14 +52,19 @@ def run(
         learner: asked, told and shown; stop iterating at any time and it stays usable.
         environment: observed and executed.
         seed: of the environment's streams.
-        movements: in all, those before ``first`` counted.
+        movements: in all, those before ``first`` counted; at least 1.
         first: number of the first one; where an earlier life stopped, to go on with it.
         teacher: asked before every movement whether it demonstrates.
         execute: stands in for the environment, see ``live`` and ``replay``.
 
     Yields:
         Every episode, once the learner has been told its outcome.
+
+    Raises (when iterated):
+        ValueError: ``movements`` or ``first`` is not such a number, or ``first`` comes after them all.
     """
+    if check_count("first", first, 0) > check_count("movements", movements, 1):
+        raise ValueError(f"first must be at most movements, got {first} of {movements}; movements counts them in all")
     execute = live(environment, seed) if execute is None else execute
     for index in range(first, movements):
         demonstration = teacher.offer(index, learner.memory) if teacher is not None else None

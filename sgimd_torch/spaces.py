@@ -6,6 +6,7 @@ learning episode [context][policy][outcome]. Numpy only; nothing here knows abou
 
 from __future__ import annotations
 
+import reprlib
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -43,12 +44,34 @@ def check_vector(name: str, value: ArrayLike, dim: int, hint: str = "") -> Array
     try:
         array = np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise ValueError(f"{name} must be numeric of shape (..., {dim}), got {value!r}{slip}") from error
+        raise ValueError(f"{name} must be numeric of shape (..., {dim}), got {_short(value)}{slip}") from error
     if array.ndim == 0 or array.shape[-1] != dim:
         raise ValueError(f"{name} must have shape (..., {dim}), got {array.shape}{slip}")
     if not np.isfinite(array).all():
-        raise ValueError(f"{name} must be finite, got {array}{slip}")
+        raise ValueError(f"{name} must be finite, but {first_entry(array, ~np.isfinite(array))}{slip}")
     return array
+
+
+def check_count(name: str, value: object, least: int) -> int:
+    """``value`` as int, a whole number of at least ``least``; numpy's integers are welcome.
+
+    Raises:
+        ValueError: it is not.
+    """
+    if not isinstance(value, int | np.integer) or value < least:
+        raise ValueError(f"{name} must be a whole number >= {least}, got {_short(value)}")
+    return int(value)
+
+
+def first_entry(array: Array, wrong: NDArray[np.bool_]) -> str:
+    """The first of the ``wrong`` entries of ``array`` and how many more there are, for an error in one line."""
+    entries = np.argwhere(wrong)
+    more = f" (and {len(entries) - 1} more)" if len(entries) > 1 else ""
+    return f"entry {entries[0].tolist()} is {array[tuple(entries[0])]}{more}"
+
+
+def _short(value: object) -> str:
+    return " ".join(reprlib.repr(value).split())
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +135,10 @@ class Box:
         """
         array = check_vector(name, points, self.dim, hint)
         if not self.contains(array).all():
-            raise ValueError(f"{name} must lie in [{self.low}, {self.high}], got {array}; was it scaled already?")
+            outside = (array < self.low) | (array > self.high)
+            k = np.argwhere(outside)[0, -1]
+            entry = f"{first_entry(array, outside)}, outside [{self.low[k]}, {self.high[k]}]"
+            raise ValueError(f"{name} must lie in its box, but {entry}; was it scaled already?")
         return array
 
 

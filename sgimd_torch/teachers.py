@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 
 from sgimd_torch.memory import Memory
-from sgimd_torch.spaces import Demonstration
+from sgimd_torch.spaces import Demonstration, check_count
 
 
 class Teacher(Protocol):
@@ -69,7 +69,7 @@ class PeriodicTeacher:
     ) -> None:
         self.demonstrations = _some(demonstrations)
         self.rng = rng
-        self.every = _at_least_one("every", every)
+        self.every = check_count("every", every, 1)
         self.choose = choose
 
     def offer(self, index: int, memory: Memory) -> Demonstration | None:
@@ -84,7 +84,7 @@ class InitialTeacher:
 
     def __init__(self, demonstrations: Sequence[Demonstration], rng: np.random.Generator, *, every: int = 10) -> None:
         self.demonstrations = _some(demonstrations)
-        self.every = _at_least_one("every", every)
+        self.every = check_count("every", every, 1)
         self._order = rng.permutation(len(demonstrations))
 
     def offer(self, index: int, memory: Memory) -> Demonstration | None:
@@ -113,7 +113,7 @@ class AskedTeacher:
     ) -> None:
         self.demonstrations = _some(demonstrations)
         self.rng = rng
-        self.patience = _at_least_one("patience", patience)
+        self.patience = check_count("patience", patience, 1)
         self.threshold = threshold
         self.choose = choose
         self._distance = np.inf
@@ -141,9 +141,3 @@ def _some(demonstrations: Sequence[Demonstration]) -> Sequence[Demonstration]:
     if not demonstrations:
         raise ValueError("a teacher needs at least one demonstration; use no teacher to learn alone")
     return demonstrations
-
-
-def _at_least_one(name: str, movements: int) -> int:
-    if movements < 1:
-        raise ValueError(f"{name} must be at least one movement, got {movements}")
-    return movements

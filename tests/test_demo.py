@@ -130,7 +130,13 @@ def test_stopped_it_says_how_to_go_on_and_leaves_no_process(benchmark_file, tmp_
     [
         (("--seed", "-1"), (), "--seed must be at least 0"),
         ((), ("--noise", "-1"), "noise must be finite and at least 0"),
-        ((), ("--evaluate_at", "[]"), "was never evaluated"),
+        ((), ("--evaluate_at", "[]"), "leaves nothing to draw"),
+        ((), ("--seed", "3"), "--seed is the demo's own"),
+        ((), ("--movements=3",), "--movements is the demo's own"),
+        ((), ("--out", "x"), "--out is the demo's own"),
+        ((), ("--algorithm", "x"), "--algorithm is not free here"),
+        ((), ("--name", "x"), "--name is not free here"),
+        ((), ("stray",), "'stray' belongs to no option"),
     ],
 )
 def test_what_cannot_be_ends_with_its_reason_and_no_traceback(benchmark_file, tmp_path, more, extra, message):
@@ -139,7 +145,14 @@ def test_what_cannot_be_ends_with_its_reason_and_no_traceback(benchmark_file, tm
     assert message in errors
     assert "Traceback" not in errors
     assert not said
-    assert not (tmp_path / "demo.png").exists()
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_wish_for_fewer_movements_is_no_reason_to_delete_the_run(finished, benchmark_file):
+    code, _, errors = ended(start(finished[0], benchmark_file, 40))
+    assert code == 2
+    assert "60 movements already" in errors
+    assert "delete" not in errors
 
 
 def test_when_one_run_fails_the_other_is_stopped(benchmark_file, tmp_path):

@@ -1,6 +1,8 @@
 """Demonstrations on disk: what is saved is loaded again, what is broken is refused by name, and what is shipped."""
 
+import pickle
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -149,9 +151,12 @@ def test_a_file_written_by_hand_as_documented_is_read(tmp_path: Path) -> None:
         (changed("contexts", np.zeros((1, 0))), "1 contexts"),
         (changed("trajectories", np.zeros((4, 6))), "truncated"),
         (changed("trajectories", np.zeros(5)), "axes"),
-        (changed("trajectories", np.full((5, 6), np.nan)), "trajectories holds NaN"),
-        (changed("outcomes", [[0.0, np.inf], [0.0, 0.0]]), "outcomes holds NaN"),
-        (changed("times", [0.0, np.nan, 0.0, 0.02, 0.04]), "times holds NaN"),
+        (
+            changed("trajectories", np.full((5, 6), np.nan)),
+            r"trajectories of recording 0: entry \[0, 0\] is nan \(and 11 more\)",
+        ),
+        (changed("outcomes", [[0.0, np.inf], [0.0, 0.0]]), r"outcomes of recording 0: entry \[1\] is inf;"),
+        (changed("times", [0.0, np.nan, 0.0, 0.02, 0.04]), r"times of recording 0: entry \[1\] is nan;"),
         (changed("times", [0.0, 0.02, 0.0, 0.02, 0.02]), "recording 1 must increase"),
         (changed("times", [0.5, 0.6, 0.0, 0.02, 0.04]), "recording 0 must increase"),
         (shuffled, "shuffled"),
@@ -183,10 +188,33 @@ def test_a_single_array_is_refused_and_so_is_a_folder(tmp_path: Path) -> None:
     np.save(tmp_path / "one.npy", np.zeros(3))
     with pytest.raises(ValueError, match="no demonstration file"):
         load_demonstrations(tmp_path / "one.npy")
-    with pytest.raises(ValueError, match="no demonstration file"):
+    with pytest.raises(IsADirectoryError, match="directory"):
         load_demonstrations(tmp_path)
     with pytest.raises(FileNotFoundError):
         load_demonstrations(tmp_path / "none.npz")
+
+
+def test_a_refusal_says_what_the_file_is_not_and_never_advises_pickle(tmp_path: Path) -> None:
+    (tmp_path / "text.npz").write_text("0.1 0.2\n")
+    (tmp_path / "pickled.npz").write_bytes(pickle.dumps(some()))
+    np.savez(tmp_path / "objects.npz", **fields() | {"times": np.array([{}] * 5)})
+    for name, message in (
+        ("text", "not an npz file"),
+        ("pickled", "not an npz file"),
+        ("objects", "more than numbers"),
+    ):
+        with pytest.raises(ValueError, match=message) as raised:
+            load_demonstrations(tmp_path / f"{name}.npz")
+        assert "pickle" not in str(raised.value).replace("pickled.npz", "")
+
+
+def test_what_cannot_be_saved_leaves_nothing_behind(tmp_path: Path) -> None:
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(IsADirectoryError, match="is a directory"):
+        save_demonstrations(tmp_path / "folder", some())
+    with pytest.raises(ValueError, match="entry"):
+        save_demonstrations(tmp_path / "mine.npz", [replace(some()[0], outcome=np.array([np.nan, 0.0]))])
+    assert [path.name for path in tmp_path.rglob("*")] == ["folder"]
 
 
 @pytest.mark.parametrize(

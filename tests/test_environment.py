@@ -177,6 +177,7 @@ def test_solve_refuses_goals_that_are_not_one_reachable_point(goal):
     "options",
     [
         {"n_joints": 1},
+        {"n_joints": 2.5},
         {"length": 0.0},
         {"length": np.inf},
         {"max_angle": 0.0},
@@ -190,3 +191,8 @@ def test_solve_refuses_goals_that_are_not_one_reachable_point(goal):
 def test_an_impossible_arm_is_refused(options):
     with pytest.raises(ValueError, match=r"must|needs"):
         PlanarArm(**options)
+
+
+def test_a_seed_in_the_place_of_a_generator_is_refused():
+    with pytest.raises(TypeError, match="got int; was the seed passed instead of a Generator"):
+        PlanarArm(5).execute(NO_CONTEXT, np.full(5, 0.5), 0)

@@ -1,5 +1,6 @@
 """Eq. (10): errors worked out on an arm, a noise floor that is known analytically, and a benchmark that fits or not."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -71,8 +72,17 @@ def test_the_noise_floor_is_the_mean_distance_to_the_mean_landing_point() -> Non
 
 def test_the_movement_that_is_judged_is_not_one_of_its_own_repeats() -> None:
     arm = PlanarArm(5, noise=0.05)
-    once_more = evaluate(perfect(arm), arm, np.array([[0.0, 0.5], [0.5, 0.0]]), 0, 0, repeats=1)
-    assert once_more.scatter.tolist() == [0.0, 0.0]  # one landing point is its own mean
+    seen = evaluate(perfect(arm), arm, np.array([[0.0, 0.5]]), 0, 0, repeats=2)
+    judged, *again = (arm.execute(NO_CONTEXT, seen.thetas[0], stream(0, "evaluation 0", row)) for row in range(3))
+    assert np.array_equal(seen.outcomes[0], judged)
+    assert seen.scatter[0] == pytest.approx(np.linalg.norm(again[0] - again[1]) / 2)  # two points and their middle
+
+
+@pytest.mark.parametrize("counts", [{"repeats": -1}, {"repeats": 1}, {"repeats": 2.5}, {"movements": -1}])
+def test_a_count_that_is_none_is_refused(counts: dict[str, int]) -> None:
+    arm = PlanarArm(5)
+    with pytest.raises(ValueError, match=f"{next(iter(counts))} must be"):
+        evaluate(perfect(arm), arm, np.array([[0.5, 0.5]]), **{"seed": 0, "movements": 0} | counts)
 
 
 def test_bias_raises_the_error_and_leaves_the_noise_floor() -> None:
@@ -183,6 +193,41 @@ def test_a_benchmark_of_another_environment_is_refused() -> None:
         Benchmark("PlanarArm", np.zeros((4, 3)), 0.1).check(PlanarArm(5))
 
 
+def test_goals_outside_the_task_space_are_refused_and_a_larger_space_takes_them() -> None:
+    in_cm = Benchmark("PlanarArm", 100 * BENCHMARK.goals, 10.0)
+    with pytest.raises(ValueError, match=r"entry \[0, 0\] is 50.0 \(and 3 more\); were they in cm"):
+        in_cm.check(PlanarArm(5))
+    with pytest.raises(ValueError, match=r"entry \[0, 0\] is nan"):
+        Benchmark("PlanarArm", np.full((1, 2), np.nan), 0.1).check(PlanarArm(5))
+    in_cm.check(PlanarArm(5, outcomes=Box.cube(-100, 100, 2)))
+    load_benchmark().check(FishingRod(threads=1))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"goals": np.zeros((0, 2))}, "n > 0"),
+        ({"goals": np.array([[0.0, np.nan]])}, r"entry \[0, 1\] is nan"),
+        ({"side": 0.0}, "side"),
+        ({"side": "wide"}, "side"),
+        ({"environment": None}, "name of a class"),
+    ],
+)
+def test_what_would_be_refused_is_not_saved(tmp_path: Path, change: dict[str, object], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        save_benchmark(tmp_path / "goals.npz", replace(BENCHMARK, **change))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_benchmark_saved_or_read_at_a_directory_is_refused_and_leaves_nothing_behind(tmp_path: Path) -> None:
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(IsADirectoryError, match="is a directory"):
+        save_benchmark(tmp_path / "folder", BENCHMARK)
+    with pytest.raises(IsADirectoryError, match="directory"):
+        load_benchmark(tmp_path / "folder")
+    assert [path.name for path in tmp_path.rglob("*")] == ["folder"]
+
+
 def test_a_benchmark_file_cut_short_or_corrupt_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "goals.npz"
     save_benchmark(path, BENCHMARK)
@@ -215,7 +260,7 @@ def test_a_benchmark_file_cut_short_or_corrupt_is_refused(tmp_path: Path) -> Non
         ({"goals": np.full((2, 2), None)}, "no benchmark"),
         ({"side": np.array(0.0)}, "side"),
         ({"side": np.array(np.nan)}, "side"),
-        ({"side": np.array("wide")}, "no benchmark"),
+        ({"side": np.array("wide")}, "side"),
     ],
 )
 def test_a_benchmark_that_cannot_be_right_is_refused(

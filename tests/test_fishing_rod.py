@@ -328,6 +328,7 @@ def test_the_task_space_may_be_a_hundred_times_larger() -> None:
         ({"max_yaw": np.inf}, "max_yaw"),
         ({"max_wind": -1.0}, "max_wind"),
         ({"threads": 0}, "threads"),
+        ({"threads": 1.5}, "threads"),
         ({"outcomes": Box.cube(-1, 1, 3)}, "rest"),
         ({"outcomes": Box.cube(5, 6, 2)}, "rest"),
     ],
@@ -345,6 +346,7 @@ def test_an_impossible_rod_is_refused(options: dict[str, object], name: str) -> 
         (np.array([0.0, 2.0, 1.0]), np.zeros((3, 6)), "increase from 0"),
         (np.array([1.0, 2.0, 3.0]), np.zeros((3, 6)), "increase from 0"),
         (np.arange(3.0), np.full((3, 6), np.nan), "finite"),
+        (np.array([0.0, 20.0, 1e5]), np.zeros((3, 6)), "in milliseconds"),
         (np.zeros(1), np.zeros((1, 6)), "n > 1"),
         (np.zeros((2, 3, 2)), np.zeros((2, 3, 6)), "times must|n > 1"),
     ],
@@ -352,3 +354,11 @@ def test_an_impossible_rod_is_refused(options: dict[str, object], name: str) -> 
 def test_what_is_no_recording_is_not_replayed(rod: FishingRod, times: Array, trajectory: Array, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         rod.replay(times, trajectory)
+
+
+def test_a_seed_in_the_place_of_a_generator_is_refused(rod: FishingRod) -> None:
+    theta = movements(1)[0]
+    with pytest.raises(TypeError, match="was the seed passed"):
+        rod.execute(NO_CONTEXT, theta, 0)
+    with pytest.raises(TypeError, match="was the seed passed"):
+        rod.execute_many(np.zeros((1, 0)), theta[None], [0])

@@ -232,7 +232,7 @@ def test_a_file_cut_short_anywhere_is_refused(tmp_path: Path) -> None:
     whole = path.read_bytes()
     for n_bytes in range(0, len(whole), 97):
         path.write_bytes(whole[:n_bytes])
-        with pytest.raises(ValueError, match="cannot be read as a saved Memory"):
+        with pytest.raises(ValueError, match="is no saved Memory"):
             Memory.load(path)
 
 
@@ -242,7 +242,7 @@ def test_a_flipped_bit_in_the_arrays_is_noticed(tmp_path: Path) -> None:
     damaged = bytearray(path.read_bytes())
     damaged[len(damaged) // 2] ^= 1
     path.write_bytes(damaged)
-    with pytest.raises(ValueError, match="cannot be read"):
+    with pytest.raises(ValueError, match="damaged"):
         Memory.load(path)
 
 
@@ -256,7 +256,7 @@ def test_a_flipped_bit_in_the_arrays_is_noticed(tmp_path: Path) -> None:
         ({"outcomes": np.zeros(3)}, "three float64 tables"),
         ({"outcomes": np.zeros((3, 2), dtype=np.float32)}, "float32"),
         ({"thetas": np.full((3, 1), np.nan)}, "finite"),
-        ({"thetas": np.array([[{}]] * 3)}, "cannot be read"),
+        ({"thetas": np.array([[{}]] * 3)}, "more than numbers"),
         ({"context_weight": -1.0}, "context_weight"),
         ({"context_weight": np.ones(2)}, "a number"),
     ],
@@ -273,7 +273,9 @@ def test_what_is_not_npz_or_not_there_is_told_apart(tmp_path: Path) -> None:
     np.save(tmp_path / "array.npy", np.zeros(3))
     (tmp_path / "text").write_text("theta, outcome\n")
     for name in ("array.npy", "text"):
-        with pytest.raises(ValueError, match="cannot be read as a saved Memory"):
+        with pytest.raises(ValueError, match="is no saved Memory: it is not an npz file"):
             Memory.load(tmp_path / name)
+    with pytest.raises(IsADirectoryError):
+        Memory.load(tmp_path)
     with pytest.raises(FileNotFoundError):
         Memory.load(tmp_path / "nothing")

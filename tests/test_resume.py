@@ -207,3 +207,28 @@ def test_a_full_disk_is_reported_and_the_run_can_go_on(tmp_path, go, benchmark, 
     assert (directory / "episodes.csv").stat().st_size == 24 * 1024
     assert go(tmp_path, "--resume") == 0
     assert csv_of(directory) == reference
+
+
+@pytest.mark.parametrize("damage", ['{"seconds_physics": "x"}', "null", "", '{"seconds_physics": null}'])
+@pytest.mark.parametrize("name", ["summary.json", "versions.json"])
+def test_a_damaged_note_on_the_run_counts_as_missing(tmp_path, go, reference, capsys, name, damage):
+    directory = tmp_path / "sgim-d" / "seed-003"
+    assert go(tmp_path, "--movements", 50) == 0
+    (directory / name).write_text(damage)
+    capsys.readouterr()
+    assert go(tmp_path, "--resume") == 0
+    assert ("it counts as missing" in capsys.readouterr().err) == (name == "summary.json" or damage in ("null", ""))
+    assert csv_of(directory) == reference
+
+
+@pytest.mark.parametrize("line", ["nan,nan,nan,nan,nan", "60.5,1,1,1,1", "4e1,1,1,1,1", "R,1,2,3,4", "60,R,1,1,1"])
+def test_a_line_of_evaluations_that_means_nothing_is_dropped(tmp_path, go, reference, capsys, line):
+    directory = tmp_path / "sgim-d" / "seed-003"
+    assert go(tmp_path) == 0
+    lines = (directory / "evaluation.csv").read_text().splitlines()
+    (directory / "evaluation.csv").write_text("\n".join([*lines[:2], line, ""]))
+    capsys.readouterr()
+    assert read_run(directory).evaluation["movements"].tolist() == [30]
+    assert go(tmp_path, "--resume") == 0
+    assert "evaluation.csv: dropped" in capsys.readouterr().err
+    assert csv_of(directory) == reference

@@ -4,16 +4,20 @@ import json
 import os
 import re
 import shlex
+import signal
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 
+import run as run_script
 import sgimd_torch
 from config import ALGORITHMS, KNOWN, Config
 from parts import build
 from read_runs import read_run
 from run import main
-from runs import MOVEMENTS, csv_of
+from runs import MOVEMENTS, ROOT, arguments, csv_of
 from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
 from sgimd_torch.evaluation import Benchmark, save_benchmark
 from sgimd_torch.fishing_rod import FishingRod
@@ -114,14 +118,24 @@ def test_a_damaged_config_is_named(tmp_path, go, capsys):
         ("--see 3", "unknown option --see"),
         ("--search gradient", "unknown search 'gradient', known are nelder-mead"),
         ("--seed -1", "seed must be at least 0, got -1"),
-        ("--seed three", "seed.*\n.*three"),
+        ("--seed three", "--seed must be a whole number, got three\n"),
         ("--seed", "seed.*expected one argument"),
         ("--movements 0", "movements must be at least 1, got 0"),
-        ("--movements 1e3", "movements"),
-        ("--task_space 0", "task_space must be a length in metres above 0, got 0"),
+        ("--movements 1e3", "--movements must be a whole number, got 1e3\n"),
+        ("--every 1.5", "--every must be a whole number, or null, got 1.5\n"),
+        ("--noise nan", "--noise must be a number, got nan\n"),
+        ("--evaluate-at 10,x", "--evaluate-at must be whole numbers such as 250,500.* got 10,x\n"),
+        ("--out ''", "--out must be a path, got an empty one"),
+        ("--benchmark=", "--benchmark must be a path, got an empty one"),
+        ("--benchmark /", "/ is a directory, a file was wanted"),
+        ("--resume=1", "--resume takes no value"),
+        ("--task_space 1e7", "at most 1e6"),
+        ("--epsilon 1.5", "epsilon must be from 0 to 1"),
+        ("--threads 100000", "threads must be at most"),
+        ("--task_space 0", "task_space must be a length in metres above 0, at most 1e6, got 0"),
         ("--task-space .nan", "task_space must be a length"),
         ("--noise -0.1", "noise must be finite and at least 0"),
-        ("--epsilon .inf", "epsilon must be finite"),
+        ("--epsilon .inf", "epsilon must be from 0 to 1"),
         ("--repeats 1", "one landing point does not scatter"),
         ("--every 0", "every must be at least 1, got 0"),
         ("--evaluate_at 0,3", "evaluate_at must be at least 1, got 0"),
@@ -132,8 +146,8 @@ def test_a_damaged_config_is_named(tmp_path, go, capsys):
         ("--benchmark {text}", "is no benchmark"),
         ("--demonstrations nowhere.npz", "demonstrations: there is no file nowhere.npz"),
         ("--demonstrations {text}", "is no demonstration file"),
-        ("--out {text}", "Not a directory|File exists"),
-        ("stray", "stray"),
+        ("--out {text}", "text is no folder"),
+        ("stray", "'stray' belongs to no option"),
     ],
 )
 def test_what_makes_no_sense_is_refused_clearly_and_leaves_nothing_behind(tmp_path, go, capsys, options, message):
@@ -253,14 +267,83 @@ def test_the_misfit_of_the_demonstrations_is_reported(tmp_path, go, capsys):
     )
 
 
-@pytest.mark.parametrize("slip", ["three samples", "degrees"])
+@pytest.mark.parametrize("slip", ["three samples", "degrees", "milliseconds"])
 def test_recordings_that_the_robot_cannot_play_are_refused_before_anything_is_written(tmp_path, go, capsys, slip):
     shown = load_demonstrations()[5]
     times, trajectory = shown.times, shown.trajectory
-    times, trajectory = (times[:3], trajectory[:3]) if slip == "three samples" else (times, np.degrees(trajectory))
+    if slip == "three samples":
+        times, trajectory = np.linspace(0, 1, 3), trajectory[:3]
+    elif slip == "degrees":
+        trajectory = np.degrees(trajectory)
+    else:
+        times = 1000 * times
     save_demonstrations(tmp_path / "own.npz", [shown, Demonstration(shown.context, times, trajectory, shown.outcome)])
     assert go(tmp_path / "runs", "--demonstrations", tmp_path / "own.npz") == 2
     said = capsys.readouterr().err
     assert "own.npz: recording 1" in said
     assert slip.split()[-1] in said
     assert not (tmp_path / "runs").exists()
+
+
+def test_recordings_whose_float_lands_outside_the_task_space_are_noted(tmp_path, go, capsys):
+    shown = load_demonstrations()[5]
+    far = Demonstration(shown.context, shown.times, shown.trajectory, 100 * shown.outcome)
+    save_demonstrations(tmp_path / "own.npz", [shown, far])
+    assert go(tmp_path, "--demonstrations", tmp_path / "own.npz", "--movements", 5) == 0
+    assert re.search(r"recording 1 lands at \(.*\) m, outside T; were they recorded in cm\?", capsys.readouterr().err)
+
+
+def test_a_link_to_nowhere_is_named(tmp_path, go, capsys):
+    (tmp_path / "link").symlink_to(tmp_path / "gone")
+    assert go(tmp_path / "link") == 2
+    assert f"{tmp_path / 'link'} is no folder" in capsys.readouterr().err
+
+
+def test_an_error_under_way_is_one_line(tmp_path, go, capsys, monkeypatch):
+    def fail(*_, **__):
+        raise ValueError("this cannot be evaluated")
+
+    monkeypatch.setattr(run_script, "evaluate", fail)
+    assert go(tmp_path) == 1
+    assert "error: this cannot be evaluated\n" in capsys.readouterr().err
+
+
+def test_evaluate_at_may_be_joined_by_an_equals_sign(tmp_path, go):
+    assert go(tmp_path, "--evaluate-at=5,6", "--movements=8") == 0
+    assert read_run(tmp_path / "sgim-d" / "seed-003").evaluation["movements"].tolist() == [5, 6, 8]
+
+
+SCRIPTS = {**os.environ, "PYTHONPATH": str(ROOT)}
+
+
+@pytest.mark.parametrize("script", ["run", "demo", "table"])
+def test_ctrl_c_while_python_imports_shows_no_traceback(script, tmp_path):
+    command = [sys.executable, "-X", "importtime", str(ROOT / f"experiments/{script}.py"), str(tmp_path)]
+    said = ""
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=SCRIPTS) as process:
+        for line in process.stderr:  # importtime tells what is loaded, as it goes
+            said += line
+            if " numpy." in line:
+                process.send_signal(signal.SIGINT)
+                break
+        said += process.stderr.read()
+    assert process.returncode == 130
+    assert "Traceback" not in said
+
+
+@pytest.mark.parametrize(
+    ("redirection", "code"), [("| true", 0), (">/dev/full", 1), ("2>/dev/full", 0), ("2>&-", 0), (">&-", 0), ("", 0)]
+)
+def test_a_run_ends_well_whatever_becomes_of_its_output(tmp_path, benchmark, redirection, code):
+    script = [sys.executable, str(ROOT / "experiments/run.py"), *arguments(tmp_path, benchmark)]
+    command = shlex.join([*script, "--movements", "5", "--name", "Å"])
+    done = subprocess.run(
+        ["bash", "-o", "pipefail", "-c", f"{command} {redirection}"],
+        capture_output=True,
+        text=True,
+        env={**SCRIPTS, "LC_ALL": "C", "PYTHONCOERCECLOCALE": "0", "PYTHONUTF8": "0"},
+    )
+    assert done.returncode == code, done
+    assert "Traceback" not in done.stderr
+    assert "Exception ignored" not in done.stderr
+    assert read_run(tmp_path / "Å" / "seed-003").summary["finished"] is True

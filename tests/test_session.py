@@ -291,3 +291,10 @@ def test_a_life_in_two_parts_is_the_whole_life(context: bool) -> None:
     assert not learner.idle  # the first part ends in mid-search
     parts += [e.outcome for e in run(learner, arm, 0, movements=60, first=37)]
     assert np.array_equal(whole, parts)
+
+
+@pytest.mark.parametrize("counts", [{"movements": 0}, {"movements": 1.5}, {"first": -1}, {"first": 11}])
+def test_a_life_of_no_movements_or_one_that_begins_after_its_end_is_refused(counts: dict[str, int]) -> None:
+    arm = PlanarArm(5)
+    with pytest.raises(ValueError, match=f"{next(iter(counts))} must be"):
+        next(run(sagg_riac(arm, 0), arm, 0, **{"movements": 10} | counts))

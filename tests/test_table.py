@@ -1,5 +1,7 @@
 """The table of what runs came to."""
 
+import shutil
+
 import numpy as np
 import pytest
 
@@ -36,3 +38,29 @@ def test_a_run_that_is_too_short_is_named(runs, capsys):
 def test_a_folder_without_runs_is_refused(tmp_path, capsys):
     assert main([str(tmp_path)]) == 2
     assert "holds no runs" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("damage", ["no summary", "junk log", "directory", "summary is a list"])
+def test_a_damaged_run_is_named_in_one_line(runs, tmp_path, capsys, damage):
+    shutil.copytree(runs, tmp_path / "runs")
+    run = tmp_path / "runs" / "random" / "seed-001"
+    if damage == "no summary":
+        (run / "summary.json").unlink()
+    elif damage == "junk log":
+        (run / "episodes.csv").write_text("junk")
+    elif damage == "directory":
+        (run / "episodes.csv").unlink()
+        (run / "episodes.csv").mkdir()
+    else:
+        (run / "summary.json").write_text("[]")
+    assert main([str(tmp_path / "runs"), "--at", "40"]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert str(run) in said
+
+
+def test_what_was_not_measured_is_a_dash(runs, capsys):
+    assert main([str(runs), "--at", "40"]) == 0  # nothing was evaluated after 1000 movements
+    said = capsys.readouterr().out
+    assert "nan" not in said
+    assert said.splitlines()[1].split()[2] == "-"

@@ -199,5 +199,6 @@ def test_a_teacher_without_demonstrations_or_with_no_time_is_refused(make: Calla
     with pytest.raises(ValueError, match="at least one demonstration"):
         make([], stream(0, "teacher"))
     (word,) = make.keywords
-    with pytest.raises(ValueError, match=f"{word} must be at least one movement"):
-        make(LESSONS, stream(0, "teacher"), **{word: 0})
+    for movements in (0, 1.5):
+        with pytest.raises(ValueError, match=f"{word} must be a whole number >= 1, got {movements}"):
+            make(LESSONS, stream(0, "teacher"), **{word: movements})

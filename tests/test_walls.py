@@ -11,7 +11,7 @@ import sgimd_torch
 
 PACKAGE = "sgimd_torch"
 ROWS = [  # a module imports only from the rows before its own
-    {"spaces"},
+    {"spaces", "archives"},
     {"memory", "motor_primitives", "environment", "search", "demonstrations", "regions"},
     {"competence", "inverse_model", "interest", "teachers", "forward_model", "fishing_rod"},
     {"strategies"},
