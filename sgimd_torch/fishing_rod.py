@@ -195,8 +195,9 @@ class FishingRod:
         draws = rng.standard_normal((self._draws, len(JOINTS)))[: len(times)]
         draws[1:] *= math.sqrt(1 - CORRELATION**2)
         noise = lfilter([1.0], [1.0, -CORRELATION], draws, axis=0)  # AR(1) of unit variance
-        speed = np.abs(np.diff(trajectory, axis=0, append=trajectory[-1:])) / self.model.opt.timestep
-        return trajectory + self.noise * speed * noise
+        speed = np.abs(trajectory[1:] - trajectory[:-1]) / self.model.opt.timestep
+        trajectory[:-1] += self.noise * speed * noise[:-1]
+        return trajectory
 
     def _settle(self) -> Array:
         """c_org, the start configuration: joints in the middle of their ranges, the line hanging still."""
@@ -215,19 +216,19 @@ class FishingRod:
     def _cast(self, contexts: Array, commands: list[Array], ends: Array) -> tuple[Array, np.ndarray]:
         """``(n, 2)`` landing points of n command sequences, the line let out at ``ends`` (s), and who diverged."""
         n = len(commands)
-        yaw_wind = np.zeros((n, 2))
-        yaw_wind[:, self._context_columns] = contexts
         steps = np.array([len(c) for c in commands])
         controls = np.zeros((n, int(steps.max()), self.model.nu))
         for k, sequence in enumerate(commands):
             controls[k, : len(sequence), :6] = sequence
             controls[k, len(sequence) :, :6] = sequence[-1]
-        controls[:, :, 0] += yaw_wind[:, None, 0]
-        controls[:, :, 6] = yaw_wind[:, None, 1]
-
         states = np.repeat(self._home[None], n, axis=0)
-        states[:, 1] += yaw_wind[:, 0]  # time comes first, then the angles: yaw is the first
-        states[:, 1 + self.model.nq + self.model.nv] += yaw_wind[:, 0]  # and the yaw servo's own state
+        if self.contexts.dim:
+            yaw_wind = np.zeros((n, 2))
+            yaw_wind[:, self._context_columns] = contexts
+            controls[:, :, 0] += yaw_wind[:, None, 0]
+            controls[:, :, 6] = yaw_wind[:, None, 1]
+            states[:, 1] += yaw_wind[:, 0]  # time comes first, then the angles: yaw is the first
+            states[:, 1 + self.model.nq + self.model.nv] += yaw_wind[:, 0]  # and the yaw servo's own state
         floats = np.repeat(self._data.sensordata[None], n, axis=0)
         landings, diverged = np.full((n, 2), np.nan), np.zeros(n, dtype=bool)
         speeds = slice(1 + self.model.nq, 1 + self.model.nq + self.model.nv)
@@ -246,7 +247,7 @@ class FishingRod:
                 elif start + last == steps[row]:
                     before = track[-2] if last > 1 else floats[row]
                     after = steps[row] - 1 - ends[row] / self.model.opt.timestep  # share of a step
-                    landings[row] = self._let_out(track[-1] + after * (before - track[-1]), float(yaw_wind[row, 1]))
+                    landings[row] = self._let_out(track[-1] + after * (before - track[-1]), float(controls[row, 0, 6]))
             states[flying], floats[flying] = run[:, -1], seen[:, -1]
             flying = flying[np.isnan(landings[flying, 0]) & ~diverged[flying]]
             if not flying.size:

@@ -42,6 +42,7 @@ class GaussianPrimitive:
         self.n_knots = n_knots
         self.sharpness = sharpness
         self.policies = Box.cube(0.0, 1.0, joints.dim * n_knots + 1)
+        self._centres = np.arange(n_knots) / (n_knots - 1)  # of the knots, as parts of the duration
 
     def duration(self, theta: Array) -> float:
         """delta (s) of one ``(theta_dim,)`` theta."""
@@ -118,8 +119,7 @@ class GaussianPrimitive:
     def _weights(self, phases: Array) -> Array:
         # Deviation: the paper prints exp(+sigma |.|^2) and five terms; the sign and i = 0..3 are ours. With
         # sigma = s / delta^2 the weights depend on the phase t / delta alone.
-        centres = np.arange(self.n_knots) / (self.n_knots - 1)
-        weights = np.exp(-self.sharpness * (phases[:, None] - centres) ** 2)  # eq. (5)
+        weights = np.exp(-self.sharpness * (phases[:, None] - self._centres) ** 2)  # eq. (5)
         return weights / weights.sum(axis=1, keepdims=True)
 
     def _check_recording(self, times: ArrayLike, trajectory: ArrayLike) -> tuple[Array, Array]:
