@@ -168,7 +168,8 @@ def test_a_benchmark_for_another_environment_is_refused(tmp_path, go, capsys):
     assert "made for PlanarArm" in capsys.readouterr().err
 
 
-def test_a_diverging_simulation_is_reported_with_its_theta_and_leaves_a_whole_log(tmp_path, go, capsys):
+def test_a_diverging_simulation_is_reported_with_its_theta_and_leaves_a_whole_log(tmp_path, monkeypatch, go, capsys):
+    monkeypatch.chdir(tmp_path)  # where MuJoCo writes a log of its own
     assert go(tmp_path, "--noise", "1e4") == 1  # commands of thousands of rad
     errors = capsys.readouterr().err
     assert "theta=[0." in errors
