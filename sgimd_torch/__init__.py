@@ -5,7 +5,7 @@ Where each part of the paper lives:
     2.1    contexts, policies, outcomes, episodes          spaces, environment
     3      the learner and the five algorithms             learner, algorithms, session
     3.2    goal interest mapping, deciding a goal          interest, competence (eqs. 1-4)
-    4      the fishing rod                                 fishing_rod
+    4      the fishing rod                                 fishing_rod, casting, film
     4.1    motor primitives, correspondence                motor_primitives (eqs. 5, 6)
     4.2    imitate a policy                                strategies
     4.3    performance                                     competence (eq. 7)
@@ -28,6 +28,7 @@ from sgimd_torch.inverse_model import LocalInverse, LocallyLinear, NearestNeighb
 from sgimd_torch.learner import Learner
 from sgimd_torch.memory import Memory
 from sgimd_torch.motor_primitives import GaussianPrimitive
+from sgimd_torch.progress_grid import ProgressGrid
 from sgimd_torch.search import nelder_mead, perturb
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Box, Demonstration, Episode, Estimate, Move, stream
@@ -58,6 +59,7 @@ __all__ = [
     "NearestNeighbour",
     "PeriodicTeacher",
     "PlanarArm",
+    "ProgressGrid",
     "SimulationError",
     "UniformGoals",
     "absolute_performance",

@@ -16,7 +16,7 @@ import numpy as np
 from sgimd_torch.competence import AttemptCompetence, Competence, Performance, performance
 from sgimd_torch.environment import Environment
 from sgimd_torch.interest import Goals, InterestMap
-from sgimd_torch.inverse_model import LocalInverse
+from sgimd_torch.inverse_model import LocallyLinear
 from sgimd_torch.learner import Learner
 from sgimd_torch.memory import Memory
 from sgimd_torch.search import nelder_mead
@@ -42,6 +42,7 @@ class Parts(TypedDict, total=False):
     budget: int
     tolerance: float | None
     global_range: tuple[float, float]
+    give_up: float
 
 
 def random_exploration(environment: Environment, seed: int) -> Learner:
@@ -76,8 +77,7 @@ def imitating(
         rng,
         repeats=repeats,
         epsilon=epsilon,
-        goals=babbling.goals,
-        judge=babbling.judge,
+        babbling=babbling,
         outcomes=outcomes,
     )
 
@@ -124,13 +124,14 @@ def goal_babbling(
     memory: Memory,
     *,
     goals: MakeGoals = InterestMap,
-    inverse: MakeInverse = LocalInverse,
+    inverse: MakeInverse = LocallyLinear,
     search: MakeSearch = nelder_mead,
     judge: MakeJudge = remembered,
     measure: Performance | None = None,
     budget: int = 15,
     tolerance: float | None = None,
     global_range: tuple[float, float] = (0.05, 0.95),
+    give_up: float = -0.5,
 ) -> GoalBabbling:
     """The paper's autonomous strategy, put together from its parts.
 
@@ -146,6 +147,7 @@ def goal_babbling(
         budget: movements for one goal, at most.
         tolerance: distance (m) at which a goal counts as reached; None for the outcome noise, .02 m at least.
         global_range: least and greatest probability of the global exploration regime.
+        give_up: competence below which a goal is given up when a movement brings it no nearer; -1 never gives up.
     """
     noise = max(environment.outcome_noise, 0.02)
     if measure is None:
@@ -162,6 +164,7 @@ def goal_babbling(
         budget=budget,
         tolerance=noise if tolerance is None else tolerance,
         global_range=global_range,
+        give_up=give_up,
     )
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from sgimd_torch.memory import Memory, Rows
-from sgimd_torch.spaces import Array, Box, Estimate
+from sgimd_torch.spaces import Array, Estimate
 
 
 class LocalInverse:
@@ -87,28 +87,28 @@ class LocallyLinear:
     """:class:`LocalInverse`, corrected to first order: eq. (9) averages, so it answers with a theta that should land on
     the weighted mean of the outcomes; a weighted ridge regression of theta on outcome supplies the rest of the way.
 
+    The answer stays in the box around all that was ever executed, since a far goal extrapolates far.
+
     Args:
-        policies: Pi; the answer is clipped to it, since a far goal extrapolates far.
         ridge: relative to the variance of the outcomes, > 0; the larger, the closer to :class:`LocalInverse`. It is
             also what settles outcomes that lie on a line, or are fewer than there are slopes.
-        h_max, k_max, dist_n, alpha, width: as for :class:`LocalInverse`.
+        h_max, k_max, dist_n, alpha, width: as for :class:`LocalInverse`, which averages fewer and more closely.
     """
 
     def __init__(
         self,
         memory: Memory,
         *,
-        policies: Box,
         ridge: float = 1e-3,
         h_max: int = 10,
-        k_max: int = 10,
+        k_max: int = 20,
         dist_n: float | None = None,
         alpha: float = 0.5,
         width: float = 1.0,
     ) -> None:
         if not ridge > 0:
             raise ValueError(f"ridge must be positive, got {ridge}; outcomes on a line have no slope across it")
-        self.policies = policies
+        self.memory = memory
         self.ridge = ridge
         self.width = width
         self._local = LocalInverse(memory, h_max=h_max, k_max=k_max, dist_n=dist_n, alpha=alpha, width=width)
@@ -129,7 +129,8 @@ class LocallyLinear:
             return estimate
         cross = (weights * deviations.T) @ (thetas - mean_theta)
         slope = np.linalg.solve(covariance + self.ridge * variance * np.eye(len(goal)), cross)
-        return estimate._replace(theta=self.policies.clip(mean_theta + (goal - mean_outcome) @ slope))
+        theta = mean_theta + (goal - mean_outcome) @ slope
+        return estimate._replace(theta=np.clip(theta, self.memory.thetas.min(axis=0), self.memory.thetas.max(axis=0)))
 
 
 def gaussian_weights(goal: Array, outcomes: Array, width: float) -> Array:

@@ -15,18 +15,42 @@ from numpy.typing import NDArray
 
 from sgimd_torch.spaces import Array
 
-Progress = Callable[[Array], float]
-"""The competences ``(n,)`` of a window, oldest first, n >= 4 -> how much they change."""
+Progress = Callable[[Array, Array, Array], float]
+"""Of a window, oldest first, n >= 4: points of C x T ``(n, dim)``, competences ``(n,)`` there when the attempts ended,
+and gains ``(n,)``, how much each attempt raised the competence at its own goal -> how much the robot progresses."""
 
 
-def absolute_progress(competences: Array) -> float:
+def gained_progress(points: Array, competences: Array, gains: Array) -> float:
+    """Mean gain: how much an attempt here raises the competence at its goal.
+
+    Deviation: eq. (3) compares the competences of older and newer goals, which differ also because the goals do. Where
+    some can be reached and others cannot, as in most regions of a large task space, it sees little else.
+    """
+    return float(gains.mean())
+
+
+def absolute_progress(points: Array, competences: Array, gains: Array) -> float:
     """Eq. (3): |newer half - older half| over the number of values; an odd window loses its oldest."""
     return abs(_rise(competences))
 
 
-def signed_progress(competences: Array) -> float:
+def signed_progress(points: Array, competences: Array, gains: Array) -> float:
     """Eq. (3) without its absolute value: competence that falls is of no interest."""
     return max(0.0, _rise(competences))
+
+
+def paired_progress(points: Array, competences: Array, gains: Array) -> float:
+    """Mean |competence - competence at the nearest earlier goal|, where a window has one.
+
+    Forestier et al. (2017) and Portelas et al. (2019) measure progress so. It tells a competence that changed with time
+    from one that only differs from place to place, but never averages the noise of single goals away. Of equally near
+    goals the latest counts. Distances are those of C x T: a context in other units than goals wants a space of its own.
+    """
+    n = len(points)
+    apart = np.square(points[:, None] - points).sum(axis=2)  # (n, n)
+    apart[np.triu_indices(n)] = np.inf  # itself and what came later
+    nearest = n - 1 - apart[1:, ::-1].argmin(axis=1)
+    return float(np.abs(competences[1:] - competences[nearest]).mean())
 
 
 def _rise(competences: Array) -> float:
@@ -36,12 +60,14 @@ def _rise(competences: Array) -> float:
     return float(newer.sum() - older.sum()) / (2 * half)
 
 
-def interest_of(competences: Array, *, window: int, progress: Progress) -> float:
-    """Progress over the last ``window`` of ``competences`` ``(n,)``.
+def interest_of(points: Array, competences: Array, gains: Array, *, window: int, progress: Progress) -> float:
+    """Progress over the last ``window`` of the goals at ``points`` ``(n, dim)``, with ``(n,)`` of the others.
 
     Deviation: 0 while fewer than 4 are known, where eq. (3) has halves of one value or none.
     """
-    return progress(competences[-window:]) if len(competences) >= 4 else 0.0
+    if len(competences) < 4:
+        return 0.0
+    return progress(points[-window:], competences[-window:], gains[-window:])
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,8 +76,8 @@ class Region:
 
     ``path`` leads from the root: "R", then "R0" below and "R1" above its cut, "R01" ... It never changes meaning.
     ``low`` and ``high`` are its corners in C x T. In order of time: ``points`` ``(n, context_dim + outcome_dim)``,
-    ``competences`` ``(n,)``, ``strategies`` ``(n,)`` names. ``attempts`` counts the goals met here, those since
-    forgotten too, but not those a parent had forgotten before it was cut. Arrays are read-only.
+    ``competences`` and ``gains`` ``(n,)``, ``strategies`` ``(n,)`` names. ``attempts`` counts the goals met here, those
+    since forgotten too, but not those a parent had forgotten before it was cut. Arrays are read-only.
     """
 
     path: str
@@ -60,12 +86,13 @@ class Region:
     context_dim: int
     points: Array
     competences: Array
+    gains: Array
     strategies: NDArray[np.str_]
     attempts: int
-    measure: Callable[[Array], float]
+    measure: Callable[[Array, Array, Array], float]
 
     def __post_init__(self) -> None:
-        for name in ("low", "high", "points", "competences", "strategies"):
+        for name in ("low", "high", "points", "competences", "gains", "strategies"):
             view = getattr(self, name).view()
             view.flags.writeable = False
             object.__setattr__(self, name, view)
@@ -82,28 +109,36 @@ class Region:
 
     def interest(self, strategy: str | None = None) -> float:
         """Local competence progress, eq. (3); with a ``strategy``, over the goals chosen by it alone."""
-        if strategy is None:
-            return self._interest
-        return self.measure(self.competences[self.strategies == strategy])
+        return self._interest if strategy is None else self.interest_among(self.strategies == strategy)
+
+    def interest_among(self, rows: NDArray[np.bool_] | slice) -> float:
+        """As if it remembered these goals alone."""
+        return self.measure(self.points[rows], self.competences[rows], self.gains[rows])
 
     @cached_property
     def _interest(self) -> float:
-        return self.measure(self.competences)
+        return self.interest_among(slice(None))
 
-    def extend(self, point: Array, competence: float, strategy: str) -> Region:
+    def extend(self, point: Array, competence: float, gain: float, strategy: str) -> Region:
         """This region with one more goal."""
         return replace(
             self,
             points=np.vstack((self.points, point)),
             competences=np.append(self.competences, competence),
+            gains=np.append(self.gains, gain),
             strategies=np.append(self.strategies, strategy),
             attempts=self.attempts + 1,
         )
 
     def keep(self, rows: NDArray[np.bool_] | slice) -> Region:
         """This region with some of its goals, in their order."""
-        points, competences, strategies = self.points[rows], self.competences[rows], self.strategies[rows]
-        return replace(self, points=points, competences=competences, strategies=strategies)
+        return replace(
+            self,
+            points=self.points[rows],
+            competences=self.competences[rows],
+            gains=self.gains[rows],
+            strategies=self.strategies[rows],
+        )
 
     def split(self, axis: int, cut: float) -> tuple[Region, Region]:
         """The halves below and above a cut; goals on the cut belong above."""

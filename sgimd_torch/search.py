@@ -8,7 +8,7 @@ field's simplest alternative. A search is a generator, so it can be paused, coun
 from __future__ import annotations
 
 import math
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from typing import TypeVar
 
 import numpy as np
@@ -22,6 +22,7 @@ def nelder_mead(
     policies: Box,
     rng: np.random.Generator,
     *,
+    noise: float = 0.05,
     step: float = 0.1,
     complete: bool = False,
     adaptive: bool = False,
@@ -30,16 +31,20 @@ def nelder_mead(
 ) -> Search:
     """Downhill simplex on the distance to the goal, around theta_g and its neighbours.
 
-    It executes theta_g first. The neighbours are vertices with the outcomes they already have: remembering costs no
-    movement (and takes outcomes of nearby contexts for those of this one). Those that lie on a line, plane ... through
-    better vertices are left out, as a flat simplex cannot turn.
+    It executes theta_g first, but for the noise. The neighbours are vertices with the outcomes they already have:
+    remembering costs no movement (and takes outcomes of nearby contexts for those of this one). Those that lie on a
+    line, plane ... through better vertices are left out, as a flat simplex cannot turn.
 
     Args:
         policies: Pi; nothing outside is proposed.
-        rng: draws the directions of the steps that stand in for missing neighbours.
+        rng: draws the noise, and the directions of the steps that stand in for missing neighbours.
+        noise: standard deviation of what is added to each parameter of every movement, in sides of ``policies``; the
+            vertex is where the movement went. Deviation: the paper adds none. But a simplex searches the flat through
+            its vertices, and neighbours from memory span the same flat again and again: without new directions the
+            learner soon repeats itself, and its inverse model cannot tell what is noise from what is not.
         step: size of those steps, root mean square over the parameters, in sides of ``policies``. Deviation: the usual
             first simplex steps along one coordinate at a time, but one knot of one joint often moves the float hardly
-            at all; these steps go in random directions.
+            at all; these steps go in random directions, and stand for the noise of these movements.
         complete: fill the simplex up to theta_dim + 1 vertices, the paper's 26, at one movement each. False: only up to
             outcome_dim + 1, so that with some neighbours the first reflection is the second movement. The search then
             stays in the flat through its vertices, where, theta being redundant, the goal usually can be met as well.
@@ -50,13 +55,18 @@ def nelder_mead(
             paper names no such end) and the next one begins from the memory that it has enriched.
 
     Raises:
-        ValueError: ``step`` is not in (0, 0.5].
+        ValueError: ``step`` is not in (0, 0.5], or ``noise`` not in [0, 0.5].
     """
     if not 0 < step <= 0.5:
         raise ValueError(f"step must lie in (0, 0.5], got {step}; it is a fraction of the sides of Pi")
+    if not 0 <= noise <= 0.5:
+        raise ValueError(f"noise must lie in [0, 0.5], got {noise}; it is a fraction of the sides of Pi")
+
+    def place(theta: Array) -> Array:
+        return policies.clip(rng.normal(theta, noise * policies.sides) if noise else theta)
 
     def search(start: Estimate, goal: Array) -> Generator[Array, Array, None]:
-        theta = policies.check("theta of the estimate", start.theta)
+        theta = place(policies.check("theta of the estimate", start.theta))
         vertices = [theta]
         values = [math.dist(goal, (yield theta))]
         flat = _Flat(theta, xatol)
@@ -73,7 +83,7 @@ def nelder_mead(
             vertices.append(vertex)
             values.append(math.dist(goal, (yield vertex)))
         simplex = np.array(vertices), np.array(values)
-        yield from _towards(goal, simplex_descent(*simplex, box=policies, adaptive=adaptive, xatol=xatol, fatol=fatol))
+        yield from _towards(goal, simplex_descent(*simplex, place=place, adaptive=adaptive, xatol=xatol, fatol=fatol))
 
     return search
 
@@ -126,7 +136,7 @@ def simplex_descent(
     vertices: Array,
     values: Array,
     *,
-    box: Box | None = None,
+    place: Callable[[Array], Array] | None = None,
     adaptive: bool = False,
     xatol: float = 1e-4,
     fatol: float = 1e-4,
@@ -138,9 +148,10 @@ def simplex_descent(
 
     Args:
         vertices: ``(n + 1, dim)``. With n < dim the search stays in the n-dimensional flat through them, but for
-            clipping.
+            ``place``.
         values: ``(n + 1,)``.
-        box: points are clipped to it. A simplex whose vertices all lie on one face cannot leave it.
+        place: moves a point to where it may be tried, into a box by clipping it, say; None leaves it where it is. (By
+            clipping alone a simplex whose vertices all lie on one face of the box cannot leave it.)
         adaptive: coefficients that depend on n.
         xatol, fatol: it ends when all vertices are this near the best, in every coordinate and in value.
     """
@@ -154,7 +165,7 @@ def simplex_descent(
     def beyond(centre: Array, distance: float) -> Array:
         """On the line from the worst vertex through the ``centre`` of the others; -1 is the worst, 0 the centre."""
         point = (1 + distance) * centre - distance * vertices[-1]
-        return point if box is None else box.clip(point)
+        return point if place is None else place(point)
 
     while np.abs(vertices[1:] - vertices[0]).max() > xatol or np.abs(values[0] - values[1:]).max() > fatol:
         centre = np.add.reduce(vertices[:-1], axis=0) / n
@@ -178,7 +189,7 @@ def simplex_descent(
         else:
             for j in range(1, n + 1):
                 shrunk = vertices[0] + shrinkage * (vertices[j] - vertices[0])
-                vertices[j] = shrunk if box is None else box.clip(shrunk)
+                vertices[j] = shrunk if place is None else place(shrunk)
                 values[j] = yield vertices[j]
         order = values.argsort(kind="stable")
         vertices, values = vertices[order], values[order]

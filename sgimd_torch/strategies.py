@@ -73,6 +73,9 @@ class GoalBabbling:
         budget: movements for one goal, at most.
         tolerance: distance (m) at which a goal counts as reached.
         global_range: least and greatest probability of the global exploration regime.
+        give_up: a goal whose competence is below this is given up at the first movement that brings it no nearer.
+            Deviation: the paper spends the whole budget on it. But in a task space far larger than what can be reached
+            nearly all goals are hopeless, and movements spent on them are lost; -1 never gives up.
     """
 
     def __init__(
@@ -89,6 +92,7 @@ class GoalBabbling:
         budget: int = 15,
         tolerance: float = 0.02,
         global_range: tuple[float, float] = (0.05, 0.95),
+        give_up: float = -0.5,
     ) -> None:
         if budget < 1:
             raise ValueError(f"budget must be at least one movement for each goal, got {budget}")
@@ -103,14 +107,16 @@ class GoalBabbling:
         self.budget = budget
         self.tolerance = tolerance
         self.global_range = global_range
+        self.give_up = give_up
 
     def attempt(self, context: Array) -> Attempt:
         """Choose a goal and pursue it."""
         yield from self.pursue(context, self.goals.sample(context))
 
     def pursue(self, context: Array, goal: Array, strategy: str = "autonomous") -> Attempt:
-        """Search until ``goal`` is reached, the budget is spent or a demonstration interrupts."""
+        """Search until ``goal`` is reached, the budget is spent, hope is given up or a demonstration interrupts."""
         outcomes: list[Array] = []
+        before = best = self.competence(context, goal)
         moves = self._explore(context, goal)
         move = next(moves)
         try:
@@ -119,10 +125,23 @@ class GoalBabbling:
                 outcomes.append(outcome)
                 if len(outcomes) == self.budget or np.linalg.norm(outcome - goal) <= self.tolerance:
                     return
+                last, best = best, self.competence(context, goal)
+                if best <= last and best < self.give_up:
+                    return
                 move = moves.send(outcome)
         finally:  # reached, exhausted or interrupted: what was learnt counts
-            if outcomes:
-                self.goals.add(context, goal, self.judge(context, goal, np.stack(outcomes)), strategy)
+            self.conclude(context, goal, outcomes, before, strategy)
+
+    def conclude(self, context: Array, goal: Array, outcomes: list[Array], before: float, strategy: str) -> None:
+        """Goal interest mapping at the end of an attempt, which led to ``outcomes``; nothing if it never moved.
+
+        Args:
+            before: competence at the goal when the attempt began.
+        """
+        if outcomes:
+            # What is nearest in (context, outcome) may, where contexts vary, be a little farther in outcome alone.
+            gain = max(0.0, self.competence(context, goal) - before)
+            self.goals.add(context, goal, self.judge(context, goal, np.stack(outcomes)), strategy, gain)
 
     def _explore(self, context: Array, goal: Array) -> Attempt:
         """Movements without end, in the global exploration or the local optimisation regime."""
@@ -160,9 +179,9 @@ class Imitate:
         rng: draws the variations.
         repeats: movements for one demonstration; None until the next one.
         epsilon: bound of the variation in each parameter, |theta_rand| < epsilon.
-        goals, judge: where the competence at the demonstrated outcome goes afterwards, and how it is judged (emulate a
-            goal, section 3.2.3); None to imitate only. A demonstrated outcome outside T is imitated, but is no goal.
-        outcomes: T; needed with ``goals``.
+        babbling: whose interest map gets the competence at the demonstrated outcome afterwards (emulate a goal, section
+            3.2.3); None to imitate only. A demonstrated outcome outside T is imitated, but is no goal.
+        outcomes: T; needed with ``babbling``.
     """
 
     def __init__(
@@ -172,39 +191,40 @@ class Imitate:
         *,
         repeats: int | None = 10,
         epsilon: float = 0.05,
-        goals: Goals | None = None,
-        judge: Judge | None = None,
+        babbling: GoalBabbling | None = None,
         outcomes: Box | None = None,
     ) -> None:
-        if (goals is None) != (judge is None) or (goals is None) != (outcomes is None):
-            raise ValueError("Imitate needs goals, judge and outcomes together, or none of them")
+        if (babbling is None) != (outcomes is None):
+            raise ValueError("Imitate needs babbling and outcomes together, or neither of them")
         self.policies = policies
         self.rng = rng
         self.repeats = repeats
         self.epsilon = epsilon
-        self.goals = goals
-        self.judge = judge
+        self.babbling = babbling
         self.outcomes = outcomes
 
     def attempt(self, context: Array, theta_d: Array, demonstration: Demonstration) -> Attempt:
         """theta_d, then its variations."""
+        goal = demonstration.outcome
+        if self.babbling is None or self.outcomes is None or not self.outcomes.contains(goal):
+            yield from self._repeat(theta_d, goal, [])
+            return
         outcomes: list[Array] = []
+        before = self.babbling.competence(context, goal)
         try:
-            for repeat in range(self.repeats) if self.repeats is not None else itertools.count():
-                # Deviation: the paper varies all repeats; the exact one shows what theta_d itself leads to.
-                theta = theta_d if repeat == 0 else self._vary(theta_d)
-                outcomes.append((yield Move(theta, demonstration.outcome, "imitate")))
+            yield from self._repeat(theta_d, goal, outcomes)
         finally:  # also when the next demonstration cuts in
-            self._emulate(context, demonstration.outcome, outcomes)
+            self.babbling.conclude(context, goal, outcomes, before, "social")
+
+    def _repeat(self, theta_d: Array, goal: Array, outcomes: list[Array]) -> Attempt:
+        """Movements; what they lead to goes into ``outcomes``."""
+        for repeat in range(self.repeats) if self.repeats is not None else itertools.count():
+            # Deviation: the paper varies all repeats; the exact one shows what theta_d itself leads to.
+            theta = theta_d if repeat == 0 else self._vary(theta_d)
+            outcomes.append((yield Move(theta, goal, "imitate")))
 
     def _vary(self, theta_d: Array) -> Array:
         return self.policies.clip(theta_d + self.rng.uniform(-self.epsilon, self.epsilon, theta_d.shape))
-
-    def _emulate(self, context: Array, goal: Array, outcomes: list[Array]) -> None:
-        if self.goals is None or self.judge is None or self.outcomes is None:
-            return
-        if outcomes and self.outcomes.contains(goal):
-            self.goals.add(context, goal, self.judge(context, goal, np.stack(outcomes)), "social")
 
 
 class Emulate:

@@ -1,6 +1,4 @@
-"""Goal interest mapping and deciding a goal: eqs. (3) and (4), the recursive split, the three goal modes."""
-
-from functools import partial
+"""Goal interest mapping and deciding a goal: eq. (4), the recursive split, the three goal modes."""
 
 import numpy as np
 import pytest
@@ -8,21 +6,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 
-from sgimd_torch.interest import InterestMap, UniformGoals
-from sgimd_torch.regions import signed_progress
+from sgimd_torch.interest import InterestMap
+from sgimd_torch.regions import absolute_progress, gained_progress, paired_progress
 from sgimd_torch.spaces import Array, Box, stream
 
 NO_CONTEXTS, LINE, SQUARE = Box.cube(0, 1, 0), Box.cube(0, 1, 1), Box.cube(0, 1, 2)
 NO_CONTEXT = np.empty(0)
-
-
-def interest(competences: list[float], strategy: str | None = None, **options) -> float:
-    """Of the only region of a map that saw these competences, oldest first."""
-    goals = InterestMap(NO_CONTEXTS, LINE, stream(0, "goals"), **options)
-    for index, competence in enumerate(competences):
-        goals.add(NO_CONTEXT, [index / 100], competence, "imitate" if index % 2 else "autonomous")
-    (region,) = goals.regions
-    return region.interest(strategy)
+BY_EQ_3 = {"g_max": 50, "max_aspect": np.inf, "progress": absolute_progress}
 
 
 def chi_square(counts: ArrayLike, probabilities: ArrayLike) -> float:
@@ -33,7 +23,7 @@ def chi_square(counts: ArrayLike, probabilities: ArrayLike) -> float:
 
 def four_regions_of_interest_1_2_3_4(**options) -> InterestMap:
     """The line, cut into quarters of interests .1, .2, .3 and .4: eq. (4) makes of them 0, 1/6, 2/6 and 3/6."""
-    goals = InterestMap(NO_CONTEXTS, LINE, stream(1, "goals"), window=4, **options)
+    goals = InterestMap(NO_CONTEXTS, LINE, stream(1, "goals"), window=4, **BY_EQ_3, **options)
     for index in range(112):
         goals.add(NO_CONTEXT, [(index * 0.6180339887) % 1], -1)  # the golden ratio spreads evenly: quarters
     assert len(goals.regions) == 4
@@ -46,51 +36,6 @@ def four_regions_of_interest_1_2_3_4(**options) -> InterestMap:
 
 def counts_in(regions: list, samples: Array) -> Array:
     return np.histogram(samples[:, 0], [region.low[0] for region in regions] + [1.0])[0]
-
-
-@pytest.mark.parametrize(
-    ("competences", "expected"),
-    [
-        ([-1, -0.5, 0], 0),  # fewer than 4
-        ([-1, -1, 0, 0], 0.5),  # |(0 + 0) - (-1 - 1)| / 4
-        ([0, 0, -1, -1], 0.5),  # falling counts like rising
-        ([-0.7, -1, -1, 0, 0], 0.5),  # 5 values: the oldest is dropped
-        ([-0.9, -0.8, -0.7, -0.3, -0.2, -0.1], 0.3),  # |-.6 + 2.4| / 6
-        ([-0.4] * 30, 0),
-    ],
-)
-def test_interest_is_the_change_between_the_halves_of_the_history(competences, expected):
-    assert interest(competences) == pytest.approx(expected)
-
-
-def test_interest_of_a_long_history_looks_at_its_window_alone():
-    competences = [0, 0, 0, -1, -1, -0.5, -0.25, 0]
-    assert interest(competences, window=4) == pytest.approx(0.3125)  # |(-.25 + 0) - (-1 - .5)| / 4
-    assert interest(competences, window=6) == pytest.approx(1.25 / 6)  # |-.75 + 2| / 6
-    assert interest(competences, window=8) == pytest.approx(0.09375)  # |-1.75 + 1| / 8
-
-
-def test_signed_progress_ignores_falling_competence_only():
-    assert interest([-1, -1, 0, 0], progress=signed_progress) == pytest.approx(0.5)
-    assert interest([0, 0, -1, -1], progress=signed_progress) == 0
-
-
-def test_a_measure_of_ones_own_is_given_the_window_oldest_first():
-    windows: list[list[float]] = []
-
-    def remember(competences: Array) -> float:
-        windows.append(competences.tolist())
-        return 7.0
-
-    assert interest([-0.9, -0.8, -0.7, -0.6, -0.5, -0.4, -0.3], window=6, progress=remember) == 7.0
-    assert windows[-1] == [-0.8, -0.7, -0.6, -0.5, -0.4, -0.3]
-
-
-def test_interest_of_a_strategy_counts_its_own_goals_alone():
-    competences = [-1, -0.4, -1, -0.4, 0, -0.4, 0, -0.4]  # autonomous rises, imitate stands still
-    assert interest(competences, "autonomous") == pytest.approx(0.5)
-    assert interest(competences, "imitate") == 0
-    assert interest(competences, "nobody's") == 0
 
 
 def test_regions_are_chosen_in_proportion_to_their_interest_above_the_least():
@@ -152,7 +97,7 @@ def test_a_new_map_draws_goals_from_the_whole_task_space():
 
 
 def test_only_regions_that_contain_the_context_are_chosen():
-    goals = InterestMap(LINE, LINE, stream(5, "goals"), modes=(1, 0, 0))
+    goals = InterestMap(LINE, LINE, stream(5, "goals"), modes=(1, 0, 0), **BY_EQ_3)
     rng, n_late = stream(5, "planted"), 0
     for _ in range(600):  # progress only in the upper half of contexts, and there for lower goals
         context, goal = rng.uniform(size=2)
@@ -183,7 +128,7 @@ def test_mode_3_does_not_leave_the_region():
 
 
 def test_mode_3_does_not_cross_a_cut():
-    goals = InterestMap(NO_CONTEXTS, LINE, stream(7, "goals"), modes=(0, 0, 1))
+    goals = InterestMap(NO_CONTEXTS, LINE, stream(7, "goals"), modes=(0, 0, 1), **BY_EQ_3)
     for index in range(51):
         goals.add(NO_CONTEXT, [index / 50], -0.5)
     _, above = goals.regions
@@ -203,9 +148,9 @@ def test_mode_3_tries_all_goals_that_are_equally_bad():
 
 
 def test_a_region_is_cut_when_it_holds_more_goals_than_allowed_and_not_before():
-    goals = InterestMap(NO_CONTEXTS, LINE, stream(9, "goals"), g_max=30)
-    for index in range(30):
-        goals.add(NO_CONTEXT, [index / 30], -1)
+    goals = InterestMap(NO_CONTEXTS, LINE, stream(9, "goals"), g_max=40)
+    for index in range(40):
+        goals.add(NO_CONTEXT, [index / 40], -1)
     assert [region.path for region in goals.regions] == ["R"]
     goals.add(NO_CONTEXT, [1.0], -1)
     assert [region.path for region in goals.regions] == ["R0", "R1"]
@@ -216,7 +161,7 @@ def test_a_cut_conserves_goals_and_their_order():
     points = rng.uniform(size=(200, 3))
     competences = -np.arange(200) / 200  # tells when a goal was added
     for point, competence in zip(points, competences, strict=True):
-        goals.add(point[:1], point[1:], competence)
+        goals.add(point[:1], point[1:], competence, gain=-competence)
     regions = goals.regions
     assert len(regions) > 3
     assert sorted(np.concatenate([region.competences for region in regions])) == sorted(competences)
@@ -224,14 +169,15 @@ def test_a_cut_conserves_goals_and_their_order():
         assert (np.diff(region.competences) < 0).all()
         rows = np.rint(-200 * region.competences).astype(int)
         np.testing.assert_array_equal(np.hstack((region.contexts, region.goals)), points[rows])
+        assert region.gains.tolist() == (-region.competences).tolist()
         assert region.attempts == len(region.goals)
 
 
-def cut_of(points: Array, competences: Array, **options) -> tuple[int, float]:
-    """(axis, position) of the first cut of the square."""
-    goals = InterestMap(NO_CONTEXTS, SQUARE, stream(11, "goals"), **options)
-    for point, competence in zip(points, competences, strict=True):
-        goals.add(NO_CONTEXT, point, competence)
+def cut_of(points: Array, competences: Array, gains: Array | None = None, **options) -> tuple[int, float]:
+    """(axis, position) of the first cut of the square, which is made at the 51st goal."""
+    goals = InterestMap(NO_CONTEXTS, SQUARE, stream(11, "goals"), **{**BY_EQ_3, **options})
+    for point, competence, gain in zip(points, competences, np.zeros(51) if gains is None else gains, strict=True):
+        goals.add(NO_CONTEXT, point, competence, gain=gain)
     below, _ = goals.regions
     axis = int(np.argmin(below.high))
     return axis, float(below.high[axis])
@@ -253,6 +199,22 @@ def test_a_region_is_cut_where_progress_ends(axis):
     assert cut_of(points, competences) == (axis, pytest.approx(8 / 21))  # the candidate between places .38 and .40
 
 
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_region_is_cut_where_gains_end_whatever_the_competences(axis):
+    points, along = evenly_spaced(axis)
+    competences = -stream(11, "planted").uniform(size=51)
+    cut = cut_of(points, competences, np.where(along < 0.39, 0.2, 0.0), progress=gained_progress)
+    assert cut == (axis, pytest.approx(8 / 21))  # 20 * 31 * .2 = 124; a place lower 17 * 34 * .19, higher 22 * 29 * .18
+
+
+def test_a_region_is_cut_where_paired_progress_ends():
+    points, along = evenly_spaced(0)
+    competences = np.where((along < 0.39) & (np.arange(51) % 2 == 0), 0.0, -1.0)  # flickers below .39
+    axis, cut = cut_of(points, competences, progress=paired_progress)
+    assert axis == 0
+    assert 0.3 < cut < 0.5
+
+
 def test_a_small_part_of_great_progress_does_not_outweigh_a_balanced_cut():
     points, along = evenly_spaced(0)
     early = np.arange(51) < 26
@@ -265,7 +227,7 @@ def test_a_small_part_of_great_progress_does_not_outweigh_a_balanced_cut():
 
 
 def test_without_any_difference_a_region_is_halved_across_its_longest_side():
-    goals = InterestMap(NO_CONTEXTS, Box(np.zeros(2), np.array([1.0, 1000.0])), stream(12, "goals"))
+    goals = InterestMap(NO_CONTEXTS, Box(np.zeros(2), np.array([1.0, 1000.0])), stream(12, "goals"), **BY_EQ_3)
     for point in stream(12, "planted").uniform([0, 0], [1, 1000], size=(60 * 16, 2)):
         goals.add(NO_CONTEXT, point, -1)
     sides = np.array([(region.high - region.low) / [1, 1000] for region in goals.regions])
@@ -275,12 +237,13 @@ def test_without_any_difference_a_region_is_halved_across_its_longest_side():
 
 
 def test_where_no_cut_is_valid_the_oldest_quarter_is_forgotten():
-    goals = InterestMap(NO_CONTEXTS, LINE, stream(13, "goals"))
+    goals = InterestMap(NO_CONTEXTS, LINE, stream(13, "goals"), g_max=50)
     competences = -np.arange(51) / 51
     for competence in competences:
-        goals.add(NO_CONTEXT, [0.3], competence)
+        goals.add(NO_CONTEXT, [0.3], competence, gain=-competence)
     (region,) = goals.regions
     assert region.competences.tolist() == competences[12:].tolist()  # 51 // 4 = 12
+    assert region.gains.tolist() == (-competences[12:]).tolist()
     goals.add(NO_CONTEXT, [0.3], -1)
     assert len(goals.regions[0].goals) == 40
     assert goals.regions[0].attempts == 52
@@ -288,14 +251,14 @@ def test_where_no_cut_is_valid_the_oldest_quarter_is_forgotten():
 
 def test_a_cut_leaves_a_twentieth_of_g_max_on_both_sides():
     for n_right, n_goals in ((2, [39]), (3, [48, 3])):  # 2 < 50 / 20 <= 3; 39 are left of 51 when none is cut
-        goals = InterestMap(NO_CONTEXTS, LINE, stream(14, "goals"), cuts=50)  # a cut between any two goals
+        goals = InterestMap(NO_CONTEXTS, LINE, stream(14, "goals"), g_max=50, cuts=50)  # a cut between any two goals
         for goal in [0.2] * (51 - n_right) + [0.8] * n_right:
             goals.add(NO_CONTEXT, [goal], -1)
         assert [len(region.goals) for region in goals.regions] == n_goals
 
 
 def test_a_goal_on_a_cut_belongs_above_it():
-    goals = InterestMap(NO_CONTEXTS, LINE, stream(15, "goals"))
+    goals = InterestMap(NO_CONTEXTS, LINE, stream(15, "goals"), g_max=50)
     for index in range(51):
         goals.add(NO_CONTEXT, [index / 50], -1)
     below, above = goals.regions
@@ -346,7 +309,7 @@ def test_leaves_tile_the_box_and_keep_each_goal_once_whatever_is_added(points, s
 
 def share_near_the_origin(seed: int, side: float, *, n: int, teach_every: int | None = None, **options) -> float:
     """Share of goals within [-2, 2]^2 of [-side, side]^2 after n goals, when only those in [-1, 1]^2 make progress."""
-    goals = InterestMap(NO_CONTEXTS, Box.cube(-side, side, 2), stream(seed, "goals"), **options)
+    goals = InterestMap(NO_CONTEXTS, Box.cube(-side, side, 2), stream(seed, "goals"), **{**BY_EQ_3, **options})
     teacher, reached = stream(seed, "teacher"), 0
     for index in range(n):
         taught = teach_every is not None and index % teach_every == 0
@@ -370,8 +333,34 @@ def test_goals_concentrate_where_a_teacher_shows_progress_in_a_ten_thousandfold_
     assert np.mean(shares) > 0.5  # without slivers; 8 seeds gave .47 to .78
 
 
+def half_hopeless(seed: int, **options) -> InterestMap:
+    """Below .5 some goals are as near as they get, others out of reach, for ever; above, attempts gain .1 each."""
+    goals, rng = InterestMap(NO_CONTEXTS, LINE, stream(seed, "goals"), **options), stream(seed, "planted")
+    for goal in rng.uniform(size=300):
+        if goal < 0.5:
+            goals.add(NO_CONTEXT, [goal], rng.choice([-1.0, -0.1]), gain=0.0)
+        else:
+            goals.add(NO_CONTEXT, [goal], -0.5, gain=0.1)
+    return goals
+
+
+def test_goals_are_chosen_where_attempts_gain_and_not_where_all_is_hopeless():
+    for seed in range(5):
+        goals = half_hopeless(seed, modes=(1, 0, 0))
+        share = np.mean([goals.sample(NO_CONTEXT)[0] > 0.5 for _ in range(500)])
+        assert share > 0.9  # all but what lies below .5 in the one region across it
+    by_eq_3 = half_hopeless(0, modes=(1, 0, 0), progress=absolute_progress)
+    assert np.mean([by_eq_3.sample(NO_CONTEXT)[0] > 0.5 for _ in range(500)]) < 0.5  # it takes places for times
+
+
+def test_a_region_of_hopeless_goals_keeps_the_goals_that_may_lie_anywhere():
+    goals = half_hopeless(0)
+    share = np.mean([goals.sample(NO_CONTEXT)[0] < 0.5 for _ in range(2000)])
+    assert share == pytest.approx(0.1, abs=0.05)  # half of mode 2's fifth, and of the region across .5 a part
+
+
 def test_sides_are_not_cut_much_shorter_than_others_beyond_the_largest_aspect():
-    goals = InterestMap(NO_CONTEXTS, SQUARE, stream(16, "goals"), max_aspect=2)
+    goals = InterestMap(NO_CONTEXTS, SQUARE, stream(16, "goals"), **{**BY_EQ_3, "max_aspect": 2})
     rng = stream(16, "planted")
     for x, y in rng.uniform(size=(600, 2)):
         goals.add(NO_CONTEXT, [x, y], -1 + x * rng.uniform())
@@ -381,7 +370,7 @@ def test_sides_are_not_cut_much_shorter_than_others_beyond_the_largest_aspect():
 
 
 def test_a_context_that_never_changes_is_never_cut():
-    goals = InterestMap(LINE, LINE, stream(17, "goals"), max_aspect=2)
+    goals = InterestMap(LINE, LINE, stream(17, "goals"), **{**BY_EQ_3, "max_aspect": 2})
     for goal in stream(17, "planted").uniform(size=400):
         goals.add([0.3], [goal], -goal)
     assert len(goals.regions) > 8
@@ -405,59 +394,14 @@ def test_only_sampling_draws():
 
 def test_what_is_read_is_a_snapshot_that_cannot_be_written_to():
     goals = InterestMap(NO_CONTEXTS, LINE, stream(19, "goals"))
-    goals.add(NO_CONTEXT, [0.5], -1)
+    goals.add(NO_CONTEXT, [0.5], -1, gain=0.25)
     (region,) = goals.regions
     goals.add(NO_CONTEXT, [0.6], -1)
     assert region.goals.tolist() == [[0.5]]
+    assert region.gains.tolist() == [0.25]
     assert goals.regions[0].goals.tolist() == [[0.5], [0.6]]
-    for array in (region.low, region.high, region.goals, region.contexts, region.competences, region.strategies):
-        assert not array.flags.writeable
-
-
-BOTH = pytest.mark.parametrize("make", [InterestMap, partial(InterestMap, window=20), UniformGoals])
-
-
-@BOTH
-def test_every_kind_of_goals_takes_the_same_place(make):
-    goals = make(LINE, SQUARE, stream(20, "goals"))
-    for _ in range(120):
-        goal = goals.sample([0.5])
-        assert goal.shape == (2,)
-        assert SQUARE.contains(goal)
-        goals.add([0.5], goal, -goal[0], "imitate")
-
-
-@BOTH
-@pytest.mark.parametrize(
-    ("context", "goal", "competence", "message"),
-    [
-        ([0.5], [0.5, np.nan], -0.5, "goal must be finite"),
-        ([0.5], [0.5], -0.5, "goal must have shape"),
-        ([0.5], [[0.5, 0.5]], -0.5, "goal must be one point"),
-        ([0.5], [0.5, 1.01], -0.5, "outcomes.contains"),
-        ([], [0.5, 0.5], -0.5, "context must have shape"),
-        ([1.5], [0.5, 0.5], -0.5, "context must be one point"),
-        ([[0.5]], [0.5, 0.5], -0.5, "context must be one point"),
-        ([0.5], [0.5, 0.5], np.nan, "competence must lie"),
-        ([0.5], [0.5, 0.5], 0.1, "competence must lie"),
-        ([0.5], [0.5, 0.5], -1.1, "competence must lie"),
-    ],
-)
-def test_what_is_not_an_attempt_at_a_goal_of_the_map_is_refused(make, context, goal, competence, message):
-    goals = make(LINE, SQUARE, stream(21, "goals"))
-    with pytest.raises(ValueError, match=message):
-        goals.add(context, goal, competence)
-    if "context" in message:
-        with pytest.raises(ValueError, match=message):
-            goals.sample(context)
-
-
-def test_uniform_goals_are_uniform_whatever_was_learnt():
-    goals = UniformGoals(NO_CONTEXTS, LINE, stream(22, "goals"))
-    for index in range(100):
-        goals.add(NO_CONTEXT, [0.1], -1 + index / 100)
-    counts = np.histogram([goals.sample(NO_CONTEXT) for _ in range(5000)], 10, (0, 1))[0]
-    assert chi_square(counts, np.full(10, 0.1)) < 27.9  # 9 degrees of freedom: odds 1 in 1000
+    for name in ("low", "high", "points", "goals", "contexts", "competences", "gains", "strategies"):
+        assert not getattr(region, name).flags.writeable
 
 
 @pytest.mark.parametrize(
@@ -465,7 +409,7 @@ def test_uniform_goals_are_uniform_whatever_was_learnt():
     [
         {"window": 5},
         {"window": 2},
-        {"window": 52},
+        {"window": 32},  # more than g_max
         {"modes": (0.7, 0.2, 0.2)},
         {"modes": (1.2, -0.2, 0.0)},
         {"cuts": 0},

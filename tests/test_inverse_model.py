@@ -15,7 +15,7 @@ Inverse = Callable[[Array, Array], Estimate]
 INVERSES: dict[str, Callable[[Memory], Inverse]] = {
     "local": LocalInverse,
     "nearest neighbour": NearestNeighbour,
-    "locally linear": lambda memory: LocallyLinear(memory, policies=Box.cube(0, 1, memory.theta_dim)),
+    "locally linear": LocallyLinear,
 }
 every_inverse = pytest.mark.parametrize("inverse_of", INVERSES.values(), ids=INVERSES.keys())
 
@@ -120,58 +120,58 @@ def test_nearest_neighbour_repeats_the_movement_that_came_nearest() -> None:
     assert estimate.outcomes.ravel().tolist() == [1.0, 2.0]
 
 
-def linear_world(noise: float = 0.0) -> tuple[Memory, Array, Box]:
+def linear_world(noise: float = 0.0) -> tuple[Memory, Array]:
     """One family of 5-D movements whose 2-D outcomes are linear in them."""
     rng = stream(1, "test inverse")
     jacobian = rng.normal(size=(5, 2))
     thetas = 0.5 + rng.uniform(-0.05, 0.05, (40, 5))
-    return remember(thetas, thetas @ jacobian + rng.normal(0, noise, (40, 2))), jacobian, Box.cube(0, 1, 5)
+    return remember(thetas, thetas @ jacobian + rng.normal(0, noise, (40, 2))), jacobian
 
 
 def test_where_outcomes_are_linear_in_theta_the_linear_model_meets_the_goal_exactly() -> None:
-    memory, jacobian, policies = linear_world()
+    memory, jacobian = linear_world()
     goal = memory.outcomes.mean(axis=0) + np.array([0.1, -0.05])
-    linear = LocallyLinear(memory, policies=policies, ridge=1e-12, width=1.0)(NO_CONTEXT, goal)
+    linear = LocallyLinear(memory, ridge=1e-12, width=1.0)(NO_CONTEXT, goal)
     assert linear.theta @ jacobian == pytest.approx(goal, abs=1e-9)
-    local = LocalInverse(memory, width=1.0)(NO_CONTEXT, goal)
+    local = LocalInverse(memory, k_max=20, width=1.0)(NO_CONTEXT, goal)
     assert np.linalg.norm(local.theta @ jacobian - goal) > 0.01  # an average alone stays among what was reached
     assert np.array_equal(linear.thetas, local.thetas)
 
 
 def test_a_strong_ridge_leaves_the_weighted_mean() -> None:
-    memory, _, policies = linear_world(noise=0.02)
+    memory, _ = linear_world(noise=0.02)
     goal = np.array([0.3, 0.2])
-    ridged = LocallyLinear(memory, policies=policies, ridge=1e12, width=1.0)(NO_CONTEXT, goal)
-    assert ridged.theta == pytest.approx(LocalInverse(memory, width=1.0)(NO_CONTEXT, goal).theta)
+    ridged = LocallyLinear(memory, ridge=1e12, width=1.0)(NO_CONTEXT, goal)
+    assert ridged.theta == pytest.approx(LocalInverse(memory, k_max=20, width=1.0)(NO_CONTEXT, goal).theta)
 
 
 def test_the_linear_model_does_not_care_in_which_unit_outcomes_are_measured() -> None:
-    memory, _, policies = linear_world(noise=0.02)
+    memory, _ = linear_world(noise=0.02)
     goal = np.array([0.3, 0.2])
-    metres = LocallyLinear(memory, policies=policies, ridge=0.5)(NO_CONTEXT, goal)
+    metres = LocallyLinear(memory, ridge=0.5)(NO_CONTEXT, goal)
     in_centimetres = remember(memory.thetas, 100 * memory.outcomes)
-    centimetres = LocallyLinear(in_centimetres, policies=policies, ridge=0.5)(NO_CONTEXT, 100 * goal)
+    centimetres = LocallyLinear(in_centimetres, ridge=0.5)(NO_CONTEXT, 100 * goal)
     assert centimetres.theta == pytest.approx(metres.theta)
 
 
-def test_the_linear_model_is_clipped_to_the_policy_space_for_goals_out_of_reach() -> None:
-    memory, _, policies = linear_world()
-    theta = LocallyLinear(memory, policies=policies)(NO_CONTEXT, np.array([100.0, 100.0])).theta
-    assert policies.contains(theta)
-    assert np.isin(theta, [0.0, 1.0]).any()
+def test_for_a_goal_out_of_reach_the_linear_model_stays_in_the_box_of_what_was_executed() -> None:
+    memory, _ = linear_world()
+    theta = LocallyLinear(memory)(NO_CONTEXT, np.array([100.0, 100.0])).theta
+    executed = Box(memory.thetas.min(axis=0), memory.thetas.max(axis=0))
+    assert executed.contains(theta)
+    assert np.isin(theta, [executed.low, executed.high]).any()
 
 
 def test_outcomes_on_a_line_move_the_linear_model_along_it_and_not_across() -> None:
-    policies = Box.cube(0, 1, 1)
     memory = remember(np.array([[0.4], [0.45], [0.5]]), np.array([[0.0, 1.0], [0.1, 1.0], [0.2, 1.0]]))
-    inverse = LocallyLinear(memory, policies=policies, ridge=1e-9)
-    assert inverse(NO_CONTEXT, np.array([0.3, 1.0])).theta[0] == pytest.approx(0.55, abs=1e-6)
-    assert inverse(NO_CONTEXT, np.array([0.3, 1.5])).theta[0] == pytest.approx(0.55, abs=1e-6)
+    inverse = LocallyLinear(memory, ridge=1e-9)
+    assert inverse(NO_CONTEXT, np.array([0.17, 1.0])).theta[0] == pytest.approx(0.485, abs=1e-6)
+    assert inverse(NO_CONTEXT, np.array([0.17, 1.5])).theta[0] == pytest.approx(0.485, abs=1e-6)
 
 
 def test_outcomes_that_coincide_give_the_linear_model_no_slope() -> None:
     memory = line({0.4: 1.0, 0.45: 1.0, 0.5: 1.0})
-    theta = LocallyLinear(memory, policies=Box.cube(0, 1, 1))(NO_CONTEXT, np.array([2.0])).theta
+    theta = LocallyLinear(memory)(NO_CONTEXT, np.array([2.0])).theta
     assert theta == LocalInverse(memory)(NO_CONTEXT, np.array([2.0])).theta
 
 
@@ -239,4 +239,4 @@ def test_a_gaussian_without_width_is_refused() -> None:
 
 def test_a_ridge_of_nothing_is_refused() -> None:
     with pytest.raises(ValueError, match="ridge"):
-        LocallyLinear(line({0.0: 0.0}), policies=Box.cube(0, 1, 1), ridge=0.0)
+        LocallyLinear(line({0.0: 0.0}), ridge=0.0)

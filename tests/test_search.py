@@ -56,7 +56,7 @@ def test_the_simplex_visits_the_same_points_as_scipy(
         options={"initial_simplex": simplex, "adaptive": adaptive, "maxfev": 2000, "maxiter": np.inf},
     )
     values = np.array([function(x) for x in simplex])
-    descent = simplex_descent(simplex, values, box=box, adaptive=adaptive)
+    descent = simplex_descent(simplex, values, place=box.clip if box else None, adaptive=adaptive)
     ours = drive(descent, function, 2000 - len(simplex))
     assert np.array_equal(np.array(ours), np.array(visited[dim + 1 :]))
     assert len(ours) > 20
@@ -119,7 +119,7 @@ def rng() -> np.random.Generator:
     return stream(0, "search")
 
 
-simplex_search = partial(nelder_mead, step=0.05, complete=True, adaptive=False, xatol=1e-4, fatol=1e-4)
+simplex_search = partial(nelder_mead, noise=0.0, step=0.05, complete=True, adaptive=False, xatol=1e-4, fatol=1e-4)
 
 
 def reflection(world: World, vertices: Array) -> Array:
@@ -231,11 +231,12 @@ def searches(policies: Box, rng: np.random.Generator) -> dict[str, Search]:
         "complete": simplex_search(policies, rng, step=0.5),
         "incomplete": simplex_search(policies, rng, complete=False),
         "adaptive": simplex_search(policies, rng, adaptive=True),
+        "noisy": simplex_search(policies, rng, noise=0.5),
         "perturb": perturb(policies, rng, sd=0.5),
     }
 
 
-@pytest.mark.parametrize("name", ["complete", "incomplete", "adaptive", "perturb"])
+@pytest.mark.parametrize("name", ["complete", "incomplete", "adaptive", "noisy", "perturb"])
 def test_no_search_leaves_the_policy_space_even_from_its_corners_towards_noise(name: str) -> None:
     rng = stream(3, "noise")
     for seed in range(1, 8):
@@ -268,6 +269,9 @@ def test_wrong_steps_and_noise_are_refused() -> None:
     for step in (0.0, 0.6, np.nan):
         with pytest.raises(ValueError, match="step"):
             simplex_search(Box.cube(0, 1, 2), rng(), step=step)
+    for noise in (-0.1, 0.6, np.nan):
+        with pytest.raises(ValueError, match="noise"):
+            nelder_mead(Box.cube(0, 1, 2), rng(), noise=noise)
     with pytest.raises(ValueError, match="sd"):
         perturb(Box.cube(0, 1, 2), stream(0, "search"), sd=0.0)
 
@@ -372,8 +376,59 @@ def test_in_a_corner_of_a_small_box_the_simplex_is_not_flat() -> None:
     policies = Box.cube(0, 1, 2)
     theta, neighbour = np.array([0.95, 0.05]), np.array([0.45, 0.55])  # mirroring in this corner leads along their line
     for seed in range(50):
-        search = nelder_mead(policies, stream(seed, "search"), step=0.1, xatol=1e-4)
+        search = nelder_mead(policies, stream(seed, "search"), noise=0.0, step=0.1, xatol=1e-4)
         estimate = Estimate(theta, neighbour[None], np.array([[0.0, 1.0]]))
         executed = drive(search(estimate, np.zeros(2)), lambda x: x, 2)
         edges = np.array([neighbour, executed[1]]) - theta
         assert abs(np.linalg.det(edges)) > 1e-4
+
+
+def noise_of(world: World, noise: float, seed: int, n: int) -> Array:
+    """Where ``n`` movements went, less where the exact simplex would have gone from where those before them went."""
+    search = nelder_mead(world.policies, stream(seed, "search"), noise=noise, xatol=1e-4, fatol=1e-4)
+    executed = world.run(search, n)
+    assert world.policies.contains(np.array(executed)).all()
+    differences, later = [executed[0] - world.theta], iter(executed[1:])
+
+    def place(theta: Array) -> Array:
+        went = next(later)
+        differences.append(went - theta)
+        return went
+
+    vertices = np.vstack((executed[0], world.thetas))
+    values = np.array([world.distance(vertex) for vertex in vertices])
+    descent = simplex_descent(vertices, values, place=place, xatol=1e-4, fatol=1e-4)
+    replayed = drive(descent, world.distance, n - 2)  # the next is placed, too
+    assert np.array_equal(replayed, executed[1 : n - 1])
+    return np.array(differences)
+
+
+def test_every_movement_goes_beside_the_exact_simplex_by_the_noise_and_its_vertex_is_where_it_went() -> None:
+    differences = np.stack([noise_of(World(dim=6, k=2), 0.02, seed, 25) for seed in range(40)])
+    assert differences.shape == (40, 25, 6)
+    # 6000 values: standard error of the mean sd / 77, of the standard deviation sd / 110; five of them.
+    assert differences.mean() == pytest.approx(0, abs=5 * 0.02 / 77)
+    assert differences.std() == pytest.approx(0.02, rel=5 / 110)
+    assert differences.std(axis=(0, 2)) == pytest.approx(np.full(25, 0.02), rel=5 / 22)  # at every movement, of 240
+
+
+def test_the_noise_is_in_sides_of_the_policy_space_and_reaches_every_parameter() -> None:
+    policies, draw = Box(np.array([0.0, -100.0]), np.array([1.0, 100.0])), rng()
+    start = Estimate(np.array([0.5, 0.0]), np.empty((0, 2)), np.empty((0, 2)))
+    search = nelder_mead(policies, draw)
+    thetas = np.array([next(search(start, np.zeros(2))) for _ in range(2000)])
+    # Standard errors: of the mean sd / 45, of the standard deviation sd / 63; five of them.
+    assert (thetas.mean(axis=0) / [1, 200]) == pytest.approx([0.5, 0.0], abs=5 * 0.05 / 45)
+    assert thetas.std(axis=0) == pytest.approx([0.05, 10.0], rel=5 / 63)
+
+
+def test_the_noise_comes_from_the_stream_and_without_noise_nothing_is_drawn() -> None:
+    world, draw = World(dim=6, k=2), rng()
+    search = partial(nelder_mead, world.policies, xatol=1e-4, fatol=1e-4)  # so that no neighbour is too near
+    first, same, other = (np.array(world.run(search(stream(seed, "search")), n=6)) for seed in (1, 1, 2))
+    assert np.array_equal(first, same)
+    assert not np.isclose(first[0], other[0]).any()
+    state = draw.bit_generator.state
+    exact = np.array(world.run(search(draw, noise=0.0), n=6))
+    assert np.array_equal(exact[0], world.theta)
+    assert draw.bit_generator.state == state

@@ -12,7 +12,7 @@ from sgimd_torch.algorithms import attempted, emulating, imitating, imitation, r
 from sgimd_torch.environment import PlanarArm
 from sgimd_torch.evaluation import evaluate
 from sgimd_torch.interest import UniformGoals
-from sgimd_torch.inverse_model import LocalInverse, LocallyLinear, NearestNeighbour
+from sgimd_torch.inverse_model import LocalInverse, NearestNeighbour
 from sgimd_torch.search import perturb
 from sgimd_torch.session import Recorded, ReplayError, live, replay, run
 from sgimd_torch.spaces import Array, Episode, stream
@@ -261,11 +261,11 @@ def test_all_initial_demonstrations_reach_the_learner_before_it_is_left_alone() 
     [
         {"goals": UniformGoals},
         {"inverse": NearestNeighbour},
-        {"inverse": lambda memory: LocallyLinear(memory, policies=PlanarArm(5).policies)},
+        {"inverse": LocalInverse},
         {"search": partial(perturb, sd=0.1)},
         {"judge": attempted},
         {"judge": remembered},
-        {"budget": 3, "tolerance": 0.1, "global_range": (0.0, 0.2)},
+        {"budget": 3, "tolerance": 0.1, "global_range": (0.0, 0.2), "give_up": -1.0},
         {"social": emulating},
     ],
 )

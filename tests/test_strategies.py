@@ -1,4 +1,4 @@
-"""Strategies: movements inside Pi, one goal remembered for each attempt however it ends, and the paper's regimes."""
+"""Strategies: movements inside Pi, one goal remembered for each attempt however it ends, and what it had gained."""
 
 from collections.abc import Callable, Generator, Iterator
 from functools import partial
@@ -26,12 +26,16 @@ class Diary:
     def __init__(self, goal: Array = FAR) -> None:
         self.goal = goal
         self.entries: list[tuple[Array, float, str]] = []
+        self.gains: list[float] = []
 
     def sample(self, context: Array) -> Array:
         return self.goal
 
-    def add(self, context: Array, goal: Array, competence: float, strategy: str = "autonomous") -> None:
+    def add(
+        self, context: Array, goal: Array, competence: float, strategy: str = "autonomous", gain: float = 0.0
+    ) -> None:
         self.entries.append((goal, competence, strategy))
+        self.gains.append(gain)
 
 
 def remembering(n: int) -> Memory:
@@ -51,6 +55,7 @@ def babbling(
     budget: int = 12,
     tolerance: float = 1e-9,
     global_range: tuple[float, float] = (0.0, 0.0),
+    give_up: float = -1.0,
     seed: int = 0,
 ) -> GoalBabbling:
     return GoalBabbling(
@@ -65,6 +70,7 @@ def babbling(
         budget=budget,
         tolerance=tolerance,
         global_range=global_range,
+        give_up=give_up,
     )
 
 
@@ -103,15 +109,14 @@ LESSON = demonstrate(ARM, [-0.5, 0.5])
 THETA_D = LESSON.trajectory[-1]
 
 
-def imitation(goals: Diary, repeats: int | None = 4, **options: object) -> Imitate:
+def imitation(goals: Diary, repeats: int | None = 4, *, memory: Memory | None = None, epsilon: float = 0.05) -> Imitate:
     return Imitate(
         ARM.policies,
         stream(0, "imitate"),
         repeats=repeats,
-        goals=goals,
-        judge=AttemptCompetence(MEASURE),
+        epsilon=epsilon,
+        babbling=babbling(Memory(0, 5, 2) if memory is None else memory, goals),
         outcomes=ARM.outcomes,
-        **options,
     )
 
 
@@ -291,11 +296,11 @@ def test_imitation_without_goals_only_imitates() -> None:
     assert len(live(imitate.attempt(NO_CONTEXT, THETA_D, LESSON))) == 3
 
 
-def test_imitation_takes_goals_judge_and_task_space_together_or_none() -> None:
+def test_imitation_takes_babbling_and_task_space_together_or_neither() -> None:
     with pytest.raises(ValueError, match="together"):
-        Imitate(ARM.policies, stream(0, "imitate"), goals=Diary())
+        Imitate(ARM.policies, stream(0, "imitate"), babbling=babbling(Memory(0, 5, 2), Diary()))
     with pytest.raises(ValueError, match="together"):
-        Imitate(ARM.policies, stream(0, "imitate"), goals=Diary(), judge=AttemptCompetence(MEASURE))
+        Imitate(ARM.policies, stream(0, "imitate"), outcomes=ARM.outcomes)
 
 
 def test_emulation_pursues_the_demonstrated_outcome_and_not_the_learners_own_goal() -> None:
@@ -320,3 +325,96 @@ def test_remembering_stores_the_demonstrated_pair_and_moves_not_at_all() -> None
     assert live(Remember(memory).attempt(NO_CONTEXT, THETA_D, LESSON)) == []
     assert memory.thetas.tolist() == [THETA_D.tolist()]
     assert memory.outcomes.tolist() == [LESSON.outcome.tolist()]
+
+
+METRE = ARM.rest - np.array([1.0, 0.0])  # a goal 1 m from rest: competence at it is -1 plus the part of the way made
+AT_METRE = Demonstration(NO_CONTEXT, LESSON.times, LESSON.trajectory, METRE)
+
+
+def way(part: float) -> Array:
+    return ARM.rest - np.array([part, 0.0])
+
+
+def having_made(*parts: float, context: Array = NO_CONTEXT) -> Memory:
+    memory = Memory(len(context), 5, 2)
+    for part in parts:
+        memory.add(context, np.full(5, 0.5), way(part))
+    return memory
+
+
+def make_way(attempt: Attempt, memory: Memory, *parts: float, context: Array = NO_CONTEXT) -> int:
+    """How many movements it makes when they make these parts of the way, and a demonstration interrupts the next."""
+    move = next(attempt)
+    for n, part in enumerate(parts, start=1):
+        memory.add(context, move.theta, way(part))
+        try:
+            move = attempt.send(way(part))
+        except StopIteration:
+            return n
+    attempt.close()
+    return len(parts)
+
+
+def answers(memory: Memory, goals: Diary, n: int) -> dict[str, Attempt]:
+    """Attempts of ``n`` movements at the goal a metre away."""
+    pursuit = babbling(memory, goals, budget=n)
+    return {
+        "goal babbling": pursuit.attempt(NO_CONTEXT),
+        "emulate": Emulate(pursuit, ARM.outcomes).attempt(NO_CONTEXT, THETA_D, AT_METRE),
+        "imitate": imitation(goals, n, memory=memory).attempt(NO_CONTEXT, THETA_D, AT_METRE),
+    }
+
+
+@pytest.mark.parametrize("name", ["goal babbling", "emulate", "imitate"])
+@pytest.mark.parametrize("n", [3, 12], ids=["to the end", "interrupted"])
+@pytest.mark.parametrize(
+    ("before", "made", "gain"),
+    [
+        ((0.2,), (0.1, 0.5, 0.4), 0.3),  # from -.8 to -.5, though the last movement left it at -.6
+        ((0.2, 0.3), (0.9, 0.1, 0.1), 0.6),
+        ((0.6,), (0.5, 0.6, 0.0), 0.0),  # no better than what was remembered
+        ((), (0.25, 0.0, 0.0), 0.25),  # an empty memory is worth -1
+        ((), (0.0, -0.5, 0.0), 0.0),
+    ],
+)
+def test_the_gain_of_an_attempt_is_its_goals_competence_afterwards_less_that_before(
+    name: str, n: int, before: tuple[float, ...], made: tuple[float, ...], gain: float
+) -> None:
+    memory, goals = having_made(*before), Diary(METRE)
+    assert make_way(answers(memory, goals, n)[name], memory, *made) == 3
+    assert goals.gains == pytest.approx([gain])
+    assert goals.entries[0][1] == pytest.approx(max(made) - 1)  # judged by the attempt alone, as this judge does
+
+
+def test_a_gain_is_never_negative_where_contexts_vary() -> None:
+    # At .3 of context from here the goal was met; here, .2 of the way is missing, which is nearer than .3.
+    here, there = np.array([0.0]), np.array([0.3])
+    memory, goals = having_made(1.0, context=there), Diary(METRE)
+    strategy = babbling(memory, goals, budget=1)
+    assert strategy.competence(here, METRE) == 0
+    assert make_way(strategy.attempt(here), memory, 0.8, context=here) == 1
+    assert strategy.competence(here, METRE) == pytest.approx(-0.2)
+    assert goals.gains == [0.0]
+
+
+@pytest.mark.parametrize(
+    ("give_up", "before", "made", "n"),
+    [
+        (-0.5, 0.2, (0.1, 0.9, 0.9, 0.9), 1),  # hopeless, and no nearer
+        (-0.5, 0.2, (0.2, 0.9, 0.9, 0.9), 1),  # as near is no nearer
+        (-0.5, 0.2, (0.3, 0.4, 0.35, 0.9), 3),  # nearer, nearer, no nearer
+        (-0.5, 0.2, (0.3, 0.55, 0.0, 0.0), 4),  # no longer hopeless
+        (-0.5, 0.6, (0.0, 0.1, 0.2, 0.3), 4),  # hopeful
+        (-0.5, 0.5, (0.0, 0.0, 0.0, 0.0), 4),  # -.5 is not below -.5
+        (-0.3, 0.6, (0.0, 0.9, 0.9, 0.9), 1),
+        (-1.0, 0.0, (0.0, 0.0, 0.0, 0.0), 4),  # -1 never gives up
+    ],
+)
+def test_a_hopeless_goal_is_given_up_at_the_first_movement_that_brings_it_no_nearer(
+    give_up: float, before: float, made: tuple[float, ...], n: int
+) -> None:
+    memory, goals = having_made(before), Diary(METRE)
+    attempt = babbling(memory, goals, budget=4, give_up=give_up).attempt(NO_CONTEXT)
+    assert make_way(attempt, memory, *made) == n
+    ((_, competence, _),) = goals.entries  # what was learnt counts
+    assert competence == pytest.approx(max(made[:n]) - 1)
