@@ -1,0 +1,67 @@
+"""CMA-ES as a search: the evolution strategy that the field would reach for, in the place of Nelder-Mead.
+
+Hansen & Ostermeier (2001), by Hansen's own package ``cma``; section 4.4.2 of Nguyen & Oudeyer (2014) is what it rivals.
+``sgim_d(environment, seed, correspondence=..., search=cma_es)``
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator
+
+import numpy as np
+
+from sgimd_torch.spaces import Array, Box, Estimate, Search
+
+try:
+    from cma import CMAEvolutionStrategy
+except ImportError as error:
+    raise ImportError(f"CMA-ES needs the package cma: pip install 'sgimd-torch[rivals]' ({error})") from error
+
+
+def cma_es(policies: Box, rng: np.random.Generator, *, sd: float = 0.05, population: int | None = 4) -> Search:
+    """Covariance matrix adaptation on the distance to the goal, around theta_g, which is executed first.
+
+    It starts anew for each goal, and of the estimate it uses theta_g alone: its distribution has no place for what is
+    remembered. Nothing is printed or written, and its draws are all from ``rng``.
+
+    Args:
+        policies: Pi; nothing outside is proposed.
+        sd: of the first generation, in sides of ``policies``, as that of `perturb`.
+        population: movements of a generation, at least 3; None for cma's own number, 4 + 3 ln(theta_dim). Deviation:
+            that is 13 for the rod, so that of a goal's 15 movements all but one would be the first generation and
+            whatever it teaches would go unused. With 4 (two mirrored pairs) there are three generations.
+
+    Raises:
+        ValueError: a number out of its range, or a Pi of one dimension.
+    """
+    if not 0 < sd < np.inf:
+        raise ValueError(f"sd must be positive and finite, got {sd}; without noise nothing new is tried")
+    if population is not None and population < 3:
+        raise ValueError(f"population must be at least 3 movements, got {population}")
+    if policies.dim < 2:
+        raise ValueError(f"CMA-ES adapts covariances, so Pi needs 2 dimensions or more, got {policies.dim}")
+    options = {
+        "bounds": [0, 1],
+        "randn": lambda *shape: rng.standard_normal(shape),
+        "seed": math.nan,  # the package would seed numpy's global stream
+        "verb_log": 0,  # writes no files
+        "verbose": -10,  # prints nothing, looks for no file of signals
+        **({} if population is None else {"popsize": population}),
+    }
+
+    def search(start: Estimate, goal: Array) -> Generator[Array, Array, None]:
+        theta = policies.check("theta of the estimate", start.theta)
+        yield theta
+        # In sides of Pi, whatever its units.
+        centre = np.clip((theta - policies.low) / policies.sides, 0, 1)
+        strategy = CMAEvolutionStrategy(centre, sd, options)
+        while not strategy.stop():
+            generation = strategy.ask()
+            distances = []
+            for point in generation:
+                theta = policies.clip(policies.low + policies.sides * point)
+                distances.append(math.dist(goal, (yield theta)))
+            strategy.tell(generation, distances)
+
+    return search
