@@ -1,42 +1,36 @@
 """The fishing rod: a six-joint arm casts a float on the water, simulated by MuJoCo.
 
 Section 4 of Nguyen & Oudeyer (2014); the model is ``fishing_rod.xml``. A movement is open loop, so its whole sequence
-of commands, noise included, is computed first and then run in C.    outcome = FishingRod().execute(context, theta, rng)
+of commands, noise included, is computed first and then run.    outcome = FishingRod().execute(context, theta, rng)
 
-Where the float lands: at the first point where it meets the water (z = 0), on the line between two steps. If it has
-not met the water ``HOLD`` seconds after the movement's end, the line is let out: the float flies on freely with the
-velocity it has, the wind pushing it, and lands where its parabola meets the water. So every movement has exactly one
-landing point.
+``casting.py`` says where the float lands. If it has not met the water ``HOLD`` seconds after the movement's end, the
+line is let out.
 """
 
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Sequence
 from pathlib import Path
 
-import mujoco
 import numpy as np
-from mujoco import rollout
 from numpy.typing import ArrayLike
 from scipy.signal import lfilter
 
+from sgimd_torch.casting import Caster, Recording
 from sgimd_torch.environment import SimulationError, check_movement, check_rng
 from sgimd_torch.motor_primitives import GaussianPrimitive
 from sgimd_torch.spaces import Array, Box, check_count, check_vector, first_entry
 
+MODEL = Path(__file__).with_name("fishing_rod.xml")
 JOINTS = ("yaw", "shoulder", "elbow", "forearm_roll", "wrist_pitch", "wrist_yaw")
 JOINT_RANGES = Box(np.array([-1.6, 0.1, -1.2, -0.6, -0.4, -1.4]), np.array([1.6, 1.5, 0.8, 0.6, 1.4, 1.4]))  # rad
 DURATIONS = (0.8, 1.6)  # s, of a movement
 HOLD = 0.15  # s, the last posture is held before the line is let out
 CORRELATION = 0.96  # of the motor noise from one step to the next
 LONGEST = 60.0  # s, of a recording to replay
-TOP_SPEED = 500.0  # rad/s; 100,000 random movements stay far below, a diverging simulation runs through it
 
-_STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
 _BLOCK = 128  # movements side by side, so that memory stays small and Ctrl-C is heard
-_CHUNK = 90  # steps run in C before looking whether the float has landed
 
 
 class FishingRod:
@@ -78,20 +72,18 @@ class FishingRod:
         self._context_columns = np.flatnonzero(ranges)
         self.contexts = Box(-ranges[self._context_columns], ranges[self._context_columns])
 
-        self.model = mujoco.MjModel.from_xml_path(str(Path(__file__).with_name("fishing_rod.xml")))
-        self._threads = check_count("threads", threads, 1) if threads is not None else os.cpu_count() or 1
-        self._data = mujoco.MjData(self.model)
-        self._pools: dict[int, tuple[rollout.Rollout, list[mujoco.MjData]]] = {}
-        self.steps = 0
-        """Physics steps simulated so far, of all movements together."""
-        self._gravity = -float(self.model.opt.gravity[2])
-        self._float_mass = float(self.model.body("float").mass[0])
+        threads = None if threads is None else check_count("threads", threads, 1)
+        self._caster = Caster(MODEL, (JOINT_RANGES.low + JOINT_RANGES.high) / 2, threads)
+        self.model = self._caster.model
+        self._home = self._caster.home
         self._draws = len(self._times(DURATIONS[1] + HOLD))  # of the motor noise, for each joint
-        self._home = self._settle()
-        self.rest = self.outcomes.check(
-            "rest, below the hanging float,", self._data.sensordata[:2].copy(), "is T in m?"
-        )
+        self.rest = self.outcomes.check("rest, below the hanging float,", self._caster.hanging[:2].copy(), "is T in m?")
         self.rest.flags.writeable = False
+
+    @property
+    def steps(self) -> int:
+        """Physics steps simulated so far, of all movements together."""
+        return self._caster.steps
 
     def observe(self, rng: np.random.Generator) -> Array:
         """``(context_dim,)`` the context of the next movement, uniform over ``contexts``; empty in the fishing task."""
@@ -138,6 +130,13 @@ class FishingRod:
         blocks = [slice(start, start + _BLOCK) for start in range(0, len(thetas), _BLOCK)]
         return np.concatenate([self._execute(contexts[block], thetas[block], rngs[block]) for block in blocks])
 
+    def record(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Recording:
+        """As ``execute``, but keeping every step, for films and close looks; takes twice as long."""
+        context, theta = check_movement(self, context, theta)
+        commands, end = self._commands(theta, rng), self.primitive.duration(theta) + HOLD
+        outcome = self._cast(context[None], theta[None], [commands], np.array([end]))[0]
+        return self._caster.record(outcome, commands, end, self._yaw_wind(context[None]))
+
     def replay(self, times: ArrayLike, trajectory: ArrayLike) -> Array:
         """Where the float lands when the arm is led along a recorded trajectory, without noise, in the zero context.
 
@@ -165,7 +164,7 @@ class FishingRod:
         end = float(times[-1]) + HOLD
         steps = self._times(end)
         commands = np.stack([np.interp(steps, times, column) for column in trajectory.T], axis=1)
-        landings, diverged = self._cast(np.zeros((1, self.contexts.dim)), [commands], np.array([end]))
+        landings, diverged = self._caster.cast([commands], np.array([end]))
         if diverged.any():
             raise SimulationError(trajectory[-1], "the simulation of a recorded trajectory diverged")
         return landings[0]
@@ -173,11 +172,21 @@ class FishingRod:
     def _execute(self, contexts: Array, thetas: Array, rngs: Sequence[np.random.Generator]) -> Array:
         commands = [self._commands(theta, rng) for theta, rng in zip(thetas, rngs, strict=True)]
         ends = np.array([self.primitive.duration(theta) + HOLD for theta in thetas])
-        landings, diverged = self._cast(contexts, commands, ends)
+        return self._cast(contexts, thetas, commands, ends)
+
+    def _cast(self, contexts: Array, thetas: Array, commands: list[Array], ends: Array) -> Array:
+        landings, diverged = self._caster.cast(commands, ends, self._yaw_wind(contexts))
         if diverged.any():
             row = int(np.flatnonzero(diverged)[0])
             raise SimulationError(thetas[row], f"the simulation diverged in context {contexts[row].tolist()}")
         return landings
+
+    def _yaw_wind(self, contexts: Array) -> Array | None:
+        if not self.contexts.dim:
+            return None
+        yaw_wind = np.zeros((len(contexts), 2))
+        yaw_wind[:, self._context_columns] = contexts
+        return yaw_wind
 
     def _times(self, end: float) -> Array:
         """When the commands up to ``end`` (s) are given; one more, as sensors show the state *before* each step."""
@@ -198,85 +207,3 @@ class FishingRod:
         speed = np.abs(trajectory[1:] - trajectory[:-1]) / self.model.opt.timestep
         trajectory[:-1] += self.noise * speed * noise[:-1]
         return trajectory
-
-    def _settle(self) -> Array:
-        """c_org, the start configuration: joints in the middle of their ranges, the line hanging still."""
-        middle = (JOINT_RANGES.low + JOINT_RANGES.high) / 2
-        self._data.qpos[:6] = middle
-        self._data.qpos[6] = -(middle[1] + middle[2] + middle[4])  # undoes the rod's pitch: the line hangs plumb
-        self._data.act[:6] = self._data.ctrl[:6] = middle
-        mujoco.mj_step(self.model, self._data, nstep=1000)
-        self._data.qvel[:] = 0
-        self._data.time = 0
-        mujoco.mj_forward(self.model, self._data)
-        home = np.zeros(mujoco.mj_stateSize(self.model, _STATE))
-        mujoco.mj_getState(self.model, self._data, home, _STATE)
-        return home
-
-    def _cast(self, contexts: Array, commands: list[Array], ends: Array) -> tuple[Array, np.ndarray]:
-        """``(n, 2)`` landing points of n command sequences, the line let out at ``ends`` (s), and who diverged."""
-        n = len(commands)
-        steps = np.array([len(c) for c in commands])
-        controls = np.zeros((n, int(steps.max()), self.model.nu))
-        for k, sequence in enumerate(commands):
-            controls[k, : len(sequence), :6] = sequence
-            controls[k, len(sequence) :, :6] = sequence[-1]
-        states = np.repeat(self._home[None], n, axis=0)
-        if self.contexts.dim:
-            yaw_wind = np.zeros((n, 2))
-            yaw_wind[:, self._context_columns] = contexts
-            controls[:, :, 0] += yaw_wind[:, None, 0]
-            controls[:, :, 6] = yaw_wind[:, None, 1]
-            states[:, 1] += yaw_wind[:, 0]  # time comes first, then the angles: yaw is the first
-            states[:, 1 + self.model.nq + self.model.nv] += yaw_wind[:, 0]  # and the yaw servo's own state
-        floats = np.repeat(self._data.sensordata[None], n, axis=0)
-        landings, diverged = np.full((n, 2), np.nan), np.zeros(n, dtype=bool)
-        speeds = slice(1 + self.model.nq, 1 + self.model.nq + self.model.nv)
-        flying = np.arange(n)
-        for start in range(0, int(steps.max()), _CHUNK):
-            stop = min(start + _CHUNK, int(steps[flying].max()))
-            run, seen = self._rollout(states[flying], controls[flying, start:stop])
-            for k, row in enumerate(flying):
-                last = min(stop, int(steps[row])) - start
-                speed, track = run[k, :last, speeds], seen[k, :last]
-                if not (speed.max() < TOP_SPEED and speed.min() > -TOP_SPEED):  # also when it is NaN
-                    diverged[row] = True
-                elif track[:, 2].min() <= 0:
-                    wet = int((track[:, 2] <= 0).argmax())
-                    landings[row] = _crossing(track[wet - 1] if wet else floats[row], track[wet])
-                elif start + last == steps[row]:
-                    before = track[-2] if last > 1 else floats[row]
-                    after = steps[row] - 1 - ends[row] / self.model.opt.timestep  # share of a step
-                    landings[row] = self._let_out(track[-1] + after * (before - track[-1]), float(controls[row, 0, 6]))
-            states[flying], floats[flying] = run[:, -1], seen[:, -1]
-            flying = flying[np.isnan(landings[flying, 0]) & ~diverged[flying]]
-            if not flying.size:
-                break
-        return landings, diverged
-
-    def _let_out(self, seen: Array, wind: float) -> tuple[float, float]:
-        """Free flight from the float's position and velocity ``(6,)``."""
-        x, y, z, dx, dy, dz = seen.tolist()
-        flight = (dz + math.sqrt(dz * dz + 2 * self._gravity * max(z, 0.0))) / self._gravity
-        return x + (dx + wind / self._float_mass * flight / 2) * flight, y + dy * flight
-
-    def _rollout(self, states: Array, controls: Array) -> tuple[Array, Array]:
-        threads = self._threads if len(states) > 1 else 1
-        if threads not in self._pools:
-            data = [mujoco.MjData(self.model) for _ in range(threads)]
-            self._pools[threads] = (rollout.Rollout(nthread=threads if threads > 1 else 0), data)
-        pool, data = self._pools[threads]
-        n, n_steps = controls.shape[:2]
-        self.steps += n * n_steps
-        run = np.empty((n, n_steps, states.shape[1]))
-        seen = np.empty((n, n_steps, self.model.nsensordata))
-        # The wrapper's own checks and copies would cost as much as four steps; shapes are right by construction.
-        pool.rollout(
-            [self.model] * n, data, states, controls, state=run, sensordata=seen, nstep=n_steps, skip_checks=True
-        )
-        return run, seen
-
-
-def _crossing(above: Array, below: Array) -> Array:
-    share = above[2] / (above[2] - below[2])
-    return above[:2] + share * (below[:2] - above[:2])
