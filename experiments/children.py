@@ -5,6 +5,7 @@ Ctrl-C, and the failure of one, stop them all; each then goes on from its files 
 
 from __future__ import annotations
 
+import fcntl
 import math
 import os
 import signal
@@ -49,16 +50,19 @@ def learn(
     next_report = time.monotonic()
     try:
         for algorithm in algorithms:
-            children.append(Child(algorithm, seed, movements, out, run_options))
+            whole = ["--algorithm", algorithm, "--seed", str(seed), "--movements", str(movements), "--out", str(out)]
+            directory = out / algorithm / f"seed-{seed:03d}"
+            log = out / f"{algorithm}.log"
+            children.append(Child(NAMES[algorithm], directory, movements, log, [*whole, *run_options]))
         while True:
             running = any(child.process.poll() is None for child in children)
             for child in children:
                 child.check()
             if live or not running or time.monotonic() >= next_report:
-                _report("   ".join([*(child.status() for child in children), _time_left(children)]), live)
+                report("   ".join([*(child.status() for child in children), _time_left(children)]), live)
                 next_report += 15
             if not running:
-                return {child.algorithm: child.directory for child in children}
+                return dict(zip(algorithms, (child.directory for child in children), strict=True))
             time.sleep(0.3)
     finally:
         if live:
@@ -70,24 +74,30 @@ def learn(
 
 
 class Child:
-    """One run in a process of its own. Its messages go to a log, its progress is read off the files that it writes."""
+    """One run in a process of its own. Its messages go to a log, its progress is read off the files that it writes.
 
-    def __init__(self, algorithm: str, seed: int, movements: int, out: Path, run_options: Sequence[str]) -> None:
-        self.algorithm = algorithm
+    Args:
+        title: what it is called on the line of progress.
+        directory, movements: of the run, as ``run_options`` make them.
+        log: file for its messages.
+        run_options: of run.py; it resumes what is there.
+    """
+
+    def __init__(self, title: str, directory: Path, movements: int, log: Path, run_options: Sequence[str]) -> None:
+        self.title = title
         self.movements = movements
-        self.directory = out / algorithm / f"seed-{seed:03d}"
-        self.log = out / f"{algorithm}.log"
+        self.directory = directory
+        self.log = log
         self._episodes = self.directory / "episodes.csv"
         self._read = self._lines = 0
         self._began, self._already = time.monotonic(), self.done()
-        command = [sys.executable, str(Path(__file__).with_name("run.py")), "--algorithm", algorithm]
-        command += ["--seed", str(seed), "--movements", str(movements), "--out", str(out), "--resume", *run_options]
+        command = [sys.executable, str(Path(__file__).with_name("run.py")), "--resume", *run_options]
         threads = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL")}
-        with self.log.open("wb") as log:
+        with self.log.open("wb") as said:
             self.process = subprocess.Popen(
                 command,
                 stdin=subprocess.DEVNULL,
-                stdout=log,
+                stdout=said,
                 stderr=subprocess.STDOUT,
                 env={**os.environ, **threads},
                 process_group=0,  # Ctrl-C comes to us, and we pass it on
@@ -105,10 +115,13 @@ class Child:
         self._lines += added.count(b"\n")
         return min(self.movements, max(0, self._lines - 1))  # the first line names the columns
 
+    def fresh(self) -> int:
+        """Movements made since it was started, those that it found on disk left out."""
+        return self.done() - self._already
+
     def seconds_left(self) -> float:
         """At the pace so far, pauses for evaluations included; inf before the first new movement."""
-        done = self.done()
-        left, fresh = self.movements - done, done - self._already
+        left, fresh = self.movements - self.done(), self.fresh()
         if left == 0:
             return 0.0
         return left * (time.monotonic() - self._began) / fresh if fresh > 0 else math.inf
@@ -118,7 +131,7 @@ class Child:
         done, error = self.done(), _last_error(self.directory / "evaluation.csv")
         shown = f", error {error:.3f} m" if error is not None else ""
         state = "done" if self.process.poll() == 0 else f"{done}/{self.movements}"
-        return f"{NAMES[self.algorithm]} {state}{shown}"
+        return f"{self.title} {state}{shown}"
 
     def check(self) -> None:
         """Notice a failure.
@@ -132,11 +145,12 @@ class Child:
         said = self.log.read_text(errors="replace").strip()
         words = said[said.rfind("error: ") :] if "error: " in said else said.rpartition("\n")[2] or "it said nothing"
         if code < 0:
-            words = f"stopped by {signal.Signals(-code).name}; start the demo again and it goes on"
+            words = f"stopped by {signal.Signals(-code).name}; start this again and it goes on"
         outlook = f"Its whole log: {self.log}."
-        if "movements already" not in words:  # what was asked for is wrong then, not what is there
+        begun = self.directory.exists()
+        if begun and "movements already" not in words:  # what was asked for is wrong then, not what is there
             outlook += f" To begin afresh, delete {self.directory} or choose another --out."
-        raise ChildFailed(f"{NAMES[self.algorithm]} failed: {words}\n{outlook}", code if code > 0 else 1)
+        raise ChildFailed(f"{self.title} failed: {words}\n{outlook}", code if code > 0 else 1)
 
     def interrupt(self) -> None:
         """As Ctrl-C does: it writes what it has, and ends."""
@@ -149,6 +163,21 @@ class Child:
             self.process.wait(timeout=20)
         except subprocess.TimeoutExpired:
             self.process.kill()
+
+
+def in_use(directory: Path) -> bool:
+    """Whether a run is being written there, one that outlived who started it, say."""
+    try:
+        lock = os.open(directory / "lock", os.O_RDONLY)
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    finally:
+        os.close(lock)
+    return False
 
 
 def _last_error(path: Path) -> float | None:
@@ -164,14 +193,21 @@ def _time_left(children: Sequence[Child]) -> str:
     running = [child for child in children if child.process.poll() is None]
     if not running:
         return "finished"
-    left = max(child.seconds_left() for child in running)
-    if left == math.inf:
+    return time_left(max(child.seconds_left() for child in running))
+
+
+def time_left(seconds: float) -> str:
+    """For people."""
+    if seconds == math.inf:
         return ""
-    minutes, seconds = divmod(round(left), 60)
-    return f"{minutes}:{seconds:02} left" if left else "finishing"
+    minutes, seconds = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    clock = f"{hours}:{minutes:02}" if hours else f"{minutes}"
+    return f"{clock}:{seconds:02} left" if hours or minutes or seconds else "finishing"
 
 
-def _report(line: str, live: bool) -> None:
+def report(line: str, live: bool) -> None:
+    """One line of progress; on a terminal it takes the place of the last."""
     width = (os.get_terminal_size(sys.stderr.fileno()).columns or 80) if live else 0
     start, end = ("\r\x1b[K", "") if live else ("", "\n")
     print(start + (line[: width - 1] if live else line), end=end, file=sys.stderr, flush=True)

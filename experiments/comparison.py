@@ -101,9 +101,7 @@ def _draw_interest(ax: Axes, run: Run) -> None:
     lows, highs = (
         np.stack([run.regions[f"{corner}_{k}"][last] for k in range(2)], axis=1) for corner in ("low", "high")
     )
-    own = run.goals[np.isfinite(run.goals[:, 0]) & (run.origin != "imitate")]
-    new = np.append(True, (np.diff(own, axis=0) != 0).any(axis=1))[: len(own)]  # one goal takes several movements
-    interest_map(ax, lows, highs, run.regions["interest"][last], goals=own[new][-GOALS:])
+    interest_map(ax, lows, highs, run.regions["interest"][last], goals=run.chosen_goals()[-GOALS:])
 
 
 def _metres(value: float | None) -> str:

@@ -43,6 +43,13 @@ class Run:
     evaluation: dict[str, Array]
     regions: dict[str, np.ndarray] | None
 
+    def chosen_goals(self) -> Array:
+        """``(n, outcome_dim)``, the goals that the learner set itself, in order, each once though it takes several
+        movements; those of imitation are the teacher's."""
+        own = self.goals[np.isfinite(self.goals).all(axis=1) & (self.origin != "imitate")]
+        new = (np.diff(own, axis=0, prepend=np.nan) != 0).any(axis=1)
+        return own[new]
+
 
 def read_run(path: str | os.PathLike[str]) -> Run:
     """What a run has written so far, be it finished, stopped or under way; a torn last line is left out.

@@ -28,6 +28,8 @@ COLOURS = {  # after Okabe & Ito: told apart with any colour vision, and in grey
     "observation": "#cc79a7",
     "imitation": "#009e73",
     "sgim-d": "#d55e00",
+    "map-elites": "#56b4e9",
+    "cma-me": "#e69f00",
 }
 NAMES = {
     "random": "Random",
@@ -35,6 +37,8 @@ NAMES = {
     "observation": "Observation",
     "imitation": "Imitation",
     "sgim-d": "SGIM-D",
+    "map-elites": "MAP-Elites",
+    "cma-me": "CMA-ME",
 }
 
 
@@ -103,11 +107,12 @@ def landing_points(
     demonstrated: Array | None = None,
     side: float = 0.05,
     most: float | None = None,
+    colour_bar: bool = True,
 ) -> QuadMesh:
     """How often the float landed where: a histogram on a logarithmic scale, empty tiles white.
 
     Args:
-        ax: drawn on, and given a colour bar.
+        ax: drawn on, and given a colour bar unless ``colour_bar`` is False.
         outcomes: ``(n, 2)`` m; how many lie outside ``box`` is written in the corner.
         box: T, the part of the plane that is shown.
         demonstrated: ``(n, 2)`` m, drawn as crosses.
@@ -120,15 +125,9 @@ def landing_points(
     Raises:
         ValueError: ``box`` is not of the plane.
     """
-    tiles = np.ma.masked_equal(tile_counts(outcomes, box, side), 0)
-    x, y = _edges(box, side)
-    norm = LogNorm(1, max(2, float(tiles.filled(0).max()) if most is None else most))
-    blues = ListedColormap(colormaps["Blues"](np.linspace(0.25, 1.0, 256)))  # a single movement is seen against white
-    mesh = ax.pcolormesh(x, y, tiles, norm=norm, cmap=blues)
-    bar = _colour_bar(ax, mesh, f"movements on a tile of {100 * side:g} cm")
-    bar.ax.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-    bar.ax.yaxis.set_major_formatter("{x:.0f}")
-    bar.ax.yaxis.set_minor_locator(NullLocator())
+    mesh = histogram(ax, outcomes, box, side=side, most=most)
+    if colour_bar:
+        count_bar([ax], mesh, f"movements on a tile of {100 * side:g} cm")
     if demonstrated is not None:
         label = f"{len(demonstrated)} demonstrated outcomes"
         ax.plot(*demonstrated.T, "x", color=COLOURS["sgim-d"], markersize=5, markeredgewidth=1.3, label=label)
@@ -137,8 +136,29 @@ def landing_points(
         text = f"{outside} of {len(outcomes)} landed outside"
         white = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 2}
         ax.text(0.5, 0.015, text, transform=ax.transAxes, ha="center", va="bottom", fontsize="small", bbox=white)
-    _water_plane(ax, box)
+    water_plane(ax, box)
     return mesh
+
+
+def histogram(ax: Axes, points: Array, box: Box, *, side: float, most: float | None = None) -> QuadMesh:
+    """How many of the ``points`` ``(n, 2)`` m lie on each tile, nothing else; arguments and result of
+    ``landing_points``."""
+    tiles = np.ma.masked_equal(tile_counts(points, box, side), 0)
+    x, y = _edges(box, side)
+    norm = LogNorm(1, max(2, float(tiles.filled(0).max()) if most is None else most))
+    blues = ListedColormap(colormaps["Blues"](np.linspace(0.25, 1.0, 256)))  # a single point is seen against white
+    return ax.pcolormesh(x, y, tiles, norm=norm, cmap=blues)
+
+
+def count_bar(axes: Sequence[Axes], mesh: QuadMesh, label: str) -> Colorbar:
+    """One colour bar, in whole numbers, for all histograms that share the scale of ``mesh``."""
+    figure = axes[0].get_figure()
+    assert figure is not None
+    bar = figure.colorbar(mesh, ax=list(axes), label=label)
+    bar.ax.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    bar.ax.yaxis.set_major_formatter("{x:.0f}")
+    bar.ax.yaxis.set_minor_locator(NullLocator())
+    return bar
 
 
 def tile_counts(outcomes: Array, box: Box, side: float = 0.05) -> Array:
@@ -181,7 +201,7 @@ def interest_map(
     _colour_bar(ax, regions, "interest: recent change of competence")
     if goals is not None:
         ax.plot(*goals.T, ".", color="#0072b2", markersize=4, label=f"last {len(goals)} goals")
-    _water_plane(ax, Box(lows.min(axis=0), highs.max(axis=0)))
+    water_plane(ax, Box(lows.min(axis=0), highs.max(axis=0)))
     return regions
 
 
@@ -201,7 +221,7 @@ def _colour_bar(ax: Axes, drawn: QuadMesh | PatchCollection, label: str) -> Colo
     return figure.colorbar(drawn, ax=ax, label=label)
 
 
-def _water_plane(ax: Axes, box: Box) -> None:
+def water_plane(ax: Axes, box: Box) -> None:
     """Axes in metres, equal aspect, all of ``box`` in sight and the robot's base marked."""
     ax.plot(0, 0, "^", color="black", markeredgecolor="white", markersize=10, label="base of the arm")
     ax.set(

@@ -1,12 +1,17 @@
-"""The scripts that make the shipped data: requests that make no sense are refused before any work."""
+"""The scripts that make the shipped data: what the robots that teach show, and what makes no sense is refused."""
 
 import sys
 
+import numpy as np
 import pytest
 
 import check_physics
 import make_benchmark
 import make_demonstrations
+import make_teachers
+from sgimd_torch.demonstrations import load_demonstrations
+from sgimd_torch.fishing_rod import FishingRod
+from sgimd_torch.spaces import stream
 
 
 @pytest.mark.parametrize(
@@ -27,15 +32,87 @@ import make_demonstrations
         (make_demonstrations, "--candidates 0"),
         (make_demonstrations, "--seed -1"),
         (make_demonstrations, "--out nowhere/demonstrations.npz"),
+        *((make_teachers, f"--{name} 0") for name in ("n", "runs", "movements", "processes")),
+        (make_teachers, "--seed -1"),
+        (make_teachers, "--out nowhere"),
+        (make_teachers, "--runs 1 --processes 1 --movements 5 --n 6"),  # too few movements
         (check_physics, "--movements 9"),
     ],
 )
 def test_what_makes_no_sense_is_refused_and_nothing_is_written(tmp_path, monkeypatch, capsys, script, options):
     monkeypatch.chdir(tmp_path)
-    out = [] if script is check_physics else ["--out", "out.npz"]
+    out = {check_physics: [], make_teachers: ["--out", "."]}.get(script, ["--out", "out.npz"])
     monkeypatch.setattr(sys, "argv", ["script", *out, *options.split()])
     with pytest.raises(SystemExit) as end:
         script.main()
     assert end.value.code == 2
     assert "error: " in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
+
+
+@pytest.fixture(scope="module")
+def pool():
+    """What two SAGG-RIAC learners remember after 30 movements each, as far as it lies in T."""
+    memories = [make_teachers.memory_of(seed, 30) for seed in (4000, 4001)]
+    thetas, outcomes = (np.concatenate(parts) for parts in zip(*memories, strict=True))
+    inside = FishingRod().outcomes.contains(outcomes)
+    return thetas[inside], outcomes[inside]
+
+
+@pytest.fixture(scope="module")
+def teachers(tmp_path_factory):
+    """Demonstrators 1 and 2, taught by those lives."""
+    out = tmp_path_factory.mktemp("teachers")
+    with pytest.MonkeyPatch.context() as patch:
+        options = f"--out {out} --n 5 --runs 2 --movements 30 --processes 1"
+        patch.setattr(sys, "argv", ["make_teachers.py", *options.split()])
+        make_teachers.main()
+    assert sorted(path.name for path in out.iterdir()) == ["demonstrator_1.npz", "demonstrator_2.npz"]
+    return {number: load_demonstrations(out / f"demonstrator_{number}.npz", n_joints=6) for number in (1, 2)}
+
+
+def rows_of(demonstrations, thetas):
+    """Rows of the pool whose thetas the recordings give back, by the learner's own correspondence."""
+    primitive = FishingRod().primitive
+    found = np.stack([primitive.correspondence(shown.times, shown.trajectory) for shown in demonstrations])
+    distances = np.abs(found[:, None] - thetas).max(axis=2)
+    assert (distances.min(axis=1) < 1e-6).all()
+    return distances.argmin(axis=1)
+
+
+def test_the_naive_demonstrator_shows_what_it_remembers(pool, teachers):
+    thetas, outcomes = pool
+    rows = rows_of(teachers[1], thetas)
+    assert len(set(rows)) == 5
+    np.testing.assert_array_equal([shown.outcome for shown in teachers[1]], outcomes[rows])
+
+
+def test_the_careful_demonstrator_shows_one_movement_of_a_tile(pool, teachers):
+    thetas, outcomes = pool
+    rows = rows_of(teachers[2], thetas)
+    tiles = make_teachers.on_tiles(outcomes, 5)
+    assert sorted(np.concatenate(tiles)) == list(range(len(outcomes)))
+    chosen = [next(k for k, tile in enumerate(tiles) if row in tile) for row in rows]
+    assert len(set(chosen)) == 5
+    assert np.ptp(outcomes[rows], axis=0).min() > 0.5 * np.ptp(outcomes, axis=0).min()  # over all that was reached
+
+
+def test_of_several_movements_the_one_that_lands_most_alike_is_the_most_reliable():
+    scattered, steady = [[0.0, 0.0], [1.0, 0.0], [0.2, 0.0]], [[0.0, 0.1], [0.0, 0.3], [0.0, 0.4]]
+    best, outcome = make_teachers.most_reliable(np.stack([scattered, steady], axis=1))
+    assert best == 1
+    np.testing.assert_array_equal(outcome, [0.0, 0.3])  # nearest the mean, 0.267
+
+
+def test_executed_again_without_noise_movements_land_where_they_did(pool):
+    rod = FishingRod(noise=0.0)
+    landed = make_teachers.execute_again(rod, pool[0][:2], stream(0, "test"))
+    assert landed.shape == (make_teachers.EXECUTIONS, 2, 2)
+    assert np.ptp(landed, axis=0).max() == 0
+    assert np.ptp(make_teachers.execute_again(FishingRod(), pool[0][:2], stream(0, "test")), axis=0).min() > 0
+
+
+def test_a_pool_on_too_few_tiles_is_refused(pool):
+    thetas, outcomes = pool
+    with pytest.raises(ValueError, match="only 1 tiles have a movement to show, too few for --n 3"):
+        make_teachers.careful(FishingRod(), thetas[[0, 0, 0]], outcomes[[0, 0, 0]], 3, stream(0, "test"))

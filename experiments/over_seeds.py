@@ -1,0 +1,247 @@
+"""What several seeds allow to say: interquartile means, bootstrap intervals, improvement, and the paper's two ANOVAs.
+
+After Agarwal et al. (2021), "Deep reinforcement learning at the edge of the statistical precipice": few seeds, so every
+number comes with an interval. ``errors`` are mean benchmark errors (m), one for each seed; smaller is better.
+    iqm_interval(errors, rng=rng); ratio_interval(ours, theirs, rng=rng); improvement_interval(ours, theirs, rng=rng)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+import numpy as np
+from scipy import stats
+
+from sgimd_torch.spaces import Array
+
+LEVEL = 0.95
+RESAMPLES = 9999
+
+
+class Interval(NamedTuple):
+    """A statistic of the data, and its 95 % bootstrap interval from ``low`` to ``high``."""
+
+    value: float
+    low: float
+    high: float
+
+
+class Anova(NamedTuple):
+    """One test for each dimension: ``p`` ``(dim,)``, and ``adjusted`` ``(dim,)`` for their number after Holm (1979)."""
+
+    p: Array
+    adjusted: Array
+
+    @property
+    def rejected(self) -> int:
+        """In how many dimensions the means differ, with at most 5 % odds of a single false one among them."""
+        return int((self.adjusted <= 1 - LEVEL).sum())
+
+    @property
+    def smallest(self) -> float:
+        """p of "the groups have the same mean in all dimensions": Bonferroni's, the smallest p times their number."""
+        return float(self.adjusted.min())
+
+
+def interquartile_mean(values: Array) -> Array:
+    """Mean of the middle half: a quarter of the ``(..., n_seeds)`` values, rounded down, is cut at either end.
+
+    With 2 or 3 seeds nothing is cut and it is the mean; of 10 it is the mean of the middle 6.
+    """
+    means: Array = stats.trim_mean(values, 0.25, axis=-1)
+    return means
+
+
+def interval(
+    statistic: Callable[..., Array], *samples: Array, rng: np.random.Generator, paired: bool = False
+) -> Interval:
+    """Percentile bootstrap: the statistic of seeds drawn again with replacement, 9999 times; its middle 95 %.
+
+    Stratified: each sample keeps its size and is drawn from by itself. Of normal errors such an interval holds the true
+    interquartile mean 94 % of the time with 10 or 20 seeds, but 90 % with 5: there it is too narrow.
+
+    Args:
+        statistic: of arrays ``(..., n_seeds, *rest)``, one for each sample; returns ``(...)``.
+        samples: ``(n_seeds, *rest)`` each.
+        rng: draws the seeds.
+        paired: all samples are of the same seeds in the same order, which are drawn together.
+
+    Raises:
+        ValueError: a sample of fewer than 2 seeds, one that is not finite, or paired ones of unequal length.
+    """
+    samples = tuple(np.asarray(sample, dtype=np.float64) for sample in samples)
+    for sample in samples:
+        if len(sample) < 2:
+            raise ValueError(f"an interval needs 2 or more seeds, got {len(sample)}")
+        if not np.isfinite(sample).all():
+            raise ValueError(f"values must be finite, got {sample[~np.isfinite(sample)][0]}; is an evaluation missing?")
+    if paired and len({len(sample) for sample in samples}) > 1:
+        raise ValueError(f"pairs need the same seeds, got samples of {[len(sample) for sample in samples]}")
+
+    def of_rows(*rows: Array, axis: int) -> Array:
+        return statistic(*(sample[row] for sample, row in zip(samples, rows, strict=True)))
+
+    rows = [np.arange(len(sample)) for sample in samples]
+    found = stats.bootstrap(
+        rows,
+        of_rows,
+        n_resamples=RESAMPLES,
+        vectorized=True,
+        paired=paired,
+        confidence_level=LEVEL,
+        method="percentile",
+        rng=rng,
+    )
+    return Interval(float(statistic(*samples)), *map(float, found.confidence_interval))
+
+
+def iqm_interval(*strata: Array, rng: np.random.Generator) -> Interval:
+    """Interquartile mean of all values together; seeds are drawn within each stratum ``(n_seeds,)``.
+
+    Raises:
+        ValueError: see ``interval``.
+    """
+    return interval(lambda *drawn: interquartile_mean(np.concatenate(drawn, axis=-1)), *strata, rng=rng)
+
+
+def ratio_interval(ours: Array, theirs: Array, *, rng: np.random.Generator, paired: bool = False) -> Interval:
+    """IQM(ours) / IQM(theirs), of ``(n_seeds,)`` each; ``paired`` when both were measured on the same runs.
+
+    Raises:
+        ValueError: ``theirs`` are not all above 0; see ``interval``.
+    """
+    if (np.asarray(theirs) <= 0).any():
+        raise ValueError(f"a ratio needs values above 0 below the line, got {np.min(theirs)}")
+    return interval(lambda x, y: interquartile_mean(x) / interquartile_mean(y), ours, theirs, rng=rng, paired=paired)
+
+
+def improvement(ours: Array, theirs: Array) -> Array:
+    """P(X < Y): how often a run of ours ``(..., n)`` errs less than one of theirs ``(..., m)``; a tie counts half.
+
+    The Mann-Whitney statistic over n m; Agarwal et al. (2021) call it the probability of improvement.
+    """
+    x, y = np.asarray(ours)[..., :, None], np.asarray(theirs)[..., None, :]
+    shares: Array = np.mean((x < y) + 0.5 * (x == y), axis=(-2, -1))
+    return shares
+
+
+def improvement_interval(ours: Array, theirs: Array, *, rng: np.random.Generator) -> Interval:
+    """``improvement`` of ``(n,)`` over ``(m,)``; the seeds of each are drawn by themselves.
+
+    Where each of ours errs less than each of theirs the interval is [1, 1], however few they are: no draw shows a tie.
+
+    Raises:
+        ValueError: see ``interval``.
+    """
+    return interval(improvement, ours, theirs, rng=rng)
+
+
+def paired_differences(ours: Mapping[int, float], theirs: Mapping[int, float]) -> Array:
+    """``(n_seeds,)`` ours - theirs, seed by seed: runs of one seed meet the same motor noise, so it cancels.
+
+    Args:
+        ours, theirs: seed -> error (m).
+
+    Raises:
+        ValueError: they are not of the same seeds.
+    """
+    if ours.keys() != theirs.keys():
+        alone = sorted(ours.keys() ^ theirs.keys())
+        raise ValueError(f"pairs need the same seeds on both sides, but only one side has {alone}")
+    return np.array([ours[seed] - theirs[seed] for seed in sorted(ours)])
+
+
+def difference_interval(
+    ours: Mapping[int, float], theirs: Mapping[int, float], *, rng: np.random.Generator
+) -> Interval:
+    """Interquartile mean of the paired differences (m); wholly below 0 where ours err less.
+
+    Raises:
+        ValueError: see ``paired_differences`` and ``interval``.
+    """
+    return iqm_interval(paired_differences(ours, theirs), rng=rng)
+
+
+def mean_over_life(movements: Array, errors: Array) -> Array:
+    """Area under the error curve, divided by its width: the error (m) at the mean moment of the learner's life.
+
+    Trapezoids over movements, on a linear scale: each movement counts the same.
+
+    Args:
+        movements: ``(n,)``, increasing, 2 or more.
+        errors: ``(..., n)`` m.
+
+    Raises:
+        ValueError: ``movements`` do not increase, or values do not match them or are not finite.
+    """
+    movements, errors = _checked_curves(movements, errors)
+    areas: Array = np.trapezoid(errors, movements, axis=-1) / (movements[-1] - movements[0])
+    return areas
+
+
+def movements_to_reach(movements: Array, errors: Array, level: Array | float) -> Array:
+    """After how many movements the error first comes down to a level; straight lines between evaluations.
+
+    Args:
+        movements: ``(n,)``, increasing, 2 or more.
+        errors: ``(..., n)`` m.
+        level: ``(...)`` m.
+
+    Returns:
+        ``(...)``, the first evaluation at the earliest, inf where the level is never reached.
+
+    Raises:
+        ValueError: see ``mean_over_life``.
+    """
+    movements, errors = _checked_curves(movements, errors)
+    level = np.asarray(level, dtype=np.float64)[..., None]
+    reached = errors <= level
+    after = np.clip(reached.argmax(axis=-1, keepdims=True), 1, None)
+    high, low = (np.take_along_axis(errors, after - step, axis=-1) for step in (1, 0))
+    fall = np.where(high > low, high - low, 1.0)
+    share = np.clip((high - level) / fall, 0, 1)  # 0 where the first evaluation is low enough already
+    found = movements[after - 1] + share * (movements[after] - movements[after - 1])
+    return np.where(reached.any(axis=-1), found[..., 0], np.inf)
+
+
+def anova(*groups: Array) -> Anova:
+    """Do these sets of movements have different means? One-way analysis of variance in each dimension of theta.
+
+    Section 6 of Nguyen & Oudeyer (2014): demonstrations against random movements, and the movements that learners
+    executed against each other. Rows must be independent of each other. Movements of one run are not, they repeat and
+    refine each other: there a row is the mean theta of a run, or p comes out far too small.
+
+    Args:
+        groups: ``(n, theta_dim)`` each, two or more groups.
+
+    Raises:
+        ValueError: fewer than 2 groups, a group of fewer than 2 rows, unequal dimensions, values that are not finite,
+            or a dimension in which no group varies.
+    """
+    arrays = [np.asarray(group, dtype=np.float64) for group in groups]
+    shapes = [array.shape for array in arrays]
+    if len(shapes) < 2 or any(len(shape) != 2 or shape[0] < 2 for shape in shapes) or len({s[1] for s in shapes}) > 1:
+        raise ValueError(f"anova needs two or more groups (n, theta_dim) of 2 or more rows, got shapes {shapes}")
+    if not all(np.isfinite(array).all() for array in arrays):
+        raise ValueError("thetas must be finite; were movements at rest left in?")
+    still = np.flatnonzero(np.all([np.ptp(array, axis=0) == 0 for array in arrays], axis=0))
+    if len(still):
+        raise ValueError(f"dimensions {still.tolist()} vary in no group, so there is no variance to compare with")
+    p = np.asarray(stats.f_oneway(*arrays, axis=0).pvalue)
+    order = np.argsort(p)
+    steps = np.maximum.accumulate(p[order] * np.arange(len(p), 0, -1))  # Holm: the k-th smallest times those left
+    adjusted = np.empty_like(p)
+    adjusted[order] = np.minimum(steps, 1.0)
+    return Anova(p, adjusted)
+
+
+def _checked_curves(movements: Array, errors: Array) -> tuple[Array, Array]:
+    movements, errors = np.asarray(movements, dtype=np.float64), np.asarray(errors, dtype=np.float64)
+    if movements.ndim != 1 or len(movements) < 2 or not (np.diff(movements) > 0).all():
+        raise ValueError(f"a curve needs 2 or more increasing numbers of movements, got {movements.tolist()}")
+    if errors.shape[-1:] != movements.shape:
+        raise ValueError(f"errors must have shape (..., {len(movements)}), got {errors.shape}")
+    if not np.isfinite(errors).all():
+        raise ValueError("errors of a curve must be finite; is an evaluation missing?")
+    return movements, errors

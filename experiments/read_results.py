@@ -1,0 +1,148 @@
+"""Reading results/paper.csv: every evaluation of every run of the comparison, by variant.
+
+results = read_results("results/paper.csv"); results["sgim-d"].at(5000)    # {seed: mean error (m)}
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sgimd_torch.spaces import Array
+
+HEADER = (
+    *("experiment", "variant", "teacher", "task_space", "seed", "movements"),
+    *("mean_error_m", "noise_floor_m", "tiles_reached"),
+)
+GOALS_HEADER = ("variant", "seed", "n_goals", "n_near")
+LAST = 5000  # movements in the life of a learner of the paper
+
+
+class ResultsError(ValueError):
+    """A table of results that is missing or damaged."""
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluated:
+    """All evaluations of one variant.
+
+    ``seeds`` ``(n_seeds,)`` and ``movements`` ``(n,)`` increase; ``errors`` and ``floors`` (m) and ``tiles`` are
+    ``(n_seeds, n)``, NaN where that seed was not evaluated or the noise not measured. ``experiment`` and ``teacher``
+    are as in the file; ``task_space`` is half the side (m) of the square of goals.
+    """
+
+    variant: str
+    experiment: str
+    teacher: str
+    task_space: float
+    seeds: NDArray[np.int64]
+    movements: NDArray[np.int64]
+    errors: Array
+    floors: Array
+    tiles: Array
+
+    def at(self, movements: int, values: str = "errors") -> dict[int, float]:
+        """Seed -> value of "errors", "floors" or "tiles" after so many movements, of the seeds that have one."""
+        column = getattr(self, values)[:, self.movements == movements]
+        pairs = zip(self.seeds.tolist(), column.tolist(), strict=True)
+        return {seed: value[0] for seed, value in pairs if value and math.isfinite(value[0])}
+
+    def curves(self, last: int = LAST) -> tuple[Array, Array]:
+        """Movements ``(n,)`` and errors ``(n_seeds, n)`` m up to ``last``, of the seeds that have all evaluations."""
+        early = self.movements <= last
+        whole = np.isfinite(self.errors[:, early]).all(axis=1)
+        return self.movements[early].astype(np.float64), self.errors[whole][:, early]
+
+
+def read_results(path: str | os.PathLike[str]) -> dict[str, Evaluated]:
+    """All variants of the table, in the order of the file.
+
+    Raises:
+        ResultsError: there is no such table, or a line of it makes no sense; the message names the line.
+    """
+    runs: dict[str, tuple[str, str, float]] = {}
+    values: dict[str, dict[tuple[int, int], tuple[float, float, float]]] = {}
+    for where, row in _rows(path, HEADER):
+        variant, seed, movements = row["variant"], _count(row, "seed", where), _count(row, "movements", where)
+        run = (row["experiment"], row["teacher"], _number(row, "task_space", where))
+        if runs.setdefault(variant, run) != run:
+            raise ResultsError(f"{where}: {variant} is {run}, on an earlier line {runs[variant]}; rename one")
+        found = values.setdefault(variant, {})
+        if (seed, movements) in found:
+            raise ResultsError(f"{where}: seed {seed} of {variant} is there twice at {movements} movements")
+        floor = _number(row, "noise_floor_m", where) if row["noise_floor_m"] not in ("", "nan") else math.nan
+        found[seed, movements] = (_number(row, "mean_error_m", where), floor, _count(row, "tiles_reached", where))
+    if not values:
+        raise ResultsError(f"{path} has no line below its header; is the comparison still to be run?")
+    return {variant: _evaluated(variant, runs[variant], found) for variant, found in values.items()}
+
+
+def read_goals(path: str | os.PathLike[str]) -> dict[str, Array]:
+    """Variant -> ``(n_seeds, 2)``: how many goals a run chose, and how many of them near the origin; {} without file.
+
+    Raises:
+        ResultsError: a line makes no sense.
+    """
+    if not Path(path).exists():
+        return {}
+    found: dict[str, list[tuple[int, int]]] = {}
+    for where, row in _rows(path, GOALS_HEADER):
+        goals, near = _count(row, "n_goals", where), _count(row, "n_near", where)
+        if not near <= goals or goals == 0:
+            raise ResultsError(f"{where}: n_near must be at most n_goals, and n_goals above 0, got {near} and {goals}")
+        found.setdefault(row["variant"], []).append((goals, near))
+    return {variant: np.array(counts, dtype=np.float64) for variant, counts in found.items()}
+
+
+def _evaluated(
+    variant: str, run: tuple[str, str, float], found: dict[tuple[int, int], tuple[float, float, float]]
+) -> Evaluated:
+    seeds, movements = (np.unique([key[k] for key in found]) for k in range(2))
+    columns = np.full((3, len(seeds), len(movements)), np.nan)
+    for (seed, when), row in found.items():
+        columns[:, np.searchsorted(seeds, seed), np.searchsorted(movements, when)] = row
+    return Evaluated(variant, *run, seeds, movements, *columns)
+
+
+def _rows(path: str | os.PathLike[str], header: tuple[str, ...]) -> Iterator[tuple[str, dict[str, str]]]:
+    """Where each line stands, for messages, and its fields by name."""
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise ResultsError(f"{path} does not exist; experiments/compare.py writes results/paper.csv") from None
+    except OSError as error:
+        raise ResultsError(f"{path} cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise ResultsError(f"{path} is no text: {error.reason}") from error
+    lines = csv.reader(text.splitlines())
+    first = next(lines, [])
+    if tuple(first) != header:
+        raise ResultsError(f"{path} must begin with {','.join(header)}, got {','.join(first)[:100]!r}")
+    for fields in lines:
+        where = f"{path}, line {lines.line_num}"
+        if len(fields) != len(header):
+            raise ResultsError(f"{where} has {len(fields)} fields, not {len(header)}; was writing cut short?")
+        yield where, dict(zip(header, fields, strict=True))
+
+
+def _number(row: dict[str, str], name: str, where: str) -> float:
+    try:
+        value = float(row[name])
+    except ValueError:
+        value = math.nan
+    if not 0 <= value < math.inf:
+        raise ResultsError(f"{where}: {name} must be a finite number of 0 or more, got {row[name]!r}")
+    return value
+
+
+def _count(row: dict[str, str], name: str, where: str) -> int:
+    if not row[name].isascii() or not row[name].isdigit():
+        raise ResultsError(f"{where}: {name} must be a whole number, got {row[name]!r}")
+    return int(row[name])

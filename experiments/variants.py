@@ -1,0 +1,99 @@
+"""Every experiment as data: which variants it compares, each a line of what differs from ``run.py``'s defaults.
+
+Section 6 of Nguyen & Oudeyer (2014) first, then what the paper lacks. A variant of SGIM-D is one changed word.
+    EXPERIMENTS["ablations"]["uniform-goals"]        # {"algorithm": "sgim-d", "goals": "uniform"}
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Final
+
+from config import ALGORITHMS, Config
+from runfiles import make_folder
+from sgimd_torch.demonstrations import SHIPPED, load_demonstrations, save_demonstrations
+
+Variant = dict[str, Any]
+SGIM_D: Final[Variant] = {"algorithm": "sgim-d"}
+SAGG_RIAC: Final[Variant] = {"algorithm": "sagg-riac"}
+# The parts that the paper names, where measurements spoke for others; for who has no goals of his own only the inverse.
+LETTER: Final[Variant] = {"inverse": "paper", "search": "nelder-mead-exact", "progress": "absolute"}
+LARGE: Final[Variant] = {"task_space": 100.0}
+FEW, HALF = "few.npz", "half.npz"  # made from the shipped demonstrations by ``make_subsets``
+
+
+def shipped(teacher: int) -> Path:
+    """The demonstrations of demonstrator 1, 2 or 3 of section 5.3."""
+    return SHIPPED.with_name(f"demonstrator_{teacher}.npz")
+
+
+def _of_teacher(teacher: int) -> dict[str, Variant]:
+    taught = ("sgim-d", "imitation", "observation")
+    return {
+        f"{algorithm}-teacher-{teacher}": {"algorithm": algorithm, "demonstrations": shipped(teacher)}
+        for algorithm in taught
+    }
+
+
+EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
+    "learners": {name: {"algorithm": name} for name in ("random", "sagg-riac", "observation", "imitation", "sgim-d")},
+    "teachers": {**_of_teacher(1), **_of_teacher(2)},
+    "large-space": {
+        "sagg-riac-large": {**SAGG_RIAC, **LARGE},
+        "sgim-d-large": {**SGIM_D, **LARGE},
+        "sgim-d-uniform-large": {**SGIM_D, **LARGE, "goals": "uniform"},
+    },
+    "long": {"sgim-d-long": {**SGIM_D, "movements": 10_000}},
+    "letter": {
+        f"{algorithm}-letter": {"algorithm": algorithm, **LETTER}
+        for algorithm in ("sagg-riac", "observation", "imitation", "sgim-d")
+    },
+    "ablations": {
+        "uniform-goals": {**SGIM_D, "goals": "uniform"},
+        "grid": {**SGIM_D, "goals": "grid"},
+        "alp-gmm": {**SGIM_D, "goals": "alp-gmm"},
+        "absolute-progress": {**SGIM_D, "progress": "absolute"},
+        "paired-progress": {**SGIM_D, "progress": "paired"},
+        "attempt-competence": {**SGIM_D, "progress": "absolute", "competence": "attempt"},
+        "inverse-paper": {**SGIM_D, "inverse": "paper"},
+        "inverse-nearest": {**SGIM_D, "inverse": "nearest"},
+        "search-nelder-mead-exact": {**SGIM_D, "search": "nelder-mead-exact"},
+        "search-perturb": {**SGIM_D, "search": "perturb"},
+        "search-cma-es": {**SGIM_D, "search": "cma-es"},
+    },
+    "baselines": {
+        "random-goals": {**SAGG_RIAC, "goals": "uniform", "inverse": "nearest", "search": "perturb"},
+        "random-goals-demonstrations": {**SGIM_D, "goals": "uniform", "inverse": "nearest", "search": "perturb"},
+        "demonstrations-noise": {"algorithm": "imitation", "choice": "random"},
+        "map-elites": {"algorithm": "map-elites"},
+        "cma-me": {"algorithm": "cma-me"},
+    },
+    "teaching": {
+        "every-10": {**SGIM_D, "every": 10},
+        "every-100": {**SGIM_D, "every": 100},
+        "initial": {**SGIM_D, "teacher": "initial"},
+        "asked": {**SGIM_D, "teacher": "asked"},
+        "few-demonstrations": {**SGIM_D, "demonstrations": Path(FEW)},
+        "half-plane": {**SGIM_D, "demonstrations": Path(HALF)},
+    },
+}
+
+
+def make_subsets(folder: Path) -> None:
+    """Write what the demonstrator of a few, 13 of 127, and the one of the right half of the plane have to show.
+
+    Raises:
+        RunError, OSError: it cannot be written.
+    """
+    everything = load_demonstrations()
+    make_folder(folder)
+    save_demonstrations(folder / FEW, everything[:13])  # in their order the first ones are spread already
+    right = [demonstration for demonstration in everything if demonstration.outcome[0] > 0]
+    save_demonstrations(folder / HALF, right)
+
+
+def teacher_of(config: Config) -> str:
+    """Who demonstrates: the number of the demonstrator, or the file's name; "" for who learns alone."""
+    if "teacher" not in ALGORITHMS[config.algorithm]:
+        return ""
+    return (config.demonstrations or SHIPPED).stem.removeprefix("demonstrator_")

@@ -1,0 +1,127 @@
+"""Make the shipped demonstrations of demonstrators 1 and 2: robots that learnt alone, by SAGG-RIAC, and now teach.
+
+Section 5.3 of the paper. Some SAGG-RIAC learners live on the fishing rod; what they remember is pooled.
+Demonstrator 1 is naive: its demonstrations are exemplars drawn at random. Demonstrator 2 is careful: its demonstrations
+are spread evenly over what was reached and, of some exemplars that landed on the same tile, each is the one that lands
+most reliably when it is executed again. What is recorded are joint trajectories, as for demonstrator 3, so the learner
+has to find theta_d by itself.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+
+import numpy as np
+from tqdm import tqdm
+
+from make_demonstrations import farthest_points
+from options import at_least
+from sgimd_torch.algorithms import sagg_riac
+from sgimd_torch.demonstrations import SHIPPED, save_demonstrations
+from sgimd_torch.environment import execute_many
+from sgimd_torch.fishing_rod import FishingRod
+from sgimd_torch.session import run
+from sgimd_torch.spaces import Array, Demonstration, stream
+
+CANDIDATES = 10  # exemplars at most that demonstrator 2 compares on a tile
+EXECUTIONS = 10  # of each of them
+
+
+def memory_of(seed: int, movements: int) -> tuple[Array, Array]:
+    """What one SAGG-RIAC learner remembers: thetas ``(movements, theta_dim)``, outcomes ``(movements, 2)`` m."""
+    rod = FishingRod(threads=1)
+    learner = sagg_riac(rod, seed)
+    for _ in run(learner, rod, seed, movements=movements):
+        pass
+    return learner.memory.thetas, learner.memory.outcomes
+
+
+def demonstrate(rod: FishingRod, theta: Array, outcome: Array) -> Demonstration:
+    """The trajectory of ``theta`` as it is commanded, recorded at 50 Hz, and where the float had landed."""
+    return Demonstration(np.zeros(0), *rod.primitive.trajectory(theta), outcome)
+
+
+def on_tiles(outcomes: Array, n: int) -> list[np.ndarray]:
+    """Rows of the ``outcomes`` ``(m, 2)`` m, tile by tile; the tiles are so large that about 1.1 n of them hold any."""
+    side = min(np.linspace(0.05, 0.4, 141), key=lambda side: abs(len(np.unique(outcomes // side, axis=0)) - 1.1 * n))
+    _, tile_of = np.unique(outcomes // side, axis=0, return_inverse=True)
+    return [np.flatnonzero(tile_of == tile) for tile in range(tile_of.max() + 1)]
+
+
+def execute_again(rod: FishingRod, thetas: Array, rng: np.random.Generator) -> Array:
+    """``(EXECUTIONS, n, 2)`` m, where each of ``(n, theta_dim)`` lands, each time with motor noise of its own."""
+    copies = np.tile(thetas, (EXECUTIONS, 1))
+    rngs = [stream(int(rng.integers(2**32)), "re-execution", k) for k in range(len(copies))]
+    return execute_many(rod, np.zeros((len(copies), 0)), copies, rngs).reshape(EXECUTIONS, len(thetas), 2)
+
+
+def most_reliable(landed: Array) -> tuple[int, Array]:
+    """Of ``(n_executions, n, 2)`` m the column that varies least, and of its landing points the most typical."""
+    best = int(landed.var(axis=0).sum(axis=1).argmin())
+    typical = np.linalg.norm(landed[:, best] - landed[:, best].mean(axis=0), axis=1).argmin()
+    return best, landed[typical, best]
+
+
+def careful(rod: FishingRod, thetas: Array, outcomes: Array, n: int, rng: np.random.Generator) -> list[Demonstration]:
+    """From each of ``n`` tiles, spread evenly, the most reliable of some exemplars that landed there.
+
+    Raises:
+        ValueError: too few tiles were reached.
+    """
+    tiles = [rng.permutation(rows)[:CANDIDATES] for rows in on_tiles(outcomes, n)]
+    landed = execute_again(rod, thetas[np.concatenate(tiles)], rng)
+    shown = []
+    for rows, again in zip(tiles, np.split(landed, np.cumsum([len(rows) for rows in tiles])[:-1], axis=1), strict=True):
+        best, outcome = most_reliable(again)
+        if rod.outcomes.contains(outcome):
+            shown.append(demonstrate(rod, thetas[rows[best]], outcome))
+    if len(shown) < n:
+        raise ValueError(f"only {len(shown)} tiles have a movement to show, too few for --n {n}; more --movements?")
+    chosen = farthest_points(np.stack([demonstration.outcome for demonstration in shown]), n)
+    return [shown[k] for k in chosen]
+
+
+def main() -> None:
+    """Let the learners live, then choose what each demonstrator shows."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument(
+        "--out",
+        type=Path,
+        default=SHIPPED.parent,
+        help="folder for demonstrator_1.npz and _2.npz (default: the shipped)",
+    )
+    parser.add_argument("--n", type=at_least(1), default=127, help="demonstrations of each (default: %(default)s)")
+    parser.add_argument("--runs", type=at_least(1), default=4, help="SAGG-RIAC learners (default: %(default)s)")
+    parser.add_argument("--movements", type=at_least(1), default=5000, help="of each learner (default: %(default)s)")
+    parser.add_argument("--seed", type=at_least(0), default=4000, help="of the first learner (default: %(default)s)")
+    parser.add_argument("--processes", type=at_least(1), default=2, help="(default: %(default)s)")
+    options = parser.parse_args()
+    if not options.out.is_dir() or not os.access(options.out, os.W_OK):
+        parser.error(f"--out must be a folder that exists and may be written, got {options.out}")
+    with ProcessPoolExecutor(options.processes) as pool:
+        seeds = range(options.seed, options.seed + options.runs)
+        pending = [pool.submit(memory_of, seed, options.movements) for seed in seeds]
+        memories = [future.result() for future in tqdm(pending, desc="learning")]
+    rod = FishingRod()
+    thetas, outcomes = (np.concatenate(parts) for parts in zip(*memories, strict=True))
+    inside = rod.outcomes.contains(outcomes)
+    thetas, outcomes = thetas[inside], outcomes[inside]
+    if len(thetas) < options.n:
+        parser.error(f"only {len(thetas)} movements landed inside T, too few for --n {options.n}; more --movements?")
+    rows = stream(options.seed, "demonstrator 1").choice(len(thetas), options.n, replace=False)
+    naive = [demonstrate(rod, thetas[row], outcomes[row]) for row in rows]
+    try:
+        shown = {1: naive, 2: careful(rod, thetas, outcomes, options.n, stream(options.seed, "demonstrator 2"))}
+    except ValueError as error:
+        parser.error(str(error))
+    for number, demonstrations in shown.items():
+        path = options.out / f"demonstrator_{number}.npz"
+        save_demonstrations(path, demonstrations)
+        print(f"{len(demonstrations)} demonstrations: {path}")
+
+
+if __name__ == "__main__":
+    main()
