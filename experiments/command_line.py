@@ -63,7 +63,7 @@ def parse(argv: Sequence[str], description: str | None = None) -> tuple[Config, 
         parser.typed[name[2:]] = typed, value
         if not value and name in ("--out", "--benchmark", "--demonstrations"):
             parser.error(f"{typed} must be a path, got an empty one")
-        if name == "--evaluate_at" and re.fullmatch(r"\d+(,\d+)*", value):
+        if name in ("--evaluate_at", "--floor_at") and re.fullmatch(r"\d+(,\d+)*", value):
             value = f"[{value}]"
         arguments[-1] = f"{name}={value}"
     values = parser.parse_args(arguments).as_dict()
@@ -83,7 +83,7 @@ class _Help(jsonargparse.DefaultHelpFormatter, argparse.RawDescriptionHelpFormat
 
 
 _INTS = "Optional[tuple[int, ...]]"
-_WANTED = {"int": "a whole number", "float": "a number"}
+_WANTED = {"int": "a whole number", "float": "a number", "bool": "true or false"}
 _WANTED |= {f"{name} | None": f"{wanted}, or null" for name, wanted in _WANTED.items()}
 _WANTED["tuple[int, ...] | None"] = "whole numbers such as 250,500, or [], or null"
 

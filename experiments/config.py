@@ -7,6 +7,7 @@ Each default is read off the library, where it is explained, and each option is 
 from __future__ import annotations
 
 import difflib
+import importlib.util
 import inspect
 import math
 import os
@@ -17,13 +18,13 @@ from pathlib import Path
 from typing import Any, Final
 
 from sgimd_torch.algorithms import MakeSearch, attempted, emulating, goal_babbling, imitating, remembered
-from sgimd_torch.environment import Environment
 from sgimd_torch.evaluation import evaluate
 from sgimd_torch.fishing_rod import FishingRod
-from sgimd_torch.interest import InterestMap, UniformGoals
+from sgimd_torch.interest import Goals, InterestMap, UniformGoals
 from sgimd_torch.inverse_model import LocalInverse, LocallyLinear, NearestNeighbour
 from sgimd_torch.memory import Memory
-from sgimd_torch.regions import absolute_progress, signed_progress
+from sgimd_torch.progress_grid import ProgressGrid
+from sgimd_torch.regions import absolute_progress, gained_progress, paired_progress, signed_progress
 from sgimd_torch.search import nelder_mead, perturb
 from sgimd_torch.spaces import Array, Estimate
 from sgimd_torch.teachers import AskedTeacher, InitialTeacher, PeriodicTeacher, at_random, least_explored
@@ -31,8 +32,21 @@ from sgimd_torch.teachers import AskedTeacher, InitialTeacher, PeriodicTeacher, 
 Inverse = Callable[[Array, Array], Estimate]
 
 
-def _linear(memory: Memory, environment: Environment) -> Inverse:
-    return LocallyLinear(memory, policies=environment.policies)
+def rival(module: str, name: str) -> Callable[..., Any]:
+    """What ``sgimd_torch.module`` has by that name; imported when it is called, with the package that it needs.
+
+    Raises:
+        ValueError: when called: that package is not installed, or broken.
+    """
+
+    def make(*arguments: Any, **options: Any) -> Any:
+        try:
+            part = getattr(importlib.import_module(f"sgimd_torch.{module}"), name)
+        except ImportError as error:
+            raise ValueError(str(error)) from error
+        return part(*arguments, **options)
+
+    return make
 
 
 _GOAL_BABBLING: Final = ("goals", "window", "progress", "competence", "search", "budget")
@@ -44,18 +58,32 @@ ALGORITHMS: Final[dict[str, tuple[str, ...]]] = {
     "imitation": (*_TAUGHT, "epsilon"),
     "observation": _TAUGHT,
     "sgim-d": (*_GOAL_BABBLING, *_TAUGHT, "social", "imitations", "epsilon"),
+    "map-elites": (),
+    "cma-me": (),
 }
-GOALS: Final = {"interest-map": InterestMap, "uniform": UniformGoals}
-PROGRESS: Final = {"absolute": absolute_progress, "signed": signed_progress}
+GOALS: Final[dict[str, Callable[..., Goals]]] = {
+    "interest-map": InterestMap,
+    "grid": ProgressGrid,
+    "alp-gmm": rival("alp_gmm", "AlpGmm"),
+    "uniform": UniformGoals,
+}
+PROGRESS: Final = {
+    "gained": gained_progress,
+    "absolute": absolute_progress,
+    "signed": signed_progress,
+    "paired": paired_progress,
+}
 SEARCHES: Final[dict[str, MakeSearch]] = {
     "nelder-mead": nelder_mead,
-    "nelder-mead-complete": partial(nelder_mead, complete=True),
+    "nelder-mead-exact": partial(nelder_mead, noise=0.0),
+    "nelder-mead-complete": partial(nelder_mead, noise=0.0, complete=True),
     "perturb": perturb,
+    "cma-es": rival("cma_es", "cma_es"),
 }
-INVERSES: Final[dict[str, Callable[[Memory, Environment], Inverse]]] = {
-    "paper": lambda memory, _: LocalInverse(memory),
-    "nearest": lambda memory, _: NearestNeighbour(memory),
-    "linear": _linear,
+INVERSES: Final[dict[str, Callable[[Memory], Inverse]]] = {
+    "linear": LocallyLinear,
+    "paper": LocalInverse,
+    "nearest": NearestNeighbour,
 }
 COMPETENCES: Final = {"memory": remembered, "attempt": attempted}
 ANSWERS: Final = {"imitate": imitating, "emulate": emulating}
@@ -75,6 +103,7 @@ KNOWN: Final[dict[str, dict[str, Any]]] = {
 # Choices that leave other options without a use.
 _MOOT: Final = {
     ("goals", "uniform"): ("window", "progress", "competence"),
+    ("goals", "alp-gmm"): ("window", "progress"),
     ("social", "emulate"): ("imitations", "epsilon"),
     ("teacher", "initial"): ("choice",),
 }
@@ -94,24 +123,29 @@ class Config:
     """One run.
 
     Args:
-        algorithm: Who learns: random, sagg-riac, imitation, observation or sgim-d.
+        algorithm: Who learns: random, sagg-riac, imitation, observation or sgim-d; or of another school map-elites or
+            cma-me, which fill an archive of outcomes (these need sgimd-torch[rivals]).
         seed: Seed of all random streams of the run, at least 0; the same seed gives the same files, byte for byte.
         movements: Length of the learner's life, movements at rest counted.
         out: Directory for runs; this one goes to OUT/NAME/seed-003.
         name: NAME in that path, to keep a variant apart; null is the algorithm's name.
         noise: Motor noise (s), standard deviation of the command (rad) for each rad/s of commanded speed; 0 is none.
         task_space: Half the side (m) of the square that goals come from; 100 in the paper's large-space experiment.
-        goals: Where goals come from (sagg-riac, sgim-d): interest-map, or uniform, the same everywhere.
+        goals: Where goals come from (sagg-riac, sgim-d): interest-map; grid, the same interest in cells that never
+            split; alp-gmm, Gaussians of high progress (needs sgimd-torch[rivals]); uniform, the same everywhere.
         window: How many competences of a region its interest is measured over, the paper's zeta; even (sagg-riac,
             sgim-d).
-        progress: What is interesting (sagg-riac, sgim-d): absolute progress, as in the paper, or signed, which ignores
-            falling competence.
+        progress: What is interesting (sagg-riac, sgim-d): gained, how much attempts raise the competence at their own
+            goals; absolute, newer competences against older ones, as in the paper; signed, which ignores falling
+            competence; or paired, the mean difference from the competence at the nearest earlier goal.
         competence: What a goal's competence is judged by (sagg-riac, sgim-d): memory, all movements ever made, as in
             the paper, or attempt, those made for this goal.
-        search: How a movement is refined (sagg-riac, sgim-d): nelder-mead, in the plane of the neighbours;
-            nelder-mead-complete, which first fills up the paper's simplex of 26; perturb, the best so far plus noise.
+        search: How a movement is refined (sagg-riac, sgim-d): nelder-mead, from the neighbours, with a little noise on
+            every movement; nelder-mead-exact, without the noise; nelder-mead-complete, which first fills up the paper's
+            simplex of 26, too; perturb, the best so far plus noise; cma-es (needs sgimd-torch[rivals]).
         budget: Movements for one goal, at most (sagg-riac, sgim-d).
-        inverse: Which movement is inferred for a goal, when learning and in evaluations: paper, nearest or linear.
+        inverse: Which movement is inferred for a goal, when learning and in evaluations: paper, the weighted mean of
+            eq. (9); linear, the same corrected to first order; nearest, the movement that came nearest.
         social: How sgim-d answers a demonstration: imitate it, or emulate, pursue its outcome in the learner's own way.
         imitations: Movements that sgim-d spends on imitating a demonstration.
         epsilon: Bound of the variation in each parameter of theta when imitating (imitation, sgim-d).
@@ -125,8 +159,11 @@ class Config:
             1000; [] never evaluates, not at the end either. Evaluating changes nothing in the run.
         repeats: How many times an evaluation executes each chosen movement again to measure the noise, at least 2; 0
             leaves the noise out.
+        floor_at: Which evaluations measure the noise, such as 1000,5000; it takes ten times as long as the error. null
+            is all of them.
         benchmark: File of the goals to evaluate on; null is the shipped one.
         threads: Threads that an evaluation may use; results do not depend on it.
+        board: Show the run in TensorBoard, true or false; scripts/watch OUT opens it. Showing changes nothing in it.
     """
 
     algorithm: str = "sgim-d"
@@ -142,7 +179,7 @@ class Config:
     competence: str = _name_of(COMPETENCES, goal_babbling, "judge")
     search: str = _name_of(SEARCHES, goal_babbling, "search")
     budget: int = _default(goal_babbling, "budget")
-    inverse: str = "paper"
+    inverse: str = _name_of(INVERSES, goal_babbling, "inverse")
     social: str = "imitate"
     imitations: int = _default(imitating, "repeats")
     epsilon: float = _default(imitating, "epsilon")
@@ -152,8 +189,10 @@ class Config:
     demonstrations: Path | None = None
     evaluate_at: tuple[int, ...] | None = None
     repeats: int = _default(evaluate, "repeats")
+    floor_at: tuple[int, ...] | None = None
     benchmark: Path | None = None
     threads: int = 1
+    board: bool = False
 
     def __post_init__(self) -> None:
         for name, known in KNOWN.items():
@@ -165,8 +204,11 @@ class Config:
             raise ValueError("repeats must be 0 or at least 2, got 1; one landing point does not scatter")
         if self.every is not None:
             _check_least("every", self.every, 1)
-        for movements in self.evaluate_at or ():
-            _check_least("evaluate_at", movements, 1)
+        for name in ("evaluate_at", "floor_at"):
+            for movements in getattr(self, name) or ():
+                _check_least(name, movements, 1)
+        if self.board and importlib.util.find_spec("tensorboard") is None:
+            raise ValueError("board true needs tensorboard, which is not installed; pip install tensorboard")
         if not 0 <= self.noise < math.inf:
             raise ValueError(f"noise must be finite and at least 0, got {self.noise}")
         if not 0 <= self.epsilon <= 1:

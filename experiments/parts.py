@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from config import ALGORITHMS, CHOICES, COMPETENCES, INVERSES, PROGRESS, SEARCHES, Config, Inverse
+from config import ALGORITHMS, CHOICES, COMPETENCES, GOALS, INVERSES, PROGRESS, SEARCHES, Config, Inverse, rival
 from sgimd_torch import algorithms
 from sgimd_torch.algorithms import MakeGoals, MakeSocial, Parts, emulating, imitating
 from sgimd_torch.demonstrations import SHIPPED as SHIPPED_DEMONSTRATIONS
@@ -19,7 +19,6 @@ from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.evaluation import SHIPPED as SHIPPED_BENCHMARK
 from sgimd_torch.evaluation import Benchmark, load_benchmark
 from sgimd_torch.fishing_rod import JOINTS, FishingRod
-from sgimd_torch.interest import InterestMap, UniformGoals
 from sgimd_torch.learner import Learner
 from sgimd_torch.motor_primitives import GaussianPrimitive
 from sgimd_torch.spaces import Box, Demonstration, stream
@@ -73,22 +72,21 @@ def build(config: Config) -> RunParts:
         data["demonstrations_crc32"] = _checksum(path)
         teacher = _teacher(config, demonstrations)
     learner = _learner(config, environment)
-    inverse = INVERSES[config.inverse](learner.memory, environment)
+    inverse = INVERSES[config.inverse](learner.memory)
     return RunParts(environment, learner, teacher, demonstrations, residuals, inverse, benchmark, data)
 
 
 def _learner(config: Config, environment: FishingRod) -> Learner:
     correspondence = environment.primitive.correspondence
-    goals: MakeGoals = UniformGoals
-    if config.goals == "interest-map":
-        goals = partial(InterestMap, window=config.window, progress=PROGRESS[config.progress])
+    goals: MakeGoals = GOALS[config.goals]
+    if config.goals in ("interest-map", "grid"):
+        goals = partial(GOALS[config.goals], window=config.window, progress=PROGRESS[config.progress])
     social: MakeSocial = emulating
     if config.social == "imitate":
         social = partial(imitating, repeats=config.imitations, epsilon=config.epsilon)
-    make_inverse = INVERSES[config.inverse]
     parts: Parts = {
         "goals": goals,
-        "inverse": lambda memory: make_inverse(memory, environment),
+        "inverse": INVERSES[config.inverse],
         "search": SEARCHES[config.search],
         "judge": COMPETENCES[config.competence],
         "budget": config.budget,
@@ -102,6 +100,10 @@ def _learner(config: Config, environment: FishingRod) -> Learner:
             return algorithms.observation(environment, config.seed, correspondence=correspondence)
         case "imitation":
             return algorithms.imitation(environment, config.seed, correspondence=correspondence, epsilon=config.epsilon)
+        case "map-elites":
+            return rival("quality_diversity", "map_elites")(environment, config.seed)
+        case "cma-me":
+            return rival("quality_diversity", "cma_me")(environment, config.seed)
     return algorithms.sgim_d(environment, config.seed, correspondence=correspondence, social=social, **parts)
 
 

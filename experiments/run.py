@@ -9,6 +9,7 @@ Examples:
 from __future__ import annotations
 
 import importlib.metadata
+import json
 import os
 import platform
 import shlex
@@ -17,6 +18,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -29,10 +31,11 @@ import sgimd_torch
 from command_line import parse
 from config import Config
 from parts import RunParts, build
+from run_board import RunBoard
 from rundir import RunDirectory
 from runfiles import Columns
 from sgimd_torch.environment import SimulationError
-from sgimd_torch.evaluation import evaluate
+from sgimd_torch.evaluation import Evaluation, evaluate
 from sgimd_torch.interest import InterestMap
 from sgimd_torch.regions import Region
 from sgimd_torch.session import ReplayError, live, replay, run
@@ -42,10 +45,10 @@ from supervise import Progress, Seconds, Stopped, Stopping, metres, say, with_st
 # These may change when a run is resumed: they say how long it lasts, where it lies and how it is looked at. Files count
 # by their content, which is recorded as a checksum.
 FREE: Final = (
-    *("movements", "out", "name", "evaluate_at", "repeats", "threads"),
+    *("movements", "out", "name", "evaluate_at", "repeats", "floor_at", "threads", "board"),
     *("benchmark", "benchmark_crc32", "demonstrations"),
 )
-EVALUATION_SETTINGS: Final = ("repeats", "benchmark_crc32")  # all evaluations of a run share these
+EVALUATION_SETTINGS: Final = ("repeats", "floor_at", "benchmark_crc32")  # all evaluations of a run share these
 FLUSH_EVERY = 1.0  # s, what a killed run loses at most
 
 
@@ -120,10 +123,14 @@ def run_in(directory: RunDirectory, config: Config, parts: RunParts, stopping: S
         execute=execute,
     )
     finished = False
-    with Progress(f"{config.variant} seed {config.seed}", len(recorded), config.movements) as progress:
+    with (
+        RunBoard(directory, config, parts, seconds, partial(regions_of, parts)) as board,
+        Progress(f"{config.variant} seed {config.seed}", len(recorded), config.movements) as progress,
+    ):
         try:
             if not recorded:
                 directory.begin()
+                board.begin()
             for episode in seconds.of_learner(episodes):
                 demonstration = episode.demonstration
                 line = directory.columns.line(episode, None if demonstration is None else rows[id(demonstration)])
@@ -132,18 +139,23 @@ def run_in(directory: RunDirectory, config: Config, parts: RunParts, stopping: S
                 elif line != directory.lines[episode.index]:
                     raise ReplayError(_differs(directory.columns, directory.lines[episode.index], line))
                 movements = episode.index + 1
+                board.episode(episode)
                 if movements in wanted and movements not in directory.evaluations:
                     directory.flush()
                     with seconds.of_evaluation():
-                        evaluate_in(directory, config, parts, movements, stopping)
+                        evaluated = evaluate_in(directory, config, parts, movements, stopping)
+                    board.evaluation(evaluated)
                 if movements == len(recorded):
                     directory.begin()
+                    board.begin()
                 if movements > len(recorded) and time.monotonic() - flushed >= FLUSH_EVERY:
                     summarise()
+                    board.flush()
                     flushed = time.monotonic()
                 progress.show(movements, directory.evaluations.last.get("mean_error_m"))
                 stopping.check()
             finished = True
+            board.finish()
         finally:
             if movements >= len(recorded):  # else the summary that was found counts for more
                 summarise(finished=finished)
@@ -152,18 +164,22 @@ def run_in(directory: RunDirectory, config: Config, parts: RunParts, stopping: S
     return f"{directory.path}: {movements} movements, {found}"
 
 
-def evaluate_in(directory: RunDirectory, config: Config, parts: RunParts, movements: int, stopping: Stopping) -> None:
+def evaluate_in(
+    directory: RunDirectory, config: Config, parts: RunParts, movements: int, stopping: Stopping
+) -> Evaluation | None:
     """Evaluate the learner as it is now, with streams that the run does not use.
 
     Before its first exemplar there is nothing to infer a movement from, as for the learner by observation before its
     first demonstration: such an evaluation is left out.
     """
     if len(parts.learner.memory) == 0:
-        return
+        return None
     goals = parts.benchmark.goals
+    repeats = config.repeats if config.floor_at is None or movements in config.floor_at else 0
     with stopping.at_once():
-        found = evaluate(parts.inverse, parts.environment, goals, config.seed, movements, repeats=config.repeats)
+        found = evaluate(parts.inverse, parts.environment, goals, config.seed, movements, repeats=repeats)
     directory.evaluations.add(movements, found, regions_of(parts))
+    return found
 
 
 def correspondence_of(parts: RunParts) -> list[str]:
@@ -203,8 +219,7 @@ def open_directory(config: Config, parts: RunParts, resume: bool) -> RunDirector
         RunError: see ``RunDirectory``; or its log is longer than the run is to be.
     """
     environment, regions = parts.environment, regions_of(parts)
-    plain = {name: str(value) if isinstance(value, Path) else value for name, value in vars(config).items()}
-    settings = {**plain, **parts.data}
+    settings = json.loads(json.dumps({**vars(config), **parts.data}, default=str))  # as they will read back
     directory = RunDirectory(
         config.directory,
         settings,

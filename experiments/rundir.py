@@ -7,7 +7,6 @@ with RunDirectory(path, settings, ...) as directory: directory.begin(); director
 from __future__ import annotations
 
 import fcntl
-import json
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -133,7 +132,7 @@ class RunDirectory:
         differ = [
             f"{name} was {before.get(name)}, now {settings.get(name)}"
             for name in dict.fromkeys((*settings, *before))
-            if name not in free and before.get(name) != json.loads(json.dumps(settings.get(name)))
+            if name not in free and before.get(name) != settings.get(name)
         ]
         if differ:
             raise RunError(

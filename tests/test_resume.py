@@ -6,9 +6,11 @@ import zlib
 
 import pytest
 
+import run as run_script
 from config import Config
 from read_runs import read_run
 from runs import EAGER, MOVEMENTS, arguments, csv_of, signal_after, start
+from sgimd_torch.evaluation import evaluate
 from sgimd_torch.spaces import stream
 
 
@@ -66,6 +68,27 @@ def test_resuming_a_finished_run_changes_nothing_but_what_is_asked_of_its_evalua
     assert read_run(directory).evaluation["movements"].tolist() == [45, 90]
     assert go(tmp_path, "--resume") == 0
     assert csv_of(directory) == reference
+
+
+def test_a_resumed_run_keeps_its_evaluations_until_floor_at_changes(tmp_path, go, reference, monkeypatch):
+    evaluated = []
+
+    def evaluate_and_note(inverse, environment, goals, seed, movements, **options):
+        evaluated.append((movements, options["repeats"]))
+        return evaluate(inverse, environment, goals, seed, movements, **options)
+
+    monkeypatch.setattr(run_script, "evaluate", evaluate_and_note)
+    assert go(tmp_path, "--movements", 60, "--floor_at", "30,90") == 0
+    assert evaluated == [(30, 2), (60, 0)]
+    assert go(tmp_path, "--resume", "--floor_at", "30,90") == 0
+    assert evaluated == [(30, 2), (60, 0), (90, 2)]
+    assert go(tmp_path, "--resume", "--floor_at", "30,90") == 0
+    assert len(evaluated) == 3
+    assert go(tmp_path, "--resume", "--floor_at", "90") == 0
+    assert evaluated[3:] == [(30, 0), (60, 0), (90, 2)]
+    assert go(tmp_path, "--resume") == 0  # null: all of them
+    assert evaluated[6:] == [(30, 2), (60, 2), (90, 2)]
+    assert csv_of(tmp_path / "sgim-d" / "seed-003") == reference
 
 
 def tear(content):

@@ -75,6 +75,22 @@ def test_evaluating_more_or_not_at_all_leaves_the_log_as_it_is(tmp_path, go, ref
     assert written["evaluation.csv"].count(b"\n") == (1 if evaluations == "[]" else 8)
 
 
+def test_floor_at_names_the_evaluations_that_measure_the_noise_and_changes_nothing_else(tmp_path, go, reference):
+    for floor_at, measured in (("60", [60]), ("30,90,1000", [30, 90]), ("[]", []), ("null", [30, 60, 90])):
+        assert go(tmp_path / floor_at, "--floor_at", floor_at) == 0
+        directory = tmp_path / floor_at / "sgim-d" / "seed-003"
+        evaluation = read_run(directory).evaluation
+        assert evaluation["movements"][np.isfinite(evaluation["noise_floor_m"])].tolist() == measured
+        written = csv_of(directory)
+        for name in ("episodes.csv", "regions.csv"):
+            assert written[name] == reference[name]
+        lines = zip(written["evaluation.csv"].splitlines(), reference["evaluation.csv"].splitlines(), strict=True)
+        for line, full in lines:
+            movements = full.split(b",")[0]
+            is_whole = movements == b"movements" or int(movements) in measured
+            assert line == (full if is_whole else full.rpartition(b",")[0] + b",nan")
+
+
 def test_threads_change_no_byte(tmp_path, go, reference):
     assert go(tmp_path, "--threads", 2) == 0
     assert csv_of(tmp_path / "sgim-d" / "seed-003") == reference
@@ -140,6 +156,8 @@ def test_a_damaged_config_is_named(tmp_path, go, capsys):
         ("--every 0", "every must be at least 1, got 0"),
         ("--evaluate_at 0,3", "evaluate_at must be at least 1, got 0"),
         ("--evaluate_at soon", "evaluate_at"),
+        ("--floor_at 0,3", "floor_at must be at least 1, got 0"),
+        ("--floor_at soon", "floor_at"),
         ("--window 7", "window must be even"),
         ("--name a/b", "name must be that of one directory"),
         ("--benchmark nowhere.npz", "benchmark: there is no file nowhere.npz"),
@@ -186,8 +204,7 @@ def test_help_names_every_choice_and_every_field_has_a_sentence(capsys):
     for choice in (name for table in KNOWN.values() for name in table):
         assert choice in text
     for field in Config.__dataclass_fields__:
-        _, _, sentence = text.partition(f"--{field} {field.upper()} ")
-        assert sentence[0].isupper(), field
+        assert re.search(rf"--{field} ({field.upper()}|{{true,false}}) [A-Z]", text), field
 
 
 @pytest.mark.parametrize(("option", "table"), [item for item in KNOWN.items() if item[0] != "algorithm"])
@@ -215,6 +232,10 @@ TEACHING = {"every": 7, "choice": "random", "imitations": 3, "epsilon": 0.2}
         ("--algorithm observation", {*BABBLING, "imitations", "epsilon"}),
         ("--algorithm sgim-d", set()),
         ("--algorithm sgim-d --goals uniform", {"window", "progress", "competence"}),
+        ("--algorithm sgim-d --goals grid", set()),
+        ("--algorithm sgim-d --goals alp-gmm", {"window", "progress"}),
+        ("--algorithm map-elites", {*BABBLING, *TEACHING}),
+        ("--algorithm cma-me", {*BABBLING, *TEACHING}),
         ("--algorithm sgim-d --social emulate", {"imitations", "epsilon"}),
         ("--algorithm sgim-d --teacher initial", {"choice"}),
     ],
@@ -244,7 +265,7 @@ def test_of_options_that_change_nothing_only_those_that_were_changed_are_named(t
 def test_config_defaults_are_the_librarys(benchmark):
     learner = build(Config(benchmark=benchmark)).learner
     shipped = sgimd_torch.sgim_d(FishingRod(), 0, correspondence=FishingRod().primitive.correspondence)
-    for name in ("budget", "tolerance", "global_range"):
+    for name in ("budget", "tolerance", "global_range", "give_up"):
         assert getattr(learner.autonomous, name) == getattr(shipped.autonomous, name)
     for part in ("goals", "inverse", "judge"):
         assert type(getattr(learner.autonomous, part)) is type(getattr(shipped.autonomous, part))
