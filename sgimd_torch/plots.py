@@ -28,8 +28,6 @@ COLOURS = {  # after Okabe & Ito: told apart with any colour vision, and in grey
     "observation": "#cc79a7",
     "imitation": "#009e73",
     "sgim-d": "#d55e00",
-    "map-elites": "#56b4e9",
-    "cma-me": "#e69f00",
 }
 NAMES = {
     "random": "Random",
@@ -37,8 +35,6 @@ NAMES = {
     "observation": "Observation",
     "imitation": "Imitation",
     "sgim-d": "SGIM-D",
-    "map-elites": "MAP-Elites",
-    "cma-me": "CMA-ME",
 }
 
 

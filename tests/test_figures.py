@@ -103,10 +103,10 @@ def test_every_joint_of_every_recording_of_a_demonstrator_is_shown(data):
     axes = FIGURES["trajectories"](data).axes
     demonstrations = load_demonstrations()  # of demonstrator 3, whose row is the last
     for joint, ax in enumerate(axes[-len(JOINTS) :]):
-        assert ax.get_title() == JOINTS[joint].replace("_", " ")
+        assert axes[joint].get_title() == JOINTS[joint].replace("_", " ")
         assert len(ax.lines) == len(demonstrations)
         np.testing.assert_array_equal(ax.lines[7].get_ydata(), demonstrations[7].trajectory[:, joint])
-    assert "Demonstrator 3" in axes[-len(JOINTS)].texts[0].get_text()
+    assert "Demonstrator 3" in axes[-len(JOINTS)].get_ylabel()
 
 
 def test_the_large_space_is_dashed_beside_the_small_one_in_the_same_colour(data):
