@@ -32,7 +32,12 @@ DEMONSTRATORS = {
     2: "Demonstrator 2: careful\n(the most reliable of them)",
     3: "Demonstrator 3: structured\n(simulated person)",
 }
-PANELS = {"ablations": "One part of SGIM-D changed", "baselines": "Other learners", "teaching": "Taught otherwise"}
+PANELS = {
+    "ablations": "One part of SGIM-D changed",
+    "baselines": "Other learners",
+    "teaching": "Taught otherwise",
+    "letter": "The paper to the letter",
+}
 REACH = 1.5  # m; the float hardly ever lands farther from the base
 
 
