@@ -1,7 +1,8 @@
-"""Run experiments: every variant for several seeds, one process a core, and what came of them in two tables.
+"""Run experiments: every variant for several seeds, one process a core, and what came of them in tables.
 
 Which variants there are: variants.py. Each run is one of run.py, in OUT/VARIANT/seed-000. When it ends, its evaluations
-go to RESULTS/paper.csv, a line each; of the large task space the goals that it chose are counted in RESULTS/goals.csv.
+go to RESULTS/paper.csv, a line each, those of forward-model and planar-arm-* to RESULTS/forward_model.csv; of the large
+task space the goals that it chose are counted in RESULTS/goals.csv. A variant of two experiments lives only once.
 Start the command again after Ctrl-C or a power cut, or with more seeds: what is in the tables is not run again, and a
 run that was stopped goes on. A run that fails is reported and the others go on.
 
@@ -16,7 +17,7 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import FrameType
 
@@ -28,7 +29,7 @@ from overview import Overview
 from runfiles import RunError
 from supervise import say, with_streams
 from tables import Table, read_keys
-from tasks import GOALS, RESULTS, Task, tasks_of
+from tasks import COLUMNS, Task, tasks_of
 from variants import EXPERIMENTS, make_subsets
 
 EXAMPLES = f"""experiments: {", ".join(EXPERIMENTS)}
@@ -36,13 +37,14 @@ EXAMPLES = f"""experiments: {", ".join(EXPERIMENTS)}
 examples:
   python experiments/compare.py                                   everything, 10 seeds each: some hours on two cores
   python experiments/compare.py learners large-space --seeds 3
+  python experiments/compare.py forward-model planar-arm-7 planar-arm-50
   python experiments/compare.py ablations --only uniform-goals grid
   python experiments/compare.py --dry-run                         what is still to be done
 """
 
 
-def carry_out(tasks: Sequence[Task], done: int, processes: int, results: Table, goals: Table) -> list[str]:
-    """Run the ``tasks``, some at once, and harvest each as it ends; what failed, with its reason.
+def carry_out(tasks: Sequence[Task], done: int, processes: int, tables: Mapping[str, Table]) -> list[str]:
+    """Run the ``tasks``, some at once, and harvest each into its ``tables`` as it ends; what failed, with its reason.
 
     A run that a killed compare.py left behind is waited for, then harvested like the others.
 
@@ -58,9 +60,13 @@ def carry_out(tasks: Sequence[Task], done: int, processes: int, results: Table, 
         failures.append(str(error))
         overview.tell(str(error), *(["The others go on."] if waiting or running else []))
 
+    def ours(task: Task) -> bool:
+        """Whether that run is under way here, for another experiment."""
+        return task.config.directory in (other.config.directory for other in running.values())
+
     try:
         while waiting or running:
-            free = (task for task in list(waiting) if not in_use(task.config.directory))
+            free = (task for task in list(waiting) if not ours(task) and not in_use(task.config.directory))
             while len(running) < processes and (task := next(free, None)):
                 waiting.remove(task)
                 try:
@@ -75,7 +81,7 @@ def carry_out(tasks: Sequence[Task], done: int, processes: int, results: Table, 
                 task = running.pop(child)
                 try:
                     child.check()
-                    task.harvest(results, goals)
+                    task.harvest(tables)
                 except (ChildFailed, RunError) as error:
                     if in_use(task.config.directory):  # the run of an earlier start, which had not shown itself yet
                         waiting.append(task)
@@ -85,7 +91,8 @@ def carry_out(tasks: Sequence[Task], done: int, processes: int, results: Table, 
                     failed(error)
                 else:
                     overview.ended(child, failed=False)
-            overview.show(elsewhere=len(waiting) if len(running) < processes else 0)
+            idle = len(running) < processes
+            overview.show(elsewhere=sum(not ours(task) for task in waiting) if idle else 0)
             time.sleep(0.3)
     finally:
         for child in running:
@@ -101,27 +108,29 @@ def main() -> int:
     signal.signal(signal.SIGINT, signal.default_int_handler)
     signal.signal(signal.SIGTERM, _interrupt)
     seeds = range(options.first_seed, options.first_seed + options.seeds)
-    table, begun = options.results / "paper.csv", False
+    begun = False
     try:
         tasks = tasks_of(options.experiments, options.only, seeds, options.out)
-        finished, _ = read_keys(table, *RESULTS)
-        left = [task for task in tasks if task.last_row not in finished]
-        say(f"{len(tasks)} runs, {len(tasks) - len(left)} of them in {table} already")
+        paths = {name: options.results / name for task in tasks for name in task.tables}
+        finished = {name: read_keys(path, *COLUMNS[name])[0] for name, path in paths.items()}
+        left = [task for task in tasks if task.last_row not in finished[task.table]]
+        where = " and ".join(str(paths[name]) for name in dict.fromkeys(task.table for task in tasks))
+        say(f"{len(tasks)} runs, {len(tasks) - len(left)} of them in {where} already")
         if options.dry_run:
             print("".join(f"{task.experiment}: {task.title}\n" for task in left), end="")
             return 0
         _make_results(options.results)
         make_subsets(options.out / "demonstrations")
-        results, goals = Table(table, *RESULTS), Table(options.results / "goals.csv", *GOALS)
+        tables = {name: Table(path, *COLUMNS[name]) for name, path in paths.items()}
         begun = True
-        failures = carry_out(left, len(tasks) - len(left), options.processes, results, goals)
+        failures = carry_out(left, len(tasks) - len(left), options.processes, tables)
     except KeyboardInterrupt:
         say("", "Stopped; the same command goes on from here.")
         return 130
     except (RunError, OSError, ValueError) as error:
         say(f"error: {error}")
         return 1 if begun else 2
-    say(f"{len(left) - len(failures)} runs ended well, {len(failures)} failed: {table}", *failures)
+    say(f"{len(left) - len(failures)} runs ended well, {len(failures)} failed: {where}", *failures)
     return 1 if failures else 0
 
 
@@ -148,7 +157,7 @@ def _options() -> argparse.Namespace:
     )
     parser.add_argument("--out", type=Path, default=Path("runs"), help="where the runs go (default: %(default)s)")
     parser.add_argument(
-        "--results", type=Path, default=Path("results"), help="folder of paper.csv and goals.csv (default: %(default)s)"
+        "--results", type=Path, default=Path("results"), help="folder of the tables (default: %(default)s)"
     )
     parser.add_argument("--dry-run", action="store_true", help="only tell what is still to be done")
     options = parser.parse_args()
@@ -161,19 +170,23 @@ def _options() -> argparse.Namespace:
 
 
 def _check_names(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
-    homes = {variant: experiment for experiment, variants in EXPERIMENTS.items() for variant in variants}
+    homes: dict[str, list[str]] = {}
+    for experiment, variants in EXPERIMENTS.items():
+        for variant in variants:
+            homes.setdefault(variant, []).append(experiment)
     known = list(EXPERIMENTS)
     for name in options.experiments:
         if name in homes and name not in EXPERIMENTS:
-            parser.error(f"{name} is a variant, of {homes[name]}; write {homes[name]} --only {name}")
+            parser.error(f"{name} is a variant, of {' and '.join(homes[name])}; write {homes[name][0]} --only {name}")
         if name not in EXPERIMENTS:
             parser.error(f"unknown experiment {name!r}, known are {', '.join(known)}{_slip(name, known)}")
-    known = [variant for variant, experiment in homes.items() if experiment in options.experiments]
+    known = [variant for variant, experiments in homes.items() if {*experiments} & {*options.experiments}]
     for name in options.only:
         if name in EXPERIMENTS and name not in homes:
             parser.error(f"{name} is an experiment, no variant; experiments go before --only")
         if name in homes and name not in known:
-            parser.error(f"{name} is a variant of {homes[name]}, asked for were {', '.join(options.experiments)}")
+            where = " and ".join(homes[name])
+            parser.error(f"{name} is a variant of {where}, asked for were {', '.join(options.experiments)}")
         if name not in homes:
             parser.error(f"unknown variant {name!r}, known are {', '.join(known)}{_slip(name, known)}")
 

@@ -17,6 +17,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
+from environments import ARMS, ENVIRONMENTS, ROD
 from sgimd_torch.algorithms import MakeSearch, attempted, emulating, goal_babbling, imitating, remembered
 from sgimd_torch.evaluation import evaluate
 from sgimd_torch.fishing_rod import FishingRod
@@ -91,6 +92,7 @@ TEACHERS: Final = {"periodic": PeriodicTeacher, "initial": InitialTeacher, "aske
 CHOICES: Final = {"least-explored": least_explored, "random": at_random}
 KNOWN: Final[dict[str, dict[str, Any]]] = {
     "algorithm": ALGORITHMS,
+    "environment": dict.fromkeys(ENVIRONMENTS),
     "goals": GOALS,
     "progress": PROGRESS,
     "competence": COMPETENCES,
@@ -102,6 +104,7 @@ KNOWN: Final[dict[str, dict[str, Any]]] = {
 }
 # Choices that leave other options without a use.
 _MOOT: Final = {
+    **{("environment", arm): ("noise", "task_space") for arm in ARMS},
     ("goals", "uniform"): ("window", "progress", "competence"),
     ("goals", "alp-gmm"): ("window", "progress"),
     ("social", "emulate"): ("imitations", "epsilon"),
@@ -129,6 +132,8 @@ class Config:
         movements: Length of the learner's life, movements at rest counted.
         out: Directory for runs; this one goes to OUT/NAME/seed-003.
         name: NAME in that path, to keep a variant apart; null is the algorithm's name.
+        environment: Where it lives: fishing-rod, or planar-arm-7 or planar-arm-50, an arm of that many joints whose
+            outcome is where it ends (m); it moves without noise.
         noise: Motor noise (s), standard deviation of the command (rad) for each rad/s of commanded speed; 0 is none.
         task_space: Half the side (m) of the square that goals come from; 100 in the paper's large-space experiment.
         goals: Where goals come from (sagg-riac, sgim-d): interest-map; grid, the same interest in cells that never
@@ -154,14 +159,14 @@ class Config:
         every: Movements from one demonstration to the next, or from one look at the learner to the next (asked); null
             is that teacher's own number.
         choice: Which demonstration comes (periodic, asked): least-explored by the learner, or random.
-        demonstrations: File of recorded demonstrations; null is the shipped one.
+        demonstrations: File of recorded demonstrations; null is the shipped one, on an arm the one made for it.
         evaluate_at: Movements after which to evaluate, besides the end, such as 250,500; null is 250, 500 and every
             1000; [] never evaluates, not at the end either. Evaluating changes nothing in the run.
         repeats: How many times an evaluation executes each chosen movement again to measure the noise, at least 2; 0
             leaves the noise out.
         floor_at: Which evaluations measure the noise, such as 1000,5000; it takes ten times as long as the error. null
             is all of them.
-        benchmark: File of the goals to evaluate on; null is the shipped one.
+        benchmark: File of the goals to evaluate on; null is the shipped one, on an arm the one made for it.
         threads: Threads that an evaluation may use; results do not depend on it.
         board: Show the run in TensorBoard, true or false; scripts/watch OUT opens it. Showing changes nothing in it.
     """
@@ -171,6 +176,7 @@ class Config:
     movements: int = 5000
     out: Path = Path("runs")
     name: str | None = None
+    environment: str = ROD
     noise: float = _default(FishingRod, "noise")
     task_space: float = 1.0
     goals: str = _name_of(GOALS, goal_babbling, "goals")
@@ -245,7 +251,7 @@ class Config:
         used = ALGORITHMS[self.algorithm]
         why = {name: f"on {self.algorithm}" for name in ALGORITHMS["sgim-d"] if name not in used}
         for (option, value), moot in _MOOT.items():
-            if option in used and getattr(self, option) == value:
+            if option in ("environment", *used) and getattr(self, option) == value:
                 why |= dict.fromkeys(moot, f"with --{option} {value}")
         given = [field.name for field in fields(self) if getattr(self, field.name) != field.default]
         return [f"--{name} has no effect {why[name]}" for name in given if name in why]

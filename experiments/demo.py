@@ -26,6 +26,7 @@ if __name__ == "__main__":  # Ctrl-C while the libraries below are loading
 from children import ChildFailed, learn
 from command_line import parse
 from comparison import draw, table
+from environments import ROD
 from read_runs import read_run
 from runfiles import make_folder
 from sgimd_torch.plots import NAMES
@@ -96,6 +97,8 @@ def _options() -> argparse.Namespace:
         if name in ("--algorithm", "--name"):
             parser.error(f"{name} is not free here: the demo compares sgim-d and random by their own names")
     config, _ = parse(options.run_options)  # refuses what run.py would
+    if config.environment != ROD:
+        parser.error("--environment is not free here: the demo shows the fishing rod")
     if config.evaluate_at == ():
         parser.error("--evaluate_at [] leaves nothing to draw; choose some movements, or leave it out")
     return options

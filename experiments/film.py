@@ -36,6 +36,7 @@ from config import Config
 from parts import RunParts, build
 from read_runs import Run, read_run
 from runfiles import RunError
+from sgimd_torch.fishing_rod import FishingRod
 from sgimd_torch.spaces import Array, stream
 from sgimd_torch.strategies import Remember
 from supervise import say, with_streams
@@ -66,11 +67,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         run = read_run(options.run)
         parts = build(config_of(run))
-        goals = parts.environment.outcomes.check("goals", options.goals or _spread(parts.benchmark.goals), "in metres")
+        rod = parts.environment
+        if not isinstance(rod, FishingRod):
+            raise RunError(f"{run.path} is of {run.config['environment']}; a film shows the fishing rod only")
+        goals = rod.outcomes.check("goals", options.goals or _spread(parts.benchmark.goals), "in metres")
         stages = _stages(run, options)
         width = options.width or (480 if len(stages) > 1 else 640)
-        with Camera(parts.environment.model, width=width, height=width * 3 // 4) as camera:
-            shots = _cast(run, parts, goals, stages, say_movements=len(stages) > 1)
+        with Camera(rod.model, width=width, height=width * 3 // 4) as camera:
+            shots = _cast(run, parts, rod, goals, stages, say_movements=len(stages) > 1)
             _film(options, camera, [[stage[k] for stage in shots] for k in range(len(goals))])
     except KeyboardInterrupt:
         say("stopped; no film was written")
@@ -113,7 +117,7 @@ def config_of(run: Run) -> Config:
 
 def remember(run: Run, parts: RunParts, start: int, stop: int) -> None:
     """Add to the memory of ``parts`` what the learner remembered in movements ``start`` to ``stop``, in its order."""
-    memory, correspondence = parts.learner.memory, parts.environment.primitive.correspondence
+    memory, correspondence = parts.learner.memory, parts.correspondence
     by_observation = isinstance(parts.learner.social, Remember)  # the others remember only what they did themselves
     for row in range(start, min(stop, len(run.index))):
         if by_observation and run.demonstration[row] >= 0:
@@ -123,9 +127,11 @@ def remember(run: Run, parts: RunParts, start: int, stop: int) -> None:
             memory.add(run.contexts[row], run.thetas[row], run.outcomes[row])
 
 
-def _cast(run: Run, parts: RunParts, goals: Array, stages: Sequence[int], *, say_movements: bool) -> list[list[Shot]]:
+def _cast(
+    run: Run, parts: RunParts, rod: FishingRod, goals: Array, stages: Sequence[int], *, say_movements: bool
+) -> list[list[Shot]]:
     """For each stage, the run's answer to each goal; a goal meets the same motor noise at every stage."""
-    rod, shots = parts.environment, []
+    shots = []
     context = (rod.contexts.low + rod.contexts.high) / 2
     title = f"{run.config['name'] or run.config['algorithm']}, seed {run.config['seed']}"
     for before, movements in zip((0, *stages), stages, strict=False):

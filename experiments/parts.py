@@ -12,15 +12,16 @@ from functools import partial
 from pathlib import Path
 
 from config import ALGORITHMS, CHOICES, COMPETENCES, GOALS, INVERSES, PROGRESS, SEARCHES, Config, Inverse, rival
+from environments import ARMS, arm_benchmark, arm_demonstrations
 from sgimd_torch import algorithms
-from sgimd_torch.algorithms import MakeGoals, MakeSocial, Parts, emulating, imitating
+from sgimd_torch.algorithms import Correspondence, MakeGoals, MakeSocial, Parts, emulating, imitating
 from sgimd_torch.demonstrations import SHIPPED as SHIPPED_DEMONSTRATIONS
 from sgimd_torch.demonstrations import load_demonstrations
+from sgimd_torch.environment import Environment, PlanarArm
 from sgimd_torch.evaluation import SHIPPED as SHIPPED_BENCHMARK
 from sgimd_torch.evaluation import Benchmark, load_benchmark
 from sgimd_torch.fishing_rod import JOINTS, FishingRod
 from sgimd_torch.learner import Learner
-from sgimd_torch.motor_primitives import GaussianPrimitive
 from sgimd_torch.spaces import Box, Demonstration, stream
 from sgimd_torch.teachers import AskedTeacher, InitialTeacher, PeriodicTeacher, Teacher
 
@@ -30,11 +31,13 @@ MISFIT = 0.5  # rad; a worse fit is no movement of this robot
 
 @dataclass(frozen=True, eq=False)
 class RunParts:
-    """What a run needs. ``inverse`` reads the learner's memory for evaluations; ``teacher`` is None, and
-    ``demonstrations`` are empty, for who learns alone. ``residuals`` (rad) say how far each is from what the robot's
-    motor primitive can play. ``data`` holds checksums of the files that were read."""
+    """What a run needs. ``correspondence`` translates a demonstrated trajectory to theta. ``inverse`` reads the
+    learner's memory for evaluations; ``teacher`` is None, and ``demonstrations`` are empty, for who learns alone.
+    ``residuals`` (rad) say how far each is from what the robot can play. ``data`` holds checksums of the files that
+    were read."""
 
-    environment: FishingRod
+    environment: FishingRod | PlanarArm
+    correspondence: Correspondence
     learner: Learner
     teacher: Teacher | None
     demonstrations: Sequence[Demonstration]
@@ -51,33 +54,54 @@ def build(config: Config) -> RunParts:
         ValueError: a part refuses its option, or a file does not fit the robot.
         FileNotFoundError: there is no such file.
     """
-    half_side = config.task_space
-    environment = FishingRod(noise=config.noise, outcomes=Box.cube(-half_side, half_side, 2), threads=config.threads)
-    benchmark_path = _existing("benchmark", config.benchmark or SHIPPED_BENCHMARK)
-    benchmark = load_benchmark(benchmark_path)
-    benchmark.check(environment)
+    robot: FishingRod | PlanarArm
+    if config.environment in ARMS:
+        robot = PlanarArm(ARMS[config.environment])
+        correspondence = robot.correspondence
+    else:
+        half_side = config.task_space
+        robot = FishingRod(noise=config.noise, outcomes=Box.cube(-half_side, half_side, 2), threads=config.threads)
+        correspondence = robot.primitive.correspondence
+    benchmark, benchmark_crc32 = _benchmark(config, robot)
+    benchmark.check(robot)
     demonstrations: Sequence[Demonstration] = []
     residuals: list[float] = []
-    data: dict[str, str | None] = {"demonstrations_crc32": None, "benchmark_crc32": _checksum(benchmark_path)}
-    teacher = None
+    teacher, demonstrations_crc32 = None, None
     if "teacher" in ALGORITHMS[config.algorithm]:
-        path = _existing("demonstrations", config.demonstrations or SHIPPED_DEMONSTRATIONS)
-        demonstrations = load_demonstrations(
-            path,
-            n_joints=len(JOINTS),
-            outcome_dim=environment.outcomes.dim,
-            context_dim=environment.contexts.dim,
-        )
-        residuals = _residuals(path, demonstrations, environment.primitive)
-        data["demonstrations_crc32"] = _checksum(path)
+        demonstrations, residuals, demonstrations_crc32 = _demonstrations(config, robot)
         teacher = _teacher(config, demonstrations)
-    learner = _learner(config, environment)
+    learner = _learner(config, robot, correspondence)
     inverse = INVERSES[config.inverse](learner.memory)
-    return RunParts(environment, learner, teacher, demonstrations, residuals, inverse, benchmark, data)
+    data = {"demonstrations_crc32": demonstrations_crc32, "benchmark_crc32": benchmark_crc32}
+    return RunParts(robot, correspondence, learner, teacher, demonstrations, residuals, inverse, benchmark, data)
 
 
-def _learner(config: Config, environment: FishingRod) -> Learner:
-    correspondence = environment.primitive.correspondence
+def _benchmark(config: Config, robot: FishingRod | PlanarArm) -> tuple[Benchmark, str | None]:
+    """The goals, and the checksum of their file; None of those that are made for an arm."""
+    if config.benchmark is None and isinstance(robot, PlanarArm):
+        return arm_benchmark(robot), None
+    path = _existing("benchmark", config.benchmark or SHIPPED_BENCHMARK)
+    return load_benchmark(path), _checksum(path)
+
+
+def _demonstrations(
+    config: Config, robot: FishingRod | PlanarArm
+) -> tuple[Sequence[Demonstration], list[float], str | None]:
+    """What is shown, what each leaves of itself (rad), and the checksum of the file, None without one."""
+    if config.demonstrations is None and isinstance(robot, PlanarArm):
+        demonstrations = arm_demonstrations(robot)
+        return demonstrations, [0.0] * len(demonstrations), None
+    path = _existing("demonstrations", config.demonstrations or SHIPPED_DEMONSTRATIONS)
+    demonstrations = load_demonstrations(
+        path,
+        n_joints=robot.policies.dim if isinstance(robot, PlanarArm) else len(JOINTS),
+        outcome_dim=robot.outcomes.dim,
+        context_dim=robot.contexts.dim,
+    )
+    return demonstrations, _residuals(path, demonstrations, robot), _checksum(path)
+
+
+def _learner(config: Config, environment: Environment, correspondence: Correspondence) -> Learner:
     goals: MakeGoals = GOALS[config.goals]
     if config.goals in ("interest-map", "grid"):
         goals = partial(GOALS[config.goals], window=config.window, progress=PROGRESS[config.progress])
@@ -119,28 +143,35 @@ def _teacher(config: Config, demonstrations: Sequence[Demonstration]) -> Teacher
     return PeriodicTeacher(demonstrations, rng, choose=choose, **every)
 
 
-def _residuals(path: Path, demonstrations: Sequence[Demonstration], primitive: GaussianPrimitive) -> list[float]:
+def _residuals(path: Path, demonstrations: Sequence[Demonstration], robot: FishingRod | PlanarArm) -> list[float]:
     """What the correspondence leaves of each demonstration, eq. (6), rad; refuses what it cannot translate."""
     residuals: list[float] = []
-    shortest, longest = primitive.durations
     for row, demonstration in enumerate(demonstrations):
-        duration = demonstration.times[-1] - demonstration.times[0]
-        if not shortest / STRETCH <= duration <= longest * STRETCH:
-            raise ValueError(
-                f"{path}: recording {row} lasts {duration:g} s, the robot's movements {shortest:g} to {longest:g} s; "
-                "was it recorded in milliseconds?"
-            )
         try:
-            theta = primitive.correspondence(demonstration.times, demonstration.trajectory)
+            residuals.append(_residual(demonstration, robot))
         except ValueError as error:
             raise ValueError(f"{path}: recording {row} cannot be translated: {error}") from error
-        residuals.append(primitive.residual(theta, demonstration.times, demonstration.trajectory))
-        if residuals[-1] > MISFIT:
-            raise ValueError(
-                f"{path}: recording {row} is {residuals[-1]:.2f} rad (root mean square) away from anything that the "
-                "robot can play; was it recorded in degrees, or with the joints in another order?"
-            )
     return residuals
+
+
+def _residual(demonstration: Demonstration, robot: FishingRod | PlanarArm) -> float:
+    times, trajectory = demonstration.times, demonstration.trajectory
+    if isinstance(robot, PlanarArm):
+        robot.correspondence(times, trajectory)
+        return 0.0  # its last posture, all that matters, is met exactly
+    duration, (shortest, longest) = times[-1] - times[0], robot.primitive.durations
+    if not shortest / STRETCH <= duration <= longest * STRETCH:
+        raise ValueError(
+            f"it lasts {duration:g} s, the robot's movements {shortest:g} to {longest:g} s; "
+            "was it recorded in milliseconds?"
+        )
+    residual = robot.primitive.residual(robot.primitive.correspondence(times, trajectory), times, trajectory)
+    if residual > MISFIT:
+        raise ValueError(
+            f"it is {residual:.2f} rad (root mean square) away from anything that the robot can play; "
+            "was it recorded in degrees, or with the joints in another order?"
+        )
+    return residual
 
 
 def _existing(what: str, path: Path) -> Path:

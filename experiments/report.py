@@ -21,6 +21,7 @@ if __name__ == "__main__":  # Ctrl-C while the libraries below are loading
 
 from tqdm import tqdm
 
+from environments import ROD
 from report_data import Life, Variant, find, read_life
 from report_films import MOST, ROOM, Film, find_films, make_film, read_film
 from report_page import page
@@ -97,9 +98,9 @@ def read(found: dict[str, list[Path]]) -> tuple[list[Variant], list[str]]:
 
 
 def film(variants: Iterable[Variant]) -> None:
-    """Films of the runs that the page shows, where there are none."""
+    """Films of the runs of the rod that the page shows, where there are none."""
     for variant in variants:
-        if not find_films(variant.typical.path):
+        if variant.typical.environment == ROD and not find_films(variant.typical.path):
             make_film(variant.typical.path)
 
 

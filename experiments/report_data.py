@@ -16,11 +16,13 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from environments import ARMS, ROD, arm_demonstrations
 from evidence import rng
 from over_seeds import Interval, iqm_interval, mean_over_life, ratio_interval
 from read_runs import find_runs, read_run
 from runfiles import RunError
 from sgimd_torch.demonstrations import SHIPPED, load_demonstrations
+from sgimd_torch.environment import PlanarArm
 from sgimd_torch.plots import NAMES
 from sgimd_torch.spaces import Array
 
@@ -55,6 +57,11 @@ class Life:
     def seed(self) -> int:
         """Of its random streams."""
         return int(self.config["seed"])
+
+    @property
+    def environment(self) -> str:
+        """Where it lived; runs that do not name it lived on the rod."""
+        return str(self.config.get("environment", ROD))
 
     @property
     def wanted(self) -> int:
@@ -230,17 +237,20 @@ def over_seeds(values: Array) -> Interval | None:
 
 def demonstrated(lives: Sequence[Life]) -> tuple[Array, str]:
     """``(n, 2)`` m what the runs were shown, each demonstration once, and what is to be said if they cannot be read."""
-    rows: dict[tuple[str | None, str | None], set[int]] = {}
+    rows: dict[tuple[str, str | None, str | None], set[int]] = {}
     for life in lives:
-        source = life.config.get("demonstrations"), life.config.get("demonstrations_crc32")
+        source = life.environment, life.config.get("demonstrations"), life.config.get("demonstrations_crc32")
         rows.setdefault(source, set()).update(life.shown.tolist())
     outcomes: list[Array] = []
-    for (file, checksum), wanted in rows.items():
-        path = Path(file or SHIPPED)
+    for (environment, file, checksum), wanted in rows.items():
+        path, of_arm = Path(file or SHIPPED), file is None and environment in ARMS
         try:
-            if wanted and f"{zlib.crc32(path.read_bytes()):08x}" != checksum:
+            if of_arm:
+                recordings = arm_demonstrations(PlanarArm(ARMS[environment]))
+            elif wanted and f"{zlib.crc32(path.read_bytes()):08x}" != checksum:
                 return np.empty((0, 2)), f"{path} is not what they were shown any more, so that is left out."
-            recordings = load_demonstrations(path, outcome_dim=2) if wanted else []
+            else:
+                recordings = load_demonstrations(path, outcome_dim=2) if wanted else []
             outcomes += [recordings[row].outcome for row in sorted(wanted)]
         except (OSError, ValueError, IndexError):
             return np.empty((0, 2)), f"{path}, what they were shown, cannot be read here and is left out."

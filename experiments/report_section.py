@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import report_figures as figures
+from environments import ROD
 from report_data import GOALS, Life, Variant
 from report_films import Film, command
 from report_html import Html, data_uri, details, picture, table, tag
@@ -65,6 +66,8 @@ def _seeds_drawn(variant: Variant) -> str:
 
 def _films(films: Sequence[Film], life: Life, label: str) -> Html:
     """Those of the run that stands for the variant; without any, how to make one."""
+    if not films and life.environment != ROD:
+        return Html()
     if not films:
         asks = tag("code", command(life.path))
         return tag("p", "No film of it yet. To make one: ", asks, ", then write this page again.", class_="soft")

@@ -13,9 +13,11 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from environments import ROD
 from evaluations import Evaluations
 from runfiles import Columns, RunError, dropped, make_folder, read_json, write_json
 
+_ONCE = {"environment": ROD}  # settings of runs that were made before there was a choice
 _UNFINISHED = ("lock", "versions.json")  # what a run killed before its config.json may have left, besides *.part
 
 
@@ -129,6 +131,7 @@ class RunDirectory:
             return None
         if not resume:
             raise RunError(f"{self.path} holds a run already; go on with it by --resume, or choose another --out")
+        before = {**_ONCE, **before}
         differ = [
             f"{name} was {before.get(name)}, now {settings.get(name)}"
             for name in dict.fromkeys((*settings, *before))

@@ -1,11 +1,11 @@
-"""One run of a comparison: how it is started, and the rows that it leaves in results/paper.csv and goals.csv.
+"""One run of a comparison: how it is started, and the rows that it leaves in the tables of results.
 
-tasks = tasks_of(["learners"], [], range(10), Path("runs")); child = tasks[0].start(); tasks[0].harvest(table, goals)
+tasks = tasks_of(["learners"], [], range(10), Path("runs")); child = tasks[0].start(); tasks[0].harvest(tables)
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cache
 from pathlib import Path
@@ -15,20 +15,25 @@ import numpy as np
 
 from children import Child
 from config import Config
+from environments import ARMS, arm_benchmark
 from read_results import GOALS_HEADER, HEADER
 from read_runs import Run, read_run
 from runfiles import RunError, make_folder
+from sgimd_torch.environment import PlanarArm
 from sgimd_torch.evaluation import SHIPPED, Benchmark, load_benchmark
-from sgimd_torch.fishing_rod import FishingRod
 from sgimd_torch.spaces import Array
 from tables import Key, Table
-from variants import EXPERIMENTS, FEW, HALF, teacher_of
+from variants import EXPERIMENTS, FEW, FORWARD_MODEL, HALF, PAPER, TABLES, teacher_of
 
-# Columns of paper.csv and goals.csv, and which of them tell one row from another.
+# Columns of the tables, and which of them tell one row from another.
 RESULTS: Final = (HEADER, ("variant", "seed", "movements"))
 GOALS: Final = (GOALS_HEADER, ("variant", "seed"))
+GOALS_TABLE: Final = "goals.csv"
+COLUMNS: Final = {PAPER: RESULTS, FORWARD_MODEL: RESULTS, GOALS_TABLE: GOALS}
+CORNER = -1.0  # m, where the tiles of a benchmark begin in x and y: T's, be it the paper's or an arm's
 NEAR = 1.5  # m from the base: goals farther away cannot be reached
-FLOORS = ("learners", "teachers", "long", "letter")  # these measure the noise floor: as much work as all the rest
+# These measure the noise floor: as much work as all the rest.
+FLOORS = ("learners", "teachers", "long", "letter", "forward-model")
 FLOOR_AT = (5000, 10_000)
 
 
@@ -45,8 +50,18 @@ class Task:
         return f"{self.config.variant} seed {self.config.seed}"
 
     @property
+    def table(self) -> str:
+        """Which table its evaluations go to."""
+        return TABLES.get(self.experiment, PAPER)
+
+    @property
+    def tables(self) -> list[str]:
+        """All that it leaves rows in."""
+        return [self.table, *([GOALS_TABLE] if self.experiment == "large-space" else [])]
+
+    @property
     def last_row(self) -> Key:
-        """Key of the last row in the table of results; who has it has them all."""
+        """Key of the last row in its ``table``; who has it has them all."""
         return self.config.variant, str(self.config.seed), str(self.config.movements)
 
     @property
@@ -55,7 +70,7 @@ class Task:
         evaluations, floor_at = self.config.evaluations, self.config.floor_at
         floors = [movements for movements in evaluations if floor_at is None or movements in floor_at]
         own = 0 if self.config.algorithm == "observation" else self.config.movements
-        n_goals = len(_benchmark(self.config.benchmark).goals)
+        n_goals = len(_benchmark(self.config.environment, self.config.benchmark).goals)
         return own + n_goals * (len(evaluations) + self.config.repeats * len(floors))
 
     def start(self) -> Child:
@@ -74,8 +89,11 @@ class Task:
         changed = [field.name for field in fields(Config) if given[field.name] != field.default]
         return [f"--{name}={_word(given[name])}" for name in changed]
 
-    def harvest(self, results: Table, goals: Table) -> None:
+    def harvest(self, tables: Mapping[str, Table]) -> None:
         """Write the rows of the finished run.
+
+        Args:
+            tables: those that ``tables`` names.
 
         Raises:
             RunError: its files are damaged, or it was not evaluated at its end.
@@ -85,8 +103,8 @@ class Task:
         if self.config.movements not in run.evaluation["movements"]:
             raise RunError(f"{run.path} has no evaluation after {self.config.movements} movements, though it ended")
         if self.experiment == "large-space":
-            goals.append([goal_row(self, run)])
-        results.append(result_rows(self, run))  # last: it is what counts as done
+            tables[GOALS_TABLE].append([goal_row(self, run)])
+        tables[self.table].append(result_rows(self, run))  # last: it is what counts as done
 
 
 def tasks_of(experiments: Sequence[str], only: Sequence[str], seeds: range, out: Path) -> list[Task]:
@@ -115,7 +133,7 @@ def tasks_of(experiments: Sequence[str], only: Sequence[str], seeds: range, out:
 
 def result_rows(task: Task, run: Run) -> list[list[object]]:
     """A row of ``RESULTS`` for each evaluation of a finished run."""
-    config, benchmark = task.config, _benchmark(task.config.benchmark)
+    config, benchmark = task.config, _benchmark(task.config.environment, task.config.benchmark)
     evaluations = zip(*(run.evaluation[name] for name in ("movements", "mean_error_m", "noise_floor_m")), strict=True)
     return [
         [
@@ -138,19 +156,20 @@ def tiles_reached(outcomes: Array, benchmark: Benchmark) -> int:
 
     Args:
         outcomes: ``(n, 2)`` m, NaN where the robot was at rest.
-        benchmark: its tiles were laid out from the corner of the paper's T, whatever T these goals came from.
+        benchmark: its tiles were laid out from ``CORNER``, whatever T these goals came from.
     """
-    corner = FishingRod().outcomes.low
     landed = outcomes[np.isfinite(outcomes).all(axis=1)]
     reached, wanted = (
-        {tuple(tile) for tile in np.floor((points - corner) / benchmark.side).tolist()}
+        {tuple(tile) for tile in np.floor((points - CORNER) / benchmark.side).tolist()}
         for points in (landed, benchmark.goals)
     )
     return len(reached & wanted)
 
 
 @cache
-def _benchmark(path: Path | None) -> Benchmark:
+def _benchmark(environment: str, path: Path | None) -> Benchmark:
+    if path is None and environment in ARMS:
+        return arm_benchmark(PlanarArm(ARMS[environment]))
     return load_benchmark(path or SHIPPED)
 
 

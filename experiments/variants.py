@@ -2,6 +2,7 @@
 
 Section 6 of Nguyen & Oudeyer (2014) first, then what the paper lacks. A variant of SGIM-D is one changed word.
     EXPERIMENTS["ablations"]["uniform-goals"]        # {"algorithm": "sgim-d", "goals": "uniform"}
+A variant that stands in two experiments is one run, with its rows in the table of each: its line is the same in both.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from config import ALGORITHMS, Config
+from environments import ARMS
 from runfiles import make_folder
 from sgimd_torch.demonstrations import SHIPPED, load_demonstrations, save_demonstrations
 
@@ -20,6 +22,14 @@ SAGG_RIAC: Final[Variant] = {"algorithm": "sagg-riac"}
 LETTER: Final[Variant] = {"inverse": "paper", "search": "nelder-mead-exact", "progress": "absolute"}
 LARGE: Final[Variant] = {"task_space": 100.0}
 FEW, HALF = "few.npz", "half.npz"  # made from the shipped demonstrations by ``make_subsets``
+# How to get from a first guess to a goal. Each line is a variant on the rod and, by a longer name, on every arm.
+REFINING: Final[dict[str, Variant]] = {
+    "sgim-d": SGIM_D,
+    "sagg-riac": SAGG_RIAC,
+    "sgim-d-perturb": {**SGIM_D, "search": "perturb"},
+    "sagg-riac-perturb": {**SAGG_RIAC, "search": "perturb"},
+}
+ON_ARMS: Final[Variant] = {"movements": 2000, "evaluate_at": (250, 500, 1000, 1500)}  # and at the end
 
 
 def shipped(teacher: int) -> Path:
@@ -33,6 +43,11 @@ def _of_teacher(teacher: int) -> dict[str, Variant]:
         f"{algorithm}-teacher-{teacher}": {"algorithm": algorithm, "demonstrations": shipped(teacher)}
         for algorithm in taught
     }
+
+
+def _on_arm(arm: str) -> dict[str, Variant]:
+    short = arm.removeprefix("planar-")
+    return {f"{name}-{short}": {**line, "environment": arm, **ON_ARMS} for name, line in REFINING.items()}
 
 
 EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
@@ -76,7 +91,12 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
         "few-demonstrations": {**SGIM_D, "demonstrations": Path(FEW)},
         "half-plane": {**SGIM_D, "demonstrations": Path(HALF)},
     },
+    "forward-model": REFINING,
+    **{arm: _on_arm(arm) for arm in ARMS},
 }
+PAPER, FORWARD_MODEL = "paper.csv", "forward_model.csv"
+# Where the rows of an experiment go; of those not named here to ``PAPER``.
+TABLES: Final = dict.fromkeys(("forward-model", *ARMS), FORWARD_MODEL)
 
 
 def make_subsets(folder: Path) -> None:
@@ -93,7 +113,10 @@ def make_subsets(folder: Path) -> None:
 
 
 def teacher_of(config: Config) -> str:
-    """Who demonstrates: the number of the demonstrator, or the file's name; "" for who learns alone."""
+    """Who demonstrates: the number of the demonstrator, the file's name, or "structured" for the postures that an arm
+    is shown; "" for who learns alone."""
     if "teacher" not in ALGORITHMS[config.algorithm]:
         return ""
+    if config.environment in ARMS and config.demonstrations is None:
+        return "structured"
     return (config.demonstrations or SHIPPED).stem.removeprefix("demonstrator_")

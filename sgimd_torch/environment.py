@@ -13,7 +13,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sgimd_torch.spaces import Array, Box, check_count, check_vector
+from sgimd_torch.spaces import Array, Box, check_count, check_vector, first_entry
 
 
 class Environment(Protocol):
@@ -189,10 +189,48 @@ class PlanarArm:
         """
         context, theta = check_movement(self, context, theta)
         check_rng(rng)
-        angles = (2 * theta - 1) * self._limits
-        angles = angles + self.noise * rng.standard_normal(len(theta))  # drawn without noise too: it moves no stream
+        # Drawn without noise too: it moves no stream.
+        angles = self.angles(theta) + self.noise * rng.standard_normal(len(theta))
         directions = np.cumsum(angles) + context.sum()  # an empty context sums to 0
         return self.length / len(theta) * np.array([np.cos(directions).sum(), np.sin(directions).sum()])
+
+    def angles(self, theta: ArrayLike) -> Array:
+        """``(..., n_joints)`` rad, by how much each joint turns or bends without noise; ``theta`` ``(..., n_joints)``.
+
+        Raises:
+            ValueError: ``theta`` is not in Pi.
+        """
+        return (2 * self.policies.check("theta", theta, "was a goal passed instead?") - 1) * self._limits
+
+    def correspondence(self, times: ArrayLike, trajectory: ArrayLike) -> Array:
+        """theta_d, the policy that holds the last posture of a demonstrated trajectory: the inverse of ``angles``.
+
+        The outcome is where the arm ends, so how it came there leaves no trace in theta, and eq. (6) is solved exactly.
+
+        Args:
+            times: ``(n_times,)`` s, increasing.
+            trajectory: ``(n_times, n_joints)`` rad.
+
+        Returns:
+            ``(n_joints,)`` in [0, 1].
+
+        Raises:
+            ValueError: shapes that do not fit, values that are not finite, unsorted times, or a last posture that the
+                joints cannot take.
+        """
+        trajectory = check_vector("trajectory", trajectory, self.policies.dim, "one column for each joint, in rad")
+        if trajectory.ndim != 2 or len(trajectory) == 0:
+            raise ValueError(f"trajectory needs samples in rows, got shape {trajectory.shape}")
+        times = check_vector("times", times, len(trajectory), "one time in s for each row of the trajectory")
+        if times.ndim != 1 or not (np.diff(times) > 0).all():
+            raise ValueError(f"times must increase from sample to sample, got {times}; were the rows shuffled?")
+        turned = trajectory[-1] / self._limits
+        beyond = np.abs(turned) > 1 + 1e-12  # more than rounding
+        if beyond.any():
+            limits = f"+-{self._limits[0]:.3f} rad, the others +-{self._limits[1]:.3f} rad"
+            entry = first_entry(trajectory[-1], beyond)
+            raise ValueError(f"the first joint turns within {limits}, but of the last posture {entry}; is it in deg?")
+        return self.policies.clip((turned + 1) / 2)
 
     def reachable(self, points: ArrayLike) -> NDArray[np.bool_]:
         """``(...)`` whether some theta without noise reaches each of ``points`` ``(..., 2)``, to rounding."""

@@ -23,8 +23,8 @@ from runs import signal_after, start
 from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.evaluation import Benchmark
 from tables import Table
-from tasks import GOALS, RESULTS, Task, goal_row, tasks_of, tiles_reached
-from variants import EXPERIMENTS, make_subsets, shipped, teacher_of
+from tasks import COLUMNS, RESULTS, Task, goal_row, tasks_of, tiles_reached
+from variants import EXPERIMENTS, TABLES, make_subsets, shipped, teacher_of
 
 # Two variants that live for 40 movements, and one, of an experiment of its own, whose demonstrations are missing.
 TINY = """
@@ -36,6 +36,9 @@ variants.EXPERIMENTS["learners"] = {"random": dict(algorithm="random", **tiny)}
 variants.EXPERIMENTS["large-space"] = {"sgim-d-large": dict(algorithm="sgim-d", task_space=100.0, **tiny)}
 variants.EXPERIMENTS["broken"] = {"untaught": dict(algorithm="sgim-d", demonstrations=Path("nowhere.npz"), **tiny)}
 variants.EXPERIMENTS["long"] = {"long-life": dict(algorithm="random", **{**tiny, "movements": 600})}
+variants.EXPERIMENTS["forward-model"] = variants.EXPERIMENTS["learners"]
+arm = dict(environment="planar-arm-7", movements=40, evaluate_at=(20,))
+variants.EXPERIMENTS["planar-arm-7"] = {"sgim-d-arm-7": dict(algorithm="sgim-d", **arm)}
 import compare
 sys.exit(compare.main())
 """
@@ -72,9 +75,9 @@ def table(path):
     return tuple(header), rows
 
 
-def keys_of(path):
+def keys_of(path, name="paper.csv"):
     """(variant, movements) of each row."""
-    return [(row[1], int(row[5])) for row in table(path / "results/paper.csv")[1]]
+    return [(row[1], int(row[5])) for row in table(path / "results" / name)[1]]
 
 
 WHOLE = [("random", 20), ("random", 40), ("sgim-d-large", 20), ("sgim-d-large", 40)]
@@ -114,6 +117,36 @@ def test_each_evaluation_is_a_row_the_failed_are_reported_and_a_second_start_doe
     assert [path.read_bytes() for path in files] == contents
 
 
+def test_a_variant_of_two_experiments_is_one_run_in_the_table_of_each(compare, tmp_path):
+    code, _, errors = ended(compare("learners", "forward-model", "planar-arm-7"))
+    assert code == 0, errors
+    assert {path.name for path in (tmp_path / "results").iterdir()} == {"paper.csv", "forward_model.csv"}
+    run, arm = (read_run(tmp_path / "runs" / name / "seed-000") for name in ("random", "sgim-d-arm-7"))
+    header, rows = table(tmp_path / "results/forward_model.csv")
+    assert header == HEADER
+    for experiment, teacher, theirs in (("forward-model", "", run), ("planar-arm-7", "structured", arm)):
+        variant, errors_m = theirs.path.parent.name, theirs.evaluation["mean_error_m"].tolist()
+        wanted = [[experiment, variant, teacher, "1.0", "0", str(20 * k), str(errors_m[k - 1]), ""] for k in (1, 2)]
+        assert [row[:8] for row in rows if row[1] == variant] == wanted
+    tiles = [int(row[8]) for row in rows if row[1] == "sgim-d-arm-7"]
+    assert 0 < tiles[0] <= tiles[1] <= 40  # at most one a movement
+    again = table(tmp_path / "results/paper.csv")[1]
+    assert again == [["learners", *row[1:]] for row in rows if row[1] == "random"]
+
+
+def test_what_is_in_one_table_is_still_to_be_done_for_the_other(tmp_path, monkeypatch, capsys, handlers):
+    results = Table(tmp_path / "paper.csv", *RESULTS)
+    results.append([["learners", "sgim-d", 3, 1.0, 0, 5000, 0.1, "", 7]])
+    results.close()
+    monkeypatch.chdir(tmp_path)
+    options = "learners forward-model --only sgim-d --seeds 1 --dry-run --results ."
+    monkeypatch.setattr(sys, "argv", ["compare.py", *options.split()])
+    assert compare_module.main() == 0
+    said = capsys.readouterr()
+    assert said.out == "forward-model: sgim-d seed 0\n"
+    assert "2 runs, 1 of them in paper.csv and forward_model.csv already" in said.err
+
+
 def test_after_ctrl_c_it_goes_on(compare, tmp_path):
     log = tmp_path / "runs/long-life/seed-000/episodes.csv"
     code, errors = signal_after(compare("long", "learners"), log, 5, signal.SIGINT)
@@ -150,10 +183,10 @@ def test_a_run_that_lost_its_rows_is_harvested_again_and_no_goal_is_counted_twic
     task, paths = Task("large-space", config), [tmp_path / "paper.csv", tmp_path / "goals.csv"]
 
     def harvest():
-        tables = [Table(path, *columns) for path, columns in zip(paths, (RESULTS, GOALS), strict=True)]
-        known = task.last_row in tables[0].keys
-        task.harvest(*tables)
-        for each in tables:
+        tables = {path.name: Table(path, *COLUMNS[path.name]) for path in paths}
+        known = task.last_row in tables[task.table].keys
+        task.harvest(tables)
+        for each in tables.values():
             each.close()
         return known
 
@@ -169,7 +202,7 @@ def test_a_run_that_ended_without_its_last_evaluation_is_no_result(go, benchmark
     assert go(tmp_path, "--movements", 30, "--evaluate_at", "[]") == 0
     task = Task("learners", Config(seed=3, movements=30, benchmark=benchmark, out=tmp_path))
     with pytest.raises(RunError, match="seed-003 has no evaluation after 30 movements, though it ended"):
-        task.harvest(None, None)
+        task.harvest({})
 
 
 def test_looking_at_what_is_to_be_done_writes_nothing(tmp_path, monkeypatch, capsys, handlers):
@@ -189,6 +222,8 @@ def test_looking_at_what_is_to_be_done_writes_nothing(tmp_path, monkeypatch, cap
         (["grid"], "grid is a variant, of ablations; write ablations --only grid"),
         (["ablations", "--only", "gird"], "unknown variant 'gird', known are uniform-goals, .*did you mean grid?"),
         (["learners", "--only", "grid"], "grid is a variant of ablations, asked for were learners"),
+        (["sgim-d"], "sgim-d is a variant, of learners and forward-model; write learners --only sgim-d"),
+        (["long", "--only", "sgim-d"], "sgim-d is a variant of learners and forward-model, asked for were long"),
         (["--only", "grid", "ablations"], "ablations is an experiment, no variant; experiments go before --only"),
         (["--seeds", "0"], "--seeds must be at least 1, got 0"),
         (["--first-seed", "-1"], "--first-seed must be at least 0, got -1"),
@@ -226,17 +261,19 @@ def test_two_comparisons_do_not_write_one_table(tmp_path, monkeypatch, capsys, h
 def test_a_run_that_cannot_start_fails_alone(tmp_path):
     (tmp_path / "stuck").write_text("a file where its directory should be")
     tasks = [Task("learners", Config(algorithm="random", name="stuck", out=tmp_path))]
-    results, goals = Table(tmp_path / "paper.csv", *RESULTS), Table(tmp_path / "goals.csv", *GOALS)
-    (failure,) = compare_module.carry_out(tasks, 0, 1, results, goals)
+    results = Table(tmp_path / "paper.csv", *RESULTS)
+    (failure,) = compare_module.carry_out(tasks, 0, 1, {"paper.csv": results})
     assert "stuck" in failure
     results.close()
-    goals.close()
 
 
-def test_every_variant_is_a_run_that_can_be_and_has_a_name_of_its_own(tmp_path):
+def test_every_variant_is_a_run_that_can_be_and_in_its_table_has_a_name_of_its_own(tmp_path):
     tasks = tasks_of(list(EXPERIMENTS), [], range(1), tmp_path)
-    assert len({task.config.directory for task in tasks}) == len(tasks)
+    assert len({(task.table, task.last_row) for task in tasks}) == len(tasks)
     assert not [note for task in tasks for note in task.config.without_effect if "--budget" in note]
+    configs = {task.config.directory: task.config for task in tasks}
+    assert all(task.config == configs[task.config.directory] for task in tasks)  # one directory, one run
+    assert {task.experiment for task in tasks if task.table == "forward_model.csv"} == set(TABLES)
     for task in tasks:
         assert parse(task.options()) == (task.config, False)
 
@@ -246,6 +283,8 @@ def test_teachers_have_the_number_of_the_demonstrator_or_the_name_of_the_file(tm
     assert teacher_of(taught) == "3"
     assert teacher_of(replace(taught, demonstrations=shipped(1))) == "1"
     assert teacher_of(replace(taught, algorithm="sagg-riac", demonstrations=shipped(1))) == ""
+    assert teacher_of(replace(taught, environment="planar-arm-50")) == "structured"
+    assert teacher_of(replace(taught, environment="planar-arm-50", demonstrations=shipped(1))) == "1"
     (few,) = tasks_of(["teaching"], ["few-demonstrations"], range(1), tmp_path)
     assert teacher_of(few.config) == "few"
     assert few.config.demonstrations == tmp_path / "demonstrations/few.npz"

@@ -90,6 +90,51 @@ def test_later_joints_are_scaled_to_the_largest_bend():
     np.testing.assert_allclose(end_of(arm, [0.5, 1.0]), [0.5, 0.5], atol=1e-15)  # straight, then +pi/2
 
 
+def test_angles_are_those_of_the_joints_from_the_middle_to_both_limits():
+    arm = PlanarArm(3, max_angle=0.5)
+    np.testing.assert_allclose(arm.angles([[0.5, 0.5, 0.5], [1.0, 1.0, 0.0]]), [[0, 0, 0], [np.pi, 0.5, -0.5]])
+    with pytest.raises(ValueError, match="theta must"):
+        arm.angles([0.5, 0.5, 1.1])
+
+
+@given(n_joints=st.integers(2, 50), seed=st.integers(0, 1000))
+@settings(max_examples=50, deadline=None, derandomize=True)
+def test_correspondence_finds_the_theta_whose_angles_a_trajectory_ends_with(n_joints, seed):
+    arm, rng = PlanarArm(n_joints), stream(seed, "postures")
+    theta = arm.policies.sample(rng)
+    somewhere = rng.uniform(-9, 9, size=(3, n_joints))  # on the way the joints may be anywhere
+    found = arm.correspondence([0.0, 0.2, 0.9, 1.0], [*somewhere, arm.angles(theta)])
+    np.testing.assert_allclose(found, theta, atol=1e-15)
+    assert arm.policies.contains(found)
+
+
+def test_a_posture_at_its_limits_is_taken_and_rounding_forgiven():
+    arm = PlanarArm(2, max_angle=1.0)
+    assert arm.correspondence([0.0], [[np.pi * (1 + 1e-15), -1.0 - 1e-15]]).tolist() == [1.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("times", "trajectory", "message"),
+    [
+        (
+            [0.0, 1.0],
+            [[0, 0], [0, 1.1]],
+            r"others \+-1.000 rad, but of the last posture entry \[1\] is 1.1; is it in deg",
+        ),
+        ([0.0, 1.0], [[0, 0], [-3.2, 0]], r"first joint turns within \+-3.142 rad"),
+        ([0.0, 1.0], [[0, 0, 0], [0, 0, 0]], "one column for each joint"),
+        ([0.0, 1.0], [[0, 0], [0, np.nan]], "trajectory must be finite"),
+        ([0.0], [0, 0], "trajectory needs samples in rows"),
+        ([], np.empty((0, 2)), "trajectory needs samples in rows"),
+        ([0.0, 1.0, 2.0], [[0, 0], [0, 0]], "one time in s for each row"),
+        ([0.0, 0.0], [[0, 0], [0, 0]], "times must increase"),
+    ],
+)
+def test_correspondence_refuses_what_the_joints_cannot_end_with(times, trajectory, message):
+    with pytest.raises(ValueError, match=message):
+        PlanarArm(2, max_angle=1.0).correspondence(times, trajectory)
+
+
 def test_a_context_turns_the_whole_arm():
     arm = PlanarArm(context=True)
     theta, turn = stream(1, "theta").uniform(size=7), np.pi / 6
