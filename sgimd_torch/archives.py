@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import zipfile
 import zlib
@@ -21,13 +22,24 @@ def write_npz(path: str | os.PathLike[str], arrays: dict[str, Any], *, compresse
     Raises:
         OSError: ``path`` is a directory, or cannot be written.
     """
+    buffer = io.BytesIO()
+    (np.savez_compressed if compressed else np.savez)(buffer, **arrays)
+    write_bytes(path, buffer.getvalue())
+
+
+def write_bytes(path: str | os.PathLike[str], content: bytes) -> None:
+    """Write ``content``; ``path`` holds the old file or the whole new one, and nothing else is left behind.
+
+    Raises:
+        OSError: ``path`` is a directory, or cannot be written.
+    """
     path = Path(path)
     if path.is_dir():
         raise IsADirectoryError(f"{path} is a directory; was the name of the file left out?")
     partial = path.with_name(f"{path.name}.{os.getpid()}.part")
     try:
         with open(partial, "wb") as file:
-            (np.savez_compressed if compressed else np.savez)(file, **arrays)
+            file.write(content)
             file.flush()
             os.fsync(file.fileno())
         os.replace(partial, path)
