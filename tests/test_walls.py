@@ -14,7 +14,7 @@ ROWS = [  # a module imports only from the rows before its own
     {"spaces", "archives"},
     {"memory", "motor_primitives", "environment", "search", "demonstrations", "regions", "casting", "cma_es"},
     {"competence", "inverse_model", "interest", "teachers", "forward_model", "fishing_rod"},
-    {"strategies", "curves", "progress_grid", "alp_gmm"},
+    {"strategies", "curves", "progress_grid", "alp_gmm", "model_inverse"},
     {"learner"},
     {"session", "evaluation", "algorithms", "board", "plots", "film", "quality_diversity"},
     {"plots_of_movements", "plots_of_results"},
@@ -26,7 +26,7 @@ LIBRARIES = {  # library: the only modules that may import it
     "scipy": ROW.keys() - {"spaces"},
     "faiss": {"memory"},
     "mujoco": {"casting", "film"},
-    "torch": {"forward_model"},
+    "torch": {"forward_model", "model_inverse"},
     "lightning": {"forward_model"},
     "safetensors": {"forward_model"},
     "tensorboard": {"board"},
@@ -41,7 +41,7 @@ ENVIRONMENTS = {"environment", "casting", "fishing_rod", "film"}
 PROTOCOL = (["Environment"], ["execute_many"])  # what works with every environment
 LEARNING = {
     *{"memory", "search", "regions", "competence", "inverse_model", "interest", "teachers", "forward_model"},
-    *{"strategies", "learner", "progress_grid", "alp_gmm", "cma_es"},
+    *{"strategies", "learner", "progress_grid", "alp_gmm", "cma_es", "model_inverse"},
 }
 
 
