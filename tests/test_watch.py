@@ -31,7 +31,8 @@ def runs(tmp_path_factory, go):
 @pytest.fixture(scope="module")
 def server(runs):
     """The process, what it said first, and a function that asks it."""
-    port = free_port(7100)
+    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
+    port = free_port(7100 + 50 * worker)  # between asking and binding another worker could take the same
     command = [sys.executable, str(ROOT / "experiments" / "watch.py"), str(runs), "--port", str(port)]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     with subprocess.Popen(
