@@ -1,14 +1,12 @@
 """Forward model L: where will the float land? An ensemble of networks, learnt while the robot learns.
 
-Not in Nguyen & Oudeyer (2014), who keep local models only. Deep ensembles with a predicted noise (Lakshminarayanan,
-Pritzel & Blundell, NeurIPS 2017), trained online through Lightning Fabric: one optimiser for life, so that Adam's
-moments survive from one refresh to the next.
+Not in Nguyen & Oudeyer (2014), who keep local models only. It is trained online through Lightning Fabric, with one
+optimiser for life, so that Adam's moments survive from one refresh to the next.
     model = ForwardModel(0, 25, 2, seed=3); model.refresh(memory); model.predict(contexts, thetas).mean
 """
 
 from __future__ import annotations
 
-import itertools
 import json
 import math
 import os
@@ -20,13 +18,14 @@ import numpy as np
 
 try:
     import torch
-    from lightning import Fabric, LightningModule
+    from lightning import Fabric
     from safetensors import SafetensorError, safe_open
     from safetensors.torch import save
 except ImportError as error:
     raise ImportError(f"the forward model needs sgimd-torch[forward]: {error}") from error
 
 from sgimd_torch.archives import write_bytes
+from sgimd_torch.ensemble import Ensemble, nll
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, check_count, check_vector, stream
 
@@ -35,7 +34,6 @@ _HELD_OUT: Final = 10  # one exemplar in so many is never trained on
 _FEWEST: Final = 50  # exemplars to begin with
 _CHUNK: Final = 20  # steps between two looks at what is held out
 _PATIENCE: Final = 5  # looks without improvement that end a refresh
-_LOG_VARIANCES: Final = (-9.0, 3.0)  # of standardised outcomes: a noise of 1 % to 450 % of their spread
 
 
 class Prediction(NamedTuple):
@@ -49,27 +47,29 @@ class Prediction(NamedTuple):
 
 class Refresh(NamedTuple):
     """What a refresh did. ``steps`` of the optimiser, negative log likelihood of the ``held_out`` exemplars at its end
-    (lower is better; of standardised outcomes), and whether it ``diverged``, so that the weights before it stand."""
+    (lower is better; of standardised outcomes), and whether it ``diverged``, so that the weights before it stand;
+    ``first``, the row of the first exemplar that was new, and what was ``foreseen`` for it and those after it, just
+    before they were learnt from, None at the first refresh."""
 
     steps: int
     held_out: float
     diverged: bool
+    first: int
+    foreseen: Prediction | None
 
 
-class ForwardModel(LightningModule):
-    """(c, theta) -> outcome, with its spread; differentiable in theta through ``forward``.
+class ForwardModel(Ensemble):
+    """(c, theta) -> outcome, with its spread; differentiable in theta through ``landing``.
 
     Args:
         context_dim, theta_dim, outcome_dim: as those of the memory.
         seed: of the weights and of every batch; torch's global generator is neither read nor moved.
-        members: networks in the ensemble; each starts from other weights and draws batches of its own.
-        hidden: units of each hidden layer.
+        members, hidden, noise_heads, lr, beta: as ``Ensemble``; each member draws batches of its own.
         every: new exemplars that a refresh waits for.
-        rate: steps of the optimiser for each new exemplar; ``first`` of them more at the first refresh.
+        rate: steps of the optimiser for each new exemplar, which is what learning costs: .4 of them take about as long
+            as a fifth of a movement of the fishing rod, 2 as long as a whole one.
         batch: exemplars a step, for each member.
         recent: share of every batch drawn from the newest ``every`` exemplars.
-        lr: of Adam.
-        beta: 0 is the likelihood itself; .5 keeps noisy movements from being given up on (Seitzer et al., ICLR 2022).
         accelerator: Lightning's name of where to train: "cpu", the fastest for these sizes, "auto" or "cuda".
 
     Raises:
@@ -81,6 +81,7 @@ class ForwardModel(LightningModule):
     outcome_mean: torch.Tensor  # (outcome_dim,)
     outcome_scale: torch.Tensor
     n_seen: torch.Tensor  # exemplars trained on
+    missed: torch.Tensor  # see ``relative_error``
 
     def __init__(
         self,
@@ -93,35 +94,32 @@ class ForwardModel(LightningModule):
         hidden: Sequence[int] = (64, 64),
         every: int = 50,
         rate: float = 0.4,
-        first: int = 300,
         batch: int = 128,
         recent: float = 0.25,
-        lr: float = 3e-3,
+        lr: float = 1e-2,
         beta: float = 0.5,
+        noise_heads: bool = True,
         accelerator: str = "cpu",
     ) -> None:
-        super().__init__()
         check_count("context_dim", context_dim, 0)
         for name, count in {"theta_dim": theta_dim, "outcome_dim": outcome_dim, "members": members}.items():
             check_count(name, count, 1)
-        if not hidden or min(hidden) < 1 or every < 1 or first < 0 or batch < 1:
-            raise ValueError(f"needs hidden, every, batch >= 1, first >= 0, got {hidden}, {every}, {batch}, {first}")
+        if not hidden or min(hidden) < 1 or every < 1 or batch < 1:
+            raise ValueError(f"needs hidden, every, batch >= 1, got {hidden}, {every}, {batch}")
         if not (0 < rate < math.inf and 0 < lr < math.inf and 0 <= recent <= 1 and 0 <= beta <= 1):
             raise ValueError(f"needs rate, lr > 0, recent, beta in [0, 1], got {rate}, {lr}, {recent}, {beta}")
+        generator = torch.Generator().manual_seed(int(stream(seed, "forward model").integers(2**63)))
+        shape = members, list(hidden), noise_heads
+        super().__init__(context_dim + theta_dim, outcome_dim, generator, *shape, lr=lr, beta=beta)
         self.sizes = {"context_dim": context_dim, "theta_dim": theta_dim, "outcome_dim": outcome_dim}
-        self.shape = {"members": members, "hidden": list(hidden)}
-        self.every, self.rate, self.first, self.batch = every, rate, first, batch
-        self.recent, self.lr, self.beta, self.accelerator = recent, lr, beta, accelerator
-        self._random = torch.Generator().manual_seed(int(stream(seed, "forward model").integers(2**63)))
-        widths = [context_dim + theta_dim, *hidden, 2 * outcome_dim]
-        self.weights, self.biases = torch.nn.ParameterList(), torch.nn.ParameterList()
-        for n_in, n_out in itertools.pairwise(widths):
-            self.weights.append(torch.randn(members, n_in, n_out, generator=self._random) / math.sqrt(n_in))
-            self.biases.append(torch.zeros(members, 1, n_out))
-        for name, dim in {"input": widths[0], "outcome": outcome_dim}.items():
+        self.shape = dict(zip(("members", "hidden", "noise_heads"), shape, strict=True))
+        self.every, self.rate, self.batch, self.recent = every, rate, batch, recent
+        self.accelerator, self._random = accelerator, generator
+        for name, dim in {"input": context_dim + theta_dim, "outcome": outcome_dim}.items():
             self.register_buffer(f"{name}_mean", torch.zeros(dim))
             self.register_buffer(f"{name}_scale", torch.ones(dim))
         self.register_buffer("n_seen", torch.zeros((), dtype=torch.int64))
+        self.register_buffer("missed", torch.zeros(()))
         self._fabric: Fabric | None = None
         self._optimizer: Any = None
 
@@ -130,26 +128,24 @@ class ForwardModel(LightningModule):
         """Whether there was anything to learn from yet; before, it predicts nothing."""
         return int(self.n_seen) > 0
 
-    def forward(self, context: torch.Tensor, theta: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """``(members, ..., outcome_dim)`` each: the mean (m), and the variance that noise makes (m^2)."""
+    @property
+    def relative_error(self) -> float:
+        """How far predictions for what is held out are from it, over how far their mean is: 1 is no better than that
+        mean, 0 perfect, infinite before anything was learnt."""
+        return float(self.missed) if self.trained else math.inf
+
+    def landing(self, context: torch.Tensor, theta: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        """``(members, ..., outcome_dim)`` each: the mean (m), and the variance that noise makes (m^2); differentiable.
+
+        Args:
+            context: ``(..., context_dim)``, or one for all of them.
+            theta: ``(..., theta_dim)``.
+        """
         inputs = torch.cat([context.expand(*theta.shape[:-1], context.shape[-1]), theta], dim=-1)
-        x = ((inputs - self.input_mean) / self.input_scale).reshape(-1, inputs.shape[-1])
-        members = len(self.weights[0])
-        mean, log_variance = self._standardised(x.expand(members, *x.shape))
-        shape = (members, *theta.shape[:-1], mean.shape[-1])
+        mean, log_variance = self(((inputs - self.input_mean) / self.input_scale).reshape(-1, inputs.shape[-1]))
+        shape = (self.members, *theta.shape[:-1], mean.shape[-1])
         mean, variance = mean.reshape(shape), log_variance.exp().reshape(shape)
         return self.outcome_mean + self.outcome_scale * mean, self.outcome_scale**2 * variance
-
-    def training_step(self, batch: tuple[torch.Tensor, torch.Tensor], batch_idx: int = 0) -> torch.Tensor:
-        """Negative log likelihood of ``(inputs, outcomes)``, both standardised, ``(members, n, ...)``."""
-        inputs, outcomes = batch
-        mean, log_variance = self._standardised(inputs)
-        loss = 0.5 * (log_variance + (outcomes - mean) ** 2 * (-log_variance).exp())
-        return (loss * (self.beta * log_variance).exp().detach()).mean()
-
-    def configure_optimizers(self) -> torch.optim.Optimizer:
-        """Adam."""
-        return torch.optim.Adam(self.parameters(), lr=self.lr)
 
     def predict(self, contexts: Array, thetas: Array) -> Prediction:
         """Where movements should land.
@@ -167,7 +163,7 @@ class ForwardModel(LightningModule):
         contexts = check_vector("contexts", contexts, self.sizes["context_dim"])
         thetas = check_vector("thetas", thetas, self.sizes["theta_dim"], "were outcomes passed instead?")
         with torch.no_grad():
-            members = self(self._tensor(contexts), self._tensor(thetas))
+            members = self.landing(self._tensor(contexts), self._tensor(thetas))
         means, variances = (part.cpu().double().numpy() for part in members)
         return Prediction(means.mean(axis=0), means.std(axis=0), np.sqrt(variances.mean(axis=0)))
 
@@ -194,10 +190,11 @@ class ForwardModel(LightningModule):
                 spread = values.std(axis=0)
                 getattr(self, f"{name}_mean").copy_(self._tensor(values.mean(axis=0)))
                 getattr(self, f"{name}_scale").copy_(self._tensor(np.where(spread > 1e-9, spread, 1.0)))
+        foreseen = self.predict(memory.contexts[seen:], memory.thetas[seen:]) if seen else None
         x = (self._tensor(inputs) - self.input_mean) / self.input_scale
         y = (self._tensor(outcomes) - self.outcome_mean) / self.outcome_scale
         self.n_seen.fill_(n)
-        return self._train(x, y, round(self.rate * (n - seen)) + (0 if seen else self.first))
+        return Refresh(*self._train(x, y, max(1, round(self.rate * (n - seen)))), seen, foreseen)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write a safetensors file whose header says in JSON what the model is; it appears whole or not at all.
@@ -239,19 +236,19 @@ class ForwardModel(LightningModule):
             raise ValueError(f"{path} holds weights that are not finite; was it saved while training diverged?")
         return model
 
-    def _train(self, x: torch.Tensor, y: torch.Tensor, steps: int) -> Refresh:
-        """At most ``steps`` on the standardised exemplars, the newest last."""
+    def _train(self, x: torch.Tensor, y: torch.Tensor, steps: int) -> tuple[int, float, bool]:
+        """At most ``steps`` on the standardised exemplars, the newest last; the first three of ``Refresh``."""
         fabric, optimizer = self._begin()
         is_held = torch.arange(len(x)) % _HELD_OUT == _HELD_OUT - 1
         held, rows = (x[is_held], y[is_held]), torch.nonzero(~is_held)[:, 0]
-        members, n_new = len(self.weights[0]), round(self.recent * self.batch)
+        n_new = round(self.recent * self.batch)
         newest = rows[-self.every :]
         before, best, waited, done = _copy(self.state_dict()), math.inf, 0, 0
         while done < steps and waited < _PATIENCE:
             chunk = min(_CHUNK, steps - done)
             for _ in range(chunk):
-                picked = rows[torch.randint(len(rows), (members, self.batch), generator=self._random)]
-                picked[:, :n_new] = newest[torch.randint(len(newest), (members, n_new), generator=self._random)]
+                picked = rows[torch.randint(len(rows), (self.members, self.batch), generator=self._random)]
+                picked[:, :n_new] = newest[torch.randint(len(newest), (self.members, n_new), generator=self._random)]
                 optimizer.zero_grad()
                 fabric.backward(self.training_step((x[picked], y[picked])))
                 optimizer.step()
@@ -260,9 +257,9 @@ class ForwardModel(LightningModule):
             if not math.isfinite(loss):
                 self.load_state_dict(before)
                 self._optimizer = None  # its moments are as bad as the weights were
-                return Refresh(done, self._held_out(*held), True)
+                return done, self._held_out(*held), True
             best, waited = (loss, 0) if loss < best else (best, waited + 1)
-        return Refresh(done, loss, False)
+        return done, loss, False
 
     def _begin(self) -> tuple[Fabric, Any]:
         """Lightning's Fabric, and the optimiser for life."""
@@ -274,17 +271,12 @@ class ForwardModel(LightningModule):
         return self._fabric, self._optimizer
 
     def _held_out(self, x: torch.Tensor, y: torch.Tensor) -> float:
-        """Negative log likelihood of what is held out, without ``beta``; the mean over the members."""
+        """Negative log likelihood of what is held out, without ``beta``; the mean over the members. Sets ``missed``."""
         with torch.no_grad():
-            mean, log_variance = self._standardised(x.expand(len(self.weights[0]), *x.shape))
-            return float((0.5 * (log_variance + (y - mean) ** 2 * (-log_variance).exp())).mean())
-
-    def _standardised(self, x: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """Mean and log variance ``(members, n, outcome_dim)`` of ``(members, n, ...)``: one batched product a layer."""
-        for layer, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
-            x = torch.baddbmm(bias, torch.nn.functional.silu(x) if layer else x, weight)
-        mean, log_variance = x.chunk(2, dim=-1)
-        return mean, log_variance.clamp(*_LOG_VARIANCES)
+            mean, log_variance = self(x)
+            length = self.outcome_scale * torch.stack([mean.mean(dim=0) - y, y.mean(dim=0) - y])
+            self.missed.copy_(torch.div(*length.norm(dim=-1).mean(dim=-1).clamp(min=1e-9)))
+            return float(nll(mean, log_variance, y).mean())
 
     def _tensor(self, values: Array) -> torch.Tensor:
         return torch.tensor(values, dtype=torch.float32, device=self.input_mean.device)

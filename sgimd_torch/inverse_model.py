@@ -55,7 +55,7 @@ class LocalInverse:
         thetas, outcomes = self.memory.thetas[rows], self.memory.outcomes[rows]
         theta = gaussian_weights(goal, outcomes, self.width) @ thetas  # eq. (9)
         # A mean lies among what it averages; rounding must not put it 1e-16 outside Pi.
-        return Estimate(np.clip(theta, thetas.min(axis=0), thetas.max(axis=0)), thetas, outcomes)
+        return Estimate(np.clip(theta, thetas.min(axis=0), thetas.max(axis=0)), thetas, outcomes, context)
 
     def _most_reliable(self, context: Array, goal: Array) -> Rows:
         near = _near_goal(self.memory, context, goal, self.h_max)  # H of eq. (8)
@@ -80,7 +80,7 @@ class NearestNeighbour:
         """
         rows = _near_goal(self.memory, context, goal, self.k)
         thetas = self.memory.thetas[rows]
-        return Estimate(thetas[0], thetas, self.memory.outcomes[rows])
+        return Estimate(thetas[0], thetas, self.memory.outcomes[rows], context)
 
 
 class LocallyLinear:
@@ -119,7 +119,8 @@ class LocallyLinear:
         Raises:
             RuntimeError: the memory is empty.
         """
-        mean_theta, thetas, outcomes = estimate = self._local(context, goal)
+        estimate = self._local(context, goal)
+        mean_theta, thetas, outcomes, _ = estimate
         weights = gaussian_weights(goal, outcomes, self.width)
         mean_outcome = weights @ outcomes
         deviations = outcomes - mean_outcome

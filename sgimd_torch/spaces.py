@@ -156,11 +156,13 @@ class Move(NamedTuple):
 
 class Estimate(NamedTuple):
     """What the inverse model infers for a goal: ``theta`` ``(theta_dim,)``, and the exemplars it rests on,
-    ``thetas`` ``(k, theta_dim)`` with their ``outcomes`` ``(k, outcome_dim)``."""
+    ``thetas`` ``(k, theta_dim)`` with their ``outcomes`` ``(k, outcome_dim)``. ``context`` ``(context_dim,)`` is that
+    of the goal; empty where there are none."""
 
     theta: Array
     thetas: Array
     outcomes: Array
+    context: Array = np.zeros(0)
 
 
 @dataclass(frozen=True, eq=False)

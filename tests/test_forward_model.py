@@ -26,6 +26,13 @@ def remembered(n, *, noise=0.0, seed=0, arm=None):
     return memory
 
 
+def noise_only(n):
+    memory = Memory(0, 3, 2)
+    for row in stream(0, "noise").random((n, 5)):
+        memory.add(NO_CONTEXT, row[:3], row[3:])
+    return memory
+
+
 def taught(memory, **options):
     model = ForwardModel(memory.contexts.shape[1], memory.thetas.shape[1], 2, **options)
     model.refresh(memory)
@@ -38,7 +45,7 @@ def weights(model):
 
 @pytest.fixture(scope="module")
 def model():
-    return taught(remembered(400), first=600)
+    return taught(remembered(400), rate=1.9)
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +61,7 @@ def test_it_predicts_unseen_movements_far_better_than_their_mean(model, unseen):
 
 def test_contexts_are_inputs_too():
     arm = PlanarArm(3, context=True)
-    model = taught(remembered(600, arm=arm), first=800)
+    model = taught(remembered(600, arm=arm), rate=1.8)
     unseen = remembered(100, seed=1, arm=arm)
     assert np.linalg.norm(model.predict(unseen.contexts, unseen.thetas).mean - unseen.outcomes, axis=1).mean() < 0.1
 
@@ -88,13 +95,34 @@ def test_eighty_percent_regions_hold_about_eighty_percent():
     assert 0.7 < (squared < -2 * np.log(0.2)).mean() < 0.9  # chi-squared with two degrees of freedom
 
 
+def test_without_noise_heads_it_predicts_one_noise_everywhere_the_mean():
+    memory = remembered(1000, noise=0.3)
+    aleatoric = taught(memory, noise_heads=False).predict(NO_CONTEXT, memory.thetas).aleatoric
+    np.testing.assert_allclose(aleatoric, np.broadcast_to(aleatoric[0], aleatoric.shape), rtol=1e-6)
+    np.testing.assert_allclose(aleatoric[0], 0.3 * np.sqrt((memory.thetas[:, 0] ** 2).mean()), rtol=0.3)
+
+
+def test_its_relative_error_is_that_on_movements_it_never_saw(model, unseen):
+    errors = np.linalg.norm(model.predict(NO_CONTEXT, unseen.thetas).mean - unseen.outcomes, axis=1)
+    spread = np.linalg.norm(unseen.outcomes - unseen.outcomes.mean(axis=0), axis=1)
+    assert model.relative_error == pytest.approx(errors.mean() / spread.mean(), rel=0.5)  # of 40 held out
+    assert model.relative_error < 0.05
+
+
+def test_its_relative_error_is_infinite_before_learning_and_about_one_where_there_is_nothing_to_learn():
+    model = ForwardModel(0, 3, 2, rate=5.0)
+    assert model.relative_error == np.inf
+    model.refresh(noise_only(400))
+    assert model.relative_error == pytest.approx(1.0, abs=0.05)
+
+
 def test_the_gradient_equals_finite_differences_and_is_finite_at_the_goal_itself():
     double = taught(remembered(100)).double()
     theta = torch.full((3,), 0.45, dtype=torch.float64, requires_grad=True)
     context = torch.zeros(0, dtype=torch.float64)
-    assert torch.autograd.gradcheck(lambda theta: double(context, theta)[0], theta)
-    goal = double(context, theta)[0].mean(dim=0).detach()
-    squared_distance = ((double(context, theta)[0].mean(dim=0) - goal) ** 2).sum()
+    assert torch.autograd.gradcheck(lambda theta: double.landing(context, theta), theta)
+    goal = double.landing(context, theta)[0].mean(dim=0).detach()
+    squared_distance = ((double.landing(context, theta)[0].mean(dim=0) - goal) ** 2).sum()
     assert torch.isfinite(torch.autograd.grad(squared_distance, theta)[0]).all()
 
 
@@ -112,7 +140,7 @@ def test_torchs_own_generator_and_threads_are_left_alone():
 
 
 def test_a_refresh_waits_for_enough_that_is_new():
-    model, memory = ForwardModel(0, 3, 2, every=50, first=0, rate=1.0), remembered(49)
+    model, memory = ForwardModel(0, 3, 2, every=50, rate=1.0), remembered(49)
     assert model.refresh(memory) is None
     assert not model.trained
     memory = remembered(50)
@@ -123,7 +151,7 @@ def test_a_refresh_waits_for_enough_that_is_new():
 
 
 def test_adams_moments_survive_a_refresh():
-    model = ForwardModel(0, 3, 2, first=0, rate=0.2)
+    model = ForwardModel(0, 3, 2, rate=0.2)
     model.refresh(remembered(100))
     model.refresh(remembered(200))
     steps = {int(state["step"]) for state in model._optimizer.state.values()}
@@ -131,11 +159,19 @@ def test_adams_moments_survive_a_refresh():
 
 
 def test_learning_stops_when_what_is_held_out_gets_no_better():
-    noise_only = Memory(0, 3, 2)
-    rng = stream(0, "noise")
-    for row in rng.random((60, 5)):
-        noise_only.add(NO_CONTEXT, row[:3], row[3:])
-    assert ForwardModel(0, 3, 2, first=5000).refresh(noise_only).steps < 2500
+    assert ForwardModel(0, 3, 2, rate=100).refresh(noise_only(60)).steps < 2500
+
+
+def test_a_refresh_says_what_was_foreseen_of_the_new_exemplars_before_it_learnt_from_them():
+    model, memory = ForwardModel(0, 3, 2), remembered(160)
+    first = model.refresh(remembered(100))  # the same hundred
+    assert (first.first, first.foreseen) == (0, None)
+    before = model.predict(NO_CONTEXT, memory.thetas[100:])
+    second = model.refresh(memory)
+    assert second.first == 100
+    for foreseen, predicted in zip(second.foreseen, before, strict=True):
+        np.testing.assert_array_equal(foreseen, predicted)
+    assert not np.array_equal(second.foreseen.mean, model.predict(NO_CONTEXT, memory.thetas[100:]).mean)
 
 
 def test_after_a_divergence_the_weights_before_it_stand():
@@ -149,13 +185,16 @@ def test_after_a_divergence_the_weights_before_it_stand():
     assert not model.refresh(remembered(300)).diverged
 
 
-def test_a_saved_model_predicts_the_same(tmp_path, model, unseen):
+@pytest.mark.parametrize("noise_heads", [True, False])
+def test_a_saved_model_predicts_the_same_and_knows_as_well_how_far_to_be_trusted(tmp_path, unseen, noise_heads):
+    model = taught(remembered(100), noise_heads=noise_heads, members=2, hidden=(8,))
     model.save(tmp_path / "model.safetensors")
     loaded = ForwardModel.load(tmp_path / "model.safetensors")
     for saved, read in zip(
         model.predict(NO_CONTEXT, unseen.thetas), loaded.predict(NO_CONTEXT, unseen.thetas), strict=True
     ):
         np.testing.assert_array_equal(saved, read)
+    assert (loaded.noise_heads, loaded.relative_error) == (noise_heads, model.relative_error)
     assert [path.name for path in tmp_path.iterdir()] == ["model.safetensors"]
 
 
@@ -191,6 +230,14 @@ def test_a_file_that_is_no_such_model_is_refused(tmp_path, model, spoil, words):
         ForwardModel.load(path)
 
 
+def test_a_loaded_model_learns_on(tmp_path):
+    taught(remembered(100)).save(tmp_path / "model.safetensors")
+    loaded = ForwardModel.load(tmp_path / "model.safetensors", every=20, rate=1.0)
+    assert loaded.refresh(remembered(110)) is None
+    refresh = loaded.refresh(remembered(120))
+    assert (refresh.first, refresh.steps, len(refresh.foreseen.mean)) == (100, 20, 20)
+
+
 def test_a_model_that_is_not_there_is_called_missing(tmp_path):
     with pytest.raises(FileNotFoundError, match="no forward model"):
         ForwardModel.load(tmp_path / "model.safetensors")
@@ -213,7 +260,17 @@ def test_another_robots_memory_or_another_runs_is_refused():
 
 @pytest.mark.parametrize(
     "options",
-    [{"members": 0}, {"hidden": ()}, {"hidden": (0,)}, {"rate": 0.0}, {"lr": np.nan}, {"recent": 1.5}, {"batch": 0}],
+    [
+        {"members": 0},
+        {"hidden": ()},
+        {"hidden": (0,)},
+        {"every": 0},
+        {"rate": 0.0},
+        {"lr": np.nan},
+        {"recent": 1.5},
+        {"beta": -0.1},
+        {"batch": 0},
+    ],
 )
 def test_numbers_out_of_their_range_are_refused(options):
     with pytest.raises(ValueError, match=next(iter(options))):

@@ -11,13 +11,13 @@ import sgimd_torch
 
 PACKAGE = "sgimd_torch"
 ROWS = [  # a module imports only from the rows before its own
-    {"spaces", "archives"},
+    {"spaces", "archives", "ensemble"},
     {"memory", "motor_primitives", "environment", "search", "demonstrations", "regions", "casting", "cma_es"},
     {"competence", "inverse_model", "interest", "teachers", "forward_model", "fishing_rod"},
-    {"strategies", "curves", "progress_grid", "alp_gmm", "model_inverse"},
-    {"learner"},
+    {"strategies", "curves", "progress_grid", "alp_gmm", "anchored", "model_diagnostics"},
+    {"learner", "model_inverse", "gradient_search"},
     {"session", "evaluation", "algorithms", "board", "plots", "film", "quality_diversity"},
-    {"plots_of_movements", "plots_of_results"},
+    {"plots_of_movements", "plots_of_results", "plots_of_model"},
     {"__init__"},
 ]
 ROW = {module: row for row, modules in enumerate(ROWS) for module in modules}
@@ -26,11 +26,11 @@ LIBRARIES = {  # library: the only modules that may import it
     "scipy": ROW.keys() - {"spaces"},
     "faiss": {"memory"},
     "mujoco": {"casting", "film"},
-    "torch": {"forward_model", "model_inverse"},
-    "lightning": {"forward_model"},
+    "torch": {"ensemble", "forward_model", "anchored", "model_inverse", "gradient_search"},
+    "lightning": {"ensemble", "forward_model"},
     "safetensors": {"forward_model"},
     "tensorboard": {"board"},
-    "matplotlib": {"plots", "plots_of_movements", "plots_of_results"},
+    "matplotlib": {"plots", "plots_of_movements", "plots_of_results", "plots_of_model"},
     "PIL": {"film"},
     "imageio_ffmpeg": {"film"},
     "cma": {"cma_es"},
@@ -40,8 +40,8 @@ LIBRARIES = {  # library: the only modules that may import it
 ENVIRONMENTS = {"environment", "casting", "fishing_rod", "film"}
 PROTOCOL = (["Environment"], ["execute_many"])  # what works with every environment
 LEARNING = {
-    *{"memory", "search", "regions", "competence", "inverse_model", "interest", "teachers", "forward_model"},
-    *{"strategies", "learner", "progress_grid", "alp_gmm", "cma_es", "model_inverse"},
+    *{"memory", "search", "regions", "competence", "inverse_model", "interest", "teachers", "forward_model", "ensemble"},
+    *{"strategies", "learner", "progress_grid", "alp_gmm", "cma_es", "anchored", "model_inverse", "gradient_search"},
 }
 
 
