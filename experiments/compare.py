@@ -77,6 +77,7 @@ def carry_out(tasks: Sequence[Task], done: int, processes: int, tables: Mapping[
                     continue
                 running[child] = task
                 overview.started(task, child)
+            idle = len(running) < processes
             for child in [child for child in running if child.process.poll() is not None]:
                 task = running.pop(child)
                 try:
@@ -91,7 +92,6 @@ def carry_out(tasks: Sequence[Task], done: int, processes: int, tables: Mapping[
                     failed(error)
                 else:
                     overview.ended(child, failed=False)
-            idle = len(running) < processes
             overview.show(elsewhere=sum(not ours(task) for task in waiting) if idle else 0)
             time.sleep(0.3)
     finally:

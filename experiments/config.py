@@ -51,6 +51,7 @@ def rival(module: str, name: str) -> Callable[..., Any]:
 
 
 _GOAL_BABBLING: Final = ("goals", "window", "progress", "competence", "search", "budget")
+_MODEL: Final = ("members", "noise_heads", "training", "anchored")
 _TAUGHT: Final = ("teacher", "every", "choice", "demonstrations")
 # Each with the options that not all of them use.
 ALGORITHMS: Final[dict[str, tuple[str, ...]]] = {
@@ -81,10 +82,18 @@ SEARCHES: Final[dict[str, MakeSearch]] = {
     "perturb": perturb,
     "cma-es": rival("cma_es", "cma_es"),
 }
+# Through the forward model, by what ``sgimd_torch.gradient_search`` calls them.
+MODEL_SEARCHES: Final[dict[str, tuple[str, dict[str, Any]]]] = {
+    "gradient": ("gradient_search", {}),
+    "gauss-newton": ("gradient_search", {"propose": "gauss_newton"}),
+    "screened": ("gradient_search", {"propose": "screen", "noise": 0.0}),
+    "nelder-mead-polished": ("polished_simplex", {}),
+}
 INVERSES: Final[dict[str, Callable[[Memory], Inverse]]] = {
     "linear": LocallyLinear,
     "paper": LocalInverse,
     "nearest": NearestNeighbour,
+    "model": LocallyLinear,  # while it learns; in evaluations through the forward model
 }
 COMPETENCES: Final = {"memory": remembered, "attempt": attempted}
 ANSWERS: Final = {"imitate": imitating, "emulate": emulating}
@@ -96,7 +105,7 @@ KNOWN: Final[dict[str, dict[str, Any]]] = {
     "goals": GOALS,
     "progress": PROGRESS,
     "competence": COMPETENCES,
-    "search": SEARCHES,
+    "search": {**SEARCHES, **MODEL_SEARCHES},
     "inverse": INVERSES,
     "social": ANSWERS,
     "teacher": TEACHERS,
@@ -147,10 +156,18 @@ class Config:
             the paper, or attempt, those made for this goal.
         search: How a movement is refined (sagg-riac, sgim-d): nelder-mead, from the neighbours, with a little noise on
             every movement; nelder-mead-exact, without the noise; nelder-mead-complete, which first fills up the paper's
-            simplex of 26, too; perturb, the best so far plus noise; cma-es (needs sgimd-torch[rivals]).
+            simplex of 26, too; perturb, the best so far plus noise; cma-es (needs sgimd-torch[rivals]). Through a
+            forward model (these need sgimd-torch[forward]): gradient, down its gradient, or gauss-newton, each movement
+            planned anew; screened, the best of 64 variations; nelder-mead-polished, a simplex from where it would go.
         budget: Movements for one goal, at most (sagg-riac, sgim-d).
         inverse: Which movement is inferred for a goal, when learning and in evaluations: paper, the weighted mean of
-            eq. (9); linear, the same corrected to first order; nearest, the movement that came nearest.
+            eq. (9); linear, the same corrected to first order; nearest, the movement that came nearest; model, linear
+            when learning, and in evaluations what a forward model makes of it (needs sgimd-torch[forward]).
+        members: Networks in the forward model; it is learnt if the search or the inverse is one of those that use it.
+        noise_heads: Whether the forward model's noise depends on the movement, true or false.
+        training: Steps of training the forward model for each movement; 0.4 takes about a fifth of the rod's physics.
+        anchored: Whether predictions are corrected by what the forward model missed nearby, true or false.
+        residual: Whether, besides, by the outcomes of the search under way (gradient, gauss-newton, screened).
         social: How sgim-d answers a demonstration: imitate it, or emulate, pursue its outcome in the learner's own way.
         imitations: Movements that sgim-d spends on imitating a demonstration.
         epsilon: Bound of the variation in each parameter of theta when imitating (imitation, sgim-d).
@@ -186,6 +203,11 @@ class Config:
     search: str = _name_of(SEARCHES, goal_babbling, "search")
     budget: int = _default(goal_babbling, "budget")
     inverse: str = _name_of(INVERSES, goal_babbling, "inverse")
+    members: int = 3
+    noise_heads: bool = True
+    training: float = 0.4
+    anchored: bool = True
+    residual: bool = True
     social: str = "imitate"
     imitations: int = _default(imitating, "repeats")
     epsilon: float = _default(imitating, "epsilon")
@@ -204,6 +226,7 @@ class Config:
         for name, known in KNOWN.items():
             _check_known(name, getattr(self, name), known)
         at_least = {"seed": 0, "movements": 1, "budget": 1, "imitations": 1, "repeats": 0, "threads": 1}
+        at_least["members"] = 1
         for name, least in at_least.items():
             _check_least(name, getattr(self, name), least)
         if self.repeats == 1:
@@ -217,6 +240,8 @@ class Config:
             raise ValueError("board true needs tensorboard, which is not installed; pip install tensorboard")
         if not 0 <= self.noise < math.inf:
             raise ValueError(f"noise must be finite and at least 0, got {self.noise}")
+        if not 0 < self.training <= 100:
+            raise ValueError(f"training must be above 0 and at most 100 steps a movement, got {self.training}")
         if not 0 <= self.epsilon <= 1:
             raise ValueError(f"epsilon must be from 0 to 1, the width of theta's box, got {self.epsilon}")
         if not 0 < self.task_space <= 1e6:
@@ -237,6 +262,12 @@ class Config:
         return self.out / self.variant / f"seed-{self.seed:03d}"
 
     @property
+    def uses_model(self) -> bool:
+        """Whether a forward model is learnt."""
+        searches = self.search in MODEL_SEARCHES and "search" in ALGORITHMS[self.algorithm]
+        return searches or self.inverse == "model"
+
+    @property
     def evaluations(self) -> list[int]:
         """The numbers of movements after which to evaluate, in order."""
         if self.evaluate_at == ():
@@ -253,6 +284,10 @@ class Config:
         for (option, value), moot in _MOOT.items():
             if option in ("environment", *used) and getattr(self, option) == value:
                 why |= dict.fromkeys(moot, f"with --{option} {value}")
+        if not self.uses_model:
+            why |= dict.fromkeys(_MODEL, "without a forward model, see --search and --inverse")
+        if "search" not in used or self.search not in [*MODEL_SEARCHES][:3]:
+            why["residual"] = f"with --search {self.search}" if "search" in used else f"on {self.algorithm}"
         given = [field.name for field in fields(self) if getattr(self, field.name) != field.default]
         return [f"--{name} has no effect {why[name]}" for name in given if name in why]
 

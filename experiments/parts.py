@@ -10,11 +10,24 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from config import ALGORITHMS, CHOICES, COMPETENCES, GOALS, INVERSES, PROGRESS, SEARCHES, Config, Inverse, rival
+from config import (
+    ALGORITHMS,
+    CHOICES,
+    COMPETENCES,
+    GOALS,
+    INVERSES,
+    MODEL_SEARCHES,
+    PROGRESS,
+    SEARCHES,
+    Config,
+    Inverse,
+    rival,
+)
 from environments import ARMS, arm_benchmark, arm_demonstrations
 from sgimd_torch import algorithms
-from sgimd_torch.algorithms import Correspondence, MakeGoals, MakeSocial, Parts, emulating, imitating
+from sgimd_torch.algorithms import Correspondence, MakeGoals, MakeSearch, MakeSocial, Parts, emulating, imitating
 from sgimd_torch.demonstrations import SHIPPED as SHIPPED_DEMONSTRATIONS
 from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.environment import Environment, PlanarArm
@@ -25,14 +38,20 @@ from sgimd_torch.learner import Learner
 from sgimd_torch.spaces import Box, Demonstration, stream
 from sgimd_torch.teachers import AskedTeacher, InitialTeacher, PeriodicTeacher, Teacher
 
+if TYPE_CHECKING:
+    from sgimd_torch.anchored import Trust
+    from sgimd_torch.forward_model import ForwardModel
+
 STRETCH = 3.0  # times longer or shorter than the robot can move is no matter of pace
 MISFIT = 0.5  # rad; a worse fit is no movement of this robot
+LEAST_NOISE = 0.01  # m; where outcomes have none, predictions still are not better than this
 
 
 @dataclass(frozen=True, eq=False)
 class RunParts:
     """What a run needs. ``correspondence`` translates a demonstrated trajectory to theta. ``inverse`` reads the
-    learner's memory for evaluations; ``teacher`` is None, and ``demonstrations`` are empty, for who learns alone.
+    learner's memory for evaluations; ``model``, to be refreshed after each movement, is None for a run without one, as
+    is how far to ``trust`` it; ``teacher`` is None, and ``demonstrations`` are empty, for who learns alone.
     ``residuals`` (rad) say how far each is from what the robot can play. ``data`` holds checksums of the files that
     were read."""
 
@@ -45,6 +64,8 @@ class RunParts:
     inverse: Inverse
     benchmark: Benchmark
     data: dict[str, str | None]
+    model: ForwardModel | None
+    trust: Trust | None
 
 
 def build(config: Config) -> RunParts:
@@ -70,10 +91,41 @@ def build(config: Config) -> RunParts:
     if "teacher" in ALGORITHMS[config.algorithm]:
         demonstrations, residuals, demonstrations_crc32 = _demonstrations(config, robot)
         teacher = _teacher(config, demonstrations)
-    learner = _learner(config, robot, correspondence)
+    model, trust = _model(config, robot)
+    learner = _learner(config, robot, correspondence, _search(config, model, trust))
     inverse = INVERSES[config.inverse](learner.memory)
+    if config.inverse == "model":
+        inverse = rival("model_inverse", "ModelInverse")(learner.memory, model, robot.policies, trust=trust)
     data = {"demonstrations_crc32": demonstrations_crc32, "benchmark_crc32": benchmark_crc32}
-    return RunParts(robot, correspondence, learner, teacher, demonstrations, residuals, inverse, benchmark, data)
+    return RunParts(
+        robot, correspondence, learner, teacher, demonstrations, residuals, inverse, benchmark, data, model, trust
+    )
+
+
+def _model(config: Config, robot: FishingRod | PlanarArm) -> tuple[ForwardModel | None, Trust | None]:
+    """The forward model and how far to trust it, None without; torch is loaded here, and only if it is wanted."""
+    if not config.uses_model:
+        return None, None
+    model = rival("forward_model", "ForwardModel")(
+        *(robot.contexts.dim, robot.policies.dim, robot.outcomes.dim),
+        seed=config.seed,
+        members=config.members,
+        noise_heads=config.noise_heads,
+        rate=config.training,
+    )
+    return model, rival("anchored", "Trust")(noise=max(robot.outcome_noise, LEAST_NOISE), anchors=config.anchored)
+
+
+def _search(config: Config, model: ForwardModel | None, trust: Trust | None) -> MakeSearch:
+    if config.search not in MODEL_SEARCHES or model is None:
+        return SEARCHES.get(config.search, SEARCHES["nelder-mead"])  # who has no goals of his own needs none
+    name, options = MODEL_SEARCHES[config.search]
+    chosen = {**options, "model": model, "trust": trust}
+    if "propose" in options:
+        chosen["propose"] = rival("gradient_search", options["propose"])
+    if name == "gradient_search":
+        chosen["residual"] = config.residual
+    return partial(rival("gradient_search", name), **chosen)
 
 
 def _benchmark(config: Config, robot: FishingRod | PlanarArm) -> tuple[Benchmark, str | None]:
@@ -101,7 +153,7 @@ def _demonstrations(
     return demonstrations, _residuals(path, demonstrations, robot), _checksum(path)
 
 
-def _learner(config: Config, environment: Environment, correspondence: Correspondence) -> Learner:
+def _learner(config: Config, environment: Environment, correspondence: Correspondence, search: MakeSearch) -> Learner:
     goals: MakeGoals = GOALS[config.goals]
     if config.goals in ("interest-map", "grid"):
         goals = partial(GOALS[config.goals], window=config.window, progress=PROGRESS[config.progress])
@@ -111,7 +163,7 @@ def _learner(config: Config, environment: Environment, correspondence: Correspon
     parts: Parts = {
         "goals": goals,
         "inverse": INVERSES[config.inverse],
-        "search": SEARCHES[config.search],
+        "search": search,
         "judge": COMPETENCES[config.competence],
         "budget": config.budget,
     }

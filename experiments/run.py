@@ -32,6 +32,7 @@ from command_line import parse
 from config import Config
 from parts import RunParts, build
 from run_board import RunBoard
+from run_model import RunModel
 from rundir import RunDirectory
 from runfiles import Columns
 from sgimd_torch.environment import SimulationError
@@ -101,16 +102,24 @@ def run_in(directory: RunDirectory, config: Config, parts: RunParts, stopping: S
     seconds = Seconds(directory.summary)
     execute = replay(recorded, seconds.of_physics(live(parts.environment, config.seed)))
     wanted = set(config.evaluations)
+    model = RunModel(directory, parts.model, 0.0 if parts.trust is None else parts.trust.error)
     movements, flushed = 0, time.monotonic()
+
+    def begin() -> None:
+        directory.begin()
+        model.begin()
+        board.begin()
 
     def summarise(*, finished: bool = False) -> None:
         directory.flush()
+        model.flush()
         last = directory.evaluations.last
         directory.summarise(
             movements=movements,
             mean_error_m=last.get("mean_error_m"),
             noise_floor_m=last.get("noise_floor_m"),
             **seconds.summary(),
+            **model.summary(),
             finished=finished,
         )
 
@@ -129,8 +138,7 @@ def run_in(directory: RunDirectory, config: Config, parts: RunParts, stopping: S
     ):
         try:
             if not recorded:
-                directory.begin()
-                board.begin()
+                begin()
             for episode in seconds.of_learner(episodes):
                 demonstration = episode.demonstration
                 line = directory.columns.line(episode, None if demonstration is None else rows[id(demonstration)])
@@ -140,21 +148,26 @@ def run_in(directory: RunDirectory, config: Config, parts: RunParts, stopping: S
                     raise ReplayError(_differs(directory.columns, directory.lines[episode.index], line))
                 movements = episode.index + 1
                 board.episode(episode)
+                if model.episode(episode, parts.learner.memory):
+                    board.model(model.curves)
                 if movements in wanted and movements not in directory.evaluations:
                     directory.flush()
                     with seconds.of_evaluation():
                         evaluated = evaluate_in(directory, config, parts, movements, stopping)
                     board.evaluation(evaluated)
                 if movements == len(recorded):
-                    directory.begin()
-                    board.begin()
+                    begin()
+                    say(*model.news())
                 if movements > len(recorded) and time.monotonic() - flushed >= FLUSH_EVERY:
                     summarise()
                     board.flush()
                     flushed = time.monotonic()
+                if movements > len(recorded):
+                    say(*model.news())
                 progress.show(movements, directory.evaluations.last.get("mean_error_m"))
                 stopping.check()
             finished = True
+            say(*model.news(ended=True))
             board.finish()
         finally:
             if movements >= len(recorded):  # else the summary that was found counts for more

@@ -7,7 +7,7 @@ with RunBoard(directory, config, parts, seconds) as board: board.episode(episode
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import Field, fields
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Final, Self
@@ -17,6 +17,7 @@ import numpy as np
 from config import Config
 from evaluations import EVALUATION, read_table
 from parts import RunParts
+from run_model import LEGEND as MODEL_LEGEND
 from rundir import RunDirectory
 from sgimd_torch.evaluation import Evaluation
 from sgimd_torch.regions import Region
@@ -70,7 +71,8 @@ class RunBoard:
 
         autonomous = parts.learner.autonomous
         tolerance = autonomous.tolerance if isinstance(autonomous, GoalBabbling) else 0.02
-        self._board = Board(directory.path, REACH, tolerance=tolerance, legend=LEGEND, replace=True)
+        legend = LEGEND if parts.model is None else {**LEGEND, **MODEL_LEGEND}
+        self._board = Board(directory.path, REACH, tolerance=tolerance, legend=legend, replace=True)
         settings = {field.name: _plain(field, getattr(config, field.name)) for field in fields(config)}
         self._board.settings(settings, first=FIRST)
         self._known = read_table(directory.path / "evaluation.csv", EVALUATION) or {}
@@ -106,6 +108,11 @@ class RunBoard:
                 board.recall("time")
         if replayed and board.movements in self._directory.evaluations:
             self._recall_evaluation(board)
+
+    def model(self, curves: Mapping[str, float]) -> None:
+        """A point for the curves of the forward model, which has just learnt."""
+        if self._board is not None:
+            self._board.scalars(curves)
 
     def evaluation(self, found: Evaluation | None) -> None:
         """Show an evaluation that was made just now, None if there was nothing to evaluate; and pictures, at times."""

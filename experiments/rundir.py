@@ -13,11 +13,14 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from environments import ROD
+from config import Config
 from evaluations import Evaluations
 from runfiles import Columns, RunError, dropped, make_folder, read_json, write_json
 
-_ONCE = {"environment": ROD}  # settings of runs that were made before there was a choice
+_ONCE = {  # settings of runs that were made before there was a choice
+    name: getattr(Config, name)
+    for name in ("environment", "members", "noise_heads", "training", "anchored", "residual")
+}
 _UNFINISHED = ("lock", "versions.json")  # what a run killed before its config.json may have left, besides *.part
 
 

@@ -22,14 +22,33 @@ SAGG_RIAC: Final[Variant] = {"algorithm": "sagg-riac"}
 LETTER: Final[Variant] = {"inverse": "paper", "search": "nelder-mead-exact", "progress": "absolute"}
 LARGE: Final[Variant] = {"task_space": 100.0}
 FEW, HALF = "few.npz", "half.npz"  # made from the shipped demonstrations by ``make_subsets``
-# How to get from a first guess to a goal. Each line is a variant on the rod and, by a longer name, on every arm.
+# How to get from a first guess to a goal, and from what was learnt to an answer. Each line is a variant on the rod and,
+# by a longer name, on every arm.
+MODEL: Final[Variant] = {**SGIM_D, "inverse": "model"}
+GRADIENT: Final[Variant] = {**MODEL, "search": "gradient"}
 REFINING: Final[dict[str, Variant]] = {
     "sgim-d": SGIM_D,
     "sagg-riac": SAGG_RIAC,
-    "sgim-d-perturb": {**SGIM_D, "search": "perturb"},
+    "search-perturb": {**SGIM_D, "search": "perturb"},
     "sagg-riac-perturb": {**SAGG_RIAC, "search": "perturb"},
+    "model": MODEL,
+    "sagg-riac-model": {**SAGG_RIAC, "inverse": "model"},
+    "gradient": GRADIENT,
+    "sagg-riac-gradient": {**SAGG_RIAC, "inverse": "model", "search": "gradient"},
+    "gauss-newton": {**MODEL, "search": "gauss-newton"},
+    "screened": {**MODEL, "search": "screened"},
+    "polished": {**MODEL, "search": "nelder-mead-polished"},
+    "gradient-linear": {**GRADIENT, "inverse": "linear"},
+    "model-unanchored": {**MODEL, "anchored": False},
+    "gradient-unanchored": {**GRADIENT, "anchored": False},
+    "gradient-no-residual": {**GRADIENT, "residual": False},
+    "model-one-noise": {**MODEL, "noise_heads": False},
+    "model-1": {**MODEL, "members": 1},
+    "model-5": {**MODEL, "members": 5},
 }
+# Where movements cost nothing, training may cost more.
 ON_ARMS: Final[Variant] = {"movements": 2000, "evaluate_at": (250, 500, 1000, 1500)}  # and at the end
+LONGER: Final[Variant] = {"training": 2.0}
 
 
 def shipped(teacher: int) -> Path:
@@ -47,7 +66,10 @@ def _of_teacher(teacher: int) -> dict[str, Variant]:
 
 def _on_arm(arm: str) -> dict[str, Variant]:
     short = arm.removeprefix("planar-")
-    return {f"{name}-{short}": {**line, "environment": arm, **ON_ARMS} for name, line in REFINING.items()}
+    return {
+        f"{name}-{short}": {**line, "environment": arm, **ON_ARMS, **(LONGER if Config(**line).uses_model else {})}
+        for name, line in REFINING.items()
+    }
 
 
 EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {

@@ -13,7 +13,7 @@ import pytest
 
 import run as run_script
 import sgimd_torch
-from config import ALGORITHMS, KNOWN, Config
+from config import ALGORITHMS, KNOWN, MODEL_SEARCHES, Config
 from parts import build
 from read_runs import read_run
 from run import main
@@ -215,10 +215,43 @@ def test_every_choice_lives_and_none_is_another_by_a_new_name(tmp_path, go, opti
     logs = set()
     # Short attempts and a short window, so that the map is split, and has its say, before the run is over.
     common = ("--every", 20, "--budget", 3, "--imitations", 3, "--window", 4, "--movements", 240, "--evaluate_at", "[]")
-    for choice in table:
+    choices = [choice for choice in table if choice not in (*MODEL_SEARCHES, "model")]  # see the next two tests
+    for choice in choices:
         assert go(tmp_path, "--name", choice, f"--{option}", choice, *common) == 0
         logs.add((tmp_path / choice / "seed-003" / "episodes.csv").read_bytes())
-    assert len(logs) == len(table)
+    assert len(logs) == len(choices)
+
+
+ON_THE_ARM = (
+    "--environment",
+    "planar-arm-7",
+    "--benchmark",
+    "null",
+    "--movements",
+    400,
+    "--evaluate_at",
+    200,
+    "--repeats",
+    0,
+    "--training",
+    4,
+)
+
+
+def test_every_search_through_the_model_lives_and_none_is_another_by_a_new_name(tmp_path, go):
+    searches = ("nelder-mead", *MODEL_SEARCHES)
+    for search in searches:
+        assert go(tmp_path, "--name", search, "--search", search, *ON_THE_ARM) == 0
+    assert len({(tmp_path / search / "seed-003" / "episodes.csv").read_bytes() for search in searches}) == len(searches)
+
+
+def test_the_inverse_through_the_model_lives_as_the_linear_one_and_answers_better(tmp_path, go):
+    runs = {}
+    for inverse in ("linear", "model"):
+        assert go(tmp_path, "--name", inverse, "--inverse", inverse, *ON_THE_ARM) == 0
+        runs[inverse] = read_run(tmp_path / inverse / "seed-003")
+    np.testing.assert_array_equal(runs["model"].thetas, runs["linear"].thetas)
+    assert runs["model"].evaluation["mean_error_m"][-1] < 0.7 * runs["linear"].evaluation["mean_error_m"][-1]
 
 
 BABBLING = {"window": 4, "progress": "signed", "competence": "attempt", "search": "perturb", "budget": 3}

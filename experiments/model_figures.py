@@ -1,0 +1,243 @@
+"""Was the forward model right, and did it know where it was not? A figure for each run, and one table of all.
+
+Judged by predictions made before the model learnt from what they predict. The figure shows where the last ones went
+wrong, whether the spread was honest, and how both came about; table.csv has the numbers of the table, unrounded.
+
+  predicted   exemplars predicted before they were learnt from
+  error       distance (m) from prediction to outcome, mean over the last 1000
+  inside      share of outcomes inside the regions of 50 / 80 / 95 %: of the last 1000, then from 2000 movements on
+  improved    share of the goals with several movements where a later one came nearer than the first
+  refreshes   how often the model learnt, and how many of these refreshes diverged; ms is the mean time of one
+
+Example:
+  python experiments/model_figures.py runs/*/seed-* --out results/model
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import io
+import math
+import os
+import signal
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+if __name__ == "__main__":  # Ctrl-C while the libraries below are loading
+    signal.signal(signal.SIGINT, lambda *_: os._exit(130))
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.figure import Figure
+from numpy.typing import ArrayLike, NDArray
+from tqdm import tqdm
+
+from figures import STYLE
+from read_runs import Run, read_run
+from run_model import REFRESHES, prediction_columns
+from runfiles import RunError, make_folder, write_whole
+from sgimd_torch import plots_of_model as plots
+from sgimd_torch.archives import write_bytes
+from sgimd_torch.model_diagnostics import LEVELS, coverage, error_by_cell, improvements, running
+from sgimd_torch.spaces import Array, Box
+from supervise import with_streams
+
+LAST: Final = 1000  # predictions
+LATE: Final = 2000  # movements, from which on the spread is to be honest
+REACH: Final = 1.5  # m; the float hardly ever lands farther from the base
+INSIDE: Final = tuple(f"inside_{100 * level:.0f}{when}" for when in ("_last", "_late") for level in LEVELS)
+COLUMNS: Final = ("run", "predicted", "error_m", *INSIDE, "improved", "refreshes", "diverged", "ms_per_refresh")
+HEAD: Final = (
+    *("run", "predicted", "error (m)", "inside 50 / 80 / 95 %", f"from {LATE} on", "improved (%)"),
+    *("refreshes", "ms each"),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class ModelRun:
+    """What the forward model of one run foretold.
+
+    ``movements`` ``(n,)``: executed before each of the predicted ones; ``observed``, ``mean`` and ``spread``
+    ``(n, outcome_dim)`` m; ``refreshes`` ``(n_refreshes,)`` for each of its columns.
+    """
+
+    run: Run
+    movements: NDArray[np.int64]
+    observed: Array
+    mean: Array
+    spread: Array
+    refreshes: dict[str, Array]
+
+    @property
+    def name(self) -> str:
+        """Such as "sgim-d/seed-003"."""
+        return "/".join(self.run.path.resolve().parts[-2:])
+
+    def inside(self, chosen: slice | NDArray[np.bool_], levels: ArrayLike = LEVELS) -> Array:
+        """Coverage ``(n_levels,)`` of the ``chosen`` predictions, NaN without any."""
+        observed, mean, spread = (values[chosen] for values in (self.observed, self.mean, self.spread))
+        return coverage(observed, mean, spread, levels) if len(observed) else np.full(np.shape(levels), np.nan)
+
+
+def read_model_run(path: Path) -> ModelRun:
+    """A run with a forward model, finished or not; predictions of movements that its log lacks are left out.
+
+    Raises:
+        RunError: it has no model, has predicted nothing yet, or its files are damaged or do not belong together.
+    """
+    run, file = read_run(path), path / "predictions.csv"
+    if not file.exists():
+        raise RunError(f"{path} has no predictions.csv: it ran without a forward model; see --inverse model of run.py")
+    dim = run.outcomes.shape[1]
+    table = _read(file, prediction_columns(dim))
+    lived = np.flatnonzero(np.isfinite(run.outcomes).all(axis=1))
+    table = table[table[:, 0] < len(lived)]
+    rows = table[:, 0].astype(np.int64)
+    if not len(rows):
+        raise RunError(f"{file} holds no prediction of a movement yet; the model learns from 50 before its first")
+    if (rows != table[:, 0]).any() or rows[0] < 0 or (np.diff(rows) <= 0).any():
+        raise RunError(f"{file} must name exemplars by whole numbers that increase; was it edited?")
+    observed, mean, epistemic, aleatoric = np.split(table[:, 1:], 4, axis=1)
+    differ = (observed != run.outcomes[lived[rows]]).any(axis=1)
+    if differ.any():
+        raise RunError(f"{file}: exemplar {rows[differ][0]} is another one in episodes.csv; is it another run's file?")
+    spread = np.hypot(epistemic, aleatoric)
+    if not (spread > 0).all():
+        raise RunError(f"{file}: exemplar {rows[(spread <= 0).any(axis=1)][0]} has a spread of 0; was it edited?")
+    refreshes = _read(path / "refreshes.csv", REFRESHES)
+    if not len(refreshes) or not np.isin(refreshes[:, -1], (0, 1)).all():
+        raise RunError(f"{path}/refreshes.csv must hold a refresh, and 0 or 1 for diverged; was it cut or edited?")
+    columns = dict(zip(REFRESHES, refreshes.T, strict=True))
+    return ModelRun(run, lived[rows], observed, mean, spread, columns)
+
+
+def row(model_run: ModelRun) -> dict[str, Any]:
+    """Its line of the table, by column; NaN for what there is none of."""
+    errors = np.linalg.norm(model_run.observed - model_run.mean, axis=1)
+    run, refreshes = model_run.run, len(model_run.refreshes["diverged"])
+    seconds = run.summary.get("seconds_model")
+    inside = (model_run.inside(slice(-LAST, None)), model_run.inside(model_run.movements >= LATE))
+    values = (
+        model_run.name,
+        len(errors),
+        float(errors[-LAST:].mean()),
+        *np.concatenate(inside).tolist(),
+        improvements(run.goals, run.outcomes, run.origin).share,
+        refreshes,
+        int(model_run.refreshes["diverged"].sum()),
+        1e3 * seconds / refreshes if isinstance(seconds, int | float) else math.nan,
+    )
+    return dict(zip(COLUMNS, values, strict=True))
+
+
+def figure_of(model_run: ModelRun) -> Figure:
+    """Where predictions went wrong, whether the spread was honest, and both over time; maps only of the plane."""
+    observed, mean, refreshes = model_run.observed, model_run.mean, model_run.refreshes
+    is_plane, last = observed.shape[1] == 2, slice(-LAST, None)
+    over_time = ["error", "coverage", "held out"]
+    figure = Figure(figsize=(17, 10) if is_plane else (12, 10), layout="constrained")
+    rows: Any = [["map", "cells", "calibration"], over_time] if is_plane else [["calibration", "error"], over_time[1:]]
+    axes = figure.subplot_mosaic(rows)
+    if is_plane:
+        half_side = model_run.run.config.get("task_space")
+        reach = min(half_side, REACH) if isinstance(half_side, int | float) else REACH
+        box = Box.cube(-reach, reach, 2)
+        plots.predictions(axes["map"], observed[last], mean[last], box)
+        plots.error_map(axes["cells"], error_by_cell(observed[last], mean[last], box), box)
+        axes["map"].set_title(f"From prediction to outcome, last {len(observed[last])}", pad=26)
+        axes["cells"].set_title("Their mean error, and number, by cell", pad=26)
+    levels = np.arange(1, 20) / 20
+    shown = {f"last {len(observed[last])}": model_run.inside(last, levels)}
+    if (late := model_run.movements >= LATE).any():
+        shown[f"from {LATE} movements on"] = model_run.inside(late, levels)
+    plots.calibration(axes["calibration"], levels, shown)
+    windows = running(observed, mean, model_run.spread)
+    ends = (model_run.movements[windows.last] + 1).astype(np.float64)
+    plots.error_over_time(axes["error"], ends, windows.errors)
+    plots.coverage_over_time(axes["coverage"], ends, windows.coverages[:, LEVELS.index(0.8)])
+    diverged = refreshes["diverged"] > 0
+    plots.held_out_over_time(axes["held out"], refreshes["movements"], refreshes["held_out"], diverged)
+    figure.suptitle(f"{model_run.name}: {len(observed)} predictions, each made before it was learnt from")
+    return figure
+
+
+def _read(path: Path, names: Sequence[str]) -> Array:
+    """``(n, len(names))``; a torn last line is left out, as of the log."""
+    try:
+        *lines, _ = path.read_text(encoding="utf-8").split("\n")
+    except FileNotFoundError:
+        raise RunError(f"{path} is missing; was it deleted?") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise RunError(f"{path} cannot be read: {error}") from error
+    if not lines or lines[0] != ",".join(names):
+        found = lines[0][:60] if lines else "no line"
+        raise RunError(f"{path} must begin with {','.join(names)}, got {found}; was it edited?")
+    rows = []
+    for number, line in enumerate(lines[1:], start=2):
+        try:
+            fields = [float(field) for field in line.split(",")]
+        except ValueError:
+            fields = []
+        if len(fields) != len(names) or not all(map(math.isfinite, fields)):
+            raise RunError(f"{path}, line {number}: needs {len(names)} numbers, got {line[:60]!r}; was it edited?")
+        rows.append(fields)
+    return np.array(rows).reshape(-1, len(names))
+
+
+def _save(figure: Figure, path: Path) -> None:
+    png = io.BytesIO()
+    figure.savefig(png, format="png", dpi=130)
+    write_bytes(path, png.getvalue())
+
+
+def _printed(cells: dict[str, Any]) -> list[str]:
+    def told(value: float, form: str) -> str:
+        return "-" if math.isnan(value) else f"{value:{form}}"
+
+    inside = [" / ".join(told(100 * cells[name], ".0f") for name in INSIDE[k : k + 3]) for k in (0, 3)]
+    learnt = f"{cells['refreshes']}, {cells['diverged']} diverged", told(cells["ms_per_refresh"], ".1f")
+    improved = told(100 * cells["improved"], ".0f")
+    return [cells["run"], str(cells["predicted"]), f"{cells['error_m']:.3f}", *inside, improved, *learnt]
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Draw and tell; the exit code is 2 when a run makes no sense."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("runs", type=Path, nargs="+", metavar="RUN", help="a run directory: runs/sgim-d/seed-003")
+    parser.add_argument("--out", type=Path, default=Path("results/model"), help="default: %(default)s")
+    options = parser.parse_args(argv)
+    quiet = not sys.stderr.isatty()
+    try:
+        found = {run.name: run for run in map(read_model_run, tqdm(options.runs, "reading", disable=quiet))}
+        if len(found) < len(options.runs):
+            raise RunError("two of these runs have the same name; draw them apart, each with its own --out")
+        make_folder(options.out)
+        for name, run in tqdm(found.items(), "drawing", disable=quiet):
+            with rc_context(STYLE):
+                _save(figure_of(run), options.out / f"{name.replace('/', '-')}.png")
+        rows = [row(run) for run in found.values()]
+        table = io.StringIO()
+        csv.DictWriter(table, COLUMNS, lineterminator="\n").writerows([dict(zip(COLUMNS, COLUMNS, strict=True)), *rows])
+        write_whole(options.out / "table.csv", table.getvalue())
+    except ValueError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    except OSError as error:
+        print(f"error: {error.filename or options.out}: {error.strerror or error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        return 130
+    lines = [HEAD, *map(_printed, rows)]
+    widths = [max(map(len, cells)) for cells in zip(*lines, strict=True)]
+    for cells in lines:
+        print("  ".join(cell.ljust(width) for cell, width in zip(cells, widths, strict=True)).rstrip())
+    print(f"figures and table.csv: {options.out}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(with_streams(main))
