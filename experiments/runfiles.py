@@ -7,6 +7,8 @@
                          context_*, theta_*, goal_*, outcome_*, crc32 of the fields before it
     evaluation.csv   movements, mean_error_m, median_error_m, p90_error_m, noise_floor_m
     regions.csv      the interest map at each evaluation, a line for each region, corners in C x T
+    predictions.csv  with a forward model: what it foretold of each exemplar before it learnt from it, and what happened
+    refreshes.csv    with a forward model: a line each time that it has learnt
     summary.json     movements so far, the last evaluation, seconds spent on physics, learning and evaluating
     lock             held by the process that writes
 

@@ -12,7 +12,8 @@ Where each part of the paper lives:
     4.4    goal-directed policy optimisation               strategies, inverse_model (eqs. 8, 9), search
     5.2    evaluation                                      evaluation (eq. 10)
     5.3    demonstrations and teachers                     demonstrations, teachers
-    -      our addition: a forward model                   forward_model, model_inverse
+    -      our addition: a forward model                   ensemble, forward_model, anchored, model_inverse,
+                                                           gradient_search, model_diagnostics
 """
 
 from __future__ import annotations
