@@ -1,4 +1,4 @@
-"""Was the forward model right, and did it know where it was not? A figure for each run, and one table of all.
+"""Was the forward model right, and did it know where it was not? A figure of each variant's first run, and one table of all.
 
 Judged by predictions made before the model learnt from what they predict. The figure shows where the last ones went
 wrong, whether the spread was honest, and how both came about; table.csv has the numbers of the table, unrounded.
@@ -216,9 +216,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         if len(found) < len(options.runs):
             raise RunError("two of these runs have the same name; draw them apart, each with its own --out")
         make_folder(options.out)
-        for name, run in tqdm(found.items(), "drawing", disable=quiet):
+        first = {name.split("/")[0]: name for name in reversed(found)}
+        for name in tqdm(first.values(), "drawing", disable=quiet):
             with rc_context(STYLE):
-                _save(figure_of(run), options.out / f"{name.replace('/', '-')}.png")
+                _save(figure_of(found[name]), options.out / f"{name.replace('/', '-')}.png")
         rows = [row(run) for run in found.values()]
         table = io.StringIO()
         csv.DictWriter(table, COLUMNS, lineterminator="\n").writerows([dict(zip(COLUMNS, COLUMNS, strict=True)), *rows])

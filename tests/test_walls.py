@@ -40,7 +40,17 @@ LIBRARIES = {  # library: the only modules that may import it
 ENVIRONMENTS = {"environment", "casting", "fishing_rod", "film"}
 PROTOCOL = (["Environment"], ["execute_many"])  # what works with every environment
 LEARNING = {
-    *{"memory", "search", "regions", "competence", "inverse_model", "interest", "teachers", "forward_model", "ensemble"},
+    *{
+        "memory",
+        "search",
+        "regions",
+        "competence",
+        "inverse_model",
+        "interest",
+        "teachers",
+        "forward_model",
+        "ensemble",
+    },
     *{"strategies", "learner", "progress_grid", "alp_gmm", "cma_es", "anchored", "model_inverse", "gradient_search"},
 }
 

@@ -1,0 +1,108 @@
+"""The bars of the forward model, and the tables that stand in results/FORWARD_MODEL.md."""
+
+import numpy as np
+import pytest
+
+from evidence import Evidence
+from model_claims import BARS, JUDGED, judge, main, read_coverages
+from paper import HEADER, SEEDS, spread
+from read_results import ResultsError, read_results
+
+TRUE = {  # variant: experiment, its errors (m) by movements
+    "sgim-d": ("forward-model", {500: 0.1, 1000: 0.08, 2000: 0.06, 3000: 0.05, 5000: 0.045}),
+    **{name: ("forward-model", {500: 0.1, 1000: 0.06, 2000: 0.04, 3000: 0.035, 5000: 0.03}) for name in JUDGED},
+    "sagg-riac": ("forward-model", {500: 0.2, 1000: 0.15, 2000: 0.1, 3000: 0.09, 5000: 0.08}),
+    "sagg-riac-model": ("forward-model", {500: 0.2, 1000: 0.14, 2000: 0.09, 3000: 0.08, 5000: 0.07}),
+    "sgim-d-arm-50": ("planar-arm-50", {250: 0.2, 500: 0.1, 1000: 0.05, 2000: 0.03}),
+    **{f"{name}-arm-50": ("planar-arm-50", {250: 0.2, 500: 0.1, 1000: 0.03, 2000: 0.01}) for name in JUDGED},
+}
+FLOOR = 0.033  # m
+HONEST = {name: np.full(3, 0.8) for name in JUDGED}
+CLAIMS = [claim for claim, _, _ in BARS]
+
+
+def write(path, *, without=(), **spoilt):
+    """``spoilt``: variant, with _ for -, to errors in the place of the true ones."""
+    lines = []
+    for name, (experiment, errors) in TRUE.items():
+        for seed in range(SEEDS) if name not in without else ():
+            for movements, error in {**errors, **spoilt.get(name.replace("-", "_"), {})}.items():
+                floor = FLOOR if movements == 5000 else ""
+                lines.append(f"{experiment},{name},3,1,{seed},{movements},{error * spread(seed)},{floor},300")
+    path.write_text("\n".join([HEADER, *lines]) + "\n")
+    return path
+
+
+def verdicts(path, coverages=HONEST):
+    rows = judge(Evidence(read_results(path), {}), coverages)
+    return {row.claim: row.verdict for row in rows}
+
+
+def test_where_every_bar_is_cleared_every_one_holds(tmp_path):
+    found = verdicts(write(tmp_path / "x.csv"))
+    assert len(found) == len(JUDGED) * (len(BARS) + 1)
+    assert set(found.values()) == {"holds"}
+
+
+@pytest.mark.parametrize(
+    ("claim", "errors"),
+    [
+        (CLAIMS[0], {2000: 0.07, 3000: 0.06}),  # comes down to .045 at 4000
+        (CLAIMS[1], {1000: 0.09, 2000: 0.07}),  # better at 5000 only
+        (CLAIMS[2], {5000: 0.036}),
+    ],
+)
+def test_a_bar_that_is_missed_does_not_hold_and_the_others_of_that_model_may(tmp_path, claim, errors):
+    found = verdicts(write(tmp_path / "x.csv", model=errors))
+    assert found[f"{claim}: `model`"] == "does not hold"
+    assert found[f"{claim}: `gradient`"] == "holds"
+
+
+def test_half_of_the_error_on_fifty_joints_is_half(tmp_path):
+    found = verdicts(write(tmp_path / "x.csv", model_arm_50={2000: 0.016}))
+    assert found[f"{CLAIMS[3]}: `model`"] == "does not hold"
+
+
+def test_a_level_that_is_never_reached_does_not_count_as_early(tmp_path):
+    worse = {1000: 0.09, 2000: 0.08, 3000: 0.07, 5000: 0.06}
+    assert verdicts(write(tmp_path / "x.csv", model=worse))[f"{CLAIMS[0]}: `model`"] == "does not hold"
+
+
+def test_what_was_not_run_is_left_open(tmp_path):
+    found = verdicts(write(tmp_path / "x.csv", without=("gradient", "model-arm-50")), {})
+    open_ones = {claim for claim, verdict in found.items() if verdict == "cannot say"}
+    wanted = {f"{claim}: `gradient`" for claim in CLAIMS[:3]} | {f"{CLAIMS[3]}: `model`"}
+    assert open_ones == wanted | {f"calibration: `{name}`" for name in JUDGED}
+
+
+@pytest.mark.parametrize(("share", "verdict"), [(0.65, "does not hold"), (0.75, "holds"), (0.93, "does not hold")])
+def test_a_spread_may_be_neither_overconfident_nor_too_cautious(tmp_path, share, verdict):
+    found = verdicts(write(tmp_path / "x.csv"), {**HONEST, "model": np.full(3, share)})
+    assert found["calibration: `model`"] == verdict
+
+
+def test_the_page_keeps_its_prose_and_gets_its_tables(tmp_path, capsys):
+    results, page = write(tmp_path / "x.csv"), tmp_path / "page.md"
+    table = tmp_path / "table.csv"
+    table.write_text("run,inside_80_late\nmodel/seed-000,0.8\nmodel/seed-001,0.82\ngradient/seed-000,nan\n")
+    options = ["--results", str(results), "--out", str(page), "--table", str(table)]
+    assert main(options) == 0
+    page.write_text(page.read_text().replace("# The forward model\n", "# The forward model\n\nProse.\n"))
+    assert main(options) == 0
+    text = page.read_text()
+    assert "\nProse.\n" in text
+    assert "0.81 [0.80, 0.82], single runs 0.80 to 0.82" in text
+    (line,) = (line for line in text.splitlines() if line.startswith("| sagg-riac-model |"))
+    assert "−0.01" in line  # compared with sagg-riac, not with SGIM-D
+    assert "9 holds, 1 cannot say" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("text", ["variant,x\nmodel,1\n", "run,inside_80_late\nmodel/seed-000,much\n"])
+def test_a_table_of_something_else_is_refused_and_the_page_untouched(tmp_path, capsys, text):
+    (tmp_path / "table.csv").write_text(text)
+    with pytest.raises(ResultsError, match=r"table\.csv is no table of model_figures\.py"):
+        read_coverages(tmp_path / "table.csv")
+    results, page = write(tmp_path / "x.csv"), tmp_path / "page.md"
+    assert main(["--results", str(results), "--out", str(page), "--table", str(tmp_path / "table.csv")]) == 2
+    assert "error:" in capsys.readouterr().err
+    assert not page.exists()
