@@ -51,7 +51,7 @@ def rival(module: str, name: str) -> Callable[..., Any]:
 
 
 _GOAL_BABBLING: Final = ("goals", "window", "progress", "competence", "search", "budget")
-_MODEL: Final = ("members", "noise_heads", "training", "anchored")
+_MODEL: Final = ("members", "noise_heads", "training", "focus", "anchored")
 _TAUGHT: Final = ("teacher", "every", "choice", "demonstrations")
 # Each with the options that not all of them use.
 ALGORITHMS: Final[dict[str, tuple[str, ...]]] = {
@@ -166,6 +166,7 @@ class Config:
         members: Networks in the forward model; it is learnt if the search or the inverse is one of those that use it.
         noise_heads: Whether the forward model's noise depends on the movement, true or false.
         training: Steps of training the forward model for each movement; 0.4 takes about a fifth of the rod's physics.
+        focus: Share of training drawn from what landed near the goal pursued, 0 to 0.75.
         anchored: Whether predictions are corrected by what the forward model missed nearby, true or false.
         residual: Whether, besides, by the outcomes of the search under way (gradient, gauss-newton, screened).
         social: How sgim-d answers a demonstration: imitate it, or emulate, pursue its outcome in the learner's own way.
@@ -206,6 +207,7 @@ class Config:
     members: int = 3
     noise_heads: bool = True
     training: float = 0.4
+    focus: float = 0.0
     anchored: bool = True
     residual: bool = True
     social: str = "imitate"
@@ -242,6 +244,8 @@ class Config:
             raise ValueError(f"noise must be finite and at least 0, got {self.noise}")
         if not 0 < self.training <= 100:
             raise ValueError(f"training must be above 0 and at most 100 steps a movement, got {self.training}")
+        if not 0 <= self.focus <= 0.75:
+            raise ValueError(f"focus must be from 0 to 0.75, got {self.focus}; the rest is of what is new and old")
         if not 0 <= self.epsilon <= 1:
             raise ValueError(f"epsilon must be from 0 to 1, the width of theta's box, got {self.epsilon}")
         if not 0 < self.task_space <= 1e6:

@@ -116,7 +116,8 @@ def config_of(run: Run) -> Config:
 
 
 def remember(run: Run, parts: RunParts, start: int, stop: int) -> None:
-    """Add to the memory of ``parts`` what the learner remembered in movements ``start`` to ``stop``, in its order."""
+    """Add to the memory of ``parts`` what the learner remembered in movements ``start`` to ``stop``, in its order, and
+    let a forward model learn from it as it did then."""
     memory, correspondence = parts.learner.memory, parts.correspondence
     by_observation = isinstance(parts.learner.social, Remember)  # the others remember only what they did themselves
     for row in range(start, min(stop, len(run.index))):
@@ -125,6 +126,9 @@ def remember(run: Run, parts: RunParts, start: int, stop: int) -> None:
             memory.add(shown.context, correspondence(shown.times, shown.trajectory), shown.outcome)
         if run.origin[row]:
             memory.add(run.contexts[row], run.thetas[row], run.outcomes[row])
+        if parts.model is not None:
+            goal = run.goals[row]
+            parts.model.refresh(memory, goal if np.isfinite(goal).all() else None)
 
 
 def _cast(

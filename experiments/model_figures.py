@@ -1,4 +1,4 @@
-"""Was the forward model right, and did it know where it was not? A figure of each variant's first run, and one table of all.
+"""Was the forward model right, and did it know where not? A figure of each variant's first run, and one table of all.
 
 Judged by predictions made before the model learnt from what they predict. The figure shows where the last ones went
 wrong, whether the spread was honest, and how both came about; table.csv has the numbers of the table, unrounded.
@@ -10,7 +10,7 @@ wrong, whether the spread was honest, and how both came about; table.csv has the
   refreshes   how often the model learnt, and how many of these refreshes diverged; ms is the mean time of one
 
 Example:
-  python experiments/model_figures.py runs/*/seed-* --out results/model
+  python experiments/model_figures.py runs/model/seed-??? --out results/model
 """
 
 from __future__ import annotations

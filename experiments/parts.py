@@ -112,6 +112,7 @@ def _model(config: Config, robot: FishingRod | PlanarArm) -> tuple[ForwardModel 
         members=config.members,
         noise_heads=config.noise_heads,
         rate=config.training,
+        focus=config.focus,
     )
     return model, rival("anchored", "Trust")(noise=max(robot.outcome_noise, LEAST_NOISE), anchors=config.anchored)
 

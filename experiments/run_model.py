@@ -83,7 +83,7 @@ class RunModel:
         if move is not None and move.goal is not None and episode.outcome is not None:
             self._lately.append((move.goal, episode.outcome, move.origin))
         begun = time.perf_counter()
-        refresh = self._model.refresh(memory)
+        refresh = self._model.refresh(memory, None if move is None else move.goal)
         self._seconds += time.perf_counter() - begun
         if refresh is None:
             return False

@@ -19,7 +19,7 @@ from runfiles import Columns, RunError, dropped, make_folder, read_json, write_j
 
 _ONCE = {  # settings of runs that were made before there was a choice
     name: getattr(Config, name)
-    for name in ("environment", "members", "noise_heads", "training", "anchored", "residual")
+    for name in ("environment", "members", "noise_heads", "training", "focus", "anchored", "residual")
 }
 _UNFINISHED = ("lock", "versions.json")  # what a run killed before its config.json may have left, besides *.part
 

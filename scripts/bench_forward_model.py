@@ -79,8 +79,8 @@ def measure(search: str, movements: int, seed: int) -> tuple[float, float, float
     autonomous.search = searching.through(autonomous.search)
     refresh, execute = training.around(model.refresh), physics.around(live(parts.environment, seed))
     lives = run(parts.learner, parts.environment, seed, movements=movements, teacher=parts.teacher, execute=execute)
-    for _ in tqdm(lives, total=movements, desc=search, unit="movement", leave=False):
-        refresh(memory)
+    for episode in tqdm(lives, total=movements, desc=search, unit="movement", leave=False):
+        refresh(memory, episode.move.goal if episode.move else None)
     answering, goals = Clock(), parts.benchmark.goals
     context = (parts.environment.contexts.low + parts.environment.contexts.high) / 2
     answering.around(parts.inverse.many)(context, goals)  # type: ignore[attr-defined]

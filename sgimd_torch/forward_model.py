@@ -33,6 +33,7 @@ VERSION: Final = 1
 _HELD_OUT: Final = 10  # one exemplar in so many is never trained on
 _FEWEST: Final = 50  # exemplars to begin with
 _CHUNK: Final = 20  # steps between two looks at what is held out
+_NEAR: Final = 200  # exemplars that count as near a goal
 _PATIENCE: Final = 5  # looks without improvement that end a refresh
 
 
@@ -70,6 +71,7 @@ class ForwardModel(Ensemble):
             as a fifth of a movement of the fishing rod, 2 as long as a whole one.
         batch: exemplars a step, for each member.
         recent: share of every batch drawn from the newest ``every`` exemplars.
+        focus: share drawn from the 200 that landed nearest the goal that ``refresh`` is told.
         accelerator: Lightning's name of where to train: "cpu", the fastest for these sizes, "auto" or "cuda".
 
     Raises:
@@ -96,6 +98,7 @@ class ForwardModel(Ensemble):
         rate: float = 0.4,
         batch: int = 128,
         recent: float = 0.25,
+        focus: float = 0.0,
         lr: float = 1e-2,
         beta: float = 0.5,
         noise_heads: bool = True,
@@ -106,14 +109,16 @@ class ForwardModel(Ensemble):
             check_count(name, count, 1)
         if not hidden or min(hidden) < 1 or every < 1 or batch < 1:
             raise ValueError(f"needs hidden, every, batch >= 1, got {hidden}, {every}, {batch}")
-        if not (0 < rate < math.inf and 0 < lr < math.inf and 0 <= recent <= 1 and 0 <= beta <= 1):
-            raise ValueError(f"needs rate, lr > 0, recent, beta in [0, 1], got {rate}, {lr}, {recent}, {beta}")
+        if not (0 < rate < math.inf and 0 < lr < math.inf and 0 <= beta <= 1):
+            raise ValueError(f"needs rate, lr > 0, beta in [0, 1], got {rate}, {lr}, {beta}")
+        if not (recent >= 0 and focus >= 0 and recent + focus <= 1):
+            raise ValueError(f"recent and focus are shares of a batch, got {recent} and {focus}")
         generator = torch.Generator().manual_seed(int(stream(seed, "forward model").integers(2**63)))
         shape = members, list(hidden), noise_heads
         super().__init__(context_dim + theta_dim, outcome_dim, generator, *shape, lr=lr, beta=beta)
         self.sizes = {"context_dim": context_dim, "theta_dim": theta_dim, "outcome_dim": outcome_dim}
         self.shape = dict(zip(("members", "hidden", "noise_heads"), shape, strict=True))
-        self.every, self.rate, self.batch, self.recent = every, rate, batch, recent
+        self.every, self.rate, self.batch, self.recent, self.focus = every, rate, batch, recent, focus
         self.accelerator, self._random = accelerator, generator
         for name, dim in {"input": context_dim + theta_dim, "outcome": outcome_dim}.items():
             self.register_buffer(f"{name}_mean", torch.zeros(dim))
@@ -167,8 +172,12 @@ class ForwardModel(Ensemble):
         means, variances = (part.cpu().double().numpy() for part in members)
         return Prediction(means.mean(axis=0), means.std(axis=0), np.sqrt(variances.mean(axis=0)))
 
-    def refresh(self, memory: Memory) -> Refresh | None:
+    def refresh(self, memory: Memory, goal: Array | None = None) -> Refresh | None:
         """Learn from what is new in ``memory``, and from what is old again; nothing if less than ``every`` is new.
+
+        Args:
+            memory: the learner's; it is only read.
+            goal: ``(outcome_dim,)`` m that the learner pursues, for ``focus``; None if it pursues none.
 
         It ends early when what is held out (one exemplar in ten, never trained on) is predicted no better, and goes
         back to the weights before it when the loss is not finite any more.
@@ -194,7 +203,10 @@ class ForwardModel(Ensemble):
         x = (self._tensor(inputs) - self.input_mean) / self.input_scale
         y = (self._tensor(outcomes) - self.outcome_mean) / self.outcome_scale
         self.n_seen.fill_(n)
-        return Refresh(*self._train(x, y, max(1, round(self.rate * (n - seen)))), seen, foreseen)
+        near = None
+        if goal is not None and self.focus:
+            near = torch.as_tensor(memory.near_outcomes(memory.contexts[-1], goal, _NEAR))
+        return Refresh(*self._train(x, y, max(1, round(self.rate * (n - seen))), near), seen, foreseen)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write a safetensors file whose header says in JSON what the model is; it appears whole or not at all.
@@ -236,19 +248,26 @@ class ForwardModel(Ensemble):
             raise ValueError(f"{path} holds weights that are not finite; was it saved while training diverged?")
         return model
 
-    def _train(self, x: torch.Tensor, y: torch.Tensor, steps: int) -> tuple[int, float, bool]:
+    def _train(
+        self, x: torch.Tensor, y: torch.Tensor, steps: int, near: torch.Tensor | None
+    ) -> tuple[int, float, bool]:
         """At most ``steps`` on the standardised exemplars, the newest last; the first three of ``Refresh``."""
         fabric, optimizer = self._begin()
         is_held = torch.arange(len(x)) % _HELD_OUT == _HELD_OUT - 1
         held, rows = (x[is_held], y[is_held]), torch.nonzero(~is_held)[:, 0]
-        n_new = round(self.recent * self.batch)
-        newest = rows[-self.every :]
+        special = [(rows[-self.every :], round(self.recent * self.batch))]
+        if near is not None:
+            special.append((near[~is_held[near]], round(self.focus * self.batch)))
         before, best, waited, done = _copy(self.state_dict()), math.inf, 0, 0
         while done < steps and waited < _PATIENCE:
             chunk = min(_CHUNK, steps - done)
             for _ in range(chunk):
                 picked = rows[torch.randint(len(rows), (self.members, self.batch), generator=self._random)]
-                picked[:, :n_new] = newest[torch.randint(len(newest), (self.members, n_new), generator=self._random)]
+                taken = 0
+                for some, count in special:
+                    drawn = torch.randint(len(some), (self.members, count), generator=self._random)
+                    picked[:, taken : taken + count] = some[drawn]
+                    taken += count
                 optimizer.zero_grad()
                 fabric.backward(self.training_step((x[picked], y[picked])))
                 optimizer.step()

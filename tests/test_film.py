@@ -161,6 +161,16 @@ def test_the_memory_rebuilt_from_the_log_judges_as_the_living_one_did(tmp_path, 
     assert seen.mean_error == run.evaluation["mean_error_m"][0]
 
 
+def test_a_forward_model_learns_again_what_it_learnt_in_the_run(tmp_path, go):
+    assert go(tmp_path, "--inverse", "model", "--movements", 150, "--evaluate_at", "[]") == 0
+    run = read_run(tmp_path / "sgim-d" / "seed-003")
+    parts = build(film.config_of(run))
+    film.remember(run, parts, 0, 60)
+    film.remember(run, parts, 60, 150)
+    errors = [line.split(",")[4] for line in (run.path / "refreshes.csv").read_text().splitlines()]
+    assert errors[-1] == repr(parts.model.relative_error)
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [

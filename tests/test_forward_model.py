@@ -150,6 +150,20 @@ def test_a_refresh_waits_for_enough_that_is_new():
     assert torch.equal(weights(model), before)
 
 
+def test_with_a_focus_a_small_network_learns_best_what_lands_near_the_goal(unseen):
+    memory = remembered(1000)
+    goal = memory.outcomes[0]
+    near = np.linalg.norm(unseen.outcomes - goal, axis=1) < 0.2
+    errors = {}
+    for name, focus, told in (("all", 0.0, goal), ("near", 0.75, goal), ("no goal", 0.75, None)):
+        model = ForwardModel(0, 3, 2, rate=0.3, hidden=(3,), recent=0.0, focus=focus)
+        model.refresh(memory, told)
+        errors[name] = np.linalg.norm(model.predict(NO_CONTEXT, unseen.thetas).mean - unseen.outcomes, axis=1)
+    assert errors["near"][near].mean() < 0.8 * errors["all"][near].mean()
+    assert errors["near"][~near].mean() > 1.2 * errors["all"][~near].mean()
+    np.testing.assert_array_equal(errors["no goal"], errors["all"])
+
+
 def test_adams_moments_survive_a_refresh():
     model = ForwardModel(0, 3, 2, rate=0.2)
     model.refresh(remembered(100))
@@ -268,6 +282,8 @@ def test_another_robots_memory_or_another_runs_is_refused():
         {"rate": 0.0},
         {"lr": np.nan},
         {"recent": 1.5},
+        {"focus": -0.1},
+        {"focus": 0.8},  # with the quarter that is recent more than a batch
         {"beta": -0.1},
         {"batch": 0},
     ],
