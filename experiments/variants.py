@@ -45,6 +45,7 @@ REFINING: Final[dict[str, Variant]] = {
     "model-one-noise": {**MODEL, "noise_heads": False},
     "model-1": {**MODEL, "members": 1},
     "model-5": {**MODEL, "members": 5},
+    "model-less-training": {**MODEL, "training": 0.3},
 }
 # Where movements cost nothing, training may cost more.
 ON_ARMS: Final[Variant] = {"movements": 2000, "evaluate_at": (250, 500, 1000, 1500)}  # and at the end
@@ -67,7 +68,7 @@ def _of_teacher(teacher: int) -> dict[str, Variant]:
 def _on_arm(arm: str) -> dict[str, Variant]:
     short = arm.removeprefix("planar-")
     return {
-        f"{name}-{short}": {**line, "environment": arm, **ON_ARMS, **(LONGER if Config(**line).uses_model else {})}
+        f"{name}-{short}": {**(LONGER if Config(**line).uses_model else {}), **line, "environment": arm, **ON_ARMS}
         for name, line in REFINING.items()
     }
 

@@ -97,8 +97,10 @@ def test_with_beta_what_is_taken_for_noise_is_less_given_up_on(beta, given_up):
     networks.weights[-1].data[:] = 0.0
     networks.biases[-1].data[..., 2:] = math.log(4.0)  # a variance of 4, everywhere, and a mean of 0
     (gradient,) = torch.autograd.grad(networks.training_step((random(MEMBERS, 6, 4), outputs)), networks.biases[-1])
-    squared_distances = -outputs.sum(dim=1, keepdim=True) / outputs.numel()  # the gradient of half their mean
-    torch.testing.assert_close(gradient[..., :2], squared_distances / given_up)
+    of_means = -outputs.sum(dim=1, keepdim=True) / outputs.numel()  # of half the mean squared distance
+    torch.testing.assert_close(gradient[..., :2], of_means / given_up)
+    of_log_variances = (1 - outputs**2 / 4).sum(dim=1, keepdim=True) / 2 / outputs.numel()
+    torch.testing.assert_close(gradient[..., 2:], of_log_variances * 4 / given_up)  # its minimum stays where it was
 
 
 @pytest.mark.filterwarnings("ignore")  # of Lightning's, of the torch that it came with, and of few workers
