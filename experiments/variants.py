@@ -29,7 +29,7 @@ GRADIENT: Final[Variant] = {**MODEL, "search": "gradient"}
 REFINING: Final[dict[str, Variant]] = {
     "sgim-d": SGIM_D,
     "sagg-riac": SAGG_RIAC,
-    "search-perturb": {**SGIM_D, "search": "perturb"},
+    "sgim-d-perturb": {**SGIM_D, "search": "perturb"},
     "sagg-riac-perturb": {**SAGG_RIAC, "search": "perturb"},
     "model": MODEL,
     "sagg-riac-model": {**SAGG_RIAC, "inverse": "model"},

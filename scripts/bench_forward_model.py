@@ -69,9 +69,9 @@ class Clock:
         return timed
 
 
-def measure(search: str, movements: int, seed: int) -> tuple[float, float, float, float]:
+def measure(search: str, movements: int, seed: int, training: float) -> tuple[float, float, float, float]:
     """Seconds of physics, training and searching, and of answering a goal."""
-    parts = build(Config(search=search, inverse="model", movements=movements, seed=seed))
+    parts = build(Config(search=search, inverse="model", movements=movements, seed=seed, training=training))
     physics, training, searching = Clock(), Clock(), Clock()
     autonomous, model, memory = parts.learner.autonomous, parts.model, parts.learner.memory
     assert isinstance(autonomous, GoalBabbling)
@@ -92,14 +92,17 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--movements", type=at_least(200), default=5000, help="of each run (5000)")
     parser.add_argument("--seed", type=at_least(0), default=1000, help="of the runs (1000)")
+    parser.add_argument("--training", type=float, default=Config.training, help="steps for each movement (%(default)s)")
     parser.add_argument("--search", choices=MODEL_SEARCHES, help="only this one, beside the simplex")
     options = parser.parse_args()
     torch.set_num_threads(1)
     searches = [options.search] if options.search else [*MODEL_SEARCHES]
-    print(f"{options.movements} movements, seed {options.seed}; training, refining and both over physics\n{HEAD}")
+    print(
+        f"{options.movements} movements, seed {options.seed}, {options.training:g} steps each; training, refining and both over physics\n{HEAD}"
+    )
     simplex = 0.0
     for search in ("nelder-mead", *searches):
-        physics, training, searching, answering = measure(search, options.movements, options.seed)
+        physics, training, searching, answering = measure(search, options.movements, options.seed, options.training)
         simplex = simplex or searching
         shares = training / physics, (searching - simplex) / physics, (training + searching - simplex) / physics
         print(
