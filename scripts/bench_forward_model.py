@@ -97,9 +97,8 @@ def main() -> int:
     options = parser.parse_args()
     torch.set_num_threads(1)
     searches = [options.search] if options.search else [*MODEL_SEARCHES]
-    print(
-        f"{options.movements} movements, seed {options.seed}, {options.training:g} steps each; training, refining and both over physics\n{HEAD}"
-    )
+    print(f"{options.movements} movements, seed {options.seed}, {options.training:g} steps each")
+    print(f"training, refining and both over physics\n{HEAD}")
     simplex = 0.0
     for search in ("nelder-mead", *searches):
         physics, training, searching, answering = measure(search, options.movements, options.seed, options.training)

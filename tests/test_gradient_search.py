@@ -192,6 +192,24 @@ def test_the_trust_region_grows_where_the_world_agrees_and_shrinks_where_it_does
     assert in_between == [0.15, 0.15, 0.15]
 
 
+def test_it_starts_from_the_estimate_and_then_from_what_has_landed_nearest(model, memory, goals):
+    estimate, goal, seen = NearestNeighbour(memory, k=4)(NO_CONTEXT, goals[0]), goals[0], []
+
+    def watched(anchored, starts, goal, policies, radius, rng):
+        seen.append(starts.numpy())
+        return descend(anchored, starts, goal, policies, radius, rng)
+
+    search = gradient_search(ARM.policies, stream(0, "search"), model=model, propose=watched, candidates=3)
+    attempt = search(estimate, goal)
+    first = next(attempt)
+    second = attempt.send(goal + 0.001)  # nearer than all
+    attempt.send(goal - 1.0)  # farther than all
+    np.testing.assert_allclose(seen[0], np.vstack([estimate.theta, estimate.thetas[:3]]), rtol=1e-6)
+    for starts in seen[1:]:
+        np.testing.assert_allclose(starts, np.vstack([first, estimate.thetas[:2]]), rtol=1e-6)
+    assert not np.array_equal(first, second)
+
+
 def test_every_goal_begins_with_the_same_trust_region(model, inverse):
     goal, seen = np.array([3.0, 3.0]), []
 
