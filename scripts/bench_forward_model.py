@@ -69,9 +69,9 @@ class Clock:
         return timed
 
 
-def measure(search: str, movements: int, seed: int, training: float) -> tuple[float, float, float, float]:
+def measure(search: str, movements: int, seed: int, steps: float) -> tuple[float, float, float, float]:
     """Seconds of physics, training and searching, and of answering a goal."""
-    parts = build(Config(search=search, inverse="model", movements=movements, seed=seed, training=training))
+    parts = build(Config(search=search, inverse="model", movements=movements, seed=seed, training=steps))
     physics, training, searching = Clock(), Clock(), Clock()
     autonomous, model, memory = parts.learner.autonomous, parts.model, parts.learner.memory
     assert isinstance(autonomous, GoalBabbling)
