@@ -165,7 +165,7 @@ class Config:
             when learning, and in evaluations what a forward model makes of it (needs sgimd-torch[forward]).
         members: Networks in the forward model; it is learnt if the search or the inverse is one of those that use it.
         noise_heads: Whether the forward model's noise depends on the movement, true or false.
-        training: Steps of training the forward model for each movement; 0.4 takes about a fifth of the rod's physics.
+        training: Steps of training the forward model for each movement; 0.3 takes about a fifth of the rod's physics.
         focus: Share of training drawn from what landed near the goal pursued, 0 to 0.75.
         anchored: Whether predictions are corrected by what the forward model missed nearby, true or false.
         residual: Whether, besides, by the outcomes of the search under way (gradient, gauss-newton, screened).
@@ -206,7 +206,7 @@ class Config:
     inverse: str = _name_of(INVERSES, goal_babbling, "inverse")
     members: int = 3
     noise_heads: bool = True
-    training: float = 0.4
+    training: float = 0.3
     focus: float = 0.0
     anchored: bool = True
     residual: bool = True

@@ -50,7 +50,7 @@ from sgimd_torch.spaces import Array
 from supervise import with_streams
 
 SIMPLEX: Final = "sgim-d"  # with Nelder & Mead's simplex and no model, what everything is measured against
-JUDGED: Final = ("model", "model-less-training", "gradient")
+JUDGED: Final = ("model", "gradient")
 ROD: Final = "forward-model"
 TIMES: Final = {ROD: (500, 1000, 2000, LAST), **dict.fromkeys(ARMS, (250, 500, 1000, 2000))}
 EMPTY: Final = "# The forward model\n" + "".join(

@@ -45,7 +45,6 @@ REFINING: Final[dict[str, Variant]] = {
     "model-one-noise": {**MODEL, "noise_heads": False},
     "model-1": {**MODEL, "members": 1},
     "model-5": {**MODEL, "members": 5},
-    "model-less-training": {**MODEL, "training": 0.3},
 }
 # Where movements cost nothing, training may cost more.
 ON_ARMS: Final[Variant] = {"movements": 2000, "evaluate_at": (250, 500, 1000, 1500)}  # and at the end

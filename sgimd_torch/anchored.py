@@ -27,6 +27,9 @@ class Trust:
         reach: distance in policy space over which an anchor tells something; None for .08 sqrt(theta_dim).
         noise: standard deviation (m) of an outcome executed again, at most: a network that knows little yet calls its
             own errors noise, and would not let the anchors correct it. See ``Environment.outcome_noise``.
+        share: how much of the spread that the model predicts is believed, of its noise and of its members' disagreement.
+            A network that has yet to learn calls its own errors noise, twice the true deviation late in a life on the
+            fishing rod and more early on, where the anchors know better; 1 believes it all.
         doubt: standard deviation (m) of the network's error where no anchor is near; where it misses the anchors by
             more, that counts.
         caution: weight of the anchored prediction's variance against the squared distance; 1 would be its expectation,
@@ -40,9 +43,10 @@ class Trust:
 
     reach: float | None = None
     noise: float = 0.04
+    share: float = 0.1
     doubt: float = 0.06
     caution: float = 10.0
-    error: float = 0.17
+    error: float = 0.25
     anchors: bool = True
 
     def __post_init__(self) -> None:
@@ -50,6 +54,8 @@ class Trust:
             value = getattr(self, name)
             if value is not None and not 0 < value < float("inf"):
                 raise ValueError(f"{name} must be positive and finite, got {value}")
+        if not 0 <= self.share <= 1:
+            raise ValueError(f"share must lie in [0, 1], got {self.share}")
         if not 0 <= self.caution < float("inf"):
             raise ValueError(f"caution must be finite and at least 0, got {self.caution}")
 
@@ -79,7 +85,7 @@ class Anchored:
         self.reach = 0.08 * thetas.shape[-1] ** 0.5 if trust.reach is None else trust.reach
         with torch.no_grad():
             means, variances = model.landing(self.tensor(contexts), self.thetas)
-            missed, noise = self.tensor(outcomes) - means.mean(dim=0), variances.mean(dim=(0, -1))
+            missed, noise = self.tensor(outcomes) - means.mean(dim=0), trust.share * variances.mean(dim=(0, -1))
             doubt = (missed**2).mean(dim=(1, 2), keepdim=True).sqrt().clamp(min=trust.doubt)
             covariance = doubt**2 * self._kernel(torch.cdist(self.thetas, self.thetas) ** 2)
             noise = noise.clamp(max=trust.noise**2) + _JITTER
@@ -95,7 +101,7 @@ class Anchored:
         disagreement of the members, and doubt counted with ``caution``."""
         means, variances = self.model.landing(self.context, theta)
         landing = means.mean(dim=0)
-        spread = variances.mean(dim=0).sum(dim=-1) + means.var(dim=0, correction=0).sum(dim=-1)
+        spread = self.trust.share * (variances.mean(dim=0) + means.var(dim=0, correction=0)).sum(dim=-1)
         if not self.trust.anchors:
             return landing, spread
         squares = (theta**2).sum(dim=-1, keepdim=True) + self._squares - 2 * (self.thetas @ theta[..., None])[..., 0]

@@ -67,7 +67,7 @@ class ForwardModel(Ensemble):
         seed: of the weights and of every batch; torch's global generator is neither read nor moved.
         members, hidden, noise_heads, lr, beta: as ``Ensemble``; each member draws batches of its own.
         every: new exemplars that a refresh waits for.
-        rate: steps of the optimiser for each new exemplar, which is what learning costs: .4 of them take about as long
+        rate: steps of the optimiser for each new exemplar, which is what learning costs: .3 of them take about as long
             as a fifth of a movement of the fishing rod, 2 as long as a whole one.
         batch: exemplars a step, for each member.
         recent: share of every batch drawn from the newest ``every`` exemplars.
@@ -95,7 +95,7 @@ class ForwardModel(Ensemble):
         members: int = 3,
         hidden: Sequence[int] = (64, 64),
         every: int = 50,
-        rate: float = 0.4,
+        rate: float = 0.3,
         batch: int = 128,
         recent: float = 0.25,
         focus: float = 0.0,

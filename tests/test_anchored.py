@@ -37,9 +37,9 @@ def anchored(model, memory, rows, trust=EXACT):
 
 
 def network(model, thetas):
-    """Landing points and spread by the network alone."""
+    """Landing points by the network alone, and what is believed of the spread that it predicts: a tenth."""
     foreseen = model.predict(NO_CONTEXT, thetas)
-    return foreseen.mean, (foreseen.epistemic**2 + foreseen.aleatoric**2).sum(axis=-1)
+    return foreseen.mean, 0.1 * (foreseen.epistemic**2 + foreseen.aleatoric**2).sum(axis=-1)
 
 
 def predict(near, thetas):
@@ -97,12 +97,23 @@ def test_of_a_noisy_anchor_as_much_is_believed_as_there_is_more_doubt_than_noise
     model = ForwardModel(0, 7, 2)  # untrained: it says 0 and is wrong by up to a metre
     model.weights[-1].data[:] = 0.0
     model.biases[-1].data[..., 2:] = 3.0  # and it calls all of that noise
-    near = anchored(model, memory, [0], Trust(noise=1.0, doubt=2.0, caution=1.0))
+    near = anchored(model, memory, [0], Trust(noise=1.0, share=1.0, doubt=2.0, caution=1.0))
     landing, spread = predict(near, memory.thetas[:1])
     np.testing.assert_allclose(landing, 0.8 * memory.outcomes[:1], rtol=1e-5)  # 2^2 / (2^2 + 1^2)
     np.testing.assert_allclose(spread - 2 * np.exp(3.0), 2 * 0.8, rtol=1e-4)  # (1 - .8) 2^2 a dimension
     near = anchored(model, memory, [0], Trust(noise=0.01, doubt=2.0))
     np.testing.assert_allclose(predict(near, memory.thetas[:1])[0], memory.outcomes[:1], rtol=1e-3)
+
+
+def test_of_the_spread_that_the_model_predicts_a_share_is_believed(memory):
+    model = ForwardModel(0, 7, 2)
+    model.weights[-1].data[:] = 0.0  # untrained: it says 0
+    model.biases[-1].data[..., 2:] = np.log(0.5)  # with a noise of .5 m^2
+    for share in (0.0, 0.3, 1.0):
+        trust = Trust(noise=9.0, share=share, doubt=2.0, caution=0.0)
+        landing, spread = predict(anchored(model, memory, [0], trust), memory.thetas[:1])
+        np.testing.assert_allclose(spread, share * 2 * 0.5, rtol=1e-5)
+        np.testing.assert_allclose(landing, memory.outcomes[:1] * 4 / (4 + share * 0.5), rtol=1e-5)
 
 
 def test_without_anchors_the_network_answers_alone(model, memory):
@@ -232,6 +243,12 @@ def test_a_step_is_a_share_of_each_side_whatever_the_unit(memory):
 def test_lengths_and_errors_that_are_no_positive_numbers_are_refused(name, value):
     with pytest.raises(ValueError, match=f"{name} must be positive and finite, got {value}"):
         Trust(**{name: value})
+
+
+@pytest.mark.parametrize("share", [-0.1, 1.1, np.nan])
+def test_a_share_out_of_range_is_refused(share):
+    with pytest.raises(ValueError, match=r"share must lie in \[0, 1\]"):
+        Trust(share=share)
 
 
 @pytest.mark.parametrize("caution", [-0.1, np.nan, np.inf])

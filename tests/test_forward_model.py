@@ -97,7 +97,7 @@ def test_eighty_percent_regions_hold_about_eighty_percent():
 
 def test_without_noise_heads_it_predicts_one_noise_everywhere_the_mean():
     memory = remembered(1000, noise=0.3)
-    aleatoric = taught(memory, noise_heads=False).predict(NO_CONTEXT, memory.thetas).aleatoric
+    aleatoric = taught(memory, noise_heads=False, rate=0.4).predict(NO_CONTEXT, memory.thetas).aleatoric
     np.testing.assert_allclose(aleatoric, np.broadcast_to(aleatoric[0], aleatoric.shape), rtol=1e-6)
     np.testing.assert_allclose(aleatoric[0], 0.3 * np.sqrt((memory.thetas[:, 0] ** 2).mean()), rtol=0.3)
 

@@ -49,7 +49,7 @@ def test_where_outcomes_are_noisy_it_lands_nearer_than_what_it_starts_from(goals
         landed = [[arm.execute(NO_CONTEXT, estimate.theta, noise) for estimate in estimates] for _ in range(5)]
         return np.linalg.norm(np.array(landed) - goals, axis=2).mean()
 
-    trust = Trust(noise=arm.outcome_noise, error=0.3)  # most of it is noise
+    trust = Trust(noise=arm.outcome_noise, share=1.0, error=0.3)  # what the model cannot predict is noise here
     for start in (LocallyLinear(memory), NearestNeighbour(memory)):
         inverse = ModelInverse(memory, model, arm.policies, start=start, trust=trust)
         found = mean_error(inverse.many(NO_CONTEXT, goals))

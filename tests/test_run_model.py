@@ -103,7 +103,7 @@ def test_every_refresh_is_recorded(reference):
     assert columns == ["movements", "exemplars", "steps", "held_out", "relative_error", "diverged"]
     assert refreshes[:, 0].tolist() == refreshes[:, 1].tolist() == [50, 100, 150]
     assert refreshes[:, 2].tolist() == [100, 100, 100]  # 2 a movement
-    assert refreshes[-1, 4] < 0.17
+    assert refreshes[-1, 4] < 0.25
     assert not refreshes[:, 5].any()
     assert json.loads((reference / "summary.json").read_text())["seconds_model"] > 0
 
@@ -179,7 +179,7 @@ def test_a_model_that_is_asked_is_announced_once(tmp_path, live, capsys):
     ("options", "why", "rows"),
     [
         (("--movements", 40), "there were too few exemplars to train it", 0),
-        (("--movements", 60, "--training", 0.02), r"its relative error is \d\.\d+, to be trusted it needs 0\.17", 1),
+        (("--movements", 60, "--training", 0.02), r"its relative error is \d\.\d+, to be trusted it needs 0\.25", 1),
     ],
 )
 def test_a_model_that_nobody_ever_asked_is_no_secret(tmp_path, live, capsys, options, why, rows):
@@ -339,7 +339,7 @@ def test_the_board_of_a_run_without_a_model_has_nothing_of_it(tmp_path, live):
 def test_a_run_made_before_there_were_these_options_is_resumed_as_if_they_stood_at_their_defaults(
     tmp_path, live, capsys
 ):
-    plain = ("--training", 0.4, "--movements", 20)
+    plain = ("--training", 0.3, "--movements", 20)
     assert live(tmp_path, *plain) == 0
     path = tmp_path / "sgim-d" / "seed-003" / "config.json"
     config = json.loads(path.read_text())
