@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 
+import run_model
 from config import Config
 from evaluations import EVALUATION, read_table
 from parts import RunParts
-from run_model import LEGEND as MODEL_LEGEND
 from rundir import RunDirectory
 from sgimd_torch.evaluation import Evaluation
 from sgimd_torch.regions import Region
@@ -71,8 +71,10 @@ class RunBoard:
 
         autonomous = parts.learner.autonomous
         tolerance = autonomous.tolerance if isinstance(autonomous, GoalBabbling) else 0.02
-        legend = LEGEND if parts.model is None else {**LEGEND, **MODEL_LEGEND}
-        self._board = Board(directory.path, REACH, tolerance=tolerance, legend=legend, replace=True)
+        legend, layout = LEGEND, None
+        if parts.model is not None:
+            legend, layout = {**LEGEND, **run_model.LEGEND}, run_model.LAYOUT
+        self._board = Board(directory.path, REACH, tolerance=tolerance, legend=legend, layout=layout, replace=True)
         settings = {field.name: _plain(field, getattr(config, field.name)) for field in fields(config)}
         self._board.settings(settings, first=FIRST)
         self._known = read_table(directory.path / "evaluation.csv", EVALUATION) or {}

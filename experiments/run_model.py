@@ -35,6 +35,14 @@ LEGEND: Final = {
     "first guess.",
     "model/ms": "Milliseconds of a refresh, the mean so far.",
 }
+LAYOUT: Final = {
+    "Does the forward model foresee where movements land?": {
+        "distance to where they landed (m)": "model/error",
+        f"share in its {LEVEL:.0%} region": "model/coverage",
+        "relative error on what it never learns from; 1 is no better than their mean": "model/relative_error",
+        f"share of refinements that helped, last {LATELY} movements": "model/improved",
+    },
+}
 
 
 def prediction_columns(outcome_dim: int) -> list[str]:

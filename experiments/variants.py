@@ -26,18 +26,22 @@ FEW, HALF = "few.npz", "half.npz"  # made from the shipped demonstrations by ``m
 # by a longer name, on every arm.
 MODEL: Final[Variant] = {**SGIM_D, "inverse": "model"}
 GRADIENT: Final[Variant] = {**MODEL, "search": "gradient"}
+ALONE: Final[Variant] = {**SAGG_RIAC, "inverse": "model"}
 REFINING: Final[dict[str, Variant]] = {
     "sgim-d": SGIM_D,
     "sagg-riac": SAGG_RIAC,
     "sgim-d-perturb": {**SGIM_D, "search": "perturb"},
     "sagg-riac-perturb": {**SAGG_RIAC, "search": "perturb"},
     "model": MODEL,
-    "sagg-riac-model": {**SAGG_RIAC, "inverse": "model"},
     "gradient": GRADIENT,
-    "sagg-riac-gradient": {**SAGG_RIAC, "inverse": "model", "search": "gradient"},
     "gauss-newton": {**MODEL, "search": "gauss-newton"},
     "screened": {**MODEL, "search": "screened"},
     "polished": {**MODEL, "search": "nelder-mead-polished"},
+    "sagg-riac-model": ALONE,
+    "sagg-riac-gradient": {**ALONE, "search": "gradient"},
+    "sagg-riac-gauss-newton": {**ALONE, "search": "gauss-newton"},
+    "sagg-riac-screened": {**ALONE, "search": "screened"},
+    "sagg-riac-polished": {**ALONE, "search": "nelder-mead-polished"},
     "gradient-linear": {**GRADIENT, "inverse": "linear"},
     "model-unanchored": {**MODEL, "anchored": False},
     "gradient-unanchored": {**GRADIENT, "anchored": False},

@@ -25,11 +25,10 @@ class Trust:
 
     Args:
         reach: distance in policy space over which an anchor tells something; None for .08 sqrt(theta_dim).
-        noise: standard deviation (m) of an outcome executed again, at most: a network that knows little yet calls its
-            own errors noise, and would not let the anchors correct it. See ``Environment.outcome_noise``.
-        share: how much of the spread that the model predicts is believed, of its noise and of its members' disagreement.
-            A network that has yet to learn calls its own errors noise, twice the true deviation late in a life on the
-            fishing rod and more early on, where the anchors know better; 1 believes it all.
+        noise: standard deviation (m) of an outcome executed again, at most; see ``Environment.outcome_noise``.
+        share: how much of the variances that the model predicts is believed, of noise and of disagreement. A network
+            that has yet to learn calls its own errors noise, twice the true deviation late in a life on the fishing rod
+            and more early on, and would not let the anchors correct it. 1 is for where little else can be learnt.
         doubt: standard deviation (m) of the network's error where no anchor is near; where it misses the anchors by
             more, that counts.
         caution: weight of the anchored prediction's variance against the squared distance; 1 would be its expectation,

@@ -49,6 +49,7 @@ class Board:
         every: movements from one point of a curve to the next.
         depth: regions have curves of their own down to this level of the tree, 15 at most with 3.
         legend: a sentence for each tag that you add, or for what stands before its slash.
+        layout: charts of them for the tab Custom Scalars, category -> chart -> tag, after those of ``LAYOUT``.
         replace: the run is replayed, and its event files are to be replaced by the first ``publish``.
 
     Raises:
@@ -65,6 +66,7 @@ class Board:
         every: int = 50,
         depth: int = 3,
         legend: Mapping[str, str] | None = None,
+        layout: Mapping[str, Mapping[str, str]] | None = None,
         replace: bool = False,
     ) -> None:
         if every < 1:
@@ -73,6 +75,7 @@ class Board:
             raise ValueError(f"{directory} holds the board of a run already; give this one another directory")
         self.every, self.movements = every, 0
         self.legend = {**LEGEND, "about": "What this run is, and how to read its board.", **(legend or {})}
+        self.layout = {**LAYOUT, **(layout or {})}
         self.curves = Curves(grid, tolerance=tolerance, depth=depth)
         self._explained: set[str] = set()
         self._file = _EventFile(Path(directory))
@@ -127,7 +130,7 @@ class Board:
         self._write({tag: _strings(markdown.encode())})
 
     def settings(self, settings: Mapping[str, bool | float | str], first: Collection[str] = ()) -> None:
-        """What makes this run, for the tabs Text and HParams, with the legend and the page of ``LAYOUT``.
+        """What makes this run, for the tabs Text and HParams, with the legend and the charts of the layout.
 
         HParams shows the columns ``first`` before the others. A setting should be of one type in all runs.
         """
@@ -135,7 +138,7 @@ class Board:
         self.text("about/settings", f"| option | value |\n|---|---|\n{rows}")
         rows = "\n".join(f"| **{tag if '/' in tag else f'{tag}/…'}** | {what} |" for tag, what in self.legend.items())
         self.text("about/legend", f"Steps are movements.\n\n| tag | what it shows |\n|---|---|\n{rows}")
-        self._file.write(self.movements, [_layout(), *_hparams(settings, first)])
+        self._file.write(self.movements, [_layout(self.layout), *_hparams(settings, first)])
 
     def finish(self) -> None:
         """Say in the tab HParams that the run has come to its end."""
@@ -248,14 +251,14 @@ def _strings(*strings: bytes) -> TensorProto:
     return TensorProto(dtype=DT_STRING, tensor_shape=TensorShapeProto(dim=dims), string_val=strings)
 
 
-def _layout() -> Summary.Value:
-    layout = layout_pb2.Layout()
-    for title, charts in LAYOUT.items():
-        category = layout.category.add(title=title)
+def _layout(layout: Mapping[str, Mapping[str, str]]) -> Summary.Value:
+    page = layout_pb2.Layout()
+    for title, charts in layout.items():
+        category = page.category.add(title=title)
         for name, tag in charts.items():
             category.chart.add(title=name).multiline.tag.append(f"^{tag}$")
     tag, metadata = layout_metadata.CONFIG_SUMMARY_TAG, layout_metadata.create_summary_metadata()
-    return Summary.Value(tag=tag, metadata=metadata, tensor=_strings(layout.SerializeToString()))
+    return Summary.Value(tag=tag, metadata=metadata, tensor=_strings(page.SerializeToString()))
 
 
 def _hparams(settings: Mapping[str, bool | float | str], first: Collection[str]) -> list[Summary.Value]:

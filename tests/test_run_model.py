@@ -8,6 +8,7 @@ import signal
 import numpy as np
 import pytest
 from tensorboard.backend.event_processing.event_file_loader import EventFileLoader
+from tensorboard.plugins.custom_scalar import layout_pb2
 from tensorboard.util.tensor_util import make_ndarray
 
 from config import MODEL_SEARCHES, Config
@@ -327,6 +328,15 @@ def test_the_board_shows_how_the_model_does_and_explains_it(reference):
     assert curves["model/error"].keys() == curves["model/coverage"].keys() == {100, 150}
     (legend,) = curves["about/legend"].values()
     assert all(f"**{tag}" in legend.decode() and why in legend.decode() for tag, why in LEGEND.items())
+    assert {tag for tag in charts_of(curves) if tag.startswith("model/")} <= LEGEND.keys()
+    assert "model/error" in charts_of(curves)
+    assert "error/mean" in charts_of(curves)
+
+
+def charts_of(curves):
+    """The tags of all charts in the tab Custom Scalars."""
+    layout = layout_pb2.Layout.FromString(curves["custom_scalars__config__"][0])
+    return [tag.strip("^$") for page in layout.category for chart in page.chart for tag in chart.multiline.tag]
 
 
 def test_the_board_of_a_run_without_a_model_has_nothing_of_it(tmp_path, live):
@@ -334,6 +344,7 @@ def test_the_board_of_a_run_without_a_model_has_nothing_of_it(tmp_path, live):
     curves = curves_of(tmp_path / "sgim-d" / "seed-003")
     assert not [tag for tag in curves if tag.startswith("model/")]
     assert "model/" not in str(curves["about/legend"])
+    assert not [tag for tag in charts_of(curves) if tag.startswith("model/")]
 
 
 def test_a_run_made_before_there_were_these_options_is_resumed_as_if_they_stood_at_their_defaults(
