@@ -29,11 +29,11 @@ if __name__ == "__main__":  # Ctrl-C while the libraries below are loading
 
 import numpy as np
 
-from claims import EMPTY, between_markers, markdown
+from claims import EMPTY
 from evidence import SEED, NotRun
 from over_seeds import Anova, anova
+from pages import markdown, read_page, write_page
 from read_runs import read_run
-from runfiles import make_folder, write_whole
 from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.fishing_rod import JOINTS, FishingRod
 from sgimd_torch.spaces import Array, stream
@@ -149,12 +149,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     options = parser.parse_args(argv)
     try:
         table = markdown(COLUMNS, [cells(line) for line in compare(options.runs)])
-        text = options.out.read_text(encoding="utf-8") if options.out.exists() else EMPTY
+        text = read_page(options.out, EMPTY)
         if "<!-- anova -->" not in text and "<!-- end of anova -->" not in text:
             text += SECTION
-        text = between_markers(text, "anova", table, options.out)
-        make_folder(options.out.parent)
-        write_whole(options.out, text)
+        write_page(options.out, text, {"anova": table})
     except ValueError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2

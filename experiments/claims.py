@@ -30,8 +30,8 @@ import numpy as np
 from evidence import Evidence, NotRun, metres, rng, shared, show
 from judgements import Row, judge
 from over_seeds import difference_interval, improvement_interval, iqm_interval, mean_over_life
-from read_results import LAST, Evaluated, ResultsError, read_goals, read_results
-from runfiles import make_folder, write_whole
+from pages import count_verdicts, markdown, read_page, verdicts_table, write_page
+from read_results import LAST, Evaluated, read_goals, read_results
 from sgimd_torch.spaces import Array
 from supervise import with_streams
 
@@ -61,42 +61,12 @@ COLUMNS = (
 )
 
 
-def claims_table(rows: Sequence[Row]) -> str:
-    """The claims in markdown."""
-    cells = [(row.claim, row.bar, row.number, f"**{row.verdict}**") for row in rows]
-    return markdown(("claim of the paper", "bar", "our number [95 % interval]", "verdict"), cells)
-
-
 def variants_table(variants: Sequence[Evaluated], evidence: Evidence) -> str:
     """One line for each variant: how it did, and how SGIM-D did beside it, at 5000 movements unless told otherwise.
 
     A difference is that of the variant to SGIM-D, above 0 where SGIM-D is better, on the seeds that both have.
     """
     return markdown(COLUMNS, [_line(variant.variant, evidence) for variant in variants])
-
-
-def markdown(head: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
-    """A table; one without lines says so."""
-    if not lines:
-        return "Not run.\n"
-    rows = [head, ["---"] * len(head), *([cell.replace("|", "\\|") for cell in line] for line in lines)]
-    return "".join(f"| {' | '.join(row)} |\n" for row in rows)
-
-
-def between_markers(text: str, name: str, table: str, path: Path) -> str:
-    """``text`` with ``table`` in the place called ``name``.
-
-    Raises:
-        ResultsError: the place is not marked, or marked more than once.
-    """
-    first, last = f"<!-- {name} -->\n", f"<!-- end of {name} -->"
-    if text.count(first) != 1 or text.count(last) != 1 or text.index(first) > text.index(last):
-        raise ResultsError(
-            f"{path} must hold the line {first.strip()} and below it the line {last}, each once; "
-            "mark where that table is to stand, or move the file away to get a new one"
-        )
-    before, after = text[: text.index(first) + len(first)], text[text.index(last) :]
-    return f"{before}\n{table}\n{after}"
 
 
 def _line(name: str, evidence: Evidence) -> list[str]:
@@ -139,7 +109,7 @@ def tables(rows: Sequence[Row], evidence: Evidence) -> dict[str, str]:
     learners = sorted((v for v in variants if v.experiment == "learners"), key=lambda v: -_mean_error(v))
     others = [variant for variant in variants if variant.experiment != "learners"]
     return {
-        "claims": claims_table(rows),
+        "claims": verdicts_table("claim of the paper", rows),
         "learners": variants_table(learners, evidence),
         "ablations": variants_table(others, evidence),
     }
@@ -159,11 +129,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         evidence = Evidence(read_results(options.results), read_goals(options.results.with_name("goals.csv")))
         rows = judge(evidence)
-        text = options.out.read_text(encoding="utf-8") if options.out.exists() else EMPTY
-        for name, table in tables(rows, evidence).items():
-            text = between_markers(text, name, table, options.out)
-        make_folder(options.out.parent)
-        write_whole(options.out, text)
+        write_page(options.out, read_page(options.out, EMPTY), tables(rows, evidence))
     except ValueError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
@@ -172,9 +138,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     except KeyboardInterrupt:
         return 130
-    verdicts = [row.verdict for row in rows]
-    counts = ", ".join(f"{verdicts.count(verdict)} {verdict}" for verdict in dict.fromkeys(verdicts))
-    print(f"{options.out}: {len(verdicts)} claims, of which {counts}")
+    print(f"{options.out}: {len(rows)} claims, of which {count_verdicts(rows)}")
     return 0
 
 

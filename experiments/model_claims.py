@@ -31,7 +31,6 @@ if __name__ == "__main__":  # Ctrl-C while the libraries below are loading
 
 import numpy as np
 
-from claims import between_markers, markdown
 from environments import ARMS
 from evidence import Evidence, NotRun, metres, rng, shared, show
 from judgements import HOLDS, OPEN, Judged, Row, at_least, at_most, below_zero
@@ -44,8 +43,8 @@ from over_seeds import (
     movements_to_reach,
     ratio_interval,
 )
+from pages import count_verdicts, markdown, read_page, verdicts_table, write_page
 from read_results import LAST, Evaluated, ResultsError, read_results
-from runfiles import make_folder, write_whole
 from sgimd_torch.spaces import Array
 from supervise import with_streams
 
@@ -208,14 +207,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         evidence = Evidence(read_results(options.results), {})
         rows = judge(evidence, read_coverages(options.table))
-        text = options.out.read_text(encoding="utf-8") if options.out.exists() else EMPTY
-        cells = [(row.claim, row.bar, row.number, f"**{row.verdict}**") for row in rows]
-        tables = {"bars": markdown(("what", "bar", "our number [95 % interval]", "verdict"), cells)}
-        tables |= {experiment: variants_table(evidence, experiment) for experiment in TIMES}
-        for name, table in tables.items():
-            text = between_markers(text, name, table, options.out)
-        make_folder(options.out.parent)
-        write_whole(options.out, text)
+        tables = {experiment: variants_table(evidence, experiment) for experiment in TIMES}
+        tables["bars"] = verdicts_table("what", rows)
+        write_page(options.out, read_page(options.out, EMPTY), tables)
     except ValueError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
@@ -224,9 +218,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     except KeyboardInterrupt:
         return 130
-    verdicts = [row.verdict for row in rows]
-    counts = ", ".join(f"{verdicts.count(verdict)} {verdict}" for verdict in dict.fromkeys(verdicts))
-    print(f"{options.out}: {len(verdicts)} bars, of which {counts}")
+    print(f"{options.out}: {len(rows)} bars, of which {count_verdicts(rows)}")
     return 0
 
 
