@@ -79,7 +79,7 @@ def measure(search: str, movements: int, seed: int, steps: float) -> tuple[float
     autonomous.search = searching.through(autonomous.search)
     refresh, execute = training.around(model.refresh), physics.around(live(parts.environment, seed))
     lives = run(parts.learner, parts.environment, seed, movements=movements, teacher=parts.teacher, execute=execute)
-    for episode in tqdm(lives, total=movements, desc=search, unit="movement", leave=False):
+    for episode in tqdm(lives, total=movements, desc=search, unit="movement", leave=False, disable=None):
         refresh(memory, episode.move.goal if episode.move else None)
     answering, goals = Clock(), parts.benchmark.goals
     context = (parts.environment.contexts.low + parts.environment.contexts.high) / 2
