@@ -47,6 +47,7 @@ from pages import count_verdicts, markdown, read_page, verdicts_table, write_pag
 from read_results import LAST, Evaluated, ResultsError, read_results
 from sgimd_torch.spaces import Array
 from supervise import with_streams
+from variants import EXPERIMENTS
 
 SIMPLEX: Final = "sgim-d"  # with Nelder & Mead's simplex and no model, what everything is measured against
 JUDGED: Final = ("model", "gradient")
@@ -142,7 +143,7 @@ def _calibrated(name: str, coverages: Array) -> Row:
 def variants_table(evidence: Evidence, experiment: str) -> str:
     """One line for each variant of an experiment; a difference below 0 says that it errs less than the simplex."""
     times = TIMES[experiment]
-    variants = [variant for variant in evidence.results.values() if variant.experiment == experiment]
+    variants = [evidence.results[name] for name in EXPERIMENTS[experiment] if name in evidence.results]
     head = ("variant", "seeds", *(f"error at {when} (m)" for when in times))
     last = f"at {times[-1]}"
     columns = (*head, f"difference to the simplex {last} (m)", "simplex better, probability")
