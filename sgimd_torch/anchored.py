@@ -28,7 +28,7 @@ class Trust:
         noise: standard deviation (m) of an outcome executed again, at most; see ``Environment.outcome_noise``.
         share: how much of the variances that the model predicts is believed, of noise and of disagreement. A network
             that has yet to learn calls its own errors noise, twice the true deviation late in a life on the fishing rod
-            and more early on, and would not let the anchors correct it. 1 is for where little else can be learnt.
+            and more early on, and would not let the anchors correct it. 1 is for outcomes as noisy as it says.
         doubt: standard deviation (m) of the network's error where no anchor is near; where it misses the anchors by
             more, that counts.
         caution: weight of the anchored prediction's variance against the squared distance; 1 would be its expectation,
