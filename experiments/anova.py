@@ -37,7 +37,7 @@ from read_runs import read_run
 from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.fishing_rod import JOINTS, FishingRod
 from sgimd_torch.spaces import Array, stream
-from supervise import say, with_streams
+from supervise import say, telling_errors, with_streams
 from variants import shipped
 
 SECTION = "\n## Means of movements, by analysis of variance\n\n<!-- anova -->\n<!-- end of anova -->\n"
@@ -141,26 +141,18 @@ def cells(line: Line) -> list[str]:
     ]
 
 
+@telling_errors
 def main(argv: Sequence[str] | None = None) -> int:
     """Print the table and write it; the exit code is 2 when a file makes no sense."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--runs", type=Path, default=Path("runs"), help="--out of compare.py, default: %(default)s")
     parser.add_argument("--out", type=Path, default=Path("results/RESULTS.md"), help="default: %(default)s")
     options = parser.parse_args(argv)
-    try:
-        table = markdown(COLUMNS, [cells(line) for line in compare(options.runs)])
-        text = read_page(options.out, EMPTY)
-        if "<!-- anova -->" not in text and "<!-- end of anova -->" not in text:
-            text += SECTION
-        write_page(options.out, text, {"anova": table})
-    except ValueError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    except OSError as error:
-        print(f"error: {error.filename} cannot be read or written: {error.strerror}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        return 130
+    table = markdown(COLUMNS, [cells(line) for line in compare(options.runs)])
+    text = read_page(options.out, EMPTY)
+    if "<!-- anova -->" not in text and "<!-- end of anova -->" not in text:
+        text += SECTION
+    write_page(options.out, text, {"anova": table})
     print(f"{table}\n{options.out}")
     return 0
 

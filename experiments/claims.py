@@ -33,7 +33,7 @@ from over_seeds import difference_interval, improvement_interval, iqm_interval, 
 from pages import count_verdicts, markdown, read_page, verdicts_table, write_page
 from read_results import LAST, Evaluated, read_goals, read_results
 from sgimd_torch.spaces import Array
-from supervise import with_streams
+from supervise import telling_errors, with_streams
 
 EMPTY = """# Results
 
@@ -120,24 +120,16 @@ def _mean_error(variant: Evaluated) -> float:
     return float(np.mean(list(variant.at(LAST).values()) or [np.inf]))
 
 
+@telling_errors
 def main(argv: Sequence[str] | None = None) -> int:
     """Write the tables; the exit code is 2 when the results or the file make no sense."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--results", type=Path, default=Path("results/paper.csv"), help="default: %(default)s")
     parser.add_argument("--out", type=Path, default=Path("results/RESULTS.md"), help="default: %(default)s")
     options = parser.parse_args(argv)
-    try:
-        evidence = Evidence(read_results(options.results), read_goals(options.results.with_name("goals.csv")))
-        rows = judge(evidence)
-        write_page(options.out, read_page(options.out, EMPTY), tables(rows, evidence))
-    except ValueError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    except OSError as error:
-        print(f"error: {options.out} cannot be read or written: {error.strerror}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        return 130
+    evidence = Evidence(read_results(options.results), read_goals(options.results.with_name("goals.csv")))
+    rows = judge(evidence)
+    write_page(options.out, read_page(options.out, EMPTY), tables(rows, evidence))
     print(f"{options.out}: {len(rows)} claims, of which {count_verdicts(rows)}")
     return 0
 

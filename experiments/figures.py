@@ -34,7 +34,7 @@ from evidence import NotRun
 from paper_figures import FIGURES, Data
 from read_results import read_results
 from runfiles import make_folder
-from supervise import with_streams
+from supervise import telling_errors, with_streams
 
 STYLE: Any = {
     "font.size": 12,
@@ -55,6 +55,7 @@ def _save(figure: Figure, path: Path) -> None:
         partial.replace(whole)
 
 
+@telling_errors
 def main(argv: Sequence[str] | None = None) -> int:
     """Draw what can be drawn; the exit code is 2 when the results make no sense."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -63,26 +64,17 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, default=Path("results/figures"), help="default: %(default)s")
     parser.add_argument("--only", choices=FIGURES, help="this figure alone")
     options = parser.parse_args(argv)
-    try:
-        data = Data(read_results(options.results), options.runs)
-        make_folder(options.out)
-        for name, draw in FIGURES.items():
-            if options.only not in (None, name):
-                continue
-            try:
-                with rc_context(STYLE):
-                    _save(draw(data), options.out / name)
-                print(f"{options.out / name}.png")
-            except NotRun as missing:
-                print(f"{name} is left out, for want of {str(missing).removeprefix('not run: ')}")
-    except ValueError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    except OSError as error:
-        print(f"error: {error.filename}: {error.strerror}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        return 130
+    data = Data(read_results(options.results), options.runs)
+    make_folder(options.out)
+    for name, draw in FIGURES.items():
+        if options.only not in (None, name):
+            continue
+        try:
+            with rc_context(STYLE):
+                _save(draw(data), options.out / name)
+            print(f"{options.out / name}.png")
+        except NotRun as missing:
+            print(f"{name} is left out, for want of {str(missing).removeprefix('not run: ')}")
     return 0
 
 

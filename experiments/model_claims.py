@@ -46,7 +46,7 @@ from over_seeds import (
 from pages import count_verdicts, markdown, read_page, verdicts_table, write_page
 from read_results import LAST, Evaluated, ResultsError, read_results
 from sgimd_torch.spaces import Array
-from supervise import with_streams
+from supervise import telling_errors, with_streams
 from variants import EXPERIMENTS
 
 SIMPLEX: Final = "sgim-d"  # with Nelder & Mead's simplex and no model, what everything is measured against
@@ -195,6 +195,7 @@ def read_coverages(path: Path) -> dict[str, Array]:
     return {name: np.array(values) for name, values in found.items()}
 
 
+@telling_errors
 def main(argv: Sequence[str] | None = None) -> int:
     """Write the tables; the exit code is 2 when the results or the file make no sense."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -205,20 +206,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     ):
         parser.add_argument(f"--{name}", type=Path, default=Path(path), help=f"{what} (default: %(default)s)")
     options = parser.parse_args(argv)
-    try:
-        evidence = Evidence(read_results(options.results), {})
-        rows = judge(evidence, read_coverages(options.table))
-        tables = {experiment: variants_table(evidence, experiment) for experiment in TIMES}
-        tables["bars"] = verdicts_table("what", rows)
-        write_page(options.out, read_page(options.out, EMPTY), tables)
-    except ValueError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    except OSError as error:
-        print(f"error: {options.out} cannot be read or written: {error.strerror}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        return 130
+    evidence = Evidence(read_results(options.results), {})
+    rows = judge(evidence, read_coverages(options.table))
+    tables = {experiment: variants_table(evidence, experiment) for experiment in TIMES}
+    tables["bars"] = verdicts_table("what", rows)
+    write_page(options.out, read_page(options.out, EMPTY), tables)
     print(f"{options.out}: {len(rows)} bars, of which {count_verdicts(rows)}")
     return 0
 

@@ -44,7 +44,7 @@ from sgimd_torch import plots_of_model as plots
 from sgimd_torch.archives import write_bytes
 from sgimd_torch.model_diagnostics import LEVELS, coverage, error_by_cell, improvements, running
 from sgimd_torch.spaces import Array, Box
-from supervise import with_streams
+from supervise import telling_errors, with_streams
 
 LAST: Final = 1000  # predictions
 LATE: Final = 2000  # movements, from which on the spread is to be honest
@@ -204,6 +204,7 @@ def _printed(cells: dict[str, Any]) -> list[str]:
     return [cells["run"], str(cells["predicted"]), f"{cells['error_m']:.3f}", *inside, improved, *learnt]
 
 
+@telling_errors
 def main(argv: Sequence[str] | None = None) -> int:
     """Draw and tell; the exit code is 2 when a run makes no sense."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -211,27 +212,18 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, default=Path("results/model"), help="default: %(default)s")
     options = parser.parse_args(argv)
     quiet = not sys.stderr.isatty()
-    try:
-        found = {run.name: run for run in map(read_model_run, tqdm(options.runs, "reading", disable=quiet))}
-        if len(found) < len(options.runs):
-            raise RunError("two of these runs have the same name; draw them apart, each with its own --out")
-        make_folder(options.out)
-        first = {name.split("/")[0]: name for name in reversed(found)}
-        for name in tqdm(first.values(), "drawing", disable=quiet):
-            with rc_context(STYLE):
-                _save(figure_of(found[name]), options.out / f"{name.replace('/', '-')}.png")
-        rows = [row(run) for run in found.values()]
-        table = io.StringIO()
-        csv.DictWriter(table, COLUMNS, lineterminator="\n").writerows([dict(zip(COLUMNS, COLUMNS, strict=True)), *rows])
-        write_whole(options.out / "table.csv", table.getvalue())
-    except ValueError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    except OSError as error:
-        print(f"error: {error.filename or options.out}: {error.strerror or error}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        return 130
+    found = {run.name: run for run in map(read_model_run, tqdm(options.runs, "reading", disable=quiet))}
+    if len(found) < len(options.runs):
+        raise RunError("two of these runs have the same name; draw them apart, each with its own --out")
+    make_folder(options.out)
+    first = {name.split("/")[0]: name for name in reversed(found)}
+    for name in tqdm(first.values(), "drawing", disable=quiet):
+        with rc_context(STYLE):
+            _save(figure_of(found[name]), options.out / f"{name.replace('/', '-')}.png")
+    rows = [row(run) for run in found.values()]
+    table = io.StringIO()
+    csv.DictWriter(table, COLUMNS, lineterminator="\n").writerows([dict(zip(COLUMNS, COLUMNS, strict=True)), *rows])
+    write_whole(options.out / "table.csv", table.getvalue())
     lines = [HEAD, *map(_printed, rows)]
     widths = [max(map(len, cells)) for cells in zip(*lines, strict=True)]
     for cells in lines:

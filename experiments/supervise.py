@@ -10,14 +10,16 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from functools import wraps
 from types import FrameType
-from typing import Any, Self
+from typing import Any, ParamSpec, Self
 
 from tqdm import tqdm
 
 from sgimd_torch.session import Execute
 from sgimd_torch.spaces import Array, Episode
 
+P = ParamSpec("P")
 REPORT_EVERY = 10.0  # s, from one line to the next where there is no terminal
 
 
@@ -162,6 +164,27 @@ def say(*messages: str) -> None:
             print(message, file=sys.stderr, flush=True)
 
 
+def telling_errors(main: Callable[P, int]) -> Callable[P, int]:
+    """``main``; files that make no sense or cannot be read or written end it with a line and the exit code 2, Ctrl-C
+    with 130."""
+
+    @wraps(main)
+    def guarded(*args: P.args, **kwargs: P.kwargs) -> int:
+        try:
+            return main(*args, **kwargs)
+        except ValueError as error:
+            say(f"error: {error}")
+        except OSError as error:
+            if error.filename is None:  # most likely stdout; ``with_streams`` tells
+                raise
+            say(f"error: {error.filename} cannot be read or written: {error.strerror}")
+        except KeyboardInterrupt:
+            return 130
+        return 2
+
+    return guarded
+
+
 def with_streams(main: Callable[[], int]) -> int:
     """``main``, whatever becomes of stdout and stderr; the exit code, 1 where stdout could not be written."""
     for name in ("stdout", "stderr"):
@@ -182,6 +205,6 @@ def with_streams(main: Callable[[], int]) -> int:
             os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())  # else the interpreter would complain
             lost = error if stream is sys.stdout else lost
     if lost is not None and not isinstance(lost, BrokenPipeError):
-        say(f"error: what was to be told is lost: {lost.strerror}")
+        say(f"error: not everything could be written: {lost.strerror}")
         code = code or 1
     return code
