@@ -27,7 +27,7 @@ def section(variant: Variant, others: Sequence[Variant], number: int, films: Seq
     if any(len(each.landed) for each in variant.lives):
         figure, missing = figures.landing(variant)
         whose = "" if single else f", in all {len(variant.lives)} runs together" if len(variant.lives) > 1 else ""
-        shown.append(drawn(figure, f"Landing points of {variant.label}", f"Where the float landed{whose}. {missing}"))
+        shown.append(drawn(figure, f"Landing points of {variant.label}", f"Where movements landed{whose}. {missing}"))
     of = "" if single else f" in seed {life.seed}"
     if figures.has_plane_map(life):
         when = int(life.regions["movements"].max()) if life.regions else 0

@@ -14,7 +14,7 @@ from over_seeds import Interval
 from report_data import Life, Variant
 
 TERMS: Final = (
-    "The error is the mean distance between the goals of a benchmark and where the float lands when the learner is "
+    "The error is the mean distance between the goals of a benchmark and where a movement lands when the learner is "
     "asked for them. The noise floor is the part of it that motor noise alone makes. Over seeds the page gives "
     "interquartile means, means of the middle half, with 95 % bootstrap intervals in brackets; with fewer than ten "
     "seeds these are too narrow. Error over life is the area under the error curve, divided by its width."
@@ -51,7 +51,7 @@ def sentence(variant: Variant) -> str:
         return "It has not been evaluated yet."
     over = f", interquartile mean over {count(len(variant.used), 'seed')}" if len(variant.used) > 1 else ""
     low = f" with a 95 % interval from {variant.final.low:.3f} to {variant.final.high:.3f} m" if over else ""
-    text = f"After {variant.last} movements its float lands {variant.final.value:.3f} m from a goal{over}{low}."
+    text = f"After {variant.last} movements it lands {variant.final.value:.3f} m from a goal{over}{low}."
     if variant.floor and variant.ratio:
         times = show(variant.ratio, ".2f")
         text += f" Motor noise alone makes {variant.floor.value:.3f} m: the error is {times} times that."
@@ -79,9 +79,7 @@ def _of_one(life: Life) -> str:
     mean, middle, most, floor = (
         life.at(last, f"{name}_m") for name in ("mean_error", "median_error", "p90_error", "noise_floor")
     )
-    text += (
-        f"After {last} movements its float lands {mean:.3f} m from a goal on the mean; for half of the goals within "
-    )
+    text += f"After {last} movements it lands {mean:.3f} m from a goal on the mean; for half of the goals within "
     text += f"{middle:.3f} m, for nine of ten within {most:.3f} m. "
     if floor > 0:
         text += f"Motor noise alone makes {floor:.3f} m, so the error is {mean / floor:.2f} times the noise floor. "

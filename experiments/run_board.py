@@ -35,8 +35,8 @@ LEGEND: Final = {
     "time": "Seconds spent so far: on physics, by the learner and on evaluations.",
     "map/competence": "The regions, named like the curves, coloured by the mean competence of the goals they remember.",
     "map/interest": "The regions, coloured by interest, and the last goals that the learner chose.",
-    "map/landed": "Where the float has landed so far, and what was demonstrated.",
-    "map/error": "How far from each benchmark goal the float landed at this evaluation.",
+    "map/landed": "Where movements have landed so far, and what was demonstrated.",
+    "map/error": "How far from each benchmark goal the movement for it landed at this evaluation.",
     "about/regions": "Where the regions with curves of their own lie, and how they are now.",
 }
 

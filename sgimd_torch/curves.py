@@ -17,7 +17,7 @@ from sgimd_torch.spaces import Array, Box, Episode
 
 # By tag, or by what stands before its slash.
 LEGEND: Final = {
-    "error/mean": "Distance (m) from a benchmark goal to where the float landed, mean over the goals, eq. (10).",
+    "error/mean": "Distance (m) from a benchmark goal to where its movement landed, mean over the goals, eq. (10).",
     "error/median": "Median of these distances (m).",
     "error/p90": "Nine in ten of these distances are shorter (m).",
     "error/noise_floor": "The part of error/mean that motor noise alone makes (m).",
