@@ -120,6 +120,7 @@ _MOOT: Final = {
     ("teacher", "initial"): ("choice",),
 }
 _MOST_THREADS: Final = max(64, os.cpu_count() or 1)
+_MOST_MEMBERS: Final = 100
 
 
 def _default(function: Callable[..., Any], name: str) -> Any:
@@ -242,6 +243,8 @@ class Config:
             raise ValueError("board true needs tensorboard, which is not installed; pip install tensorboard")
         if not 0 <= self.noise < math.inf:
             raise ValueError(f"noise must be finite and at least 0, got {self.noise}")
+        if self.members > _MOST_MEMBERS:
+            raise ValueError(f"members must be at most {_MOST_MEMBERS}, got {self.members}; 5 are many")
         if not 0 < self.training <= 100:
             raise ValueError(f"training must be above 0 and at most 100 steps a movement, got {self.training}")
         if not 0 <= self.focus <= 0.75:
@@ -288,6 +291,8 @@ class Config:
         for (option, value), moot in _MOOT.items():
             if option in ("environment", *used) and getattr(self, option) == value:
                 why |= dict.fromkeys(moot, f"with --{option} {value}")
+        if not {"search", "epsilon"} & set(used):
+            why["focus"] = f"on {self.algorithm}, which pursues no goals"
         if not self.uses_model:
             why |= dict.fromkeys(_MODEL, "without a forward model, see --search and --inverse")
         if "search" not in used or self.search not in [*MODEL_SEARCHES][:3]:

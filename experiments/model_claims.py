@@ -33,7 +33,7 @@ import numpy as np
 
 from environments import ARMS
 from evidence import Evidence, NotRun, metres, rng, shared, show
-from judgements import HOLDS, OPEN, Judged, Row, at_least, at_most, below_zero
+from judgements import FAILS, HOLDS, OPEN, Judged, Row, at_least, at_most, below_zero
 from over_seeds import (
     difference_interval,
     improvement_interval,
@@ -80,7 +80,7 @@ def _lower_error(name: str) -> Callable[[Evidence], Judged]:
             for when in (1000, 2000, LAST)
         }
         below = [below_zero(each) for each in found.values()]
-        verdict = HOLDS if below.count(HOLDS) >= 2 else OPEN if OPEN in below else below[0]
+        verdict = next((each for each in (HOLDS, FAILS) if below.count(each) >= 2), OPEN)
         return "; ".join(f"{when}: {metres(each)}" for when, each in found.items()), verdict
 
     return judged

@@ -116,7 +116,7 @@ def _rows(path: str | os.PathLike[str], header: tuple[str, ...]) -> Iterator[tup
     try:
         text = Path(path).read_text(encoding="utf-8")
     except FileNotFoundError:
-        raise ResultsError(f"{path} does not exist; experiments/compare.py writes results/paper.csv") from None
+        raise ResultsError(f"{path} does not exist; experiments/compare.py writes it") from None
     except OSError as error:
         raise ResultsError(f"{path} cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:

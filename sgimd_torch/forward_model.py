@@ -30,11 +30,13 @@ from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, check_count, check_vector, stream
 
 VERSION: Final = 1
+_SHAPE: Final = ("context_dim", "theta_dim", "outcome_dim", "members", "hidden", "noise_heads")  # in its file
 _HELD_OUT: Final = 10  # one exemplar in so many is never trained on
 _FEWEST: Final = 50  # exemplars to begin with
 _CHUNK: Final = 20  # steps between two looks at what is held out
 _NEAR: Final = 200  # exemplars that count as near a goal
 _PATIENCE: Final = 5  # looks without improvement that end a refresh
+_LOST: Final = 2.0  # relative error, twice that of predicting the mean
 
 
 class Prediction(NamedTuple):
@@ -74,6 +76,9 @@ class ForwardModel(Ensemble):
         focus: share drawn from the 200 that landed nearest the goal that ``refresh`` is told.
         accelerator: Lightning's name of where to train: "cpu", the fastest for these sizes, "auto" or "cuda".
 
+    The first refresh sets the scales for life. If its exemplars are variations of one movement, all later ones lie far
+    outside and are learnt badly; ``relative_error`` shows it.
+
     Raises:
         ValueError: a number out of its range.
     """
@@ -105,10 +110,13 @@ class ForwardModel(Ensemble):
         accelerator: str = "cpu",
     ) -> None:
         check_count("context_dim", context_dim, 0)
-        for name, count in {"theta_dim": theta_dim, "outcome_dim": outcome_dim, "members": members}.items():
+        dims = {"theta_dim": theta_dim, "outcome_dim": outcome_dim}
+        for name, count in {**dims, "members": members, "every": every, "batch": batch}.items():
             check_count(name, count, 1)
-        if not hidden or min(hidden) < 1 or every < 1 or batch < 1:
-            raise ValueError(f"needs hidden, every, batch >= 1, got {hidden}, {every}, {batch}")
+        if not isinstance(hidden, Sequence) or not hidden:
+            raise ValueError(f"hidden must be a sequence of layers' units such as (64, 64), got {hidden}")
+        for units in hidden:
+            check_count("hidden", units, 1)
         if not (0 < rate < math.inf and 0 < lr < math.inf and 0 <= beta <= 1):
             raise ValueError(f"needs rate, lr > 0, beta in [0, 1], got {rate}, {lr}, {beta}")
         if not (recent >= 0 and focus >= 0 and recent + focus <= 1):
@@ -125,7 +133,7 @@ class ForwardModel(Ensemble):
             self.register_buffer(f"{name}_scale", torch.ones(dim))
         self.register_buffer("n_seen", torch.zeros((), dtype=torch.int64))
         self.register_buffer("missed", torch.zeros(()))
-        self._fabric: Fabric | None = None
+        self._lightning: Fabric | None = None
         self._optimizer: Any = None
 
     @property
@@ -136,7 +144,8 @@ class ForwardModel(Ensemble):
     @property
     def relative_error(self) -> float:
         """How far predictions for what is held out are from it, over how far their mean is: 1 is no better than that
-        mean, 0 perfect, infinite before anything was learnt."""
+        mean, 0 perfect, infinite before anything was learnt. A learner that repeats few movements with small variations
+        makes it too low: what is held out has near copies among the rest."""
         return float(self.missed) if self.trained else math.inf
 
     def landing(self, context: torch.Tensor, theta: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
@@ -179,20 +188,23 @@ class ForwardModel(Ensemble):
             memory: the learner's; it is only read.
             goal: ``(outcome_dim,)`` m that the learner pursues, for ``focus``; None if it pursues none.
 
-        It ends early when what is held out (one exemplar in ten, never trained on) is predicted no better, and goes
-        back to the weights before it when the loss is not finite any more.
+        It ends early when what is held out (one exemplar in ten, never trained on) is predicted no better. It goes back
+        to the weights before it when the loss is not finite any more or twice as bad as predicting the mean, and
+        also when it is interrupted.
 
         Raises:
             ValueError: a memory of other dimensions, or with fewer exemplars than it was trained on.
         """
-        dims = {name: getattr(memory, name.replace("_dim", "s")).shape[1] for name in self.sizes}
-        if dims != self.sizes:
-            raise ValueError(f"the model has dimensions {self.sizes}, the memory {dims}; is it another robot's?")
+        self.check_fits("memory", **{name: getattr(memory, name) for name in self.sizes})
         n, seen = len(memory), int(self.n_seen)
         if n < seen:
             raise ValueError(f"the model was trained on {seen} exemplars, the memory has {n}; is it another run's?")
         if n < _FEWEST or n - seen < self.every:
             return None
+        near = None
+        if goal is not None and self.focus:
+            near = torch.as_tensor(memory.near_outcomes(memory.contexts[-1], goal, _NEAR))
+        self._begin()  # it moves the weights to where they are trained, and the exemplars follow
         inputs, outcomes = np.hstack([memory.contexts, memory.thetas]), memory.outcomes
         if not seen:  # once and for all: later scales would turn what is learnt into something else
             for name, values in {"input": inputs, "outcome": outcomes}.items():
@@ -202,11 +214,19 @@ class ForwardModel(Ensemble):
         foreseen = self.predict(memory.contexts[seen:], memory.thetas[seen:]) if seen else None
         x = (self._tensor(inputs) - self.input_mean) / self.input_scale
         y = (self._tensor(outcomes) - self.outcome_mean) / self.outcome_scale
+        before = _copy(self.state_dict())
+        try:
+            steps, held_out, diverged = self._train(x, y, max(1, round(self.rate * (n - seen))), near, before)
+        except BaseException:
+            self._restore(before)
+            raise
         self.n_seen.fill_(n)
-        near = None
-        if goal is not None and self.focus:
-            near = torch.as_tensor(memory.near_outcomes(memory.contexts[-1], goal, _NEAR))
-        return Refresh(*self._train(x, y, max(1, round(self.rate * (n - seen))), near), seen, foreseen)
+        return Refresh(steps, held_out, diverged, seen, foreseen)
+
+    def check_fits(self, what: str, **sizes: int) -> None:
+        """Raise ``ValueError`` unless the dimensions of ``what`` (``theta_dim=25``) are the model's."""
+        if any(self.sizes[name] != size for name, size in sizes.items()):
+            raise ValueError(f"the model has dimensions {self.sizes}, the {what} {sizes}; is it another robot's?")
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write a safetensors file whose header says in JSON what the model is; it appears whole or not at all.
@@ -240,25 +260,35 @@ class ForwardModel(Ensemble):
         if about.get("version") != str(VERSION):
             raise ValueError(f"{path} has version {about.get('version')}, this library reads {VERSION}")
         try:
-            model = cls(**{**options, **json.loads(about["model"])})
+            said = json.loads(about["model"])
+            shape = {name: said[name] for name in _SHAPE}
+        except (KeyError, TypeError, json.JSONDecodeError) as error:
+            raise ValueError(f"{path} does not say what model it holds: {error}") from error
+        model = cls(**{**options, **shape})
+        try:
             model.load_state_dict(state)
-        except (KeyError, TypeError, RuntimeError, json.JSONDecodeError) as error:
+        except RuntimeError as error:
             raise ValueError(f"{path} holds weights of another shape than it says: {error}") from error
         if not all(torch.isfinite(values).all() for values in state.values()):
             raise ValueError(f"{path} holds weights that are not finite; was it saved while training diverged?")
         return model
 
+    def __getstate__(self) -> dict[str, Any]:
+        """For copies and other processes: as if saved and loaded, without the optimiser's moments."""
+        return {**super().__getstate__(), "_lightning": None, "_optimizer": None}
+
     def _train(
-        self, x: torch.Tensor, y: torch.Tensor, steps: int, near: torch.Tensor | None
+        self, x: torch.Tensor, y: torch.Tensor, steps: int, near: torch.Tensor | None, before: dict[str, torch.Tensor]
     ) -> tuple[int, float, bool]:
-        """At most ``steps`` on the standardised exemplars, the newest last; the first three of ``Refresh``."""
+        """At most ``steps`` on the standardised exemplars, the newest last; back to ``before`` if that diverges.
+        Returns the first three of ``Refresh``."""
         fabric, optimizer = self._begin()
         is_held = torch.arange(len(x)) % _HELD_OUT == _HELD_OUT - 1
         held, rows = (x[is_held], y[is_held]), torch.nonzero(~is_held)[:, 0]
         special = [(rows[-self.every :], round(self.recent * self.batch))]
         if near is not None:
             special.append((near[~is_held[near]], round(self.focus * self.batch)))
-        before, best, waited, done = _copy(self.state_dict()), math.inf, 0, 0
+        lost, best, waited, done = max(_LOST, 2 * self.relative_error), math.inf, 0, 0
         while done < steps and waited < _PATIENCE:
             chunk = min(_CHUNK, steps - done)
             for _ in range(chunk):
@@ -273,21 +303,25 @@ class ForwardModel(Ensemble):
                 optimizer.step()
             done += chunk
             loss = self._held_out(*held)
-            if not math.isfinite(loss):
-                self.load_state_dict(before)
-                self._optimizer = None  # its moments are as bad as the weights were
+            if not (math.isfinite(loss) and float(self.missed) <= lost):
+                self._restore(before)
                 return done, self._held_out(*held), True
             best, waited = (loss, 0) if loss < best else (best, waited + 1)
         return done, loss, False
 
     def _begin(self) -> tuple[Fabric, Any]:
         """Lightning's Fabric, and the optimiser for life."""
-        if self._fabric is None:
-            self._fabric = Fabric(accelerator=self.accelerator, devices=1)
-            self.to(self._fabric.device)
+        if self._lightning is None:
+            self._lightning = Fabric(accelerator=self.accelerator, devices=1)
+            self.to(self._lightning.device)
         if self._optimizer is None:
-            self._optimizer = self._fabric.setup_optimizers(self.configure_optimizers())
-        return self._fabric, self._optimizer
+            self._optimizer = self._lightning.setup_optimizers(self.configure_optimizers())
+        return self._lightning, self._optimizer
+
+    def _restore(self, state: dict[str, Any]) -> None:
+        """Back to these weights, without the optimiser's moments, which are of others."""
+        self.load_state_dict(state)
+        self._optimizer = None
 
     def _held_out(self, x: torch.Tensor, y: torch.Tensor) -> float:
         """Negative log likelihood of what is held out, without ``beta``; the mean over the members. Sets ``missed``."""

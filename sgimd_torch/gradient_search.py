@@ -114,13 +114,11 @@ def gradient_search(
         trust: how far to trust the model.
 
     Raises:
-        ValueError: a number out of its range.
+        ValueError: a number out of its range, or a model of other dimensions.
     """
-    check_count("candidates", candidates, 1)
+    _check(policies, model, candidates, radius)
     if not 0 <= noise <= 0.5:
         raise ValueError(f"noise must lie in [0, 0.5], got {noise}; it is a fraction of the sides of Pi")
-    if not _RADII[0] <= radius <= _RADII[1]:
-        raise ValueError(f"radius must lie in {list(_RADII)}, got {radius}; it is a fraction of the sides of Pi")
     simplex = nelder_mead(policies, rng)
 
     def search(start: Estimate, goal: Array) -> Generator[Array, Array, None]:
@@ -164,7 +162,11 @@ def polished_simplex(
 
     Args:
         policies, rng, model, propose, candidates, radius, trust: as ``gradient_search``.
+
+    Raises:
+        ValueError: as ``gradient_search``.
     """
+    _check(policies, model, candidates, radius)
     simplex = nelder_mead(policies, rng)
 
     def search(start: Estimate, goal: Array) -> Generator[Array, Array, None]:
@@ -176,6 +178,13 @@ def polished_simplex(
         yield from simplex(start, goal)
 
     return search
+
+
+def _check(policies: Box, model: ForwardModel, candidates: int, radius: float) -> None:
+    model.check_fits("policies", theta_dim=policies.dim)
+    check_count("candidates", candidates, 1)
+    if not _RADII[0] <= radius <= _RADII[1]:
+        raise ValueError(f"radius must lie in {list(_RADII)}, got {radius}; it is a fraction of the sides of Pi")
 
 
 def _anchored(model: ForwardModel, context: Array, thetas: Array, outcomes: Array, trust: Trust) -> Anchored:

@@ -38,7 +38,7 @@ class ModelInverse:
         trust: how far to trust the model.
 
     Raises:
-        ValueError: a number out of its range.
+        ValueError: a number out of its range, or a model of other dimensions.
     """
 
     def __init__(
@@ -59,6 +59,8 @@ class ModelInverse:
         check_count("steps", steps, 0)
         if not 0 < step < np.inf:
             raise ValueError(f"step must be positive and finite, got {step}")
+        model.check_fits("memory", **{name: getattr(memory, name) for name in model.sizes})
+        model.check_fits("policies", theta_dim=policies.dim)
         self.memory, self.model, self.policies, self.trust = memory, model, policies, trust
         self.start = LocallyLinear(memory) if start is None else start
         self.k, self.anchors, self.steps, self.step = k, anchors, steps, step
@@ -77,7 +79,7 @@ class ModelInverse:
         return self.many(context, goal[None])[0]
 
     def many(self, context: Array, goals: Array) -> list[Estimate]:
-        """An estimate for each of ``(n, outcome_dim)`` goals, ten times as fast as one by one.
+        """An estimate for each of ``(n, outcome_dim)`` goals, several times as fast as one by one.
 
         Raises:
             RuntimeError: the memory is empty.

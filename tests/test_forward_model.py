@@ -1,6 +1,7 @@
 """The forward model: what it learns, how sure it is, and what it refuses."""
 
 import json
+import pickle
 import subprocess
 import sys
 
@@ -199,6 +200,67 @@ def test_after_a_divergence_the_weights_before_it_stand():
     assert not model.refresh(remembered(300)).diverged
 
 
+def test_weights_that_are_finite_but_lost_count_as_a_divergence_too():
+    model = taught(remembered(300), rate=1.0)
+    before, error = weights(model), model.relative_error
+    model.lr, model._optimizer = 1.0, None
+    assert model.refresh(remembered(400)).diverged
+    assert torch.equal(weights(model), before)
+    assert model.relative_error == pytest.approx(error, rel=0.2)  # of more exemplars held out
+
+
+def interrupted(*_):
+    raise KeyboardInterrupt
+
+
+def test_a_refresh_that_is_interrupted_has_changed_nothing(monkeypatch):
+    whole = taught(remembered(100))
+    for model in (ForwardModel(0, 3, 2), whole):
+        before, error = weights(model), model.relative_error
+        with monkeypatch.context() as patch:
+            patch.setattr(model, "_held_out", interrupted)  # after the first steps
+            with pytest.raises(KeyboardInterrupt):
+                model.refresh(remembered(200))
+        assert torch.equal(weights(model), before)
+        assert model.relative_error == error
+        assert model.refresh(remembered(200)).steps == 60 - 30 * (model is whole)
+    assert ForwardModel(0, 3, 2).relative_error == np.inf
+
+
+@pytest.mark.skipif(torch.cuda.is_available(), reason="there is a GPU")
+def test_a_model_for_a_gpu_that_is_not_there_says_so_and_stays_untrained():
+    model = ForwardModel(0, 3, 2, accelerator="cuda")
+    with pytest.raises(Exception, match="CUDA"):
+        model.refresh(remembered(100))
+    assert not model.trained
+
+
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="there is no GPU")
+def test_on_a_gpu_it_learns_as_well(unseen):
+    model = taught(remembered(400), rate=1.9, accelerator="cuda")
+    assert model.input_mean.is_cuda
+    error = np.linalg.norm(model.predict(NO_CONTEXT, unseen.thetas).mean - unseen.outcomes, axis=1).mean()
+    assert error < 0.1
+
+
+def test_the_weights_have_moved_to_where_they_are_trained_before_any_exemplar_does(monkeypatch):
+    model, order = ForwardModel(0, 3, 2), []
+    for name in ("_begin", "_tensor"):
+        step = getattr(model, name)
+        monkeypatch.setattr(model, name, lambda *args, name=name, step=step: (order.append(name), step(*args))[1])
+    model.refresh(remembered(100))
+    assert order[0] == "_begin"
+    assert "_tensor" in order
+
+
+def test_a_copy_for_another_process_predicts_the_same_and_learns_on(model, unseen):
+    copy = pickle.loads(pickle.dumps(model))
+    np.testing.assert_array_equal(
+        copy.predict(NO_CONTEXT, unseen.thetas).mean, model.predict(NO_CONTEXT, unseen.thetas).mean
+    )
+    assert copy.refresh(remembered(500)).first == 400
+
+
 @pytest.mark.parametrize("noise_heads", [True, False])
 def test_a_saved_model_predicts_the_same_and_knows_as_well_how_far_to_be_trusted(tmp_path, unseen, noise_heads):
     model = taught(remembered(100), noise_heads=noise_heads, members=2, hidden=(8,))
@@ -222,7 +284,8 @@ def test_a_saved_model_predicts_the_same_and_knows_as_well_how_far_to_be_trusted
             "version 2, this library reads 1",
         ),
         (lambda path, state, about: save_file(state, path), "version None"),
-        (lambda path, state, about: save_file(state, path, {"version": "1", "model": "{"}), "another shape"),
+        (lambda path, state, about: save_file(state, path, {"version": "1", "model": "{"}), "not say what model"),
+        (lambda path, state, about: save_file(state, path, {"version": "1", "model": "{}"}), "not say .*context_dim"),
         (
             lambda path, state, about: save_file(
                 state, path, {"version": "1", "model": json.dumps({**json.loads(about["model"]), "theta_dim": 4})}
@@ -242,6 +305,12 @@ def test_a_file_that_is_no_such_model_is_refused(tmp_path, model, spoil, words):
     spoil(path, load_file(path), about)
     with pytest.raises(ValueError, match=words):
         ForwardModel.load(path)
+
+
+def test_a_slip_in_the_options_of_a_model_to_be_loaded_is_not_blamed_on_the_file(tmp_path, model):
+    model.save(tmp_path / "model.safetensors")
+    with pytest.raises(TypeError, match="ratee"):
+        ForwardModel.load(tmp_path / "model.safetensors", ratee=3)
 
 
 def test_a_loaded_model_learns_on(tmp_path):
@@ -286,6 +355,9 @@ def test_another_robots_memory_or_another_runs_is_refused():
         {"focus": 0.8},  # with the quarter that is recent more than a batch
         {"beta": -0.1},
         {"batch": 0},
+        {"batch": 2.5},
+        {"every": 2.5},
+        {"hidden": 64},
     ],
 )
 def test_numbers_out_of_their_range_are_refused(options):

@@ -330,5 +330,13 @@ def test_it_never_ends(model, inverse, goals):
     [{"candidates": 0}, {"noise": -0.1}, {"noise": 0.6}, {"noise": np.nan}, {"radius": 0.01}, {"radius": 0.31}],
 )
 def test_numbers_out_of_their_range_are_refused(model, options):
-    with pytest.raises(ValueError, match=next(iter(options))):
-        gradient_search(ARM.policies, stream(0, "search"), model=model, **options)
+    makes = (gradient_search, polished_simplex)[: 1 + ("noise" not in options)]
+    for make in makes:
+        with pytest.raises(ValueError, match=next(iter(options))):
+            make(ARM.policies, stream(0, "search"), model=model, **options)
+
+
+@pytest.mark.parametrize("make", [gradient_search, polished_simplex])
+def test_a_model_of_another_robot_is_refused(model, make):
+    with pytest.raises(ValueError, match="is it another robot's"):
+        make(PlanarArm(3).policies, stream(0, "search"), model=model)

@@ -58,6 +58,12 @@ def test_a_bar_that_is_missed_does_not_hold_and_the_others_of_that_model_may(tmp
     assert found[f"{claim}: `gradient`"] == "holds"
 
 
+@pytest.mark.parametrize("worse", [(1000, 2000), (1000, 5000), (2000, 5000)])
+def test_lower_at_one_of_three_is_not_lower(tmp_path, worse):
+    found = verdicts(write(tmp_path / "x.csv", model=dict.fromkeys(worse, 0.09)))
+    assert found[f"{CLAIMS[1]}: `model`"] == "does not hold"
+
+
 def test_half_of_the_error_on_fifty_joints_is_half(tmp_path):
     found = verdicts(write(tmp_path / "x.csv", model_arm_50={2000: 0.016}))
     assert found[f"{CLAIMS[3]}: `model`"] == "does not hold"

@@ -178,6 +178,13 @@ def test_contexts_reach_the_model():
         assert np.linalg.norm(landed - goal) < 0.02
 
 
+def test_a_model_of_another_robot_is_refused(taught):
+    with pytest.raises(ValueError, match="is it another robot's"):
+        ModelInverse(Memory(0, 3, 2), taught[1], ARM.policies)
+    with pytest.raises(ValueError, match=r"the policies \{'theta_dim': 3\}; is it another robot's"):
+        ModelInverse(*taught, PlanarArm(3).policies)
+
+
 @pytest.mark.parametrize("options", [{"k": 0}, {"anchors": 0}, {"steps": -1}, {"step": 0.0}, {"step": np.nan}])
 def test_numbers_out_of_their_range_are_refused(taught, options):
     with pytest.raises(ValueError, match=next(iter(options))):

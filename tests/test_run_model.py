@@ -15,7 +15,7 @@ from config import MODEL_SEARCHES, Config
 from parts import LEAST_NOISE, build
 from read_runs import read_run
 from run import main
-from run_model import LEGEND, RunModel
+from run_model import INSTEAD, LEGEND, RunModel
 from rundir import RunDirectory
 from runfiles import Columns
 from runs import EAGER, signal_after, start
@@ -186,7 +186,7 @@ def test_a_model_that_is_asked_is_announced_once(tmp_path, live, capsys):
 def test_a_model_that_nobody_ever_asked_is_no_secret(tmp_path, live, capsys, options, why, rows):
     assert live(tmp_path, *MODEL, *options) == 0
     said = capsys.readouterr().err
-    assert re.search(f"the forward model is not asked, the local inverse model answers in its place: {why}\n", said)
+    assert re.search(f"the forward model is not asked, {INSTEAD}: {why}\n", said)
     directory = tmp_path / "sgim-d" / "seed-003"
     assert len((directory / "refreshes.csv").read_text().splitlines()) == 1 + rows
     assert len((directory / "predictions.csv").read_text().splitlines()) == 1
@@ -261,7 +261,8 @@ def test_options_of_a_model_that_is_not_there_are_named():
     assert "without a forward model, see --search and --inverse" in named()["members"]
     assert named(inverse="model").keys() == {"residual"}
     assert named(search="nelder-mead-polished").keys() == {"residual"}
-    assert named(algorithm="random", inverse="model").keys() == {"residual"}
+    assert named(algorithm="random", inverse="model").keys() == {"residual", "focus"}
+    assert named(algorithm="imitation", inverse="model").keys() == {"residual"}
     assert given.keys() <= named(algorithm="random", search="gradient").keys()
     for search in ("gradient", "gauss-newton", "screened"):
         assert not named(search=search)
@@ -272,6 +273,7 @@ def test_options_of_a_model_that_is_not_there_are_named():
     ("options", "message"),
     [
         ("--members 0", "members must be at least 1, got 0"),
+        ("--members 101", "members must be at most 100, got 101"),
         ("--members 1.5", "--members must be a whole number, got 1.5"),
         ("--training 0", "training must be above 0 and at most 100 steps a movement, got 0"),
         ("--training 101", "training must be above 0 and at most 100"),
