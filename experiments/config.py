@@ -163,7 +163,8 @@ class Config:
         budget: Movements for one goal, at most (sagg-riac, sgim-d).
         inverse: Which movement is inferred for a goal, when learning and in evaluations: paper, the weighted mean of
             eq. (9); linear, the same corrected to first order; nearest, the movement that came nearest; model, linear
-            when learning, and in evaluations what a forward model makes of it (needs sgimd-torch[forward]).
+            when learning, and in evaluations what a forward model makes of it (needs sgimd-torch[forward]); that
+            pays for those who explore and misleads the imitation learner.
         members: Networks in the forward model; it is learnt if the search or the inverse is one of those that use it.
         noise_heads: Whether the forward model's noise depends on the movement, true or false.
         training: Steps of training the forward model for each movement; 0.3 takes about a fifth of the rod's physics.

@@ -3,7 +3,7 @@
 Each table replaces what stands between its two marker lines:
 
   <!-- bars -->            each bar, the number of every variant judged by it, a verdict   <!-- end of bars -->
-  <!-- forward-model -->   all variants on the rod: errors, difference to the simplex      <!-- end of forward-model -->
+  <!-- forward-model -->   all variants on the rod: errors, difference to the plain one    <!-- end of forward-model -->
   <!-- planar-arm-7 -->    the same on the arm of 7 joints                                 <!-- end of planar-arm-7 -->
   <!-- planar-arm-50 -->   and on that of 50                                               <!-- end of planar-arm-50 -->
 
@@ -141,19 +141,21 @@ def _calibrated(name: str, coverages: Array) -> Row:
 
 
 def variants_table(evidence: Evidence, experiment: str) -> str:
-    """One line for each variant of an experiment; a difference below 0 says that it errs less than the simplex."""
+    """One line for each variant of an experiment; a difference below 0 says that it errs less than the same learner
+    without model and with the simplex."""
     times = TIMES[experiment]
     variants = [evidence.results[name] for name in EXPERIMENTS[experiment] if name in evidence.results]
     head = ("variant", "seeds", *(f"error at {when} (m)" for when in times))
     last = f"at {times[-1]}"
-    columns = (*head, f"difference to the simplex {last} (m)", "simplex better, probability")
+    columns = (*head, f"difference to the plain learner {last} (m)", "plain better, probability")
     return markdown(columns, [_line(variant, evidence, times) for variant in variants])
 
 
 def _line(variant: Evaluated, evidence: Evidence, times: Sequence[int]) -> list[str]:
     name, last = variant.variant, times[-1]
     arm = next((f"-{arm.removeprefix('planar-')}" for arm in ARMS if variant.experiment == arm), "")
-    simplex = f"sagg-riac{arm}" if name.startswith("sagg-riac") else f"{SIMPLEX}{arm}"
+    learner = next((each for each in ("sagg-riac", "imitation") if name.startswith(each)), SIMPLEX)
+    plain = f"{learner}{arm}"
 
     def told(tell: Callable[[], str]) -> str:
         try:
@@ -162,17 +164,17 @@ def _line(variant: Evaluated, evidence: Evidence, times: Sequence[int]) -> list[
             return "-"
 
     def difference() -> str:
-        pairs = shared(evidence.at(name, last), evidence.at(simplex, last))
+        pairs = shared(evidence.at(name, last), evidence.at(plain, last))
         return metres(difference_interval(*pairs, rng=rng())).removesuffix(" m")
 
     def improvement() -> str:
-        return show(improvement_interval(evidence.errors(simplex, last), evidence.errors(name, last), rng=rng()))
+        return show(improvement_interval(evidence.errors(plain, last), evidence.errors(name, last), rng=rng()))
 
     def error(when: int) -> str:
         return show(iqm_interval(evidence.errors(name, when), rng=rng()), ".4f")
 
     errors = [told(lambda when=when: error(when)) for when in times]  # type: ignore[misc]
-    compared = ["", ""] if name == simplex else [told(difference), told(improvement)]
+    compared = ["", ""] if name == plain else [told(difference), told(improvement)]
     return [name, str(len(variant.at(last))), *errors, *compared]
 
 

@@ -42,6 +42,8 @@ REFINING: Final[dict[str, Variant]] = {
     "sagg-riac-gauss-newton": {**ALONE, "search": "gauss-newton"},
     "sagg-riac-screened": {**ALONE, "search": "screened"},
     "sagg-riac-polished": {**ALONE, "search": "nelder-mead-polished"},
+    "imitation": {"algorithm": "imitation"},
+    "imitation-model": {"algorithm": "imitation", "inverse": "model"},
     "gradient-linear": {**GRADIENT, "inverse": "linear"},
     "model-unanchored": {**MODEL, "anchored": False},
     "gradient-unanchored": {**GRADIENT, "anchored": False},
