@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 REACH: Final = Box.cube(-1, 1, 2)  # m, what the arm and its line can reach; cells in it compare runs of any task space
 GOALS: Final = 100  # the last ones are drawn
-FIRST: Final = ("algorithm", "goals", "inverse", "movements", "search", "seed")  # in HParams from the start
+FIRST: Final = ("algorithm", "goals", "inverse", "movements", "search")  # HParams shows five before one asks for more
 LEGEND: Final = {
     "time": "Seconds spent so far: on physics, by the learner and on evaluations.",
     "map/competence": "The regions, named like the curves, coloured by the mean competence of the goals they remember.",
