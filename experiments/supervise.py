@@ -175,9 +175,10 @@ def telling_errors(main: Callable[P, int]) -> Callable[P, int]:
         except ValueError as error:
             say(f"error: {error}")
         except OSError as error:
-            if error.filename is None:  # most likely stdout; ``with_streams`` tells
+            if error.filename is None and error.errno is not None:  # most likely stdout; ``with_streams`` tells
                 raise
-            say(f"error: {error.filename} cannot be read or written: {error.strerror}")
+            which = f"{error.filename} cannot be read or written: {error.strerror}"
+            say(f"error: {error if error.filename is None else which}")
         except KeyboardInterrupt:
             return 130
         return 2
