@@ -51,8 +51,21 @@ def server(runs):
 
             yield process, said, ask
         finally:
+            process.terminate()  # a kill would leave TensorBoard behind
+            process.wait()
             timer.cancel()
-            process.kill()
+
+
+def test_whoever_terminates_it_ends_tensorboard_too(runs):
+    port = free_port(8000)
+    command = [sys.executable, str(ROOT / "experiments" / "watch.py"), str(runs), "--port", str(port)]
+    with subprocess.Popen(command, env={**os.environ, "PYTHONPATH": str(ROOT)}, stdout=subprocess.PIPE) as process:
+        while b"http" not in process.stdout.readline():
+            assert process.poll() is None
+        process.terminate()
+        assert process.wait(timeout=30) == 143
+    with pytest.raises(OSError, match="refused"):
+        DIRECT.open(f"http://127.0.0.1:{port}", timeout=5)
 
 
 def curve(ask, tag):
