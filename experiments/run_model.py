@@ -24,7 +24,9 @@ if TYPE_CHECKING:
 REFRESHES: Final = ("movements", "exemplars", "steps", "held_out", "relative_error", "diverged")
 LEVEL: Final = 0.8  # of the regions whose coverage the board shows
 LATELY: Final = 500  # movements, over which the board says how often refining a guess helped
-INSTEAD: Final = "the local inverse model answers and the simplex searches in its place"
+NOT_ASKED: Final = (
+    "the forward model is not asked, the local inverse model answers and the simplex searches in its place"
+)
 LEGEND: Final = {
     "model/relative_error": "Error for exemplars never trained on, over that of always predicting their mean.",
     "model/held_out": "Negative log likelihood of exemplars never trained on; lower is better.",
@@ -130,7 +132,7 @@ class RunModel:
         if ended and self._model is not None and not self._asked:
             trained = self._model.trained
             why = self._how_wrong(self._model.relative_error) if trained else "there were too few exemplars to train it"
-            news.append(f"the forward model is not asked, {INSTEAD}: {why}")
+            news.append(f"{NOT_ASKED}: {why}")
         return news
 
     def summary(self) -> dict[str, float]:
@@ -155,7 +157,7 @@ class RunModel:
     def _say_whether_asked(self, movements: int, error: float) -> None:
         asked = error <= self._trust
         if asked != self._asked:
-            who = "the forward model is asked from here on" if asked else f"the forward model is not asked, {INSTEAD}"
+            who = "the forward model is asked from here on" if asked else NOT_ASKED
             self._news.append(f"movement {movements}: {who}: {self._how_wrong(error)}")
         self._asked = asked
 

@@ -175,10 +175,12 @@ def telling_errors(main: Callable[P, int]) -> Callable[P, int]:
         except ValueError as error:
             say(f"error: {error}")
         except OSError as error:
-            if error.filename is None and error.errno is not None:  # most likely stdout; ``with_streams`` tells
+            if error.filename is not None:
+                say(f"error: {error.filename} cannot be read or written: {error.strerror}")
+            elif error.errno is None:  # raised by us, it says all itself
+                say(f"error: {error}")
+            else:  # most likely of stdout; ``with_streams`` tells
                 raise
-            which = f"{error.filename} cannot be read or written: {error.strerror}"
-            say(f"error: {error if error.filename is None else which}")
         except KeyboardInterrupt:
             return 130
         return 2

@@ -109,10 +109,9 @@ class ForwardModel(Ensemble):
         noise_heads: bool = True,
         accelerator: str = "cpu",
     ) -> None:
-        check_count("context_dim", context_dim, 0)
-        dims = {"theta_dim": theta_dim, "outcome_dim": outcome_dim}
-        for name, count in {**dims, "members": members, "every": every, "batch": batch}.items():
-            check_count(name, count, 1)
+        sizes = {"context_dim": context_dim, "theta_dim": theta_dim, "outcome_dim": outcome_dim}
+        for name, count in {**sizes, "members": members, "every": every, "batch": batch}.items():
+            check_count(name, count, 0 if name == "context_dim" else 1)
         if not isinstance(hidden, Sequence) or not hidden:
             raise ValueError(f"hidden must be a sequence of layers' units such as (64, 64), got {hidden}")
         for units in hidden:
@@ -124,7 +123,7 @@ class ForwardModel(Ensemble):
         generator = torch.Generator().manual_seed(int(stream(seed, "forward model").integers(2**63)))
         shape = members, list(hidden), noise_heads
         super().__init__(context_dim + theta_dim, outcome_dim, generator, *shape, lr=lr, beta=beta)
-        self.sizes = {"context_dim": context_dim, "theta_dim": theta_dim, "outcome_dim": outcome_dim}
+        self.sizes = sizes
         self.shape = dict(zip(("members", "hidden", "noise_heads"), shape, strict=True))
         self.every, self.rate, self.batch, self.recent, self.focus = every, rate, batch, recent, focus
         self.accelerator, self._random = accelerator, generator

@@ -15,7 +15,7 @@ from config import MODEL_SEARCHES, Config
 from parts import LEAST_NOISE, build
 from read_runs import read_run
 from run import main
-from run_model import INSTEAD, LEGEND, RunModel
+from run_model import LEGEND, RunModel
 from rundir import RunDirectory
 from runfiles import Columns
 from runs import EAGER, signal_after, start
@@ -186,7 +186,8 @@ def test_a_model_that_is_asked_is_announced_once(tmp_path, live, capsys):
 def test_a_model_that_nobody_ever_asked_is_no_secret(tmp_path, live, capsys, options, why, rows):
     assert live(tmp_path, *MODEL, *options) == 0
     said = capsys.readouterr().err
-    assert re.search(f"the forward model is not asked, {INSTEAD}: {why}\n", said)
+    instead = "the local inverse model answers and the simplex searches in its place"
+    assert re.search(f"the forward model is not asked, {instead}: {why}\n", said)
     directory = tmp_path / "sgim-d" / "seed-003"
     assert len((directory / "refreshes.csv").read_text().splitlines()) == 1 + rows
     assert len((directory / "predictions.csv").read_text().splitlines()) == 1

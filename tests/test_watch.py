@@ -28,16 +28,18 @@ def runs(tmp_path_factory, go):
     return out
 
 
+def watching(runs, port):
+    command = [sys.executable, str(ROOT / "experiments" / "watch.py"), str(runs), "--port", str(port)]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    return subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
 @pytest.fixture(scope="module")
 def server(runs):
     """The process, what it said first, and a function that asks it."""
     worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
     port = free_port(7100 + 50 * worker)  # between asking and binding another worker could take the same
-    command = [sys.executable, str(ROOT / "experiments" / "watch.py"), str(runs), "--port", str(port)]
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    with subprocess.Popen(
-        command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as process:
+    with watching(runs, port) as process:
         timer = threading.Timer(120, process.kill)
         timer.start()
         try:
@@ -58,9 +60,8 @@ def server(runs):
 
 def test_whoever_terminates_it_ends_tensorboard_too(runs):
     port = free_port(8000)
-    command = [sys.executable, str(ROOT / "experiments" / "watch.py"), str(runs), "--port", str(port)]
-    with subprocess.Popen(command, env={**os.environ, "PYTHONPATH": str(ROOT)}, stdout=subprocess.PIPE) as process:
-        while b"http" not in process.stdout.readline():
+    with watching(runs, port) as process:
+        while "http" not in process.stdout.readline():
             assert process.poll() is None
         process.terminate()
         assert process.wait(timeout=30) == 143
