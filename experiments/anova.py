@@ -31,13 +31,13 @@ import numpy as np
 
 from claims import EMPTY
 from evidence import SEED, NotRun
-from over_seeds import Anova, anova
 from pages import markdown, read_page, write_page
-from read_runs import read_run
 from sgimd_torch.demonstrations import load_demonstrations
-from sgimd_torch.fishing_rod import JOINTS, FishingRod
+from sgimd_torch.environments.fishing_rod import JOINTS, FishingRod
+from sgimd_torch.runs.process import say, telling_errors, with_streams
+from sgimd_torch.runs.read import read_run
 from sgimd_torch.spaces import Array, stream
-from supervise import say, telling_errors, with_streams
+from sgimd_torch.views.statistics import Anova, anova
 from variants import shipped
 
 SECTION = "\n## Means of movements, by analysis of variance\n\n<!-- anova -->\n<!-- end of anova -->\n"

@@ -29,11 +29,11 @@ import numpy as np
 
 from evidence import Evidence, NotRun, metres, rng, shared, show
 from judgements import Row, judge
-from over_seeds import difference_interval, improvement_interval, iqm_interval, mean_over_life
 from pages import count_verdicts, markdown, read_page, verdicts_table, write_page
 from read_results import LAST, Evaluated, read_goals, read_results
+from sgimd_torch.runs.process import telling_errors, with_streams
 from sgimd_torch.spaces import Array
-from supervise import telling_errors, with_streams
+from sgimd_torch.views.statistics import difference_interval, improvement_interval, iqm_interval, mean_over_life
 
 EMPTY = """# Results
 

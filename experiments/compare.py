@@ -24,10 +24,10 @@ from types import FrameType
 if __name__ == "__main__":  # Ctrl-C while the libraries below are loading
     signal.signal(signal.SIGINT, lambda *_: os._exit(130))
 
-from children import Child, ChildFailed, in_use
 from overview import Overview
-from runfiles import RunError
-from supervise import say, with_streams
+from sgimd_torch.runs.children import Child, ChildFailed, in_use
+from sgimd_torch.runs.log import RunError
+from sgimd_torch.runs.process import say, with_streams
 from tables import Table, read_keys
 from tasks import COLUMNS, Task, tasks_of
 from variants import EXPERIMENTS, make_subsets

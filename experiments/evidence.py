@@ -11,9 +11,9 @@ from typing import Final
 
 import numpy as np
 
-from over_seeds import Interval, difference_interval
 from read_results import LAST, Evaluated
 from sgimd_torch.spaces import Array
+from sgimd_torch.views.statistics import Interval, difference_interval
 
 SEED: Final = 2014  # of the bootstrap: each number draws from its own default_rng(SEED), whatever else is computed
 

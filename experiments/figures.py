@@ -33,8 +33,8 @@ from matplotlib.figure import Figure
 from evidence import NotRun
 from paper_figures import FIGURES, Data
 from read_results import read_results
-from runfiles import make_folder
-from supervise import telling_errors, with_streams
+from sgimd_torch.runs.log import make_folder
+from sgimd_torch.runs.process import telling_errors, with_streams
 
 STYLE: Any = {
     "font.size": 12,

@@ -12,7 +12,9 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from evidence import Evidence, NotRun, metres, rng, shared, show
-from over_seeds import (
+from read_results import LAST
+from sgimd_torch.spaces import Array
+from sgimd_torch.views.statistics import (
     Interval,
     difference_interval,
     improvement_interval,
@@ -23,8 +25,6 @@ from over_seeds import (
     movements_to_reach,
     ratio_interval,
 )
-from read_results import LAST
-from sgimd_torch.spaces import Array
 
 HOLDS: Final = "holds"
 FAILS: Final = "does not hold"

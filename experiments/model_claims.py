@@ -31,10 +31,14 @@ if __name__ == "__main__":  # Ctrl-C while the libraries below are loading
 
 import numpy as np
 
-from environments import ARMS
 from evidence import Evidence, NotRun, metres, rng, shared, show
 from judgements import FAILS, HOLDS, OPEN, Judged, Row, at_least, at_most, below_zero
-from over_seeds import (
+from pages import count_verdicts, markdown, read_page, verdicts_table, write_page
+from read_results import LAST, Evaluated, ResultsError, read_results
+from sgimd_torch.runs.process import telling_errors, with_streams
+from sgimd_torch.runs.tasks import ARMS
+from sgimd_torch.spaces import Array
+from sgimd_torch.views.statistics import (
     difference_interval,
     improvement_interval,
     interquartile_mean,
@@ -43,10 +47,6 @@ from over_seeds import (
     movements_to_reach,
     ratio_interval,
 )
-from pages import count_verdicts, markdown, read_page, verdicts_table, write_page
-from read_results import LAST, Evaluated, ResultsError, read_results
-from sgimd_torch.spaces import Array
-from supervise import telling_errors, with_streams
 from variants import EXPERIMENTS
 
 SIMPLEX: Final = "sgim-d"  # with Nelder & Mead's simplex and no model, what everything is measured against

@@ -37,14 +37,14 @@ from numpy.typing import ArrayLike, NDArray
 from tqdm import tqdm
 
 from figures import STYLE
-from read_runs import Run, read_run
-from run_model import REFRESHES, prediction_columns
-from runfiles import RunError, make_folder, write_whole
-from sgimd_torch import plots_of_model as plots
-from sgimd_torch.archives import write_bytes
-from sgimd_torch.model_diagnostics import LEVELS, coverage, error_by_cell, improvements, running
+from sgimd_torch.figures import predictions as plots
+from sgimd_torch.files import write_bytes
+from sgimd_torch.forward_model.diagnostics import LEVELS, coverage, error_by_cell, improvements, running
+from sgimd_torch.runs.log import RunError, make_folder, write_whole
+from sgimd_torch.runs.model_record import REFRESHES, prediction_columns
+from sgimd_torch.runs.process import telling_errors, with_streams
+from sgimd_torch.runs.read import Run, read_run
 from sgimd_torch.spaces import Array, Box
-from supervise import telling_errors, with_streams
 
 LAST: Final = 1000  # predictions
 LATE: Final = 2000  # movements, from which on the spread is to be honest

@@ -10,8 +10,8 @@ import sys
 import time
 from collections.abc import Sequence
 
-from children import Child, report, time_left
-from supervise import say
+from sgimd_torch.runs.children import Child, report, time_left
+from sgimd_torch.runs.process import say
 from tasks import Task
 
 REPLAY = 0.2  # what replaying a movement takes, of executing it: the learner's part, without physics

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from judgements import Row
 from read_results import ResultsError
-from runfiles import make_folder, write_whole
+from sgimd_torch.runs.log import make_folder, write_whole
 
 
 def markdown(head: Sequence[str], lines: Sequence[Sequence[str]]) -> str:

@@ -15,16 +15,16 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from evidence import NotRun, rng, shared
-from over_seeds import Interval, difference_interval, iqm_interval, paired_differences
 from read_results import LAST, Evaluated
-from read_runs import Run, read_run
-from sgimd_torch import plots_of_movements
 from sgimd_torch.demonstrations import SHIPPED, load_demonstrations
-from sgimd_torch.fishing_rod import JOINTS
-from sgimd_torch.plots import COLOURS, NAMES, count_bar, landing_points, tile_counts
-from sgimd_torch.plots_of_results import Difference, SeedCurves, forest, goal_distances, goal_histogram, seed_curves
+from sgimd_torch.environments.fishing_rod import JOINTS
+from sgimd_torch.figures import movements as plots_of_movements
+from sgimd_torch.figures.learning import COLOURS, NAMES, count_bar, landing_points, tile_counts
+from sgimd_torch.figures.results import Difference, SeedCurves, forest, goal_distances, goal_histogram, seed_curves
+from sgimd_torch.runs.process import say
+from sgimd_torch.runs.read import Run, read_run
 from sgimd_torch.spaces import Array, Box
-from supervise import say
+from sgimd_torch.views.statistics import Interval, difference_interval, iqm_interval, paired_differences
 
 BAND = "thick: interquartile mean, band: its 95 % interval, thin: seeds"
 DEMONSTRATORS = {

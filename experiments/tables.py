@@ -14,7 +14,7 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from runfiles import RunError
+from sgimd_torch.runs.log import RunError
 
 Key = tuple[str, ...]
 

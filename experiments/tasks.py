@@ -13,14 +13,14 @@ from typing import Final
 
 import numpy as np
 
-from children import Child
-from config import Config
-from environments import ARMS, arm_benchmark
 from read_results import GOALS_HEADER, HEADER
-from read_runs import Run, read_run
-from runfiles import RunError, make_folder
-from sgimd_torch.environment import PlanarArm
+from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import SHIPPED, Benchmark, load_benchmark
+from sgimd_torch.runs.children import Child
+from sgimd_torch.runs.config import Config
+from sgimd_torch.runs.log import RunError, make_folder
+from sgimd_torch.runs.read import Run, read_run
+from sgimd_torch.runs.tasks import ARMS, arm_benchmark
 from sgimd_torch.spaces import Array
 from tables import Key, Table
 from variants import EXPERIMENTS, FEW, FORWARD_MODEL, HALF, PAPER, TABLES, teacher_of

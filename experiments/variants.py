@@ -10,10 +10,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, Final
 
-from config import ALGORITHMS, Config
-from environments import ARMS
-from runfiles import make_folder
 from sgimd_torch.demonstrations import SHIPPED, load_demonstrations, save_demonstrations
+from sgimd_torch.runs.config import ALGORITHMS, Config
+from sgimd_torch.runs.log import make_folder
+from sgimd_torch.runs.tasks import ARMS
 
 Variant = dict[str, Any]
 SGIM_D: Final[Variant] = {"algorithm": "sgim-d"}

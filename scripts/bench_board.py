@@ -20,10 +20,10 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "experiments"))
 
 import numpy as np
 
-import run as experiment
-from run_board import RunBoard
 from sgimd_torch import Demonstration, InterestMap, PeriodicTeacher, PlanarArm, evaluate, run, sgim_d, stream
-from sgimd_torch.board import Board, read_events
+from sgimd_torch.board.writer import Board, read_events
+from sgimd_torch.runs import run as experiment
+from sgimd_torch.runs.board import RunBoard
 from sgimd_torch.strategies import GoalBabbling
 
 CALLS = ("__init__", "episode", "evaluation", "begin", "flush", "finish", "__exit__")

@@ -23,9 +23,9 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "experiments"))
 import torch
 from tqdm import tqdm
 
-from config import MODEL_SEARCHES, Config
 from options import at_least
-from parts import build
+from sgimd_torch.runs.build import build
+from sgimd_torch.runs.config import MODEL_SEARCHES, Config
 from sgimd_torch.session import live, run
 from sgimd_torch.spaces import Array, Estimate
 from sgimd_torch.strategies import GoalBabbling

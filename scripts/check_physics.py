@@ -13,9 +13,9 @@ import numpy as np
 from tqdm import tqdm
 
 from options import at_least
-from sgimd_torch.environment import SimulationError
+from sgimd_torch.environments.fishing_rod import JOINT_RANGES, FishingRod
+from sgimd_torch.environments.protocol import SimulationError
 from sgimd_torch.evaluation import load_benchmark
-from sgimd_torch.fishing_rod import JOINT_RANGES, FishingRod
 from sgimd_torch.spaces import Array, stream
 
 SEED = 1

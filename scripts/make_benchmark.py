@@ -16,8 +16,8 @@ from tqdm import tqdm
 from options import at_least, writable_file
 from sgimd_torch.algorithms import random_exploration, sagg_riac, sgim_d
 from sgimd_torch.demonstrations import load_demonstrations
+from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.evaluation import SHIPPED, Benchmark, save_benchmark, tile_goals
-from sgimd_torch.fishing_rod import FishingRod
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Array, stream
 from sgimd_torch.teachers import PeriodicTeacher

@@ -16,7 +16,7 @@ from tqdm import tqdm
 
 from options import at_least, writable_file
 from sgimd_torch.demonstrations import SHIPPED, save_demonstrations
-from sgimd_torch.fishing_rod import JOINT_RANGES, FishingRod
+from sgimd_torch.environments.fishing_rod import JOINT_RANGES, FishingRod
 from sgimd_torch.spaces import Array, Demonstration, stream
 
 RATE = 50  # Hz

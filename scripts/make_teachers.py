@@ -21,8 +21,8 @@ from make_demonstrations import farthest_points
 from options import at_least
 from sgimd_torch.algorithms import sagg_riac
 from sgimd_torch.demonstrations import SHIPPED, save_demonstrations
-from sgimd_torch.environment import execute_many
-from sgimd_torch.fishing_rod import FishingRod
+from sgimd_torch.environments.fishing_rod import FishingRod
+from sgimd_torch.environments.protocol import execute_many
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Array, Demonstration, stream
 

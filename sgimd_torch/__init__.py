@@ -23,21 +23,24 @@ from typing import TYPE_CHECKING
 from sgimd_torch.algorithms import imitation, observation, random_exploration, sagg_riac, sgim_d
 from sgimd_torch.competence import absolute_performance, performance
 from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
-from sgimd_torch.environment import Environment, PlanarArm, SimulationError
+from sgimd_torch.environments.motor_primitives import GaussianPrimitive
+from sgimd_torch.environments.planar_arm import PlanarArm
+from sgimd_torch.environments.protocol import Environment, SimulationError
 from sgimd_torch.evaluation import Benchmark, Evaluation, evaluate, load_benchmark, save_benchmark
-from sgimd_torch.interest import InterestMap, UniformGoals
-from sgimd_torch.inverse_model import LocalInverse, LocallyLinear, NearestNeighbour
+from sgimd_torch.goals.interest_map import InterestMap, UniformGoals
+from sgimd_torch.goals.progress_grid import ProgressGrid
+from sgimd_torch.inverses.local import LocalInverse, NearestNeighbour
+from sgimd_torch.inverses.locally_linear import LocallyLinear
 from sgimd_torch.learner import Learner
 from sgimd_torch.memory import Memory
-from sgimd_torch.motor_primitives import GaussianPrimitive
-from sgimd_torch.progress_grid import ProgressGrid
-from sgimd_torch.search import nelder_mead, perturb
+from sgimd_torch.searches.perturb import perturb
+from sgimd_torch.searches.simplex import nelder_mead
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Box, Demonstration, Episode, Estimate, Move, stream
 from sgimd_torch.teachers import AskedTeacher, InitialTeacher, PeriodicTeacher
 
 if TYPE_CHECKING:
-    from sgimd_torch.fishing_rod import FishingRod
+    from sgimd_torch.environments.fishing_rod import FishingRod
 
 __version__ = "0.1.0"
 __all__ = [
@@ -85,7 +88,7 @@ __all__ = [
 
 def __getattr__(name: str) -> object:
     if name == "FishingRod":  # MuJoCo is loaded only for those who fish
-        from sgimd_torch.fishing_rod import FishingRod
+        from sgimd_torch.environments.fishing_rod import FishingRod
 
         return FishingRod
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

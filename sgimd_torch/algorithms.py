@@ -14,12 +14,12 @@ from typing import TypedDict, Unpack
 import numpy as np
 
 from sgimd_torch.competence import AttemptCompetence, Competence, Performance, performance
-from sgimd_torch.environment import Environment
-from sgimd_torch.interest import Goals, InterestMap
-from sgimd_torch.inverse_model import LocallyLinear
+from sgimd_torch.environments.protocol import Environment
+from sgimd_torch.goals.interest_map import Goals, InterestMap
+from sgimd_torch.inverses.locally_linear import LocallyLinear
 from sgimd_torch.learner import Learner
 from sgimd_torch.memory import Memory
-from sgimd_torch.search import nelder_mead
+from sgimd_torch.searches.simplex import nelder_mead
 from sgimd_torch.spaces import Array, Box, Estimate, Search, stream
 from sgimd_torch.strategies import Babble, Emulate, GoalBabbling, Imitate, Judge, Remember, Rest, SocialStrategy
 

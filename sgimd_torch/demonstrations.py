@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sgimd_torch.archives import read_npz, write_npz
+from sgimd_torch.files import read_npz, write_npz
 from sgimd_torch.spaces import Array, Demonstration, first_entry
 
 VERSION = 1

@@ -14,8 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from sgimd_torch.archives import read_npz, write_npz
-from sgimd_torch.environment import Environment, execute_many
+from sgimd_torch.environments.protocol import Environment, execute_many
+from sgimd_torch.files import read_npz, write_npz
 from sgimd_torch.spaces import Array, Box, Estimate, check_count, check_vector, first_entry, stream
 
 VERSION = 1

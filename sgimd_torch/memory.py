@@ -14,7 +14,7 @@ import faiss
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sgimd_torch.archives import read_npz, write_npz
+from sgimd_torch.files import read_npz, write_npz
 from sgimd_torch.spaces import Array, check_vector
 
 Rows = NDArray[np.int64]

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sgimd_torch.environment import Environment
+from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.learner import Learner
 from sgimd_torch.spaces import Array, Episode, check_count, stream
 from sgimd_torch.teachers import Teacher

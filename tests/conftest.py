@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from run import main
 from runs import arguments, csv_of
 from sgimd_torch.evaluation import Benchmark, save_benchmark
+from sgimd_torch.runs.run import main
 
 
 @pytest.fixture(scope="session")

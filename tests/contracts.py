@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sgimd_torch.environment import Environment, execute_many
+from sgimd_torch.environments.protocol import Environment, execute_many
 from sgimd_torch.spaces import Array, stream
 
 

@@ -13,7 +13,7 @@ ROOT = Path(sgimd_torch.__file__).parents[1]
 MOVEMENTS = 90
 CSV = ("episodes.csv", "evaluation.csv", "regions.csv")
 # Every movement goes to disk at once, so that a test can wait for the k-th.
-EAGER = "import run, sys; run.FLUSH_EVERY = 0; sys.exit(run.main(sys.argv[1:]))"
+EAGER = "import sys; from sgimd_torch.runs import run; run.FLUSH_EVERY = 0; sys.exit(run.main(sys.argv[1:]))"
 
 
 def arguments(out, benchmark):
@@ -27,7 +27,7 @@ def csv_of(directory):
 
 def start(program, *options, limit=""):
     """Another process; ``limit`` is for ``ulimit``."""
-    paths = [str(ROOT / "experiments"), str(ROOT), os.environ.get("PYTHONPATH", "")]
+    paths = [str(ROOT), os.environ.get("PYTHONPATH", "")]
     command = shlex.join([sys.executable, "-c", program, *map(str, options)])
     return subprocess.Popen(
         ["bash", "-c", f"{f'ulimit {limit}; ' if limit else ''}exec {command}"],

@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from sgimd_torch.demonstrations import SHIPPED, load_demonstrations, save_demonstrations
-from sgimd_torch.fishing_rod import JOINT_RANGES, FishingRod
+from sgimd_torch.environments.fishing_rod import JOINT_RANGES, FishingRod
 from sgimd_torch.spaces import Array, Demonstration, stream
 
 

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sgimd_torch.environment import PlanarArm
+from sgimd_torch.environments.fishing_rod import FishingRod
+from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import Benchmark, Evaluation, evaluate, load_benchmark, save_benchmark, tile_goals
-from sgimd_torch.fishing_rod import FishingRod
-from sgimd_torch.inverse_model import LocalInverse, NearestNeighbour
+from sgimd_torch.inverses.local import LocalInverse, NearestNeighbour
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, Box, Estimate, stream
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sgimd_torch.algorithms import sagg_riac
-from sgimd_torch.environment import PlanarArm
+from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.learner import Learner
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, Attempt, Demonstration, Move, stream

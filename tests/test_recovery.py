@@ -5,9 +5,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from sgimd_torch.environment import PlanarArm
+from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import evaluate
-from sgimd_torch.inverse_model import LocalInverse
+from sgimd_torch.inverses.local import LocalInverse
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Array, stream
 from sgimd_torch.teachers import PeriodicTeacher

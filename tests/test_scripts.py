@@ -10,7 +10,7 @@ import make_benchmark
 import make_demonstrations
 import make_teachers
 from sgimd_torch.demonstrations import load_demonstrations
-from sgimd_torch.fishing_rod import FishingRod
+from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.spaces import stream
 
 

@@ -9,11 +9,11 @@ import pytest
 from numpy.typing import ArrayLike
 
 from sgimd_torch.algorithms import attempted, emulating, imitating, imitation, remembered, sagg_riac, sgim_d
-from sgimd_torch.environment import PlanarArm
+from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import evaluate
-from sgimd_torch.interest import UniformGoals
-from sgimd_torch.inverse_model import LocalInverse, NearestNeighbour
-from sgimd_torch.search import perturb
+from sgimd_torch.goals.interest_map import UniformGoals
+from sgimd_torch.inverses.local import LocalInverse, NearestNeighbour
+from sgimd_torch.searches.perturb import perturb
 from sgimd_torch.session import Recorded, ReplayError, live, replay, run
 from sgimd_torch.spaces import Array, Episode, stream
 from sgimd_torch.teachers import InitialTeacher, PeriodicTeacher

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from sgimd_torch.competence import AttemptCompetence, Competence, performance
-from sgimd_torch.environment import PlanarArm
-from sgimd_torch.inverse_model import NearestNeighbour
+from sgimd_torch.environments.planar_arm import PlanarArm
+from sgimd_torch.inverses.local import NearestNeighbour
 from sgimd_torch.memory import Memory
-from sgimd_torch.search import nelder_mead, perturb
+from sgimd_torch.searches.perturb import perturb
+from sgimd_torch.searches.simplex import nelder_mead
 from sgimd_torch.spaces import Array, Attempt, Box, Demonstration, Estimate, Move, Search, stream
 from sgimd_torch.strategies import Babble, Emulate, GoalBabbling, Imitate, Remember, Rest
 from worlds import NO_CONTEXT, demonstrate

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from sgimd_torch.algorithms import imitation, observation, random_exploration, sagg_riac, sgim_d
-from sgimd_torch.environment import PlanarArm
+from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.learner import Learner
 from sgimd_torch.spaces import Array, Demonstration, stream
 

@@ -1,0 +1,140 @@
+"""The pictures on the board: the water plane from above, coloured by competence, interest, landing points and error.
+
+pictures = draw(regions, space, outcomes=..., ...); pictures["competence"] is a png
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.collections import PatchCollection
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+from matplotlib.ticker import MaxNLocator
+
+from sgimd_torch.board.scalars import branches
+from sgimd_torch.figures.learning import interest_map, landing_points
+from sgimd_torch.goals.regions import Region
+from sgimd_torch.spaces import Array, Box
+
+LEVEL = 2  # of the tree: those regions are named in the pictures, as on the board's page of curves
+# The scales stay, so that pictures of different times and runs can be compared; what lies beyond looks like the end.
+WORST = -0.25
+FARTHEST = 0.3  # m
+STYLE: Any = {"font.size": 8, "axes.titlesize": 8}
+
+
+def draw(
+    regions: Sequence[Region],
+    space: Box,
+    *,
+    outcomes: Array,
+    goals: Array,
+    demonstrated: Array,
+    benchmark: Array,
+    errors: Array,
+) -> dict[str, bytes]:
+    """The pictures, as png.
+
+    Args:
+        regions: leaves of the interest map; empty for a learner without one, which gets no picture of it.
+        space: T, of the plane.
+        outcomes, goals, demonstrated: ``(n, 2)`` m, where the float landed; the last own goals; what was demonstrated.
+        benchmark, errors: ``(n, 2)`` and ``(n,)`` m, its goals and how far from each the float landed.
+    """
+    side = float(space.sides[0]) / 40
+
+    def landed(ax: Axes) -> None:
+        landing_points(ax, outcomes, space, demonstrated=demonstrated if len(demonstrated) else None, side=side)
+
+    pictures = {"landed": landed, "error": lambda ax: _errors(ax, benchmark, errors)}
+    if regions:
+        pictures["interest"] = lambda ax: _interest(ax, regions, goals)
+        pictures["competence"] = lambda ax: _competence(ax, regions)
+    return {name: _png(picture) for name, picture in pictures.items()}
+
+
+def where(regions: Sequence[Region]) -> str:
+    """A table, in Markdown, of the regions that have curves of their own: where they lie, and how they are."""
+    lines = ["| region | corner below | corner above | goals | competence | interest |", "|---|---|---|---|---|---|"]
+    for path, below in branches(regions, 3).items():
+        low, high = _corners(below)
+        competences = np.concatenate([region.competences for region in below])
+        competence = f"{competences.mean():.2f}" if len(competences) else "-"
+        interest = sum(region.interest() * len(region.goals) for region in below) / max(1, len(competences))
+        corners = (", ".join(f"{x:.2f}" for x in corner) for corner in (low, high))
+        lines.append(f"| {path} | {' | '.join(corners)} | {len(competences)} | {competence} | {interest:.3f} |")
+    return "\n".join(lines)
+
+
+def _interest(ax: Axes, regions: Sequence[Region], goals: Array) -> None:
+    drawn = interest_map(ax, *_boxes(regions), np.array([region.interest() for region in regions]), goals=goals)
+    _label(drawn, "interest of a region: change of competence")
+    _name(ax, regions)
+
+
+def _competence(ax: Axes, regions: Sequence[Region]) -> None:
+    means = [region.competences.mean() if len(region.goals) else np.nan for region in regions]
+    drawn = interest_map(ax, *_boxes(regions), np.ma.masked_invalid(means))
+    drawn.set_cmap("viridis")
+    drawn.set_clim(WORST, 0)
+    _label(drawn, "mean competence of a region; 0: reached")
+    _name(ax, regions)
+
+
+def _errors(ax: Axes, benchmark: Array, errors: Array) -> None:
+    drawn = ax.scatter(
+        benchmark[:, 0], benchmark[:, 1], c=errors, s=14, cmap="viridis_r", vmin=0, vmax=FARTHEST, edgecolors="none"
+    )
+    figure = ax.get_figure()
+    assert figure is not None
+    figure.colorbar(drawn, ax=ax, label="distance from goal to landing point (m)", extend="max")
+    ax.plot(0, 0, "^", color="black", markeredgecolor="white", markersize=9)
+    ax.set(xlabel="x (m)", ylabel="y (m)", aspect="equal")
+    ax.xaxis.set_major_locator(MaxNLocator(4))
+    ax.yaxis.set_major_locator(MaxNLocator(4))
+    ax.set_title(f"{len(errors)} benchmark goals, mean error {errors.mean():.3f} m")
+
+
+def _label(drawn: PatchCollection, label: str) -> None:
+    assert drawn.colorbar is not None
+    drawn.colorbar.set_label(label)
+
+
+def _name(ax: Axes, regions: Sequence[Region]) -> None:
+    """Frame and name the regions of the curves."""
+    named = branches(regions, LEVEL)
+    for path, below in named.items():
+        if f"{path}0" in named:
+            continue
+        low, high = _corners(below)
+        ax.add_patch(Rectangle((low[0], low[1]), *(high - low), fill=False, edgecolor="black", linewidth=1.6))
+        x, y = (low + high) / 2
+        text = ax.text(x, y, path, ha="center", va="center", fontweight="bold")
+        text.set_bbox({"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 1.2})
+
+
+def _boxes(regions: Sequence[Region]) -> tuple[Array, Array]:
+    return np.stack([region.low for region in regions]), np.stack([region.high for region in regions])
+
+
+def _corners(regions: Sequence[Region]) -> tuple[Array, Array]:
+    lows, highs = _boxes(regions)
+    return lows.min(axis=0), highs.max(axis=0)
+
+
+def _png(picture: Callable[[Axes], object]) -> bytes:
+    """As large as TensorBoard shows it."""
+    with rc_context(STYLE):
+        figure = Figure(figsize=(4.0, 3.5), dpi=90)
+        ax = figure.subplots()
+        figure.subplots_adjust(left=0.13, bottom=0.13, right=0.92, top=0.88)
+        picture(ax)
+        content = io.BytesIO()
+        figure.savefig(content, format="png", pil_kwargs={"compress_level": 3})
+    return content.getvalue()

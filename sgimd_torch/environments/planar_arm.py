@@ -1,0 +1,154 @@
+"""A planar arm whose reachable set and inverse are known exactly: for tests, quick ablations and first steps.
+
+arm = PlanarArm(); outcome = arm.execute(arm.observe(rng), theta, rng)
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sgimd_torch.environments.protocol import check_movement, check_rng
+from sgimd_torch.spaces import Array, Box, check_count, check_vector, first_entry
+
+
+class PlanarArm:
+    """An arm of equal links in the plane; the outcome is where its end stands.
+
+    ``theta`` in [0, 1]^n_joints is scaled to joint angles, .5 being 0: the first joint turns in [-pi, pi], the others
+    bend in [-max_angle, max_angle]. What it can reach is exactly the ring ``min_radius`` <= radius <= ``length``.
+
+    Args:
+        n_joints: at least 2.
+        length: of the whole arm, m.
+        max_angle: rad, in (0, pi]; None means 2 pi / n_joints, the least that leaves no hole in the ring.
+        noise: standard deviation of every joint angle, rad; what it does to the outcome depends on the movement.
+        context: whether a context turns the whole arm, by an angle in [-pi/4, pi/4]; ``rest`` is that of context 0.
+        outcomes: T; None means the square around the ring.
+
+    Raises:
+        ValueError: a number out of its range, or ``outcomes`` that do not contain ``rest``.
+    """
+
+    def __init__(
+        self,
+        n_joints: int = 7,
+        *,
+        length: float = 1.0,
+        max_angle: float | None = None,
+        noise: float = 0.0,
+        context: bool = False,
+        outcomes: Box | None = None,
+    ) -> None:
+        n_joints = check_count("n_joints", n_joints, 2)
+        if max_angle is None:
+            max_angle = 2 * np.pi / n_joints
+        if not (0 < length < np.inf and 0 < max_angle <= np.pi and 0 <= noise < np.inf):
+            raise ValueError(f"needs length > 0, 0 < max_angle <= pi, noise >= 0, got {length}, {max_angle}, {noise}")
+        self.contexts = Box.cube(-np.pi / 4, np.pi / 4, int(context))
+        self.policies = Box.cube(0.0, 1.0, n_joints)
+        self.outcomes = Box.cube(-length, length, 2) if outcomes is None else outcomes
+        self.rest = self.outcomes.check("rest, where the straight arm ends,", [length, 0.0], "T has 2 dimensions")
+        self.rest.flags.writeable = False
+        self.length, self.noise = length, noise
+        self._limits = np.array([np.pi] + [max_angle] * (n_joints - 1))
+        # Among bends up to max_angle, equal ones bring the end closest (Cauchy's arm lemma), until they close a circle.
+        self._max_bend = min(max_angle, 2 * np.pi / n_joints)
+        self.min_radius = max(0.0, self._radius(self._max_bend))
+        self.outcome_noise = self._mean_outcome_noise()
+
+    def observe(self, rng: np.random.Generator) -> Array:
+        """``(context_dim,)`` uniform in C."""
+        return self.contexts.sample(rng)
+
+    def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
+        """``(2,)`` m, where the end stands after one movement.
+
+        Raises:
+            ValueError: ``context`` is not one point of C, or ``theta`` not one of Pi.
+            TypeError: ``rng`` is not a Generator.
+        """
+        context, theta = check_movement(self, context, theta)
+        check_rng(rng)
+        # Drawn without noise too: it moves no stream.
+        angles = self.angles(theta) + self.noise * rng.standard_normal(len(theta))
+        directions = np.cumsum(angles) + context.sum()  # an empty context sums to 0
+        return self.length / len(theta) * np.array([np.cos(directions).sum(), np.sin(directions).sum()])
+
+    def angles(self, theta: ArrayLike) -> Array:
+        """``(..., n_joints)`` rad, by how much each joint turns or bends without noise; ``theta`` ``(..., n_joints)``.
+
+        Raises:
+            ValueError: ``theta`` is not in Pi.
+        """
+        return (2 * self.policies.check("theta", theta, "was a goal passed instead?") - 1) * self._limits
+
+    def correspondence(self, times: ArrayLike, trajectory: ArrayLike) -> Array:
+        """theta_d, the policy that holds the last posture of a demonstrated trajectory: the inverse of ``angles``.
+
+        The outcome is where the arm ends, so how it came there leaves no trace in theta, and eq. (6) is solved exactly.
+
+        Args:
+            times: ``(n_times,)`` s, increasing.
+            trajectory: ``(n_times, n_joints)`` rad.
+
+        Returns:
+            ``(n_joints,)`` in [0, 1].
+
+        Raises:
+            ValueError: shapes that do not fit, values that are not finite, unsorted times, or a last posture that the
+                joints cannot take.
+        """
+        trajectory = check_vector("trajectory", trajectory, self.policies.dim, "one column for each joint, in rad")
+        if trajectory.ndim != 2 or len(trajectory) == 0:
+            raise ValueError(f"trajectory needs samples in rows, got shape {trajectory.shape}")
+        times = check_vector("times", times, len(trajectory), "one time in s for each row of the trajectory")
+        if times.ndim != 1 or not (np.diff(times) > 0).all():
+            raise ValueError(f"times must increase from sample to sample, got {times}; were the rows shuffled?")
+        turned = trajectory[-1] / self._limits
+        beyond = np.abs(turned) > 1 + 1e-12  # more than rounding
+        if beyond.any():
+            limits = f"+-{self._limits[0]:.3f} rad, the others +-{self._limits[1]:.3f} rad"
+            entry = first_entry(trajectory[-1], beyond)
+            raise ValueError(f"the first joint turns within {limits}, but of the last posture {entry}; is it in deg?")
+        return self.policies.clip((turned + 1) / 2)
+
+    def reachable(self, points: ArrayLike) -> NDArray[np.bool_]:
+        """``(...)`` whether some theta without noise reaches each of ``points`` ``(..., 2)``, to rounding."""
+        radius = np.linalg.norm(check_vector("points", points, 2), axis=-1)
+        rounding = 1e-12 * self.length
+        is_reachable: NDArray[np.bool_] = (self.min_radius - rounding <= radius) & (radius <= self.length + rounding)
+        return is_reachable
+
+    def solve(self, context: ArrayLike, goal: ArrayLike) -> Array:
+        """``(n_joints,)`` a theta that reaches ``goal`` without noise: equal bends, the first joint for the direction.
+
+        Raises:
+            ValueError: ``goal`` is not one reachable point ``(2,)``, or ``context`` not one of C.
+        """
+        from scipy.optimize import root_scalar  # takes longer to import than this whole library
+
+        context, _ = check_movement(self, context, np.full(self.policies.dim, 0.5))
+        goal = check_vector("goal", goal, 2, "was theta passed instead?")
+        if goal.ndim != 1 or not self.reachable(goal):
+            raise ValueError(f"goal must be one point from {self.min_radius} to {self.length} m away, got {goal}")
+        n = self.policies.dim
+        radius = np.clip(np.linalg.norm(goal), self._radius(self._max_bend), self._radius(0.0))
+        bend = root_scalar(lambda bend: self._radius(bend) - radius, bracket=(0.0, self._max_bend), xtol=1e-15).root
+        first = np.arctan2(goal[1], goal[0]) - context.sum() - (n - 1) / 2 * bend  # the chord halves the total turn
+        angles = np.array([np.angle(np.exp(1j * first))] + [bend] * (n - 1))
+        return self.policies.clip((angles / self._limits + 1) / 2)
+
+    def _radius(self, bend: float) -> float:
+        """How far the end is when all joints but the first bend alike: falls from the length to 0 at a full turn."""
+        n = self.policies.dim
+        return float(self.length / n * np.cos((np.arange(n) - (n - 1) / 2) * bend).sum())
+
+    def _mean_outcome_noise(self) -> float:
+        """Root mean square, over uniform thetas, of an outcome's deviation per dimension, to first order in noise."""
+        n, straightness = self.policies.dim, np.sinc(self._limits[1] / np.pi)  # the mean cosine of a bend
+        apart = np.abs(np.subtract.outer(np.arange(n), np.arange(n)))
+        alignment = straightness**apart  # (n, n) the mean cosine between two links
+        # A joint moves the end by its angle times its distance to the end, the length of the links beyond it.
+        levers = [alignment[joint:, joint:].sum() for joint in range(n)]
+        return float(self.noise * self.length / n * np.sqrt(np.sum(levers) / 2))

@@ -1,0 +1,131 @@
+"""The world as the learner meets it: observe a context, execute a movement, see its outcome.
+
+Section 2.1 of Nguyen & Oudeyer (2014): M(c, theta) = tau. An environment of your own needs the seven members of
+`Environment`: three boxes, ``rest``, ``outcome_noise``, ``observe`` and ``execute``.
+    outcome = environment.execute(environment.observe(rng), theta, rng)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sgimd_torch.spaces import Array, Box
+
+
+class Environment(Protocol):
+    """What a learner can move and see. Nothing carries over from one movement to the next."""
+
+    @property
+    def contexts(self) -> Box:
+        """C; ``dim`` 0 when every movement starts alike."""
+        ...
+
+    @property
+    def policies(self) -> Box:
+        """Pi."""
+        ...
+
+    @property
+    def outcomes(self) -> Box:
+        """T, from which goals are drawn. Outcomes may fall outside."""
+        ...
+
+    @property
+    def rest(self) -> Array:
+        """tau_org ``(outcome_dim,)`` in T, the outcome of not moving."""
+        ...
+
+    @property
+    def outcome_noise(self) -> float:
+        """Typical standard deviation (m), per dimension, of an outcome executed again; 0 if it is always the same."""
+        ...
+
+    def observe(self, rng: np.random.Generator) -> Array:
+        """``(context_dim,)`` in which the next movement will start."""
+        ...
+
+    def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
+        """``(outcome_dim,)`` of one movement, tau = M(c, theta); noise comes from ``rng`` alone.
+
+        Raises:
+            ValueError: ``context`` is not one point of C or ``theta`` not one of Pi; see `check_movement`.
+            SimulationError: there is no finite outcome.
+        """
+        ...
+
+
+@runtime_checkable
+class BatchEnvironment(Environment, Protocol):
+    """An environment that executes many movements faster together than one by one."""
+
+    def execute_many(self, contexts: Array, thetas: Array, rngs: Sequence[np.random.Generator]) -> Array:
+        """``(n, outcome_dim)``, row i equal to ``execute(contexts[i], thetas[i], rngs[i])`` bit for bit."""
+        ...
+
+
+class SimulationError(RuntimeError):
+    """A simulation gave no usable outcome; ``theta`` ``(theta_dim,)`` is what was being executed."""
+
+    def __init__(self, theta: Array, reason: str) -> None:
+        super().__init__(theta, reason)  # both in args, or it could not travel between processes
+        self.theta, self.reason = theta, reason
+
+    def __str__(self) -> str:
+        return f"{self.reason}; theta={np.asarray(self.theta).tolist()}"
+
+
+def execute_many(
+    environment: Environment, contexts: ArrayLike, thetas: ArrayLike, rngs: Sequence[np.random.Generator]
+) -> Array:
+    """Many movements: together if the environment can, else one by one, with the same outcomes.
+
+    Args:
+        environment: any; a `BatchEnvironment` is asked once.
+        contexts: ``(n, context_dim)`` in C.
+        thetas: ``(n, theta_dim)`` in Pi.
+        rngs: n streams, one for each movement, so that no outcome depends on what else is in the batch.
+
+    Returns:
+        ``(n, outcome_dim)``, row i equal to ``environment.execute(contexts[i], thetas[i], rngs[i])`` bit for bit.
+
+    Raises:
+        ValueError: the numbers of rows differ, or a row lies outside C or Pi.
+        SimulationError: a movement has no finite outcome.
+    """
+    contexts = environment.contexts.check("contexts", contexts)
+    thetas = environment.policies.check("thetas", thetas, "were goals passed instead?")
+    if not contexts.ndim == thetas.ndim == 2 or not len(contexts) == len(thetas) == len(rngs):
+        raise ValueError(f"needs n contexts, thetas, rngs, got {contexts.shape}, {thetas.shape} and {len(rngs)} rngs")
+    if len(thetas) == 0:
+        return np.empty((0, environment.outcomes.dim))
+    if isinstance(environment, BatchEnvironment):
+        return environment.execute_many(contexts, thetas, rngs)
+    return np.stack([environment.execute(*movement) for movement in zip(contexts, thetas, rngs, strict=True)])
+
+
+def check_movement(environment: Environment, context: ArrayLike, theta: ArrayLike) -> tuple[Array, Array]:
+    """One point of C and one of Pi, as float64: the first line of an ``execute``.
+
+    Raises:
+        ValueError: another shape, NaN or infinity, or a point outside its box.
+    """
+    context = environment.contexts.check("context", context, "was theta passed first?")
+    theta = environment.policies.check("theta", theta, "was a goal passed instead?")
+    if not context.ndim == theta.ndim == 1:
+        raise ValueError(f"execute() takes one movement, got {context.shape} and {theta.shape}; is it execute_many()?")
+    return context, theta
+
+
+def check_rng(rng: object) -> None:
+    """Refuse what is no random stream, before anything is drawn from it.
+
+    Raises:
+        TypeError: it is not a Generator.
+    """
+    if not isinstance(rng, np.random.Generator):
+        slip = "was the seed passed instead of a Generator, such as stream(seed, name)?"
+        raise TypeError(f"rng must be a numpy.random.Generator, got {type(rng).__name__}; {slip}")

@@ -1,0 +1,1 @@
+"""Figures of learning, movements, predictions and results. Needs matplotlib."""

@@ -1,0 +1,96 @@
+"""The honest rival of the interest map's tree: the same interest and the same choice of goals over a fixed grid.
+
+What differs from section 3.2.1 of Nguyen & Oudeyer (2014) is that cells never split. In few dimensions and a task space
+of the size of what can be reached a grid may do as well; elsewhere it shows what the recursive split is worth.
+``goals = ProgressGrid(contexts, outcomes, rng)``, in the place of `InterestMap`
+"""
+
+from __future__ import annotations
+
+import itertools
+from functools import partial
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sgimd_torch.goals.interest_map import Tiling
+from sgimd_torch.goals.regions import Progress, Region, gained_progress, interest_of
+from sgimd_torch.spaces import Array, Box
+
+_ENOUGH = 100  # cells, by default: each needs four goals before it knows its progress, and a run has some 500
+_MOST = 100_000  # more cells than any run has goals
+
+
+class ProgressGrid:
+    """Equal cells over C x T, and the choice of goals from them by eqs. (3) and (4).
+
+    Args:
+        contexts, outcomes, rng: as of `InterestMap`. Goals come from the cells that contain the context.
+        cells: for each dimension of C x T; None for about 100 in all, and 2 at least: 10 x 10 in two dimensions.
+        window: how many recent goals interest looks at; even, at least 4. A cell remembers no more.
+        modes: probabilities of a goal (1) in a cell of high interest, (2) anywhere, (3) near a cell's worst goal.
+        near: mode 3 stays this close to the worst goal, as a part of the cell's sides.
+        progress: as of `InterestMap`.
+
+    Raises:
+        ValueError: a number out of its range, or so many cells that none would ever hold four goals.
+    """
+
+    def __init__(
+        self,
+        contexts: Box,
+        outcomes: Box,
+        rng: np.random.Generator,
+        *,
+        cells: int | None = None,
+        window: int = 24,
+        modes: tuple[float, float, float] = (0.7, 0.2, 0.1),
+        near: float = 0.05,
+        progress: Progress = gained_progress,
+    ) -> None:
+        if window % 2 or window < 4:
+            raise ValueError(f"window must be even and at least 4, got {window}")
+        dim = contexts.dim + outcomes.dim
+        if cells is None:
+            cells = max(2, round(_ENOUGH ** (1 / dim)))
+        if cells < 1 or cells**dim > _MOST:
+            raise ValueError(
+                f"cells must be from 1 for each dimension to {_MOST} in all, got {cells} in {dim} dimensions"
+            )
+        self.window = window
+        measure = partial(interest_of, window=window, progress=progress)
+        self._tiling = Tiling(contexts, outcomes, rng, measure, modes=modes, near=near)
+        edges = np.linspace(self._tiling.box.low, self._tiling.box.high, cells + 1)  # (cells + 1, dim)
+        axes = np.arange(dim)
+
+        def cell(corner: tuple[int, ...]) -> Region:
+            low = np.array(corner)
+            path = "R" + "".join(f".{index}" for index in corner)
+            return self._tiling.region(path, edges[low, axes], edges[low + 1, axes])
+
+        self._tiling.plant([cell(corner) for corner in itertools.product(range(cells), repeat=dim)])
+
+    @property
+    def regions(self) -> list[Region]:
+        """The cells, which tile C x T; ``R.3.7`` is the fourth from below in the first dimension, the eighth in the
+        second."""
+        return list(self._tiling.regions)
+
+    def sample(self, context: ArrayLike) -> Array:
+        """Decide a goal, section 3.2.2: ``(outcome_dim,)`` in T.
+
+        Raises:
+            ValueError: ``context`` is not one point of C.
+        """
+        return self._tiling.sample(context)
+
+    def add(
+        self, context: ArrayLike, goal: ArrayLike, competence: float, strategy: str = "autonomous", gain: float = 0.0
+    ) -> None:
+        """Competence was measured at a goal; its cell forgets what lies before its window.
+
+        Raises:
+            ValueError: as `InterestMap.add`.
+        """
+        index = self._tiling.add(context, goal, competence, strategy, gain)
+        self._tiling.regions[index] = self._tiling.regions[index].keep(slice(-self.window, None))

@@ -1,0 +1,126 @@
+"""Local inverse model L^-1: which movement should land on the goal, judging by what similar movements did?
+
+Section 4.4.2 and eqs. (8) and (9) of Nguyen & Oudeyer (2014). Many movements reach one place, and averaging unlike ones
+reaches none of their places; so pick one region of policy space that is near the goal *and* reliable, and stay in it.
+    inverse = LocalInverse(memory); estimate = inverse(context, goal); estimate.theta
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sgimd_torch.memory import Memory, Rows
+from sgimd_torch.spaces import Array, Estimate
+
+
+class LocalInverse:
+    """Mean theta of the most reliable neighbourhood, weighted towards the goal. It changes and draws nothing.
+
+    Args:
+        h_max: how many of the nearest outcomes are weighed against each other, eq. (8).
+        k_max: exemplars at most in a neighbourhood K_h.
+        dist_n: the paper's distN, radius of a neighbourhood in policy space. None: 0.6 in 25 dimensions, and
+            growing with the square root of their number, as distances in a unit cube do.
+        alpha: what a metre of spread costs, in metres of distance to the goal.
+        width: of the Gaussian of eq. (9), in mean distances between the neighbourhood's outcomes and the goal. Wide, it
+            averages the neighbourhood; narrow, it follows the exemplar nearest to the goal.
+    """
+
+    def __init__(
+        self,
+        memory: Memory,
+        *,
+        h_max: int = 10,
+        k_max: int = 10,
+        dist_n: float | None = None,
+        alpha: float = 0.5,
+        width: float = 0.25,
+    ) -> None:
+        if not width > 0:
+            raise ValueError(f"width must be positive, got {width}; it is in mean distances to the goal")
+        self.memory = memory
+        self.h_max = h_max
+        self.k_max = k_max
+        self.dist_n = 0.6 * np.sqrt(memory.theta_dim / 25) if dist_n is None else dist_n
+        self.alpha = alpha
+        self.width = width
+
+    def __call__(self, context: Array, goal: Array) -> Estimate:
+        """theta_g, and K_best ordered from the policy nearest to its centre theta_h outwards.
+
+        Raises:
+            RuntimeError: the memory is empty.
+        """
+        rows = self._most_reliable(context, goal)
+        thetas, outcomes = self.memory.thetas[rows], self.memory.outcomes[rows]
+        theta = gaussian_weights(goal, outcomes, self.width) @ thetas  # eq. (9)
+        # A mean lies among what it averages; rounding must not put it 1e-16 outside Pi.
+        return Estimate(np.clip(theta, thetas.min(axis=0), thetas.max(axis=0)), thetas, outcomes, context)
+
+    def _most_reliable(self, context: Array, goal: Array) -> Rows:
+        near = _near_goal(self.memory, context, goal, self.h_max)  # H of eq. (8)
+        neighbourhoods = self.memory.neighbourhoods(near, self.k_max, self.dist_n)  # K_h of eq. (8)
+        spreads = _spreads(self.memory.outcomes, neighbourhoods)
+        unreliability = _distances(self.memory.outcomes[near], goal) + self.alpha * spreads
+        return neighbourhoods[int(unreliability.argmin())]
+
+
+class NearestNeighbour:
+    """The movement whose outcome came nearest, as it was: the field's simplest inverse model."""
+
+    def __init__(self, memory: Memory, k: int = 10) -> None:
+        self.memory = memory
+        self.k = k
+
+    def __call__(self, context: Array, goal: Array) -> Estimate:
+        """theta of the nearest outcome, and the ``k`` exemplars with the nearest outcomes, nearest first.
+
+        Raises:
+            RuntimeError: the memory is empty.
+        """
+        rows = _near_goal(self.memory, context, goal, self.k)
+        thetas = self.memory.thetas[rows]
+        return Estimate(thetas[0], thetas, self.memory.outcomes[rows], context)
+
+
+def gaussian_weights(goal: Array, outcomes: Array, width: float) -> Array:
+    """beta of eq. (9): ``(k,)``, summing to one, a Gaussian of each distance between ``outcomes`` and ``goal``.
+
+    The paper leaves the Gaussian's width open: here ``width`` mean distances, and at least a millimetre.
+    """
+    distances = _distances(outcomes, goal)
+    scaled = distances / max(1e-3, width * distances.mean())
+    weights = np.exp(0.5 * (scaled.min() ** 2 - scaled**2))  # the nearest weighs 1 before normalising: none underflow
+    return weights / weights.sum()
+
+
+def _near_goal(memory: Memory, context: Array, goal: Array, k: int) -> Rows:
+    rows = memory.near_outcomes(context, goal, k)
+    if not len(rows):
+        raise RuntimeError("the inverse model needs a memory of at least one exemplar, but it is empty; explore first")
+    return rows
+
+
+def _spreads(outcomes: Array, neighbourhoods: list[Rows]) -> Array:
+    """``(h,)`` metres: the standard deviation of the outcomes within each neighbourhood.
+
+    Deviation: the paper takes the variance, which is neither a distance nor large enough to matter next to one. A
+    movement without neighbours has no deviation, yet is not sure: it gets the median of the others'. Where none has
+    neighbours all get 0, and the nearest to the goal is chosen.
+    """
+    spreads = np.array([_standard_deviation(outcomes[rows]) for rows in neighbourhoods])
+    known = ~np.isnan(spreads)
+    return np.where(known, spreads, np.median(spreads[known]) if known.any() else 0.0)
+
+
+def _standard_deviation(outcomes: Array) -> float:
+    n = len(outcomes)
+    if n < 2:
+        return np.nan
+    deviations = outcomes - outcomes.sum(axis=0) / n
+    return float(np.sqrt((deviations * deviations).sum() / (n - 1)))  # n - 1: else small neighbourhoods look reliable
+
+
+def _distances(outcomes: Array, goal: Array) -> Array:
+    difference = outcomes - goal
+    return np.sqrt((difference * difference).sum(axis=-1))

@@ -1,0 +1,116 @@
+"""Inverse by the forward model: of all movements like those that came near, which should land nearest, and reliably?
+
+Not in Nguyen & Oudeyer (2014), whose inverse model, eqs. (8) and (9), looks at outcomes alone. Here candidates descend
+the expected squared distance to the goal, the predicted noise included: among redundant movements the reliable win.
+    inverse = ModelInverse(memory, model, environment.policies); inverse(context, goal).theta
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import torch
+
+from sgimd_torch.forward_model.anchored import TRUST, Anchored, Trust
+from sgimd_torch.forward_model.model import ForwardModel
+from sgimd_torch.inverses.locally_linear import LocallyLinear
+from sgimd_torch.memory import Memory
+from sgimd_torch.spaces import Array, Box, Estimate, check_count
+
+_TOGETHER = 64  # goals in one batch, about 50 MB
+
+
+class ModelInverse:
+    """Descends from ``start``'s estimate and the movements that landed nearest, to what ``model`` expects to be best.
+
+    It reads the model and trains it never, so that looking changes nothing: call ``model.refresh(memory)`` in the loop
+    that adds to the memory. Until the model is good enough for ``trust`` it answers as ``start`` does.
+
+    Args:
+        memory: read for candidates and anchors.
+        model: predicts.
+        policies: Pi; nothing outside is proposed.
+        start: another inverse model, whose estimate is one of the candidates; None for :class:`LocallyLinear`.
+        k: candidates besides, the remembered movements that landed nearest the goal.
+        anchors: neighbours in policy space, of each candidate, by which predictions for it are corrected.
+        steps, step: of the descent, in sides of ``policies``. Many small steps end nearer the start than few large.
+        trust: how far to trust the model.
+
+    Raises:
+        ValueError: a number out of its range, or a model of other dimensions.
+    """
+
+    def __init__(
+        self,
+        memory: Memory,
+        model: ForwardModel,
+        policies: Box,
+        *,
+        start: Callable[[Array, Array], Estimate] | None = None,
+        k: int = 10,
+        anchors: int = 40,
+        steps: int = 40,
+        step: float = 0.005,
+        trust: Trust = TRUST,
+    ) -> None:
+        check_count("k", k, 1)
+        check_count("anchors", anchors, 1)
+        check_count("steps", steps, 0)
+        if not 0 < step < np.inf:
+            raise ValueError(f"step must be positive and finite, got {step}")
+        model.check_fits("memory", **{name: getattr(memory, name) for name in model.sizes})
+        model.check_fits("policies", theta_dim=policies.dim)
+        self.memory, self.model, self.policies, self.trust = memory, model, policies, trust
+        self.start = LocallyLinear(memory) if start is None else start
+        self.k, self.anchors, self.steps, self.step = k, anchors, steps, step
+
+    @property
+    def trusted(self) -> bool:
+        """Whether the model is good enough to be asked."""
+        return self.model.relative_error <= self.trust.error
+
+    def __call__(self, context: Array, goal: Array) -> Estimate:
+        """The candidate that should do best, with the neighbours that ``start`` gives.
+
+        Raises:
+            RuntimeError: the memory is empty.
+        """
+        return self.many(context, goal[None])[0]
+
+    def many(self, context: Array, goals: Array) -> list[Estimate]:
+        """An estimate for each of ``(n, outcome_dim)`` goals, several times as fast as one by one.
+
+        Raises:
+            RuntimeError: the memory is empty.
+        """
+        estimates = [self.start(context, goal) for goal in goals]
+        if not self.trusted:
+            return estimates
+        found: list[Estimate] = []
+        for first in range(0, len(goals), _TOGETHER):
+            some = slice(first, first + _TOGETHER)
+            found += self._descended(context, goals[some], estimates[some])
+        return found
+
+    def _descended(self, context: Array, goals: Array, estimates: list[Estimate]) -> list[Estimate]:
+        memory = self.memory
+        starts = [
+            np.vstack([estimate.theta, memory.thetas[memory.near_outcomes(context, goal, self.k)]])
+            for goal, estimate in zip(goals, estimates, strict=True)
+        ]
+        n_each = min(map(len, starts))
+        candidates = self.policies.clip(np.vstack([thetas[:n_each] for thetas in starts]))
+        rows = [memory.near_policies(context, theta, self.anchors) for theta in candidates]
+        near = np.stack([row[: min(map(len, rows))] for row in rows])
+        anchored = Anchored(
+            self.model, context, memory.contexts[near], memory.thetas[near], memory.outcomes[near], self.trust
+        )
+        aims = anchored.tensor(goals.repeat(n_each, axis=0))
+        theta = anchored.descend(anchored.tensor(candidates), aims, self.policies, steps=self.steps, step=self.step)
+        with torch.no_grad():
+            best = anchored.expected(theta, aims).reshape(len(goals), n_each).argmin(dim=1)
+        chosen = theta.reshape(len(goals), n_each, -1)[torch.arange(len(goals)), best].cpu().double().numpy()
+        return [
+            estimate._replace(theta=self.policies.clip(row)) for estimate, row in zip(estimates, chosen, strict=True)
+        ]

@@ -1,0 +1,1 @@
+"""Learners of other schools, to compare with."""

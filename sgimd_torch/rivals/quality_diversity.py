@@ -1,0 +1,167 @@
+"""Quality diversity: fill an archive of outcomes with the movements that reach them, another school's learners.
+
+MAP-Elites (Mouret & Clune 2015) and CMA-ME (Fontaine et al. 2020), by the package ``ribs``. They too end with a
+movement for every outcome that they found, but they aim at no goal: they vary movements that led somewhere new.
+    learner = map_elites(environment, seed)        learner = cma_me(environment, seed)
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+
+from sgimd_torch.environments.protocol import Environment
+from sgimd_torch.learner import Learner
+from sgimd_torch.memory import Memory
+from sgimd_torch.spaces import Array, Attempt, Box, Move, check_count, stream
+
+try:
+    from ribs.archives import GridArchive
+    from ribs.emitters import EmitterBase, EvolutionStrategyEmitter, GaussianEmitter
+except ImportError as error:
+    raise ImportError(f"quality diversity needs ribs: pip install 'sgimd-torch[rivals]' ({error})") from error
+
+_CELLS = 400  # by default: 20 x 20, of .1 m in the fishing task, as the tiles of its benchmark
+_MOST_CELLS = 1_000_000  # ribs keeps an array over all of them
+
+
+def map_elites(
+    environment: Environment,
+    seed: int,
+    *,
+    first: int = 100,
+    sd: float = 0.05,
+    batch: int = 10,
+    cells: int | None = None,
+) -> Learner:
+    """MAP-Elites: Gaussian variations of elites, drawn evenly from the cells of T that were reached.
+
+    Args:
+        environment: its boxes are read; it is not executed.
+        seed: of this learner's stream.
+        first: uniform movements to begin with.
+        sd: of the variations, in sides of Pi, as that of `perturb`; what leaves Pi is clipped.
+        batch: movements between two looks at the archive.
+        cells: for each dimension of T; None for about 400 in all.
+
+    Raises:
+        ValueError: a number out of its range, or an environment with contexts, which an archive over T cannot tell
+            apart.
+    """
+    if not 0 < sd < np.inf:
+        raise ValueError(f"sd must be positive and finite, got {sd}; without noise nothing new is tried")
+    first, batch = check_count("first", first, 1), check_count("batch", batch, 1)
+    rng = stream(seed, "map-elites")
+    archive = _archive(environment, rng, cells)
+    emitter = GaussianEmitter(
+        archive,
+        sigma=sd,
+        initial_solutions=rng.uniform(size=(first, environment.policies.dim)),
+        batch_size=batch,
+        seed=_seed(rng),
+    )
+    return _learner(environment, archive, [emitter], "map-elites")
+
+
+def cma_me(
+    environment: Environment,
+    seed: int,
+    *,
+    emitters: int = 5,
+    sd: float = 0.1,
+    batch: int | None = None,
+    cells: int | None = None,
+) -> Learner:
+    """CMA-ME: CMA-ES that climbs towards new cells of the archive, and restarts from an elite when it finds none.
+
+    Args:
+        environment, seed, cells: as of `map_elites`.
+        emitters: of the improvement type, which take turns, all from the centre of Pi. Deviation: Fontaine et al. have
+            15, which would leave each some 25 generations of a run on the rod.
+        sd: of the first generation and after a restart, in sides of Pi; what leaves Pi is clipped. Deviation: pyribs'
+            examples begin wider, but from the middle of a box of many dimensions that leads into its corners.
+        batch: movements of a generation, at least 2; None for 4 + 3 ln(theta_dim).
+
+    Raises:
+        ValueError: as `map_elites`.
+    """
+    if not 0 < sd < np.inf:
+        raise ValueError(f"sd must be positive and finite, got {sd}; without noise nothing new is tried")
+    if batch is not None:
+        check_count("batch", batch, 2)
+    rng = stream(seed, "cma-me")
+    archive = _archive(environment, rng, cells)
+    centre = np.full(environment.policies.dim, 0.5)
+    team = [
+        EvolutionStrategyEmitter(archive, x0=centre, sigma0=sd, ranker="2imp", batch_size=batch, seed=_seed(rng))
+        for _ in range(check_count("emitters", emitters, 1))
+    ]
+    return _learner(environment, archive, team, "cma-me")
+
+
+class QualityDiversity:
+    """The movements of emitters, batch after batch; the archive hears of a batch when all of it was executed.
+
+    The objective, by which elites replace each other, is little effort: minus the mean square of a movement's distance
+    from the middle of Pi, in its sides. Outcomes outside T count for the nearest cell of its border. In a T far larger
+    than what can be reached nearly all outcomes share a few cells, and little is left to vary.
+
+    Each attempt is one movement; one that is interrupted before its outcome was told is proposed again.
+
+    Args:
+        policies: Pi.
+        archive: over T, of movements in sides of Pi.
+        emitters: propose a batch each, in turns. Deviation: what lies outside Pi is clipped here, where CMA-ES itself
+            would draw again, without end once its mean lies in a corner of many dimensions.
+        origin: of the movements, for the log.
+    """
+
+    def __init__(self, policies: Box, archive: GridArchive, emitters: Sequence[EmitterBase], origin: str) -> None:
+        self.policies = policies
+        self.archive = archive
+        self._emitters = itertools.cycle(emitters)
+        self._origin = origin
+        self._ask()
+
+    def attempt(self, context: Array) -> Attempt:
+        """The next movement of the batch."""
+        theta = self.policies.low + self.policies.sides * self._batch[len(self._outcomes)]
+        outcome = yield Move(self.policies.clip(theta), None, self._origin)
+        self._outcomes.append(outcome)
+        if len(self._outcomes) == len(self._batch):
+            self._tell()
+            self._ask()
+
+    def _ask(self) -> None:
+        self._emitter = next(self._emitters)
+        self._batch: Array = np.clip(self._emitter.ask(), 0, 1)  # (n, theta_dim)
+        self._outcomes: list[Array] = []
+
+    def _tell(self) -> None:
+        objectives, outcomes = -np.square(self._batch - 0.5).mean(axis=1), np.stack(self._outcomes)
+        added = self.archive.add(self._batch, objectives, outcomes)
+        self._emitter.tell(self._batch, objectives, outcomes, added)
+
+
+def _archive(environment: Environment, rng: np.random.Generator, cells: int | None) -> GridArchive:
+    if environment.contexts.dim:
+        raise ValueError(f"quality diversity knows one context only, got contexts of dim {environment.contexts.dim}")
+    outcomes = environment.outcomes
+    cells = max(2, round(_CELLS ** (1 / outcomes.dim))) if cells is None else check_count("cells", cells, 1)
+    if cells**outcomes.dim > _MOST_CELLS:
+        raise ValueError(f"cells must be {_MOST_CELLS} in all at most, got {cells} in {outcomes.dim} dimensions")
+    ranges = list(zip(outcomes.low, outcomes.high, strict=True))
+    return GridArchive(
+        solution_dim=environment.policies.dim, dims=[cells] * outcomes.dim, ranges=ranges, seed=_seed(rng)
+    )
+
+
+def _learner(environment: Environment, archive: GridArchive, emitters: Sequence[EmitterBase], origin: str) -> Learner:
+    memory = Memory(environment.contexts.dim, environment.policies.dim, environment.outcomes.dim)
+    return Learner(memory, QualityDiversity(environment.policies, archive, emitters, origin))
+
+
+def _seed(rng: np.random.Generator) -> int:
+    return int(rng.integers(2**32))

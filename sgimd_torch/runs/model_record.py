@@ -1,0 +1,165 @@
+"""The forward model of a run: trained while it goes on, watched for how well it foresees, never unheard silently.
+
+predictions.csv and refreshes.csv are made again by a replay, so a resumed run has them as if it had never stopped.
+    model = RunModel(directory, parts.model, trust); model.episode(episode, memory); model.flush()
+"""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from sgimd_torch.forward_model.diagnostics import coverage, improvements
+from sgimd_torch.memory import Memory
+from sgimd_torch.runs.directory import RunDirectory
+from sgimd_torch.runs.log import numbers, write_whole
+from sgimd_torch.spaces import Array, Episode
+
+if TYPE_CHECKING:
+    from sgimd_torch.forward_model.model import ForwardModel, Prediction
+
+REFRESHES: Final = ("movements", "exemplars", "steps", "held_out", "relative_error", "diverged")
+LEVEL: Final = 0.8  # of the regions whose coverage the board shows
+LATELY: Final = 500  # movements, over which the board says how often refining a guess helped
+NOT_ASKED: Final = (
+    "the forward model is not asked, the local inverse model answers and the simplex searches in its place"
+)
+LEGEND: Final = {
+    "model/relative_error": "Error for exemplars never trained on, over that of always predicting their mean.",
+    "model/held_out": "Negative log likelihood of exemplars never trained on; lower is better.",
+    "model/steps": "Of the optimiser, at the last refresh.",
+    "model/error": "Distance (m) from where the newest movements landed to where the model, before learning them, "
+    "said that they would.",
+    "model/coverage": f"Share of the newest movements that landed in the model's {LEVEL:.0%} region.",
+    "model/improved": f"Share of the goals of the last {LATELY} movements for which refining came nearer than the "
+    "first guess.",
+    "model/ms": "Milliseconds of a refresh, the mean so far.",
+}
+LAYOUT: Final = {
+    "Does the forward model foresee where movements land?": {
+        "distance to where they landed (m)": "model/error",
+        f"share in its {LEVEL:.0%} region": "model/coverage",
+        "relative error on what it never learns from; 1 is no better than their mean": "model/relative_error",
+        f"share of refinements that helped, last {LATELY} movements": "model/improved",
+    },
+}
+
+
+def prediction_columns(outcome_dim: int) -> list[str]:
+    """Of predictions.csv."""
+    parts = ("outcome", "predicted", "epistemic", "aleatoric")
+    return ["exemplar", *(f"{part}_{k}" for part in parts for k in range(outcome_dim))]
+
+
+class RunModel:
+    """Refreshes the model after every movement and keeps a record; does nothing in a run without one.
+
+    Args:
+        directory: of the run; its files stay as they are until ``begin``.
+        model: None for a run without.
+        trust: relative error above which nobody asks the model.
+
+    ``curves`` are for the board, by tag, as the last refresh left them.
+    """
+
+    def __init__(self, directory: RunDirectory, model: ForwardModel | None, trust: float) -> None:
+        self._model, self._trust = model, trust
+        self._files = {name: directory.path / f"{name}.csv" for name in ("predictions", "refreshes")}
+        columns = {"predictions": prediction_columns(directory.columns.outcome_dim), "refreshes": REFRESHES}
+        self._pending = {name: [",".join(columns[name])] for name in self._files}
+        self._writes = False
+        self._asked = False
+        self._refreshes = 0
+        self._lately: deque[tuple[Array, Array, str]] = deque(maxlen=LATELY)
+        self._seconds = 0.0
+        self._news: list[str] = []
+        self.curves: dict[str, float] = {}
+
+    def begin(self) -> None:
+        """The replay is over: take the place of earlier files."""
+        self._writes = self._model is not None
+        if self._writes:
+            for path in self._files.values():
+                write_whole(path, "")
+            self.flush()
+
+    def episode(self, episode: Episode, memory: Memory) -> bool:
+        """Refresh after a movement, lived or replayed; whether the model has learnt, so that ``curves`` are new."""
+        if self._model is None:
+            return False
+        movements, move = episode.index + 1, episode.move
+        if move is not None and move.goal is not None and episode.outcome is not None:
+            self._lately.append((move.goal, episode.outcome, move.origin))
+        begun = time.perf_counter()
+        refresh = self._model.refresh(memory, None if move is None else move.goal)
+        self._seconds += time.perf_counter() - begun
+        if refresh is None:
+            return False
+        self._refreshes += 1
+        error = self._model.relative_error
+        fields = [movements, len(memory), refresh.steps, repr(refresh.held_out), repr(error), int(refresh.diverged)]
+        self._pending["refreshes"].append(",".join(map(str, fields)))
+        self.curves = {
+            "model/relative_error": error,
+            "model/held_out": refresh.held_out,
+            "model/steps": refresh.steps,
+            "model/ms": 1000 * self._seconds / self._refreshes,
+            "model/improved": self._improved(),
+        }
+        if refresh.foreseen is not None:
+            self._foreseen(refresh.first, memory.outcomes[refresh.first :], refresh.foreseen)
+        if refresh.diverged:
+            self._news.append(f"movement {movements}: training diverged; the forward model keeps its last good weights")
+        self._say_whether_asked(movements, error)
+        return True
+
+    def flush(self) -> None:
+        """Hand everything to the operating system."""
+        if not self._writes:
+            return
+        for name, path in self._files.items():
+            lines, self._pending[name] = self._pending[name], []
+            if lines:
+                with path.open("a", encoding="utf-8", newline="") as file:
+                    file.write("".join(f"{line}\n" for line in lines))
+
+    def news(self, *, ended: bool = False) -> list[str]:
+        """What is to be told about the model and was not yet; at the end of a run, too, that it is not asked."""
+        news, self._news = self._news, []
+        if ended and self._model is not None and not self._asked:
+            trained = self._model.trained
+            why = self._how_wrong(self._model.relative_error) if trained else "there were too few exemplars to train it"
+            news.append(f"{NOT_ASKED}: {why}")
+        return news
+
+    def summary(self) -> dict[str, float]:
+        """For summary.json: seconds spent on refreshes, from movement 0 on, as a replay does them again."""
+        return {} if self._model is None else {"seconds_model": round(self._seconds, 3)}
+
+    def _foreseen(self, first: int, outcomes: Array, foreseen: Prediction) -> None:
+        parts = (outcomes, *foreseen)
+        for row, values in enumerate(np.hstack(parts), first):
+            self._pending["predictions"].append(",".join([str(row), *numbers(values, len(values))]))
+        spread = np.hypot(foreseen.epistemic, foreseen.aleatoric)
+        self.curves["model/error"] = float(np.linalg.norm(outcomes - foreseen.mean, axis=1).mean())
+        self.curves["model/coverage"] = float(coverage(outcomes, foreseen.mean, spread, (LEVEL,))[0])
+
+    def _improved(self) -> float:
+        if not self._lately:
+            return float("nan")
+        goals, outcomes, origins = zip(*self._lately, strict=True)
+        found = improvements(np.stack(goals), np.stack(outcomes), np.array(origins))
+        return found.share
+
+    def _say_whether_asked(self, movements: int, error: float) -> None:
+        asked = error <= self._trust
+        if asked != self._asked:
+            who = "the forward model is asked from here on" if asked else NOT_ASKED
+            self._news.append(f"movement {movements}: {who}: {self._how_wrong(error)}")
+        self._asked = asked
+
+    def _how_wrong(self, error: float) -> str:
+        return f"its relative error is {error:.3f}, to be trusted it needs {self._trust:g}"

@@ -1,0 +1,108 @@
+"""Reading run directories: everything that a run has written, as arrays. Figures and tables are made from this alone.
+
+run = read_run("runs/sgim-d/seed-003"); run.outcomes, run.evaluation["mean_error_m"]    # runfiles.py explains the files
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sgimd_torch.runs.log import Columns, RunError, read_json
+from sgimd_torch.runs.tables import EVALUATION, read_table
+from sgimd_torch.spaces import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A run as it was read.
+
+    ``index`` ``(n,)``, ``origin`` ``(n,)`` names, "" at rest, ``demonstration`` ``(n,)`` row of the demonstration just
+    before, -1 if there was none; ``contexts``, ``thetas``, ``goals`` and ``outcomes`` ``(n, dim)``, NaN where there was
+    none. ``evaluation`` has an array for each column, an entry for each evaluation; ``regions`` likewise, with an entry
+    for each region at each evaluation, None for a learner without interest map. ``config``, ``versions``, ``summary``:
+    as in their files.
+    """
+
+    path: Path
+    config: dict[str, Any]
+    versions: dict[str, Any]
+    summary: dict[str, Any]
+    index: NDArray[np.int64]
+    origin: NDArray[np.str_]
+    demonstration: NDArray[np.int64]
+    contexts: Array
+    thetas: Array
+    goals: Array
+    outcomes: Array
+    evaluation: dict[str, Array]
+    regions: dict[str, np.ndarray] | None
+
+    def chosen_goals(self) -> Array:
+        """``(n, outcome_dim)``, the goals that the learner set itself, in order, each once though it takes several
+        movements; those of imitation are the teacher's."""
+        own = self.goals[np.isfinite(self.goals).all(axis=1) & (self.origin != "imitate")]
+        new = (np.diff(own, axis=0, prepend=np.nan) != 0).any(axis=1)
+        return own[new]
+
+
+def read_run(path: str | os.PathLike[str]) -> Run:
+    """What a run has written so far, be it finished, stopped or under way; a torn last line is left out.
+
+    Raises:
+        RunError: there is no run at ``path``, or its files are damaged.
+    """
+    path = Path(path)
+    config = read_json(path / "config.json", missing=None)
+    if config is None:
+        raise RunError(f"{path} is no run directory, it has no config.json; runs lie in OUT/NAME/seed-000")
+    try:
+        log = (path / "episodes.csv").read_bytes()
+    except FileNotFoundError:
+        log = b""
+    except OSError as error:
+        raise RunError(f"{path}/episodes.csv cannot be read: {error.strerror}") from error
+    header, newline, body = log.partition(b"\n")
+    try:
+        just_begun = not newline and b"index,".startswith(header[:6])
+        columns = Columns(0, 0, 0) if just_begun else Columns.of(header + newline)
+    except RunError as error:
+        raise RunError(f"{path}/episodes.csv: {error}") from error
+    rows = [line.decode().rstrip("\n").split(",") for line in columns.whole_lines(body)]
+    ends = np.cumsum([3, columns.context_dim, columns.theta_dim, columns.outcome_dim, columns.outcome_dim])
+    numbers = np.array([[field or "nan" for field in row[3:-1]] for row in rows], dtype=np.float64)
+    contexts, thetas, goals, outcomes = np.split(numbers.reshape(len(rows), ends[-1] - 3), ends[1:-1] - 3, axis=1)
+    return Run(
+        path=path,
+        config=config,
+        versions=read_json(path / "versions.json", missing={}),
+        summary=read_json(path / "summary.json", missing={}),
+        index=np.arange(len(rows)),
+        origin=np.array([row[1] for row in rows], dtype=np.str_),
+        demonstration=np.array([int(row[2] or -1) for row in rows], dtype=np.int64),
+        contexts=contexts,
+        thetas=thetas,
+        goals=goals,
+        outcomes=outcomes,
+        evaluation=read_table(path / "evaluation.csv", EVALUATION) or {name: np.empty(0) for name in EVALUATION},
+        regions=read_table(path / "regions.csv"),
+    )
+
+
+def find_runs(out: str | os.PathLike[str]) -> dict[str, list[Path]]:
+    """Run directories below ``out``, by name, seeds in order.
+
+    Raises:
+        RunError: there is none.
+    """
+    found: dict[str, list[Path]] = {}
+    for config in sorted(Path(out).glob("*/seed-*/config.json")):
+        found.setdefault(config.parent.parent.name, []).append(config.parent)
+    if not found:
+        raise RunError(f"{out} holds no runs; they lie in OUT/NAME/seed-000")
+    return found

@@ -1,0 +1,292 @@
+"""Let one learner live, evaluate it now and then, and write everything to one run directory, OUT/NAME/seed-003.
+
+Examples:
+  python experiments/run.py --algorithm sgim-d --seed 3
+  python experiments/run.py --algorithm sgim-d --seed 3 --resume              after Ctrl-C, or with more --movements
+  python experiments/run.py --algorithm sagg-riac --goals uniform --name uniform-goals --movements 2000
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+import json
+import os
+import platform
+import shlex
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any, Final
+
+if __name__ == "__main__":  # Ctrl-C while the libraries below are loading
+    signal.signal(signal.SIGINT, lambda *_: os._exit(130))
+
+import numpy as np
+
+import sgimd_torch
+from sgimd_torch.environments.protocol import SimulationError
+from sgimd_torch.evaluation import Evaluation, evaluate
+from sgimd_torch.goals.interest_map import InterestMap
+from sgimd_torch.goals.regions import Region
+from sgimd_torch.runs.board import RunBoard
+from sgimd_torch.runs.build import RunParts, build
+from sgimd_torch.runs.command_line import parse
+from sgimd_torch.runs.config import Config
+from sgimd_torch.runs.directory import RunDirectory
+from sgimd_torch.runs.log import Columns
+from sgimd_torch.runs.model_record import RunModel
+from sgimd_torch.runs.process import Progress, Seconds, Stopped, Stopping, metres, say, with_streams
+from sgimd_torch.session import ReplayError, live, replay, run
+from sgimd_torch.strategies import GoalBabbling
+
+# These may change when a run is resumed: they say how long it lasts, where it lies and how it is looked at. Files count
+# by their content, which is recorded as a checksum.
+FREE: Final = (
+    *("movements", "out", "name", "evaluate_at", "repeats", "floor_at", "threads", "board"),
+    *("benchmark", "benchmark_crc32", "demonstrations"),
+)
+EVALUATION_SETTINGS: Final = ("repeats", "floor_at", "benchmark_crc32")  # all evaluations of a run share these
+FLUSH_EVERY = 1.0  # s, what a killed run loses at most
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run from the command line.
+
+    Returns:
+        The exit code: 0 finished; 2 the request is wrong; 1 it failed under way; 130 or 143 a signal stopped it.
+    """
+    argv = sys.argv[1:] if argv is None else argv
+    try:
+        config, resume = parse(argv, __doc__)
+    except SystemExit as end:  # --help, or an option that cannot be
+        return int(end.code or 0)
+    with Stopping() as stopping:
+        try:
+            with stopping.at_once():
+                parts = build(config)
+            directory = open_directory(config, parts, resume)
+        except (ValueError, OSError) as error:  # RunError, too
+            return _fail(error, 2)
+        except Stopped as stop:
+            return stop.exit_code
+        try:
+            with directory:
+                say(*config.without_effect, *directory.notes, *correspondence_of(parts))
+                report = run_in(directory, config, parts, stopping)
+        except Stopped as stop:
+            again = shlex.join([sys.executable, os.path.relpath(__file__), *argv, *([] if resume else ["--resume"])])
+            say(f"stopped after {directory.summary.get('movements', 0)} movements; to go on: {again}")
+            return stop.exit_code
+        except ReplayError as error:
+            return _fail(error, 2)
+        except (SimulationError, ValueError) as error:
+            return _fail(error, 1)
+        except OSError as error:
+            return _fail(f"{directory.path} cannot be written: {error}; is the disk full? --resume goes on", 1)
+    print(report)
+    return 0
+
+
+def run_in(directory: RunDirectory, config: Config, parts: RunParts, stopping: Stopping) -> str:
+    """Replay what the directory's log holds, live on to the end, and say what came out.
+
+    Seconds: physics and evaluations of a resumed run add to those of its summary, which is at most ``FLUSH_EVERY`` old
+    if it was killed; the learner's are counted from movement 0 on, since a replay lets it do all its work again.
+    """
+    rows = {id(demonstration): row for row, demonstration in enumerate(parts.demonstrations)}
+    recorded = [directory.columns.recorded(line) for line in directory.lines]
+    seconds = Seconds(directory.summary)
+    execute = replay(recorded, seconds.of_physics(live(parts.environment, config.seed)))
+    wanted = set(config.evaluations)
+    model = RunModel(directory, parts.model, 0.0 if parts.trust is None else parts.trust.error)
+    movements, flushed = 0, time.monotonic()
+
+    def begin() -> None:
+        directory.begin()
+        model.begin()
+        board.begin()
+
+    def summarise(*, finished: bool = False) -> None:
+        directory.flush()
+        model.flush()
+        last = directory.evaluations.last
+        directory.summarise(
+            movements=movements,
+            mean_error_m=last.get("mean_error_m"),
+            noise_floor_m=last.get("noise_floor_m"),
+            **seconds.summary(),
+            **model.summary(),
+            finished=finished,
+        )
+
+    episodes = run(
+        parts.learner,
+        parts.environment,
+        config.seed,
+        movements=config.movements,
+        teacher=parts.teacher,
+        execute=execute,
+    )
+    finished = False
+    with (
+        RunBoard(directory, config, parts, seconds, partial(regions_of, parts)) as board,
+        Progress(f"{config.variant} seed {config.seed}", len(recorded), config.movements) as progress,
+    ):
+        try:
+            if not recorded:
+                begin()
+            for episode in seconds.of_learner(episodes):
+                demonstration = episode.demonstration
+                line = directory.columns.line(episode, None if demonstration is None else rows[id(demonstration)])
+                if episode.index >= len(recorded):
+                    directory.append(line)
+                elif line != directory.lines[episode.index]:
+                    raise ReplayError(_differs(directory.columns, directory.lines[episode.index], line))
+                movements = episode.index + 1
+                board.episode(episode)
+                if model.episode(episode, parts.learner.memory):
+                    board.model(model.curves)
+                if movements in wanted and movements not in directory.evaluations:
+                    directory.flush()
+                    with seconds.of_evaluation():
+                        evaluated = evaluate_in(directory, config, parts, movements, stopping)
+                    board.evaluation(evaluated)
+                if movements == len(recorded):
+                    begin()
+                    say(*model.news())
+                if movements > len(recorded) and time.monotonic() - flushed >= FLUSH_EVERY:
+                    summarise()
+                    board.flush()
+                    flushed = time.monotonic()
+                if movements > len(recorded):
+                    say(*model.news())
+                progress.show(movements, directory.evaluations.last.get("mean_error_m"))
+                stopping.check()
+            finished = True
+            say(*model.news(ended=True))
+            board.finish()
+        finally:
+            if movements >= len(recorded):  # else the summary that was found counts for more
+                summarise(finished=finished)
+    error, floor = (directory.summary[name] for name in ("mean_error_m", "noise_floor_m"))
+    found = "not evaluated" if error is None else f"mean error {error:.4f} m, noise floor {metres(floor)}"
+    return f"{directory.path}: {movements} movements, {found}"
+
+
+def evaluate_in(
+    directory: RunDirectory, config: Config, parts: RunParts, movements: int, stopping: Stopping
+) -> Evaluation | None:
+    """Evaluate the learner as it is now, with streams that the run does not use.
+
+    Before its first exemplar there is nothing to infer a movement from, as for the learner by observation before its
+    first demonstration: such an evaluation is left out.
+    """
+    if len(parts.learner.memory) == 0:
+        return None
+    goals = parts.benchmark.goals
+    repeats = config.repeats if config.floor_at is None or movements in config.floor_at else 0
+    with stopping.at_once():
+        found = evaluate(parts.inverse, parts.environment, goals, config.seed, movements, repeats=repeats)
+    directory.evaluations.add(movements, found, regions_of(parts))
+    return found
+
+
+def correspondence_of(parts: RunParts) -> list[str]:
+    """How well the robot can play what it will be shown; nothing for who learns alone."""
+    if not parts.residuals:
+        return []
+    median, worst = np.median(parts.residuals), max(parts.residuals)
+    n = len(parts.residuals)
+    return [
+        f"{n} demonstrations; correspondence misses them by {median:.4f} rad (median), {worst:.4f} rad at most",
+        *_outside(parts),
+    ]
+
+
+def _outside(parts: RunParts) -> list[str]:
+    box, shown = parts.environment.outcomes, parts.demonstrations
+    outside = [row for row, demonstration in enumerate(shown) if not box.contains(demonstration.outcome)]
+    if not outside:
+        return []
+    place = ", ".join(f"{x:g}" for x in shown[outside[0]].outcome)
+    more = f", as do {len(outside) - 1} more" if len(outside) > 1 else ""
+    return [f"recording {outside[0]} lands at ({place}) m, outside T{more}; were they recorded in cm?"]
+
+
+def regions_of(parts: RunParts) -> list[Region]:
+    """Of the learner's interest map; none if it has no such map."""
+    autonomous = parts.learner.autonomous
+    if isinstance(autonomous, GoalBabbling) and isinstance(autonomous.goals, InterestMap):
+        return autonomous.goals.regions
+    return []
+
+
+def open_directory(config: Config, parts: RunParts, resume: bool) -> RunDirectory:
+    """The directory of this run; of an earlier part's evaluations it keeps those that the whole run would have.
+
+    Raises:
+        RunError: see ``RunDirectory``; or its log is longer than the run is to be.
+    """
+    environment, regions = parts.environment, regions_of(parts)
+    settings = json.loads(json.dumps({**vars(config), **parts.data}, default=str))  # as they will read back
+    directory = RunDirectory(
+        config.directory,
+        settings,
+        free=FREE,
+        columns=Columns(environment.contexts.dim, environment.policies.dim, environment.outcomes.dim),
+        region_dims=len(regions[0].low) if regions else None,
+        versions=versions(),
+        resume=resume,
+        movements=config.movements,
+    )
+    same = directory.before is not None and all(
+        directory.before.get(key) == settings[key] for key in EVALUATION_SETTINGS
+    )
+    directory.evaluations.keep(m for m in config.evaluations if same and m <= len(directory.lines))
+    return directory
+
+
+def versions() -> dict[str, Any]:
+    """What runs here; ``commit`` is None outside a git repository and ends in "-dirty" when files were changed."""
+    packages = {"numpy": "numpy", "scipy": "scipy", "faiss": "faiss-cpu", "mujoco": "mujoco"}
+    here = str(Path(__file__).parent)
+    describe = ["git", "-C", here, "describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"]
+    try:
+        commit = subprocess.run(describe, capture_output=True, text=True, check=True, timeout=10).stdout.strip()
+    except (OSError, subprocess.SubprocessError):
+        commit = None
+    return {
+        "python": platform.python_version(),
+        **{name: importlib.metadata.version(package) for name, package in packages.items()},
+        "sgimd_torch": sgimd_torch.__version__,
+        "platform": platform.platform(),
+        "commit": commit,
+    }
+
+
+def _differs(columns: Columns, recorded: bytes, now: bytes) -> str:
+    """Of two lines: which columns differ, the first three in full."""
+    were, are = (line.decode().split(",")[:-1] for line in (recorded, now))
+    differences = [
+        f"{name} was {old or 'empty'}, now {new or 'empty'}"
+        for name, old, new in zip(columns.names[:-1], were, are, strict=True)
+        if old != new
+    ]
+    more = f"; and {len(differences) - 3} more" if len(differences) > 3 else ""
+    return (
+        f"movement {were[0]} is replayed otherwise than recorded: {'; '.join(differences[:3])}{more}. "
+        "Was it recorded by another version, or on another processor?"
+    )
+
+
+def _fail(error: Exception | str, code: int) -> int:
+    say(f"error: {error}")
+    return code
+
+
+if __name__ == "__main__":
+    sys.exit(with_streams(main))

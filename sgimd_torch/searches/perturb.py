@@ -1,0 +1,44 @@
+"""The field's simplest search: the best movement so far, plus noise.
+
+search = perturb(policies, rng)(estimate, goal); theta = next(search); theta = search.send(outcome) ...
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator
+
+import numpy as np
+
+from sgimd_torch.spaces import Array, Box, Estimate, Search
+
+
+def perturb(policies: Box, rng: np.random.Generator, *, sd: float = 0.05) -> Search:
+    """Gaussian noise around the best theta so far, remembered or executed here, clipped to ``policies``; never ends.
+
+    It executes theta_g first where that is new: a copy of a remembered theta has its outcome already.
+
+    Args:
+        sd: of the noise, in sides of ``policies``.
+
+    Raises:
+        ValueError: ``sd`` is not positive.
+    """
+    if not sd > 0:
+        raise ValueError(f"sd must be positive, got {sd}; without noise nothing new is tried")
+
+    def vary(theta: Array) -> Array:
+        return policies.clip(rng.normal(theta, sd * policies.sides))
+
+    def search(start: Estimate, goal: Array) -> Generator[Array, Array, None]:
+        distances = np.linalg.norm(start.outcomes - goal, axis=1)
+        best, shortest = start.thetas[distances.argmin()], float(distances.min())
+        remembered = (start.thetas == start.theta).all(axis=1).any()
+        theta = vary(best) if remembered else policies.check("theta of the estimate", start.theta)
+        while True:
+            distance = math.dist(goal, (yield theta))
+            if distance < shortest:
+                best, shortest = theta, distance
+            theta = vary(best)
+
+    return search

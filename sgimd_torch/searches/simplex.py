@@ -1,0 +1,235 @@
+"""Searches: given a first guess, which movement to try next so that the outcome comes nearer the goal?
+
+Section 4.4.2 of Nguyen & Oudeyer (2014), local optimisation: Nelder & Mead's simplex (Lagarias et al. 1998), and the
+field's simplest alternative. A search is a generator, so it can be paused, counted and interrupted at any movement:
+    search = nelder_mead(policies)(estimate, goal); theta = next(search); theta = search.send(outcome) ...
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Generator
+from typing import TypeVar
+
+import numpy as np
+
+from sgimd_torch.spaces import Array, Box, Estimate, Search
+
+Movement = TypeVar("Movement")
+
+
+def nelder_mead(
+    policies: Box,
+    rng: np.random.Generator,
+    *,
+    noise: float = 0.05,
+    step: float = 0.1,
+    complete: bool = False,
+    adaptive: bool = False,
+    xatol: float = 0.1,
+    fatol: float = 0.05,
+) -> Search:
+    """Downhill simplex on the distance to the goal, around theta_g and its neighbours.
+
+    It executes theta_g first, but for the noise. The neighbours are vertices with the outcomes they already have:
+    remembering costs no movement (and takes outcomes of nearby contexts for those of this one). Those that lie on a
+    line, plane ... through better vertices are left out, as a flat simplex cannot turn.
+
+    Args:
+        policies: Pi; nothing outside is proposed.
+        rng: draws the noise, and the directions of the steps that stand in for missing neighbours.
+        noise: standard deviation of what is added to each parameter of every movement, in sides of ``policies``; the
+            vertex is where the movement went. Deviation: the paper adds none. But a simplex searches the flat through
+            its vertices, and neighbours from memory span the same flat again and again: without new directions the
+            learner soon repeats itself, and its inverse model cannot tell what is noise from what is not.
+        step: size of those steps, root mean square over the parameters, in sides of ``policies``. Deviation: the usual
+            first simplex steps along one coordinate at a time, but one knot of one joint often moves the float hardly
+            at all; these steps go in random directions, and stand for the noise of these movements.
+        complete: fill the simplex up to theta_dim + 1 vertices, the paper's 26, at one movement each. False: only up to
+            outcome_dim + 1, so that with some neighbours the first reflection is the second movement. The search then
+            stays in the flat through its vertices, where, theta being redundant, the goal usually can be met as well.
+            Deviation: False is the default, as 25 steps would be the whole budget of a goal.
+        adaptive: Gao & Han's coefficients (2012), gentler in high dimensions.
+        xatol, fatol: it ends when all vertices are this near the best, in theta and in metres from the goal. Below the
+            noise of the outcomes a simplex cannot tell better from worse, so by default it ends early (a deviation: the
+            paper names no such end) and the next one begins from the memory that it has enriched.
+
+    Raises:
+        ValueError: ``step`` is not in (0, 0.5], or ``noise`` not in [0, 0.5].
+    """
+    if not 0 < step <= 0.5:
+        raise ValueError(f"step must lie in (0, 0.5], got {step}; it is a fraction of the sides of Pi")
+    if not 0 <= noise <= 0.5:
+        raise ValueError(f"noise must lie in [0, 0.5], got {noise}; it is a fraction of the sides of Pi")
+
+    def place(theta: Array) -> Array:
+        return policies.clip(rng.normal(theta, noise * policies.sides) if noise else theta)
+
+    def search(start: Estimate, goal: Array) -> Generator[Array, Array, None]:
+        theta = place(policies.check("theta of the estimate", start.theta))
+        vertices = [theta]
+        values = [math.dist(goal, (yield theta))]
+        flat = _Flat(theta, xatol)
+        distances = np.linalg.norm(start.outcomes - goal, axis=1)
+        for k in distances.argsort(kind="stable"):
+            if flat.lacks(start.thetas[k]):
+                flat.widen(start.thetas[k])
+                vertices.append(policies.check("a theta of the estimate", start.thetas[k]))
+                values.append(float(distances[k]))
+        n_vertices = 1 + (policies.dim if complete else min(policies.dim, len(goal)))
+        while len(vertices) < n_vertices:
+            vertex = _step_out(policies, theta, flat, rng, step)
+            flat.widen(vertex)
+            vertices.append(vertex)
+            values.append(math.dist(goal, (yield vertex)))
+        simplex = np.array(vertices), np.array(values)
+        yield from _towards(goal, simplex_descent(*simplex, place=place, adaptive=adaptive, xatol=xatol, fatol=fatol))
+
+    return search
+
+
+def limit(attempt: Generator[Movement, Array, None], n: int) -> Generator[Movement, Array, None]:
+    """The first ``n`` movements of ``attempt``, which is then closed; closing this one closes it, too.
+
+    All ``n`` outcomes reach ``attempt``; whatever it proposes after the last is dropped.
+
+    Raises:
+        ValueError: ``n`` is negative.
+    """
+    if n < 0:
+        raise ValueError(f"n must be >= 0 movements, got {n}")
+    return _first(attempt, n)
+
+
+def simplex_descent(
+    vertices: Array,
+    values: Array,
+    *,
+    place: Callable[[Array], Array] | None = None,
+    adaptive: bool = False,
+    xatol: float = 1e-4,
+    fatol: float = 1e-4,
+) -> Generator[Array, float, None]:
+    """Nelder & Mead's method from a simplex with known values: yields points, is sent their values.
+
+    It visits the points that ``scipy.optimize.minimize(method="Nelder-Mead")`` visits after its first simplex, bit for
+    bit (among equal values the newest ranks last, as Lagarias et al. ask; scipy leaves that to its unstable sort).
+
+    Args:
+        vertices: ``(n + 1, dim)``. With n < dim the search stays in the n-dimensional flat through them, but for
+            ``place``.
+        values: ``(n + 1,)``.
+        place: moves a point to where it may be tried, into a box by clipping it, say; None leaves it where it is. (By
+            clipping alone a simplex whose vertices all lie on one face of the box cannot leave it.)
+        adaptive: coefficients that depend on n.
+        xatol, fatol: it ends when all vertices are this near the best, in every coordinate and in value.
+    """
+    if len(vertices) < 2 or len(values) != len(vertices):
+        raise ValueError(f"a simplex needs two vertices or more, a value each, got {len(vertices)} and {len(values)}")
+    order = values.argsort(kind="stable")
+    vertices, values = vertices[order], values[order]
+    n = len(vertices) - 1
+    expansion, contraction, shrinkage = (1 + 2 / n, 0.75 - 1 / (2 * n), 1 - 1 / n) if adaptive else (2.0, 0.5, 0.5)
+
+    def beyond(centre: Array, distance: float) -> Array:
+        """On the line from the worst vertex through the ``centre`` of the others; -1 is the worst, 0 the centre."""
+        point = (1 + distance) * centre - distance * vertices[-1]
+        return point if place is None else place(point)
+
+    while np.abs(vertices[1:] - vertices[0]).max() > xatol or np.abs(values[0] - values[1:]).max() > fatol:
+        centre = np.add.reduce(vertices[:-1], axis=0) / n
+        reflected = beyond(centre, 1)
+        value = yield reflected
+        better: tuple[Array, float] | None = None
+        if value < values[0]:
+            expanded = beyond(centre, expansion)
+            value_expanded = yield expanded
+            better = (expanded, value_expanded) if value_expanded < value else (reflected, value)
+        elif value < values[-2]:
+            better = reflected, value
+        else:
+            outside = value < values[-1]
+            contracted = beyond(centre, contraction if outside else -contraction)
+            value_contracted = yield contracted
+            if value_contracted <= value if outside else value_contracted < values[-1]:
+                better = contracted, value_contracted
+        if better is not None:
+            vertices[-1], values[-1] = better
+        else:
+            for j in range(1, n + 1):
+                shrunk = vertices[0] + shrinkage * (vertices[j] - vertices[0])
+                vertices[j] = shrunk if place is None else place(shrunk)
+                values[j] = yield vertices[j]
+        order = values.argsort(kind="stable")
+        vertices, values = vertices[order], values[order]
+
+
+class _Flat:
+    """The affine hull of a simplex under construction: which points or axes lead out of it?"""
+
+    _SINE = 0.1  # a vertex less steep above the flat than 6 degrees makes a simplex that hardly turns
+
+    def __init__(self, origin: Array, shortest: float) -> None:
+        self._origin = origin
+        self._shortest = shortest
+        self._basis = np.empty((0, len(origin)))  # orthonormal rows
+
+    def lacks(self, point: Array) -> bool:
+        """Whether ``point`` lies clearly outside, and so may become a vertex."""
+        edge = point - self._origin
+        outside, length = np.linalg.norm(self._across(edge)), np.linalg.norm(edge)
+        return bool(outside > self._shortest and outside > self._SINE * length)
+
+    def widen(self, point: Array) -> None:
+        """Make ``point`` a vertex."""
+        across = self._across(point - self._origin)
+        self._basis = np.vstack((self._basis, across / np.linalg.norm(across)))
+
+    def direction_out(self, rng: np.random.Generator) -> Array:
+        """A random unit vector at right angles to the flat."""
+        across = self._across(rng.standard_normal(len(self._origin)))
+        return across / np.linalg.norm(across)
+
+    def _across(self, edges: Array) -> Array:
+        return edges - edges @ self._basis.T @ self._basis
+
+
+def _step_out(policies: Box, theta: Array, flat: _Flat, rng: np.random.Generator, step: float) -> Array:
+    """A random step from ``theta`` that leads out of the flat and stays in the box.
+
+    Coordinates that would leave the box are mirrored: clipping them would flatten the simplex. In a corner of a box of
+    few dimensions mirroring may do so, too; then any direction is tried.
+    """
+    direction = flat.direction_out(rng)
+    for _ in range(100):  # in vain for a step no longer than xatol
+        change = step * np.sqrt(policies.dim) * policies.sides * direction
+        forth, back = theta + change, theta - change
+        vertex = policies.clip(np.where((forth < policies.low) | (forth > policies.high), back, forth))
+        if flat.lacks(vertex):
+            break
+        direction = rng.standard_normal(policies.dim)
+        direction /= np.linalg.norm(direction)
+    return vertex
+
+
+def _towards(goal: Array, descent: Generator[Array, float, None]) -> Generator[Array, Array, None]:
+    """``descent`` sent the distances to ``goal`` of the outcomes that this one is sent."""
+    try:
+        theta = next(descent)
+        while True:
+            theta = descent.send(math.dist(goal, (yield theta)))
+    except StopIteration:
+        return
+
+
+def _first(attempt: Generator[Movement, Array, None], n: int) -> Generator[Movement, Array, None]:
+    try:
+        if n:
+            movement = next(attempt)
+            for _ in range(n - 1):
+                movement = attempt.send((yield movement))
+            attempt.send((yield movement))
+    except StopIteration:
+        return
+    finally:
+        attempt.close()

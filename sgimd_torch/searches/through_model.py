@@ -1,0 +1,208 @@
+"""Searches through the forward model: which movement should land nearer, and reliably, judging by its gradient?
+
+Not in Nguyen & Oudeyer (2014); swaps for the simplex of section 4.4.2, which needs no model.
+    search = gradient_search(policies, rng, model=model); movements = search(estimate, goal); theta = next(movements)
+Until the model is good enough for ``trust`` each of them is the simplex.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Generator
+from typing import Final
+
+import numpy as np
+import torch
+
+from sgimd_torch.forward_model.anchored import TRUST, Anchored, Trust
+from sgimd_torch.forward_model.model import ForwardModel
+from sgimd_torch.searches.simplex import nelder_mead
+from sgimd_torch.spaces import Array, Box, Estimate, Search, check_count
+
+Propose = Callable[[Anchored, torch.Tensor, torch.Tensor, Box, float, np.random.Generator], torch.Tensor]
+"""(anchored, starts ``(n, theta_dim)``, goal ``(1, outcome_dim)``, policies, radius, rng) -> proposals, of which the
+one that is expected to do best is taken; none is farther than the radius from its start, see ``Anchored.descend``."""
+
+_RADII: Final = (0.02, 0.3)  # sides, root mean square: between the noise of a movement and leaving the neighbourhood
+
+
+def descend(
+    anchored: Anchored,
+    starts: torch.Tensor,
+    goal: torch.Tensor,
+    policies: Box,
+    radius: float,
+    rng: np.random.Generator,
+    *,
+    steps: int = 5,
+    step: float = 0.03,
+) -> torch.Tensor:
+    """Down the gradient of the expected squared distance, the noise included."""
+    return anchored.descend(starts, goal, policies, steps=steps, step=step, radius=radius)
+
+
+def gauss_newton(
+    anchored: Anchored,
+    starts: torch.Tensor,
+    goal: torch.Tensor,
+    policies: Box,
+    radius: float,
+    rng: np.random.Generator,
+    *,
+    steps: int = 3,
+    damping: float = 1e-3,
+) -> torch.Tensor:
+    """The least change that meets the goal to first order, again and again; ``damping`` is in m^2 for a side squared.
+
+    It looks at the landing point alone, not at its spread.
+    """
+    low, high, sides = (anchored.tensor(values) for values in (policies.low, policies.high, policies.sides))
+    theta = starts
+    for _ in range(steps):
+        theta = theta.detach().requires_grad_(True)
+        landing, _ = anchored.predict(theta)
+        rows = [torch.autograd.grad(part.sum(), theta, retain_graph=True)[0] for part in landing.unbind(dim=1)]
+        jacobian = torch.stack(rows, dim=1) * sides  # (n, outcome_dim, theta_dim)
+        damped = jacobian @ jacobian.mT + damping * torch.eye(landing.shape[1], device=theta.device)
+        change = jacobian.mT @ torch.linalg.solve(damped, (goal - landing.detach())[..., None])
+        theta = anchored.within(starts, theta.detach() + sides * change[..., 0], sides, radius).clamp(low, high)
+    return theta.detach()
+
+
+def screen(
+    anchored: Anchored,
+    starts: torch.Tensor,
+    goal: torch.Tensor,
+    policies: Box,
+    radius: float,
+    rng: np.random.Generator,
+    *,
+    draws: int = 64,
+) -> torch.Tensor:
+    """Variations of the starts, root mean square half the radius; no gradient."""
+    thetas = starts.double().cpu().numpy()[np.arange(draws) % len(starts)]
+    return anchored.tensor(policies.clip(rng.normal(thetas, radius / 2 * policies.sides)))
+
+
+def gradient_search(
+    policies: Box,
+    rng: np.random.Generator,
+    *,
+    model: ForwardModel,
+    propose: Propose = descend,
+    noise: float = 0.05,
+    candidates: int = 5,
+    radius: float = 0.15,
+    residual: bool = True,
+    trust: Trust = TRUST,
+) -> Search:
+    """Every movement is planned anew through the model, from theta_g and what has landed nearest; it never ends.
+
+    Predictions are anchored at the neighbours of the estimate, all proposals in one batch. Each outcome becomes an
+    anchor, too, so that what the model missed here corrects the next prediction; and proposals keep to a trust region,
+    which grows when the change of the outcome is what was predicted, and shrinks when it is not.
+
+    Args:
+        policies: Pi; nothing outside is proposed.
+        rng: draws the noise.
+        model: predicts; whoever runs the loop refreshes it.
+        propose: from where a candidate may begin to where it should go: ``descend``, ``gauss_newton`` or ``screen``.
+        noise: as that of ``nelder_mead``: without it the memory soon holds too few different movements.
+        candidates: how many remembered movements are starting points.
+        radius: of the trust region at the beginning, root mean square over the parameters, in sides of ``policies``.
+        residual: False leaves the outcomes of this search out of the anchors, for comparison.
+        trust: how far to trust the model.
+
+    Raises:
+        ValueError: a number out of its range, or a model of other dimensions.
+    """
+    _check(policies, model, candidates, radius)
+    if not 0 <= noise <= 0.5:
+        raise ValueError(f"noise must lie in [0, 0.5], got {noise}; it is a fraction of the sides of Pi")
+    simplex = nelder_mead(policies, rng)
+
+    def search(start: Estimate, goal: Array) -> Generator[Array, Array, None]:
+        if not model.relative_error <= trust.error:
+            yield from simplex(start, goal)
+            return
+        within = radius
+        thetas, outcomes, n_anchors = start.thetas, start.outcomes, len(start.thetas)
+        first = policies.check("theta of the estimate", start.theta)[None]
+        while True:
+            nearest = np.linalg.norm(outcomes - goal, axis=1).argsort(kind="stable")[:candidates]
+            anchored = _anchored(model, start.context, thetas[:n_anchors], outcomes[:n_anchors], trust)
+            starts = anchored.tensor(np.vstack([first, thetas[nearest]]))
+            theta = _best(anchored, propose, starts, goal, policies, within, rng)
+            theta = policies.clip(rng.normal(theta, noise * policies.sides)) if noise else policies.clip(theta)
+            with torch.no_grad():
+                predicted = anchored.predict(anchored.tensor(theta[None]))[0][0].cpu().double().numpy()
+            outcome = yield theta
+            misfit, change = math.dist(predicted, outcome), math.dist(predicted, outcomes[nearest[0]])
+            if misfit < 0.5 * change:
+                within = min(within * 1.5, _RADII[1])
+            elif misfit > change:
+                within = max(within / 2, _RADII[0])
+            thetas, outcomes, first = np.vstack([thetas, theta]), np.vstack([outcomes, outcome]), first[:0]
+            n_anchors += residual
+
+    return search
+
+
+def polished_simplex(
+    policies: Box,
+    rng: np.random.Generator,
+    *,
+    model: ForwardModel,
+    propose: Propose = descend,
+    candidates: int = 5,
+    radius: float = 0.15,
+    trust: Trust = TRUST,
+) -> Search:
+    """Nelder & Mead's simplex, begun where the model would go: one descent for each simplex, not for each movement.
+
+    Args:
+        policies, rng, model, propose, candidates, radius, trust: as ``gradient_search``.
+
+    Raises:
+        ValueError: as ``gradient_search``.
+    """
+    _check(policies, model, candidates, radius)
+    simplex = nelder_mead(policies, rng)
+
+    def search(start: Estimate, goal: Array) -> Generator[Array, Array, None]:
+        if model.relative_error <= trust.error:
+            nearest = np.linalg.norm(start.outcomes - goal, axis=1).argsort(kind="stable")[:candidates]
+            anchored = _anchored(model, start.context, start.thetas, start.outcomes, trust)
+            starts = anchored.tensor(np.vstack([start.theta, start.thetas[nearest]]))
+            start = start._replace(theta=policies.clip(_best(anchored, propose, starts, goal, policies, radius, rng)))
+        yield from simplex(start, goal)
+
+    return search
+
+
+def _check(policies: Box, model: ForwardModel, candidates: int, radius: float) -> None:
+    model.check_fits("policies", theta_dim=policies.dim)
+    check_count("candidates", candidates, 1)
+    if not _RADII[0] <= radius <= _RADII[1]:
+        raise ValueError(f"radius must lie in {list(_RADII)}, got {radius}; it is a fraction of the sides of Pi")
+
+
+def _anchored(model: ForwardModel, context: Array, thetas: Array, outcomes: Array, trust: Trust) -> Anchored:
+    """The same anchors for all candidates, taken to be of this ``context``."""
+    contexts = np.broadcast_to(context, (1, len(thetas), len(context)))
+    return Anchored(model, context, contexts, thetas[None], outcomes[None], trust)
+
+
+def _best(
+    anchored: Anchored,
+    propose: Propose,
+    starts: torch.Tensor,
+    goal: Array,
+    policies: Box,
+    radius: float,
+    rng: np.random.Generator,
+) -> Array:
+    aim = anchored.tensor(goal[None])
+    proposals = propose(anchored, starts, aim, policies, radius, rng)
+    with torch.no_grad():
+        return proposals[anchored.expected(proposals, aim).argmin()].cpu().double().numpy()

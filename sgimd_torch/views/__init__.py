@@ -1,0 +1,1 @@
+"""Looking at runs: tables, reports, films, TensorBoard, the demo."""

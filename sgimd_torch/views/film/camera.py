@@ -1,0 +1,279 @@
+"""Films of the fishing rod: the arm casts, the line swings, the float lands, some way off its goal.
+
+Section 4 of Nguyen & Oudeyer (2014), to look at. What is shown is what ``FishingRod.record`` has simulated, in real
+time. Line and float are drawn thicker than they are, or nobody would see them.
+    with Camera(rod.model) as camera: write_film("film.mp4", shoot(camera, [[Shot(recording, goal)]]))
+
+Needs the extra ``film``, and OpenGL: without a display, set MUJOCO_GL=egl before anything imports mujoco.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+import os
+import subprocess
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from itertools import chain, pairwise
+from pathlib import Path
+from typing import Any, Final, Self
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from sgimd_torch.environments.rod_physics import Recording
+from sgimd_torch.spaces import Array
+
+try:
+    from imageio_ffmpeg import get_ffmpeg_exe
+    from PIL import Image, ImageDraw, ImageFont
+except ImportError as error:
+    raise ImportError(f"films need {error.name}; install the extra film: pip install 'sgimd-torch[film]'") from error
+
+Frame = NDArray[np.uint8]  # (height, width, 3)
+
+RATE: Final = 25  # frames a second
+PAUSE: Final = 1.6  # s, the landing is shown
+MOST_PAST: Final = 300  # landings that are drawn: they cost as much time as all the rest
+
+_Colour = tuple[float, float, float, float]
+_INK, _FLOAT, _GOAL, _PATH = (0.06, 0.06, 0.08, 1), (0.92, 0.18, 0.06, 1), (1, 0.88, 0.1, 1), (1, 0.6, 0.4, 1)
+_PAST, _RING, _SHADOW = (0.95, 0.97, 1, 0.8), (0.85, 0.92, 0.97, 0.8), (0.05, 0.15, 0.25, 0.6)
+
+
+@dataclass(frozen=True, eq=False)
+class Shot:
+    """One movement to film: the ``goal`` ``(2,)`` m that it is for, a ``title``, and ``past`` landings ``(n, 2)`` m, of
+    which ``MOST_PAST`` are drawn, evenly picked."""
+
+    recording: Recording
+    goal: Array
+    title: str = ""
+    past: Array = field(default_factory=lambda: np.empty((0, 2)))
+
+    @property
+    def missed(self) -> float:
+        """Distance (m) between goal and landing."""
+        return float(np.linalg.norm(self.recording.outcome - self.goal))
+
+    def caption(self, time: float) -> str:
+        """What is said below the picture at ``time`` (s)."""
+        recording = self.recording
+        if time >= recording.landed:
+            return f"goal {_place(self.goal)}, landed {_place(recording.outcome)}: missed by {100 * self.missed:.0f} cm"
+        let_out = recording.let_out is not None and time > recording.let_out
+        return f"goal {_place(self.goal)}   {time:.2f} s{'   line let out' if let_out else ''}"
+
+
+class NoGraphics(RuntimeError):
+    """MuJoCo finds no OpenGL to draw with."""
+
+
+class Camera:
+    """Draws shots as images, without a window; a context manager.
+
+    Args:
+        model: of the rod, left as it is.
+        width, height: of an image, pixels, even; at most 1280 and 960.
+
+    Raises:
+        NoGraphics: there is no OpenGL here, or not of the kind that MUJOCO_GL asks for.
+        ValueError: more pixels than that.
+    """
+
+    def __init__(self, model: mujoco.MjModel, *, width: int = 640, height: int = 480) -> None:
+        self._model = copy.copy(model)
+        for name in ("line", "float"):  # _draw_line does it
+            self._model.material(name).rgba[3] = 0.0
+        self._data = mujoco.MjData(self._model)
+        self._tip = self._model.site("tip").id
+        self._line = [self._model.body(f"line_{k:02}").id for k in range(2, 31)]
+        self._font = ImageFont.load_default(height / 24)
+        try:
+            self._renderer = mujoco.Renderer(self._model, height, width)
+        except (
+            mujoco.FatalError,
+            AttributeError,
+            RuntimeError,
+            ImportError,
+        ) as error:  # each kind of OpenGL has its own
+            raise NoGraphics(no_graphics(error)) from error
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._renderer.close()
+
+    def frame(self, shot: Shot, time: float) -> Frame:
+        """The scene at ``time`` (s); from the landing on, the landing."""
+        recording = shot.recording
+        time = min(time, recording.landed)
+        row = min(round(time / recording.step), len(recording.states) - 1)
+        mujoco.mj_setState(self._model, self._data, recording.states[row], mujoco.mjtState.mjSTATE_FULLPHYSICS)
+        mujoco.mj_forward(self._model, self._data)
+        self._renderer.update_scene(self._data, camera="shore")
+        scene = self._renderer.scene
+        _draw_plane(scene, shot)
+        self._draw_line(scene, recording, time)
+        if time == recording.landed:
+            _draw_chain(scene, [np.append(shot.goal, 0.006), np.append(recording.outcome, 0.006)], 0.005, _GOAL)
+        return self._captioned(self._renderer.render(), shot.title, shot.caption(time))
+
+    def _draw_line(self, scene: mujoco.MjvScene, recording: Recording, time: float) -> None:
+        """The line, the float, and where the float has been."""
+        here = recording.float_at(time)
+        _draw_chain(scene, [*(recording.float_at(t) for t in np.arange(0.0, time, 0.02)), here], 0, _PATH)
+        line = [self._data.site_xpos[self._tip], *self._data.xpos[self._line], here]
+        if recording.let_out is not None and time > recording.let_out:
+            line = [line[0], here]
+        _draw_chain(scene, line, 0.004, _INK)
+        _draw(scene, mujoco.mjtGeom.mjGEOM_SPHERE, (0.024, 0, 0), here, _FLOAT)
+        if here[2] > 0.03:
+            _draw(scene, mujoco.mjtGeom.mjGEOM_CYLINDER, (0.024, 0.001, 0), np.append(here[:2], 0.008), _SHADOW)
+
+    def _captioned(self, pixels: Frame, title: str, caption: str) -> Frame:
+        image = Image.fromarray(pixels)
+        pen, margin = ImageDraw.Draw(image, "RGBA"), image.height // 48
+        for text, anchor, y in ((title, "la", margin), (caption, "ld", image.height - margin)):
+            if text:
+                left, top, right, bottom = pen.textbbox((2 * margin, y), text, self._font, anchor)
+                pen.rectangle((left - margin, top - margin / 2, right + margin, bottom + margin / 2), (15, 30, 45, 190))
+                pen.text((2 * margin, y), text, "white", self._font, anchor)
+        return np.asarray(image)
+
+
+def no_graphics(error: Exception) -> str:
+    """What to do when MuJoCo fails with ``error`` to find OpenGL."""
+    asked = os.environ.get("MUJOCO_GL", "")
+    return (
+        f"MuJoCo finds no OpenGL to draw with (MUJOCO_GL={asked}: {error}); without a display set MUJOCO_GL=egl and "
+        "install libegl1 (Debian, Ubuntu), or MUJOCO_GL=osmesa and libosmesa6"
+    )
+
+
+def shoot(camera: Camera, scenes: Iterable[Sequence[Shot]], *, columns: int = 2) -> Iterator[Frame]:
+    """The frames of a film: scene after scene, the shots of each side by side until all have landed, then a pause."""
+    for shots in scenes:
+        for k in range(_length(shots)):
+            yield tiled([camera.frame(shot, k / RATE) for shot in shots], columns)
+
+
+def count_frames(scenes: Iterable[Sequence[Shot]]) -> int:
+    """How many frames ``shoot`` yields."""
+    return sum(map(_length, scenes))
+
+
+def tiled(frames: Sequence[Frame], columns: int) -> Frame:
+    """One image of several of one size, row by row; places left over are black."""
+    columns = min(columns, len(frames))
+    rows = math.ceil(len(frames) / columns)
+    height, width, _ = frames[0].shape
+    image = np.zeros((rows * height, columns * width, 3), np.uint8)
+    for k, frame in enumerate(frames):
+        y, x = k // columns * height, k % columns * width
+        image[y : y + height, x : x + width] = frame
+    return image
+
+
+def write_film(path: str | os.PathLike[str], frames: Iterable[Frame]) -> None:
+    """An mp4 file that every player opens (H.264, yuv420p); it appears whole or not at all.
+
+    Args:
+        path: ends on .mp4.
+        frames: one or more, all of one size, even in height and width.
+
+    Raises:
+        OSError: ``path`` cannot be written, or the encoder fails.
+    """
+    path, frames = Path(path), iter(frames)
+    partial = path.with_name(f"{path.stem}.{os.getpid()}.part.mp4")
+    try:
+        partial.touch()  # a folder that takes no files is known before the first frame is drawn
+        first = next(frames)
+        size = f"{first.shape[1]}x{first.shape[0]}"
+        given = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", size, "-r", str(RATE), "-i", "-"]
+        wanted = ["-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "23", "-movflags", "+faststart"]
+        _encode([get_ffmpeg_exe(), "-v", "error", *given, *wanted, "-y", str(partial)], chain([first], frames))
+        partial.replace(path)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def _encode(command: Sequence[str], frames: Iterable[Frame]) -> None:
+    # In a session of its own Ctrl-C does not reach the encoder: it is for whoever draws the frames.
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True) as encoder:
+        assert encoder.stdin is not None
+        try:
+            with suppress(BrokenPipeError):  # it gave up, and says why
+                for frame in frames:
+                    encoder.stdin.write(frame.tobytes())
+            _, said = encoder.communicate()
+        except BaseException:
+            encoder.kill()
+            raise
+    if encoder.returncode:
+        raise OSError(f"the film was not encoded: {said.decode(errors='replace').strip() or encoder.returncode}")
+
+
+def write_sheet(path: str | os.PathLike[str], frames: Sequence[Frame], *, columns: int = 3, width: int = 420) -> None:
+    """A png file of several frames, each made ``width`` pixels wide; whole or not at all.
+
+    Raises:
+        OSError: ``path`` cannot be written.
+    """
+    path = Path(path)
+    height = round(width * frames[0].shape[0] / frames[0].shape[1])
+    small = [np.asarray(Image.fromarray(frame).resize((width, height), Image.Resampling.LANCZOS)) for frame in frames]
+    partial = path.with_name(f"{path.name}.{os.getpid()}.part")
+    try:
+        Image.fromarray(tiled(small, columns)).save(partial, "PNG", optimize=True)
+        partial.replace(path)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def _length(shots: Sequence[Shot]) -> int:
+    return math.ceil((max(shot.recording.landed for shot in shots) + PAUSE) * RATE)
+
+
+def _place(point: Array) -> str:
+    return f"({point[0]:.2f}, {point[1]:.2f}) m"
+
+
+def _draw_plane(scene: mujoco.MjvScene, shot: Shot) -> None:
+    """On the water: circles of half a metre and of a metre around the base, past landings, the goal."""
+    for radius in (0.5, 1.0):
+        _draw_chain(scene, _circle(np.zeros(2), radius), 0, _RING)
+        _draw(
+            scene, mujoco.mjtGeom.mjGEOM_LABEL, (0.1, 0.1, 0.1), np.array([0.0, -radius, 0.01]), _RING, f"{radius:g} m"
+        )
+    for landing in shot.past[:: max(1, math.ceil(len(shot.past) / MOST_PAST))]:
+        _draw(scene, mujoco.mjtGeom.mjGEOM_BOX, (0.007, 0.007, 0.001), np.append(landing, 0.001), _PAST)
+    _draw_chain(scene, _circle(shot.goal, 0.06), 0.008, _GOAL)
+
+
+def _circle(centre: Array, radius: float) -> Array:
+    angles = np.linspace(0, 2 * np.pi, 60)
+    return np.append(centre, 0.004) + radius * np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
+
+
+def _draw_chain(scene: mujoco.MjvScene, points: Sequence[Array] | Array, radius: float, colour: _Colour) -> None:
+    """Rods from point to point, of a ``radius`` in m; 0 draws lines, which is quicker."""
+    kind, width = (mujoco.mjtGeom.mjGEOM_CAPSULE, radius) if radius else (mujoco.mjtGeom.mjGEOM_LINE, 2)  # 2 pixels
+    for start, stop in pairwise(points):
+        mujoco.mjv_connector(_draw(scene, kind, (width, 0, 0), start, colour), kind, width, start, stop)
+
+
+def _draw(
+    scene: mujoco.MjvScene, kind: int, size: Sequence[float], place: Array, colour: _Colour, label: str = ""
+) -> Any:
+    """One more body in the scene; its size in m, as MuJoCo counts it for this ``kind``."""
+    geom = scene.geoms[scene.ngeom]
+    mujoco.mjv_initGeom(geom, kind, np.array(size), place, np.eye(3).ravel(), np.array(colour, np.float32))
+    geom.label = label
+    scene.ngeom += 1
+    return geom

@@ -1,0 +1,273 @@
+"""Film what a run has learnt: the arm casts for chosen goals, with the movements that the run's own memory infers.
+
+Each goal is answered by the run's inverse model, its memory rebuilt from the log, and executed once with motor noise.
+A yellow ring is the goal, white dots are past landings, circles lie half a metre and a metre around the base. Where the
+float has not met the water after the movement, the line is let out and the float falls: the film says so.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import signal
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import fields
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+if __name__ == "__main__":
+    signal.signal(signal.SIGINT, lambda *_: os._exit(130))  # Ctrl-C while the libraries below are loading
+    if sys.platform == "linux":
+        os.environ.setdefault("MUJOCO_GL", "egl")  # draws without a display
+    try:
+        import mujoco  # noqa: F401
+    except (ImportError, AttributeError, RuntimeError) as error:  # each kind of OpenGL fails in its own way
+        asked = os.environ.get("MUJOCO_GL")
+        print(f"error: MUJOCO_GL={asked} cannot be had here ({error}); set MUJOCO_GL=egl, or unset it", file=sys.stderr)
+        sys.exit(2)
+
+import numpy as np
+from tqdm import tqdm
+
+from sgimd_torch.environments.fishing_rod import FishingRod
+from sgimd_torch.runs.build import RunParts, build
+from sgimd_torch.runs.config import Config
+from sgimd_torch.runs.log import RunError
+from sgimd_torch.runs.process import say, with_streams
+from sgimd_torch.runs.read import Run, read_run
+from sgimd_torch.spaces import Array, stream
+from sgimd_torch.strategies import Remember
+
+try:
+    from sgimd_torch.views.film.camera import (
+        Camera,
+        Frame,
+        NoGraphics,
+        Shot,
+        count_frames,
+        shoot,
+        write_film,
+        write_sheet,
+    )
+except ImportError as error:
+    print(f"error: {error}", file=sys.stderr)
+    sys.exit(2)
+
+AFTER = (100, 500, 1000, 5000)
+EXAMPLES = """examples:
+  scripts/film runs/sgim-d/seed-003                               six goals all around, into runs/sgim-d/seed-003.mp4
+  scripts/film runs/sgim-d/seed-003 --goals 0.3,0.6 -0.5,0.4      these two
+  scripts/film runs/sgim-d/seed-003 --time-lapse                  each goal after 100, 500, 1000 and 5000 movements
+  scripts/film runs/sgim-d/seed-003 --time-lapse --after 50,200   after 50 and 200
+"""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Infer, cast, film.
+
+    Returns:
+        The exit code: 0 done; 2 the request is wrong, or there is no OpenGL; 130 stopped by Ctrl-C or SIGTERM.
+    """
+    options = _options(argv)
+    previous = [signal.signal(number, _interrupt) for number in (signal.SIGINT, signal.SIGTERM)]
+    try:
+        run = read_run(options.run)
+        parts = build(config_of(run))
+        rod = parts.environment
+        if not isinstance(rod, FishingRod):
+            raise RunError(f"{run.path} is of {run.config['environment']}; a film shows the fishing rod only")
+        goals = rod.outcomes.check("goals", options.goals or _spread(parts.benchmark.goals), "in metres")
+        stages = _stages(run, options)
+        width = options.width or (480 if len(stages) > 1 else 640)
+        with Camera(rod.model, width=width, height=width * 3 // 4) as camera:
+            shots = _cast(run, parts, rod, goals, stages, say_movements=len(stages) > 1)
+            _film(options, camera, [[stage[k] for stage in shots] for k in range(len(goals))])
+    except KeyboardInterrupt:
+        say("stopped; no film was written")
+        return 130
+    except (NoGraphics, ImportError, OSError, ValueError) as error:  # RunError, too
+        say(f"error: {error}")
+        return 2
+    finally:
+        for number, handler in zip((signal.SIGINT, signal.SIGTERM), previous, strict=True):
+            signal.signal(number, handler)
+    for movements, stage in zip(stages, shots, strict=True):
+        missed = np.array([shot.missed for shot in stage])
+        print(
+            f"after {movements} movements: {missed.mean():.3f} m from the goal on the mean, {missed.max():.3f} at most"
+        )
+    print(f"Film {options.out}" + (f", sheet {options.sheet}" if options.sheet else ""))
+    return 0
+
+
+def config_of(run: Run) -> Config:
+    """The choices that made a run, of its config.json; those that it does not name were not there to make.
+
+    Raises:
+        RunError: they make no sense.
+    """
+    values: dict[str, Any] = {}
+    for field in fields(Config):
+        value = run.config.get(field.name)
+        if isinstance(value, list):
+            value = tuple(value)
+        elif isinstance(value, str) and "Path" in str(field.type):
+            value = Path(value)
+        if field.name in run.config:
+            values[field.name] = value
+    try:
+        return Config(**values)
+    except (TypeError, ValueError) as error:
+        raise RunError(f"{run.path}/config.json does not describe a run of this version: {error}") from error
+
+
+def remember(run: Run, parts: RunParts, start: int, stop: int) -> None:
+    """Add to the memory of ``parts`` what the learner remembered in movements ``start`` to ``stop``, in its order, and
+    let a forward model learn from it as it did then."""
+    memory, correspondence = parts.learner.memory, parts.correspondence
+    by_observation = isinstance(parts.learner.social, Remember)  # the others remember only what they did themselves
+    for row in range(start, min(stop, len(run.index))):
+        if by_observation and run.demonstration[row] >= 0:
+            shown = parts.demonstrations[run.demonstration[row]]
+            memory.add(shown.context, correspondence(shown.times, shown.trajectory), shown.outcome)
+        if run.origin[row]:
+            memory.add(run.contexts[row], run.thetas[row], run.outcomes[row])
+        if parts.model is not None:
+            goal = run.goals[row]
+            parts.model.refresh(memory, goal if np.isfinite(goal).all() else None)
+
+
+def _cast(
+    run: Run, parts: RunParts, rod: FishingRod, goals: Array, stages: Sequence[int], *, say_movements: bool
+) -> list[list[Shot]]:
+    """For each stage, the run's answer to each goal; a goal meets the same motor noise at every stage."""
+    shots = []
+    context = (rod.contexts.low + rod.contexts.high) / 2
+    title = f"{run.config['name'] or run.config['algorithm']}, seed {run.config['seed']}"
+    for before, movements in zip((0, *stages), stages, strict=False):
+        remember(run, parts, before, movements)
+        if not len(parts.learner.memory):
+            raise RunError(
+                f"{run.path} remembers nothing after {movements} movements, so there is nothing to infer from"
+            )
+        landed = run.outcomes[:movements]
+        landed = landed[np.isfinite(landed[:, 0])]
+        stage = []
+        for k, goal in enumerate(goals):
+            theta = parts.inverse(context, goal).theta
+            recording = rod.record(context, theta, stream(run.config["seed"], "film", k))
+            shown = f"after {movements} movements" if say_movements else f"{title}, after {movements} movements"
+            stage.append(Shot(recording, goal, shown, landed))
+        shots.append(stage)
+    return shots
+
+
+def _film(options: argparse.Namespace, camera: Camera, scenes: list[list[Shot]]) -> None:
+    lasts: list[Frame] = []  # of each scene
+    ends = np.cumsum([count_frames([scene]) for scene in scenes]) - 1
+
+    def frames() -> Iterator[Frame]:
+        # tqdm knows how long it will take; where there is no terminal it says so now and then
+        interval = 0.2 if sys.stderr.isatty() else 10.0
+        bar = tqdm(shoot(camera, scenes), "filming", int(ends[-1]) + 1, unit=" frames", mininterval=interval)
+        for k, frame in enumerate(bar):
+            if k in ends:
+                lasts.append(frame)
+            yield frame
+
+    write_film(options.out, frames())
+    if options.sheet is not None:
+        write_sheet(options.sheet, lasts)
+
+
+def _stages(run: Run, options: argparse.Namespace) -> list[int]:
+    """After how many movements to look."""
+    lived = len(run.index)
+    if not lived:
+        raise RunError(f"{run.path} has no movements yet; let it run on with --resume")
+    if not options.time_lapse:
+        return [lived]
+    if options.after is None:
+        return [*(movements for movements in AFTER if movements < lived), lived][: len(AFTER)]
+    if max(options.after) > lived:
+        raise RunError(f"--after must be at most {lived}, the movements of {run.path}, got {max(options.after)}")
+    return sorted(set(options.after))
+
+
+def _spread(goals: Array) -> Array:
+    """``(6, 2)`` the benchmark goals nearest to six places all around, alternately 1 m and 0.6 m away."""
+    angles = np.radians(np.arange(30, 390, 60))
+    places = np.array([1.0, 0.6] * 3)[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    nearest = [int(np.linalg.norm(goals - place, axis=1).argmin()) for place in places]
+    return goals[list(dict.fromkeys(nearest))]
+
+
+def _options(argv: Sequence[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog="scripts/film",
+        description=__doc__,
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("run", type=Path, help="a run's directory: OUT/NAME/seed-003")
+    parser.add_argument(
+        "--goals", type=_goal, nargs="+", metavar="X,Y", help="in m; without it, six of the benchmark's, all around"
+    )
+    parser.add_argument("--time-lapse", action="store_true", help="what it did for each goal early and late, tiled")
+    parser.add_argument(
+        "--after",
+        type=_counts,
+        metavar="N,N",
+        help=f"movements, of a time lapse (default: {','.join(map(str, AFTER))})",
+    )
+    parser.add_argument("--width", type=_width, help="of a picture, pixels (default: 640; in a time lapse 480)")
+    parser.add_argument("--out", type=Path, help="the film, .mp4 (default: beside the run's directory)")
+    parser.add_argument("--sheet", type=Path, help="also an image of how each scene ends, .png")
+    # A word that begins with a minus is no option when a number follows it.
+    given = sys.argv[1:] if argv is None else argv
+    words = [f" {word}" if re.match(r"-[.\d]", word) else word for word in given]
+    options = parser.parse_args(words)
+    if options.after and not options.time_lapse:
+        parser.error("--after belongs to --time-lapse")
+    if options.out is None:
+        options.out = Path(f"{options.run.resolve()}{'-time-lapse' if options.time_lapse else ''}.mp4")
+    for path, suffix in ((options.out, ".mp4"), (options.sheet, ".png")):
+        if path is not None and (path.suffix != suffix or path.is_dir() or not path.parent.is_dir()):
+            parser.error(f"must be a {suffix} file in a folder that exists, got {path}")
+    return options
+
+
+def _goal(text: str) -> list[float]:
+    try:
+        x, y = map(float, text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"must be x,y in metres such as 0.3,0.6, got {text.strip()!r}") from None
+    return [x, y]
+
+
+def _counts(text: str) -> list[int]:
+    try:
+        counts = [int(word) for word in text.split(",")]
+    except ValueError:
+        counts = [0]
+    if min(counts) < 1:
+        raise argparse.ArgumentTypeError(f"must be whole numbers above 0 such as 100,500, got {text.strip()!r}")
+    return counts
+
+
+def _width(text: str) -> int:
+    width = int(text) if text.isascii() and text.isdigit() else 0
+    if width % 8 or not 160 <= width <= 1280:
+        raise argparse.ArgumentTypeError(f"must be from 160 to 1280 in steps of 8, got {text!r}")
+    return width
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    raise KeyboardInterrupt
+
+
+if __name__ == "__main__":
+    sys.exit(with_streams(main))

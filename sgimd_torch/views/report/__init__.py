@@ -1,0 +1,1 @@
+"""One page about one run, or about many side by side."""

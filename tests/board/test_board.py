@@ -1,0 +1,336 @@
+"""The board: what its curves count, what its file holds, and that a resumed run leaves one continuous board."""
+
+import signal
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from tensorboard.backend.event_processing.event_file_loader import EventFileLoader
+from tensorboard.plugins.custom_scalar import layout_pb2
+from tensorboard.plugins.hparams import metadata as hparams
+from tensorboard.util.tensor_util import make_ndarray
+
+from runs import EAGER, arguments, csv_of, signal_after, start
+from sgimd_torch import InterestMap, PeriodicTeacher, PlanarArm, evaluate, run, stream
+from sgimd_torch.board.scalars import LEGEND, Curves, Grid, branches
+from sgimd_torch.board.writer import Board
+from sgimd_torch.runs.read import read_run
+from sgimd_torch.spaces import Box, Demonstration, Episode, Move
+from worlds import demonstrations, make
+
+LIFE = 1500  # movements
+PLANE = Box.cube(-1, 1, 2)
+GOAL, NEAR, FAR = np.array([0.5, 0.5]), np.array([0.5, 0.51]), np.array([0.5, 0.9])  # near: within the tolerance
+SHOWN = Demonstration(np.zeros(0), np.zeros(2), np.zeros((2, 1)), np.array([-0.5, 0.5]))
+
+
+def movement(index, goal, outcome, origin="local", demonstration=None):
+    return Episode(index, np.zeros(0), Move(np.zeros(1), goal, origin), outcome, demonstration)
+
+
+def events_of(directory):
+    (path,) = directory.glob("events.out.tfevents.*")
+    return list(EventFileLoader(str(path)).Load())
+
+
+def curves_of(directory):
+    """By tag: {step: value}; a step that is there twice fails."""
+    found = {}
+    for event in events_of(directory):
+        for value in event.summary.value:
+            tensor = make_ndarray(value.tensor)
+            shown = tensor.item() if tensor.dtype == np.float32 and tensor.size else tensor.tolist()
+            assert found.setdefault(value.tag, {}).setdefault(event.step, shown) is shown, (value.tag, event.step)
+    return found
+
+
+def interest_map(n=400):
+    goals = InterestMap(Box.cube(0, 1, 0), PLANE, stream(0, "goals"))
+    rng = stream(0, "competence")
+    for _ in range(n):
+        goal = goals.sample([])
+        goals.add([], goal, -rng.random() if goal[0] > 0 else -0.1)
+    return goals
+
+
+def test_a_goal_counts_once_and_as_reached_when_one_of_its_movements_came_near():
+    curves = Curves(PLANE, tolerance=0.02)
+    for index, outcome in enumerate([FAR, NEAR, FAR]):
+        curves.episode(movement(index, GOAL, outcome))
+    curves.episode(movement(3, -GOAL, FAR))
+    values = curves.of_behaviour()
+    assert (values["goals/attempted"], values["goals/reached"], values["goals/reached_share"]) == (2, 1, 0.5)
+    assert values["goals/missed_by"] == pytest.approx((0.01 + np.hypot(1, 1.4)) / 2)
+
+
+def test_imitations_count_for_the_teacher_and_not_as_goals_of_the_learners_own():
+    curves = Curves(PLANE)
+    curves.episode(movement(0, GOAL, NEAR))
+    curves.episode(movement(1, SHOWN.outcome, SHOWN.outcome * 1.2, "imitate", SHOWN))
+    curves.episode(movement(2, SHOWN.outcome, SHOWN.outcome * 1.4, "imitate"))
+    values = curves.of_behaviour()
+    assert values["goals/attempted"] == 1
+    assert values["teacher/demonstrations"] == 1
+    assert values["teacher/missed_by"] == pytest.approx(0.3 * np.sqrt(0.5))
+
+
+def test_shares_of_regimes_sum_to_one_and_a_regime_that_was_seen_keeps_its_curve():
+    curves = Curves(PLANE)
+    for index, origin in enumerate(["global", "local", "local", "imitate"]):
+        curves.episode(movement(index, GOAL, FAR, origin))
+    assert curves.of_behaviour().items() >= {"regime/global": 0.25, "regime/local": 0.5, "regime/imitate": 0.25}.items()
+    curves.episode(Episode(4, np.zeros(0), None, None, None))
+    values = {tag: value for tag, value in curves.of_behaviour().items() if tag.startswith("regime/")}
+    assert values == {"regime/global": 0, "regime/local": 0, "regime/imitate": 0, "regime/rest": 1}
+
+
+def test_a_region_that_was_cut_goes_on_as_the_mean_over_the_goals_of_its_parts():
+    regions = interest_map().regions
+    values = Curves(PLANE, depth=3).of_regions(regions)
+    for path in ("R", "R0", "R10"):
+        below = [region for region in regions if region.path.startswith(path)]
+        assert len(below) > 1
+        goals = np.concatenate([region.competences for region in below])
+        interests = np.concatenate([np.full(len(region.goals), region.interest()) for region in below])
+        assert values[f"competence/{path}"] == pytest.approx(goals.mean())
+        assert values[f"interest/{path}"] == pytest.approx(interests.mean())
+        assert values[f"region_goals/{path}"] == sum(region.attempts for region in below)
+    assert values["region_size/R"] == pytest.approx(1)
+    assert values["region_size/R0"] + values["region_size/R1"] == pytest.approx(1)
+    assert values["regions/count"] == len(regions)
+
+
+def test_the_names_of_regions_are_bounded_and_none_disappears_while_the_tree_grows():
+    goals, curves, names = interest_map(0), Curves(PLANE, depth=2), set()
+    rng = stream(1, "goals")
+    for _ in range(2000):
+        goal = PLANE.sample(rng)
+        goals.add([], goal, -rng.random())
+        if rng.random() < 0.05:
+            now = {tag for tag in curves.of_regions(goals.regions) if tag.startswith("interest/")}
+            assert names <= now
+            names = now
+    assert len(goals.regions) > 20
+    assert names == {f"interest/R{bits}" for bits in ("", "0", "1", "00", "01", "10", "11")}
+
+
+def test_regions_asked_for_again_and_again_give_what_fresh_curves_give():
+    goals, curves = interest_map(0), Curves(PLANE)
+    rng = stream(2, "goals")
+    for _ in range(300):
+        goals.add([], PLANE.sample(rng), -rng.random())
+        values = curves.of_regions(goals.regions)
+    fresh = Curves(PLANE).of_regions(goals.regions)
+    assert values == {tag: value for tag, value in fresh.items() if tag in values}
+    assert {tag.partition("/")[0] for tag in fresh.keys() - values.keys()} <= {"region_size"}  # which is told once
+
+
+def test_a_region_knows_which_share_of_its_goals_was_reached():
+    goals, curves = interest_map(0), Curves(PLANE, tolerance=0.02)
+    for index, outcome in enumerate([NEAR, FAR, FAR, NEAR]):
+        goal = GOAL * (1 + 0.001 * index)
+        curves.episode(movement(index, goal, outcome))
+        goals.add([], goal, -0.5)
+    assert curves.of_regions(goals.regions)["region_reached/R"] == 0.5
+
+
+def test_cells_of_the_grid_hold_each_point_once_the_border_included():
+    grid = Grid(PLANE)
+    assert len(grid.names) == len(set(grid.names)) == 16
+    counts, sums = grid.sums(np.array([[-1, -1], [1, 1], [0, 0], [0.1, 0.4], [1.1, 0]]), np.array([1.0, 2, 3, 4, 5]))
+    means = grid.means(counts, sums)
+    assert means == {"x -1..-0.5, y -1..-0.5": 1, "x 0.5..1, y 0.5..1": 2, "x 0..0.5, y 0..0.5": 3.5}
+
+
+def test_cells_of_a_fixed_grid_lie_below_the_whole_and_have_no_curves_of_their_own():
+    (region,) = interest_map(0).regions
+    halves = [type(region)(**{**vars(region), "path": path}) for path in ("R.0", "R.1")]
+    assert branches(halves, 3) == {"R": halves}
+
+
+@pytest.mark.parametrize("dim", [1, 2, 3, 6])
+def test_a_grid_has_at_most_sixteen_cells_in_any_dimension(dim):
+    assert 1 <= len(Grid(Box.cube(0, 1, dim)).names) <= 16
+
+
+@pytest.fixture(scope="module")
+def board(tmp_path_factory):
+    """A planar arm is taught, and evaluated twice; returns the directory and the mean errors (m)."""
+    directory, arm = tmp_path_factory.mktemp("board"), PlanarArm()
+    learner, teacher = make("sgim-d", arm), PeriodicTeacher(demonstrations(arm), stream(0, "teacher"))
+    goals = np.array([[0.3, 0.3], [-0.5, 0.2]])
+    evaluations = {}
+    with Board(directory, arm.outcomes, legend={"mine": "A number of mine."}) as board:
+        board.settings({"seed": 0, "goals": "interest-map", "fast": True}, first=["seed"])
+        for episode in run(learner, arm, 0, movements=LIFE, teacher=teacher):
+            board.episode(episode)
+            if board.due:
+                board.regions(learner.autonomous.goals.regions)
+                board.scalars({"mine/squared": board.movements**2, "mine/missing": np.nan})
+            if board.movements in (200, LIFE):
+                found = evaluate(learner.autonomous.inverse, arm, goals, 0, board.movements)
+                board.evaluation(goals, found.errors, found.noise_floor)
+                evaluations[board.movements] = found.mean_error
+        board.finish()
+    return directory, evaluations
+
+
+def test_tensorboard_reads_what_was_written(board):
+    directory, evaluations = board
+    curves, steps = curves_of(directory), range(50, LIFE + 1, 50)
+    assert curves["error/mean"] == pytest.approx(evaluations, rel=1e-6)
+    assert curves["mine/squared"] == {step: step**2 for step in steps}
+    assert "mine/missing" not in curves
+    assert curves["competence/R"].keys() == curves["regime/local"].keys() == set(steps)
+
+
+def test_every_tag_is_explained_once_in_the_file_and_once_in_the_legend(board):
+    directory, _ = board
+    explained = [
+        value.tag
+        for event in events_of(directory)
+        for value in event.summary.value
+        if value.metadata.summary_description and value.metadata.plugin_data.plugin_name in ("scalars", "text")
+    ]
+    curves = curves_of(directory)
+    assert sorted(explained) == sorted(tag for tag in curves if not tag.startswith(("_hparams_", "custom_scalars")))
+    (legend,) = curves["about/legend"].values()
+    assert all(f"**{tag}" in legend.decode() for tag in LEGEND)
+
+
+def test_a_tag_that_nobody_explained_is_refused(tmp_path):
+    with Board(tmp_path, PLANE) as board, pytest.raises(ValueError, match="legend"):
+        board.scalars({"mine": 1.0})
+
+
+def test_the_page_of_charts_names_only_curves_that_are_there(board):
+    directory, _ = board
+    curves = curves_of(directory)
+    layout = layout_pb2.Layout.FromString(curves["custom_scalars__config__"][0])
+    tags = {tag for category in layout.category for chart in category.chart for tag in chart.multiline.tag}
+    missing = {tag.strip("^$") for tag in tags} - curves.keys()
+    assert "^error/mean$" in tags
+    assert all(f"{tag[:-1]}0" in missing for tag in missing)  # parts of a region that was not cut
+    assert {tag.partition("/")[0] for tag in missing} <= {"competence", "interest"}
+
+
+def test_runs_can_be_compared_by_settings_and_results(board):
+    directory, _ = board
+    contents = {
+        value.tag: value.metadata.plugin_data.content for event in events_of(directory) for value in event.summary.value
+    }
+    begun = hparams.parse_session_start_info_plugin_data(contents[hparams.SESSION_START_INFO_TAG])
+    assert begun.hparams["seed"].number_value == 0
+    assert begun.hparams["goals"].string_value == "interest-map"
+    assert begun.hparams["fast"].bool_value is True
+    compared = hparams.parse_experiment_plugin_data(contents[hparams.EXPERIMENT_TAG])
+    assert [info.name for info in compared.hparam_infos if info.differs] == ["seed"]
+    assert {info.name.tag for info in compared.metric_infos} <= curves_of(directory).keys()
+
+
+def test_a_second_board_in_one_directory_is_refused(tmp_path):
+    Board(tmp_path, PLANE).close()
+    with pytest.raises(ValueError, match="another directory"):
+        Board(tmp_path, PLANE)
+
+
+def test_a_board_that_replaces_another_leaves_it_alone_until_published(tmp_path):
+    with Board(tmp_path, PLANE) as first:
+        first.scalars({"error/mean": 1.0})
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    with Board(tmp_path, PLANE, replace=True) as second:
+        second.scalars({"error/mean": 2.0})
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+    with Board(tmp_path, PLANE, replace=True) as third:
+        third.publish()
+        third.scalars({"error/mean": 3.0})
+    assert curves_of(tmp_path)["error/mean"] == {0: 3.0}
+    assert before.keys().isdisjoint(path.name for path in tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("tail", [b"", b"\x10", bytes(100), b"\xff" * 40], ids=["whole", "torn", "zeros", "ones"])
+def test_a_torn_or_damaged_end_of_the_old_file_is_left_out(tmp_path, tail):
+    with Board(tmp_path, PLANE) as board:
+        board.scalars({"error/mean": 1.0})
+    (path,) = tmp_path.iterdir()
+    path.write_bytes(path.read_bytes() + tail)
+    with Board(tmp_path, PLANE, replace=True) as board:
+        board.publish()
+        assert board.recall("error")
+        assert not board.recall("map")
+    assert curves_of(tmp_path)["error/mean"] == {0: 1.0}
+
+
+def test_a_library_that_is_not_watched_loads_no_tensorboard():
+    program = "import sys, run; assert not {'tensorboard', 'torch'} & set(sys.modules)"
+    done = subprocess.run(
+        [sys.executable, "-c", f"import sys; sys.path[:0] = {sys.path!r}; {program}"], capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_board_loads_neither_torch_nor_matplotlib_nor_tensorflow():
+    program = "import sys, sgimd_torch.board; print({'torch', 'matplotlib', 'tensorflow'} & set(sys.modules))"
+    done = subprocess.run(
+        [sys.executable, "-c", f"import sys; sys.path[:0] = {sys.path!r}; {program}"], capture_output=True, text=True
+    )
+    assert done.stdout == "set()\n", done.stderr
+
+
+OPTIONS = ("--movements", "160", "--evaluate_at", "60,120", "--board", "true")
+
+
+@pytest.fixture(scope="module")
+def watched(tmp_path_factory, go):
+    out = tmp_path_factory.mktemp("watched")
+    assert go(out, *OPTIONS) == 0
+    return out / "sgim-d" / "seed-003"
+
+
+def test_watching_a_run_changes_no_byte_of_it(tmp_path, go, watched):
+    assert go(tmp_path, *OPTIONS, "--board", "false") == 0
+    assert csv_of(tmp_path / "sgim-d" / "seed-003") == csv_of(watched)
+
+
+def test_the_curves_of_a_run_are_those_of_its_files(watched):
+    curves, read = curves_of(watched), read_run(watched)
+    for tag, column in {"mean": "mean_error_m", "p90": "p90_error_m", "noise_floor": "noise_floor_m"}.items():
+        expected = dict(zip(read.evaluation["movements"], read.evaluation[column], strict=True))
+        assert curves[f"error/{tag}"] == pytest.approx(expected, rel=1e-6)
+    first = read.origin[:50]
+    for origin in np.unique(first):
+        assert curves[f"regime/{origin}"][50] == pytest.approx((first == origin).mean())
+    shown = {step: (read.demonstration[:step] >= 0).sum() for step in (50, 100, 150)}
+    assert curves["teacher/demonstrations"] == shown
+    assert all(picture[2].startswith(b"\x89PNG") for picture in curves["map/error"].values())
+
+
+@pytest.mark.parametrize(("signum", "lines"), [(signal.SIGKILL, 110), (signal.SIGINT, 130)])
+def test_a_run_that_was_stopped_and_resumed_leaves_the_board_of_one_that_never_was(
+    tmp_path, go, benchmark, watched, signum, lines
+):
+    directory = tmp_path / "sgim-d" / "seed-003"
+    process = start(EAGER, *arguments(tmp_path, benchmark), *OPTIONS)
+    signal_after(process, directory / "episodes.csv", lines, signum)
+    assert go(tmp_path, *OPTIONS, "--resume") == 0
+    resumed, whole = curves_of(directory), curves_of(watched)
+    assert resumed.keys() == whole.keys()
+    for tag in whole:
+        if tag.partition("/")[0] not in ("time", "_hparams_", "about"):
+            assert resumed[tag] == whole[tag], tag
+    assert resumed["time/physics"].keys() == whole["time/physics"].keys()
+
+
+def test_a_run_that_was_not_watched_gets_its_board_when_it_is_resumed(tmp_path, go, watched):
+    assert go(tmp_path, *OPTIONS, "--board", "false") == 0
+    assert go(tmp_path, *OPTIONS, "--resume") == 0
+    resumed, whole = curves_of(tmp_path / "sgim-d" / "seed-003"), curves_of(watched)
+    for tag in ("error/mean", "competence/R", "goals/reached", "regime/local"):
+        assert resumed[tag] == whole[tag]
+
+
+def test_an_evaluation_that_is_taken_back_leaves_the_board_too(tmp_path, go):
+    assert go(tmp_path, *OPTIONS) == 0
+    assert go(tmp_path, *OPTIONS, "--evaluate_at", "120", "--resume") == 0
+    assert curves_of(tmp_path / "sgim-d" / "seed-003")["error/mean"].keys() == {120, 160}

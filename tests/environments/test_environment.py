@@ -1,0 +1,244 @@
+"""The environment protocol, and the planar arm whose reachable set and inverse are known exactly."""
+
+import pickle
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import ArrayLike
+from scipy.optimize import minimize
+
+from contracts import check_environment
+from sgimd_torch.environments.planar_arm import PlanarArm
+from sgimd_torch.environments.protocol import BatchEnvironment, SimulationError, check_movement, execute_many
+from sgimd_torch.spaces import Array, Box, stream
+
+NO_CONTEXT = np.empty(0)
+
+
+def end_of(arm: PlanarArm, theta: ArrayLike, context: ArrayLike = NO_CONTEXT) -> Array:
+    return arm.execute(context, theta, stream(0, "environment"))
+
+
+class Slope:
+    """The least a user writes: one parameter, and an outcome twice as far."""
+
+    contexts, policies, outcomes = Box.cube(0, 1, 0), Box.cube(0, 1, 1), Box.cube(0, 2, 1)
+    rest, outcome_noise = np.zeros(1), 0.0
+
+    def observe(self, rng: np.random.Generator) -> Array:
+        return self.contexts.sample(rng)
+
+    def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
+        context, theta = check_movement(self, context, theta)
+        return 2 * theta
+
+
+class FastSlope(Slope):
+    n_batches = 0
+
+    def execute_many(self, contexts: Array, thetas: Array, rngs: Sequence[np.random.Generator]) -> Array:
+        self.n_batches += 1
+        return 2 * thetas
+
+
+@pytest.mark.parametrize(
+    "environment",
+    [
+        PlanarArm(),
+        PlanarArm(2, length=3.0),
+        PlanarArm(noise=0.02, context=True),
+        PlanarArm(context=True, outcomes=Box.cube(-100, 100, 2)),
+        Slope(),
+        FastSlope(),
+    ],
+    ids=["arm", "two joints", "noise and context", "large task space", "user's", "user's batches"],
+)
+def test_environment_keeps_the_contract(environment):
+    check_environment(environment)
+
+
+def test_a_batch_is_executed_at_once_where_the_environment_can():
+    environment = FastSlope()
+    assert isinstance(environment, BatchEnvironment)
+    assert not isinstance(Slope(), BatchEnvironment)
+    rngs = [stream(seed, "row") for seed in range(2)]
+    assert execute_many(environment, np.empty((2, 0)), [[0.25], [0.5]], rngs).tolist() == [[0.5], [1.0]]
+    assert environment.n_batches == 1
+
+
+def test_a_diverged_simulation_names_its_theta_even_from_another_process():
+    error = pickle.loads(pickle.dumps(SimulationError(np.array([0.25, 0.5]), "NaN in qpos")))
+    assert str(error) == "NaN in qpos; theta=[0.25, 0.5]"
+    assert error.theta.tolist() == [0.25, 0.5]
+
+
+def test_rest_is_the_end_of_the_straight_arm():
+    arm = PlanarArm(5, length=2.0)
+    np.testing.assert_allclose(end_of(arm, np.full(5, 0.5)), [2.0, 0.0], atol=1e-15)
+    assert arm.rest.tolist() == [2.0, 0.0]
+
+
+def test_two_links_up_and_then_right_end_at_half_a_metre_each():
+    arm = PlanarArm(2, max_angle=np.pi)
+    np.testing.assert_allclose(end_of(arm, [0.75, 0.25]), [0.5, 0.5], atol=1e-15)  # pi/2, then -pi/2
+
+
+def test_later_joints_are_scaled_to_the_largest_bend():
+    arm = PlanarArm(2, max_angle=np.pi / 2)
+    np.testing.assert_allclose(end_of(arm, [0.5, 1.0]), [0.5, 0.5], atol=1e-15)  # straight, then +pi/2
+
+
+def test_angles_are_those_of_the_joints_from_the_middle_to_both_limits():
+    arm = PlanarArm(3, max_angle=0.5)
+    np.testing.assert_allclose(arm.angles([[0.5, 0.5, 0.5], [1.0, 1.0, 0.0]]), [[0, 0, 0], [np.pi, 0.5, -0.5]])
+    with pytest.raises(ValueError, match="theta must"):
+        arm.angles([0.5, 0.5, 1.1])
+
+
+@given(n_joints=st.integers(2, 50), seed=st.integers(0, 1000))
+@settings(max_examples=50, deadline=None, derandomize=True)
+def test_correspondence_finds_the_theta_whose_angles_a_trajectory_ends_with(n_joints, seed):
+    arm, rng = PlanarArm(n_joints), stream(seed, "postures")
+    theta = arm.policies.sample(rng)
+    somewhere = rng.uniform(-9, 9, size=(3, n_joints))  # on the way the joints may be anywhere
+    found = arm.correspondence([0.0, 0.2, 0.9, 1.0], [*somewhere, arm.angles(theta)])
+    np.testing.assert_allclose(found, theta, atol=1e-15)
+    assert arm.policies.contains(found)
+
+
+def test_a_posture_at_its_limits_is_taken_and_rounding_forgiven():
+    arm = PlanarArm(2, max_angle=1.0)
+    assert arm.correspondence([0.0], [[np.pi * (1 + 1e-15), -1.0 - 1e-15]]).tolist() == [1.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("times", "trajectory", "message"),
+    [
+        (
+            [0.0, 1.0],
+            [[0, 0], [0, 1.1]],
+            r"others \+-1.000 rad, but of the last posture entry \[1\] is 1.1; is it in deg",
+        ),
+        ([0.0, 1.0], [[0, 0], [-3.2, 0]], r"first joint turns within \+-3.142 rad"),
+        ([0.0, 1.0], [[0, 0, 0], [0, 0, 0]], "one column for each joint"),
+        ([0.0, 1.0], [[0, 0], [0, np.nan]], "trajectory must be finite"),
+        ([0.0], [0, 0], "trajectory needs samples in rows"),
+        ([], np.empty((0, 2)), "trajectory needs samples in rows"),
+        ([0.0, 1.0, 2.0], [[0, 0], [0, 0]], "one time in s for each row"),
+        ([0.0, 0.0], [[0, 0], [0, 0]], "times must increase"),
+    ],
+)
+def test_correspondence_refuses_what_the_joints_cannot_end_with(times, trajectory, message):
+    with pytest.raises(ValueError, match=message):
+        PlanarArm(2, max_angle=1.0).correspondence(times, trajectory)
+
+
+def test_a_context_turns_the_whole_arm():
+    arm = PlanarArm(context=True)
+    theta, turn = stream(1, "theta").uniform(size=7), np.pi / 6
+    x, y = end_of(arm, theta, [0.0])
+    turned = [np.cos(turn) * x - np.sin(turn) * y, np.sin(turn) * x + np.cos(turn) * y]
+    np.testing.assert_allclose(end_of(arm, theta, [turn]), turned, atol=1e-15)
+
+
+@given(
+    n_joints=st.integers(2, 12),
+    max_angle=st.one_of(st.none(), st.floats(0.1, np.pi)),
+    share=st.floats(0, 1),
+    direction=st.floats(-np.pi, np.pi),
+    turn=st.floats(-np.pi / 4, np.pi / 4),
+)
+@settings(max_examples=150, deadline=None, derandomize=True)
+def test_solve_reaches_every_goal_of_the_ring_in_every_context(n_joints, max_angle, share, direction, turn):
+    arm = PlanarArm(n_joints, length=3.0, max_angle=max_angle, context=True)
+    radius = arm.min_radius + share * (3.0 - arm.min_radius)
+    goal = radius * np.array([np.cos(direction), np.sin(direction)])
+    assert arm.reachable(goal)
+    theta = arm.solve([turn], goal)
+    assert arm.policies.contains(theta)
+    np.testing.assert_allclose(end_of(arm, theta, [turn]), goal, atol=1e-12)
+
+
+def test_the_default_arm_reaches_its_whole_disc_and_nothing_beyond():
+    arm = PlanarArm(length=2.0)
+    points = [[0.0, 0.0], [0.0, -2.0], [1.4, 1.4], [1.42, 1.42], [2.01, 0.0]]  # radii 0, 2, 1.98, 2.008, 2.01
+    assert arm.reachable(points).tolist() == [True, True, True, False, False]
+    arm = PlanarArm(5, length=2.0)
+    straight = [end_of(arm, [turn, *[0.5] * 4]) for turn in np.linspace(0, 1, 50)]
+    assert arm.reachable(straight).all()  # some are 4e-16 beyond the length
+
+
+def test_an_arm_that_can_bend_more_than_a_full_turn_still_reaches_its_base():
+    assert PlanarArm(7, max_angle=5 * np.pi / 7).min_radius == pytest.approx(0, abs=1e-15)
+
+
+def test_no_bends_bring_the_end_closer_than_the_inner_radius():
+    arm = PlanarArm(3, max_angle=1.0)
+    assert arm.min_radius == pytest.approx((1 + 2 * np.cos(1.0)) / 3)  # cos(-1) + cos(0) + cos(1) links of 1/3
+
+    def radius(bends: Array) -> float:
+        return float(np.linalg.norm(end_of(arm, [0.5, *np.clip(bends, 0, 1)])))
+
+    starts = stream(2, "starts").uniform(size=(10, 2))
+    closest = [minimize(radius, start, method="Nelder-Mead").fun for start in starts]
+    assert min(closest) == pytest.approx(arm.min_radius, abs=1e-6)
+    assert arm.reachable([arm.min_radius + 1e-9, 0])
+    assert not arm.reachable([arm.min_radius - 1e-9, 0])
+
+
+def test_announced_noise_is_that_of_outcomes_executed_again():
+    arm, rng = PlanarArm(5, length=2.0, noise=0.01), stream(3, "environment")
+    thetas = stream(3, "theta").uniform(size=(4000, 5))
+    difference = [arm.execute(NO_CONTEXT, theta, rng) - arm.execute(NO_CONTEXT, theta, rng) for theta in thetas]
+    measured = np.sqrt(np.mean(np.square(difference)) / 2)  # a difference has twice the variance
+    # 8000 squares, their spread about 2 relative: one standard error is 1.1 %, so 5 % is more than four of them.
+    assert measured == pytest.approx(arm.outcome_noise, rel=0.05)
+
+
+def test_a_stretched_arm_is_noisier_than_a_folded_one():
+    arm, rng = PlanarArm(noise=0.01), stream(4, "environment")
+    folded = arm.solve(NO_CONTEXT, [0.1, 0.0])
+    deviations = [np.std([arm.execute(NO_CONTEXT, theta, rng) for _ in range(300)], axis=0).max()
+                  for theta in (np.full(7, 0.5), folded)]  # fmt: skip
+    assert deviations[0] > 1.5 * deviations[1]
+
+
+def test_taking_the_noise_away_moves_no_stream():
+    streams = [stream(5, "environment") for _ in range(2)]
+    for noise, rng in zip((0.0, 0.1), streams, strict=True):
+        PlanarArm(noise=noise).execute(NO_CONTEXT, np.full(7, 0.5), rng)
+    assert streams[0].random() == streams[1].random()
+
+
+@pytest.mark.parametrize("goal", [[1.01, 0.0], [np.nan, 0.0], [0.1, 0.0, 0.0], [[0.1, 0.0]], [0.3, 0.0]])
+def test_solve_refuses_goals_that_are_not_one_reachable_point(goal):
+    with pytest.raises(ValueError, match="goal must"):
+        PlanarArm(3, max_angle=1.0).solve(NO_CONTEXT, goal)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"n_joints": 1},
+        {"n_joints": 2.5},
+        {"length": 0.0},
+        {"length": np.inf},
+        {"max_angle": 0.0},
+        {"max_angle": 3.2},
+        {"noise": -0.1},
+        {"noise": np.nan},
+        {"outcomes": Box.cube(-1, 1, 3)},
+        {"outcomes": Box.cube(2, 3, 2)},
+    ],
+)
+def test_an_impossible_arm_is_refused(options):
+    with pytest.raises(ValueError, match=r"must|needs"):
+        PlanarArm(**options)
+
+
+def test_a_seed_in_the_place_of_a_generator_is_refused():
+    with pytest.raises(TypeError, match="got int; was the seed passed instead of a Generator"):
+        PlanarArm(5).execute(NO_CONTEXT, np.full(5, 0.5), 0)

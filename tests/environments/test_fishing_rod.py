@@ -1,0 +1,364 @@
+"""The fishing rod: laws of its mechanics, one landing point for every movement, and noise of its own stream."""
+
+from collections.abc import Callable
+from itertools import pairwise
+
+import mujoco
+import numpy as np
+import pytest
+
+from contracts import check_environment
+from sgimd_torch.environments.fishing_rod import HOLD, JOINTS, FishingRod
+from sgimd_torch.environments.protocol import SimulationError
+from sgimd_torch.learner import Learner
+from sgimd_torch.memory import Memory
+from sgimd_torch.spaces import Array, Box, stream
+from sgimd_torch.strategies import Babble
+
+NO_CONTEXT = np.zeros(0)
+
+
+@pytest.fixture(scope="module")
+def rod() -> FishingRod:
+    """Without noise; nobody may change its model."""
+    return FishingRod(noise=0.0, threads=1)
+
+
+def movements(n: int, seed: int = 0) -> Array:
+    return stream(seed, "movements").random((n, 25))
+
+
+def cast(rod: FishingRod, theta: Array, context: Array = NO_CONTEXT, seed: int = 0) -> Array:
+    return rod.execute(context, theta, stream(seed, "environment"))
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{}, {"noise": 0.0}, {"max_yaw": 1.0}, {"max_wind": 0.05, "threads": 1}, {"max_yaw": 0.5, "max_wind": 0.02}],
+)
+def test_the_rod_keeps_the_contract_of_environments(options: dict[str, float]) -> None:
+    check_environment(FishingRod(**options))
+
+
+def test_without_a_context_asked_for_there_is_none(rod: FishingRod) -> None:
+    assert rod.contexts.dim == 0
+    assert FishingRod(max_yaw=1.0, max_wind=0.05).contexts.high.tolist() == [1.0, 0.05]
+    assert FishingRod(max_wind=0.05).contexts.low.tolist() == [-0.05]
+
+
+def test_every_element_of_the_model_has_a_name(rod: FishingRod) -> None:
+    for kind in ("BODY", "JOINT", "GEOM", "SITE", "ACTUATOR", "SENSOR", "CAMERA", "LIGHT", "MATERIAL"):
+        kind_of_object = getattr(mujoco.mjtObj, f"mjOBJ_{kind}")
+        count = {"BODY": "nbody", "JOINT": "njnt", "ACTUATOR": "nu", "CAMERA": "ncam", "MATERIAL": "nmat"}
+        n = getattr(rod.model, count.get(kind, f"n{kind.lower()}"))
+        assert n > 0
+        names = [mujoco.mj_id2name(rod.model, kind_of_object, i) for i in range(n)]
+        assert all(names), f"{kind}: {names}"
+
+
+def test_six_joints_move_the_arm_and_thirty_the_line(rod: FishingRod) -> None:
+    names = [rod.model.joint(i).name for i in range(rod.model.njnt)]
+    assert names == [*JOINTS, *(f"line_{k:02}" for k in range(1, 31))]
+    assert (rod.model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE).all()
+    across = [rod.model.joint(f"line_{k:02}").axis for k in range(1, 31)]
+    assert [float(one @ next_one) for one, next_one in pairwise(across)] == [0.0] * 29
+    assert rod.policies.dim == 25
+
+
+def step_through(rod: FishingRod, theta: Array, see: Callable[[mujoco.MjData], None], wind: float = 0.0) -> None:
+    """The movement once more, step by step in Python from the start configuration."""
+    data = mujoco.MjData(rod.model)
+    mujoco.mj_setState(rod.model, data, rod._home, mujoco.mjtState.mjSTATE_FULLPHYSICS)
+    step = rod.model.opt.timestep
+    for k in range(round((rod.primitive.duration(theta) + HOLD) / step)):
+        data.ctrl[:6], data.ctrl[6] = rod.primitive.at(theta, np.array([k * step]))[0], wind
+        mujoco.mj_step(rod.model, data)
+        mujoco.mj_forward(rod.model, data)  # a step leaves the sensors as they were before it
+        see(data)
+
+
+def test_the_line_keeps_its_length_along_a_movement(rod: FishingRod) -> None:
+    lengths, bends = [], []
+
+    def see(data: mujoco.MjData) -> None:
+        points = np.array([data.body(name).xpos for name in [*(f"line_{k:02}" for k in range(1, 31)), "float"]])
+        lengths.append(np.linalg.norm(np.diff(points, axis=0), axis=1))
+        bends.append(np.linalg.norm(points[-1] - points[0]))
+
+    step_through(rod, movements(1)[0], see)
+    assert np.array(lengths) == pytest.approx(0.014, abs=1e-12)
+    assert min(bends) < 0.99 * 30 * 0.014  # it did bend
+
+
+def test_the_float_lands_where_its_path_first_crosses_the_water(rod: FishingRod) -> None:
+    n_landed = 0
+    for theta in movements(40):
+        path: list[Array] = []
+        step_through(rod, theta, lambda data, path=path: path.append(data.sensordata[:3].copy()))
+        track = np.array(path)
+        wet = np.flatnonzero(track[:, 2] <= 0)
+        if wet.size:
+            above, below = track[wet[0] - 1], track[wet[0]]
+            landing = cast(rod, theta)
+            shares = (landing - above[:2]) / (below[:2] - above[:2])
+            assert shares == pytest.approx(np.full(2, above[2] / (above[2] - below[2])), abs=1e-6)
+            n_landed += 1
+    assert n_landed > 3
+
+
+@pytest.mark.parametrize("wind", [0.0, 0.05, -0.05])
+def test_a_float_still_in_the_air_at_the_end_flies_on_as_a_stone_does(wind: float) -> None:
+    rod = FishingRod(noise=0.0, max_wind=0.05, threads=1)
+    n_flown = 0
+    for theta in movements(20):
+        theta[-1] = 0.5  # 1.2 s and the hold end on a step
+        path: list[Array] = []
+        step_through(rod, theta, lambda data, path=path: path.append(data.sensordata.copy()), wind=wind)
+        if min(height for _, _, height, *_ in path) <= 0:
+            continue
+        position, velocity = np.split(path[-1], 2)
+        flight = max(np.roots([-9.81 / 2, velocity[2], position[2]]))  # z + vz t - g t^2 / 2 = 0
+        carried = np.array([wind / 0.02, 0.0]) * flight**2 / 2  # the float has 20 g
+        expected = position[:2] + velocity[:2] * flight + carried
+        assert cast(rod, theta, np.array([wind])) == pytest.approx(expected, abs=1e-6)
+        n_flown += 1
+    assert n_flown > 3
+
+
+def test_a_small_change_of_theta_or_of_the_duration_alone_changes_the_landing_point_little(rod: FishingRod) -> None:
+    for theta in movements(40, seed=1):
+        longer = theta.copy()
+        longer[-1] = theta[-1] - 1e-6
+        assert np.abs(cast(rod, longer) - cast(rod, theta)).max() < 1e-4
+        other = rod.policies.clip(theta + stream(0, "direction").normal(0, 1e-6, 25))
+        assert np.abs(cast(rod, other) - cast(rod, theta)).max() < 1e-3
+
+
+def test_the_duration_crosses_the_steps_of_the_simulation_without_a_jump(rod: FishingRod) -> None:
+    # Pace .5 is 1.2 s, a whole number of steps: just above it the movement takes one step more.
+    for theta in movements(20, seed=2):
+        below, above = theta.copy(), theta.copy()
+        below[-1], above[-1] = 0.5 - 1e-9, 0.5 + 1e-9
+        assert np.abs(cast(rod, below) - cast(rod, above)).max() < 1e-6
+
+
+def test_a_batch_on_two_threads_equals_one_thread_and_single_movements_bit_for_bit() -> None:
+    thetas = movements(6)
+    thetas[:, -1] = np.linspace(0, 1, 6)  # different lengths
+    batches = [
+        FishingRod(noise=0.03, threads=threads).execute_many(
+            np.zeros((6, 0)), thetas, [stream(i, "environment") for i in range(6)]
+        )
+        for threads in (1, 2)
+    ]
+    single = FishingRod(noise=0.03, threads=1)
+    ones = [cast(single, theta, seed=i) for i, theta in enumerate(thetas)]
+    assert np.array_equal(batches[0], batches[1])
+    assert np.array_equal(batches[0], ones)
+
+
+def test_noise_draws_as_much_whatever_theta() -> None:
+    noisy = FishingRod(noise=0.03, threads=1)
+    short, long = movements(2)
+    short[-1], long[-1] = 0.0, 1.0
+    rngs = [stream(0, "environment"), stream(0, "environment")]
+    for theta, rng in zip((short, long), rngs, strict=True):
+        noisy.execute(NO_CONTEXT, theta, rng)
+    assert rngs[0].bit_generator.state == rngs[1].bit_generator.state
+    assert rngs[0].bit_generator.state != stream(0, "environment").bit_generator.state
+
+
+def test_without_noise_the_stream_does_not_matter_and_with_noise_it_does(rod: FishingRod) -> None:
+    theta = movements(1)[0]
+    assert np.array_equal(cast(rod, theta, seed=1), cast(rod, theta, seed=2))
+    assert rod.outcome_noise == 0
+    noisy = FishingRod(noise=0.03, threads=1)
+    assert not np.array_equal(cast(noisy, theta, seed=1), cast(noisy, theta, seed=2))
+    assert noisy.outcome_noise > 0
+
+
+def test_an_arm_that_does_not_move_has_no_noise() -> None:
+    still = np.full(25, 0.5)
+    noisy = FishingRod(noise=0.1, threads=1)
+    assert cast(noisy, still, seed=1) == pytest.approx(cast(noisy, still, seed=2), abs=1e-9)
+    assert cast(noisy, still) == pytest.approx(noisy.rest, abs=1e-3)
+
+
+def test_every_movement_begins_in_the_start_configuration() -> None:
+    first, second = movements(2)
+    fresh, used = FishingRod(noise=0.0, threads=1), FishingRod(noise=0.0, threads=1)
+    cast(used, first)
+    assert np.array_equal(cast(used, second), cast(fresh, second))
+
+
+def test_a_turned_base_turns_the_landing_point_about_itself(rod: FishingRod) -> None:
+    turned = FishingRod(noise=0.0, max_yaw=1.0, threads=1)
+    for theta, yaw in zip(movements(10), np.linspace(-1, 1, 10), strict=True):
+        turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
+        assert cast(turned, theta, np.array([yaw])) == pytest.approx(turn @ cast(rod, theta), abs=1e-6)
+
+
+def test_a_side_wind_carries_a_hanging_float_along_x_alone_and_both_ways_alike() -> None:
+    windy = FishingRod(noise=0.0, max_wind=0.05, threads=1)
+    still = np.full(25, 0.5)
+    calm, right, left = (cast(windy, still, np.array([wind])) for wind in (0.0, 0.05, -0.05))
+    assert right[0] - calm[0] > 0.02
+    assert abs(right[1] - calm[1]) < 0.3 * (right[0] - calm[0])
+    assert left == pytest.approx(right * [-1, 1], abs=1e-6)
+
+
+def test_no_wind_is_no_context_and_the_world_is_mirrored_left_to_right(rod: FishingRod) -> None:
+    windy = FishingRod(noise=0.0, max_wind=0.05, threads=1)
+    theta = movements(1)[0]
+    assert np.array_equal(cast(windy, theta, np.zeros(1)), cast(rod, theta))
+    mirrored = theta.reshape(-1)[:24].reshape(6, 4).copy()
+    for joint in ("yaw", "forearm_roll", "wrist_yaw"):  # the others turn about x
+        mirrored[JOINTS.index(joint)] = 1 - mirrored[JOINTS.index(joint)]
+    assert cast(rod, np.append(mirrored, theta[-1])) == pytest.approx(cast(rod, theta) * [-1, 1], abs=1e-6)
+
+
+def test_dense_and_sparse_dynamics_agree(rod: FishingRod) -> None:
+    sparse = FishingRod(noise=0.0, threads=1)
+    assert rod.model.opt.jacobian == mujoco.mjtJacobian.mjJAC_DENSE
+    sparse.model.opt.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE
+    for theta in movements(3):
+        assert cast(sparse, theta) == pytest.approx(cast(rod, theta), abs=1e-7)
+
+
+def test_replaying_a_movement_lands_where_executing_it_does(rod: FishingRod) -> None:
+    step = rod.model.opt.timestep
+    for theta in movements(5):
+        theta[-1] = 0.5
+        times = step * np.arange(round(1.2 / step) + 1)
+        assert rod.replay(times, rod.primitive.at(theta, times)) == pytest.approx(cast(rod, theta), abs=1e-6)
+
+
+def test_replay_is_without_noise_and_in_the_zero_context() -> None:
+    noisy, calm = FishingRod(noise=0.1, max_yaw=1.0, threads=1), FishingRod(noise=0.0, threads=1)
+    times, trajectory = calm.primitive.trajectory(movements(1)[0])
+    assert np.array_equal(noisy.replay(times, trajectory), calm.replay(times, trajectory))
+
+
+def unstable() -> FishingRod:
+    """A line whose hinges have neither damping nor armature."""
+    rod = FishingRod(noise=0.0, threads=1)
+    rod.model.dof_damping[6:] = 0
+    rod.model.dof_armature[6:] = 0
+    return rod
+
+
+@pytest.fixture
+def mujoco_log(tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes its warnings into the working directory
+
+
+@pytest.mark.usefixtures("mujoco_log")
+def test_a_divergence_is_an_error_that_names_its_theta() -> None:
+    theta = movements(1)[0]
+    with pytest.raises(SimulationError, match="diverged") as raised:
+        cast(unstable(), theta)
+    assert np.array_equal(raised.value.theta, theta)
+    assert str(theta[0]) in str(raised.value)
+
+
+@pytest.mark.usefixtures("mujoco_log")
+def test_after_a_divergence_the_next_movement_is_as_ever(rod: FishingRod) -> None:
+    fragile, theta = unstable(), movements(1)[0]
+    with pytest.raises(SimulationError):
+        cast(fragile, theta)
+    fragile.model.dof_damping[6:] = rod.model.dof_damping[6:]
+    fragile.model.dof_armature[6:] = rod.model.dof_armature[6:]
+    assert np.array_equal(cast(fragile, theta), cast(rod, theta))
+
+
+@pytest.mark.usefixtures("mujoco_log")
+def test_a_diverged_movement_in_a_batch_is_the_one_that_is_named() -> None:
+    fragile, still, moving = unstable(), np.full(25, 0.5), movements(1)[0]
+    still[-1] = moving[-1] = 0.0  # short enough for the line at rest to stay at rest
+    cast(fragile, still)
+    with pytest.raises(SimulationError) as raised:
+        fragile.execute_many(np.zeros((2, 0)), np.stack((still, moving)), [stream(i, "environment") for i in (0, 1)])
+    assert np.array_equal(raised.value.theta, moving)
+
+
+@pytest.mark.usefixtures("mujoco_log")
+def test_a_diverged_movement_never_enters_memory() -> None:
+    fragile = unstable()
+    learner = Learner(Memory(0, 25, 2), Babble(fragile.policies, stream(0, "babble")))
+    move = learner.ask(NO_CONTEXT)
+    with pytest.raises(SimulationError):
+        learner.tell(fragile.execute(NO_CONTEXT, move.theta, stream(0, "environment")))
+    assert len(learner.memory) == 0
+
+
+def test_nothing_diverges_and_everything_lands_in_reach_even_on_the_corners_of_the_box() -> None:
+    noisy, rng = FishingRod(threads=2), stream(0, "corners")
+    thetas = np.concatenate([rng.random((150, 25)), rng.integers(0, 2, (50, 25)).astype(float)])
+    landings = noisy.execute_many(np.zeros((200, 0)), thetas, [stream(i, "environment") for i in range(200)])
+    assert np.isfinite(landings).all()
+    assert np.linalg.norm(landings, axis=1).max() < 5
+
+
+@pytest.mark.slow
+def test_re_executed_movements_scatter_as_the_paper_says() -> None:
+    noisy = FishingRod(threads=2)
+    thetas = np.repeat(movements(200), 20, axis=0)
+    landings = noisy.execute_many(
+        np.zeros((4000, 0)), thetas, [stream(0, "environment", i) for i in range(4000)]
+    ).reshape(200, 20, 2)
+    sds = landings.std(axis=1, ddof=1).mean(axis=1)  # per dimension, of each movement
+    assert 0.03 < sds.mean() < 0.075
+    tenths = np.sort(sds)
+    assert tenths[-20:].mean() > 5 * tenths[:20].mean()
+    assert 0.5 < noisy.outcome_noise / sds.mean() < 2
+
+
+def test_the_task_space_may_be_a_hundred_times_larger() -> None:
+    large = FishingRod(noise=0.0, outcomes=Box.cube(-100, 100, 2), threads=1)
+    assert large.outcomes.sides.tolist() == [200.0, 200.0]
+    theta = movements(1)[0]
+    assert np.array_equal(cast(large, theta), cast(FishingRod(noise=0.0, threads=1), theta))
+
+
+@pytest.mark.parametrize(
+    ("options", "name"),
+    [
+        ({"noise": -0.1}, "noise"),
+        ({"noise": np.nan}, "noise"),
+        ({"max_yaw": np.inf}, "max_yaw"),
+        ({"max_wind": -1.0}, "max_wind"),
+        ({"threads": 0}, "threads"),
+        ({"threads": 1.5}, "threads"),
+        ({"outcomes": Box.cube(-1, 1, 3)}, "rest"),
+        ({"outcomes": Box.cube(5, 6, 2)}, "rest"),
+    ],
+)
+def test_an_impossible_rod_is_refused(options: dict[str, object], name: str) -> None:
+    with pytest.raises(ValueError, match=name):
+        FishingRod(**options)
+
+
+@pytest.mark.parametrize(
+    ("times", "trajectory", "message"),
+    [
+        (np.arange(3.0), np.zeros((3, 5)), "trajectory must have shape"),
+        (np.arange(4.0), np.zeros((3, 6)), "times must have shape"),
+        (np.array([0.0, 2.0, 1.0]), np.zeros((3, 6)), "increase from 0"),
+        (np.array([1.0, 2.0, 3.0]), np.zeros((3, 6)), "increase from 0"),
+        (np.arange(3.0), np.full((3, 6), np.nan), "finite"),
+        (np.array([0.0, 20.0, 1e5]), np.zeros((3, 6)), "in milliseconds"),
+        (np.zeros(1), np.zeros((1, 6)), "n > 1"),
+        (np.zeros((2, 3, 2)), np.zeros((2, 3, 6)), "times must|n > 1"),
+    ],
+)
+def test_what_is_no_recording_is_not_replayed(rod: FishingRod, times: Array, trajectory: Array, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        rod.replay(times, trajectory)
+
+
+def test_a_seed_in_the_place_of_a_generator_is_refused(rod: FishingRod) -> None:
+    theta = movements(1)[0]
+    with pytest.raises(TypeError, match="was the seed passed"):
+        rod.execute(NO_CONTEXT, theta, 0)
+    with pytest.raises(TypeError, match="was the seed passed"):
+        rod.execute_many(np.zeros((1, 0)), theta[None], [0])

@@ -1,0 +1,212 @@
+"""Eqs. (5) and (6): trajectories worked out by hand, and theta found again from the trajectory it made."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sgimd_torch.environments.motor_primitives import GaussianPrimitive
+from sgimd_torch.spaces import Array, Box, stream
+
+JOINTS = Box(np.array([-1.0, 0.0]), np.array([1.0, 10.0]))
+DURATIONS = (0.8, 1.6)
+
+
+def primitive(*, n_knots: int = 4, sharpness: float = 9.0, joints: Box = JOINTS) -> GaussianPrimitive:
+    return GaussianPrimitive(joints, DURATIONS, n_knots=n_knots, sharpness=sharpness)
+
+
+def unit_joint(n_knots: int, sharpness: float) -> GaussianPrimitive:
+    return primitive(n_knots=n_knots, sharpness=sharpness, joints=Box.cube(0, 1, 1))
+
+
+def test_two_knots_are_blended_by_the_gaussians_of_equation_5() -> None:
+    # Knots 0 and 1 at the phases 0 and 1, s = ln 3: at phase p the second weighs 3^-(p-1)^2 against 3^-p^2.
+    trajectory = unit_joint(2, np.log(3.0)).at(np.array([0.0, 1.0, 0.5]), np.array([0.0, 0.6, 1.2]))
+    assert trajectory.ravel() == pytest.approx([1 / 4, 1 / 2, 3 / 4])
+
+
+def test_a_movement_starts_near_its_first_knot_and_not_its_last() -> None:
+    # The paper's printed sign, exp(+ sigma |.|^2), would play it backwards.
+    _, trajectory = unit_joint(4, 9.0).trajectory(np.array([0.0, 0.0, 0.0, 1.0, 0.0]))
+    assert trajectory[0, 0] < 0.01
+    assert trajectory[-1, 0] > 0.7
+
+
+def test_weights_sum_to_one_so_equal_knots_make_a_still_joint() -> None:
+    _, trajectory = primitive().trajectory(np.array([0.3] * 4 + [0.8] * 4 + [0.5]))
+    assert trajectory[:, 0] == pytest.approx(-0.4)
+    assert trajectory[:, 1] == pytest.approx(8.0)
+
+
+def test_the_sharper_the_gaussians_the_nearer_the_trajectory_passes_to_its_knots() -> None:
+    theta = np.array([0.2, 0.9, 0.4, 0.7, 0.5])
+    misses = []
+    for sharpness in (5.0, 20.0, 200.0):
+        blended = unit_joint(4, sharpness).at(theta, np.linspace(0, 1.2, 4))[:, 0]
+        misses.append(np.abs(blended - theta[:4]).max())
+    assert misses[0] > misses[1] > misses[2]
+    assert misses[2] < 1e-9
+
+
+def test_rising_knots_make_a_rising_trajectory_that_stays_between_them() -> None:
+    _, trajectory = unit_joint(4, 6.0).trajectory(np.array([0.1, 0.2, 0.7, 0.9, 0.5]), rate=500)
+    assert (np.diff(trajectory[:, 0]) > 0).all()
+    assert trajectory.min() > 0.1
+    assert trajectory.max() < 0.9
+
+
+def test_theta_holds_the_knots_joint_by_joint_and_then_the_duration() -> None:
+    theta = np.array([0.1, 0.1, 0.1, 0.1, 0.6, 0.6, 0.6, 0.6, 1.0])
+    times, trajectory = primitive().trajectory(theta)
+    assert times[-1] == pytest.approx(1.6)
+    assert trajectory[7] == pytest.approx([-0.8, 6.0])
+
+
+def test_a_longer_movement_is_the_same_movement_played_slower() -> None:
+    short, long = stream(0, "theta").random(9), stream(0, "theta").random(9)
+    short[-1], long[-1] = 0.0, 1.0
+    times = np.linspace(0, 0.8, 30)
+    assert primitive().at(long, 2 * times) == pytest.approx(primitive().at(short, times))
+
+
+def test_after_its_end_a_movement_holds_its_last_posture() -> None:
+    theta = stream(0, "theta").random(9)
+    duration = primitive().duration(theta)
+    held = primitive().at(theta, np.array([duration, duration + 0.1, 100.0]))
+    assert held == pytest.approx(np.tile(held[0], (3, 1)))
+
+
+def test_a_recording_ends_with_the_movement_and_has_at_least_the_rate_asked_for() -> None:
+    times, trajectory = primitive().trajectory(np.full(9, 0.123), rate=50)
+    assert times[0] == 0
+    assert times[-1] == pytest.approx(0.8 + 0.123 * 0.8)
+    assert len(times) == len(trajectory) == 46  # 0.8984 s: 45 steps of 19.96 ms
+    assert np.diff(times) == pytest.approx(times[1])
+
+
+def corner_or_inside(dim: int) -> st.SearchStrategy[list[float]]:
+    """Thetas with entries on the faces of the box, near them and inside."""
+    entry = st.one_of(st.sampled_from([0.0, 1.0, 1e-9, 1 - 1e-9]), st.floats(0, 1))
+    return st.lists(entry, min_size=dim, max_size=dim)
+
+
+@given(theta=corner_or_inside(9), sharpness=st.sampled_from([5.0, 6.0, 9.0, 12.0]), rate=st.sampled_from([10.0, 50.0]))
+@settings(max_examples=150, deadline=None, derandomize=True)
+def test_the_correspondence_finds_theta_again(theta: list[float], sharpness: float, rate: float) -> None:
+    skill = primitive(sharpness=sharpness)
+    times, trajectory = skill.trajectory(np.array(theta), rate)
+    found = skill.correspondence(times, trajectory)
+    assert found == pytest.approx(np.array(theta), abs=1e-6)
+    assert skill.policies.contains(found)
+    assert skill.residual(found, times, trajectory) < 1e-6
+
+
+@pytest.mark.parametrize("corner", [0.0, 1.0])
+def test_the_correspondence_finds_the_outermost_corners_of_the_box(corner: float) -> None:
+    theta = np.full(25, corner)
+    skill = primitive(joints=Box.cube(-1.6, 1.4, 6))
+    assert skill.correspondence(*skill.trajectory(theta)) == pytest.approx(theta, abs=1e-6)
+
+
+def test_a_recording_with_an_uneven_rate_and_a_late_start_is_the_same_demonstration() -> None:
+    skill, theta = primitive(), stream(2, "theta").random(9)
+    times = np.sort(stream(2, "times").uniform(0, skill.duration(theta), 40))
+    times[[0, -1]] = 0.0, skill.duration(theta)
+    assert skill.correspondence(times + 7.0, skill.at(theta, times)) == pytest.approx(theta, abs=1e-6)
+
+
+def recorded(bend: float) -> tuple[Array, Array]:
+    """Both joints from their low ends to ``bend`` times their sides, in a straight line of 1.2 s."""
+    times = np.linspace(0, 1.2, 61)
+    return times, JOINTS.low + np.outer(times / 1.2, bend * JOINTS.sides)
+
+
+def test_a_recording_beyond_the_joint_ranges_is_fitted_inside_them_and_the_rest_reported() -> None:
+    skill = primitive()
+    times, trajectory = recorded(bend=2.0)
+    theta = skill.correspondence(times, trajectory)
+    assert skill.policies.contains(theta)
+    assert theta[[3, 7]] == pytest.approx([1.0, 1.0], abs=1e-6)  # the last knots, twice as far in the recording
+    assert skill.residual(theta, times, trajectory) > 0.1
+
+
+def test_no_theta_in_the_box_fits_a_recording_beyond_it_better() -> None:
+    skill, rng = primitive(), stream(0, "other thetas")
+    times, trajectory = recorded(bend=1.5)
+    theta = skill.correspondence(times, trajectory)
+    least = skill.residual(theta, times, trajectory)
+    others = skill.policies.clip(theta + rng.normal(0, 0.02, (500, 9)))
+    assert min(skill.residual(other, times, trajectory) for other in others) > least
+
+
+def test_the_residual_is_the_root_mean_square_in_radians() -> None:
+    skill = primitive()
+    times, trajectory = skill.trajectory(np.full(9, 0.5))
+    theta = skill.correspondence(times, trajectory)
+    assert skill.residual(theta, times, trajectory) == pytest.approx(0, abs=1e-9)
+    shifted = trajectory + np.array([0.3, 0.0])  # one of two joints is off by 0.3 rad throughout
+    assert skill.residual(theta, times, shifted) == pytest.approx(0.3 / np.sqrt(2))
+
+
+def test_a_shape_that_four_knots_cannot_follow_leaves_a_residual() -> None:
+    skill = primitive()
+    times = np.linspace(0, 1.2, 61)
+    trembling = np.stack([0.2 * np.sin(30 * times), np.full(61, 5.0)], axis=1)
+    theta = skill.correspondence(times, trembling)
+    assert skill.residual(theta, times, trembling) == pytest.approx(0.1, abs=0.02)  # sd .2 / sqrt(2), over two joints
+
+
+@pytest.mark.parametrize(("duration", "pace"), [(0.2, 0.0), (0.8, 0.0), (1.2, 0.5), (1.6, 1.0), (5.0, 1.0)])
+def test_a_demonstration_is_played_at_its_own_pace_or_the_nearest_allowed(duration: float, pace: float) -> None:
+    skill, theta = primitive(), stream(1, "theta").random(9)
+    _, trajectory = skill.trajectory(theta)
+    found = skill.correspondence(np.linspace(0, duration, len(trajectory)), trajectory)
+    assert found[-1] == pytest.approx(pace)
+    assert found[:-1] == pytest.approx(theta[:-1], abs=1e-6)  # the shape is kept
+    assert skill.residual(found, np.linspace(0, duration, len(trajectory)), trajectory) < 1e-6
+
+
+def test_arguments_are_left_as_they_were() -> None:
+    skill = primitive()
+    times, trajectory = recorded(bend=2.0)
+    before = times.copy(), trajectory.copy()
+    skill.residual(skill.correspondence(times, trajectory), times, trajectory)
+    assert np.array_equal(times, before[0])
+    assert np.array_equal(trajectory, before[1])
+
+
+@pytest.mark.parametrize(
+    ("times", "trajectory", "message"),
+    [
+        (np.arange(10.0), np.zeros((10, 3)), "trajectory must have shape"),
+        (np.arange(9.0), np.zeros((10, 2)), "times must have shape"),
+        (np.arange(3.0), np.zeros((3, 2)), "4 samples or more"),
+        (np.arange(10.0)[::-1], np.zeros((10, 2)), "times must increase"),
+        (np.zeros(10), np.zeros((10, 2)), "times must increase"),
+        (np.arange(10.0), np.full((10, 2), np.nan), "trajectory must be finite"),
+        (np.full(10, np.inf), np.zeros((10, 2)), "times must be finite"),
+        (["a"] * 10, np.zeros((10, 2)), "times must be numeric"),
+        (np.arange(2.0), np.zeros(2), "samples"),
+    ],
+)
+def test_what_is_no_recording_is_refused(times: Array, trajectory: Array, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        primitive().correspondence(times, trajectory)
+    with pytest.raises(ValueError, match=message):
+        primitive().residual(np.full(9, 0.5), times, trajectory)
+
+
+@pytest.mark.parametrize("theta", [np.full(8, 0.5), np.full(9, 1.1), np.full(9, np.nan), np.full(9, -1e-9)])
+def test_a_theta_outside_the_box_has_no_trajectory(theta: Array) -> None:
+    with pytest.raises(ValueError, match="theta must"):
+        primitive().trajectory(theta)
+
+
+def test_a_primitive_without_time_knots_or_width_is_refused() -> None:
+    for durations in ((0.0, 1.0), (1.0, 1.0), (2.0, 1.0), (np.nan, 1.0)):
+        with pytest.raises(ValueError, match="durations"):
+            GaussianPrimitive(JOINTS, durations)
+    for options in ({"n_knots": 1}, {"sharpness": 0.0}, {"sharpness": np.nan}):
+        with pytest.raises(ValueError, match="n_knots"):
+            GaussianPrimitive(JOINTS, DURATIONS, **options)

@@ -1,0 +1,244 @@
+"""The verdicts on the paper's claims, and the tables that stand in results/RESULTS.md."""
+
+import re
+
+import numpy as np
+import pytest
+
+from claims import main
+from evidence import Evidence
+from judgements import CLAIMS, at_least, at_most, judge
+from paper import SEEDS, TRUE, error, rows, spread, write_paper
+from read_results import ResultsError, read_goals, read_results
+from sgimd_torch.views.statistics import Interval
+
+NAMES = [claim for claim, _, _ in CLAIMS]
+
+
+def write_goals(path, sgim_d=(40, 60, 50), sagg_riac=(1, 0, 2)):
+    lines = [f"sgim-d-large,{seed},400,{near}" for seed, near in enumerate(sgim_d)]
+    lines += [f"sagg-riac-large,{seed},500,{near}" for seed, near in enumerate(sagg_riac)]
+    path.write_text("\n".join(["variant,seed,n_goals,n_near", *lines]) + "\n")
+    return path
+
+
+@pytest.fixture
+def results(tmp_path):
+    write_goals(tmp_path / "goals.csv")
+    return write_paper(tmp_path / "paper.csv")
+
+
+def judged(results):
+    return judge(Evidence(read_results(results), read_goals(results.with_name("goals.csv"))))
+
+
+def verdicts(results):
+    return {row.claim: row.verdict for row in judged(results)}
+
+
+def test_where_the_paper_is_right_every_claim_holds(results):
+    assert set(verdicts(results).values()) == {"holds"}
+
+
+SPOILT = {  # claim: a change that makes it wrong
+    NAMES[0]: {"sgim_d": {"last": 0.13}},
+    NAMES[1]: {"sagg_riac": {"last": 0.25}},
+    NAMES[2]: {"imitation": {"last": 0.25}},
+    NAMES[3]: {"observation": {"last": 0.05}},
+    NAMES[4]: {"random": {"last": 0.07}},
+    NAMES[6]: {"random": {"last": 0.081}},
+    NAMES[7]: {"sgim_d_teacher_1": {"last": 0.155}},
+    NAMES[8]: {"imitation_teacher_2": {"last": 0.07}},
+    NAMES[9]: {"sagg_riac": {"last": 0.07}},
+    NAMES[10]: {"sgim_d_large": {"last": 0.11}},
+    NAMES[11]: {"sagg_riac_large": {"last": 0.15}},
+    NAMES[13]: {"sagg_riac": {"tiles": 50}},
+    NAMES[15]: {"uniform_goals": {"last": 0.07}},
+    NAMES[16]: {"sgim_d_uniform_large": {"last": 0.07}},
+}
+
+
+@pytest.mark.parametrize("claim", SPOILT)
+def test_a_claim_that_the_runs_contradict_does_not_hold(results, claim):
+    write_paper(results, **SPOILT[claim])
+    assert verdicts(results)[claim] == "does not hold"
+
+
+def test_an_error_far_above_the_noise_floor_does_not_approach_it(results):
+    text = results.read_text()
+    results.write_text(re.sub(r"(sgim-d,3,1,\d,5000,[\d.]+),[\d.]+", r"\1,0.04", text))
+    assert verdicts(results)["SGIM-D approaches the noise level"] == "does not hold"
+
+
+def test_an_error_that_rises_again_is_late_damage(results):
+    text = results.read_text()
+    results.write_text(re.sub(r"(sgim-d-long,3,1,\d,10000),[\d.]+", r"\1,0.1", text))
+    assert verdicts(results)["No late damage"] == "does not hold"
+
+
+@pytest.mark.parametrize(
+    ("sgim_d", "sagg_riac", "verdict"),
+    [((40, 50, 60), (0, 0, 0), "holds"), ((40, 50, 60), (30, 30, 30), "does not hold"), ((0, 0, 60), (0, 1, 1), None)],
+)
+def test_goals_count_as_near_by_their_share(results, sgim_d, sagg_riac, verdict):
+    write_goals(results.with_name("goals.csv"), sgim_d, sagg_riac)
+    assert verdicts(results)[NAMES[12]] == (verdict or "cannot say")
+
+
+def test_when_the_interval_straddles_the_bar_nothing_can_be_said(results):
+    noisy = [0.02, 0.3, 0.2, 0.12, 0.25, 0.1]
+    write_paper(results, sagg_riac={"last": noisy})
+    found = verdicts(results)
+    assert found["SAGG-RIAC clearly beats Random"] == "cannot say"
+    assert found["SGIM-D halves Random's error"] == "holds"
+
+
+@pytest.mark.parametrize("missing", sorted(set(TRUE) - {"grid", "observation-teacher-1", "observation-teacher-2"}))
+def test_what_was_not_run_is_named_and_the_other_claims_are_judged(tmp_path, missing):
+    write_goals(tmp_path / "goals.csv")
+    found = judged(write_paper(tmp_path / "paper.csv", without=[missing]))
+    open_ = [row for row in found if row.verdict != "holds"]
+    assert open_
+    assert {(row.number, row.verdict) for row in open_} == {(f"not run: {missing}", "cannot say")}
+    assert len(open_) < len(found) or missing == "sgim-d"
+
+
+@pytest.mark.parametrize(
+    ("value", "low", "high", "verdict"),
+    [
+        (0.48, 0.46, 0.54, "holds"),
+        (0.48, 0.46, 0.56, "cannot say"),
+        (0.52, 0.49, 0.54, "cannot say"),
+        (0.52, 0.51, 0.54, "does not hold"),
+    ],
+)
+def test_a_bar_with_a_margin_for_its_interval(value, low, high, verdict):
+    assert at_most(Interval(value, low, high), 0.5, upper=0.55) == verdict
+
+
+def test_at_least_is_at_most_turned_round():
+    assert at_least(Interval(0.97, 0.95, 1.0), 0.95) == "holds"
+    assert at_least(Interval(0.97, 0.90, 1.0), 0.95) == "cannot say"
+    assert at_least(Interval(0.80, 0.70, 0.94), 0.95) == "does not hold"
+
+
+def cells(text, variant):
+    line = next(line for line in text.splitlines() if f"| {variant} |" in line)
+    return [cell.strip() for cell in line.strip("|").split("|")]
+
+
+def test_the_tables_give_each_variant_beside_sgim_d(results, tmp_path):
+    out = tmp_path / "new" / "RESULTS.md"
+    assert main(["--results", str(results), "--out", str(out)]) == 0
+    text = out.read_text()
+    experiment, _, seeds, early, late, _, better, difference, tiles = cells(text, "uniform-goals")
+    assert (experiment, seeds) == ("ablations", str(SEEDS))
+    middle = [spread(seed) for seed in range(1, 5)]
+    assert late.startswith(f"{0.085 * np.mean(middle):.3f} [")
+    assert early.startswith(f"{np.mean([error(0.085, seed, 1000) for seed in range(1, 5)]):.3f} [")
+    assert better.startswith("1.00 [")
+    assert difference.startswith("+0.0050 [+0.00")
+    assert tiles.startswith("292 [")
+    assert cells(text, "sgim-d")[6:8] == ["", ""]
+    learners = text[text.index("<!-- learners -->") : text.index("<!-- end of learners -->")]
+    order = re.findall(r"\| learners \| ([\w-]+)", learners)
+    assert order == ["observation", "random", "sagg-riac", "imitation", "sgim-d"]  # the best last
+    assert "uniform-goals" not in learners
+
+
+def test_the_same_results_give_the_same_file_and_prose_stays(results, tmp_path):
+    out = tmp_path / "RESULTS.md"
+    assert main(["--results", str(results), "--out", str(out)]) == 0
+    first = out.read_text()
+    prose = first.replace("## The five learners", "## Five of them\n\nBy hand, with a | and <!-- a comment -->.")
+    out.write_text(prose)
+    assert main(["--results", str(results), "--out", str(out)]) == 0
+    assert out.read_text() == prose
+    write_paper(results, sgim_d={"last": 0.13})
+    assert main(["--results", str(results), "--out", str(out)]) == 0
+    changed = out.read_text()
+    assert changed != prose
+    between = r"(<!-- (\w+) -->).*?(<!-- end of \2 -->)"
+    assert re.sub(between, "", changed, flags=re.S) == re.sub(between, "", prose, flags=re.S)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "# Results\n",
+        "<!-- claims -->\n<!-- end of claims -->\n",  # no place for the others
+        "<!-- end of claims -->\n<!-- claims -->\n",
+        "<!-- claims -->\n<!-- claims -->\n<!-- end of claims -->\n",
+    ],
+)
+def test_a_file_without_its_markers_is_left_alone(results, tmp_path, capsys, text):
+    out = tmp_path / "RESULTS.md"
+    out.write_text(text)
+    assert main(["--results", str(results), "--out", str(out)]) == 2
+    assert "must hold the line <!-- " in capsys.readouterr().err
+    assert out.read_text() == text
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["RESULTS.md", "goals.csv", "paper.csv"]
+
+
+def test_seeds_that_only_one_side_has_are_left_out_of_pairs_and_that_is_told(results, tmp_path):
+    text = [line for line in results.read_text().splitlines() if ",grid," not in line]
+    results.write_text("\n".join([*text, *rows("grid", seeds=range(4, SEEDS + 3))]) + "\n")
+    assert main(["--results", str(results), "--out", str(tmp_path / "R.md")]) == 0
+    grid = cells((tmp_path / "R.md").read_text(), "grid")
+    assert grid[2] == "5"
+    assert grid[7].endswith("(2 pairs)")
+
+
+def test_a_run_that_is_under_way_is_counted_where_it_was_evaluated(results):
+    lines = results.read_text().splitlines()
+    results.write_text("\n".join(line for line in lines if ",sgim-d,3,1,0,5000" not in line) + "\n")
+    found = read_results(results)["sgim-d"]
+    assert set(found.at(5000)) == set(range(1, SEEDS))
+    assert set(found.at(1000)) == set(range(SEEDS))
+    assert found.curves()[1].shape == (SEEDS - 1, 7)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (lambda text: text.replace("variant,teacher", "teacher,variant", 1), "must begin with experiment,variant"),
+        (lambda text: "", "must begin with experiment,variant"),
+        (lambda text: text.splitlines()[0] + "\n", "no line below its header"),
+        (lambda text: text + "learners,random,,1,9,50", r"line \d+ has 6 fields, not 9"),
+        (lambda text: text + "learners,random,,1,9,5000,nan,,3\n", "mean_error_m must be a finite number"),
+        (lambda text: text + "learners,random,,1,9,5000,-1,,3\n", "mean_error_m must be a finite number"),
+        (lambda text: text + "learners,random,,1,9.5,5000,1,,3\n", "seed must be a whole number, got '9.5'"),
+        (lambda text: text + "learners,random,,1,9,5000,1,low,3\n", "noise_floor_m must be"),
+        (lambda text: text + "learners,random,,1,0,5000,1,,3\n", "seed 0 of random is there twice at 5000"),
+        (lambda text: text + "baselines,random,,1,9,5000,1,,3\n", "on an earlier line .*rename one"),
+    ],
+)
+def test_a_malformed_table_is_refused_in_one_line(results, tmp_path, capsys, spoil, message):
+    results.write_text(spoil(results.read_text()))
+    with pytest.raises(ResultsError, match=message):
+        read_results(results)
+    out = tmp_path / "RESULTS.md"
+    assert main(["--results", str(results), "--out", str(out)]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith(f"error: {results}")
+    assert said.count("\n") == 1
+    assert not out.exists()
+
+
+def test_a_table_that_is_not_there_is_refused_with_where_it_comes_from(tmp_path, capsys):
+    assert main(["--results", str(tmp_path / "none.csv"), "--out", str(tmp_path / "R.md")]) == 2
+    assert "none.csv does not exist; experiments/compare.py writes" in capsys.readouterr().err
+
+
+def test_goals_that_are_more_than_there_are_are_refused(results):
+    results.with_name("goals.csv").write_text("variant,seed,n_goals,n_near\nsgim-d-large,0,3,4\n")
+    with pytest.raises(ResultsError, match="line 2: n_near must be at most n_goals"):
+        read_goals(results.with_name("goals.csv"))
+
+
+def test_the_help_teaches(capsys):
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    said = capsys.readouterr().out
+    assert "<!-- end of claims -->" in said
+    assert "python experiments/claims.py --results" in said

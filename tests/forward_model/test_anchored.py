@@ -1,0 +1,257 @@
+"""Anchored predictions: exact where something landed, the network's far away, and doubted in between."""
+
+import numpy as np
+import pytest
+import torch
+
+from sgimd_torch.environments.planar_arm import PlanarArm
+from sgimd_torch.forward_model.anchored import Anchored, Trust
+from sgimd_torch.forward_model.model import ForwardModel
+from sgimd_torch.memory import Memory
+from sgimd_torch.spaces import Box, stream
+
+NO_CONTEXT = np.zeros(0)
+ARM = PlanarArm(7)
+EXACT = Trust(noise=1e-6)
+
+
+@pytest.fixture(scope="module")
+def memory():
+    memory, rng = Memory(0, 7, 2), stream(0, "exemplars")
+    for theta in rng.random((300, 7)):
+        memory.add(NO_CONTEXT, theta, ARM.execute(NO_CONTEXT, theta, rng))
+    return memory
+
+
+@pytest.fixture(scope="module")
+def model(memory):
+    """Good enough to be asked, and still wrong by some cm."""
+    model = ForwardModel(0, 7, 2, rate=1.0)
+    model.refresh(memory)
+    return model
+
+
+def anchored(model, memory, rows, trust=EXACT):
+    thetas, outcomes = memory.thetas[rows][None], memory.outcomes[rows][None]
+    return Anchored(model, NO_CONTEXT, np.zeros((1, len(rows), 0)), thetas, outcomes, trust)
+
+
+def network(model, thetas):
+    """Landing points by the network alone, and what is believed of the spread that it predicts: a tenth."""
+    foreseen = model.predict(NO_CONTEXT, thetas)
+    return foreseen.mean, 0.1 * (foreseen.epistemic**2 + foreseen.aleatoric**2).sum(axis=-1)
+
+
+def predict(near, thetas):
+    with torch.no_grad():
+        return [part.numpy() for part in near.predict(near.tensor(thetas))]
+
+
+def test_what_landed_is_predicted_where_it_landed(model, memory):
+    rows = np.arange(20)
+    for near in (anchored(model, memory, rows), anchored(model, memory, rows[:1])):
+        n = near.thetas.shape[1]
+        assert np.linalg.norm(network(model, memory.thetas[:n])[0] - memory.outcomes[:n], axis=1).max() > 0.01
+        np.testing.assert_allclose(predict(near, memory.thetas[:n])[0], memory.outcomes[:n], atol=2e-3)
+
+
+def test_near_an_anchor_the_landing_point_changes_as_the_network_says(model, memory):
+    near, theta = anchored(model, memory, [0], Trust(noise=1e-6, reach=1.0)), memory.thetas[0]
+    thetas = theta + 0.02 * stream(0, "steps").standard_normal((10, 7))
+    change = network(model, thetas)[0] - network(model, theta)[0]
+    assert np.abs(change).max() > 0.02
+    np.testing.assert_allclose(predict(near, thetas)[0], memory.outcomes[0] + change, atol=1e-3)
+
+
+def test_by_default_an_anchor_tells_something_over_eight_hundredths_of_the_diagonal(model, memory):
+    near, theta = anchored(model, memory, [0]), memory.thetas[0]
+    missed = memory.outcomes[0] - network(model, theta)[0]
+    beyond = theta + 0.08 * np.sqrt(7) * np.eye(7)[0]
+    correction = predict(near, beyond[None])[0][0] - network(model, beyond)[0]
+    np.testing.assert_allclose(correction, missed * np.exp(-0.5), rtol=5e-3)  # a Gaussian, one deviation away
+
+
+@pytest.mark.parametrize("doubt", [0.001, 0.3])
+def test_far_from_all_anchors_the_network_alone_is_left_and_all_the_doubt(model, memory, doubt):
+    rows, far = np.arange(20), np.full((1, 7), 5.0)
+    near = anchored(model, memory, rows, Trust(doubt=doubt, caution=3.0))
+    landing, spread = predict(near, far)
+    expected_landing, expected_spread = network(model, far)
+    np.testing.assert_allclose(landing, expected_landing, rtol=1e-5)
+    missed = np.sqrt(((memory.outcomes[rows] - network(model, memory.thetas[rows])[0]) ** 2).mean())
+    assert 0.001 < missed < 0.3  # where it misses the anchors by more than it should, that counts
+    np.testing.assert_allclose(spread - expected_spread, 3.0 * 2 * max(doubt, missed) ** 2, rtol=1e-3)
+
+
+def test_doubt_grows_from_nothing_at_an_anchor_and_counts_by_caution(model, memory):
+    thetas = memory.thetas[0] + np.outer([0.0, 0.05, 0.1, 0.2, 0.4, 2.0], np.eye(7)[0])
+    _, careless = predict(anchored(model, memory, [0], Trust(noise=1e-6, caution=0.0)), thetas)
+    _, careful = predict(anchored(model, memory, [0], Trust(noise=1e-6, caution=7.0)), thetas)
+    np.testing.assert_allclose(careless, network(model, thetas)[1], rtol=1e-4)
+    doubt = careful - careless
+    assert (np.diff(doubt) > 0).all()
+    assert doubt[0] < 0.001 * doubt[-1]
+
+
+def test_of_a_noisy_anchor_as_much_is_believed_as_there_is_more_doubt_than_noise(memory):
+    model = ForwardModel(0, 7, 2)  # untrained: it says 0 and is wrong by up to a metre
+    model.weights[-1].data[:] = 0.0
+    model.biases[-1].data[..., 2:] = 3.0  # and it calls all of that noise
+    near = anchored(model, memory, [0], Trust(noise=1.0, share=1.0, doubt=2.0, caution=1.0))
+    landing, spread = predict(near, memory.thetas[:1])
+    np.testing.assert_allclose(landing, 0.8 * memory.outcomes[:1], rtol=1e-5)  # 2^2 / (2^2 + 1^2)
+    np.testing.assert_allclose(spread - 2 * np.exp(3.0), 2 * 0.8, rtol=1e-4)  # (1 - .8) 2^2 a dimension
+    near = anchored(model, memory, [0], Trust(noise=0.01, doubt=2.0))
+    np.testing.assert_allclose(predict(near, memory.thetas[:1])[0], memory.outcomes[:1], rtol=1e-3)
+
+
+def test_of_the_spread_that_the_model_predicts_a_share_is_believed(memory):
+    model = ForwardModel(0, 7, 2)
+    model.weights[-1].data[:] = 0.0  # untrained: it says 0
+    model.biases[-1].data[..., 2:] = np.log(0.5)  # with a noise of .5 m^2
+    for share in (0.0, 0.3, 1.0):
+        trust = Trust(noise=9.0, share=share, doubt=2.0, caution=0.0)
+        landing, spread = predict(anchored(model, memory, [0], trust), memory.thetas[:1])
+        np.testing.assert_allclose(spread, share * 2 * 0.5, rtol=1e-5)
+        np.testing.assert_allclose(landing, memory.outcomes[:1] * 4 / (4 + share * 0.5), rtol=1e-5)
+
+
+def test_without_anchors_the_network_answers_alone(model, memory):
+    landing, spread = predict(anchored(model, memory, np.arange(5), Trust(anchors=False)), memory.thetas[:10])
+    expected_landing, expected_spread = network(model, memory.thetas[:10])
+    np.testing.assert_allclose(landing, expected_landing, atol=1e-6)
+    np.testing.assert_allclose(spread, expected_spread, rtol=1e-4)
+
+
+def test_each_candidate_has_its_own_anchors(model, memory):
+    rows, trust = np.arange(12).reshape(3, 4), Trust(noise=0.01)
+    thetas = memory.thetas[rows[:, 0]] + 0.03
+    together = Anchored(model, NO_CONTEXT, np.zeros((3, 4, 0)), memory.thetas[rows], memory.outcomes[rows], trust)
+    for k, (landing, spread) in enumerate(zip(*predict(together, thetas), strict=True)):
+        alone = predict(anchored(model, memory, rows[k], trust), thetas[k : k + 1])
+        np.testing.assert_allclose(landing, alone[0][0], atol=1e-5)
+        np.testing.assert_allclose(spread, alone[1][0], rtol=1e-3)
+
+
+def test_an_anchor_counts_in_its_own_context_and_the_candidate_in_its_own():
+    model = ForwardModel(1, 7, 2)  # untrained, but the context matters
+    theta, here, there = np.full((1, 1, 7), 0.5), np.array([0.3]), np.array([[[-0.3]]])
+    near = Anchored(model, here, there, theta, np.array([[[0.4, 0.2]]]), EXACT)
+    landing = {float(c[0]): network_in(model, c, theta[0]) for c in (here, there[0, 0])}
+    assert np.abs(landing[0.3] - landing[-0.3]).max() > 0.01
+    np.testing.assert_allclose(predict(near, theta[0])[0], [0.4, 0.2] + landing[0.3] - landing[-0.3], atol=1e-3)
+
+
+def network_in(model, context, thetas):
+    with torch.no_grad():
+        return model.landing(torch.tensor(context).float(), torch.tensor(thetas).float())[0].mean(dim=0).numpy()
+
+
+@pytest.mark.parametrize("anchors", [True, False])
+def test_the_gradient_of_what_is_expected_equals_finite_differences(model, memory, anchors):
+    near = anchored(model, memory, np.arange(40), Trust(noise=0.01, anchors=anchors))
+    theta, goals, step = near.tensor(memory.thetas[38:42] + 0.02), near.tensor(memory.outcomes[50:54]), 3e-3
+    gradient = gradient_at(near, theta, goals)
+    with torch.no_grad():
+        for k, ahead in enumerate(step * torch.eye(7)):
+            slope = (near.expected(theta + ahead, goals) - near.expected(theta - ahead, goals)) / (2 * step)
+            torch.testing.assert_close(gradient[:, k], slope, atol=5e-3, rtol=5e-3)  # in float32
+    assert gradient.abs().max() > 1
+
+
+def gradient_at(near, theta, goals):
+    theta = theta.detach().requires_grad_(True)
+    return torch.autograd.grad(near.expected(theta, goals).sum(), theta)[0]
+
+
+@pytest.mark.parametrize("trust", [EXACT, Trust(), Trust(anchors=False)])
+def test_the_gradient_is_finite_at_the_goal_itself_and_at_an_anchor(model, memory, trust):
+    near = anchored(model, memory, np.arange(5), trust)
+    theta = near.tensor(memory.thetas[:5])
+    goals = near.predict(theta)[0].detach()
+    assert torch.isfinite(gradient_at(near, theta, goals)).all()
+    with torch.no_grad():
+        landing, spread = near.predict(theta)
+        torch.testing.assert_close(near.expected(theta, landing), spread)  # no distance is left
+        torch.testing.assert_close(near.expected(theta, landing + 0.3), spread + 2 * 0.09)
+
+
+BOX = Box(np.array([0.0, -1.0, 10.0, 0.0, 0.0, 0.0, 0.0]), np.array([1.0, 1.0, 30.0, 1.0, 1.0, 1.0, 0.01]))
+
+
+def in_sides(change):
+    return np.sqrt(((change / BOX.sides) ** 2).mean(axis=-1))
+
+
+def test_the_trust_region_ends_at_its_radius_and_near_points_are_left_alone():
+    rng = stream(0, "points")
+    start = BOX.low + BOX.sides * rng.random((50, 7))
+    far, near = (start + size * BOX.sides * rng.uniform(-1, 1, (50, 7)) for size in (1.0, 0.1))
+    tensors = [torch.tensor(values) for values in (start, far, near, BOX.sides)]
+    kept = Anchored.within(tensors[0], tensors[1], tensors[3], 0.1).numpy()
+    np.testing.assert_allclose(in_sides(kept - start), 0.1)
+    scale = (kept - start) / (far - start)
+    np.testing.assert_allclose(scale, np.broadcast_to(scale[:, :1], scale.shape), rtol=1e-6)  # straight towards it
+    torch.testing.assert_close(Anchored.within(tensors[0], tensors[2], tensors[3], 0.1), tensors[2])
+    torch.testing.assert_close(Anchored.within(tensors[0], tensors[0], tensors[3], 0.1), tensors[0])
+
+
+@pytest.mark.parametrize("radius", [None, 0.05])
+def test_a_descent_comes_down_and_stays_in_the_box_and_in_the_trust_region(model, memory, radius):
+    near = anchored(model, memory, np.arange(40), Trust(noise=0.01))
+    start, goals = memory.thetas[:30], near.tensor(memory.outcomes[100:130])
+    policies = Box.cube(start.min(), start.max(), 7)  # some begin on its border
+    with torch.no_grad():
+        before = near.expected(near.tensor(start), goals)
+    found = near.descend(near.tensor(start), goals, policies, steps=30, step=0.02, radius=radius)
+    with torch.no_grad():
+        assert (near.expected(found, goals) < before).all()
+        assert near.expected(found, goals).mean() < 0.8 * before.mean()
+    found = found.double().numpy()
+    assert policies.contains(np.round(found, 7)).all()
+    lengths = np.sqrt((((found - start) / policies.sides) ** 2).mean(axis=1))
+    if radius is None:
+        assert lengths.max() > 0.05
+    else:
+        assert lengths.max() == pytest.approx(radius, rel=1e-4)
+
+
+def test_a_descent_of_no_steps_stays_where_it_is(model, memory):
+    near = anchored(model, memory, np.arange(5))
+    start = near.tensor(memory.thetas[:5])
+    assert torch.equal(near.descend(start, start[:, :2], ARM.policies, steps=0, step=0.1), start)
+
+
+def test_a_step_is_a_share_of_each_side_whatever_the_unit(memory):
+    """Parameters in other units, learnt in these: the way down is the same."""
+    paths = []
+    for scale in (np.ones(7), BOX.sides):
+        scaled, policies = Memory(0, 7, 2), Box(np.zeros(7), scale)
+        for theta, outcome in zip(memory.thetas[:60], memory.outcomes[:60], strict=True):
+            scaled.add(NO_CONTEXT, theta * scale, outcome)
+        model = ForwardModel(0, 7, 2)
+        model.refresh(scaled)
+        near = anchored(model, scaled, np.arange(5), Trust(anchors=False))
+        goals = near.tensor(memory.outcomes[5:10])
+        found = near.descend(near.tensor(scaled.thetas[:5]), goals, policies, steps=10, step=0.02, radius=0.05)
+        paths.append(found.numpy() / scale)
+    np.testing.assert_allclose(paths[0], paths[1], atol=1e-3)
+
+
+@pytest.mark.parametrize("name", ["reach", "noise", "doubt", "error"])
+@pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf])
+def test_lengths_and_errors_that_are_no_positive_numbers_are_refused(name, value):
+    with pytest.raises(ValueError, match=f"{name} must be positive and finite, got {value}"):
+        Trust(**{name: value})
+
+
+@pytest.mark.parametrize("share", [-0.1, 1.1, np.nan])
+def test_a_share_out_of_range_is_refused(share):
+    with pytest.raises(ValueError, match=r"share must lie in \[0, 1\]"):
+        Trust(share=share)
+
+
+@pytest.mark.parametrize("caution", [-0.1, np.nan, np.inf])
+def test_a_caution_out_of_range_is_refused(caution):
+    with pytest.raises(ValueError, match="caution must be finite and at least 0"):
+        Trust(caution=caution)

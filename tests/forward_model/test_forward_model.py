@@ -1,0 +1,371 @@
+"""The forward model: what it learns, how sure it is, and what it refuses."""
+
+import json
+import pickle
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import torch
+from safetensors.torch import load_file, save_file
+
+from sgimd_torch.environments.planar_arm import PlanarArm
+from sgimd_torch.forward_model.model import ForwardModel
+from sgimd_torch.memory import Memory
+from sgimd_torch.spaces import stream
+
+NO_CONTEXT = np.zeros(0)
+
+
+def remembered(n, *, noise=0.0, seed=0, arm=None):
+    arm = PlanarArm(3) if arm is None else arm
+    memory, rng = Memory(arm.contexts.dim, arm.policies.dim, 2), stream(seed, "exemplars")
+    for theta in arm.policies.low + 0.3 + 0.4 * rng.random((n, arm.policies.dim)):
+        context = arm.observe(rng)
+        memory.add(context, theta, arm.execute(context, theta, rng) + noise * theta[0] * rng.standard_normal(2))
+    return memory
+
+
+def noise_only(n):
+    memory = Memory(0, 3, 2)
+    for row in stream(0, "noise").random((n, 5)):
+        memory.add(NO_CONTEXT, row[:3], row[3:])
+    return memory
+
+
+def taught(memory, **options):
+    model = ForwardModel(memory.contexts.shape[1], memory.thetas.shape[1], 2, **options)
+    model.refresh(memory)
+    return model
+
+
+def weights(model):
+    return torch.cat([parameter.flatten() for parameter in model.parameters()]).detach().clone()
+
+
+@pytest.fixture(scope="module")
+def model():
+    return taught(remembered(400), rate=1.9)
+
+
+@pytest.fixture(scope="module")
+def unseen():
+    return remembered(200, seed=1)
+
+
+def test_it_predicts_unseen_movements_far_better_than_their_mean(model, unseen):
+    error = np.linalg.norm(model.predict(NO_CONTEXT, unseen.thetas).mean - unseen.outcomes, axis=1).mean()
+    spread = np.linalg.norm(unseen.outcomes - unseen.outcomes.mean(axis=0), axis=1).mean()
+    assert error < spread / 10
+
+
+def test_contexts_are_inputs_too():
+    arm = PlanarArm(3, context=True)
+    model = taught(remembered(600, arm=arm), rate=1.8)
+    unseen = remembered(100, seed=1, arm=arm)
+    assert np.linalg.norm(model.predict(unseen.contexts, unseen.thetas).mean - unseen.outcomes, axis=1).mean() < 0.1
+
+
+def test_batch_axes_lead_and_change_nothing(model, unseen):
+    together = model.predict(NO_CONTEXT, unseen.thetas[:6].reshape(2, 3, 3))
+    one_by_one = [model.predict(NO_CONTEXT, theta) for theta in unseen.thetas[:6]]
+    for part, parts in zip(together, zip(*one_by_one, strict=True), strict=True):
+        assert part.shape == (2, 3, 2)
+        np.testing.assert_allclose(part.reshape(6, 2), np.stack(parts), rtol=1e-4, atol=1e-6)
+
+
+def test_members_disagree_more_where_nothing_was_executed(model, unseen):
+    far = np.zeros((50, 3))
+    assert (
+        model.predict(NO_CONTEXT, far).epistemic.mean() > 3 * model.predict(NO_CONTEXT, unseen.thetas).epistemic.mean()
+    )
+
+
+def test_it_finds_out_which_movements_are_noisy_and_how_noisy():
+    model = taught(remembered(3000, noise=0.3), rate=0.5)
+    thetas = np.array([[0.35, 0.5, 0.5], [0.65, 0.5, 0.5]])  # noise of .3 * theta_0 a dimension
+    np.testing.assert_allclose(model.predict(NO_CONTEXT, thetas).aleatoric.mean(axis=1), 0.3 * thetas[:, 0], rtol=0.3)
+
+
+def test_eighty_percent_regions_hold_about_eighty_percent():
+    model = taught(remembered(2000, noise=0.3), rate=0.5)
+    unseen = remembered(1000, noise=0.3, seed=1)
+    mean, epistemic, aleatoric = model.predict(NO_CONTEXT, unseen.thetas)
+    squared = ((unseen.outcomes - mean) ** 2 / (epistemic**2 + aleatoric**2)).sum(axis=1)
+    assert 0.7 < (squared < -2 * np.log(0.2)).mean() < 0.9  # chi-squared with two degrees of freedom
+
+
+def test_without_noise_heads_it_predicts_one_noise_everywhere_the_mean():
+    memory = remembered(1000, noise=0.3)
+    aleatoric = taught(memory, noise_heads=False, rate=0.4).predict(NO_CONTEXT, memory.thetas).aleatoric
+    np.testing.assert_allclose(aleatoric, np.broadcast_to(aleatoric[0], aleatoric.shape), rtol=1e-6)
+    np.testing.assert_allclose(aleatoric[0], 0.3 * np.sqrt((memory.thetas[:, 0] ** 2).mean()), rtol=0.3)
+
+
+def test_its_relative_error_is_that_on_movements_it_never_saw(model, unseen):
+    errors = np.linalg.norm(model.predict(NO_CONTEXT, unseen.thetas).mean - unseen.outcomes, axis=1)
+    spread = np.linalg.norm(unseen.outcomes - unseen.outcomes.mean(axis=0), axis=1)
+    assert model.relative_error == pytest.approx(errors.mean() / spread.mean(), rel=0.5)  # of 40 held out
+    assert model.relative_error < 0.05
+
+
+def test_its_relative_error_is_infinite_before_learning_and_about_one_where_there_is_nothing_to_learn():
+    model = ForwardModel(0, 3, 2, rate=5.0)
+    assert model.relative_error == np.inf
+    model.refresh(noise_only(400))
+    assert model.relative_error == pytest.approx(1.0, abs=0.05)
+
+
+def test_the_gradient_equals_finite_differences_and_is_finite_at_the_goal_itself():
+    double = taught(remembered(100)).double()
+    theta = torch.full((3,), 0.45, dtype=torch.float64, requires_grad=True)
+    context = torch.zeros(0, dtype=torch.float64)
+    assert torch.autograd.gradcheck(lambda theta: double.landing(context, theta), theta)
+    goal = double.landing(context, theta)[0].mean(dim=0).detach()
+    squared_distance = ((double.landing(context, theta)[0].mean(dim=0) - goal) ** 2).sum()
+    assert torch.isfinite(torch.autograd.grad(squared_distance, theta)[0]).all()
+
+
+def test_the_same_seed_learns_the_same_weights_and_another_seed_others():
+    memory = remembered(100)
+    assert torch.equal(weights(taught(memory, seed=3)), weights(taught(memory, seed=3)))
+    assert not torch.equal(weights(taught(memory, seed=3)), weights(taught(memory, seed=4)))
+
+
+def test_torchs_own_generator_and_threads_are_left_alone():
+    before, threads = torch.random.get_rng_state(), torch.get_num_threads()
+    taught(remembered(100)).predict(NO_CONTEXT, np.full(3, 0.5))
+    assert torch.equal(torch.random.get_rng_state(), before)
+    assert torch.get_num_threads() == threads
+
+
+def test_a_refresh_waits_for_enough_that_is_new():
+    model, memory = ForwardModel(0, 3, 2, every=50, rate=1.0), remembered(49)
+    assert model.refresh(memory) is None
+    assert not model.trained
+    memory = remembered(50)
+    assert model.refresh(memory).steps == 50
+    before = weights(model)
+    assert model.refresh(memory) is None
+    assert torch.equal(weights(model), before)
+
+
+def test_with_a_focus_a_small_network_learns_best_what_lands_near_the_goal(unseen):
+    memory = remembered(1000)
+    goal = memory.outcomes[0]
+    near = np.linalg.norm(unseen.outcomes - goal, axis=1) < 0.2
+    errors = {}
+    for name, focus, told in (("all", 0.0, goal), ("near", 0.75, goal), ("no goal", 0.75, None)):
+        model = ForwardModel(0, 3, 2, rate=0.3, hidden=(3,), recent=0.0, focus=focus)
+        model.refresh(memory, told)
+        errors[name] = np.linalg.norm(model.predict(NO_CONTEXT, unseen.thetas).mean - unseen.outcomes, axis=1)
+    assert errors["near"][near].mean() < 0.8 * errors["all"][near].mean()
+    assert errors["near"][~near].mean() > 1.2 * errors["all"][~near].mean()
+    np.testing.assert_array_equal(errors["no goal"], errors["all"])
+
+
+def test_adams_moments_survive_a_refresh():
+    model = ForwardModel(0, 3, 2, rate=0.2)
+    model.refresh(remembered(100))
+    model.refresh(remembered(200))
+    steps = {int(state["step"]) for state in model._optimizer.state.values()}
+    assert steps == {40}
+
+
+def test_learning_stops_when_what_is_held_out_gets_no_better():
+    assert ForwardModel(0, 3, 2, rate=100).refresh(noise_only(60)).steps < 2500
+
+
+def test_a_refresh_says_what_was_foreseen_of_the_new_exemplars_before_it_learnt_from_them():
+    model, memory = ForwardModel(0, 3, 2), remembered(160)
+    first = model.refresh(remembered(100))  # the same hundred
+    assert (first.first, first.foreseen) == (0, None)
+    before = model.predict(NO_CONTEXT, memory.thetas[100:])
+    second = model.refresh(memory)
+    assert second.first == 100
+    for foreseen, predicted in zip(second.foreseen, before, strict=True):
+        np.testing.assert_array_equal(foreseen, predicted)
+    assert not np.array_equal(second.foreseen.mean, model.predict(NO_CONTEXT, memory.thetas[100:]).mean)
+
+
+def test_after_a_divergence_the_weights_before_it_stand():
+    model = taught(remembered(100))
+    before, prediction = weights(model), model.predict(NO_CONTEXT, np.full(3, 0.5))
+    model.lr, model._optimizer = 1e30, None
+    assert model.refresh(remembered(200)).diverged
+    assert torch.equal(weights(model), before)
+    np.testing.assert_array_equal(model.predict(NO_CONTEXT, np.full(3, 0.5)).mean, prediction.mean)
+    model.lr = 3e-3
+    assert not model.refresh(remembered(300)).diverged
+
+
+def test_weights_that_are_finite_but_lost_count_as_a_divergence_too():
+    model = taught(remembered(300), rate=1.0)
+    before, error = weights(model), model.relative_error
+    model.lr, model._optimizer = 1.0, None
+    assert model.refresh(remembered(400)).diverged
+    assert torch.equal(weights(model), before)
+    assert model.relative_error == pytest.approx(error, rel=0.2)  # of more exemplars held out
+
+
+def interrupted(*_):
+    raise KeyboardInterrupt
+
+
+def test_a_refresh_that_is_interrupted_has_changed_nothing(monkeypatch):
+    whole = taught(remembered(100))
+    for model in (ForwardModel(0, 3, 2), whole):
+        before, error = weights(model), model.relative_error
+        with monkeypatch.context() as patch:
+            patch.setattr(model, "_held_out", interrupted)  # after the first steps
+            with pytest.raises(KeyboardInterrupt):
+                model.refresh(remembered(200))
+        assert torch.equal(weights(model), before)
+        assert model.relative_error == error
+        assert model.refresh(remembered(200)).steps == 60 - 30 * (model is whole)
+    assert ForwardModel(0, 3, 2).relative_error == np.inf
+
+
+@pytest.mark.skipif(torch.cuda.is_available(), reason="there is a GPU")
+def test_a_model_for_a_gpu_that_is_not_there_says_so_and_stays_untrained():
+    model = ForwardModel(0, 3, 2, accelerator="cuda")
+    with pytest.raises(Exception, match="CUDA"):
+        model.refresh(remembered(100))
+    assert not model.trained
+
+
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="there is no GPU")
+def test_on_a_gpu_it_learns_as_well(unseen):
+    model = taught(remembered(400), rate=1.9, accelerator="cuda")
+    assert model.input_mean.is_cuda
+    error = np.linalg.norm(model.predict(NO_CONTEXT, unseen.thetas).mean - unseen.outcomes, axis=1).mean()
+    assert error < 0.1
+
+
+def test_the_weights_have_moved_to_where_they_are_trained_before_any_exemplar_does(monkeypatch):
+    model, order = ForwardModel(0, 3, 2), []
+    for name in ("_begin", "_tensor"):
+        step = getattr(model, name)
+        monkeypatch.setattr(model, name, lambda *args, name=name, step=step: (order.append(name), step(*args))[1])
+    model.refresh(remembered(100))
+    assert order[0] == "_begin"
+    assert "_tensor" in order
+
+
+def test_a_copy_for_another_process_predicts_the_same_and_learns_on(model, unseen):
+    copy = pickle.loads(pickle.dumps(model))
+    np.testing.assert_array_equal(
+        copy.predict(NO_CONTEXT, unseen.thetas).mean, model.predict(NO_CONTEXT, unseen.thetas).mean
+    )
+    assert copy.refresh(remembered(500)).first == 400
+
+
+@pytest.mark.parametrize("noise_heads", [True, False])
+def test_a_saved_model_predicts_the_same_and_knows_as_well_how_far_to_be_trusted(tmp_path, unseen, noise_heads):
+    model = taught(remembered(100), noise_heads=noise_heads, members=2, hidden=(8,))
+    model.save(tmp_path / "model.safetensors")
+    loaded = ForwardModel.load(tmp_path / "model.safetensors")
+    for saved, read in zip(
+        model.predict(NO_CONTEXT, unseen.thetas), loaded.predict(NO_CONTEXT, unseen.thetas), strict=True
+    ):
+        np.testing.assert_array_equal(saved, read)
+    assert (loaded.noise_heads, loaded.relative_error) == (noise_heads, model.relative_error)
+    assert [path.name for path in tmp_path.iterdir()] == ["model.safetensors"]
+
+
+@pytest.mark.parametrize(
+    ("spoil", "words"),
+    [
+        (lambda path, state, about: path.write_bytes(path.read_bytes()[:-100]), "truncated"),
+        (lambda path, state, about: path.write_bytes(b"PK not a model"), "no forward model"),
+        (
+            lambda path, state, about: save_file(state, path, {**about, "version": "2"}),
+            "version 2, this library reads 1",
+        ),
+        (lambda path, state, about: save_file(state, path), "version None"),
+        (lambda path, state, about: save_file(state, path, {"version": "1", "model": "{"}), "not say what model"),
+        (lambda path, state, about: save_file(state, path, {"version": "1", "model": "{}"}), "not say .*context_dim"),
+        (
+            lambda path, state, about: save_file(
+                state, path, {"version": "1", "model": json.dumps({**json.loads(about["model"]), "theta_dim": 4})}
+            ),
+            "another shape",
+        ),
+        (
+            lambda path, state, about: save_file({**state, "biases.0": state["biases.0"] * np.nan}, path, about),
+            "not finite",
+        ),
+    ],
+)
+def test_a_file_that_is_no_such_model_is_refused(tmp_path, model, spoil, words):
+    path = tmp_path / "model.safetensors"
+    model.save(path)
+    about = {"version": "1", "model": json.dumps({**model.sizes, **model.shape})}
+    spoil(path, load_file(path), about)
+    with pytest.raises(ValueError, match=words):
+        ForwardModel.load(path)
+
+
+def test_a_slip_in_the_options_of_a_model_to_be_loaded_is_not_blamed_on_the_file(tmp_path, model):
+    model.save(tmp_path / "model.safetensors")
+    with pytest.raises(TypeError, match="ratee"):
+        ForwardModel.load(tmp_path / "model.safetensors", ratee=3)
+
+
+def test_a_loaded_model_learns_on(tmp_path):
+    taught(remembered(100)).save(tmp_path / "model.safetensors")
+    loaded = ForwardModel.load(tmp_path / "model.safetensors", every=20, rate=1.0)
+    assert loaded.refresh(remembered(110)) is None
+    refresh = loaded.refresh(remembered(120))
+    assert (refresh.first, refresh.steps, len(refresh.foreseen.mean)) == (100, 20, 20)
+
+
+def test_a_model_that_is_not_there_is_called_missing(tmp_path):
+    with pytest.raises(FileNotFoundError, match="no forward model"):
+        ForwardModel.load(tmp_path / "model.safetensors")
+
+
+def test_before_it_has_learnt_it_predicts_nothing():
+    with pytest.raises(RuntimeError, match="50 exemplars"):
+        ForwardModel(0, 3, 2).predict(NO_CONTEXT, np.full(3, 0.5))
+
+
+def test_another_robots_memory_or_another_runs_is_refused():
+    model = taught(remembered(100))
+    with pytest.raises(ValueError, match="another robot's"):
+        model.refresh(Memory(0, 4, 2))
+    with pytest.raises(ValueError, match="another run's"):
+        model.refresh(remembered(60))
+    with pytest.raises(ValueError, match="were outcomes passed instead"):
+        model.predict(NO_CONTEXT, np.zeros(2))
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"members": 0},
+        {"hidden": ()},
+        {"hidden": (0,)},
+        {"every": 0},
+        {"rate": 0.0},
+        {"lr": np.nan},
+        {"recent": 1.5},
+        {"focus": -0.1},
+        {"focus": 0.8},  # with the quarter that is recent more than a batch
+        {"beta": -0.1},
+        {"batch": 0},
+        {"batch": 2.5},
+        {"every": 2.5},
+        {"hidden": 64},
+    ],
+)
+def test_numbers_out_of_their_range_are_refused(options):
+    with pytest.raises(ValueError, match=next(iter(options))):
+        ForwardModel(0, 3, 2, **options)
+
+
+def test_without_its_packages_it_says_what_to_install():
+    program = "import sys; sys.modules['lightning'] = None\nimport sgimd_torch.forward_model"
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert "ImportError: the forward model needs sgimd-torch[forward]" in run.stderr

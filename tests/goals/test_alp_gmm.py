@@ -1,0 +1,109 @@
+"""ALP-GMM: goals follow absolute learning progress, also in a context, and nothing of the fit leaks out."""
+
+import numpy as np
+import pytest
+
+from sgimd_torch.goals.alp_gmm import AlpGmm
+from sgimd_torch.spaces import Box, stream
+
+NO_CONTEXTS, LINE, SQUARE = Box.cube(0, 1, 0), Box.cube(0, 1, 1), Box.cube(0, 1, 2)
+NO_CONTEXT = np.empty(0)
+
+
+def practise(goals: AlpGmm, n: int, low: float, high: float, seed: int = 0) -> None:
+    """Goals on a line, of which only those between ``low`` and ``high`` go up and down."""
+    rng = stream(seed, "planted")
+    for goal in rng.uniform(size=n):
+        goals.add(NO_CONTEXT, [goal], -rng.uniform() if low < goal < high else -1)
+
+
+def test_goals_follow_progress_and_the_uniform_ones_reach_the_rest():
+    goals = AlpGmm(NO_CONTEXTS, LINE, stream(1, "goals"))
+    practise(goals, 250, 0.6, 0.8)
+    samples = np.array([goals.sample(NO_CONTEXT)[0] for _ in range(2000)])
+    inside = np.mean((samples > 0.55) & (samples < 0.85))  # Gaussians have no edges
+    assert inside > 0.65  # at most .8 + .2 * .3, where uniform goals would give .3
+    assert 0.05 < np.mean(samples < 0.4) < 0.2  # a fifth of .4 = .08 by the uniform ones, where all would give .4
+
+
+def test_goals_are_uniform_before_the_first_fit_and_where_nothing_progresses():
+    for n in (49, 250):
+        goals = AlpGmm(NO_CONTEXTS, LINE, stream(2, "goals"))
+        practise(goals, n, 2, 3) if n == 250 else practise(goals, n, 0.6, 0.8)
+        counts = np.histogram([goals.sample(NO_CONTEXT) for _ in range(2000)], 10, (0, 1))[0]
+        assert np.abs(counts - 200).max() < 5 * np.sqrt(2000 * 0.1 * 0.9)  # five standard deviations
+
+
+def test_what_lies_before_the_last_memory_goals_is_forgotten():
+    goals = AlpGmm(NO_CONTEXTS, LINE, stream(3, "goals"), memory=60, uniform=0.0)
+    practise(goals, 60, 0.0, 0.3)
+    practise(goals, 400, 0.7, 1.0, seed=1)  # long enough that few goals are nearest to one of the first 60
+    samples = np.array([goals.sample(NO_CONTEXT)[0] for _ in range(300)])
+    assert np.mean(samples > 0.6) > 0.85
+
+
+def test_a_new_fit_comes_after_refit_goals_and_no_sooner():
+    one, other = (AlpGmm(NO_CONTEXTS, LINE, stream(4, "goals"), refit=60, uniform=0.0) for _ in range(2))
+    for goals in (one, other):
+        practise(goals, 60, 0.0, 0.3)
+        assert goals.sample(NO_CONTEXT)[0] < 0.6
+    practise(one, 59, 0.7, 1.0, seed=1)
+    assert [one.sample(NO_CONTEXT) for _ in range(20)] == [other.sample(NO_CONTEXT) for _ in range(20)]
+    one.add(NO_CONTEXT, [0.5], -1)
+    assert one.sample(NO_CONTEXT) != other.sample(NO_CONTEXT)
+
+
+def test_progress_is_measured_against_the_nearest_earlier_goal():
+    # Competence differs from place to place in both; only in the second does it change with time, and in one place.
+    still, moving = (AlpGmm(NO_CONTEXTS, LINE, stream(5, "goals"), memory=50, uniform=0.0) for _ in range(2))
+    for index in range(100):
+        place = (index % 10) / 10
+        still.add(NO_CONTEXT, [place], -place)
+        moving.add(NO_CONTEXT, [place], -1 + index / 100 if place == 0.7 else -place)
+    near = [np.mean([abs(goals.sample(NO_CONTEXT)[0] - 0.7) < 0.15 for _ in range(300)]) for goals in (still, moving)]
+    assert near[0] == pytest.approx(0.3, abs=0.14)  # uniform, five standard errors
+    assert near[1] > 0.9
+
+
+def test_in_a_context_goals_come_from_where_that_context_progresses():
+    goals = AlpGmm(LINE, LINE, stream(6, "goals"), uniform=0.0)
+    rng = stream(6, "planted")
+    for context, goal in rng.uniform(size=(250, 2)):
+        goals.add([context], [goal], -rng.uniform() if abs(context - goal) < 0.15 else -1)
+    for context in (0.2, 0.5, 0.8):
+        samples = np.array([goals.sample([context])[0] for _ in range(300)])
+        assert np.median(samples) == pytest.approx(context, abs=0.15)
+
+
+def test_goals_stay_in_a_task_space_of_any_size_even_when_progress_is_in_its_corner():
+    box = Box(np.array([-100.0, -1e-3]), np.array([100.0, 0.0]))
+    goals, rng = AlpGmm(NO_CONTEXTS, box, stream(7, "goals")), stream(7, "planted")
+    for goal in rng.uniform(box.low, box.high, (150, 2)):
+        goals.add(NO_CONTEXT, goal, -rng.uniform() if goal[0] > 90 else -1)
+    samples = np.array([goals.sample(NO_CONTEXT) for _ in range(500)])
+    assert box.contains(samples).all()
+    assert np.mean(samples[:, 0] > 80) > 0.5
+    assert np.mean((samples == box.high).any(axis=1)) < 0.02  # drawn again, hardly ever clipped
+
+
+def test_goals_that_coincide_are_fitted_without_a_warning():
+    goals = AlpGmm(LINE, SQUARE, stream(8, "goals"))
+    for index in range(120):
+        assert SQUARE.contains(goals.sample([0.5]))
+        goals.add([0.5], [0.25, 0.75], -(index % 2))
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"components": 1}, "components must be"),
+        ({"refit": 0}, "refit must be"),
+        ({"refit": 9}, "at least components=10, got 9 and 250"),
+        ({"memory": 9}, "at least components=10, got 50 and 9"),
+        ({"uniform": 1.1}, "uniform must be a probability"),
+        ({"uniform": np.nan}, "uniform must be a probability"),
+    ],
+)
+def test_numbers_out_of_range_are_refused(options, message):
+    with pytest.raises(ValueError, match=message):
+        AlpGmm(NO_CONTEXTS, LINE, stream(0, "goals"), **options)

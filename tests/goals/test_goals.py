@@ -1,0 +1,197 @@
+"""Every kind of goals keeps the same promises; and what the interest map's rivals without a tree do with progress."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+
+from sgimd_torch.goals.alp_gmm import AlpGmm
+from sgimd_torch.goals.interest_map import InterestMap, UniformGoals
+from sgimd_torch.goals.progress_grid import ProgressGrid
+from sgimd_torch.goals.regions import absolute_progress, gained_progress, paired_progress
+from sgimd_torch.spaces import Box, stream
+
+NO_CONTEXTS, LINE, SQUARE = Box.cube(0, 1, 0), Box.cube(0, 1, 1), Box.cube(0, 1, 2)
+NO_CONTEXT = np.empty(0)
+
+
+def global_state() -> str:
+    return str(np.random.get_state())  # noqa: NPY002 - nobody may touch it
+
+
+ALL = pytest.mark.parametrize(
+    "make",
+    [
+        InterestMap,
+        partial(InterestMap, window=20, progress=paired_progress),
+        ProgressGrid,
+        partial(ProgressGrid, cells=3, progress=paired_progress),
+        AlpGmm,
+        UniformGoals,
+    ],
+    ids=["map", "paired", "grid", "paired grid", "alp-gmm", "uniform"],
+)
+
+
+@ALL
+def test_every_kind_of_goals_takes_the_same_place(make):
+    goals = make(LINE, SQUARE, stream(20, "goals"))
+    for _ in range(120):
+        goal = goals.sample([0.5])
+        assert goal.shape == (2,)
+        assert SQUARE.contains(goal)
+        goals.add([0.5], goal, -goal[0], "imitate", 0.1)
+
+
+@ALL
+def test_only_sampling_draws_whatever_the_kind_of_goals(make):
+    rng = stream(23, "goals")
+    goals = make(LINE, SQUARE, rng)
+    for index in range(110):
+        state = rng.bit_generator.state
+        goals.add([0.5], [index / 110, 0.5], -1)
+        assert rng.bit_generator.state == state
+        goals.sample([0.5])
+        assert rng.bit_generator.state != state
+
+
+@ALL
+def test_the_same_stream_gives_the_same_goals(make):
+    def lived(seed):
+        goals, planted, numpy_state = make(LINE, SQUARE, stream(seed, "goals")), stream(24, "planted"), global_state()
+        sampled = []
+        for _ in range(110):
+            context = planted.uniform(size=1)
+            sampled.append(goals.sample(context))
+            goals.add(context, sampled[-1], -planted.uniform())
+        assert global_state() == numpy_state, "drew from numpy's global stream"
+        return np.array(sampled)
+
+    assert np.array_equal(lived(1), lived(1))
+    assert not np.array_equal(lived(1), lived(2))
+
+
+@ALL
+@pytest.mark.parametrize(
+    ("context", "goal", "competence", "message"),
+    [
+        ([0.5], [0.5, np.nan], -0.5, "goal must be finite"),
+        ([0.5], [0.5], -0.5, "goal must have shape"),
+        ([0.5], [[0.5, 0.5]], -0.5, "goal must be one point"),
+        ([0.5], [0.5, 1.01], -0.5, "outcomes.contains"),
+        ([], [0.5, 0.5], -0.5, "context must have shape"),
+        ([1.5], [0.5, 0.5], -0.5, "context must be one point"),
+        ([[0.5]], [0.5, 0.5], -0.5, "context must be one point"),
+        ([0.5], [0.5, 0.5], np.nan, "competence must lie"),
+        ([0.5], [0.5, 0.5], 0.1, "competence must lie"),
+        ([0.5], [0.5, 0.5], -1.1, "competence must lie"),
+    ],
+)
+def test_what_is_not_an_attempt_at_a_goal_of_the_map_is_refused(make, context, goal, competence, message):
+    goals = make(LINE, SQUARE, stream(21, "goals"))
+    with pytest.raises(ValueError, match=message):
+        goals.add(context, goal, competence)
+    if "context" in message:
+        with pytest.raises(ValueError, match=message):
+            goals.sample(context)
+
+
+@ALL
+@pytest.mark.parametrize("gain", [-0.01, 1.01, np.nan, np.inf])
+def test_a_gain_that_is_none_is_refused(make, gain):
+    goals = make(LINE, SQUARE, stream(21, "goals"))
+    with pytest.raises(ValueError, match=r"gain must lie in \[0, 1\], got"):
+        goals.add([0.5], [0.5, 0.5], -0.5, "autonomous", gain)
+    goals.add([0.5], [0.5, 0.5], -0.5, "autonomous", 0.0)
+    goals.add([0.5], [0.5, 0.5], 0.0, "autonomous", 1.0)
+
+
+def test_uniform_goals_are_uniform_whatever_was_learnt():
+    goals = UniformGoals(NO_CONTEXTS, LINE, stream(22, "goals"))
+    for index in range(100):
+        goals.add(NO_CONTEXT, [0.1], -1 + index / 100)
+    counts = np.histogram([goals.sample(NO_CONTEXT) for _ in range(5000)], 10, (0, 1))[0]
+    assert np.abs(counts - 500).max() < 5 * np.sqrt(5000 * 0.1 * 0.9)  # five standard deviations
+
+
+def planted(make, cells: int, **options) -> ProgressGrid:
+    """Cells on a line; each but the first met two failures, then two goals that went .2 better, .4 better ...
+
+    Gains rise the other way: none in the last cell, .1 in the one below ...
+    """
+    goals = make(NO_CONTEXTS, LINE, stream(30, "goals"), cells=cells, **options)
+    for index, region in enumerate(goals.regions):
+        for competence in (-1, -1, -1 + 0.2 * index, -1 + 0.2 * index):
+            goals.add(NO_CONTEXT, (region.low + region.high) / 2, competence, gain=0.1 * (cells - 1 - index))
+    return goals
+
+
+@pytest.mark.parametrize(("progress", "tenths"), [(absolute_progress, [0, 1, 2, 3]), (gained_progress, [3, 2, 1, 0])])
+def test_cells_of_the_grid_are_chosen_in_proportion_to_their_interest(progress, tenths):
+    goals = planted(ProgressGrid, 4, modes=(1, 0, 0), progress=progress)
+    assert [region.interest() for region in goals.regions] == pytest.approx(np.array(tenths) / 10)
+    samples = np.array([goals.sample(NO_CONTEXT) for _ in range(6000)])
+    counts = np.histogram(samples, 4, (0, 1))[0]
+    expected = 6000 * np.array(tenths) / 6
+    assert np.all(np.abs(counts - expected) <= 5 * np.sqrt(expected))
+
+
+def test_the_third_mode_stays_near_a_cells_worst_goal():
+    goals = planted(ProgressGrid, 4, modes=(0, 0, 1), near=0.1)
+    away = np.array([np.abs(goals.sample(NO_CONTEXT) - [0.125, 0.375, 0.625, 0.875]).min() for _ in range(300)])
+    assert 0.02 < away.max() <= 0.025  # a tenth of a quarter; 300 draws all below .8 of it: odds 1e-29
+
+
+def test_a_cell_forgets_what_lies_before_its_window_and_counts_it():
+    goals = ProgressGrid(NO_CONTEXTS, LINE, stream(31, "goals"), cells=2, window=4, progress=absolute_progress)
+    for competence in (-1, -0.9, -0.8, -0.7, -0.6, -0.5):
+        goals.add(NO_CONTEXT, [0.7], competence, gain=-competence)
+    goals.add(NO_CONTEXT, [0.2], 0)
+    below, above = goals.regions
+    assert above.competences.tolist() == [-0.8, -0.7, -0.6, -0.5]
+    assert above.gains.tolist() == [0.8, 0.7, 0.6, 0.5]
+    assert above.interest() == pytest.approx(0.1)
+    assert (above.attempts, below.attempts) == (6, 1)
+
+
+@pytest.mark.parametrize(("dim", "cells"), [(1, 100), (2, 10), (3, 5), (8, 2)])
+def test_cells_tile_the_space_about_a_hundred_of_them(dim, cells):
+    box = Box(np.full(dim, -100.0), np.arange(dim) + 100.3)
+    regions = ProgressGrid(NO_CONTEXTS, box, stream(32, "goals")).regions
+    assert len(regions) == cells**dim == len({region.path for region in regions})
+    lows, highs = (np.array([getattr(region, name) for region in regions]) for name in ("low", "high"))
+    assert np.prod((highs - lows) / box.sides, axis=1) == pytest.approx(np.full(len(regions), 1 / len(regions)))
+    for k in range(dim):
+        assert set(lows[:, k]) - {box.low[k]} == set(highs[:, k]) - {box.high[k]}  # to the last digit
+    assert regions[1].path == "R" + ".0" * (dim - 1) + ".1"
+
+
+def test_each_goal_counts_in_one_cell_borders_included():
+    goals = ProgressGrid(NO_CONTEXTS, SQUARE, stream(33, "goals"), cells=2)
+    for goal in ([0, 0], [0.5, 0.5], [1, 1], [0.5, 0], [0, 1]):
+        goals.add(NO_CONTEXT, goal, -1)
+    assert [len(region.goals) for region in goals.regions] == [1, 1, 1, 2]
+
+
+def test_goals_come_from_cells_that_contain_the_context():
+    goals = ProgressGrid(LINE, LINE, stream(34, "goals"), cells=2, modes=(1, 0, 0), progress=absolute_progress)
+    for competence in (-1, -1, 0, 0):
+        goals.add([0.9], [0.2], competence)
+    assert max(goals.sample([0.6])[0] for _ in range(100)) < 0.5
+    assert max(goals.sample([0.4])[0] for _ in range(100)) > 0.5  # no progress here: uniform, odds of failure 2^-100
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"window": 5}, "window must be even"),
+        ({"window": 2}, "window must be even and at least 4"),
+        ({"modes": (0.7, 0.2, 0.2)}, "modes must be three"),
+        ({"near": 0.0}, "near must lie in"),
+        ({"cells": 0}, "cells must be from 1"),
+        ({"cells": 1000}, "100000 in all, got 1000 in 2 dimensions"),
+    ],
+)
+def test_a_grid_refuses_numbers_out_of_range(options, message):
+    with pytest.raises(ValueError, match=message):
+        ProgressGrid(NO_CONTEXTS, SQUARE, stream(0, "goals"), **options)

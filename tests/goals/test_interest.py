@@ -1,0 +1,425 @@
+"""Goal interest mapping and deciding a goal: eq. (4), the recursive split, the three goal modes."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import ArrayLike
+
+from sgimd_torch.goals.interest_map import InterestMap
+from sgimd_torch.goals.regions import absolute_progress, gained_progress, paired_progress
+from sgimd_torch.spaces import Array, Box, stream
+
+NO_CONTEXTS, LINE, SQUARE = Box.cube(0, 1, 0), Box.cube(0, 1, 1), Box.cube(0, 1, 2)
+NO_CONTEXT = np.empty(0)
+BY_EQ_3 = {"g_max": 50, "max_aspect": np.inf, "progress": absolute_progress}
+
+
+def chi_square(counts: ArrayLike, probabilities: ArrayLike) -> float:
+    counts = np.asarray(counts)
+    expected = counts.sum() * np.asarray(probabilities)
+    return float(np.sum((counts - expected) ** 2 / expected))
+
+
+def four_regions_of_interest_1_2_3_4(**options) -> InterestMap:
+    """The line, cut into quarters of interests .1, .2, .3 and .4: eq. (4) makes of them 0, 1/6, 2/6 and 3/6."""
+    goals = InterestMap(NO_CONTEXTS, LINE, stream(1, "goals"), window=4, **BY_EQ_3, **options)
+    for index in range(112):
+        goals.add(NO_CONTEXT, [(index * 0.6180339887) % 1], -1)  # the golden ratio spreads evenly: quarters
+    assert len(goals.regions) == 4
+    for index, region in enumerate(goals.regions):
+        for competence in (-1, -1, -0.8 + 0.2 * index, -0.8 + 0.2 * index):
+            goals.add(NO_CONTEXT, (region.low + region.high) / 2, competence)
+    assert [region.interest() for region in goals.regions] == pytest.approx([0.1, 0.2, 0.3, 0.4])
+    return goals
+
+
+def counts_in(regions: list, samples: Array) -> Array:
+    return np.histogram(samples[:, 0], [region.low[0] for region in regions] + [1.0])[0]
+
+
+def test_regions_are_chosen_in_proportion_to_their_interest_above_the_least():
+    goals = four_regions_of_interest_1_2_3_4(modes=(1, 0, 0))
+    samples = np.array([goals.sample(NO_CONTEXT) for _ in range(10_000)])
+    counts = counts_in(goals.regions, samples)
+    assert counts[0] == 0
+    assert chi_square(counts[1:], [1 / 6, 2 / 6, 3 / 6]) < 13.8  # 2 degrees of freedom: odds 1 in 1000
+    last = samples[samples[:, 0] >= goals.regions[-1].low[0]]
+    within = np.histogram(last, 10, (goals.regions[-1].low[0], 1.0))[0]
+    assert chi_square(within, np.full(10, 0.1)) < 27.9  # uniform in it, 9 degrees of freedom: odds 1 in 1000
+
+
+def test_the_three_modes_share_the_goals_7_to_2_to_1():
+    goals = four_regions_of_interest_1_2_3_4(near=0.01)
+    samples = np.array([goals.sample(NO_CONTEXT) for _ in range(10_000)])
+    counts = counts_in(goals.regions, samples)
+    volumes = np.array([region.high[0] - region.low[0] for region in goals.regions])
+    expected = 0.8 * np.array([0, 1, 2, 3]) / 6 + 0.2 * volumes  # modes 1 and 3 follow interest, mode 2 does not
+    assert chi_square(counts, expected) < 16.3  # 3 degrees of freedom: odds 1 in 1000
+    last = goals.regions[-1]
+    worst = last.goals[last.competences == -1]
+    is_near = np.abs(samples - worst[:, 0]).min(axis=1) <= 0.01 * (last.high[0] - last.low[0])
+    in_last = samples[:, 0] >= last.low[0]
+    # Mode 3 alone would give .1 * 3/6; other modes come near too, in as large a part as lies near a worst goal.
+    line = np.linspace(last.low[0], last.high[0], 100_001)
+    share = np.mean(np.abs(line[:, None] - worst[:, 0]).min(axis=1) <= 0.01 * (last.high[0] - last.low[0]))
+    mode_3, others = 0.1 * 3 / 6, 0.7 * 3 / 6 + 0.2 * volumes[-1]
+    probability = (mode_3 + others * share) / (mode_3 + others)
+    assert chi_square(np.bincount(is_near[in_last], minlength=2), [1 - probability, probability]) < 10.8  # 1 in 1000
+
+
+def test_goals_are_uniform_while_all_interests_are_equal():
+    goals = InterestMap(NO_CONTEXTS, LINE, stream(2, "goals"), modes=(1, 0, 0))
+    for goal in stream(2, "planted").uniform(size=300) ** 3:  # crowded at 0: leaves of very different sizes
+        goals.add(NO_CONTEXT, [goal], -1)
+    sizes = [region.high[0] - region.low[0] for region in goals.regions]
+    assert len(sizes) > 4
+    assert max(sizes) > 10 * min(sizes)
+    counts = np.histogram([goals.sample(NO_CONTEXT) for _ in range(10_000)], 20, (0, 1))[0]
+    assert chi_square(counts, np.full(20, 1 / 20)) < 43.8  # 19 degrees of freedom: odds 1 in 1000
+
+
+def test_goals_are_uniform_in_every_context_while_all_interests_are_equal():
+    goals = InterestMap(LINE, LINE, stream(3, "goals"), modes=(1, 0, 0))
+    for context, goal in stream(3, "planted").uniform(size=(400, 2)) ** [2, 3]:
+        goals.add([context], [goal], -1)
+    assert len({region.high[0] - region.low[0] for region in goals.regions}) > 2
+    for context in (0.0, 0.1, 1.0):
+        counts = np.histogram([goals.sample([context]) for _ in range(3000)], 10, (0, 1))[0]
+        assert chi_square(counts, np.full(10, 0.1)) < 27.9  # 9 degrees of freedom: odds 1 in 1000, three times
+
+
+def test_a_new_map_draws_goals_from_the_whole_task_space():
+    for modes in ((1, 0, 0), (0, 1, 0), (0, 0, 1)):  # mode 3 has no worst goal yet
+        goals = InterestMap(NO_CONTEXTS, LINE, stream(4, "goals"), modes=modes)
+        counts = np.histogram([goals.sample(NO_CONTEXT) for _ in range(2000)], 10, (0, 1))[0]
+        assert chi_square(counts, np.full(10, 0.1)) < 27.9  # 9 degrees of freedom: odds 1 in 1000, three times
+
+
+def test_only_regions_that_contain_the_context_are_chosen():
+    goals = InterestMap(LINE, LINE, stream(5, "goals"), modes=(1, 0, 0), **BY_EQ_3)
+    rng, n_late = stream(5, "planted"), 0
+    for _ in range(600):  # progress only in the upper half of contexts, and there for lower goals
+        context, goal = rng.uniform(size=2)
+        improves = context > 0.5 and goal < 0.5
+        n_late += improves
+        goals.add([context], [goal], -1 + n_late / 200 if improves else -1)
+    upper = np.array([goals.sample([0.9]) for _ in range(500)])
+    lower = np.array([goals.sample([0.1]) for _ in range(500)])
+    assert np.mean(upper < 0.55) > 0.9
+    assert 0.35 < np.mean(lower < 0.5) < 0.65  # no progress in this context: uniform, six standard errors
+
+
+def test_mode_3_stays_near_the_least_competent_goal():
+    goals = InterestMap(NO_CONTEXTS, Box(np.zeros(2), np.array([1.0, 100.0])), stream(6, "goals"), modes=(0, 0, 1))
+    for goal, competence in (([0.2, 20], -0.1), ([0.5, 50], -0.9), ([0.8, 80], -0.2)):
+        goals.add(NO_CONTEXT, goal, competence)
+    away = np.abs(np.array([goals.sample(NO_CONTEXT) for _ in range(500)]) - [0.5, 50]).max(axis=0)
+    assert (away <= [0.05, 5]).all()
+    assert (away > [0.049, 4.9]).all()  # 500 draws all miss the last 2 % with odds .98^500 = 4e-5
+
+
+def test_mode_3_does_not_leave_the_region():
+    goals = InterestMap(NO_CONTEXTS, LINE, stream(7, "goals"), modes=(0, 0, 1))
+    goals.add(NO_CONTEXT, [0.01], -1)
+    samples = np.array([goals.sample(NO_CONTEXT) for _ in range(200)])
+    assert samples.min() == 0
+    assert 0.05 < samples.max() <= 0.06
+
+
+def test_mode_3_does_not_cross_a_cut():
+    goals = InterestMap(NO_CONTEXTS, LINE, stream(7, "goals"), modes=(0, 0, 1), **BY_EQ_3)
+    for index in range(51):
+        goals.add(NO_CONTEXT, [index / 50], -0.5)
+    _, above = goals.regions
+    goals.add(NO_CONTEXT, above.low, -1)  # the only progress, so this region is chosen, and its worst goal
+    samples = np.array([goals.sample(NO_CONTEXT) for _ in range(200)])
+    assert samples.min() == above.low
+    assert samples.max() <= above.low + 0.05 * (above.high - above.low)
+
+
+def test_mode_3_tries_all_goals_that_are_equally_bad():
+    goals = InterestMap(NO_CONTEXTS, LINE, stream(8, "goals"), modes=(0, 0, 1))
+    for goal, competence in ((0.2, -1), (0.5, -0.5), (0.8, -1)):
+        goals.add(NO_CONTEXT, [goal], competence)
+    nearest = {round(float(goals.sample(NO_CONTEXT)[0]), 1) for _ in range(60)}  # all on one side: odds 2^-59
+    assert {0.2, 0.8} <= nearest
+    assert 0.5 not in nearest
+
+
+def test_a_region_is_cut_when_it_holds_more_goals_than_allowed_and_not_before():
+    goals = InterestMap(NO_CONTEXTS, LINE, stream(9, "goals"), g_max=40)
+    for index in range(40):
+        goals.add(NO_CONTEXT, [index / 40], -1)
+    assert [region.path for region in goals.regions] == ["R"]
+    goals.add(NO_CONTEXT, [1.0], -1)
+    assert [region.path for region in goals.regions] == ["R0", "R1"]
+
+
+def test_a_cut_conserves_goals_and_their_order():
+    goals, rng = InterestMap(LINE, SQUARE, stream(10, "goals")), stream(10, "planted")
+    points = rng.uniform(size=(200, 3))
+    competences = -np.arange(200) / 200  # tells when a goal was added
+    for point, competence in zip(points, competences, strict=True):
+        goals.add(point[:1], point[1:], competence, gain=-competence)
+    regions = goals.regions
+    assert len(regions) > 3
+    assert sorted(np.concatenate([region.competences for region in regions])) == sorted(competences)
+    for region in regions:
+        assert (np.diff(region.competences) < 0).all()
+        rows = np.rint(-200 * region.competences).astype(int)
+        np.testing.assert_array_equal(np.hstack((region.contexts, region.goals)), points[rows])
+        assert region.gains.tolist() == (-region.competences).tolist()
+        assert region.attempts == len(region.goals)
+
+
+def cut_of(points: Array, competences: Array, gains: Array | None = None, **options) -> tuple[int, float]:
+    """(axis, position) of the first cut of the square, which is made at the 51st goal."""
+    goals = InterestMap(NO_CONTEXTS, SQUARE, stream(11, "goals"), **{**BY_EQ_3, **options})
+    for point, competence, gain in zip(points, competences, np.zeros(51) if gains is None else gains, strict=True):
+        goals.add(NO_CONTEXT, point, competence, gain=gain)
+    below, _ = goals.regions
+    axis = int(np.argmin(below.high))
+    return axis, float(below.high[axis])
+
+
+def evenly_spaced(axis: int) -> tuple[Array, Array]:
+    """51 goals at 0, 1/50 ... 1 on an axis, scattered on the other, and an order of time scattered on both."""
+    places = np.empty((51, 2))
+    places[:, axis] = np.arange(51) * 20 % 51 / 50  # 20 and 51 have no common factor: each place once
+    places[:, 1 - axis] = np.arange(51) * 7 % 51 / 50
+    return places, places[:, axis]
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_region_is_cut_where_progress_ends(axis):
+    points, along = evenly_spaced(axis)
+    early = np.arange(51) < 26
+    competences = np.where((along < 0.39) & ~early, 0.0, -1.0)
+    assert cut_of(points, competences) == (axis, pytest.approx(8 / 21))  # the candidate between places .38 and .40
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_region_is_cut_where_gains_end_whatever_the_competences(axis):
+    points, along = evenly_spaced(axis)
+    competences = -stream(11, "planted").uniform(size=51)
+    cut = cut_of(points, competences, np.where(along < 0.39, 0.2, 0.0), progress=gained_progress)
+    assert cut == (axis, pytest.approx(8 / 21))  # 20 * 31 * .2 = 124; a place lower 17 * 34 * .19, higher 22 * 29 * .18
+
+
+def test_a_region_is_cut_where_paired_progress_ends():
+    points, along = evenly_spaced(0)
+    competences = np.where((along < 0.39) & (np.arange(51) % 2 == 0), 0.0, -1.0)  # flickers below .39
+    axis, cut = cut_of(points, competences, progress=paired_progress)
+    assert axis == 0
+    assert 0.3 < cut < 0.5
+
+
+def test_a_small_part_of_great_progress_does_not_outweigh_a_balanced_cut():
+    points, along = evenly_spaced(0)
+    early = np.arange(51) < 26
+    competences = np.full(51, -1.0)
+    competences[(along < 0.49) & ~early] = -0.6  # interest .2 in 25 goals, .5 in the first 5
+    competences[(along < 0.09) & ~early] = 0.0
+    axis, cut = cut_of(points, competences)
+    assert axis == 0
+    assert 0.3 < cut < 0.6
+
+
+def test_without_any_difference_a_region_is_halved_across_its_longest_side():
+    goals = InterestMap(NO_CONTEXTS, Box(np.zeros(2), np.array([1.0, 1000.0])), stream(12, "goals"), **BY_EQ_3)
+    for point in stream(12, "planted").uniform([0, 0], [1, 1000], size=(60 * 16, 2)):
+        goals.add(NO_CONTEXT, point, -1)
+    sides = np.array([(region.high - region.low) / [1, 1000] for region in goals.regions])
+    aspect = sides.max(axis=1) / sides.min(axis=1)
+    assert len(sides) > 20
+    assert aspect.max() < 5  # halves of halves: 1 or 2, times the luck of the median; strips would reach 2^16
+
+
+def test_where_no_cut_is_valid_the_oldest_quarter_is_forgotten():
+    goals = InterestMap(NO_CONTEXTS, LINE, stream(13, "goals"), g_max=50)
+    competences = -np.arange(51) / 51
+    for competence in competences:
+        goals.add(NO_CONTEXT, [0.3], competence, gain=-competence)
+    (region,) = goals.regions
+    assert region.competences.tolist() == competences[12:].tolist()  # 51 // 4 = 12
+    assert region.gains.tolist() == (-competences[12:]).tolist()
+    goals.add(NO_CONTEXT, [0.3], -1)
+    assert len(goals.regions[0].goals) == 40
+    assert goals.regions[0].attempts == 52
+
+
+def test_a_cut_leaves_a_twentieth_of_g_max_on_both_sides():
+    for n_right, n_goals in ((2, [39]), (3, [48, 3])):  # 2 < 50 / 20 <= 3; 39 are left of 51 when none is cut
+        goals = InterestMap(NO_CONTEXTS, LINE, stream(14, "goals"), g_max=50, cuts=50)  # a cut between any two goals
+        for goal in [0.2] * (51 - n_right) + [0.8] * n_right:
+            goals.add(NO_CONTEXT, [goal], -1)
+        assert [len(region.goals) for region in goals.regions] == n_goals
+
+
+def test_a_goal_on_a_cut_belongs_above_it():
+    goals = InterestMap(NO_CONTEXTS, LINE, stream(15, "goals"), g_max=50)
+    for index in range(51):
+        goals.add(NO_CONTEXT, [index / 50], -1)
+    below, above = goals.regions
+    assert below.high == above.low
+    goals.add(NO_CONTEXT, above.low, -0.5)
+    assert [-0.5 in region.competences for region in goals.regions] == [False, True]
+
+
+COORDINATE = st.one_of(st.sampled_from([-1.0, -0.5, 0.0, 0.5, 1.0]), st.floats(-1, 1))
+POINTS = st.lists(st.tuples(COORDINATE, COORDINATE, COORDINATE), min_size=30, max_size=120)
+
+
+@given(points=POINTS, seed=st.integers(0, 99), max_aspect=st.sampled_from([np.inf, 2.0]), cuts=st.sampled_from([3, 20]))
+@settings(max_examples=60, deadline=None, derandomize=True)
+def test_leaves_tile_the_box_and_keep_each_goal_once_whatever_is_added(points, seed, max_aspect, cuts):
+    box, rng = Box.cube(-1, 1, 3), stream(seed, "planted")
+    contexts, outcomes = Box.cube(-1, 1, 1), Box.cube(-1, 1, 2)
+    options = {"max_aspect": max_aspect, "cuts": cuts}  # few cuts fall on goals, many between them
+    goals = InterestMap(contexts, outcomes, stream(seed, "goals"), g_max=8, window=4, **options)
+    competences = -rng.permutation(len(points)) / len(points)  # each its own
+    kept, after = 0, goals.regions
+    for point, competence in zip(np.array(points), competences, strict=True):
+        before = {region.path: region for region in after}
+        goals.add(point[:1], point[1:], competence)
+        after = goals.regions
+        new = [region for region in after if region.path not in before]
+        assert sum(competence in region.competences for region in after) == 1
+        assert len(new) in (0, 2)
+        kept += 1
+        if sum(len(region.goals) for region in after) != kept:
+            kept -= 9 // 4  # the documented forgetting: no valid cut, a quarter of g_max + 1
+            assert not new
+        assert sum(len(region.goals) for region in after) == kept
+        for region in after:
+            assert len(region.goals) <= 8
+            places = np.hstack((region.contexts, region.goals))
+            is_below = (places < region.high) | ((places == region.high) & (region.high == box.high))
+            assert ((region.low <= places) & is_below).all()
+        for region in new:
+            parent = before[region.path[:-1]]
+            assert (region.high - region.low >= (parent.high - parent.low) / 15 * (1 - 1e-9)).all()  # rounding
+    lows, highs = (np.array([getattr(region, name) for region in after]) for name in ("low", "high"))
+    assert np.prod(highs - lows, axis=1).sum() == pytest.approx(8)
+    overlap = np.minimum(highs[:, None], highs) - np.maximum(lows[:, None], lows)
+    assert ((overlap > 0).all(axis=2) == np.eye(len(after), dtype=bool)).all()
+    assert [region.path for region in after] == sorted(region.path for region in after)
+
+
+def share_near_the_origin(seed: int, side: float, *, n: int, teach_every: int | None = None, **options) -> float:
+    """Share of goals within [-2, 2]^2 of [-side, side]^2 after n goals, when only those in [-1, 1]^2 make progress."""
+    goals = InterestMap(NO_CONTEXTS, Box.cube(-side, side, 2), stream(seed, "goals"), **{**BY_EQ_3, **options})
+    teacher, reached = stream(seed, "teacher"), 0
+    for index in range(n):
+        taught = teach_every is not None and index % teach_every == 0
+        goal = teacher.uniform(-1, 1, 2) if taught else goals.sample(NO_CONTEXT)
+        can_progress = np.abs(goal).max() <= 1
+        reached += can_progress
+        goals.add(NO_CONTEXT, goal, -1 + min(1, reached / 300) if can_progress else -1)
+    samples = np.array([goals.sample(NO_CONTEXT) for _ in range(200)])
+    return float(np.mean(np.abs(samples).max(axis=1) <= 2))
+
+
+def test_goals_concentrate_where_progress_is_in_a_hundredfold_larger_space():
+    shares = [share_near_the_origin(seed, 10, n=600) for seed in range(5)]
+    assert np.median(shares) > 0.6  # of .8 that follow interest; uniform goals: .04
+
+
+def test_goals_concentrate_where_a_teacher_shows_progress_in_a_ten_thousandfold_larger_space():
+    shares = [share_near_the_origin(seed, 100, n=600, teach_every=4) for seed in range(5)]
+    assert np.mean(shares) > 0.1  # uniform goals: .0004; 8 seeds gave .03 to .78
+    shares = [share_near_the_origin(seed, 100, n=600, teach_every=4, max_aspect=5) for seed in range(5)]
+    assert np.mean(shares) > 0.5  # without slivers; 8 seeds gave .47 to .78
+
+
+def half_hopeless(seed: int, **options) -> InterestMap:
+    """Below .5 some goals are as near as they get, others out of reach, for ever; above, attempts gain .1 each."""
+    goals, rng = InterestMap(NO_CONTEXTS, LINE, stream(seed, "goals"), **options), stream(seed, "planted")
+    for goal in rng.uniform(size=300):
+        if goal < 0.5:
+            goals.add(NO_CONTEXT, [goal], rng.choice([-1.0, -0.1]), gain=0.0)
+        else:
+            goals.add(NO_CONTEXT, [goal], -0.5, gain=0.1)
+    return goals
+
+
+def test_goals_are_chosen_where_attempts_gain_and_not_where_all_is_hopeless():
+    for seed in range(5):
+        goals = half_hopeless(seed, modes=(1, 0, 0))
+        share = np.mean([goals.sample(NO_CONTEXT)[0] > 0.5 for _ in range(500)])
+        assert share > 0.9  # all but what lies below .5 in the one region across it
+    by_eq_3 = half_hopeless(0, modes=(1, 0, 0), progress=absolute_progress)
+    assert np.mean([by_eq_3.sample(NO_CONTEXT)[0] > 0.5 for _ in range(500)]) < 0.5  # it takes places for times
+
+
+def test_a_region_of_hopeless_goals_keeps_the_goals_that_may_lie_anywhere():
+    goals = half_hopeless(0)
+    share = np.mean([goals.sample(NO_CONTEXT)[0] < 0.5 for _ in range(2000)])
+    assert share == pytest.approx(0.1, abs=0.05)  # half of mode 2's fifth, and of the region across .5 a part
+
+
+def test_sides_are_not_cut_much_shorter_than_others_beyond_the_largest_aspect():
+    goals = InterestMap(NO_CONTEXTS, SQUARE, stream(16, "goals"), **{**BY_EQ_3, "max_aspect": 2})
+    rng = stream(16, "planted")
+    for x, y in rng.uniform(size=(600, 2)):
+        goals.add(NO_CONTEXT, [x, y], -1 + x * rng.uniform())
+    sides = np.array([region.high - region.low for region in goals.regions])
+    # A side at most twice shorter than the other may be cut once more, to no less than a fifteenth.
+    assert (sides.max(axis=1) / sides.min(axis=1)).max() <= 2 * 15
+
+
+def test_a_context_that_never_changes_is_never_cut():
+    goals = InterestMap(LINE, LINE, stream(17, "goals"), **{**BY_EQ_3, "max_aspect": 2})
+    for goal in stream(17, "planted").uniform(size=400):
+        goals.add([0.3], [goal], -goal)
+    assert len(goals.regions) > 8
+    assert all(region.low[0] == 0 and region.high[0] == 1 for region in goals.regions)
+
+
+def test_only_sampling_draws():
+    rngs = [stream(18, "goals") for _ in range(2)]
+    maps = [InterestMap(NO_CONTEXTS, SQUARE, rng) for rng in rngs]
+    for index in range(150):
+        goal = maps[0].sample(NO_CONTEXT)
+        np.testing.assert_array_equal(goal, maps[1].sample(NO_CONTEXT))
+        for goals in maps:
+            goals.add(NO_CONTEXT, goal, -index / 150)
+        assert all(region.interest() >= 0 for region in maps[0].regions)  # one looks, the other does not
+    assert len(maps[0].regions) > 2
+    state = rngs[0].bit_generator.state
+    maps[0].add(NO_CONTEXT, [0.5, 0.5], -1)
+    assert rngs[0].bit_generator.state == state
+
+
+def test_what_is_read_is_a_snapshot_that_cannot_be_written_to():
+    goals = InterestMap(NO_CONTEXTS, LINE, stream(19, "goals"))
+    goals.add(NO_CONTEXT, [0.5], -1, gain=0.25)
+    (region,) = goals.regions
+    goals.add(NO_CONTEXT, [0.6], -1)
+    assert region.goals.tolist() == [[0.5]]
+    assert region.gains.tolist() == [0.25]
+    assert goals.regions[0].goals.tolist() == [[0.5], [0.6]]
+    for name in ("low", "high", "points", "goals", "contexts", "competences", "gains", "strategies"):
+        assert not getattr(region, name).flags.writeable
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"window": 5},
+        {"window": 2},
+        {"window": 32},  # more than g_max
+        {"modes": (0.7, 0.2, 0.2)},
+        {"modes": (1.2, -0.2, 0.0)},
+        {"cuts": 0},
+        {"near": 0.0},
+        {"min_side": 0.0},
+        {"min_side": 0.6},
+        {"max_aspect": 0.5},
+        {"max_aspect": np.nan},
+    ],
+)
+def test_a_number_out_of_range_is_refused(options):
+    with pytest.raises(ValueError, match=f"{next(iter(options))}.*got"):
+        InterestMap(NO_CONTEXTS, LINE, stream(0, "goals"), **options)

@@ -1,0 +1,243 @@
+"""Eqs. (8) and (9): memories small enough to work the inverse out by hand, and laws every inverse model keeps."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from sgimd_torch.inverses.local import LocalInverse, NearestNeighbour
+from sgimd_torch.inverses.locally_linear import LocallyLinear
+from sgimd_torch.memory import Memory
+from sgimd_torch.spaces import Array, Box, Estimate, stream
+
+NO_CONTEXT = np.zeros(0)
+Inverse = Callable[[Array, Array], Estimate]
+
+INVERSES: dict[str, Callable[[Memory], Inverse]] = {
+    "local": LocalInverse,
+    "nearest neighbour": NearestNeighbour,
+    "locally linear": LocallyLinear,
+}
+every_inverse = pytest.mark.parametrize("inverse_of", INVERSES.values(), ids=INVERSES.keys())
+
+
+def remember(thetas: Array, outcomes: Array) -> Memory:
+    memory = Memory(0, thetas.shape[1], outcomes.shape[1])
+    for theta, outcome in zip(thetas, outcomes, strict=True):
+        memory.add(NO_CONTEXT, theta, outcome)
+    return memory
+
+
+def line(pairs: dict[float, float]) -> Memory:
+    """One-dimensional movements and where they landed."""
+    return remember(np.array([[theta] for theta in pairs]), np.array([[outcome] for outcome in pairs.values()]))
+
+
+def random_memory(n: int, theta_dim: int = 25) -> Memory:
+    """Families of related movements, as goal babbling makes them, on a curved map."""
+    rng = stream(0, "test inverse")
+    thetas = np.clip(np.repeat(rng.uniform(0, 1, (n // 10, theta_dim)), 10, axis=0) + rng.normal(0, 0.05, (n, 1)), 0, 1)
+    outcomes = np.sin(thetas @ rng.normal(size=(theta_dim, 2)))
+    return remember(thetas, outcomes)
+
+
+def test_theta_is_the_gaussian_weighted_mean_of_the_neighbourhood() -> None:
+    memory = line({0.0: 0.0, 0.1: 1.0})
+    # Distances 1/4 and 3/4, width their mean 1/2: weights exp(-1/8) and exp(-9/8), that is 1 : 1/e.
+    theta = LocalInverse(memory, width=1.0)(NO_CONTEXT, np.array([0.25])).theta
+    assert theta[0] == pytest.approx(0.1 / (1 + np.e))
+    # Half as wide: exp(-1/2) and exp(-9/2), that is 1 : 1/e^4.
+    theta = LocalInverse(memory, width=0.5)(NO_CONTEXT, np.array([0.25])).theta
+    assert theta[0] == pytest.approx(0.1 / (1 + np.e**4))
+
+
+def test_a_wide_gaussian_averages_and_a_narrow_one_follows_the_nearest() -> None:
+    memory = line({0.0: 0.1, 0.1: 0.9})
+    for width, theta in ((1e6, 0.05), (1e-6, 0.0)):
+        assert LocalInverse(memory, width=width)(NO_CONTEXT, np.zeros(1)).theta[0] == pytest.approx(theta)
+
+
+def test_the_width_of_the_gaussian_has_a_floor_of_a_millimetre() -> None:
+    memory = line({0.0: 0.0, 0.1: 1e-3})
+    theta = LocalInverse(memory, width=1e-6)(NO_CONTEXT, np.zeros(1)).theta
+    assert theta[0] == pytest.approx(0.1 / (1 + np.exp(0.5)))  # a millimetre off weighs exp(-1/2)
+    copies = line({0.0: 0.5, 0.1: 0.5})
+    assert LocalInverse(copies)(NO_CONTEXT, np.array([0.5])).theta[0] == pytest.approx(0.05)
+
+
+def test_a_reproducible_movement_farther_away_beats_an_erratic_one_on_the_goal() -> None:
+    # The erratic pair: standard deviation 0.4 / sqrt(2) = 0.28, so 0 + 0.14 against 0.12 + 0 for the reliable pair.
+    memory = line({0.10: 0.0, 0.11: 0.4, 0.90: 0.12, 0.91: 0.12})
+    goal = np.array([0.0])
+    assert LocalInverse(memory, alpha=0.5)(NO_CONTEXT, goal).theta[0] == pytest.approx(0.905)
+    assert LocalInverse(memory, alpha=0.4)(NO_CONTEXT, goal).theta[0] < 0.11  # 0.11 against 0.12
+
+
+def test_a_movement_without_neighbours_is_trusted_as_the_median_of_the_others() -> None:
+    # Standard deviations of the pairs 0, 0.4 / sqrt(2) = 0.28 and 1.4: median 0.28, so 0 + 0.14 for the loner.
+    loner, reliable = {0.5: 0.0}, {0.10: 0.12, 0.11: 0.12}
+    erratic, wild = {0.90: 1.0, 0.91: 1.4}, {0.30: 2.0, 0.31: 4.0}
+    near = LocalInverse(line(loner | reliable | erratic | wild), alpha=0.5)
+    assert near(NO_CONTEXT, np.zeros(1)).theta[0] == pytest.approx(0.105)
+    farther = {0.10: 0.16, 0.11: 0.16}
+    assert LocalInverse(line(loner | farther | erratic | wild), alpha=0.5)(NO_CONTEXT, np.zeros(1)).theta[0] == 0.5
+
+
+def test_where_no_movement_has_neighbours_the_nearest_to_the_goal_is_repeated() -> None:
+    memory = line({0.0: 0.3, 0.5: 0.2, 1.0: 0.4})
+    estimate = LocalInverse(memory)(NO_CONTEXT, np.zeros(1))
+    assert estimate.theta.tolist() == [0.5]
+    assert estimate.thetas.tolist() == [[0.5]]
+    assert estimate.outcomes.tolist() == [[0.2]]
+
+
+def test_two_unlike_ways_to_one_place_are_never_averaged() -> None:
+    memory = line({0.10: 0.0, 0.12: 0.01, 0.90: 0.0, 0.88: 0.01})
+    theta = LocalInverse(memory)(NO_CONTEXT, np.zeros(1)).theta[0]
+    assert min(abs(theta - 0.1), abs(theta - 0.9)) < 0.02
+
+
+def test_only_the_h_max_nearest_outcomes_compete() -> None:
+    memory = line({0.10: 0.0, 0.11: 0.4, 0.90: 0.12, 0.91: 0.12})
+    assert LocalInverse(memory, h_max=1)(NO_CONTEXT, np.zeros(1)).theta[0] < 0.11
+
+
+def test_the_neighbourhood_reaches_dist_n_and_no_more_than_k_max_nearest_first() -> None:
+    memory = line({0.0: 0.0, 0.119: 0.1, 0.121: 0.2, 0.05: 0.3})
+    goal = np.zeros(1)
+    default = LocalInverse(memory, h_max=1)(NO_CONTEXT, goal)  # 0.6 * sqrt(1 / 25) = 0.12
+    assert default.thetas.ravel().tolist() == [0.0, 0.05, 0.119]
+    assert default.outcomes.ravel().tolist() == [0.0, 0.3, 0.1]
+    assert LocalInverse(memory, h_max=1, dist_n=1.0)(NO_CONTEXT, goal).thetas.shape == (4, 1)
+    assert LocalInverse(memory, h_max=1, k_max=2)(NO_CONTEXT, goal).thetas.ravel().tolist() == [0.0, 0.05]
+    assert LocalInverse(random_memory(20)).dist_n == pytest.approx(0.6)
+
+
+def test_nearest_neighbour_repeats_the_movement_that_came_nearest() -> None:
+    memory = line({0.1: 3.0, 0.2: 1.0, 0.3: 2.0})
+    estimate = NearestNeighbour(memory, k=2)(NO_CONTEXT, np.array([1.4]))
+    assert estimate.theta.tolist() == [0.2]
+    assert estimate.thetas.ravel().tolist() == [0.2, 0.3]
+    assert estimate.outcomes.ravel().tolist() == [1.0, 2.0]
+
+
+def linear_world(noise: float = 0.0) -> tuple[Memory, Array]:
+    """One family of 5-D movements whose 2-D outcomes are linear in them."""
+    rng = stream(1, "test inverse")
+    jacobian = rng.normal(size=(5, 2))
+    thetas = 0.5 + rng.uniform(-0.05, 0.05, (40, 5))
+    return remember(thetas, thetas @ jacobian + rng.normal(0, noise, (40, 2))), jacobian
+
+
+def test_where_outcomes_are_linear_in_theta_the_linear_model_meets_the_goal_exactly() -> None:
+    memory, jacobian = linear_world()
+    goal = memory.outcomes.mean(axis=0) + np.array([0.1, -0.05])
+    linear = LocallyLinear(memory, ridge=1e-12, width=1.0)(NO_CONTEXT, goal)
+    assert linear.theta @ jacobian == pytest.approx(goal, abs=1e-9)
+    local = LocalInverse(memory, k_max=20, width=1.0)(NO_CONTEXT, goal)
+    assert np.linalg.norm(local.theta @ jacobian - goal) > 0.01  # an average alone stays among what was reached
+    assert np.array_equal(linear.thetas, local.thetas)
+
+
+def test_a_strong_ridge_leaves_the_weighted_mean() -> None:
+    memory, _ = linear_world(noise=0.02)
+    goal = np.array([0.3, 0.2])
+    ridged = LocallyLinear(memory, ridge=1e12, width=1.0)(NO_CONTEXT, goal)
+    assert ridged.theta == pytest.approx(LocalInverse(memory, k_max=20, width=1.0)(NO_CONTEXT, goal).theta)
+
+
+def test_the_linear_model_does_not_care_in_which_unit_outcomes_are_measured() -> None:
+    memory, _ = linear_world(noise=0.02)
+    goal = np.array([0.3, 0.2])
+    metres = LocallyLinear(memory, ridge=0.5)(NO_CONTEXT, goal)
+    in_centimetres = remember(memory.thetas, 100 * memory.outcomes)
+    centimetres = LocallyLinear(in_centimetres, ridge=0.5)(NO_CONTEXT, 100 * goal)
+    assert centimetres.theta == pytest.approx(metres.theta)
+
+
+def test_for_a_goal_out_of_reach_the_linear_model_stays_in_the_box_of_what_was_executed() -> None:
+    memory, _ = linear_world()
+    theta = LocallyLinear(memory)(NO_CONTEXT, np.array([100.0, 100.0])).theta
+    executed = Box(memory.thetas.min(axis=0), memory.thetas.max(axis=0))
+    assert executed.contains(theta)
+    assert np.isin(theta, [executed.low, executed.high]).any()
+
+
+def test_outcomes_on_a_line_move_the_linear_model_along_it_and_not_across() -> None:
+    memory = remember(np.array([[0.4], [0.45], [0.5]]), np.array([[0.0, 1.0], [0.1, 1.0], [0.2, 1.0]]))
+    inverse = LocallyLinear(memory, ridge=1e-9)
+    assert inverse(NO_CONTEXT, np.array([0.17, 1.0])).theta[0] == pytest.approx(0.485, abs=1e-6)
+    assert inverse(NO_CONTEXT, np.array([0.17, 1.5])).theta[0] == pytest.approx(0.485, abs=1e-6)
+
+
+def test_outcomes_that_coincide_give_the_linear_model_no_slope() -> None:
+    memory = line({0.4: 1.0, 0.45: 1.0, 0.5: 1.0})
+    theta = LocallyLinear(memory)(NO_CONTEXT, np.array([2.0])).theta
+    assert theta == LocalInverse(memory)(NO_CONTEXT, np.array([2.0])).theta
+
+
+@every_inverse
+def test_nothing_can_be_inferred_from_an_empty_memory(inverse_of: Callable[[Memory], Inverse]) -> None:
+    with pytest.raises(RuntimeError, match="empty"):
+        inverse_of(Memory(0, 3, 2))(NO_CONTEXT, np.zeros(2))
+
+
+@every_inverse
+def test_one_exemplar_is_repeated_whatever_the_goal(inverse_of: Callable[[Memory], Inverse]) -> None:
+    memory = remember(np.array([[0.2, 0.7]]), np.array([[1.0, 1.0]]))
+    for goal in (np.ones(2), np.array([-1e6, 3.0])):
+        assert inverse_of(memory)(NO_CONTEXT, goal).theta.tolist() == [0.2, 0.7]
+
+
+@every_inverse
+@pytest.mark.parametrize("far", [0.0, 0.5, 100.0, 1e9])
+def test_asking_twice_answers_the_same_inside_the_policy_space(
+    inverse_of: Callable[[Memory], Inverse], far: float
+) -> None:
+    memory = random_memory(500)
+    inverse, goal = inverse_of(memory), far * np.array([0.8, -0.6])
+    first, second = inverse(NO_CONTEXT, goal), inverse(NO_CONTEXT, goal)
+    for a, b in zip(first, second, strict=True):
+        assert np.array_equal(a, b)
+    assert Box.cube(0, 1, 25).contains(first.theta)
+    assert len(memory) == 500
+    for theta, outcome in zip(first.thetas, first.outcomes, strict=True):
+        row = int((memory.thetas == theta).all(axis=1).argmax())
+        assert np.array_equal(memory.outcomes[row], outcome)
+
+
+@every_inverse
+def test_what_is_inferred_may_be_changed_without_changing_memory(inverse_of: Callable[[Memory], Inverse]) -> None:
+    memory = random_memory(50)
+    thetas = memory.thetas.copy()
+    estimate = inverse_of(memory)(NO_CONTEXT, np.zeros(2))
+    for array in estimate:
+        array[:] = 7.0
+    assert np.array_equal(memory.thetas, thetas)
+
+
+def test_a_mean_of_movements_on_the_border_does_not_leave_the_policy_space_by_rounding() -> None:
+    rng = stream(2, "test inverse")
+    policies = Box.cube(0, 1, 2)
+    for _ in range(50):
+        memory = remember(np.ones((9, 2)), rng.normal(size=(9, 2)))
+        assert policies.contains(LocalInverse(memory)(NO_CONTEXT, rng.normal(size=2)).theta)
+
+
+def test_the_neighbours_of_another_context_do_not_count() -> None:
+    memory = Memory(1, 1, 1)
+    for context, theta in ((0.0, 0.10), (0.0, 0.11), (5.0, 0.90), (5.0, 0.91)):
+        memory.add(np.array([context]), np.array([theta]), np.zeros(1))
+    assert LocalInverse(memory)(np.array([0.0]), np.zeros(1)).theta[0] == pytest.approx(0.105)
+    assert LocalInverse(memory)(np.array([5.0]), np.zeros(1)).theta[0] == pytest.approx(0.905)
+
+
+def test_a_gaussian_without_width_is_refused() -> None:
+    for width in (0.0, -1.0, np.nan):
+        with pytest.raises(ValueError, match="width"):
+            LocalInverse(line({0.0: 0.0}), width=width)
+
+
+def test_a_ridge_of_nothing_is_refused() -> None:
+    with pytest.raises(ValueError, match="ridge"):
+        LocallyLinear(line({0.0: 0.0}), ridge=0.0)

@@ -1,0 +1,192 @@
+"""The inverse by the forward model: nearer the goal, by more reliable movements, and never far from what was tried."""
+
+import numpy as np
+import pytest
+import torch
+
+from sgimd_torch.environments.planar_arm import PlanarArm
+from sgimd_torch.forward_model.anchored import Trust
+from sgimd_torch.forward_model.model import ForwardModel
+from sgimd_torch.inverses.local import NearestNeighbour
+from sgimd_torch.inverses.locally_linear import LocallyLinear
+from sgimd_torch.inverses.through_model import ModelInverse
+from sgimd_torch.memory import Memory
+from sgimd_torch.spaces import Box, stream
+
+NO_CONTEXT = np.zeros(0)
+ARM = PlanarArm(7)
+
+
+def executed(arm, thetas):
+    """A memory of them, each in a context that was observed."""
+    memory, rng = Memory(arm.contexts.dim, arm.policies.dim, 2), stream(0, "exemplars")
+    for theta in thetas:
+        context = arm.observe(rng)
+        memory.add(context, theta, arm.execute(context, theta, rng))
+    return memory
+
+
+@pytest.fixture(scope="module")
+def taught():
+    memory = executed(ARM, stream(0, "thetas").random((600, 7)))
+    model = ForwardModel(0, 7, 2, rate=2.0)
+    model.refresh(memory)
+    return memory, model
+
+
+@pytest.fixture(scope="module")
+def goals():
+    rng = stream(1, "goals")
+    return np.stack([ARM.execute(NO_CONTEXT, theta, rng) for theta in rng.random((30, 7))])
+
+
+def test_where_outcomes_are_noisy_it_lands_nearer_than_what_it_starts_from(goals):
+    arm = PlanarArm(7, noise=0.1)
+    memory, model = executed(arm, stream(0, "thetas").random((1500, 7))), ForwardModel(0, 7, 2, rate=0.7)
+    model.refresh(memory)
+
+    def mean_error(estimates):
+        noise = stream(2, "evaluation")
+        landed = [[arm.execute(NO_CONTEXT, estimate.theta, noise) for estimate in estimates] for _ in range(5)]
+        return np.linalg.norm(np.array(landed) - goals, axis=2).mean()
+
+    trust = Trust(noise=arm.outcome_noise, share=1.0, error=0.3)  # what the model cannot predict is noise here
+    for start in (LocallyLinear(memory), NearestNeighbour(memory)):
+        inverse = ModelInverse(memory, model, arm.policies, start=start, trust=trust)
+        found = mean_error(inverse.many(NO_CONTEXT, goals))
+        assert found < 0.85 * mean_error([start(NO_CONTEXT, goal) for goal in goals])
+
+
+def test_without_noise_it_lands_several_times_nearer_than_what_it_starts_from(taught, goals):
+    inverse = ModelInverse(*taught, ARM.policies)
+
+    def mean_error(estimates):
+        landed = [ARM.execute(NO_CONTEXT, estimate.theta, stream(0, "any")) for estimate in estimates]
+        return np.linalg.norm(np.array(landed) - goals, axis=1).mean()
+
+    assert mean_error(inverse.many(NO_CONTEXT, goals)) < mean_error([inverse.start(NO_CONTEXT, g) for g in goals]) / 2
+
+
+def test_without_steps_it_picks_among_what_is_known(taught, goals):
+    memory, model = taught
+    inverse = ModelInverse(memory, model, ARM.policies, start=NearestNeighbour(memory), steps=0)
+    for goal in goals[:5]:
+        nearest = memory.thetas[memory.near_outcomes(NO_CONTEXT, goal, 10)]
+        assert np.abs(nearest - inverse(NO_CONTEXT, goal).theta).max(axis=1).min() < 1e-6  # rounded to float32
+
+
+def test_of_two_ways_to_a_goal_the_reliable_one_wins():
+    memory, rng = Memory(0, 2, 2), stream(0, "exemplars")
+    for theta in rng.random((1500, 2)):  # theta_1 moves nothing, but the larger, the noisier
+        memory.add(NO_CONTEXT, theta, np.array([theta[0], 0.0]) + 0.3 * theta[1] * rng.standard_normal(2))
+    model = ForwardModel(0, 2, 2, rate=0.4)
+    model.refresh(memory)
+    start = NearestNeighbour(memory)
+    inverse = ModelInverse(memory, model, Box.cube(0.0, 1.0, 2), start=start, trust=Trust(error=1.0))
+    goals = np.array([[goal, 0.0] for goal in (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8)])
+    chosen = [estimate.theta[1] for estimate in inverse.many(NO_CONTEXT, goals)]
+    assert max(chosen) < 0.1 < np.mean([start(NO_CONTEXT, goal).theta[1] for goal in goals])
+
+
+def test_the_greater_the_caution_the_nearer_it_stays_to_what_was_tried(taught, goals):
+    memory, model = taught
+
+    def distance(caution):
+        inverse = ModelInverse(memory, model, ARM.policies, trust=Trust(caution=caution), step=0.05)
+        thetas = [estimate.theta for estimate in inverse.many(NO_CONTEXT, goals)]
+        return np.mean([np.linalg.norm(memory.thetas - theta, axis=1).min() for theta in thetas])
+
+    careless, rational, timid = map(distance, (0.0, 1.0, 1000.0))
+    assert timid < 0.8 * rational
+    assert rational < 0.5 * careless
+
+
+def test_all_goals_together_find_what_each_finds_alone(taught, goals):
+    inverse = ModelInverse(*taught, ARM.policies)
+    several = np.vstack([goals, goals + 0.05, goals - 0.05])  # more than one batch
+    together = inverse.many(NO_CONTEXT, several)
+    assert len(together) == len(several)
+    for goal, estimate in list(zip(several, together, strict=True))[::19]:
+        alone = inverse(NO_CONTEXT, goal)
+        np.testing.assert_allclose(estimate.theta, alone.theta, atol=1e-3)  # many steps in float32
+        np.testing.assert_array_equal(estimate.thetas, alone.thetas)
+        np.testing.assert_array_equal(estimate.outcomes, alone.outcomes)
+
+
+def test_its_neighbours_are_those_of_what_it_starts_from(taught, goals):
+    memory, model = taught
+    inverse = ModelInverse(memory, model, ARM.policies)
+    theta, *rest = inverse(NO_CONTEXT, goals[0])
+    first, *wanted = inverse.start(NO_CONTEXT, goals[0])
+    assert not np.array_equal(theta, first)
+    assert all(np.array_equal(found, neighbours) for found, neighbours in zip(rest, wanted, strict=True))
+
+
+def test_it_stays_in_the_box_at_a_goal_out_of_reach(taught):
+    theta = ModelInverse(*taught, ARM.policies, step=0.3)(NO_CONTEXT, np.array([9.0, 9.0])).theta
+    assert ARM.policies.contains(theta)
+    assert theta.min() == 0.0 or theta.max() == 1.0
+
+
+def test_looking_changes_nothing_and_answers_alike(taught, goals):
+    memory, model = taught
+    before, random = [values.clone() for values in model.state_dict().values()], torch.random.get_rng_state()
+    inverse = ModelInverse(memory, model, ARM.policies)
+    np.testing.assert_array_equal(inverse(NO_CONTEXT, goals[0]).theta, inverse(NO_CONTEXT, goals[0]).theta)
+    assert all(torch.equal(was, now) for was, now in zip(before, model.state_dict().values(), strict=True))
+    assert torch.equal(torch.random.get_rng_state(), random)
+
+
+def test_before_the_model_has_learnt_it_answers_as_its_start():
+    memory = Memory(0, 2, 2)
+    memory.add(NO_CONTEXT, np.array([0.2, 0.4]), np.array([0.1, 0.3]))
+    inverse = ModelInverse(memory, ForwardModel(0, 2, 2), Box.cube(0.0, 1.0, 2), start=NearestNeighbour(memory))
+    assert not inverse.trusted
+    np.testing.assert_array_equal(inverse(NO_CONTEXT, np.zeros(2)).theta, [0.2, 0.4])
+    np.testing.assert_array_equal(inverse.many(NO_CONTEXT, np.zeros((2, 2)))[1].theta, [0.2, 0.4])
+
+
+def test_it_answers_as_its_start_until_the_model_is_good_enough_and_from_then_on_otherwise(taught, goals):
+    memory, model = taught
+    asked, answered = (
+        ModelInverse(memory, model, ARM.policies, trust=Trust(error=share * model.relative_error))
+        for share in (1.01, 0.99)
+    )
+    start = asked.start(NO_CONTEXT, goals[0]).theta
+    assert (asked.trusted, answered.trusted) == (True, False)
+    np.testing.assert_array_equal(answered(NO_CONTEXT, goals[0]).theta, start)
+    assert not np.array_equal(asked(NO_CONTEXT, goals[0]).theta, start)
+
+
+def test_a_memory_of_fewer_exemplars_than_candidates_and_anchors_will_do(taught):
+    memory = executed(ARM, stream(3, "thetas").random((3, 7)))
+    assert ARM.policies.contains(ModelInverse(memory, taught[1], ARM.policies)(NO_CONTEXT, np.zeros(2)).theta)
+
+
+def test_an_empty_memory_is_refused_by_name(taught):
+    with pytest.raises(RuntimeError, match="empty; explore first"):
+        ModelInverse(Memory(0, 7, 2), taught[1], ARM.policies)(NO_CONTEXT, np.zeros(2))
+
+
+def test_contexts_reach_the_model():
+    arm = PlanarArm(3, context=True)
+    memory, model = executed(arm, 0.3 + 0.4 * stream(0, "thetas").random((1000, 3))), ForwardModel(1, 3, 2, rate=1.0)
+    model.refresh(memory)
+    inverse, goal = ModelInverse(memory, model, arm.policies), memory.outcomes[0]
+    for turned in (-0.5, 0.5):
+        context = memory.contexts[0] + turned * np.sign(-memory.contexts[0])
+        landed = arm.execute(context, inverse(context, goal).theta, stream(0, "any"))
+        assert np.linalg.norm(landed - goal) < 0.02
+
+
+def test_a_model_of_another_robot_is_refused(taught):
+    with pytest.raises(ValueError, match="is it another robot's"):
+        ModelInverse(Memory(0, 3, 2), taught[1], ARM.policies)
+    with pytest.raises(ValueError, match=r"the policies \{'theta_dim': 3\}; is it another robot's"):
+        ModelInverse(*taught, PlanarArm(3).policies)
+
+
+@pytest.mark.parametrize("options", [{"k": 0}, {"anchors": 0}, {"steps": -1}, {"step": 0.0}, {"step": np.nan}])
+def test_numbers_out_of_their_range_are_refused(taught, options):
+    with pytest.raises(ValueError, match=next(iter(options))):
+        ModelInverse(*taught, ARM.policies, **options)

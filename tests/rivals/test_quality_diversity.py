@@ -1,0 +1,113 @@
+"""MAP-Elites and CMA-ME as learners: batches, interruptions, an archive that fills, and draws from one stream."""
+
+import numpy as np
+import pytest
+
+from sgimd_torch.environments.planar_arm import PlanarArm
+from sgimd_torch.learner import Learner
+from sgimd_torch.rivals.quality_diversity import cma_me, map_elites
+from sgimd_torch.session import run
+from sgimd_torch.spaces import Array, Box
+from worlds import NO_CONTEXT
+
+ARM = PlanarArm(6)
+BOTH = pytest.mark.parametrize("make", [map_elites, cma_me])
+
+
+class Elsewhere(PlanarArm):
+    """The arm with other spaces, which the learners read; its movements are made up in the tests."""
+
+    def __init__(self, policies: Box, outcomes: Box, contexts: Box) -> None:
+        super().__init__(policies.dim)
+        self.policies, self.outcomes, self.contexts = policies, outcomes, contexts
+
+
+def live(learner: Learner, n: int) -> Array:
+    for _ in run(learner, ARM, 0, movements=n):
+        pass
+    return learner.memory.thetas
+
+
+def cells_reached(learner: Learner) -> int:
+    return len(learner.autonomous.archive)
+
+
+@BOTH
+def test_the_same_seed_makes_the_same_movements_and_another_seed_others(make):
+    numpy_state = str(np.random.get_state())  # noqa: NPY002 - nobody may touch it
+    first, same, other = (live(make(ARM, seed), 250) for seed in (1, 1, 2))
+    assert np.array_equal(first, same)
+    assert not np.isclose(first, other).all(axis=1).any()
+    assert str(np.random.get_state()) == numpy_state  # noqa: NPY002
+    assert ARM.policies.contains(first).all()
+
+
+@BOTH
+def test_an_interruption_at_any_movement_costs_nothing(make):
+    undisturbed, interrupted = make(ARM, 3), make(ARM, 3)
+    expected = live(undisturbed, 150)
+    for index in range(150):
+        move = interrupted.ask(NO_CONTEXT)
+        if index % 7 == 3:  # before its outcome is told: it comes again
+            interrupted.interrupt()
+            assert np.array_equal(interrupted.ask(NO_CONTEXT).theta, move.theta)
+        interrupted.tell(undisturbed.memory.outcomes[index])
+        if index % 5 == 2:
+            interrupted.interrupt()
+    assert np.array_equal(interrupted.memory.thetas, expected)
+    assert cells_reached(interrupted) == cells_reached(undisturbed)
+
+
+@BOTH
+def test_the_archive_hears_of_a_batch_when_all_its_movements_were_made(make):
+    learner = make(ARM, 4, batch=8, **({"first": 8} if make is map_elites else {}))
+    found = []
+    for _ in range(24):
+        live(learner, 1)
+        found.append(cells_reached(learner))
+    assert found[6] == 0 < found[7] == found[14]
+    assert found[7] <= found[15] <= found[23]
+
+
+def test_cma_me_moves_on_from_its_first_generation():
+    adapting, still = cma_me(ARM, 6), cma_me(ARM, 6, emitters=1, batch=500)
+    live(adapting, 500), live(still, 500)
+    assert cells_reached(adapting) > 2 * cells_reached(still)
+
+
+def test_variations_of_elites_spread_by_sd_and_elites_are_of_little_effort():
+    learner = map_elites(ARM, 7, first=50, batch=500, sd=0.01)
+    thetas = live(learner, 550)
+    first, later = thetas[:50], thetas[50:]
+    away = np.linalg.norm(later[:, None] - first, axis=2).min(axis=1)
+    assert np.sqrt(np.mean(np.square(away)) / 6) == pytest.approx(0.01, rel=0.15)  # those clipped move less
+    elites = learner.autonomous.archive.data("solution")
+    assert np.square(elites - 0.5).mean() < np.square(thetas - 0.5).mean()
+
+
+@BOTH
+def test_policies_of_any_box_and_outcomes_outside_of_t_are_taken(make):
+    policies = Box(np.array([-5.0, 0.0, 3.0]), np.array([5.0, 1000.0, 3.001]))
+    learner = make(Elsewhere(policies, Box.cube(-1, 1, 2), ARM.contexts), 8)
+    for index in range(230):
+        theta = learner.ask(NO_CONTEXT).theta
+        assert policies.contains(theta)
+        learner.tell(np.array([-1e6, 0.5 + index]))
+    assert learner.memory.thetas.std(axis=0) == pytest.approx(policies.sides * 0.2, rel=0.7)
+    assert cells_reached(learner) in (1, 2)  # the second is of y = .5, all others share the corner
+
+
+@BOTH
+def test_what_makes_no_sense_is_refused(make):
+    for options, message in (
+        ({"sd": 0.0}, "sd must be positive"),
+        ({"batch": 0}, "batch must be"),
+        ({"cells": 0}, "cells must be"),
+        ({"cells": 2000}, "in all at most, got 2000 in 2 dimensions"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            make(ARM, 0, **options)
+    with pytest.raises(ValueError, match="one context only, got contexts of dim 1"):
+        make(Elsewhere(ARM.policies, ARM.outcomes, Box.cube(0, 1, 1)), 0)
+    with pytest.raises(ValueError, match="must be a whole number"):
+        map_elites(ARM, 0, first=0) if make is map_elites else cma_me(ARM, 0, emitters=0)

@@ -1,0 +1,235 @@
+"""Whole runs on planar arms: the same files as on the rod, goals and a teacher of their own, and what they refuse."""
+
+import json
+import re
+import sys
+
+import numpy as np
+import pytest
+
+from runs import csv_of
+from sgimd_torch.demonstrations import save_demonstrations
+from sgimd_torch.environments.fishing_rod import FishingRod
+from sgimd_torch.environments.planar_arm import PlanarArm
+from sgimd_torch.evaluation import Benchmark, save_benchmark
+from sgimd_torch.runs.build import build
+from sgimd_torch.runs.config import ALGORITHMS, Config
+from sgimd_torch.runs.read import read_run
+from sgimd_torch.runs.run import main
+from sgimd_torch.runs.tasks import ARMS, arm_benchmark, arm_demonstrations
+from sgimd_torch.spaces import Demonstration, stream
+from sgimd_torch.views import demo
+from sgimd_torch.views.film import command as film
+from sgimd_torch.views.report import command as report
+from sgimd_torch.views.report.data import demonstrated, read_life
+from tasks import tiles_reached
+
+NO_CONTEXT = np.empty(0)
+
+
+def live(out, *options):
+    """The exit code of a short run; later options win."""
+    short = ("--environment", "planar-arm-7", "--seed", 3, "--movements", 70, "--evaluate_at", 40, "--repeats", 2)
+    return main([str(word) for word in (*short, "--out", out, *options)])
+
+
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory):
+    """Directory of a whole run of SGIM-D."""
+    out = tmp_path_factory.mktemp("arm")
+    assert live(out) == 0
+    return out / "sgim-d" / "seed-003"
+
+
+@pytest.mark.parametrize("environment", ARMS)
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+def test_every_algorithm_lives_on_every_arm_and_writes_a_whole_run_directory(tmp_path, environment, algorithm):
+    assert live(tmp_path, "--environment", environment, "--algorithm", algorithm) == 0
+    run = read_run(tmp_path / algorithm / "seed-003")
+    assert run.thetas.shape == (70, ARMS[environment])
+    assert run.outcomes.shape == (70, 2)
+    assert run.evaluation["movements"].tolist() == [40, 70]
+    assert run.config["environment"] == environment
+    assert run.config["benchmark_crc32"] is run.config["demonstrations_crc32"] is None
+    moved, arm = np.flatnonzero(run.origin != ""), PlanarArm(ARMS[environment])
+    for k in moved[-3:]:
+        assert np.array_equal(arm.execute(NO_CONTEXT, run.thetas[k], stream(0, "any")), run.outcomes[k])
+    assert np.all(run.evaluation["noise_floor_m"] < 1e-12)  # without noise all repetitions end in one point
+
+
+@pytest.mark.parametrize("n_joints", ARMS.values())
+def test_goals_for_an_arm_lie_within_reach_one_a_tile_and_evenly(n_joints):
+    arm = PlanarArm(n_joints)
+    benchmark = arm_benchmark(arm)
+    benchmark.check(arm)
+    goals = benchmark.goals
+    assert 200 <= len(goals) <= 360
+    assert arm.reachable(goals).all()
+    assert tiles_reached(goals, benchmark) == len(goals)
+    quadrants = [((goals * signs) > 0).all(axis=1).sum() for signs in ((1, 1), (1, -1), (-1, 1), (-1, -1))]
+    assert min(quadrants) > 0.9 * len(goals) / 4
+    # A quarter of a disc's area lies within half its radius. Of its tiles, only those on the border are left to chance.
+    assert abs((np.linalg.norm(goals, axis=1) < 0.5).sum() - len(goals) / 4) < 10
+    assert np.array_equal(goals, arm_benchmark(PlanarArm(n_joints)).goals)
+
+
+def test_the_tiles_of_rod_and_arm_begin_at_one_corner():
+    assert FishingRod().outcomes.low.tolist() == PlanarArm().outcomes.low.tolist() == [-1, -1]
+    benchmark = Benchmark("PlanarArm", np.array([[-0.95, 0.95], [0.95, 0.05]]), 0.1)
+    assert tiles_reached(np.array([[-0.99, 0.91], [0.85, 0.05], [0.95, -0.05]]), benchmark) == 1
+
+
+@pytest.mark.parametrize("n_joints", ARMS.values())
+def test_an_arm_is_shown_how_to_come_from_rest_to_postures_of_equal_bends_all_over_its_reach(n_joints):
+    arm = PlanarArm(n_joints)
+    shown = arm_demonstrations(arm)
+    assert len(shown) == 127
+    for demonstration in shown:
+        trajectory = demonstration.trajectory
+        assert not trajectory[0].any()
+        np.testing.assert_allclose(trajectory[-1, 1:], trajectory[-1, 1], atol=1e-12)
+        theta = arm.correspondence(demonstration.times, trajectory)
+        np.testing.assert_array_equal(arm.angles(theta), trajectory[-1])
+        end = arm.execute(NO_CONTEXT, theta, stream(0, "any"))
+        np.testing.assert_allclose(end, demonstration.outcome, atol=1e-14)
+    # A 127th of the area is a disc of radius 1 / sqrt(127): neighbours are between one and two such radii apart.
+    ends = np.array([demonstration.outcome for demonstration in shown])
+    gaps = np.linalg.norm(ends[:, None] - ends, axis=2)[~np.eye(127, dtype=bool)].reshape(127, 126).min(axis=1)
+    assert 1 / np.sqrt(127) < gaps.min() <= gaps.max() < 2 / np.sqrt(127)
+
+
+def test_an_imitating_arm_varies_the_posture_that_it_was_shown(tmp_path):
+    assert live(tmp_path, "--algorithm", "imitation", "--epsilon", 0.03) == 0
+    run, arm = read_run(tmp_path / "imitation" / "seed-003"), PlanarArm()
+    assert np.flatnonzero(run.demonstration >= 0).tolist() == [30, 60]
+    shown = arm_demonstrations(arm)[run.demonstration[30]]
+    assert np.array_equal(run.goals[30], shown.outcome)
+    assert (np.abs(run.thetas[30:60] - arm.correspondence(shown.times, shown.trajectory)) <= 0.03 + 1e-12).all()
+
+
+def test_own_demonstrations_and_goals_take_the_place_of_the_arms(tmp_path, capsys):
+    arm = PlanarArm()
+    save_demonstrations(tmp_path / "own.npz", arm_demonstrations(arm)[:2])
+    save_benchmark(tmp_path / "goals.npz", Benchmark("PlanarArm", np.array([[0.1, 0.2]]), 0.1))
+    files = ("--demonstrations", tmp_path / "own.npz", "--benchmark", tmp_path / "goals.npz")
+    assert live(tmp_path, *files) == 0
+    run = read_run(tmp_path / "sgim-d" / "seed-003")
+    assert set(run.demonstration[run.demonstration >= 0].tolist()) == {0, 1}
+    assert run.evaluation["mean_error_m"].tolist() == run.evaluation["median_error_m"].tolist()  # of one goal
+    assert None not in (run.config["benchmark_crc32"], run.config["demonstrations_crc32"])
+    assert "2 demonstrations; correspondence misses them by 0.0000 rad" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("environment", "options", "message"),
+    [
+        ("planar-arm-7", ["--benchmark", "{rod}"], "the benchmark was made for FishingRod .* got PlanarArm"),
+        ("planar-arm-50", ["--demonstrations", "{seven}"], "has 7 joints, the robot has 50"),
+        ("planar-arm-7", ["--demonstrations", "{degrees}"], "recording 0 cannot be translated: .* is it in deg"),
+        ("fishing-rod", ["--demonstrations", "{seven}"], "has 7 joints, the robot has 6"),
+    ],
+)
+def test_files_of_another_robot_are_refused(tmp_path, benchmark, capsys, environment, options, message):
+    shown = arm_demonstrations(PlanarArm())
+    seven, degrees = tmp_path / "seven.npz", tmp_path / "degrees.npz"
+    save_demonstrations(seven, shown)
+    save_demonstrations(
+        degrees, [Demonstration(s.context, s.times, np.degrees(s.trajectory), s.outcome) for s in shown]
+    )
+    options = [option.format(rod=benchmark, seven=seven, degrees=degrees) for option in options]
+    assert live(tmp_path / "out", "--environment", environment, *options) == 2
+    errors = capsys.readouterr().err
+    assert re.search(message, errors)
+    assert "Traceback" not in errors
+    assert not (tmp_path / "out").exists()
+
+
+def test_noise_and_task_space_are_the_rods(tmp_path, reference, capsys):
+    assert live(tmp_path, "--noise", 0.5, "--task_space", 100) == 0
+    said = capsys.readouterr().err
+    assert "--noise has no effect with --environment planar-arm-7\n" in said
+    assert "--task_space has no effect with --environment planar-arm-7\n" in said
+    assert csv_of(tmp_path / "sgim-d" / "seed-003") == csv_of(reference)
+    assert not Config(noise=0.5, task_space=100.0).without_effect
+
+
+def test_a_run_on_an_arm_made_longer_equals_a_long_run(tmp_path, reference):
+    assert live(tmp_path, "--movements", 50) == 0
+    assert live(tmp_path, "--resume") == 0
+    assert csv_of(tmp_path / "sgim-d" / "seed-003") == csv_of(reference)
+
+
+def test_a_run_made_before_there_was_a_choice_lived_on_the_rod(tmp_path, go, capsys):
+    assert go(tmp_path, "--movements", 5) == 0
+    path = tmp_path / "sgim-d" / "seed-003" / "config.json"
+    config = json.loads(path.read_text())
+    path.write_text(json.dumps({name: value for name, value in config.items() if name != "environment"}))
+    assert go(tmp_path, "--movements", 6, "--resume", "--environment", "planar-arm-7", "--benchmark", "null") == 2
+    assert "environment was fishing-rod, now planar-arm-7" in capsys.readouterr().err
+    assert go(tmp_path, "--movements", 6, "--resume") == 0
+    assert json.loads(path.read_text()) == {**config, "movements": 6}
+
+
+@pytest.mark.parametrize("other", ["fishing-rod", "planar-arm-50"])
+def test_a_run_of_one_environment_is_not_resumed_in_another(tmp_path, capsys, other):
+    assert live(tmp_path, "--movements", 5) == 0
+    directory = tmp_path / "sgim-d" / "seed-003"
+    before = {path.name: path.read_bytes() for path in directory.iterdir()}
+    assert live(tmp_path, "--environment", other, "--resume") == 2
+    assert f"environment was planar-arm-7, now {other}" in capsys.readouterr().err
+    assert {path.name: path.read_bytes() for path in directory.iterdir()} == before
+
+
+def test_only_the_rod_is_filmed(reference, tmp_path, capsys):
+    assert film.main([str(reference), "--out", str(tmp_path / "arm.mp4")]) == 2
+    said = capsys.readouterr().err
+    assert f"error: {reference} is of planar-arm-7; a film shows the fishing rod only\n" in said
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_report_with_films_leaves_out_those_of_an_arm(tmp_path, reference):
+    assert report.main([str(reference), "--film", "--out", str(tmp_path / "page.html")]) == 0
+    assert "<video" not in (tmp_path / "page.html").read_text()
+
+
+def test_the_demo_is_of_the_rod(monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", ["demo", "--", "--environment", "planar-arm-7"])
+    with pytest.raises(SystemExit) as end:
+        demo.main()
+    assert end.value.code == 2
+    assert "the demo shows the fishing rod" in capsys.readouterr().err
+
+
+def test_the_memory_of_an_arm_rebuilt_from_the_log_is_that_of_the_living_one(reference):
+    run = read_run(reference)
+    parts = build(film.config_of(run))
+    film.remember(run, parts, 0, len(run.index))
+    assert np.array_equal(parts.learner.memory.outcomes, run.outcomes[run.origin != ""])
+
+
+def test_a_report_shows_an_arm_beside_the_rod_with_what_each_was_shown(tmp_path, reference, go):
+    assert go(tmp_path, "--name", "rod") == 0
+    (tmp_path / "arm").symlink_to(reference.parent)
+    assert report.main([str(tmp_path), "--out", str(tmp_path / "page.html")]) == 0
+    page = (tmp_path / "page.html").read_text()
+    assert "planar-arm-7" in page
+    assert "judged by different benchmarks" in page
+    assert "left out" not in page.lower()
+    assert f"scripts/film {tmp_path / 'rod' / 'seed-003'}" in page
+    assert f"scripts/film {tmp_path / 'arm' / 'seed-003'}" not in page
+
+
+def test_a_report_marks_the_postures_that_the_arm_was_shown(reference):
+    life = read_life(reference)
+    shown, missing = demonstrated([life])
+    assert missing == ""
+    wanted = arm_demonstrations(PlanarArm())
+    assert shown.tolist() == [wanted[row].outcome.tolist() for row in sorted(set(life.shown.tolist()))]
+    assert len(shown) == 2
+
+
+def test_a_board_of_an_arm_is_written(tmp_path):
+    assert live(tmp_path, "--board", "true") == 0
+    directory = tmp_path / "sgim-d" / "seed-003"
+    assert list(directory.glob("events.out.tfevents.*"))
+    assert json.loads((directory / "summary.json").read_text())["finished"] is True

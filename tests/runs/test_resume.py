@@ -1,0 +1,257 @@
+"""Runs that are stopped, killed, damaged or made longer: in the end they are as if nothing had happened."""
+
+import fcntl
+import signal
+import zlib
+
+import pytest
+
+from runs import EAGER, MOVEMENTS, arguments, csv_of, signal_after, start
+from sgimd_torch.evaluation import evaluate
+from sgimd_torch.runs import run as run_script
+from sgimd_torch.runs.config import Config
+from sgimd_torch.runs.read import read_run
+from sgimd_torch.spaces import stream
+
+
+@pytest.mark.parametrize(
+    ("signum", "lines", "code"), [(signal.SIGKILL, 20, -9), (signal.SIGKILL, 64, -9), (signal.SIGINT, 40, 130)]
+)
+def test_a_run_that_is_stopped_and_resumed_ends_as_if_it_never_was(
+    tmp_path, go, benchmark, reference, capsys, signum, lines, code
+):
+    directory = tmp_path / "sgim-d" / "seed-003"
+    process = start(EAGER, *arguments(tmp_path, benchmark))
+    found, errors = signal_after(process, directory / "episodes.csv", lines, signum)
+    assert found == code
+    assert "Traceback" not in errors
+    assert ("--resume" in errors) == (signum == signal.SIGINT)
+    before = (directory / "episodes.csv").read_bytes()
+    assert lines <= before.count(b"\n") < MOVEMENTS
+    assert go(tmp_path) == 2  # without --resume nothing is touched
+    assert "--resume" in capsys.readouterr().err
+    assert (directory / "episodes.csv").read_bytes() == before
+    assert go(tmp_path, "--resume") == 0
+    assert csv_of(directory) == reference
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("algorithm", ["random", "imitation", "sgim-d"])
+def test_a_run_killed_five_times_at_random_ends_as_if_it_never_was(tmp_path, go, benchmark, algorithm):
+    options = ("--algorithm", algorithm, "--movements", 900, "--evaluate_at", "200,400,600,800")
+    assert go(tmp_path / "whole", *options) == 0
+    directory = tmp_path / "killed" / algorithm / "seed-003"
+    for lines in sorted(stream(0, "kills").integers(2, 880, size=5)):
+        process = start(EAGER, *arguments(tmp_path / "killed", benchmark), *options, "--resume")
+        signal_after(process, directory / "episodes.csv", lines, signal.SIGKILL)
+    assert go(tmp_path / "killed", *options, "--resume") == 0
+    assert csv_of(directory) == csv_of(tmp_path / "whole" / algorithm / "seed-003")
+
+
+@pytest.mark.parametrize("algorithm", ["sgim-d", "observation"])
+def test_a_finished_run_made_longer_equals_a_long_run(tmp_path, go, algorithm):
+    options = ("--algorithm", algorithm)
+    assert go(tmp_path / "long", *options) == 0
+    assert go(tmp_path / "extended", *options, "--movements", 50) == 0  # evaluated after 50, which the long one is not
+    assert go(tmp_path / "extended", *options, "--resume") == 0
+    extended = tmp_path / "extended" / algorithm / "seed-003"
+    assert csv_of(extended) == csv_of(tmp_path / "long" / algorithm / "seed-003")
+    assert read_run(extended).config["movements"] == MOVEMENTS
+
+
+def test_resuming_a_finished_run_changes_nothing_but_what_is_asked_of_its_evaluation(tmp_path, go, reference):
+    directory = tmp_path / "sgim-d" / "seed-003"
+    assert go(tmp_path) == 0
+    assert go(tmp_path, "--resume") == 0
+    assert csv_of(directory) == reference
+    assert go(tmp_path, "--resume", "--evaluate_at", "45", "--repeats", 3) == 0
+    assert read_run(directory).evaluation["movements"].tolist() == [45, 90]
+    assert go(tmp_path, "--resume") == 0
+    assert csv_of(directory) == reference
+
+
+def test_a_resumed_run_keeps_its_evaluations_until_floor_at_changes(tmp_path, go, reference, monkeypatch):
+    evaluated = []
+
+    def evaluate_and_note(inverse, environment, goals, seed, movements, **options):
+        evaluated.append((movements, options["repeats"]))
+        return evaluate(inverse, environment, goals, seed, movements, **options)
+
+    monkeypatch.setattr(run_script, "evaluate", evaluate_and_note)
+    assert go(tmp_path, "--movements", 60, "--floor_at", "30,90") == 0
+    assert evaluated == [(30, 2), (60, 0)]
+    assert go(tmp_path, "--resume", "--floor_at", "30,90") == 0
+    assert evaluated == [(30, 2), (60, 0), (90, 2)]
+    assert go(tmp_path, "--resume", "--floor_at", "30,90") == 0
+    assert len(evaluated) == 3
+    assert go(tmp_path, "--resume", "--floor_at", "90") == 0
+    assert evaluated[3:] == [(30, 0), (60, 0), (90, 2)]
+    assert go(tmp_path, "--resume") == 0  # null: all of them
+    assert evaluated[6:] == [(30, 2), (60, 2), (90, 2)]
+    assert csv_of(tmp_path / "sgim-d" / "seed-003") == reference
+
+
+def tear(content):
+    return content[:-100]
+
+
+def zero(content):
+    return content[:-1500] + bytes(1500)
+
+
+def flip(content):
+    digit = content.index(b"\n40,") + 60
+    return content[:digit] + (b"7" if content[digit : digit + 1] != b"7" else b"8") + content[digit + 1 :]
+
+
+def lose_newline(content):
+    return content[:-1]
+
+
+def append_garbage(content):
+    return content + b"\xff\x00 90,,,"
+
+
+def repeat_last_line(content):
+    return content + content.splitlines(keepends=True)[-1]
+
+
+@pytest.mark.parametrize(
+    ("damage", "kept"),
+    [(tear, 89), (zero, 87), (flip, 40), (lose_newline, 89), (append_garbage, 90), (repeat_last_line, 90)],
+)
+def test_of_a_damaged_log_what_is_whole_is_kept_and_the_rest_lived_again(tmp_path, go, reference, capsys, damage, kept):
+    directory = tmp_path / "sgim-d" / "seed-003"
+    assert go(tmp_path) == 0
+    log = directory / "episodes.csv"
+    damaged = damage(log.read_bytes())
+    log.write_bytes(damaged)
+    assert len(read_run(directory).index) == kept
+    capsys.readouterr()
+    assert go(tmp_path, "--resume") == 0
+    dropped = len(damaged) - sum(map(len, reference["episodes.csv"].splitlines(keepends=True)[: kept + 1]))
+    messages = capsys.readouterr().err
+    assert f"episodes.csv: dropped {dropped} bytes" in messages
+    assert f"{kept} movements are kept" in messages
+    assert csv_of(directory) == reference
+
+
+@pytest.mark.parametrize("name", ["evaluation.csv", "regions.csv"])
+@pytest.mark.parametrize("damage", [tear, lose_newline, append_garbage, lambda content: bytes(len(content))])
+def test_damaged_evaluations_are_done_again(tmp_path, go, reference, capsys, name, damage):
+    directory = tmp_path / "sgim-d" / "seed-003"
+    assert go(tmp_path) == 0
+    (directory / name).write_bytes(damage((directory / name).read_bytes()))
+    capsys.readouterr()
+    assert go(tmp_path, "--resume") == 0
+    assert f"{name}: dropped" in capsys.readouterr().err
+    assert csv_of(directory) == reference
+
+
+def test_a_run_killed_before_its_config_was_written_starts_afresh(tmp_path, go, reference, capsys):
+    directory = tmp_path / "sgim-d" / "seed-003"
+    directory.mkdir(parents=True)
+    for name in ("lock", "versions.json", "config.json.part"):
+        (directory / name).touch()
+    assert go(tmp_path, "--resume") == 0
+    assert "no run yet" in capsys.readouterr().err
+    assert csv_of(directory) == reference
+    assert not list(directory.glob("*.part"))
+
+
+def test_a_log_that_another_learner_wrote_is_not_continued(tmp_path, go, capsys):
+    assert go(tmp_path) == go(tmp_path, "--seed", 4) == 0
+    directory = tmp_path / "sgim-d" / "seed-003"
+    other = (tmp_path / "sgim-d" / "seed-004" / "episodes.csv").read_bytes()
+    (directory / "episodes.csv").write_bytes(other + b"torn")
+    before = {path.name: path.read_bytes() for path in directory.iterdir()}
+    capsys.readouterr()
+    assert go(tmp_path, "--resume", "--evaluate_at", "10", "--movements", 95) == 2
+    message = capsys.readouterr().err
+    assert "movement 0" in message
+    assert "Traceback" not in message
+    assert {path.name: path.read_bytes() for path in directory.iterdir()} == before
+
+
+def test_a_replay_that_disagrees_names_the_columns(tmp_path, go, capsys):
+    assert go(tmp_path) == 0
+    log = tmp_path / "sgim-d" / "seed-003" / "episodes.csv"
+    header, *lines = log.read_text().splitlines()
+    k = next(k for k, line in enumerate(lines) if line.split(",")[1] == "local")
+    fields = lines[k].split(",")[:-1]
+    column = header.split(",").index("goal_0")
+    goal, fields[column] = fields[column], "0.125"
+    fields[1] = "global"
+    body = ",".join(fields)
+    lines[k] = f"{body},{zlib.crc32(body.encode()):08x}"
+    log.write_text("".join(f"{line}\n" for line in (header, *lines)))
+    capsys.readouterr()
+    assert go(tmp_path, "--resume") == 2
+    message = capsys.readouterr().err
+    assert f"movement {k} " in message
+    assert f"origin was global, now local; goal_0 was 0.125, now {goal}. Was it recorded by another" in message
+    assert len(message) < 300
+
+
+def test_a_run_is_resumed_with_its_own_configuration_only(tmp_path, go, capsys):
+    assert go(tmp_path, "--movements", 10) == 0
+    before = (tmp_path / "sgim-d" / "seed-003" / "config.json").read_bytes()
+    assert go(tmp_path, "--resume", "--budget", 7, "--goals", "uniform") == 2
+    message = capsys.readouterr().err
+    assert "goals was interest-map, now uniform" in message
+    assert f"budget was {Config().budget}, now 7" in message
+    assert "epsilon" not in message
+    assert (tmp_path / "sgim-d" / "seed-003" / "config.json").read_bytes() == before
+
+
+def test_a_run_is_not_made_shorter(tmp_path, go, capsys):
+    assert go(tmp_path, "--movements", 10) == 0
+    assert go(tmp_path, "--movements", 9, "--resume") == 2
+    assert "10 movements already" in capsys.readouterr().err
+    assert go(tmp_path, "--movements", 10, "--resume") == 0
+
+
+def test_a_run_that_another_process_writes_is_left_alone(tmp_path, go, capsys):
+    assert go(tmp_path, "--movements", 10) == 0
+    with (tmp_path / "sgim-d" / "seed-003" / "lock").open("r+") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        assert go(tmp_path, "--resume") == 2
+    assert "in use by another process" in capsys.readouterr().err
+    assert go(tmp_path, "--resume") == 0
+
+
+def test_a_full_disk_is_reported_and_the_run_can_go_on(tmp_path, go, benchmark, reference):
+    directory = tmp_path / "sgim-d" / "seed-003"
+    process = start(EAGER, *arguments(tmp_path, benchmark), limit="-f 24")  # KiB a file may have
+    _, errors = process.communicate()
+    assert process.returncode == 1
+    assert "cannot be written" in errors
+    assert "Traceback" not in errors
+    assert (directory / "episodes.csv").stat().st_size == 24 * 1024
+    assert go(tmp_path, "--resume") == 0
+    assert csv_of(directory) == reference
+
+
+@pytest.mark.parametrize("damage", ['{"seconds_physics": "x"}', "null", "", '{"seconds_physics": null}'])
+@pytest.mark.parametrize("name", ["summary.json", "versions.json"])
+def test_a_damaged_note_on_the_run_counts_as_missing(tmp_path, go, reference, capsys, name, damage):
+    directory = tmp_path / "sgim-d" / "seed-003"
+    assert go(tmp_path, "--movements", 50) == 0
+    (directory / name).write_text(damage)
+    capsys.readouterr()
+    assert go(tmp_path, "--resume") == 0
+    assert ("it counts as missing" in capsys.readouterr().err) == (name == "summary.json" or damage in ("null", ""))
+    assert csv_of(directory) == reference
+
+
+@pytest.mark.parametrize("line", ["nan,nan,nan,nan,nan", "60.5,1,1,1,1", "4e1,1,1,1,1", "R,1,2,3,4", "60,R,1,1,1"])
+def test_a_line_of_evaluations_that_means_nothing_is_dropped(tmp_path, go, reference, capsys, line):
+    directory = tmp_path / "sgim-d" / "seed-003"
+    assert go(tmp_path) == 0
+    lines = (directory / "evaluation.csv").read_text().splitlines()
+    (directory / "evaluation.csv").write_text("\n".join([*lines[:2], line, ""]))
+    capsys.readouterr()
+    assert read_run(directory).evaluation["movements"].tolist() == [30]
+    assert go(tmp_path, "--resume") == 0
+    assert "evaluation.csv: dropped" in capsys.readouterr().err
+    assert csv_of(directory) == reference

@@ -1,0 +1,407 @@
+"""Whole runs on the fishing rod: what they write, that they can be repeated, and what they refuse."""
+
+import json
+import os
+import re
+import shlex
+import signal
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import sgimd_torch
+from runs import MOVEMENTS, ROOT, arguments, csv_of
+from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
+from sgimd_torch.environments.fishing_rod import FishingRod
+from sgimd_torch.evaluation import Benchmark, save_benchmark
+from sgimd_torch.runs import run as run_script
+from sgimd_torch.runs.build import build
+from sgimd_torch.runs.config import ALGORITHMS, KNOWN, MODEL_SEARCHES, Config
+from sgimd_torch.runs.read import read_run
+from sgimd_torch.runs.run import main
+from sgimd_torch.spaces import Demonstration, stream
+
+
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+def test_every_algorithm_writes_a_whole_run_directory(tmp_path, go, capsys, algorithm):
+    assert go(tmp_path, "--algorithm", algorithm) == 0
+    directory = tmp_path / algorithm / "seed-003"
+    assert str(directory) in capsys.readouterr().out
+    run = read_run(directory)
+    assert run.index.tolist() == list(range(MOVEMENTS))
+    assert run.thetas.shape == (MOVEMENTS, 25)
+    assert (run.regions is not None) == (algorithm in ("sagg-riac", "sgim-d"))
+    header = (directory / "evaluation.csv").read_text().splitlines()[0]
+    assert header == "movements,mean_error_m,median_error_m,p90_error_m,noise_floor_m"
+    # Observation has seen nothing before movement 30, so it has nothing to be evaluated by after 30 movements.
+    wanted = [60, 90] if algorithm in ("observation", "imitation") else [30, 60, 90]
+    assert run.evaluation["movements"].tolist() == wanted
+    assert list(run.summary)[:3] == ["movements", "mean_error_m", "noise_floor_m"]
+    assert {"seconds_physics", "seconds_learner", "seconds_evaluation"} < set(run.summary)
+    assert run.summary["movements"] == MOVEMENTS
+    assert run.summary["finished"] is True
+    assert run.summary["mean_error_m"] == run.evaluation["mean_error_m"][-1]
+    assert run.config["algorithm"] == algorithm
+    assert {"python", "numpy", "scipy", "faiss", "mujoco", "sgimd_torch", "platform", "commit"} == set(run.versions)
+    assert not list(directory.glob("*.part"))
+
+
+def test_the_log_shows_who_rested_imitated_and_was_taught(tmp_path, go):
+    assert go(tmp_path, "--algorithm", "imitation") == 0
+    run = read_run(tmp_path / "imitation" / "seed-003")
+    assert np.flatnonzero(run.demonstration >= 0).tolist() == [30, 60]
+    assert run.origin.tolist() == [""] * 30 + ["imitate"] * 60
+    assert np.isnan(run.outcomes[:30]).all()
+    assert not np.isnan(run.outcomes[30:]).any()
+
+
+def test_the_same_seed_makes_the_same_bytes(tmp_path, go, reference):
+    assert go(tmp_path) == 0
+    assert csv_of(tmp_path / "sgim-d" / "seed-003") == reference
+
+
+def test_another_seed_makes_another_run(tmp_path, go, reference):
+    assert go(tmp_path, "--seed", 4) == 0
+    assert csv_of(tmp_path / "sgim-d" / "seed-004")["episodes.csv"] != reference["episodes.csv"]
+
+
+@pytest.mark.parametrize("evaluations", ["[]", "[1,2,7,30,31,89]"])
+def test_evaluating_more_or_not_at_all_leaves_the_log_as_it_is(tmp_path, go, reference, evaluations):
+    assert go(tmp_path, "--evaluate_at", evaluations) == 0
+    written = csv_of(tmp_path / "sgim-d" / "seed-003")
+    assert written["episodes.csv"] == reference["episodes.csv"]
+    assert written["evaluation.csv"].count(b"\n") == (1 if evaluations == "[]" else 8)
+
+
+def test_floor_at_names_the_evaluations_that_measure_the_noise_and_changes_nothing_else(tmp_path, go, reference):
+    for floor_at, measured in (("60", [60]), ("30,90,1000", [30, 90]), ("[]", []), ("null", [30, 60, 90])):
+        assert go(tmp_path / floor_at, "--floor_at", floor_at) == 0
+        directory = tmp_path / floor_at / "sgim-d" / "seed-003"
+        evaluation = read_run(directory).evaluation
+        assert evaluation["movements"][np.isfinite(evaluation["noise_floor_m"])].tolist() == measured
+        written = csv_of(directory)
+        for name in ("episodes.csv", "regions.csv"):
+            assert written[name] == reference[name]
+        lines = zip(written["evaluation.csv"].splitlines(), reference["evaluation.csv"].splitlines(), strict=True)
+        for line, full in lines:
+            movements = full.split(b",")[0]
+            is_whole = movements == b"movements" or int(movements) in measured
+            assert line == (full if is_whole else full.rpartition(b",")[0] + b",nan")
+
+
+def test_threads_change_no_byte(tmp_path, go, reference):
+    assert go(tmp_path, "--threads", 2) == 0
+    assert csv_of(tmp_path / "sgim-d" / "seed-003") == reference
+
+
+def test_with_and_without_the_teacher_the_environment_makes_the_same_noise(tmp_path, go):
+    assert go(tmp_path, "--algorithm", "sagg-riac") == go(tmp_path, "--algorithm", "sgim-d") == 0
+    alone, taught = (read_run(tmp_path / name / "seed-003") for name in ("sagg-riac", "sgim-d"))
+    assert np.array_equal(alone.outcomes[:30], taught.outcomes[:30])  # until the first demonstration they are one
+    assert not np.array_equal(alone.thetas[30:], taught.thetas[30:])
+    rod = FishingRod(threads=1)
+    for run in (alone, taught):
+        for k in (40, 75):
+            noise = stream(3, "environment", k)
+            assert np.array_equal(rod.execute(run.contexts[k], run.thetas[k], noise), run.outcomes[k])
+
+
+def test_a_directory_with_other_files_is_left_alone(tmp_path, go, capsys):
+    directory = tmp_path / "sgim-d" / "seed-003"
+    directory.mkdir(parents=True)
+    (directory / "thesis.tex").touch()
+    assert go(tmp_path) == go(tmp_path, "--resume") == 2
+    assert "thesis.tex" in capsys.readouterr().err
+    assert os.listdir(directory) == ["thesis.tex"]
+
+
+def test_a_damaged_config_is_named(tmp_path, go, capsys):
+    assert go(tmp_path, "--movements", 10) == 0
+    (tmp_path / "sgim-d" / "seed-003" / "config.json").write_text('{"algorithm": ')
+    assert go(tmp_path, "--resume") == 2
+    assert "config.json cannot be read" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ("--algorithm sgimd", "unknown algorithm 'sgimd', known are random, sagg-riac, .* did you mean sgim-d"),
+        ("--algorithm 'sgim d'", "did you mean sgim-d"),
+        ("--algorithm ''", "unknown algorithm"),
+        ("--sede 3", "unknown option --sede; did you mean --seed"),
+        ("--see 3", "unknown option --see"),
+        ("--search downhill", "unknown search 'downhill', known are nelder-mead"),
+        ("--environment planar-arm", "unknown environment 'planar-arm', known are fishing-rod, .* did you mean planar"),
+        ("--seed -1", "seed must be at least 0, got -1"),
+        ("--seed three", "--seed must be a whole number, got three\n"),
+        ("--seed", "seed.*expected one argument"),
+        ("--movements 0", "movements must be at least 1, got 0"),
+        ("--movements 1e3", "--movements must be a whole number, got 1e3\n"),
+        ("--every 1.5", "--every must be a whole number, or null, got 1.5\n"),
+        ("--noise nan", "--noise must be a number, got nan\n"),
+        ("--evaluate-at 10,x", "--evaluate-at must be whole numbers such as 250,500.* got 10,x\n"),
+        ("--out ''", "--out must be a path, got an empty one"),
+        ("--benchmark=", "--benchmark must be a path, got an empty one"),
+        ("--benchmark /", "/ is a directory, a file was wanted"),
+        ("--resume=1", "--resume takes no value"),
+        ("--task_space 1e7", "at most 1e6"),
+        ("--epsilon 1.5", "epsilon must be from 0 to 1"),
+        ("--threads 100000", "threads must be at most"),
+        ("--task_space 0", "task_space must be a length in metres above 0, at most 1e6, got 0"),
+        ("--task-space .nan", "task_space must be a length"),
+        ("--noise -0.1", "noise must be finite and at least 0"),
+        ("--epsilon .inf", "epsilon must be from 0 to 1"),
+        ("--repeats 1", "one landing point does not scatter"),
+        ("--every 0", "every must be at least 1, got 0"),
+        ("--evaluate_at 0,3", "evaluate_at must be at least 1, got 0"),
+        ("--evaluate_at soon", "evaluate_at"),
+        ("--floor_at 0,3", "floor_at must be at least 1, got 0"),
+        ("--floor_at soon", "floor_at"),
+        ("--window 7", "window must be even"),
+        ("--name a/b", "name must be that of one directory"),
+        ("--benchmark nowhere.npz", "benchmark: there is no file nowhere.npz"),
+        ("--benchmark {text}", "is no benchmark"),
+        ("--demonstrations nowhere.npz", "demonstrations: there is no file nowhere.npz"),
+        ("--demonstrations {text}", "is no demonstration file"),
+        ("--out {text}", "text is no folder"),
+        ("stray", "'stray' belongs to no option"),
+    ],
+)
+def test_what_makes_no_sense_is_refused_clearly_and_leaves_nothing_behind(tmp_path, go, capsys, options, message):
+    text = tmp_path / "text"
+    text.write_text("not what you look for")
+    assert go(tmp_path / "out", *shlex.split(options.format(text=text))) == 2
+    errors = capsys.readouterr().err
+    assert len(errors) < 1000
+    assert "Traceback" not in errors
+    assert "error: " in errors
+    assert re.search(message, errors)
+    assert os.listdir(tmp_path) == ["text"]
+
+
+def test_a_benchmark_for_another_environment_is_refused(tmp_path, go, capsys):
+    save_benchmark(tmp_path / "arm.npz", Benchmark("PlanarArm", np.zeros((3, 2)), 0.1))
+    assert go(tmp_path / "out", "--benchmark", tmp_path / "arm.npz") == 2
+    assert "made for PlanarArm" in capsys.readouterr().err
+
+
+def test_a_diverging_simulation_is_reported_with_its_theta_and_leaves_a_whole_log(tmp_path, monkeypatch, go, capsys):
+    monkeypatch.chdir(tmp_path)  # where MuJoCo writes a log of its own
+    assert go(tmp_path, "--noise", "1e4") == 1  # commands of thousands of rad
+    errors = capsys.readouterr().err
+    assert "theta=[0." in errors
+    assert "Traceback" not in errors
+    directory = tmp_path / "sgim-d" / "seed-003"
+    lines = (directory / "episodes.csv").read_bytes().count(b"\n")
+    assert len(read_run(directory).index) == lines - 1 < MOVEMENTS
+    assert read_run(directory).summary["finished"] is False
+
+
+def test_help_names_every_choice_and_every_field_has_a_sentence(capsys):
+    assert main(["--help"]) == 0
+    text = " ".join(capsys.readouterr().out.split()).replace("- ", "-")
+    for choice in (name for table in KNOWN.values() for name in table):
+        assert choice in text
+    for field in Config.__dataclass_fields__:
+        assert re.search(rf"--{field} ({field.upper()}|{{true,false}}) [A-Z]", text), field
+
+
+@pytest.mark.parametrize(
+    ("option", "table"), [item for item in KNOWN.items() if item[0] not in ("algorithm", "environment")]
+)
+def test_every_choice_lives_and_none_is_another_by_a_new_name(tmp_path, go, option, table):
+    logs = set()
+    # Short attempts and a short window, so that the map is split, and has its say, before the run is over.
+    common = ("--every", 20, "--budget", 3, "--imitations", 3, "--window", 4, "--movements", 240, "--evaluate_at", "[]")
+    choices = [choice for choice in table if choice not in (*MODEL_SEARCHES, "model")]  # see the next two tests
+    for choice in choices:
+        assert go(tmp_path, "--name", choice, f"--{option}", choice, *common) == 0
+        logs.add((tmp_path / choice / "seed-003" / "episodes.csv").read_bytes())
+    assert len(logs) == len(choices)
+
+
+ON_THE_ARM = (
+    "--environment",
+    "planar-arm-7",
+    "--benchmark",
+    "null",
+    "--movements",
+    400,
+    "--evaluate_at",
+    200,
+    "--repeats",
+    0,
+    "--training",
+    4,
+)
+
+
+def test_every_search_through_the_model_lives_and_none_is_another_by_a_new_name(tmp_path, go):
+    searches = ("nelder-mead", *MODEL_SEARCHES)
+    for search in searches:
+        assert go(tmp_path, "--name", search, "--search", search, *ON_THE_ARM) == 0
+    assert len({(tmp_path / search / "seed-003" / "episodes.csv").read_bytes() for search in searches}) == len(searches)
+
+
+def test_the_inverse_through_the_model_lives_as_the_linear_one_and_answers_better(tmp_path, go):
+    runs = {}
+    for inverse in ("linear", "model"):
+        assert go(tmp_path, "--name", inverse, "--inverse", inverse, *ON_THE_ARM) == 0
+        runs[inverse] = read_run(tmp_path / inverse / "seed-003")
+    np.testing.assert_array_equal(runs["model"].thetas, runs["linear"].thetas)
+    assert runs["model"].evaluation["mean_error_m"][-1] < 0.7 * runs["linear"].evaluation["mean_error_m"][-1]
+
+
+BABBLING = {"window": 4, "progress": "signed", "competence": "attempt", "search": "perturb", "budget": 3}
+TEACHING = {"every": 7, "choice": "random", "imitations": 3, "epsilon": 0.2}
+
+
+@pytest.mark.parametrize(
+    ("options", "moot"),
+    [
+        ("--algorithm random", {*BABBLING, *TEACHING}),
+        ("--algorithm sagg-riac", set(TEACHING)),
+        ("--algorithm sagg-riac --goals uniform --teacher initial", {*TEACHING, *list(BABBLING)[:3], "teacher"}),
+        ("--algorithm imitation --social emulate", {*BABBLING, "imitations", "social"}),
+        ("--algorithm observation", {*BABBLING, "imitations", "epsilon"}),
+        ("--algorithm sgim-d", set()),
+        ("--algorithm sgim-d --goals uniform", {"window", "progress", "competence"}),
+        ("--algorithm sgim-d --goals grid", set()),
+        ("--algorithm sgim-d --goals alp-gmm", {"window", "progress"}),
+        ("--algorithm map-elites", {*BABBLING, *TEACHING}),
+        ("--algorithm cma-me", {*BABBLING, *TEACHING}),
+        ("--algorithm sgim-d --social emulate", {"imitations", "epsilon"}),
+        ("--algorithm sgim-d --teacher initial", {"choice"}),
+    ],
+)
+def test_options_that_change_nothing_are_named_and_change_nothing(tmp_path, go, capsys, options, moot):
+    common = (*options.split(), "--name", "run", "--evaluate_at", "[]")
+    changed = BABBLING | TEACHING
+    logs = []
+    for given in (changed, {name: value for name, value in changed.items() if name not in moot}):
+        out = tmp_path / str(len(logs))
+        more = [word for name, value in given.items() for word in (f"--{name}", value)]
+        assert go(out, *common, *more) == 0
+        logs.append((out / "run" / "seed-003" / "episodes.csv").read_bytes())
+        named = set(re.findall(r"--(\w+) has no effect", capsys.readouterr().err))
+        assert named == moot & {*given, "social", "teacher"}
+    assert logs[0] == logs[1]
+
+
+def test_of_options_that_change_nothing_only_those_that_were_changed_are_named(tmp_path, go, capsys):
+    budget = str(Config().budget)
+    assert go(tmp_path, "--algorithm", "random", "--budget", budget, "--inverse", "nearest", "--movements", 5) == 0
+    assert "no effect" not in capsys.readouterr().err
+    assert go(tmp_path, "--algorithm", "random", "--budget", 5, "--name", "five", "--movements", 5) == 0
+    assert "--budget has no effect on random\n" in capsys.readouterr().err
+
+
+def test_config_defaults_are_the_librarys(benchmark):
+    learner = build(Config(benchmark=benchmark)).learner
+    shipped = sgimd_torch.sgim_d(FishingRod(), 0, correspondence=FishingRod().primitive.correspondence)
+    for name in ("budget", "tolerance", "global_range", "give_up"):
+        assert getattr(learner.autonomous, name) == getattr(shipped.autonomous, name)
+    for part in ("goals", "inverse", "judge"):
+        assert type(getattr(learner.autonomous, part)) is type(getattr(shipped.autonomous, part))
+    for name in ("repeats", "epsilon"):
+        assert getattr(learner.social, name) == getattr(shipped.social, name)
+
+
+def test_json_files_are_plain_json(tmp_path, go):
+    assert go(tmp_path, "--repeats", 0, "--movements", 10) == 0  # no repeats: no noise floor, NaN in the csv
+    directory = tmp_path / "sgim-d" / "seed-003"
+    for path in directory.glob("*.json"):
+        json.loads(path.read_text(), parse_constant=pytest.fail)  # called for NaN, which is no json
+    assert read_run(directory).summary["noise_floor_m"] is None
+    assert np.isnan(read_run(directory).evaluation["noise_floor_m"]).all()
+
+
+def test_the_misfit_of_the_demonstrations_is_reported(tmp_path, go, capsys):
+    assert go(tmp_path) == 0
+    assert re.search(
+        r"127 demonstrations; correspondence misses them by 0\.\d+ rad \(median\)", capsys.readouterr().err
+    )
+
+
+@pytest.mark.parametrize("slip", ["three samples", "degrees", "milliseconds"])
+def test_recordings_that_the_robot_cannot_play_are_refused_before_anything_is_written(tmp_path, go, capsys, slip):
+    shown = load_demonstrations()[5]
+    times, trajectory = shown.times, shown.trajectory
+    if slip == "three samples":
+        times, trajectory = np.linspace(0, 1, 3), trajectory[:3]
+    elif slip == "degrees":
+        trajectory = np.degrees(trajectory)
+    else:
+        times = 1000 * times
+    save_demonstrations(tmp_path / "own.npz", [shown, Demonstration(shown.context, times, trajectory, shown.outcome)])
+    assert go(tmp_path / "runs", "--demonstrations", tmp_path / "own.npz") == 2
+    said = capsys.readouterr().err
+    assert "own.npz: recording 1" in said
+    assert slip.split()[-1] in said
+    assert not (tmp_path / "runs").exists()
+
+
+def test_recordings_whose_float_lands_outside_the_task_space_are_noted(tmp_path, go, capsys):
+    shown = load_demonstrations()[5]
+    far = Demonstration(shown.context, shown.times, shown.trajectory, 100 * shown.outcome)
+    save_demonstrations(tmp_path / "own.npz", [shown, far])
+    assert go(tmp_path, "--demonstrations", tmp_path / "own.npz", "--movements", 5) == 0
+    assert re.search(r"recording 1 lands at \(.*\) m, outside T; were they recorded in cm\?", capsys.readouterr().err)
+
+
+def test_a_link_to_nowhere_is_named(tmp_path, go, capsys):
+    (tmp_path / "link").symlink_to(tmp_path / "gone")
+    assert go(tmp_path / "link") == 2
+    assert f"{tmp_path / 'link'} is no folder" in capsys.readouterr().err
+
+
+def test_an_error_under_way_is_one_line(tmp_path, go, capsys, monkeypatch):
+    def fail(*_, **__):
+        raise ValueError("this cannot be evaluated")
+
+    monkeypatch.setattr(run_script, "evaluate", fail)
+    assert go(tmp_path) == 1
+    assert "error: this cannot be evaluated\n" in capsys.readouterr().err
+
+
+def test_evaluate_at_may_be_joined_by_an_equals_sign(tmp_path, go):
+    assert go(tmp_path, "--evaluate-at=5,6", "--movements=8") == 0
+    assert read_run(tmp_path / "sgim-d" / "seed-003").evaluation["movements"].tolist() == [5, 6, 8]
+
+
+SCRIPTS = {**os.environ, "PYTHONPATH": str(ROOT)}
+
+
+@pytest.mark.parametrize("script", ["run", "demo", "table"])
+def test_ctrl_c_while_python_imports_shows_no_traceback(script, tmp_path):
+    command = [sys.executable, "-X", "importtime", str(ROOT / f"experiments/{script}.py"), str(tmp_path)]
+    said = ""
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=SCRIPTS) as process:
+        for line in process.stderr:  # importtime tells what is loaded, as it goes
+            said += line
+            if " numpy." in line:
+                process.send_signal(signal.SIGINT)
+                break
+        said += process.stderr.read()
+    assert process.returncode == 130
+    assert "Traceback" not in said
+
+
+@pytest.mark.parametrize(
+    ("redirection", "code"), [("| true", 0), (">/dev/full", 1), ("2>/dev/full", 0), ("2>&-", 0), (">&-", 0), ("", 0)]
+)
+def test_a_run_ends_well_whatever_becomes_of_its_output(tmp_path, benchmark, redirection, code):
+    script = [sys.executable, str(ROOT / "experiments/run.py"), *arguments(tmp_path, benchmark)]
+    command = shlex.join([*script, "--movements", "5", "--name", "Å"])
+    done = subprocess.run(
+        ["bash", "-o", "pipefail", "-c", f"{command} {redirection}"],
+        capture_output=True,
+        text=True,
+        env={**SCRIPTS, "LC_ALL": "C", "PYTHONCOERCECLOCALE": "0", "PYTHONUTF8": "0"},
+    )
+    assert done.returncode == code, done
+    assert "Traceback" not in done.stderr
+    assert "Exception ignored" not in done.stderr
+    assert read_run(tmp_path / "Å" / "seed-003").summary["finished"] is True

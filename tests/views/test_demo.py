@@ -1,0 +1,173 @@
+"""The demo as a newcomer meets it, with lives of a few movements and a benchmark of a few goals."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sgimd_torch.evaluation import Benchmark, save_benchmark
+from sgimd_torch.runs.read import read_run
+from sgimd_torch.views.demo_figure import draw, table
+
+ROOT = Path(__file__).parent.parent
+
+
+@pytest.fixture(scope="module")
+def benchmark_file(tmp_path_factory):
+    path = tmp_path_factory.mktemp("benchmark") / "small.npz"
+    save_benchmark(path, Benchmark("FishingRod", np.array([[0.0, 0.5], [0.4, 0.3], [-0.5, 0.2]]), 0.1))
+    return path
+
+
+DEMO = [sys.executable, str(ROOT / "experiments/demo.py")]
+ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
+
+
+def start(out, benchmark_file, movements, *more, extra=()):
+    command = [*DEMO, "--out", str(out), "--movements", str(movements), *more]
+    command += ["--", "--benchmark", str(benchmark_file), "--repeats", "2", "--evaluate_at", "30", *extra]
+    return subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=ENVIRONMENT, process_group=0
+    )
+
+
+def ended(demo):
+    out, errors = demo.communicate(timeout=120)
+    return demo.returncode, out, errors
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory, benchmark_file):
+    out = tmp_path_factory.mktemp("demo")
+    return out, *ended(start(out, benchmark_file, 60))
+
+
+@pytest.fixture(scope="module")
+def runs(finished):
+    return {algorithm: read_run(finished[0] / algorithm / "seed-000") for algorithm in ("sgim-d", "random")}
+
+
+def is_whole_png(path):
+    content = path.read_bytes()
+    return content.startswith(b"\x89PNG\r\n\x1a\n") and content.endswith(b"IEND\xaeB`\x82")
+
+
+def test_the_demo_ends_well_with_both_runs_and_a_figure(finished, runs):
+    out, code, said, errors = finished
+    assert code == 0, errors
+    assert [len(run.index) for run in runs.values()] == [60, 60]
+    assert is_whole_png(out / "demo.png")
+    assert (out / "demo.png").stat().st_size > 50_000  # an empty figure of this size has a tenth of that
+    assert not list(out.glob("*.part"))
+    assert str(out / "demo.png") in said
+
+
+def test_the_table_compares_both_algorithms_in_error_noise_and_seconds(runs):
+    head, sgim_d, random, ratio = table(runs).splitlines()
+    assert head.split() == ["error", "60", "noise", "floor", "physics", "learning", "evaluation"]
+    for line, name in ((sgim_d, "sgim-d"), (random, "random")):
+        error, floor = runs[name].evaluation["mean_error_m"][-1], runs[name].evaluation["noise_floor_m"][-1]
+        assert line.lower().split()[:5] == [name, f"{error:.3f}", "m", f"{floor:.3f}", "m"]
+    last = [run.evaluation["mean_error_m"][-1] for run in runs.values()]
+    assert f"{last[0] / last[1]:.2f} times" in ratio
+
+
+def test_the_table_is_shown(finished, runs):
+    assert table(runs) in finished[2]
+
+
+def test_the_figure_shows_the_data_of_the_runs(runs):
+    curves, interest, sgim_d, random = draw(runs).axes[:4]
+    for line, run in zip(curves.lines[::2], runs.values(), strict=True):
+        np.testing.assert_array_equal(line.get_xdata(), [30, 60])
+        np.testing.assert_array_equal(line.get_ydata(), run.evaluation["mean_error_m"])
+    assert len(interest.collections[0].get_paths()) == (runs["sgim-d"].regions["movements"] == 60).sum()
+    for ax, run in ((sgim_d, runs["sgim-d"]), (random, runs["random"])):
+        assert ax.collections[0].get_array().sum() == (np.abs(run.outcomes) <= 1).all(axis=1).sum()
+    assert sgim_d.collections[0].norm.vmax == random.collections[0].norm.vmax
+    assert len(sgim_d.lines) == 2  # demonstrated outcomes and the base
+    assert len(random.lines) == 1
+
+
+def test_a_second_start_uses_what_is_there(finished, benchmark_file, tmp_path):
+    out = tmp_path / "again"
+    shutil.copytree(finished[0], out)
+    logs = {path: path.read_bytes() for path in out.glob("*/*/e*.csv")}
+    assert len(logs) == 4
+    figure = (out / "demo.png").read_bytes()
+    (out / "demo.png").unlink()
+    code, _, errors = ended(start(out, benchmark_file, 60))
+    assert code == 0, errors
+    assert logs == {path: path.read_bytes() for path in logs}
+    assert (out / "demo.png").read_bytes() == figure
+
+
+def test_stopped_it_says_how_to_go_on_and_leaves_no_process(benchmark_file, tmp_path):
+    demo = start(tmp_path, benchmark_file, 100_000)
+    log = tmp_path / "random/seed-000/episodes.csv"
+    began = time.monotonic()
+    while not (log.exists() and log.read_bytes().count(b"\n") > 5):
+        assert time.monotonic() < began + 60
+        time.sleep(0.1)
+    demo.send_signal(signal.SIGINT)
+    code, _, errors = ended(demo)
+    assert code == 130
+    assert "goes on from here" in errors
+    assert "Traceback" not in errors
+    size = log.stat().st_size
+    time.sleep(1.5)  # a run flushes its log every second
+    assert log.stat().st_size == size
+
+
+@pytest.mark.parametrize(
+    ("more", "extra", "message"),
+    [
+        (("--seed", "-1"), (), "--seed must be at least 0"),
+        ((), ("--noise", "-1"), "noise must be finite and at least 0"),
+        ((), ("--evaluate_at", "[]"), "leaves nothing to draw"),
+        ((), ("--seed", "3"), "--seed is the demo's own"),
+        ((), ("--movements=3",), "--movements is the demo's own"),
+        ((), ("--out", "x"), "--out is the demo's own"),
+        ((), ("--algorithm", "x"), "--algorithm is not free here"),
+        ((), ("--name", "x"), "--name is not free here"),
+        ((), ("stray",), "'stray' belongs to no option"),
+    ],
+)
+def test_what_cannot_be_ends_with_its_reason_and_no_traceback(benchmark_file, tmp_path, more, extra, message):
+    code, said, errors = ended(start(tmp_path, benchmark_file, 20, *more, extra=extra))
+    assert code == 2
+    assert message in errors
+    assert "Traceback" not in errors
+    assert not said
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_wish_for_fewer_movements_is_no_reason_to_delete_the_run(finished, benchmark_file):
+    code, _, errors = ended(start(finished[0], benchmark_file, 40))
+    assert code == 2
+    assert "60 movements already" in errors
+    assert "delete" not in errors
+
+
+def test_when_one_run_fails_the_other_is_stopped(benchmark_file, tmp_path):
+    foreign = tmp_path / "random/seed-000/thesis.txt"
+    foreign.parent.mkdir(parents=True)
+    foreign.write_text("not a run")
+    code, _, errors = ended(start(tmp_path, benchmark_file, 100_000))
+    assert code == 2
+    assert "Random failed: error: " in errors
+    assert "thesis.txt" in errors
+    assert "Traceback" not in errors
+    assert foreign.read_text() == "not a run"
+
+
+def test_the_help_teaches():
+    shown = subprocess.run([*DEMO, "--help"], capture_output=True, text=True, check=True, env=ENVIRONMENT)
+    assert "scripts/demo --seed 1" in shown.stdout
+    assert "demo.png" in shown.stdout

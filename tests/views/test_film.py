@@ -1,0 +1,263 @@
+"""Films show what was simulated: where the float flies, when it lands, what the run's own memory infers."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from imageio_ffmpeg import get_ffmpeg_exe
+
+from runs import ROOT
+from sgimd_torch.environments.fishing_rod import HOLD, FishingRod
+from sgimd_torch.evaluation import evaluate
+from sgimd_torch.runs.build import build
+from sgimd_torch.runs.read import read_run
+from sgimd_torch.spaces import stream
+from sgimd_torch.views.film import command as film
+from sgimd_torch.views.film.camera import PAUSE, RATE, Shot, count_frames, tiled, write_film, write_sheet
+
+THETAS = stream(0, "film").random((100, 25))[40:]  # some reach the water before the line is let out
+FRAMES = [np.full((48, 64, 3), 4 * k, np.uint8) for k in range(30)]
+
+
+@pytest.fixture(scope="module")
+def rod():
+    return FishingRod(threads=1)
+
+
+@pytest.fixture(scope="module")
+def recordings(rod):
+    return [rod.record([], theta, stream(1, "noise", 40 + k)) for k, theta in enumerate(THETAS)]
+
+
+@pytest.fixture(scope="module")
+def run_path(tmp_path_factory, go):
+    out = tmp_path_factory.mktemp("film")
+    assert go(out, "--movements", 40, "--evaluate_at", "35", "--repeats", 0) == 0
+    return out / "sgim-d" / "seed-003"
+
+
+def decoded(path, height, width):
+    """The pictures of a film, and what the decoder says about it."""
+    command = [get_ffmpeg_exe(), "-i", str(path), "-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
+    ended = subprocess.run(command, capture_output=True, check=True)
+    return np.frombuffer(ended.stdout, np.uint8).reshape(-1, height, width, 3).astype(int), ended.stderr.decode()
+
+
+def positions_along(recording, times):
+    return np.stack([recording.float_at(time) for time in times])
+
+
+def test_a_recorded_movement_lands_where_the_executed_one_does(rod, recordings):
+    for k, (theta, recording) in enumerate(zip(THETAS, recordings, strict=True)):
+        np.testing.assert_array_equal(recording.outcome, rod.execute([], theta, stream(1, "noise", 40 + k)))
+
+
+def test_a_recorded_movement_meets_its_context():
+    rod = FishingRod(max_yaw=1.0, max_wind=0.05)
+    for k, theta in enumerate(THETAS[:8]):
+        context = rod.contexts.sample(stream(2, "context", k))
+        recording = rod.record(context, theta, stream(1, "noise", k))
+        np.testing.assert_array_equal(recording.outcome, rod.execute(context, theta, stream(1, "noise", k)))
+        before = recording.float_at(recording.landed - 1e-9)
+        np.testing.assert_allclose(before, [*recording.outcome, 0.0], atol=1e-7)  # at less than 100 m/s
+
+
+def test_the_float_comes_down_to_its_landing_point_without_a_jump(recordings):
+    assert {recording.let_out is None for recording in recordings} == {True, False}  # both ways of landing
+    for recording in recordings:
+        before = recording.float_at(recording.landed - 1e-9)
+        np.testing.assert_allclose(before, [*recording.outcome, 0.0], atol=1e-7)
+        np.testing.assert_array_equal(recording.float_at(recording.landed + 1), [*recording.outcome, 0.0])
+        earlier = positions_along(recording, np.linspace(0, recording.landed, 50)[:-1])
+        assert (earlier[:, 2] > 0).all()
+
+
+def test_the_line_is_let_out_when_the_posture_has_been_held(rod, recordings):
+    for theta, recording in zip(THETAS, recordings, strict=True):
+        if recording.let_out is None:
+            assert recording.landed <= rod.primitive.duration(theta) + HOLD
+        else:
+            assert recording.let_out == rod.primitive.duration(theta) + HOLD
+
+
+def test_a_float_let_out_falls_freely_and_leaves_without_a_jump(recordings):
+    recording = next(r for r in recordings if r.let_out is not None and r.landed > r.let_out + 0.1)
+    free = positions_along(recording, recording.let_out + 0.01 * np.arange(1, 10))
+    np.testing.assert_allclose(np.diff(free, 2, axis=0) / 0.01**2, np.tile([0, 0, -9.81], (7, 1)), atol=1e-6)
+    around = positions_along(recording, [recording.let_out - 1e-9, recording.let_out + 1e-9])
+    np.testing.assert_allclose(around[0], around[1], atol=1e-6)
+
+
+def test_states_and_floats_of_a_recording_belong_together_and_the_line_bends(rod, recordings):
+    data, bent = mujoco.MjData(rod.model), []
+    recording = recordings[0]
+    assert len(recording.states) == len(recording.floats) == np.ceil(recording.landed / recording.step) + 1
+    for state, seen in zip(recording.states[::10], recording.floats[::10], strict=True):
+        mujoco.mj_setState(rod.model, data, state, mujoco.mjtState.mjSTATE_FULLPHYSICS)
+        mujoco.mj_forward(rod.model, data)
+        np.testing.assert_allclose(data.site("float").xpos, seen[:3], atol=1e-12)
+        tip, middle = data.site("tip").xpos, data.body("line_16").xpos
+        bent.append(np.linalg.norm(middle - (tip + seen[:3]) / 2))
+    assert max(bent) > 0.02  # m off the straight line
+
+
+def test_a_film_lasts_until_the_last_float_has_landed_and_a_pause(recordings):
+    early, late = sorted(recordings[:2], key=lambda recording: recording.landed)
+    scenes = [[Shot(early, np.zeros(2)), Shot(late, np.zeros(2))], [Shot(early, np.zeros(2))]]
+    assert count_frames(scenes) == sum(np.ceil((r.landed + PAUSE) * RATE) for r in (late, early))
+
+
+def test_the_caption_says_when_the_line_is_let_out_and_how_far_the_goal_was_missed(recordings):
+    recording = next(r for r in recordings if r.let_out is not None)
+    shot = Shot(recording, recording.outcome + np.array([0.03, 0.04]))
+    assert shot.missed == pytest.approx(0.05)
+    assert "let out" not in shot.caption(recording.let_out)
+    assert "line let out" in shot.caption((recording.let_out + recording.landed) / 2)
+    assert shot.caption(recording.landed).endswith("missed by 5 cm")
+
+
+def test_tiles_stand_row_by_row():
+    image = tiled([np.full((2, 4, 3), k + 1, np.uint8) for k in range(3)], 2)
+    np.testing.assert_array_equal(image[::2, ::4, 0], [[1, 2], [3, 0]])
+
+
+def test_a_film_holds_every_frame_in_a_format_that_all_players_know(tmp_path):
+    write_film(tmp_path / "film.mp4", iter(FRAMES))
+    pictures, about = decoded(tmp_path / "film.mp4", 48, 64)
+    assert pictures.mean(axis=(1, 2, 3)) == pytest.approx([frame.mean() for frame in FRAMES], abs=3)  # it is lossy
+    for words in ("Video: h264", "yuv420p", "64x48", f"{RATE} fps"):
+        assert words in about
+    write_sheet(tmp_path / "sheet.png", FRAMES[:4], columns=2, width=32)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["film.mp4", "sheet.png"]
+
+
+def test_an_interrupted_film_leaves_the_old_one_and_nothing_else(tmp_path):
+    def interrupted():
+        yield from FRAMES
+        raise KeyboardInterrupt
+
+    (tmp_path / "film.mp4").write_text("old")
+    with pytest.raises(KeyboardInterrupt):
+        write_film(tmp_path / "film.mp4", interrupted())
+    with pytest.raises(OSError, match="not encoded"):
+        write_film(tmp_path / "film.mp4", [np.zeros((47, 63, 3), np.uint8)])  # odd
+    assert [path.read_text() for path in tmp_path.iterdir()] == ["old"]
+
+
+@pytest.mark.parametrize("algorithm", ["sgim-d", "observation"])
+def test_the_memory_rebuilt_from_the_log_judges_as_the_living_one_did(tmp_path, go, algorithm):
+    assert go(tmp_path, "--algorithm", algorithm, "--movements", 40, "--evaluate_at", "35", "--repeats", 0) == 0
+    run = read_run(tmp_path / algorithm / "seed-003")
+    parts = build(film.config_of(run))
+    assert (run.demonstration[:35] >= 0).any()
+    film.remember(run, parts, 0, 20)
+    film.remember(run, parts, 20, 35)  # in two steps, as a time lapse does
+    seen = evaluate(parts.inverse, parts.environment, parts.benchmark.goals, 3, 35, repeats=0)
+    assert seen.mean_error == run.evaluation["mean_error_m"][0]
+
+
+def test_a_forward_model_learns_again_what_it_learnt_in_the_run(tmp_path, go):
+    assert go(tmp_path, "--inverse", "model", "--movements", 150, "--evaluate_at", "[]") == 0
+    run = read_run(tmp_path / "sgim-d" / "seed-003")
+    parts = build(film.config_of(run))
+    film.remember(run, parts, 0, 60)
+    film.remember(run, parts, 60, 150)
+    errors = [line.split(",")[4] for line in (run.path / "refreshes.csv").read_text().splitlines()]
+    assert errors[-1] == repr(parts.model.relative_error)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ("--goals 0.3", "must be x,y in metres such as 0.3,0.6, got '0.3'"),
+        ("--goals -0.3,far", "got '-0.3,far'"),
+        ("--goals 0.3,0.6 -30,60", "outside"),
+        ("--goals nan,0", "must be finite"),
+        ("--after 20", "belongs to --time-lapse"),
+        ("--time-lapse --after 0,20", "whole numbers above 0"),
+        ("--time-lapse --after 41", "must be at most 40"),
+        ("--out film.avi", "must be a .mp4 file"),
+        ("--out nowhere/film.mp4", "in a folder that exists"),
+        ("--sheet sheet.jpg", "must be a .png file"),
+        ("--width 100", "from 160 to 1280"),
+    ],
+)
+def test_what_cannot_be_filmed_is_refused_with_its_reason(run_path, capsys, options, message):
+    before = sorted(run_path.parent.iterdir())
+    try:
+        code = film.main([str(run_path), *options.split()])
+    except SystemExit as end:
+        code = end.code
+    assert code == 2
+    assert message in capsys.readouterr().err
+    assert sorted(run_path.parent.iterdir()) == before
+
+
+def test_a_run_without_movements_is_refused(run_path, tmp_path, capsys):
+    empty = tmp_path / "seed-000"
+    empty.mkdir()
+    assert film.main([str(empty)]) == 2
+    (empty / "config.json").write_bytes((run_path / "config.json").read_bytes())
+    assert film.main([str(empty)]) == 2
+    said = capsys.readouterr().err
+    assert "is no run directory" in said
+    assert "has no movements yet" in said
+
+
+def filmed(run_path, out, gl, *options):
+    command = [sys.executable, str(ROOT / "experiments" / "film.py"), str(run_path), "--goals", "0.2,0.5"]
+    process = subprocess.run(
+        [*command, "--width", "320", "--out", str(out / "film.mp4"), *options],
+        env={**os.environ, "PYTHONPATH": str(ROOT), "MUJOCO_GL": gl},
+        cwd=out,
+        capture_output=True,
+        text=True,
+    )
+    return process.returncode, process.stdout, process.stderr
+
+
+def test_a_film_is_made_without_a_display_or_the_lack_of_opengl_is_explained(run_path, tmp_path):
+    code, said, errors = filmed(run_path, tmp_path, "egl", "--sheet", "sheet.png")
+    assert "Traceback" not in errors
+    if code:  # a machine without EGL
+        assert code == 2
+        assert "MUJOCO_GL" in errors
+        assert not list(tmp_path.glob("*.mp4")) + list(tmp_path.glob("*.png"))
+        return
+    assert "after 40 movements" in said
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["film.mp4", "sheet.png"]
+    pictures, _ = decoded(tmp_path / "film.mp4", 240, 320)
+    red = (pictures[..., 0] - pictures[..., 1] > 60).sum(axis=(1, 2))
+    assert 0 < red[0] < red[-1]  # the float, then also the path that it has taken
+    assert np.abs(pictures[-1] - pictures[-10]).mean() < 2  # the landing stands still
+    assert np.abs(pictures[-1] - pictures[0]).max() > 100  # and is not where it began
+
+
+@pytest.mark.parametrize("gl", ["disable", "bogus"])
+def test_without_opengl_the_error_says_what_to_set(run_path, tmp_path, gl):
+    code, said, errors = filmed(run_path, tmp_path, gl)
+    assert code == 2
+    assert f"MUJOCO_GL={gl}" in errors
+    assert "set MUJOCO_GL=egl" in errors
+    assert "Traceback" not in errors
+    assert not said
+    assert not list(Path(tmp_path).iterdir())
+
+
+def test_the_handlers_of_signals_are_put_back(run_path):
+    before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
+    film.main([str(run_path), "--goals", "30,0"])
+    assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before
+
+
+def test_the_help_teaches(capsys):
+    with pytest.raises(SystemExit):
+        film.main(["--help"])
+    said = capsys.readouterr().out
+    assert "--time-lapse" in said
+    assert "scripts/film runs/sgim-d/seed-003 --goals 0.3,0.6" in said

@@ -1,0 +1,158 @@
+"""scripts/watch: a real TensorBoard over a real run says what the files of the run say; bad requests are answered."""
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import urllib.parse
+import urllib.request
+
+import numpy as np
+import pytest
+
+from runs import ROOT
+from sgimd_torch.runs.read import read_run
+from sgimd_torch.views.watch import boards_below, free_port, main
+
+DIRECT = urllib.request.build_opener(urllib.request.ProxyHandler({}))
+RUN = "sgim-d/seed-003"
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory, go):
+    out = tmp_path_factory.mktemp("runs")
+    assert go(out, "--movements", 300, "--evaluate_at", "100,200", "--board", "true") == 0
+    return out
+
+
+def watching(runs, port):
+    command = [sys.executable, str(ROOT / "experiments" / "watch.py"), str(runs), "--port", str(port)]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    return subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+@pytest.fixture(scope="module")
+def server(runs):
+    """The process, what it said first, and a function that asks it."""
+    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
+    port = free_port(7100 + 50 * worker)  # between asking and binding another worker could take the same
+    with watching(runs, port) as process:
+        timer = threading.Timer(120, process.kill)
+        timer.start()
+        try:
+            said = "".join(process.stdout.readline() for _ in range(4))
+            address = f"http://127.0.0.1:{port}"
+            assert address in said, process.stderr.read()
+
+            def ask(path, **query):
+                with DIRECT.open(f"{address}/data/plugin/{path}?{urllib.parse.urlencode(query)}", timeout=30) as reply:
+                    return json.load(reply)
+
+            yield process, said, ask
+        finally:
+            process.terminate()  # a kill would leave TensorBoard behind
+            process.wait()
+            timer.cancel()
+
+
+def test_whoever_terminates_it_ends_tensorboard_too(runs):
+    port = free_port(8000)
+    with watching(runs, port) as process:
+        while "http" not in process.stdout.readline():
+            assert process.poll() is None
+        process.terminate()
+        assert process.wait(timeout=30) == 143
+    with pytest.raises(OSError, match="refused"):
+        DIRECT.open(f"http://127.0.0.1:{port}", timeout=5)
+
+
+def curve(ask, tag):
+    points = ask("scalars/scalars", run=RUN, tag=tag)
+    return {int(step): value for _, step, value in points}
+
+
+def test_the_server_has_every_evaluation_of_the_run(server, runs):
+    _, _, ask = server
+    evaluation = read_run(runs / RUN).evaluation
+    for tag, column in {
+        "error/mean": "mean_error_m",
+        "error/median": "median_error_m",
+        "error/p90": "p90_error_m",
+        "error/noise_floor": "noise_floor_m",
+    }.items():
+        expected = dict(zip(evaluation["movements"].astype(int), evaluation[column], strict=True))
+        assert curve(ask, tag) == pytest.approx(expected, rel=1e-6)
+
+
+def test_the_server_has_the_regions_of_the_run(server, runs):
+    _, _, ask = server
+    regions = read_run(runs / RUN).regions
+    for movements in (100, 200, 300):
+        now = {name: column[regions["movements"] == movements] for name, column in regions.items()}
+        assert curve(ask, "regions/count")[movements] == len(now["path"])
+        for path in {name[:length] for name in now["path"] for length in (1, 2, 3)}:
+            below = np.char.startswith(now["path"], path)
+            competences, interests, goals = (now[name][below] for name in ("competence", "interest", "goals"))
+            competence, interest = (np.nansum(values * goals) / goals.sum() for values in (competences, interests))
+            assert curve(ask, f"competence/{path}")[movements] == pytest.approx(competence, rel=1e-5)
+            assert curve(ask, f"interest/{path}")[movements] == pytest.approx(interest, rel=1e-5)
+            assert curve(ask, f"region_goals/{path}")[movements] == now["attempts"][below].sum()
+
+
+def test_the_server_has_what_the_log_says_about_regimes_and_demonstrations(server, runs):
+    _, _, ask = server
+    run = read_run(runs / RUN)
+    shown = curve(ask, "teacher/demonstrations")
+    assert shown == {step: (run.demonstration[:step] >= 0).sum() for step in range(50, 301, 50)}
+    for origin in ("global", "local", "imitate"):
+        shares = curve(ask, f"regime/{origin}")
+        assert shares == pytest.approx({step: (run.origin[step - 50 : step] == origin).mean() for step in shares})
+        assert max(shares) == 300
+
+
+def test_the_server_explains_its_curves_and_shows_pictures_and_the_page_of_charts(server):
+    _, _, ask = server
+    tags = ask("scalars/tags")[RUN]
+    assert all(tag["description"] for tag in tags.values())
+    assert len(tags) < 140
+    pictures = ask("images/tags")[RUN]
+    assert pictures.keys() == {"map/competence", "map/interest", "map/landed", "map/error"}
+    (page,) = [page for page in [ask("custom_scalars/layout")] if page]
+    assert len(page["category"]) == 4
+
+
+def test_ctrl_c_ends_it_without_a_traceback(server):
+    process, said, _ = server
+    assert "custom_scalars" in said
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=30)
+    assert process.returncode == 130
+    assert "Traceback" not in errors
+
+
+def test_a_port_that_is_taken_is_passed_over():
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        assert free_port(taken.getsockname()[1]) > taken.getsockname()[1]
+
+
+@pytest.mark.parametrize(("options", "says"), [(["--port", "0"], "1 to 65535"), (["--prot", "1"], "--prot")])
+def test_an_option_that_cannot_be_is_refused(runs, capsys, options, says):
+    assert main([str(runs), *options]) == 2
+    assert says in capsys.readouterr().err
+
+
+def test_runs_without_a_board_are_told_how_to_get_one(tmp_path, go, capsys):
+    assert go(tmp_path) == 0
+    assert main([str(tmp_path)]) == 2
+    assert "--board true" in capsys.readouterr().err
+    assert main([str(tmp_path / "nowhere")]) == 2
+    assert "no directory" in capsys.readouterr().err
+
+
+def test_boards_are_counted_by_run(runs):
+    assert boards_below(runs) == boards_below(runs / RUN) == 1
