@@ -36,7 +36,6 @@ from judgements import FAILS, HOLDS, OPEN, Judged, Row, at_least, at_most, below
 from pages import count_verdicts, markdown, read_page, verdicts_table, write_page
 from read_results import LAST, Evaluated, ResultsError, read_results
 from sgimd_torch.runs.process import telling_errors, with_streams
-from sgimd_torch.runs.tasks import ARMS
 from sgimd_torch.spaces import Array
 from sgimd_torch.views.statistics import (
     difference_interval,
@@ -47,7 +46,7 @@ from sgimd_torch.views.statistics import (
     movements_to_reach,
     ratio_interval,
 )
-from variants import EXPERIMENTS
+from variants import ARMS, EXPERIMENTS
 
 SIMPLEX: Final = "sgim-d"  # with Nelder & Mead's simplex and no model, what everything is measured against
 JUDGED: Final = ("model", "gradient")
