@@ -14,7 +14,7 @@ from typing import TypedDict, Unpack
 import numpy as np
 
 from sgimd_torch.competence import AttemptCompetence, Competence, Performance, performance
-from sgimd_torch.environments.protocol import Environment
+from sgimd_torch.environments.protocol import Environment, check_rest
 from sgimd_torch.goals.interest_map import Goals, InterestMap
 from sgimd_torch.inverses.locally_linear import LocallyLinear
 from sgimd_torch.learner import Learner
@@ -169,4 +169,5 @@ def goal_babbling(
 
 
 def _memory(environment: Environment) -> Memory:
+    check_rest(environment)
     return Memory(environment.contexts.dim, environment.policies.dim, environment.outcomes.dim)

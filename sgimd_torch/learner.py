@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sgimd_torch.memory import Memory
-from sgimd_torch.spaces import Array, Attempt, Demonstration, Move, check_vector
+from sgimd_torch.spaces import Array, Attempt, Demonstration, Move, check_point, read_only
 from sgimd_torch.strategies import SocialStrategy, Strategy
 
 
@@ -76,10 +76,11 @@ class Learner:
             RuntimeError: the last movement's outcome has not been told, or the context changed while not ``idle``.
             ValueError: a context of another shape, or not finite.
         """
-        context = check_vector("context", context, self.memory.contexts.shape[1])
+        context = check_point("context", context, self.memory.context_dim)
         if self._asked:
             raise RuntimeError("ask() again needs the outcome of the last movement; was tell() forgotten?")
         if self._attempt is None:
+            context = read_only(context)
             self._begin(self.autonomous.attempt(context), context)
             if self._attempt is None:
                 raise RuntimeError(f"{type(self.autonomous).__name__}.attempt() has to yield at least once")
@@ -99,16 +100,15 @@ class Learner:
 
         Raises:
             RuntimeError: no movement was asked for.
-            ValueError: an outcome of another shape, or not finite; nothing is remembered and the learner still waits.
+            ValueError: an outcome of another shape, not finite or beyond 1e100; nothing is remembered and the learner
+                still waits.
         """
         if not self._asked or self._attempt is None or self._move is None:
             raise RuntimeError("tell() needs the outcome of a movement, but ask() has not proposed one")
-        hint = f"theta was {self._move.theta.tolist()}"
-        outcome = check_vector("outcome", outcome, self.memory.outcomes.shape[1], hint)
         self.memory.add(self._context, self._move.theta, outcome)
         self._asked = False
         try:
-            self._move = self._attempt.send(outcome)
+            self._move = self._attempt.send(self.memory.outcomes[-1])
         except StopIteration:
             self._attempt = self._move = None
 
@@ -123,9 +123,10 @@ class Learner:
             raise RuntimeError("this learner has no social strategy, so there is nothing to teach it")
         if self._asked:
             raise RuntimeError("watch() needs the outcome of the last movement first; was tell() forgotten?")
-        context = check_vector("context of the demonstration", demonstration.context, self.memory.contexts.shape[1])
-        check_vector("outcome of the demonstration", demonstration.outcome, self.memory.outcomes.shape[1])
+        context = check_point("context of the demonstration", demonstration.context, self.memory.context_dim)
+        check_point("outcome of the demonstration", demonstration.outcome, self.memory.outcome_dim)
         theta_d = self.correspondence(demonstration.times, demonstration.trajectory)
+        theta_d = check_point("theta_d of the correspondence", theta_d, self.memory.theta_dim)
         self.interrupt()
         self._begin(self.social.attempt(context, theta_d, demonstration), context)
 
@@ -137,7 +138,7 @@ class Learner:
         self._asked = False
 
     def _begin(self, attempt: Attempt, context: Array) -> None:
-        self._context = context.copy()
+        self._context = context
         try:
             self._attempt, self._move = attempt, next(attempt)
         except StopIteration:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sgimd_torch.files import read_npz, write_npz
-from sgimd_torch.spaces import Array, check_vector
+from sgimd_torch.spaces import Array, check_point, check_vector
 
 Rows = NDArray[np.int64]
 
@@ -76,12 +76,12 @@ class Memory:
         """Remember one exemplar: ``(context_dim,)``, ``(theta_dim,)``, ``(outcome_dim,)``.
 
         Raises:
-            ValueError: a wrong shape, or a value that is not finite; nothing is remembered then.
+            ValueError: a wrong shape, or a value that is not finite or beyond 1e100; nothing is remembered then.
         """
-        context = _one("context", context, self.context_dim, _NO_CONTEXT)
-        theta = _one("theta", theta, self.theta_dim, "was a goal passed instead?")
+        context = check_point("context", context, self.context_dim, _NO_CONTEXT)
+        theta = check_point("theta", theta, self.theta_dim, "was a goal passed instead?")
         try:
-            outcome = _one("outcome", outcome, self.outcome_dim, "did the simulation diverge, or is it a theta?")
+            outcome = check_point("outcome", outcome, self.outcome_dim, "did the simulation diverge, or is it a theta?")
         except ValueError as error:
             raise ValueError(f"{error}; its theta was {theta.tolist()}") from None
         self._append(context[None], theta[None], outcome[None])
@@ -89,12 +89,12 @@ class Memory:
     def near_outcomes(self, context: ArrayLike, goal: ArrayLike, k: int) -> Rows:
         """``(min(k, n),)`` rows whose outcomes lie nearest ``goal`` ``(outcome_dim,)``, nearest first, older first
         among equals."""
-        goal = _one("goal", goal, self.outcome_dim, "was a theta passed instead?")
+        goal = check_point("goal", goal, self.outcome_dim, "was a theta passed instead?")
         return self._outcome_side.nearest(self._key(context, goal)[None], k)[0]
 
     def near_policies(self, context: ArrayLike, theta: ArrayLike, k: int, within: float = np.inf) -> Rows:
         """At most ``k`` rows whose thetas lie nearest ``theta`` ``(theta_dim,)`` and not farther than ``within``."""
-        theta = _one("theta", theta, self.theta_dim, "was a goal passed instead?")
+        theta = check_point("theta", theta, self.theta_dim, "was a goal passed instead?")
         return self._policy_side.nearest(self._key(context, theta)[None], k, within)[0]
 
     def neighbourhoods(self, rows: Rows, k: int, within: float = np.inf) -> list[Rows]:
@@ -128,7 +128,7 @@ class Memory:
         self._policy_side.append(np.concatenate((weighted, thetas), axis=1))
 
     def _key(self, context: ArrayLike, point: Array) -> Array:
-        context = _one("context", context, self.context_dim, _NO_CONTEXT)
+        context = check_point("context", context, self.context_dim, _NO_CONTEXT)
         return np.concatenate((self.context_weight * context, point))
 
 
@@ -199,13 +199,6 @@ def _squared_distances(points: Array, query: Array) -> Array:
 
 def _read_only(array: Array) -> Array:
     array.flags.writeable = False
-    return array
-
-
-def _one(name: str, value: ArrayLike, dim: int, hint: str) -> Array:
-    array = check_vector(name, value, dim, hint)
-    if array.ndim != 1:
-        raise ValueError(f"{name} must have shape ({dim},), got {array.shape}; one exemplar or goal at a time")
     return array
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.learner import Learner
-from sgimd_torch.spaces import Array, Episode, check_count, stream
+from sgimd_torch.spaces import Array, Episode, check_count, read_only, stream
 from sgimd_torch.teachers import Teacher
 
 Execute = Callable[[int, Array, Array], Array]
@@ -70,7 +70,7 @@ def run(
         demonstration = teacher.offer(index, learner.memory) if teacher is not None else None
         if demonstration is not None:
             learner.watch(demonstration)
-        context = environment.observe(stream(seed, "context", index)) if learner.idle else learner.context
+        context = read_only(environment.observe(stream(seed, "context", index))) if learner.idle else learner.context
         move, outcome = learner.ask(context), None
         if move is not None:
             outcome = execute(index, context, move.theta)
@@ -82,7 +82,8 @@ def live(environment: Environment, seed: int) -> Execute:
     """Execute in ``environment``, movement i with the noise of stream i."""
 
     def execute(index: int, context: Array, theta: Array) -> Array:
-        return environment.execute(context, theta, stream(seed, "environment", index))
+        # Copies, which the environment may write into: the records stay as they are.
+        return environment.execute(context.copy(), theta.copy(), stream(seed, "environment", index))
 
     return execute
 

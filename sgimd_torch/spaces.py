@@ -9,12 +9,14 @@ from __future__ import annotations
 import reprlib
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
+
+_LARGEST: Final = 1e100  # squared distances between numbers up to here do not overflow
 
 
 def stream(seed: int, name: str, index: int | None = None) -> np.random.Generator:
@@ -26,29 +28,46 @@ def stream(seed: int, name: str, index: int | None = None) -> np.random.Generato
         index: one stream for each movement, say; None for a single stream.
 
     Raises:
-        ValueError: the seed is negative.
+        ValueError: the seed or the index is not a whole number >= 0.
     """
-    if seed < 0:
-        raise ValueError(f"seed must be >= 0, got {seed}")
-    key = tuple(name.encode()) + (() if index is None else (256, index))  # 256: no byte of a name
-    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=key))
+    # 256 separates the index from the name: no byte is that large.
+    key = tuple(name.encode()) + (() if index is None else (256, check_count("index", index, 0)))
+    return np.random.default_rng(np.random.SeedSequence(check_count("seed", seed, 0), spawn_key=key))
 
 
 def check_vector(name: str, value: ArrayLike, dim: int, hint: str = "") -> Array:
-    """``value`` as float64 of shape ``(..., dim)``, every entry finite.
+    """``value`` as float64 of shape ``(..., dim)``, every entry finite and at most 1e100 in size.
 
     Raises:
-        ValueError: it is not numeric, has another last axis, or holds NaN or infinity.
+        ValueError: it does not hold real numbers (but text, truth values, dates, a mask ...), has another last axis, or
+            an entry is NaN, infinite or so large that its square may overflow.
     """
     slip = f"; {hint}" if hint else ""
     try:
-        array = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{name} must be numeric of shape (..., {dim}), got {_short(value)}{slip}") from error
+        array = np.asarray(value)
+    except ValueError as error:
+        raise ValueError(f"{name} must be real numbers of shape (..., {dim}), got {_short(value)}{slip}") from error
+    if array.dtype.kind not in "fiu" or isinstance(value, np.ma.MaskedArray):
+        kind = "a masked array" if isinstance(value, np.ma.MaskedArray) else array.dtype
+        raise ValueError(f"{name} must be real numbers of shape (..., {dim}), got {kind} {_short(value)}{slip}")
     if array.ndim == 0 or array.shape[-1] != dim:
         raise ValueError(f"{name} must have shape (..., {dim}), got {array.shape}{slip}")
-    if not np.isfinite(array).all():
-        raise ValueError(f"{name} must be finite, but {first_entry(array, ~np.isfinite(array))}{slip}")
+    array = array.astype(np.float64, copy=False)
+    usable = np.abs(array) <= _LARGEST  # NaN is not
+    if not usable.all():
+        raise ValueError(f"{name} must be finite, {_LARGEST:g} at most, but {first_entry(array, ~usable)}{slip}")
+    return array
+
+
+def check_point(name: str, value: ArrayLike, dim: int, hint: str = "") -> Array:
+    """``value`` as float64 of shape ``(dim,)``: one context, theta, goal or outcome.
+
+    Raises:
+        ValueError: as `check_vector`, or there are several.
+    """
+    array = check_vector(name, value, dim, hint)
+    if array.ndim != 1:
+        raise ValueError(f"{name} must have shape ({dim},), got {array.shape}; only one at a time")
     return array
 
 
@@ -56,9 +75,9 @@ def check_count(name: str, value: object, least: int) -> int:
     """``value`` as int, a whole number of at least ``least``; numpy's integers are welcome.
 
     Raises:
-        ValueError: it is not.
+        ValueError: it is not; nor are True and False.
     """
-    if not isinstance(value, int | np.integer) or value < least:
+    if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < least:
         raise ValueError(f"{name} must be a whole number >= {least}, got {_short(value)}")
     return int(value)
 
@@ -142,16 +161,20 @@ class Box:
         return array
 
 
-class Move(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Move:
     """What a strategy wants executed.
 
     ``theta`` is ``(theta_dim,)``; ``goal`` ``(outcome_dim,)`` what it was for, None when babbling; ``origin`` names the
-    regime ("babble", "global", "local", "imitate") for analysis, never for control flow.
+    regime ("babble", "global", "local", "imitate") for analysis, never for control flow. Arrays are read-only copies.
     """
 
     theta: Array
     goal: Array | None
     origin: str
+
+    def __post_init__(self) -> None:
+        _own(self, "theta", "goal")
 
 
 class Estimate(NamedTuple):
@@ -168,24 +191,45 @@ class Estimate(NamedTuple):
 @dataclass(frozen=True, eq=False)
 class Demonstration:
     """(c_d, zeta_d, tau_d): ``context`` ``(context_dim,)``; ``trajectory`` ``(n_times, n_joints)`` rad at ``times``
-    ``(n_times,)`` s; ``outcome`` ``(outcome_dim,)`` m, where the float landed."""
+    ``(n_times,)`` s; ``outcome`` ``(outcome_dim,)`` m, where the float landed. All are read-only copies."""
 
     context: Array
     times: Array
     trajectory: Array
     outcome: Array
 
+    def __post_init__(self) -> None:
+        _own(self, "context", "times", "trajectory", "outcome")
+
 
 @dataclass(frozen=True, eq=False)
 class Episode:
     """[context][policy][outcome] and why it happened. ``move`` and ``outcome`` are None when the learner rested;
-    ``demonstration`` is what the teacher showed just before, if anything."""
+    ``demonstration`` is what the teacher showed just before, if anything. Arrays are read-only copies."""
 
     index: int
     context: Array
     move: Move | None
     outcome: Array | None
     demonstration: Demonstration | None
+
+    def __post_init__(self) -> None:
+        _own(self, "context", "outcome")
+
+
+def _own(record: Move | Demonstration | Episode, *names: str) -> None:
+    """Replace the arrays of a new record by read-only copies, so that nobody can change it afterwards."""
+    for name in names:
+        value = getattr(record, name)
+        if value is not None:
+            object.__setattr__(record, name, read_only(value))
+
+
+def read_only(value: ArrayLike) -> Array:
+    """A copy that cannot be written into."""
+    array = np.array(value)
+    array.flags.writeable = False
+    return array
 
 
 Attempt = Generator[Move | None, Array, None]

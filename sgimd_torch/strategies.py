@@ -16,7 +16,7 @@ import numpy as np
 from sgimd_torch.competence import Competence
 from sgimd_torch.goals.interest_map import Goals
 from sgimd_torch.memory import Memory
-from sgimd_torch.spaces import Array, Attempt, Box, Demonstration, Estimate, Move, Search
+from sgimd_torch.spaces import Array, Attempt, Box, Demonstration, Estimate, Move, Search, check_count
 
 Judge = Callable[[Array, Array, Array], float]
 """(context, goal, outcomes of the attempt) -> the competence to remember for the goal, in [-1, 0]."""
@@ -76,6 +76,9 @@ class GoalBabbling:
         give_up: a goal whose competence is below this is given up at the first movement that brings it no nearer.
             Deviation: the paper spends the whole budget on it. But in a task space far larger than what can be reached
             nearly all goals are hopeless, and movements spent on them are lost; -1 never gives up.
+
+    Raises:
+        ValueError: a number out of its range.
     """
 
     def __init__(
@@ -94,8 +97,10 @@ class GoalBabbling:
         global_range: tuple[float, float] = (0.05, 0.95),
         give_up: float = -0.5,
     ) -> None:
-        if budget < 1:
-            raise ValueError(f"budget must be at least one movement for each goal, got {budget}")
+        if not 0 <= tolerance < np.inf:
+            raise ValueError(f"tolerance must be a distance (m), finite and >= 0, got {tolerance}")
+        if not 0 <= global_range[0] <= global_range[1] <= 1:
+            raise ValueError(f"global_range must be two probabilities, the least first, got {global_range}")
         self.policies = policies
         self.memory = memory
         self.goals = goals
@@ -104,7 +109,7 @@ class GoalBabbling:
         self.competence = competence
         self.judge = judge
         self.rng = rng
-        self.budget = budget
+        self.budget = check_count("budget", budget, 1)
         self.tolerance = tolerance
         self.global_range = global_range
         self.give_up = give_up

@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 
 from sgimd_torch.memory import Memory
-from sgimd_torch.spaces import Demonstration, check_count
+from sgimd_torch.spaces import Demonstration, check_count, check_vector
 
 
 class Teacher(Protocol):
@@ -41,7 +41,8 @@ def least_explored(
     Args:
         tiles: in each dimension of the box around the demonstrated outcomes.
     """
-    demonstrated = np.stack([demonstration.outcome for demonstration in demonstrations])
+    shown = [demonstration.outcome for demonstration in demonstrations]
+    demonstrated = check_vector("outcomes of the demonstrations", shown, memory.outcome_dim, "of another robot?")
     low, high = demonstrated.min(axis=0), demonstrated.max(axis=0)
     side = np.maximum(high - low, 1e-9) / tiles  # demonstrations on a line span no box across it
 
@@ -140,4 +141,8 @@ class AskedTeacher:
 def _some(demonstrations: Sequence[Demonstration]) -> Sequence[Demonstration]:
     if not demonstrations:
         raise ValueError("a teacher needs at least one demonstration; use no teacher to learn alone")
+    shapes = {(np.shape(shown.context), np.shape(shown.outcome)) for shown in demonstrations}
+    if len(shapes) > 1 or any(len(shape) != 1 for pair in shapes for shape in pair):
+        wanted = "contexts (context_dim,) and outcomes (outcome_dim,), all alike"
+        raise ValueError(f"demonstrations must have {wanted}, got {sorted(shapes)}; of two robots?")
     return demonstrations

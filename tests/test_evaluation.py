@@ -256,7 +256,7 @@ def test_a_benchmark_file_cut_short_or_corrupt_is_refused(tmp_path: Path) -> Non
         ({"goals": np.zeros((0, 2))}, "n > 0"),
         ({"goals": np.zeros(2)}, "n > 0"),
         ({"goals": np.full((2, 2), np.nan)}, "finite"),
-        ({"goals": np.full((2, 2), "far")}, "numeric"),
+        ({"goals": np.full((2, 2), "far")}, "real numbers"),
         ({"goals": np.full((2, 2), None)}, "no benchmark"),
         ({"side": np.array(0.0)}, "side"),
         ({"side": np.array(np.nan)}, "side"),

@@ -87,7 +87,13 @@ def test_ask_and_tell_alternate() -> None:
     assert len(robot.memory) == 1
 
 
-@pytest.mark.parametrize("outcome", [[np.nan, 0.0], [np.inf, 0.0], [0.0], [0.0, 0.0, 0.0], "far", None, [[0.0, 0.0]]])
+@pytest.mark.parametrize(
+    "outcome",
+    [
+        *([np.nan, 0.0], [np.inf, 0.0], [0.0], [0.0, 0.0, 0.0], "far", None, [[0.0, 0.0]]),
+        *([1e300, 0.0], [0.0, -1e101], [1j, 0.0], [True, False], ["0", "1"]),
+    ],
+)
 def test_an_outcome_that_is_none_changes_nothing_and_is_still_waited_for(outcome: object) -> None:
     pursuit = Pursuit()
     robot = learner(pursuit)
@@ -102,12 +108,13 @@ def test_an_outcome_that_is_none_changes_nothing_and_is_still_waited_for(outcome
     assert pursuit.n_ended == 0
 
 
-def test_the_error_of_a_nan_outcome_names_its_theta() -> None:
+@pytest.mark.parametrize("value", [np.nan, 1e300])
+def test_the_error_of_an_outcome_that_cannot_be_names_its_theta(value: float) -> None:
     robot = learner(Pursuit())
     step(robot)
     robot.ask(NO_CONTEXT)
-    with pytest.raises(ValueError, match=r"theta was \[0\.1, 0\.1, 0\.1, 0\.1\]"):
-        robot.tell([np.nan, 0.0])
+    with pytest.raises(ValueError, match=r"did the simulation diverge.*theta was \[0\.1, 0\.1, 0\.1, 0\.1\]"):
+        robot.tell([value, 0.0])
 
 
 def test_a_demonstration_interrupts_a_search_after_any_movement() -> None:
@@ -216,6 +223,8 @@ def test_a_demonstration_that_does_not_fit_is_refused_and_interrupts_nothing() -
         Demonstration(np.zeros(1), times, trajectory, outcome),
         Demonstration(NO_CONTEXT, times, trajectory, np.full(2, np.nan)),
         Demonstration(NO_CONTEXT, times, trajectory, np.zeros(3)),
+        Demonstration(NO_CONTEXT, times, trajectory, outcome[None]),
+        Demonstration(np.zeros((2, 0)), times, trajectory, outcome),
     ):
         with pytest.raises(ValueError, match="of the demonstration"):
             robot.watch(bad)
@@ -252,3 +261,43 @@ def test_a_context_is_kept_as_it_was_asked_with() -> None:
 def test_there_is_no_context_to_keep_while_nothing_is_under_way() -> None:
     with pytest.raises(RuntimeError, match="idle"):
         _ = sagg_riac(PlanarArm(4), 0).context
+
+
+def test_what_callers_hand_in_may_change_afterwards() -> None:
+    pursuit = Pursuit(n=2)
+    robot = learner(pursuit, context_dim=1)
+    context, outcome, shown = np.array([0.1]), np.array([0.2, 0.3]), LESSON.outcome.copy()
+    lesson = Demonstration(context, LESSON.times, LESSON.trajectory, shown)
+    step(robot, outcome, context)
+    for array in (context, outcome, shown):
+        array[:] = 9.0
+    assert pursuit.contexts == [np.array([0.1])]
+    assert robot.context.tolist() == [0.1]
+    assert robot.memory.outcomes.tolist() == [[0.2, 0.3]]
+    robot.watch(lesson)
+    move = robot.ask([0.1])
+    assert np.array_equal(move.goal, LESSON.outcome)
+
+
+def test_what_the_learner_hands_out_is_read_only() -> None:
+    robot = learner(Pursuit(), context_dim=1)
+    move = robot.ask([0.1])
+    for array in (move.theta, robot.context):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 9.0
+
+
+@pytest.mark.parametrize("context", [[[0.1]], [[0.1], [0.2]], [True], ["0.1"], [0.1j]])
+def test_a_context_of_another_shape_or_kind_is_refused(context: object) -> None:
+    with pytest.raises(ValueError, match=r"context must .*got"):
+        learner(Pursuit(), context_dim=1).ask(context)
+
+
+def test_a_correspondence_to_another_robots_policies_is_refused_and_interrupts_nothing() -> None:
+    pursuit = Pursuit()
+    imitate = Imitate(ARM.policies, stream(0, "imitate"))
+    robot = Learner(Memory(0, 4, 2), pursuit, social=imitate, correspondence=lambda times, trajectory: np.zeros(5))
+    step(robot)
+    with pytest.raises(ValueError, match=r"theta_d of the correspondence must have shape \(..., 4\), got \(5,\)"):
+        robot.watch(LESSON)
+    assert pursuit.n_ended == 0

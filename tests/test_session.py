@@ -298,3 +298,57 @@ def test_a_life_of_no_movements_or_one_that_begins_after_its_end_is_refused(coun
     arm = PlanarArm(5)
     with pytest.raises(ValueError, match=f"{next(iter(counts))} must be"):
         next(run(sagg_riac(arm, 0), arm, 0, **{"movements": 10} | counts))
+
+
+class CarelessArm(PlanarArm):
+    """Writes into what it was given, and hands out arrays that it goes on using."""
+
+    def __init__(self) -> None:
+        super().__init__(5, context=True)
+        self.seen, self.end = np.zeros(1), np.zeros(2)
+
+    def observe(self, rng: np.random.Generator) -> Array:
+        self.seen[:] = super().observe(rng)
+        return self.seen
+
+    def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
+        self.end[:] = super().execute(context, theta, rng)
+        for array in (context, theta, self.seen):
+            array *= 0
+        return self.end
+
+
+def test_an_environment_may_write_into_what_it_is_given_and_spoils_no_record() -> None:
+    careful, careless = PlanarArm(5, context=True), CarelessArm()
+    first, second = sagg_riac(careful, 0), sagg_riac(careless, 0)
+    episodes = list(run(first, careful, 0, movements=60))
+    assert summary(list(run(second, careless, 0, movements=60))) == summary(episodes)
+    for name in ("contexts", "thetas", "outcomes"):
+        assert np.array_equal(getattr(first.memory, name), getattr(second.memory, name))
+
+
+@every_algorithm
+def test_nothing_that_a_life_hands_out_can_change_what_is_remembered(name: str) -> None:
+    arm = PlanarArm(5)
+    learner, teacher = make(name, arm), teacher_of(arm) if name in TAUGHT else None
+    for episode in run(learner, arm, 0, movements=60, teacher=teacher):
+        records = filter(None, (episode, episode.move, episode.demonstration))
+        for array in [value for record in records for value in vars(record).values() if isinstance(value, np.ndarray)]:
+            with pytest.raises(ValueError, match="read-only"):
+                array[...] = 0
+
+
+@pytest.mark.parametrize("rest", [np.array([2.0, 0.0]), np.array([np.nan, 0.0]), np.zeros(5), np.zeros((1, 2))])
+@every_algorithm
+def test_no_learner_is_built_on_an_environment_whose_rest_is_no_outcome_in_its_task_space(
+    name: str, rest: Array
+) -> None:
+    arm = PlanarArm(5)
+    arm.rest = rest
+    with pytest.raises(ValueError, match="rest of the environment must"):
+        make(name, arm)
+
+
+def test_a_tolerance_that_is_no_number_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"tolerance must .* got nan"):
+        sagg_riac(PlanarArm(5), 0, tolerance=np.nan)

@@ -3,7 +3,16 @@
 import numpy as np
 import pytest
 
-from sgimd_torch.spaces import Box, check_count, check_vector
+from sgimd_torch.spaces import (
+    Box,
+    Demonstration,
+    Episode,
+    Move,
+    check_count,
+    check_point,
+    check_vector,
+    stream,
+)
 
 THETA = np.full(25, 0.5)
 
@@ -44,3 +53,65 @@ def test_a_count_may_be_any_whole_number_that_is_large_enough(value: int):
 @pytest.mark.parametrize("value", [1, -1, 2.0, 2.5, np.float64(3), np.nan, "3", None, np.arange(3)])
 def test_what_is_no_count_is_refused(value: object):
     assert ">= 2, got " in refused(check_count, value, 2)
+
+
+@pytest.mark.parametrize(
+    ("value", "found"),
+    [
+        (THETA + 0j, "complex128"),
+        (["0.5"] * 25, "<U3"),
+        (np.full(25, "2014-05-01", dtype="datetime64[D]"), "datetime64"),
+        (THETA > 0, "bool"),
+        ([True] * 25, "bool"),
+        (np.ma.masked_array(THETA, THETA > 0), "masked"),
+    ],
+)
+def test_a_vector_of_anything_but_real_numbers_is_refused_by_its_type(value: object, found: str):
+    assert found in refused(check_vector, value, 25, "a hint")
+
+
+@pytest.mark.parametrize("value", [[1] * 25, np.ones(25, dtype=np.uint8), np.ones(25, dtype=np.float32), [1.0] * 25])
+def test_a_vector_may_hold_any_real_numbers(value: object):
+    assert check_vector("theta", value, 25).dtype == np.float64
+    assert check_vector("theta", value, 25).tolist() == [1.0] * 25
+
+
+def test_numbers_whose_squares_would_overflow_are_refused():
+    theta = THETA.copy()
+    theta[[2, 5]] = -1e300, 1e101
+    assert "entry [2] is -1e+300 (and 1 more)" in refused(check_vector, theta, 25)
+    assert check_vector("theta", np.full(25, -1e100), 25).tolist() == [-1e100] * 25
+
+
+def test_a_point_is_one_vector_not_several():
+    assert check_point("theta", THETA, 25).shape == (25,)
+    assert "got (2, 25)" in refused(check_point, np.stack([THETA, THETA]), 25)
+    assert "got (1, 25)" in refused(check_point, THETA[None], 25)
+
+
+@pytest.mark.parametrize("value", [True, False, np.True_])
+def test_a_switch_is_no_count(value: object):
+    assert f"got {value!r}" in refused(check_count, value, 0)
+
+
+@pytest.mark.parametrize(("seed", "index"), [(1.5, None), (-1, None), (True, None), ("1", None), (0, 1.5), (0, -1)])
+def test_a_stream_needs_whole_numbers(seed: object, index: object):
+    with pytest.raises(ValueError, match=rf"must be a whole number >= 0, got {index if index else repr(seed)}"):
+        stream(seed, "search", index)
+
+
+def test_a_record_keeps_what_it_was_made_of_and_is_read_only():
+    arrays = [np.full(shape, 0.5) for shape in (1, 3, (3, 2), 2, 2)]
+    demonstration = Demonstration(*arrays[:4])
+    move = Move(arrays[3], arrays[4], "test")
+    records = [demonstration, move, Episode(0, arrays[0], move, arrays[4], demonstration)]
+    for array in arrays:
+        array[:] = 9.0
+    fields = [value for record in records for value in vars(record).values() if isinstance(value, np.ndarray)]
+    assert len(fields) == 8
+    for field in fields:
+        assert (field == 0.5).all()
+        with pytest.raises(ValueError, match="read-only"):
+            field[0] = 9.0
+    assert Move(THETA, None, "babble").goal is None
+    assert Episode(0, THETA, None, None, None).outcome is None

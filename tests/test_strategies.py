@@ -1,5 +1,6 @@
 """Strategies: movements inside Pi, one goal remembered for each attempt however it ends, and what it had gained."""
 
+import re
 from collections.abc import Callable, Generator, Iterator
 from functools import partial
 
@@ -244,9 +245,18 @@ def test_a_search_that_ends_before_the_budget_is_begun_anew_from_what_is_known_b
     assert len(memory) == 25
 
 
-def test_a_budget_of_nothing_is_refused() -> None:
-    with pytest.raises(ValueError, match="budget"):
-        babbling(Memory(0, 5, 2), Diary(), budget=0)
+@pytest.mark.parametrize(
+    "options",
+    [
+        *({"budget": budget} for budget in (0, 1.5, True)),
+        *({"tolerance": tolerance} for tolerance in (np.nan, np.inf, -0.1)),
+        *({"global_range": pair} for pair in ((0.9, 0.1), (-0.1, 0.5), (0.5, 1.1), (np.nan, 0.5))),
+    ],
+)
+def test_numbers_that_goal_babbling_cannot_use_are_refused(options: dict[str, object]) -> None:
+    ((name, value),) = options.items()
+    with pytest.raises(ValueError, match=f"{name} must .*got {re.escape(str(value))}"):
+        babbling(Memory(0, 5, 2), Diary(), **options)
 
 
 def test_imitation_is_exact_first_and_then_varied_by_less_than_epsilon() -> None:

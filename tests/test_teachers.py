@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -202,3 +203,17 @@ def test_a_teacher_without_demonstrations_or_with_no_time_is_refused(make: Calla
     for movements in (0, 1.5):
         with pytest.raises(ValueError, match=f"{word} must be a whole number >= 1, got {movements}"):
             make(LESSONS, stream(0, "teacher"), **{word: movements})
+
+
+@pytest.mark.parametrize("other", [lesson(0.5), lesson(0.1, 0.2, 0.3), lesson()])
+def test_demonstrations_of_another_robot_are_refused_by_name(other: Demonstration) -> None:
+    with pytest.raises(ValueError, match=r"outcomes of the demonstrations must have shape \(..., 2\), got \(9, "):
+        least_explored([other] * 9, reached([0.0, 0.0]), stream(0, "teacher"))
+    with pytest.raises(ValueError, match=r"demonstrations must have contexts .*all alike, got .*\(2,\)"):
+        PeriodicTeacher([LESSONS[0], other], stream(0, "teacher"))
+
+
+@pytest.mark.parametrize("shape", [(1, 2), ()])
+def test_a_demonstration_with_more_or_less_than_one_outcome_is_refused(shape: tuple[int, ...]) -> None:
+    with pytest.raises(ValueError, match="demonstrations must have contexts"):
+        InitialTeacher([replace(LESSONS[0], outcome=np.zeros(shape))], stream(0, "teacher"))

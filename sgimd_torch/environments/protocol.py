@@ -96,8 +96,9 @@ def execute_many(
         ValueError: the numbers of rows differ, or a row lies outside C or Pi.
         SimulationError: a movement has no finite outcome.
     """
-    contexts = environment.contexts.check("contexts", contexts)
-    thetas = environment.policies.check("thetas", thetas, "were goals passed instead?")
+    # Copies, which the environment may write into.
+    contexts = environment.contexts.check("contexts", contexts).copy()
+    thetas = environment.policies.check("thetas", thetas, "were goals passed instead?").copy()
     if not contexts.ndim == thetas.ndim == 2 or not len(contexts) == len(thetas) == len(rngs):
         raise ValueError(f"needs n contexts, thetas, rngs, got {contexts.shape}, {thetas.shape} and {len(rngs)} rngs")
     if len(thetas) == 0:
@@ -118,6 +119,16 @@ def check_movement(environment: Environment, context: ArrayLike, theta: ArrayLik
     if not context.ndim == theta.ndim == 1:
         raise ValueError(f"execute() takes one movement, got {context.shape} and {theta.shape}; is it execute_many()?")
     return context, theta
+
+
+def check_rest(environment: Environment) -> None:
+    """Refuse an environment whose ``rest`` is not one point of T, before a learner is built on it.
+
+    Raises:
+        ValueError: another shape, NaN or infinity, or a point outside T.
+    """
+    if environment.outcomes.check("rest of the environment", environment.rest, "is it a theta?").ndim != 1:
+        raise ValueError(f"rest of the environment must be one outcome, got shape {np.shape(environment.rest)}")
 
 
 def check_rng(rng: object) -> None:

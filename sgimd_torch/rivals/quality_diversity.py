@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sgimd_torch.environments.protocol import Environment
+from sgimd_torch.environments.protocol import Environment, check_rest
 from sgimd_torch.learner import Learner
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, Attempt, Box, Move, check_count, stream
@@ -159,6 +159,7 @@ def _archive(environment: Environment, rng: np.random.Generator, cells: int | No
 
 
 def _learner(environment: Environment, archive: GridArchive, emitters: Sequence[EmitterBase], origin: str) -> Learner:
+    check_rest(environment)
     memory = Memory(environment.contexts.dim, environment.policies.dim, environment.outcomes.dim)
     return Learner(memory, QualityDiversity(environment.policies, archive, emitters, origin))
 

@@ -69,6 +69,26 @@ def test_a_batch_is_executed_at_once_where_the_environment_can():
     assert environment.n_batches == 1
 
 
+class CarelessSlope(Slope):
+    def execute(self, context: Array, theta: Array, rng: np.random.Generator) -> Array:
+        theta *= 2
+        return theta
+
+
+class CarelessFastSlope(CarelessSlope):
+    def execute_many(self, contexts: Array, thetas: Array, rngs: Sequence[np.random.Generator]) -> Array:
+        thetas *= 2
+        return thetas
+
+
+@pytest.mark.parametrize("environment", [CarelessSlope(), CarelessFastSlope()])
+def test_an_environment_that_writes_into_a_batch_leaves_the_callers_arrays_as_they_were(environment):
+    thetas = np.array([[0.25], [0.5]])
+    outcomes = execute_many(environment, np.empty((2, 0)), thetas, [stream(seed, "row") for seed in range(2)])
+    assert outcomes.tolist() == [[0.5], [1.0]]
+    assert thetas.tolist() == [[0.25], [0.5]]
+
+
 def test_a_diverged_simulation_names_its_theta_even_from_another_process():
     error = pickle.loads(pickle.dumps(SimulationError(np.array([0.25, 0.5]), "NaN in qpos")))
     assert str(error) == "NaN in qpos; theta=[0.25, 0.5]"

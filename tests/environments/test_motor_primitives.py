@@ -186,7 +186,7 @@ def test_arguments_are_left_as_they_were() -> None:
         (np.zeros(10), np.zeros((10, 2)), "times must increase"),
         (np.arange(10.0), np.full((10, 2), np.nan), "trajectory must be finite"),
         (np.full(10, np.inf), np.zeros((10, 2)), "times must be finite"),
-        (["a"] * 10, np.zeros((10, 2)), "times must be numeric"),
+        (["a"] * 10, np.zeros((10, 2)), "times must be real numbers"),
         (np.arange(2.0), np.zeros(2), "samples"),
     ],
 )

@@ -109,5 +109,7 @@ def test_what_makes_no_sense_is_refused(make):
             make(ARM, 0, **options)
     with pytest.raises(ValueError, match="one context only, got contexts of dim 1"):
         make(Elsewhere(ARM.policies, ARM.outcomes, Box.cube(0, 1, 1)), 0)
+    with pytest.raises(ValueError, match="rest of the environment must lie in"):
+        make(Elsewhere(ARM.policies, Box.cube(2, 3, 2), ARM.contexts), 0)
     with pytest.raises(ValueError, match="must be a whole number"):
         map_elites(ARM, 0, first=0) if make is map_elites else cma_me(ARM, 0, emitters=0)
