@@ -15,7 +15,8 @@ import numpy as np
 
 from sgimd_torch.competence import AttemptCompetence, Competence, Performance, performance
 from sgimd_torch.environments.protocol import Environment, check_rest
-from sgimd_torch.goals.interest_map import Goals, InterestMap
+from sgimd_torch.goals.interest_map import InterestMap
+from sgimd_torch.goals.protocol import Goals
 from sgimd_torch.inverses.locally_linear import LocallyLinear
 from sgimd_torch.learner import Learner
 from sgimd_torch.memory import Memory

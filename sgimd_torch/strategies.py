@@ -14,7 +14,7 @@ from typing import Protocol
 import numpy as np
 
 from sgimd_torch.competence import Competence
-from sgimd_torch.goals.interest_map import Goals
+from sgimd_torch.goals.protocol import Goals
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, Attempt, Box, Demonstration, Estimate, Move, Search, check_count
 

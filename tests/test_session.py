@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from sgimd_torch.algorithms import attempted, emulating, imitating, imitation, remembered, sagg_riac, sgim_d
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import evaluate
-from sgimd_torch.goals.interest_map import UniformGoals
+from sgimd_torch.goals.uniform import UniformGoals
 from sgimd_torch.inverses.local import LocalInverse, NearestNeighbour
 from sgimd_torch.searches.perturb import perturb
 from sgimd_torch.session import Recorded, ReplayError, live, replay, run

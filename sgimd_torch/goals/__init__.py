@@ -1,1 +1,1 @@
-"""Where goals come from: interest maps and what they are compared with (section 3.2.1)."""
+"""Goal models, which choose the next goal: the interest map of section 3.2.1, and what it is compared with."""

@@ -1,9 +1,9 @@
 """ALP-GMM: goals from Gaussians of high absolute learning progress, a rival of the interest map without regions.
 
 Portelas, Colas, Hofmann & Oudeyer, Teacher algorithms for curriculum learning of deep RL in continuously parameterized
-environments (CoRL 2019). Progress at a goal is |competence - competence at the nearest earlier goal|; a mixture of
-Gaussians over (context, goal, progress) is fitted now and then, and tells where it is high.
-``goals = AlpGmm(contexts, outcomes, rng)``, in the place of `InterestMap`; needs scikit-learn
+environments (CoRL 2019). Progress at a goal is |competence - competence at the nearest earlier goal|. A mixture of
+Gaussians over (context, goal, progress) is fitted from time to time, and shows where progress is high. Needs
+scikit-learn.    goals = AlpGmm(contexts, outcomes, rng)
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import warnings
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sgimd_torch.goals.interest_map import one_attempt, one_point
+from sgimd_torch.goals.protocol import check_attempt, check_in
 from sgimd_torch.spaces import Array, Box, check_count
 
 try:
@@ -22,24 +22,24 @@ try:
 except ImportError as error:
     raise ImportError(f"ALP-GMM needs scikit-learn: pip install 'sgimd-torch[rivals]' ({error})") from error
 
-_TRIES = 20  # draws from a Gaussian until one lies in T
+_DRAWS = 20  # from a Gaussian; the first that lies in T is the goal
 
 
 class AlpGmm:
     """Goals from a mixture of Gaussians over (context, goal, absolute learning progress).
 
-    A Gaussian is chosen in proportion to its mean progress, and a goal is drawn from it; in a context, in proportion to
-    mean progress times its density there, and the goal from the Gaussian that remains given this context. Distances are
-    measured in sides of C x T.
+    Without contexts a Gaussian is chosen in proportion to its mean progress, and a goal is drawn from it. In a context
+    it is chosen in proportion to its mean progress times its density there, and the goal is drawn from the Gaussian
+    given this context. Distances are measured in sides of C x T.
 
     Args:
         contexts: C; ``dim`` 0 when there is only one context.
-        outcomes: T. Goals drawn outside are drawn again, in the end clipped.
+        outcomes: T. A goal drawn outside is drawn again, and clipped if 20 draws lie outside.
         rng: the only source of draws; ``add`` draws nothing.
-        refit: goals between two fits; all goals are uniform before the first. Deviation: the publication waits for 250,
-            half of what a run on the rod has.
-        memory: how many of the last goals are fitted. The nearest earlier goal is sought among all.
-        components: the most Gaussians of a mixture; Akaike's criterion chooses from 2 on.
+        refit: goals between two fits; before the first fit, goals are uniform. Deviation: the publication waits for 250
+            goals, half of what a run on the rod has.
+        memory: how many of the last goals are fitted. The nearest earlier goal is looked for among all goals.
+        components: the largest number of Gaussians. Akaike's criterion chooses a number from 2 to this.
         uniform: probability of a goal anywhere in T.
 
     Raises:
@@ -75,12 +75,12 @@ class AlpGmm:
         self._mixture: GaussianMixture | None = None
 
     def sample(self, context: ArrayLike) -> Array:
-        """``(outcome_dim,)`` in T; before it, a fit when one is due.
+        """``(outcome_dim,)`` in T; fits the mixture first when that is due.
 
         Raises:
             ValueError: ``context`` is not one point of C.
         """
-        context = one_point(self.contexts, "context", context)
+        context = check_in(self.contexts, "context", context)
         if len(self._points) >= self._fitted + self.refit:
             self._mixture, self._fitted = self._fit(), len(self._points)
         if self._mixture is None or self._rng.random() < self.uniform:
@@ -90,12 +90,12 @@ class AlpGmm:
     def add(
         self, context: ArrayLike, goal: ArrayLike, competence: float, strategy: str = "autonomous", gain: float = 0.0
     ) -> None:
-        """Competence was measured at a goal: how far is it from that at the nearest earlier one, the latest of equals?
+        """Competence was measured at a goal: how far is it from that at the nearest earlier goal, the latest of equals?
 
         Raises:
-            ValueError: as `InterestMap.add`.
+            ValueError: see `Goals.add`.
         """
-        point = (one_attempt(self.contexts, self.outcomes, context, goal, competence, gain) - self._low) / self._sides
+        point = (check_attempt(self.contexts, self.outcomes, context, goal, competence, gain) - self._low) / self._sides
         progress = 0.0
         if len(self._points):
             apart = np.square(self._points - point).sum(axis=1)
@@ -105,11 +105,11 @@ class AlpGmm:
         self._progress = np.append(self._progress, progress)
 
     def _fit(self) -> GaussianMixture:
-        """Of mixtures of 2, 3 ... Gaussians over the last goals the best by Akaike's criterion."""
+        """The best mixture of 2, 3 ... Gaussians over the last goals, by Akaike's criterion."""
         rows = np.column_stack((self._points, self._progress))[-self.memory :]
         seed = int(self._rng.integers(2**32))
         with warnings.catch_warnings():
-            # Goals that coincide, or a fit not quite converged, make a mixture that Akaike's criterion may judge, too.
+            # Akaike's criterion may also judge a mixture of goals that coincide, or one that has not quite converged.
             warnings.simplefilter("ignore", ConvergenceWarning)
             numbers = range(2, self.components + 1)
             mixtures = [GaussianMixture(number, random_state=seed).fit(rows) for number in numbers]
@@ -129,6 +129,6 @@ class AlpGmm:
         gain = np.linalg.solve(covariances[k, c, c], covariances[k, c, g]).T  # (outcome_dim, context_dim)
         mean = means[k, g] + gain @ away[k]
         spread = np.linalg.cholesky(covariances[k, g, g] - gain @ covariances[k, c, g])
-        draws = mean + self._rng.standard_normal((_TRIES, self.outcomes.dim)) @ spread.T
+        draws = mean + self._rng.standard_normal((_DRAWS, self.outcomes.dim)) @ spread.T
         goals = self.outcomes.low + self.outcomes.sides * draws
         return self.outcomes.clip(goals[self.outcomes.contains(goals).argmax()])

@@ -1,8 +1,8 @@
-"""The honest rival of the interest map's tree: the same interest and the same choice of goals over a fixed grid.
+"""A fixed grid with the interest and the choice of goals of the interest map: what is the recursive split worth?
 
-What differs from section 3.2.1 of Nguyen & Oudeyer (2014) is that cells never split. In few dimensions and a task space
-of the size of what can be reached a grid may do as well; elsewhere it shows what the recursive split is worth.
-``goals = ProgressGrid(contexts, outcomes, rng)``, in the place of `InterestMap`
+It differs from section 3.2.1 of Nguyen & Oudeyer (2014) only in that cells never split. A grid may do as well in few
+dimensions, when the task space is as large as what can be reached.
+    goals = ProgressGrid(contexts, outcomes, rng)
 """
 
 from __future__ import annotations
@@ -13,27 +13,28 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sgimd_torch.goals.interest_map import Tiling
 from sgimd_torch.goals.regions import Progress, Region, gained_progress, interest_of
+from sgimd_torch.goals.tiling import Tiling
 from sgimd_torch.spaces import Array, Box
 
-_ENOUGH = 100  # cells, by default: each needs four goals before it knows its progress, and a run has some 500
-_MOST = 100_000  # more cells than any run has goals
+_DEFAULT_CELLS = 100  # a cell needs four goals before its progress is known, and a run has about 500 goals
+_MAX_CELLS = 100_000  # more than any run has goals
 
 
 class ProgressGrid:
     """Equal cells over C x T, and the choice of goals from them by eqs. (3) and (4).
 
     Args:
-        contexts, outcomes, rng: as of `InterestMap`. Goals come from the cells that contain the context.
-        cells: for each dimension of C x T; None for about 100 in all, and 2 at least: 10 x 10 in two dimensions.
-        window: how many recent goals interest looks at; even, at least 4. A cell remembers no more.
+        contexts, outcomes, rng: as in `InterestMap`. Goals come from the cells that contain the context.
+        cells: for each dimension of C x T. None gives about 100 in all, and at least 2 for each dimension: 10 x 10 in
+            two dimensions.
+        window: how many recent goals the interest looks at; even, at least 4. A cell remembers no more.
         modes: probabilities of a goal (1) in a cell of high interest, (2) anywhere, (3) near a cell's worst goal.
-        near: mode 3 stays this close to the worst goal, as a part of the cell's sides.
-        progress: as of `InterestMap`.
+        near: how far from the worst goal mode 3 goes, as a part of the cell's sides.
+        progress: as in `InterestMap`.
 
     Raises:
-        ValueError: a number out of its range, or so many cells that none would ever hold four goals.
+        ValueError: a number out of its range, or so many cells that none would ever get four goals.
     """
 
     def __init__(
@@ -52,10 +53,11 @@ class ProgressGrid:
             raise ValueError(f"window must be even and at least 4, got {window}")
         dim = contexts.dim + outcomes.dim
         if cells is None:
-            cells = max(2, round(_ENOUGH ** (1 / dim)))
-        if cells < 1 or cells**dim > _MOST:
+            cells = max(2, round(_DEFAULT_CELLS ** (1 / dim)))
+        if cells < 1 or cells**dim > _MAX_CELLS:
             raise ValueError(
-                f"cells must be from 1 for each dimension to {_MOST} in all, got {cells} in {dim} dimensions"
+                f"cells must be at least 1 for each dimension and at most {_MAX_CELLS} in all, "
+                f"got {cells} in {dim} dimensions"
             )
         self.window = window
         measure = partial(interest_of, window=window, progress=progress)
@@ -72,7 +74,7 @@ class ProgressGrid:
 
     @property
     def regions(self) -> list[Region]:
-        """The cells, which tile C x T; ``R.3.7`` is the fourth from below in the first dimension, the eighth in the
+        """The cells, which tile C x T. ``R.3.7`` is the fourth from below in the first dimension, and the eighth in the
         second."""
         return list(self._tiling.regions)
 
@@ -87,10 +89,10 @@ class ProgressGrid:
     def add(
         self, context: ArrayLike, goal: ArrayLike, competence: float, strategy: str = "autonomous", gain: float = 0.0
     ) -> None:
-        """Competence was measured at a goal; its cell forgets what lies before its window.
+        """Competence was measured at a goal. Its cell forgets what is older than the window.
 
         Raises:
-            ValueError: as `InterestMap.add`.
+            ValueError: see `Goals.add`.
         """
         index = self._tiling.add(context, goal, competence, strategy, gain)
         self._tiling.regions[index] = self._tiling.regions[index].keep(slice(-self.window, None))

@@ -1,7 +1,7 @@
 """Regions of C x T, and how interesting they are: the leaves of the interest map.
 
 Section 3.2.1 and eq. (3) of Nguyen & Oudeyer (2014): interest is local competence progress over a sliding window of
-the goals that were attempted last.
+the last goals that were attempted.    region.goals, region.competences, region.interest()
 """
 
 from __future__ import annotations
@@ -16,15 +16,16 @@ from numpy.typing import NDArray
 from sgimd_torch.spaces import Array
 
 Progress = Callable[[Array, Array, Array], float]
-"""Of a window, oldest first, n >= 4: points of C x T ``(n, dim)``, competences ``(n,)`` there when the attempts ended,
-and gains ``(n,)``, how much each attempt raised the competence at its own goal -> how much the robot progresses."""
+"""(points, competences, gains) of a window of n >= 4 goals, oldest first -> how much the robot progresses. Points
+``(n, dim)`` lie in C x T; competences ``(n,)`` were measured there when the attempts ended; gains ``(n,)`` say how much
+each attempt raised the competence at its own goal."""
 
 
 def gained_progress(points: Array, competences: Array, gains: Array) -> float:
     """Mean gain: how much an attempt here raises the competence at its goal.
 
-    Deviation: eq. (3) compares the competences of older and newer goals, which differ also because the goals do. Where
-    some can be reached and others cannot, as in most regions of a large task space, it sees little else.
+    Deviation: eq. (3) compares the competences of older and newer goals, which also differ because the goals differ. In
+    most regions of a large task space some goals can be reached and others cannot, and eq. (3) sees little else.
     """
     return float(gains.mean())
 
@@ -35,20 +36,20 @@ def absolute_progress(points: Array, competences: Array, gains: Array) -> float:
 
 
 def signed_progress(points: Array, competences: Array, gains: Array) -> float:
-    """Eq. (3) without its absolute value: competence that falls is of no interest."""
+    """Eq. (3) without its absolute value: falling competence is not interesting."""
     return max(0.0, _rise(competences))
 
 
 def paired_progress(points: Array, competences: Array, gains: Array) -> float:
-    """Mean |competence - competence at the nearest earlier goal|, where a window has one.
+    """Mean |competence - competence at the nearest earlier goal of the window|, over all goals but the first.
 
-    Forestier et al. (2017) and Portelas et al. (2019) measure progress so. It tells a competence that changed with time
-    from one that only differs from place to place, but never averages the noise of single goals away. Of equally near
-    goals the latest counts. Distances are those of C x T: a context in other units than goals wants a space of its own.
+    Forestier et al. (2017) and Portelas et al. (2019) measure progress in this way. It tells competence that changes in
+    time from competence that only differs between places, but it never averages out the noise of single goals. Of
+    equally near goals the latest counts. Distances are measured in C x T: scale contexts of other units than goals.
     """
     n = len(points)
     apart = np.square(points[:, None] - points).sum(axis=2)  # (n, n)
-    apart[np.triu_indices(n)] = np.inf  # itself and what came later
+    apart[np.triu_indices(n)] = np.inf  # the goal itself, and later ones
     nearest = n - 1 - apart[1:, ::-1].argmin(axis=1)
     return float(np.abs(competences[1:] - competences[nearest]).mean())
 
@@ -61,9 +62,9 @@ def _rise(competences: Array) -> float:
 
 
 def interest_of(points: Array, competences: Array, gains: Array, *, window: int, progress: Progress) -> float:
-    """Progress over the last ``window`` of the goals at ``points`` ``(n, dim)``, with ``(n,)`` of the others.
+    """Progress over the last ``window`` goals, at ``points`` ``(n, dim)`` with ``competences`` and ``gains`` ``(n,)``.
 
-    Deviation: 0 while fewer than 4 are known, where eq. (3) has halves of one value or none.
+    Deviation: 0 for fewer than 4 goals, where the halves of eq. (3) have one value or none.
     """
     if len(competences) < 4:
         return 0.0
@@ -72,12 +73,12 @@ def interest_of(points: Array, competences: Array, gains: Array, *, window: int,
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """R_i, a leaf of the tree as it stood when it was read: later goals make a new Region.
+    """R_i, a leaf of the tree as it was when it was read: later goals make a new Region.
 
-    ``path`` leads from the root: "R", then "R0" below and "R1" above its cut, "R01" ... It never changes meaning.
-    ``low`` and ``high`` are its corners in C x T. In order of time: ``points`` ``(n, context_dim + outcome_dim)``,
-    ``competences`` and ``gains`` ``(n,)``, ``strategies`` ``(n,)`` names. ``attempts`` counts the goals met here, those
-    since forgotten too, but not those a parent had forgotten before it was cut. Arrays are read-only.
+    ``path`` leads from the root: "R", then "R0" below and "R1" above its cut, "R01" ... It never changes its meaning.
+    ``low`` and ``high`` are the corners in C x T. In order of time: ``points`` ``(n, context_dim + outcome_dim)``,
+    ``competences`` and ``gains`` ``(n,)``, ``strategies`` ``(n,)`` names. ``attempts`` counts all goals that came here,
+    also forgotten ones, but not those that a parent had forgotten before it was cut. Arrays are read-only.
     """
 
     path: str
@@ -108,11 +109,11 @@ class Region:
         return self.points[:, self.context_dim :]
 
     def interest(self, strategy: str | None = None) -> float:
-        """Local competence progress, eq. (3); with a ``strategy``, over the goals chosen by it alone."""
+        """Local competence progress, eq. (3); with a ``strategy``, over the goals that it alone has chosen."""
         return self._interest if strategy is None else self.interest_among(self.strategies == strategy)
 
     def interest_among(self, rows: NDArray[np.bool_] | slice) -> float:
-        """As if it remembered these goals alone."""
+        """The interest that it would have with these goals alone."""
         return self.measure(self.points[rows], self.competences[rows], self.gains[rows])
 
     @cached_property

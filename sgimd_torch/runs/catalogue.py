@@ -145,7 +145,7 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
         "interest-map": _at("goals.interest_map:InterestMap", "where competence changes, in regions", uses=_PROGRESS),
         "grid": _at("goals.progress_grid:ProgressGrid", "the same in cells that never split", uses=_PROGRESS),
         "alp-gmm": _at("goals.alp_gmm:AlpGmm", "Gaussians of high progress (extra rivals)"),
-        "uniform": _at("goals.interest_map:UniformGoals", "the same everywhere", ignores=("competence",)),
+        "uniform": _at("goals.uniform:UniformGoals", "the same everywhere", ignores=("competence",)),
     },
     "progress": {
         "gained": _at("goals.regions:gained_progress", "how much attempts raise the competence at their own goals"),

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from sgimd_torch.goals.alp_gmm import AlpGmm
-from sgimd_torch.goals.interest_map import InterestMap, UniformGoals
+from sgimd_torch.goals.interest_map import InterestMap
 from sgimd_torch.goals.progress_grid import ProgressGrid
 from sgimd_torch.goals.regions import absolute_progress, gained_progress, paired_progress
+from sgimd_torch.goals.uniform import UniformGoals
 from sgimd_torch.spaces import Box, stream
 
 NO_CONTEXTS, LINE, SQUARE = Box.cube(0, 1, 0), Box.cube(0, 1, 1), Box.cube(0, 1, 2)
@@ -188,7 +189,7 @@ def test_goals_come_from_cells_that_contain_the_context():
         ({"window": 2}, "window must be even and at least 4"),
         ({"modes": (0.7, 0.2, 0.2)}, "modes must be three"),
         ({"near": 0.0}, "near must lie in"),
-        ({"cells": 0}, "cells must be from 1"),
+        ({"cells": 0}, "cells must be at least 1 for each dimension"),
         ({"cells": 1000}, "100000 in all, got 1000 in 2 dimensions"),
     ],
 )

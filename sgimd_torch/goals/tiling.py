@@ -1,0 +1,108 @@
+"""Regions that tile C x T, and the choice of a goal from them: what the interest map and the progress grid share.
+
+Section 3.2.2 and eq. (4) of Nguyen & Oudeyer (2014). A map cuts C x T into regions and gives them to a `Tiling`.
+    tiling.plant(regions); goal = tiling.sample(context); index = tiling.add(context, goal, competence, strategy, gain)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sgimd_torch.goals.protocol import check_attempt, check_in
+from sgimd_torch.goals.regions import Region
+from sgimd_torch.spaces import Array, Box
+
+
+class Tiling:
+    """Regions that tile C x T; at first one region, all of it.
+
+    Args:
+        contexts, outcomes, rng, modes, near: as in `InterestMap`.
+        measure: (points, competences, gains) -> the interest of a region.
+
+    Raises:
+        ValueError: a number out of its range.
+    """
+
+    def __init__(
+        self,
+        contexts: Box,
+        outcomes: Box,
+        rng: np.random.Generator,
+        measure: Callable[[Array, Array, Array], float],
+        *,
+        modes: tuple[float, float, float],
+        near: float,
+    ) -> None:
+        if min(modes) < 0 or not np.isclose(sum(modes), 1):
+            raise ValueError(f"modes must be three probabilities that sum to 1, got {modes}")
+        if not 0 < near <= 1:
+            raise ValueError(f"near must lie in (0, 1], got {near}; it is a part of a region's sides")
+        self.contexts, self.outcomes = contexts, outcomes
+        self.box = Box(np.concatenate((contexts.low, outcomes.low)), np.concatenate((contexts.high, outcomes.high)))
+        self._modes, self._near, self._rng, self._measure = modes, near, rng, measure
+        self.plant([self.region("R", self.box.low, self.box.high)])
+
+    def region(self, path: str, low: Array, high: Array) -> Region:
+        """A region without goals."""
+        nothing = np.empty((0, self.box.dim)), np.empty(0), np.empty(0), np.empty(0, dtype=np.str_)
+        return Region(path, low, high, self.contexts.dim, *nothing, 0, self._measure)
+
+    def plant(self, regions: list[Region]) -> None:
+        """Use these regions from now on; they must tile C x T."""
+        self.regions = regions
+        self._lows = np.stack([region.low for region in regions])
+        self._highs = np.stack([region.high for region in regions])
+        # Regions are half open, [low, high), but closed at the border of C x T: each point is in exactly one.
+        self._ends = np.where(self._highs == self.box.high, np.inf, self._highs)
+
+    def add(self, context: ArrayLike, goal: ArrayLike, competence: float, strategy: str, gain: float) -> int:
+        """Give a goal to the region in which it lies, and return the index of that region.
+
+        Raises:
+            ValueError: see `check_attempt`.
+        """
+        point = check_attempt(self.contexts, self.outcomes, context, goal, competence, gain)
+        index = int(self._contain(point).argmax())
+        self.regions[index] = self.regions[index].extend(point, competence, gain, strategy)
+        return index
+
+    def sample(self, context: ArrayLike) -> Array:
+        """Decide a goal, section 3.2.2: a mode, a region that contains the context, a goal in it.
+
+        Raises:
+            ValueError: ``context`` is not one point of C.
+        """
+        context = check_in(self.contexts, "context", context)
+        mode = 1 + self._rng.choice(3, p=self._modes)
+        if mode == 2:
+            return self.outcomes.sample(self._rng)
+        region = self._choose(context)
+        low, high = region.low[self.contexts.dim :], region.high[self.contexts.dim :]
+        if mode == 1 or len(region.goals) == 0:
+            return self._rng.uniform(low, high)
+        # Ties are common, as competence is -1 wherever nothing came near. The first would be tried again and again.
+        worst = self._rng.choice(np.flatnonzero(region.competences == region.competences.min()))
+        step = self._near * (high - low)
+        return Box(low, high).clip(region.goals[worst] + self._rng.uniform(-step, step))
+
+    def _contain(self, point: Array) -> NDArray[np.bool_]:
+        """``(n_regions,)`` which contain a point of C, or of C x T: only the coordinates that it has count."""
+        dim = len(point)
+        inside = (self._lows[:, :dim] <= point) & (point < self._ends[:, :dim])  # (n_regions, dim)
+        contain: NDArray[np.bool_] = np.all(inside, axis=1)
+        return contain
+
+    def _choose(self, context: Array) -> Region:
+        """A region with the probability of eq. (4), among those that contain the context."""
+        here = np.flatnonzero(self._contain(context))
+        interests = np.array([self.regions[index].interest() for index in here])
+        weights = interests - interests.min()  # eq. (4)
+        # Deviation: eq. (4) is 0/0 where no region stands out. Their shares of T then make goals uniform.
+        if not weights.any():
+            sides = (self._highs - self._lows)[here, self.contexts.dim :]
+            weights = (sides / self.outcomes.sides).prod(axis=1)
+        return self.regions[int(self._rng.choice(here, p=weights / weights.sum()))]
