@@ -1,8 +1,8 @@
-"""The five learners of the paper, each a few lines: which strategy in which slot?
+"""The five learners of the paper, a few lines each: which strategy is in which slot?
 
-Section 5.1 of Nguyen & Oudeyer (2014). Every part is a keyword, so an ablation is one changed word:
+Section 5.1 of Nguyen & Oudeyer (2014). Every part is a keyword, so an ablation changes one word:
     learner = sgim_d(environment, seed, correspondence=environment.primitive.correspondence, goals=UniformGoals)
-Parts are given as constructors, since they need boxes, the memory and random streams that only a builder knows.
+Parts are passed as constructors, because they need boxes, the memory and random streams, which are made here.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ MakeSocial = Callable[[GoalBabbling, Box, np.random.Generator], SocialStrategy]
 
 
 class Parts(TypedDict, total=False):
-    """The keywords of ``goal_babbling``, where they are explained."""
+    """The keywords of ``goal_babbling``, which explains them."""
 
     goals: MakeGoals
     inverse: MakeInverse
@@ -48,25 +48,25 @@ class Parts(TypedDict, total=False):
 
 def random_exploration(environment: Environment, seed: int) -> Learner:
     """Random: uniform movements."""
-    return Learner(_memory(environment), Babble(environment.policies, stream(seed, "babble")))
+    return Learner(_empty_memory(environment), Babble(environment.policies, stream(seed, "babble")))
 
 
 def sagg_riac(environment: Environment, seed: int, **parts: Unpack[Parts]) -> Learner:
     """SAGG-RIAC: active goal babbling, without a teacher."""
-    memory = _memory(environment)
+    memory = _empty_memory(environment)
     return Learner(memory, goal_babbling(environment, seed, memory, **parts))
 
 
 def observation(environment: Environment, seed: int, *, correspondence: Correspondence) -> Learner:
     """Observation: watches and remembers, never moves."""
-    memory = _memory(environment)
+    memory = _empty_memory(environment)
     return Learner(memory, Rest(), social=Remember(memory), correspondence=correspondence)
 
 
 def imitation(environment: Environment, seed: int, *, correspondence: Correspondence, epsilon: float = 0.05) -> Learner:
     """Imitation: repeats the last demonstration with small variations until the next one."""
     imitate = Imitate(environment.policies, stream(seed, "imitate"), repeats=None, epsilon=epsilon)
-    return Learner(_memory(environment), Rest(), social=imitate, correspondence=correspondence)
+    return Learner(_empty_memory(environment), Rest(), social=imitate, correspondence=correspondence)
 
 
 def imitating(
@@ -84,7 +84,7 @@ def imitating(
 
 
 def emulating(babbling: GoalBabbling, outcomes: Box, rng: np.random.Generator) -> Emulate:
-    """A swap for ``imitating``: the teacher's goals without his movements."""
+    """A swap for ``imitating``: the teacher's goals without the teacher's movements."""
     return Emulate(babbling, outcomes)
 
 
@@ -103,7 +103,7 @@ def sgim_d(
         correspondence: (times, trajectory) -> theta_d, eq. (6).
         social: (goal babbling, T, rng) -> the answer to a demonstration.
     """
-    memory = _memory(environment)
+    memory = _empty_memory(environment)
     babbling = goal_babbling(environment, seed, memory, **parts)
     answer = social(babbling, environment.outcomes, stream(seed, "imitate"))
     return Learner(memory, babbling, social=answer, correspondence=correspondence)
@@ -134,21 +134,24 @@ def goal_babbling(
     global_range: tuple[float, float] = (0.05, 0.95),
     give_up: float = -0.5,
 ) -> GoalBabbling:
-    """The paper's autonomous strategy, put together from its parts.
+    """The paper's autonomous strategy, built from its parts.
 
     Args:
         environment: its boxes, rest and outcome noise are read; it is not executed.
-        seed: of every stream of this learner.
-        memory: what the learner remembers.
-        goals: (contexts, outcomes, rng) -> where goals come from.
+        seed: of all streams of this learner.
+        memory: of the learner.
+        goals: (contexts, outcomes, rng) -> the goal model.
         inverse: (memory) -> the inverse model.
         search: (policies, rng) -> the refinement of its estimate.
-        judge: (memory, measure) -> which competence enters the interest map.
+        judge: (memory, measure) -> the competence that the goal model is told.
         measure: J; None for eq. (7), relative to the distance from rest.
-        budget: movements for one goal, at most.
-        tolerance: distance (m) at which a goal counts as reached; None for the outcome noise, .02 m at least.
+        budget: the most movements for one goal.
+        tolerance: distance (m) at which a goal counts as reached; None for the outcome noise, but at least .02 m.
         global_range: least and greatest probability of the global exploration regime.
-        give_up: competence below which a goal is given up when a movement brings it no nearer; -1 never gives up.
+        give_up: below this competence a goal is given up when a movement does not raise it; -1 never gives up.
+
+    Raises:
+        ValueError: a number out of its range.
     """
     noise = max(environment.outcome_noise, 0.02)
     if measure is None:
@@ -169,6 +172,6 @@ def goal_babbling(
     )
 
 
-def _memory(environment: Environment) -> Memory:
+def _empty_memory(environment: Environment) -> Memory:
     check_rest(environment)
     return Memory(environment.contexts.dim, environment.policies.dim, environment.outcomes.dim)

@@ -1,4 +1,4 @@
-"""Performance and competence: how well is a goal met, and how well could it be met by now?
+"""Performance and competence: how well was a goal met, and how well can it be met by now?
 
 Section 4.3 and eqs. (2) and (7) of Nguyen & Oudeyer (2014).
     measure = partial(performance, rest=environment.rest, d_min=0.02)
@@ -15,7 +15,7 @@ from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array
 
 Performance = Callable[[Array, Array], Array]
-"""J: ``(goal, outcome)`` ``(..., outcome_dim)`` -> ``(...)`` in [-1, 0], falling as they part for a given goal."""
+"""J: (goal, outcome) ``(..., outcome_dim)`` -> ``(...)`` in [-1, 0]; for a given goal it falls with their distance."""
 
 
 def performance(goal: Array, outcome: Array, rest: Array, d_min: float) -> Array:
@@ -27,8 +27,8 @@ def performance(goal: Array, outcome: Array, rest: Array, d_min: float) -> Array
         goal: ``(..., outcome_dim)`` metres on the water plane.
         outcome: ``(..., outcome_dim)``; leading axes broadcast with ``goal``.
         rest: ``(outcome_dim,)`` where the float lands without moving, the paper's tau_org.
-        d_min: metres, > 0, the standard deviation of the noise, say. Deviation: eq. (7) is 0/0 for a goal at ``rest``,
-            and near it noise alone scores -1, so goals nearer than ``d_min`` are judged as if they lay at ``d_min``.
+        d_min: metres, > 0, for example the standard deviation of the noise. Deviation: eq. (7) is 0/0 for a goal at
+            ``rest``, and near it noise alone gives -1, so goals nearer than ``d_min`` are judged as if at ``d_min``.
 
     Returns:
         ``(...)`` in [-1, 0].
@@ -40,7 +40,7 @@ def performance(goal: Array, outcome: Array, rest: Array, d_min: float) -> Array
 
 
 def absolute_performance(goal: Array, outcome: Array, d_ref: float) -> Array:
-    """As :func:`performance`, but every goal is judged by the same ``d_ref`` > 0, metres: -1 from there on."""
+    """As :func:`performance`, but relative to the same ``d_ref`` > 0, metres, for all goals: -1 from there on."""
     return -np.minimum(1.0, _distance(goal, outcome) / _positive("d_ref", d_ref))
 
 
@@ -48,8 +48,8 @@ class Competence:
     """gamma of eq. (2), the `memory` reading: the best performance remembered. In one context it never falls.
 
     Deviation: the paper prints the minimum over memory, but J is negative, so the best is the maximum. J falls with
-    distance, hence the best is the nearest outcome's. Deviation: eq. (2) asks for the very same context, which never
-    comes again where contexts vary; the nearest in (context, outcome) stands in for it.
+    distance, so the nearest outcome has the best. Deviation: eq. (2) asks for exactly the same context, which never
+    comes again where contexts vary; the nearest exemplar in (context, outcome) is used instead.
     """
 
     def __init__(self, memory: Memory, performance: Performance) -> None:
@@ -57,20 +57,20 @@ class Competence:
         self.performance = performance
 
     def __call__(self, context: Array, goal: Array, outcomes: Array | None = None) -> float:
-        """In [-1, 0], and -1 for an empty memory. ``outcomes`` of the attempt are not needed: memory holds them."""
+        """In [-1, 0], -1 for an empty memory. ``outcomes`` of the attempt are not needed: they are in memory."""
         nearest = self.memory.near_outcomes(context, goal, k=1)
         return _best(self.performance, goal, self.memory.outcomes[nearest])
 
 
 class AttemptCompetence:
-    """The `attempt` reading, SAGG-RIAC's own: the best performance of this attempt alone. It can fall, when a movement
-    stops working, and the interest measure then sees that something changes."""
+    """The `attempt` reading, SAGG-RIAC's own: the best performance of this attempt alone. It can fall when a movement
+    stops working, and then the interest measure sees a change."""
 
     def __init__(self, performance: Performance) -> None:
         self.performance = performance
 
     def __call__(self, context: Array, goal: Array, outcomes: Array) -> float:
-        """In [-1, 0] from the ``outcomes`` ``(n, outcome_dim)`` of this attempt, and -1 if nothing was executed."""
+        """In [-1, 0] from the ``outcomes`` ``(n, outcome_dim)`` of this attempt, -1 if nothing was executed."""
         return _best(self.performance, goal, outcomes)
 
 

@@ -1,13 +1,13 @@
 """Demonstrations on disk: recorded joint trajectories, their times and where the float landed.
 
-One ``.npz`` file without pickle, so that any numpy reads it; n recordings of different lengths stand end to end:
+One ``.npz`` file without pickle, which any numpy reads. The n recordings may differ in length and stand end to end:
     version          ()                   1
     lengths          (n,) int             samples of each recording, 2 or more
     times            (sum,) s             from 0, increasing within each recording
     trajectories     (sum, n_joints) rad
     outcomes         (n, outcome_dim) m   where the float landed
     contexts         (n, context_dim)     (n, 0) in the fishing task
-``save_demonstrations`` writes it, so your own recordings need no more than a list of ``Demonstration``.
+``save_demonstrations`` writes it from a list of ``Demonstration``, so that is all your own recordings need.
 """
 
 from __future__ import annotations
@@ -56,14 +56,14 @@ def load_demonstrations(
     outcome_dim: int | None = None,
     context_dim: int | None = None,
 ) -> list[Demonstration]:
-    """Read recordings; the shipped ones of the (simulated) human demonstrator 3 unless told otherwise.
+    """Read recordings; by default the shipped ones of the (simulated) human demonstrator 3.
 
     Args:
         path: a ``.npz`` file as described above.
         n_joints, outcome_dim, context_dim: what the robot expects; None accepts any.
 
     Raises:
-        ValueError: not such a file, or empty, truncated, not numeric, unsorted in time, not finite, or made for another
+        ValueError: not such a file, or empty, truncated, not numbers, unsorted in time, not finite, or made for another
             robot; the message names the file and the recording.
         OSError: there is no file, or it is a directory.
     """

@@ -1,6 +1,6 @@
 """Evaluation: how near does the robot come to goals spread over all that can be reached?
 
-Section 5.2 and eq. (10) of Nguyen & Oudeyer (2014). Looking changes nothing: an evaluation executes without learning or
+Section 5.2 and eq. (10) of Nguyen & Oudeyer (2014). An evaluation changes nothing: it executes without learning or
 remembering, with random streams of its own.
     benchmark = load_benchmark(); evaluation = evaluate(inverse, environment, benchmark.goals, seed, movements)
 """
@@ -24,8 +24,8 @@ SHIPPED = Path(__file__).with_name("data") / "benchmark.npz"
 
 @dataclass(frozen=True, eq=False)
 class Benchmark:
-    """Goals to be judged by: ``environment`` names the class they were made for, ``goals`` is ``(n, outcome_dim)`` m,
-    ``side`` (m) the side of the tiles that they were drawn from."""
+    """The goals that learners are judged by. ``environment`` is the class that they were made for; ``goals`` is
+    ``(n, outcome_dim)`` m; ``side`` (m) is that of the tiles that they were drawn from."""
 
     environment: str
     goals: Array
@@ -54,9 +54,9 @@ class Benchmark:
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """What ``evaluate`` saw. ``errors`` ``(n,)`` m, one for each goal; ``thetas`` ``(n, theta_dim)`` what was executed;
-    ``outcomes`` ``(n, outcome_dim)`` where it landed; ``scatter`` ``(n,)`` m, mean distance of the repeated landing
-    points of each theta to their own mean, NaN without repeats."""
+    """What ``evaluate`` found. ``errors`` ``(n,)`` m, one for each goal; ``thetas`` ``(n, theta_dim)`` that were
+    executed; ``outcomes`` ``(n, outcome_dim)`` where they landed; ``scatter`` ``(n,)`` m, the mean distance of the
+    repeated landing points of each theta to their own mean, NaN without repeats."""
 
     errors: Array
     thetas: Array
@@ -70,7 +70,7 @@ class Evaluation:
 
     @property
     def noise_floor(self) -> float:
-        """The part of the error that noise alone makes, m: what is left of ``mean_error`` is bias."""
+        """The part of ``mean_error`` that noise alone makes, m; the rest is bias."""
         return float(self.scatter.mean())
 
 
@@ -84,16 +84,16 @@ def evaluate(
     context: Array | None = None,
     repeats: int = 10,
 ) -> Evaluation:
-    """Invert every goal, execute what comes out once, and ``repeats`` times more to measure the noise.
+    """Invert every goal, execute the result once, and ``repeats`` times more to measure the noise.
 
     Args:
         inverse: (context, goal) -> estimate; its memory must not be empty. If it has a method ``many``, (context,
-            goals) -> estimates, that is asked instead.
-        environment: executed, all goals side by side if it can.
+            goals) -> estimates, that is used instead.
+        environment: executed, all goals side by side if it can do that.
         goals: ``(n, outcome_dim)`` m.
         seed, movements: name the random streams, so that each evaluation of a run has its own.
         context: ``(context_dim,)`` in which to execute; None for the middle of C.
-        repeats: 0 leaves the noise out; 1 would not, as one landing point does not scatter.
+        repeats: 0 does not measure the noise; otherwise 2 or more, as one landing point does not scatter.
 
     Raises:
         ValueError: no goals, of another dimension, or not finite; repeats or movements out of range.
@@ -110,7 +110,7 @@ def evaluate(
     many = getattr(inverse, "many", None)  # a forward model is ten times as fast in batches
     estimates = many(context, goals) if many is not None else [inverse(context, goal) for goal in goals]
     thetas = np.stack([estimate.theta for estimate in estimates])
-    copies = np.tile(thetas, (1 + repeats, 1))  # all goals once, then all again: row k is judged, whatever repeats
+    copies = np.tile(thetas, (1 + repeats, 1))  # all goals once, then again: the judged rows do not depend on repeats
     rngs = [stream(seed, f"evaluation {movements}", row) for row in range(len(copies))]
     landed = execute_many(environment, np.tile(context, (len(copies), 1)), copies, rngs)
     landed = landed.reshape(1 + repeats, *goals.shape)
@@ -125,11 +125,11 @@ def tile_goals(outcomes: Array, box: Box, side: float, rng: np.random.Generator,
     """One random goal in each tile of the apparent reachable space.
 
     Args:
-        outcomes: ``(n, outcome_dim)`` m, pooled over runs; those outside ``box`` are left out.
+        outcomes: ``(n, outcome_dim)`` m, of several runs together; those outside ``box`` do not count.
         box: T.
         side: of a tile (m).
         rng: draws the goals.
-        at_least: outcomes that make a tile reachable.
+        at_least: outcomes on a tile for it to be reachable.
 
     Returns:
         ``(n_tiles, outcome_dim)`` m, in the order of the tiles.
@@ -153,7 +153,7 @@ def save_benchmark(path: str | os.PathLike[str], benchmark: Benchmark) -> None:
 
 
 def load_benchmark(path: str | os.PathLike[str] = SHIPPED) -> Benchmark:
-    """Read a benchmark; the shipped one for ``FishingRod`` unless told otherwise.
+    """Read a benchmark; by default the shipped one for ``FishingRod``.
 
     Raises:
         ValueError: not such a file, truncated, of another version, without goals, or with numbers that are not finite.

@@ -1,4 +1,4 @@
-"""The learner: whose turn is it, the learner's own curiosity or the answer to its teacher?
+"""The learner: it explores on its own until a demonstration interrupts, and then answers the demonstration.
 
 Algorithm 1 of Nguyen & Oudeyer (2014), rebuilt. All five learners of the paper are this class with two slots, an
 autonomous and a social strategy. The caller owns the loop: ``move = learner.ask(context)``, execute it,
@@ -18,12 +18,12 @@ from sgimd_torch.strategies import SocialStrategy, Strategy
 
 
 class Learner:
-    """Alternates between its own exploration and what a teacher shows.
+    """Alternates between its own exploration and answers to demonstrations.
 
     Args:
-        memory: keeps every exemplar that is told.
-        autonomous: what to do on its own.
-        social: how to answer a demonstration; None for a learner that cannot be taught.
+        memory: keeps the exemplar of every outcome that is told.
+        autonomous: what it does on its own.
+        social: how it answers a demonstration; None for a learner that cannot be taught.
         correspondence: (times, trajectory) -> theta_d, eq. (6); needed with ``social``.
 
     Raises:
@@ -51,29 +51,29 @@ class Learner:
 
     @property
     def idle(self) -> bool:
-        """Nothing is under way: the next ``ask`` begins something new, and may do so in a new context."""
+        """Whether no attempt is under way, so that the next ``ask`` begins one, also in a new context."""
         return self._attempt is None
 
     @property
     def context(self) -> Array:
-        """``(context_dim,)`` in which what is under way began, and in which it goes on.
+        """``(context_dim,)`` of the attempt under way, read-only.
 
         Raises:
-            RuntimeError: nothing is under way.
+            RuntimeError: no attempt is under way.
         """
         if self._attempt is None:
-            raise RuntimeError("nothing is under way, so any context will do; see idle")
+            raise RuntimeError("no attempt is under way, so the context may be any; see idle")
         return self._context
 
     def ask(self, context: ArrayLike) -> Move | None:
-        """The next movement, or None to stay still for this one (then there is nothing to tell).
+        """The next movement, or None to stay still this time, when there is no outcome to tell.
 
         Args:
-            context: ``(context_dim,)`` in which it will be executed. What is under way goes on in the context in which
-                it began; ``idle`` says when a new one can come.
+            context: ``(context_dim,)`` in which it will be executed. An attempt stays in the context in which it began;
+                ``idle`` says when a new context can come.
 
         Raises:
-            RuntimeError: the last movement's outcome has not been told, or the context changed while not ``idle``.
+            RuntimeError: the last movement's outcome was not told, or the context changed while not ``idle``.
             ValueError: a context of another shape, or not finite.
         """
         context = check_point("context", context, self.memory.context_dim)
@@ -93,7 +93,7 @@ class Learner:
         return self._move
 
     def tell(self, outcome: ArrayLike) -> None:
-        """What the movement that was asked for led to; it enters memory.
+        """Tell the outcome of the movement that was asked for; it enters memory.
 
         Args:
             outcome: ``(outcome_dim,)``.
@@ -113,14 +113,14 @@ class Learner:
             self._attempt = self._move = None
 
     def watch(self, demonstration: Demonstration) -> None:
-        """See a demonstration: what is under way ends here, and the social strategy answers from the next ``ask`` on.
+        """See a demonstration: the attempt under way ends, and the social strategy answers from the next ``ask`` on.
 
         Raises:
-            RuntimeError: this learner has no social strategy, or the last movement's outcome has not been told.
+            RuntimeError: this learner has no social strategy, or the last movement's outcome was not told.
             ValueError: a demonstration that does not fit the spaces or the correspondence.
         """
         if self.social is None or self.correspondence is None:
-            raise RuntimeError("this learner has no social strategy, so there is nothing to teach it")
+            raise RuntimeError("this learner has no social strategy, so it cannot be taught; use no teacher")
         if self._asked:
             raise RuntimeError("watch() needs the outcome of the last movement first; was tell() forgotten?")
         context = check_point("context of the demonstration", demonstration.context, self.memory.context_dim)
@@ -131,7 +131,7 @@ class Learner:
         self._begin(self.social.attempt(context, theta_d, demonstration), context)
 
     def interrupt(self) -> None:
-        """End what is under way; what was learnt until here counts. An outcome not yet told is no longer waited for."""
+        """End the attempt under way; what it learnt so far counts. An outcome not yet told is no longer expected."""
         if self._attempt is not None:
             self._attempt.close()
         self._attempt = self._move = None

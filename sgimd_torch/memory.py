@@ -1,7 +1,7 @@
-"""Memory: every exemplar (c, theta, tau) the learner has lived, and the exact nearest ones.
+"""Memory: all exemplars (c, theta, tau) of a learner, and the exact nearest neighbours among them.
 
-Sections 3.2 and 4.4 of Nguyen & Oudeyer (2014): the set M. The outcome side answers "what have I done that landed
-near there?" (H of eq. 8), the policy side "what else have I done like that?" (K_h of eq. 8).
+Sections 3.2 and 4.4 of Nguyen & Oudeyer (2014): the set M. The outcome side answers "which movements landed near
+there?" (H of eq. 8), the policy side "which movements are like this one?" (K_h of eq. 8).
     memory.add(context, theta, outcome); rows = memory.near_outcomes(context, goal, k=10); memory.thetas[rows]
 """
 
@@ -24,17 +24,17 @@ _NO_CONTEXT: Final = "an environment without contexts gives np.zeros(0)"
 _EPSILON32: Final = float(np.finfo(np.float32).eps)
 _LARGEST32: Final = float(np.finfo(np.float32).max)  # what faiss reports where float32 overflowed
 
-faiss.omp_set_num_threads(1)  # queries here last microseconds: waking other threads costs more than they save
+faiss.omp_set_num_threads(1)  # queries last microseconds: to wake other threads costs more than they save
 faiss.cvar.distance_compute_blas_threshold = 2**20  # above it |a|^2 + |b|^2 - 2ab cancels, and _Neighbours' bound fails
 
 
 class Memory:
-    """Exemplars in the order they were lived; a row number names one for ever.
+    """Exemplars in the order in which they were added; the row number of an exemplar never changes.
 
     Args:
-        context_dim: may be 0, the fishing task.
+        context_dim: 0 without contexts, as in the fishing task.
         theta_dim, outcome_dim: at least 1.
-        context_weight: length of one unit of context next to one unit of outcome or theta, when asking who is near.
+        context_weight: in distances, the length of one unit of context next to one unit of outcome or theta.
 
     Raises:
         ValueError: a dimension or the weight is out of range.
@@ -59,7 +59,7 @@ class Memory:
 
     @property
     def contexts(self) -> Array:
-        """``(n, context_dim)`` read-only; what comes later does not appear in a view taken now."""
+        """``(n, context_dim)`` read-only; exemplars that are added later do not appear in it."""
         return self._contexts.rows
 
     @property
@@ -87,22 +87,22 @@ class Memory:
         self._append(context[None], theta[None], outcome[None])
 
     def near_outcomes(self, context: ArrayLike, goal: ArrayLike, k: int) -> Rows:
-        """``(min(k, n),)`` rows whose outcomes lie nearest ``goal`` ``(outcome_dim,)``, nearest first, older first
-        among equals."""
+        """``(min(k, n),)`` rows whose outcomes lie nearest to ``goal`` ``(outcome_dim,)``, nearest first; of equally
+        near ones the oldest first."""
         goal = check_point("goal", goal, self.outcome_dim, "was a theta passed instead?")
         return self._outcome_side.nearest(self._key(context, goal)[None], k)[0]
 
     def near_policies(self, context: ArrayLike, theta: ArrayLike, k: int, within: float = np.inf) -> Rows:
-        """At most ``k`` rows whose thetas lie nearest ``theta`` ``(theta_dim,)`` and not farther than ``within``."""
+        """At most ``k`` rows whose thetas lie nearest to ``theta`` ``(theta_dim,)``, not farther than ``within``."""
         theta = check_point("theta", theta, self.theta_dim, "was a goal passed instead?")
         return self._policy_side.nearest(self._key(context, theta)[None], k, within)[0]
 
     def neighbourhoods(self, rows: Rows, k: int, within: float = np.inf) -> list[Rows]:
-        """For each remembered row, itself included, what :meth:`near_policies` of its context and theta would say."""
+        """For each of ``rows`` what :meth:`near_policies` gives for its context and theta; it is its own neighbour."""
         return self._policy_side.nearest(self._policy_side.keys.rows[rows], k, within)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write an npz file, which no pickle is needed to read; ``path`` holds the old file or the whole new one."""
+        """Write an npz file without pickle; ``path`` holds the old file or the whole new one."""
         arrays = {"contexts": self.contexts, "thetas": self.thetas, "outcomes": self.outcomes}
         write_npz(path, {"version": _VERSION, "context_weight": self.context_weight, **arrays})
 
@@ -137,7 +137,7 @@ class _Table:
 
     def __init__(self, dim: int) -> None:
         self._room = np.empty((64, dim))
-        self.rows: Array = _read_only(self._room[:0])
+        self.rows: Array = _read_only_view(self._room[:0])
 
     def append(self, rows: Array) -> None:
         n_old, n_new = len(self.rows), len(self.rows) + len(rows)
@@ -146,7 +146,7 @@ class _Table:
             room[:n_old] = self.rows
             self._room = room
         self._room[n_old:n_new] = rows
-        self.rows = _read_only(self._room[:n_new])
+        self.rows = _read_only_view(self._room[:n_new])
 
 
 class _Neighbours:
@@ -163,8 +163,8 @@ class _Neighbours:
         self._index.add(keys.astype(np.float32))
 
     def nearest(self, queries: Array, k: int, within: float = np.inf) -> list[Rows]:
-        """For each of ``queries`` ``(m, dim)`` at most ``k`` rows not farther than ``within``, nearest first, ties in
-        order of row number."""
+        """For each of ``queries`` ``(m, dim)`` at most ``k`` rows not farther than ``within``, nearest first; ties stay
+        in the order of row numbers."""
         if k < 1:
             raise ValueError(f"k must be at least 1, got {k}")
         keys = self.keys.rows
@@ -176,7 +176,7 @@ class _Neighbours:
         order = squared.argsort(axis=1, kind="stable")[:, :k]
         squared = np.take_along_axis(squared, order, axis=1)
         rows = np.take_along_axis(proposed, order, axis=1)
-        # A row that was not proposed has squared32 >= the last one's. Were it as near as `reach`, rounding its key,
+        # A row that was not proposed has squared32 >= the last one's. If it were as near as `reach`, rounding its key,
         # the query, their difference and the sum to float32 could not have put it beyond `reach + error`.
         reach = np.minimum(np.sqrt(squared[:, -1]), within)
         error = _EPSILON32 * (queries.shape[1] + 5) * (reach + np.sqrt((queries * queries).sum(axis=1)))
@@ -197,7 +197,7 @@ def _squared_distances(points: Array, query: Array) -> Array:
     return (difference * difference).sum(axis=-1)
 
 
-def _read_only(array: Array) -> Array:
+def _read_only_view(array: Array) -> Array:
     array.flags.writeable = False
     return array
 

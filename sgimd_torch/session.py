@@ -1,9 +1,9 @@
-"""A learner's life in an environment, movement by movement; live, or replayed from what was recorded.
+"""The main loop: a learner in an environment, movement by movement; live, or replayed from a record.
 
-The main loop of algorithm 1 of Nguyen & Oudeyer (2014).
+Algorithm 1 of Nguyen & Oudeyer (2014).
     for episode in run(learner, environment, seed, movements=5000, teacher=teacher): ...
-Movement i draws its noise from a stream of its own, so it meets the same noise whatever came before it, and a replayed
-movement need not be executed to leave the next one's noise as it was.
+Movement i draws its noise from stream i. So the noise does not depend on the movements before, and a replay, which
+executes nothing, does not change the noise of the movements after it.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ Execute = Callable[[int, Array, Array], Array]
 
 
 class Recorded(NamedTuple):
-    """A movement that was executed once: ``theta`` and ``outcome``, both None if the learner rested."""
+    """A movement on record: its ``theta`` and ``outcome``, both None if the learner rested."""
 
     theta: Array | None
     outcome: Array | None
 
 
 class ReplayError(RuntimeError):
-    """The learner does not do again what was recorded: another library version, processor or configuration."""
+    """The learner does not repeat what was recorded: another library version, processor or configuration."""
 
 
 def run(
@@ -43,28 +43,28 @@ def run(
     teacher: Teacher | None = None,
     execute: Execute | None = None,
 ) -> Iterator[Episode]:
-    """Let ``learner`` live for ``movements`` movements, those at rest counted.
+    """Let ``learner`` make ``movements`` movements, counting those at rest.
 
-    A context is observed when the learner begins something new and holds until that ends; the answer to a demonstration
-    takes place in the demonstration's.
+    A context is observed when an attempt begins, and holds until it ends. The answer to a demonstration takes place in
+    the context of the demonstration.
 
     Args:
-        learner: asked, told and shown; stop iterating at any time and it stays usable.
-        environment: observed and executed.
+        learner: is asked, told and shown. The caller may stop iterating at any time and go on using it.
+        environment: is observed and executed.
         seed: of the environment's streams.
-        movements: in all, those before ``first`` counted; at least 1.
-        first: number of the first one; where an earlier life stopped, to go on with it.
-        teacher: asked before every movement whether it demonstrates.
-        execute: stands in for the environment, see ``live`` and ``replay``.
+        movements: in all, counting those before ``first``; at least 1.
+        first: index of the first movement; to go on with an earlier run, the number of movements that it made.
+        teacher: is asked before every movement whether it demonstrates.
+        execute: is called instead of the environment's, see ``live`` and ``replay``.
 
     Yields:
-        Every episode, once the learner has been told its outcome.
+        Every episode, after the learner was told its outcome.
 
     Raises (when iterated):
         ValueError: ``movements`` or ``first`` is not such a number, or ``first`` comes after them all.
     """
     if check_count("first", first, 0) > check_count("movements", movements, 1):
-        raise ValueError(f"first must be at most movements, got {first} of {movements}; movements counts them in all")
+        raise ValueError(f"first must be at most movements, got {first} of {movements}; movements counts all of a run")
     execute = live(environment, seed) if execute is None else execute
     for index in range(first, movements):
         demonstration = teacher.offer(index, learner.memory) if teacher is not None else None
@@ -82,14 +82,14 @@ def live(environment: Environment, seed: int) -> Execute:
     """Execute in ``environment``, movement i with the noise of stream i."""
 
     def execute(index: int, context: Array, theta: Array) -> Array:
-        # Copies, which the environment may write into: the records stay as they are.
+        # Copies, so that an environment may write into them.
         return environment.execute(context.copy(), theta.copy(), stream(seed, "environment", index))
 
     return execute
 
 
 def replay(recorded: Sequence[Recorded], then: Execute) -> Execute:
-    """Give the outcomes that were ``recorded``, without executing; after them, ``then``.
+    """Give the ``recorded`` outcomes without executing anything; after them, call ``then``.
 
     Raises (when called):
         ReplayError: the learner proposes another theta than the recorded one.

@@ -1,4 +1,4 @@
-"""Spaces, records and random streams: the words that every other module speaks.
+"""Spaces, records and random streams: the words that all other modules use.
 
 Section 2.1 of Nguyen & Oudeyer (2014): contexts c in C, policies theta in Pi, outcomes tau in T, and a
 learning episode [context][policy][outcome]. Numpy only; nothing here knows about learning or physics.
@@ -20,12 +20,12 @@ _LARGEST: Final = 1e100  # squared distances between numbers up to here do not o
 
 
 def stream(seed: int, name: str, index: int | None = None) -> np.random.Generator:
-    """A random stream of its own for every use, so that taking one part away leaves the others' draws as they were.
+    """A separate random stream for each use, so that removing one part does not change the draws of the others.
 
     Args:
         seed: of the run, >= 0.
         name: what the draws are for: ``"environment"``, ``"goals"``, ``"search"``, ``"teacher"`` ...
-        index: one stream for each movement, say; None for a single stream.
+        index: for one stream each, of each movement for example; None for a single stream.
 
     Raises:
         ValueError: the seed or the index is not a whole number >= 0.
@@ -39,17 +39,17 @@ def check_vector(name: str, value: ArrayLike, dim: int, hint: str = "") -> Array
     """``value`` as float64 of shape ``(..., dim)``, every entry finite and at most 1e100 in size.
 
     Raises:
-        ValueError: it does not hold real numbers (but text, truth values, dates, a mask ...), has another last axis, or
-            an entry is NaN, infinite or so large that its square may overflow.
+        ValueError: it does not hold real numbers (but complex ones, text, True and False, dates, a mask), has another
+            last axis, or an entry is NaN, infinite or so large that squared distances may overflow.
     """
     slip = f"; {hint}" if hint else ""
     try:
         array = np.asarray(value)
     except ValueError as error:
-        raise ValueError(f"{name} must be real numbers of shape (..., {dim}), got {_short(value)}{slip}") from error
+        raise ValueError(f"{name} must be real numbers of shape (..., {dim}), got {_in_short(value)}{slip}") from error
     if array.dtype.kind not in "fiu" or isinstance(value, np.ma.MaskedArray):
         kind = "a masked array" if isinstance(value, np.ma.MaskedArray) else array.dtype
-        raise ValueError(f"{name} must be real numbers of shape (..., {dim}), got {kind} {_short(value)}{slip}")
+        raise ValueError(f"{name} must be real numbers of shape (..., {dim}), got {kind} {_in_short(value)}{slip}")
     if array.ndim == 0 or array.shape[-1] != dim:
         raise ValueError(f"{name} must have shape (..., {dim}), got {array.shape}{slip}")
     array = array.astype(np.float64, copy=False)
@@ -72,24 +72,24 @@ def check_point(name: str, value: ArrayLike, dim: int, hint: str = "") -> Array:
 
 
 def check_count(name: str, value: object, least: int) -> int:
-    """``value`` as int, a whole number of at least ``least``; numpy's integers are welcome.
+    """``value`` as int, a whole number of at least ``least``, of Python or numpy.
 
     Raises:
-        ValueError: it is not; nor are True and False.
+        ValueError: it is something else; True and False are no counts.
     """
     if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < least:
-        raise ValueError(f"{name} must be a whole number >= {least}, got {_short(value)}")
+        raise ValueError(f"{name} must be a whole number >= {least}, got {_in_short(value)}")
     return int(value)
 
 
 def first_entry(array: Array, wrong: NDArray[np.bool_]) -> str:
-    """The first of the ``wrong`` entries of ``array`` and how many more there are, for an error in one line."""
+    """The first ``wrong`` entry of ``array`` and how many more there are, for an error message of one line."""
     entries = np.argwhere(wrong)
     more = f" (and {len(entries) - 1} more)" if len(entries) > 1 else ""
     return f"entry {entries[0].tolist()} is {array[tuple(entries[0])]}{more}"
 
 
-def _short(value: object) -> str:
+def _in_short(value: object) -> str:
     return " ".join(reprlib.repr(value).split())
 
 
@@ -178,9 +178,9 @@ class Move:
 
 
 class Estimate(NamedTuple):
-    """What the inverse model infers for a goal: ``theta`` ``(theta_dim,)``, and the exemplars it rests on,
+    """What the inverse model infers for a goal: ``theta`` ``(theta_dim,)``, and the exemplars that it is based on,
     ``thetas`` ``(k, theta_dim)`` with their ``outcomes`` ``(k, outcome_dim)``. ``context`` ``(context_dim,)`` is that
-    of the goal; empty where there are none."""
+    of the goal, empty where there are no contexts."""
 
     theta: Array
     thetas: Array
@@ -218,7 +218,7 @@ class Episode:
 
 
 def _own(record: Move | Demonstration | Episode, *names: str) -> None:
-    """Replace the arrays of a new record by read-only copies, so that nobody can change it afterwards."""
+    """Replace arrays of a new record by read-only copies, so that later changes elsewhere do not reach it."""
     for name in names:
         value = getattr(record, name)
         if value is not None:
@@ -233,7 +233,8 @@ def read_only(value: ArrayLike) -> Array:
 
 
 Attempt = Generator[Move | None, Array, None]
-"""Yields movements, is sent their outcomes; ``close()`` interrupts it. Yielding None, it stays still and so ends."""
+"""Yields movements and is sent their outcomes. To yield None is to stay still, which ends the attempt; ``close()``
+interrupts it."""
 
 Search = Callable[[Estimate, Array], Generator[Array, Array, None]]
-"""(start, goal) -> yields thetas to execute, is sent their outcomes ``(outcome_dim,)``."""
+"""(start, goal) -> yields thetas to execute and is sent their outcomes ``(outcome_dim,)``."""

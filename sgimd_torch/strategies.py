@@ -1,7 +1,7 @@
-"""Policy space exploration: what the robot does next, for itself or after its teacher.
+"""Policy space exploration: what the robot does next, on its own or after a demonstration.
 
-Sections 3.1, 4.2 and 4.4 of Nguyen & Oudeyer (2014). A strategy is a generator: it yields a movement and is sent the
-outcome, so each reads like the paper's pseudo-code, and a demonstration can interrupt any of them at any movement.
+Sections 3.1, 4.2 and 4.4 of Nguyen & Oudeyer (2014). An attempt is a generator: it yields a movement and is sent the
+outcome. So it reads like the paper's pseudo-code, and a demonstration can interrupt it at any movement.
     autonomous: Babble, Rest, GoalBabbling          social: Imitate, Emulate, Remember
 """
 
@@ -19,14 +19,14 @@ from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, Attempt, Box, Demonstration, Estimate, Move, Search, check_count
 
 Judge = Callable[[Array, Array, Array], float]
-"""(context, goal, outcomes of the attempt) -> the competence to remember for the goal, in [-1, 0]."""
+"""(context, goal, outcomes of the attempt) -> the competence at the goal when the attempt has ended, in [-1, 0]."""
 
 
 class Strategy(Protocol):
-    """What a learner does on its own, in one context until the attempt ends. It has to yield at least once."""
+    """What a learner does on its own. An attempt stays in one context, and has to yield at least once."""
 
     def attempt(self, context: Array) -> Attempt:
-        """Movements for one goal, or one movement for none."""
+        """Movements for one goal, or one movement without a goal."""
         ...
 
 
@@ -51,7 +51,7 @@ class Babble:
 
 
 class Rest:
-    """Do nothing for one movement: the learner by observation, and the learner by imitation before its first lesson."""
+    """Stay still for one movement: the observation learner, or the imitation learner before the first demonstration."""
 
     def attempt(self, context: Array) -> Attempt:
         """No movement."""
@@ -63,19 +63,19 @@ class GoalBabbling:
 
     Args:
         policies: Pi.
-        memory: read for what has been reached so far.
-        goals: where goals come from, and where the competence at them goes.
-        inverse: the local inverse model, (context, goal) -> estimate.
+        memory: what has been reached so far; only read.
+        goals: gives goals, and is told the competence at them.
+        inverse: the inverse model, (context, goal) -> estimate.
         search: refines the estimate movement by movement.
-        competence: gamma, of what is remembered; decides between the regimes.
-        judge: the competence that an attempt leaves with its goal.
-        rng: draws the regimes and the movements of the global one.
-        budget: movements for one goal, at most.
+        competence: gamma, from memory; decides between the regimes.
+        judge: the competence that ``goals`` is told at the end of an attempt.
+        rng: draws the regimes and the movements of the global regime.
+        budget: the most movements for one goal.
         tolerance: distance (m) at which a goal counts as reached.
         global_range: least and greatest probability of the global exploration regime.
-        give_up: a goal whose competence is below this is given up at the first movement that brings it no nearer.
-            Deviation: the paper spends the whole budget on it. But in a task space far larger than what can be reached
-            nearly all goals are hopeless, and movements spent on them are lost; -1 never gives up.
+        give_up: a goal with competence below this is given up at the first movement that does not raise it; -1 never
+            gives up. Deviation: the paper spends the whole budget on every goal. But in a task space far larger than
+            what can be reached nearly all goals are hopeless, and movements spent on them are lost.
 
     Raises:
         ValueError: a number out of its range.
@@ -119,7 +119,7 @@ class GoalBabbling:
         yield from self.pursue(context, self.goals.sample(context))
 
     def pursue(self, context: Array, goal: Array, strategy: str = "autonomous") -> Attempt:
-        """Search until ``goal`` is reached, the budget is spent, hope is given up or a demonstration interrupts."""
+        """Search until ``goal`` is reached or given up, the budget is spent, or a demonstration interrupts."""
         outcomes: list[Array] = []
         before = best = self.competence(context, goal)
         moves = self._explore(context, goal)
@@ -134,22 +134,23 @@ class GoalBabbling:
                 if best <= last and best < self.give_up:
                     return
                 move = moves.send(outcome)
-        finally:  # reached, exhausted or interrupted: what was learnt counts
+        finally:  # also when a demonstration interrupts
             self.conclude(context, goal, outcomes, before, strategy)
 
     def conclude(self, context: Array, goal: Array, outcomes: list[Array], before: float, strategy: str) -> None:
-        """Goal interest mapping at the end of an attempt, which led to ``outcomes``; nothing if it never moved.
+        """Goal interest mapping at the end of an attempt with these ``outcomes``; nothing if it made no movement.
 
         Args:
             before: competence at the goal when the attempt began.
+            strategy: "autonomous" or "social", who had chosen the goal.
         """
         if outcomes:
-            # What is nearest in (context, outcome) may, where contexts vary, be a little farther in outcome alone.
+            # Where contexts vary, a new exemplar nearer in (context, outcome) may be farther in outcome alone.
             gain = max(0.0, self.competence(context, goal) - before)
             self.goals.add(context, goal, self.judge(context, goal, np.stack(outcomes)), strategy, gain)
 
     def _explore(self, context: Array, goal: Array) -> Attempt:
-        """Movements without end, in the global exploration or the local optimisation regime."""
+        """Endless movements, in the global exploration or the local optimisation regime."""
         while True:
             if self.rng.random() < self._global_probability(context, goal):
                 # Deviation: the paper prints "theta in T", which must be Pi.
@@ -158,14 +159,14 @@ class GoalBabbling:
                 yield from self._optimise(context, goal)
 
     def _global_probability(self, context: Array, goal: Array) -> float:
-        """The farther the goal from all that was reached, the likelier is global exploration."""
+        """Global exploration is the more likely, the farther the goal is from all that was reached."""
         if len(self.memory) == 0:
             return 1.0
-        # Deviation: the paper's probability is -J itself; kept off 0 and 1, neither regime ever dies out.
+        # Deviation: the paper's probability is -J itself. It is kept off 0 and 1, so that both regimes stay possible.
         return float(np.clip(-self.competence(context, goal), *self.global_range))
 
     def _optimise(self, context: Array, goal: Array) -> Attempt:
-        """From the local inverse model's estimate, the search's movements, until it ends by itself."""
+        """The movements of a search from the inverse model's estimate, until the search ends by itself."""
         search = self.search(self.inverse(context, goal), goal)
         theta = next(search, None)
         while theta is not None:
@@ -182,10 +183,10 @@ class Imitate:
     Args:
         policies: Pi.
         rng: draws the variations.
-        repeats: movements for one demonstration; None until the next one.
+        repeats: movements for one demonstration; None goes on until the next demonstration.
         epsilon: bound of the variation in each parameter, |theta_rand| < epsilon.
-        babbling: whose interest map gets the competence at the demonstrated outcome afterwards (emulate a goal, section
-            3.2.3); None to imitate only. A demonstrated outcome outside T is imitated, but is no goal.
+        babbling: its interest map is told the competence at the demonstrated outcome afterwards (emulate a goal,
+            section 3.2.3); None to imitate only. A demonstrated outcome outside T is imitated, but never a goal.
         outcomes: T; needed with ``babbling``.
     """
 
@@ -218,11 +219,11 @@ class Imitate:
         before = self.babbling.competence(context, goal)
         try:
             yield from self._repeat(theta_d, goal, outcomes)
-        finally:  # also when the next demonstration cuts in
+        finally:  # also when the next demonstration interrupts
             self.babbling.conclude(context, goal, outcomes, before, "social")
 
     def _repeat(self, theta_d: Array, goal: Array, outcomes: list[Array]) -> Attempt:
-        """Movements; what they lead to goes into ``outcomes``."""
+        """Movements; their outcomes are appended to ``outcomes``."""
         for repeat in range(self.repeats) if self.repeats is not None else itertools.count():
             # Deviation: the paper varies all repeats; the exact one shows what theta_d itself leads to.
             theta = theta_d if repeat == 0 else self._vary(theta_d)
@@ -233,7 +234,7 @@ class Imitate:
 
 
 class Emulate:
-    """Take over the teacher's goal, not his movement: pursue the demonstrated outcome by one's own search."""
+    """Take over the teacher's goal but not the movement: pursue the demonstrated outcome by goal babbling."""
 
     def __init__(self, babbling: GoalBabbling, outcomes: Box) -> None:
         self.babbling = babbling
@@ -246,7 +247,7 @@ class Emulate:
 
 
 class Remember:
-    """Learn by observation: keep (theta_d, tau_d) as if it were one's own, and move not at all."""
+    """Learn by observation: remember (theta_d, tau_d) as if it had been executed, and do not move."""
 
     def __init__(self, memory: Memory) -> None:
         self.memory = memory

@@ -17,7 +17,7 @@ from sgimd_torch.spaces import Demonstration, check_count, check_vector
 
 
 class Teacher(Protocol):
-    """Offers demonstrations to a learner whose memory it can see; the paper's What, How and When in one call."""
+    """Offers demonstrations to a learner, whose memory it can see: the paper's What, How and When in one call."""
 
     def offer(self, index: int, memory: Memory) -> Demonstration | None:
         """A demonstration before movement ``index`` (0, 1, ...), or None."""
@@ -25,29 +25,32 @@ class Teacher(Protocol):
 
 
 Choose = Callable[[Sequence[Demonstration], Memory, np.random.Generator], Demonstration]
-"""Which demonstration to give, seeing what the learner has reached."""
+"""(demonstrations, the learner's memory, rng) -> the demonstration to give."""
 
 
 def at_random(demonstrations: Sequence[Demonstration], memory: Memory, rng: np.random.Generator) -> Demonstration:
-    """Any of them, alike."""
+    """Any of them, all equally likely."""
     return demonstrations[int(rng.integers(len(demonstrations)))]
 
 
 def least_explored(
     demonstrations: Sequence[Demonstration], memory: Memory, rng: np.random.Generator, *, tiles: int = 10
 ) -> Demonstration:
-    """One from a tile chosen at random among those, of all with demonstrations, that the learner has reached least.
+    """A demonstration from a tile chosen at random among the tiles that have any and that the learner reached least.
 
     Args:
         tiles: in each dimension of the box around the demonstrated outcomes.
+
+    Raises:
+        ValueError: outcomes of another dimension than those of the memory.
     """
     shown = [demonstration.outcome for demonstration in demonstrations]
     demonstrated = check_vector("outcomes of the demonstrations", shown, memory.outcome_dim, "of another robot?")
     low, high = demonstrated.min(axis=0), demonstrated.max(axis=0)
-    side = np.maximum(high - low, 1e-9) / tiles  # demonstrations on a line span no box across it
+    side = np.maximum(high - low, 1e-9) / tiles  # never 0, also for demonstrations on a line
 
     outcomes = np.concatenate((demonstrated, memory.outcomes))
-    # The upper border belongs to the last tile, or the farthest demonstrations would stand alone.
+    # The upper border belongs to the last tile; otherwise the farthest demonstrations would have a tile of their own.
     cells = np.where(outcomes == high, tiles - 1, np.floor((outcomes - low) / side))
     tile_of = np.unique(cells, axis=0, return_inverse=True)[1].ravel()
     ours, theirs = np.split(tile_of, [len(demonstrated)])
@@ -58,7 +61,7 @@ def least_explored(
 
 
 class PeriodicTeacher:
-    """Demonstrates at a fixed frequency, the paper's choice: before the movements ``every``, 2 ``every``, ..."""
+    """Demonstrates regularly, as in the paper: before the movements ``every``, 2 ``every``, ..."""
 
     def __init__(
         self,
@@ -68,7 +71,7 @@ class PeriodicTeacher:
         every: int = 30,
         choose: Choose = least_explored,
     ) -> None:
-        self.demonstrations = _some(demonstrations)
+        self.demonstrations = _checked(demonstrations)
         self.rng = rng
         self.every = check_count("every", every, 1)
         self.choose = choose
@@ -81,10 +84,10 @@ class PeriodicTeacher:
 
 
 class InitialTeacher:
-    """Gives all its demonstrations at the start, each once, in random order, one before every ``every`` movements."""
+    """Gives each demonstration once, at the start, in random order: one before the movements 0, ``every``, ..."""
 
     def __init__(self, demonstrations: Sequence[Demonstration], rng: np.random.Generator, *, every: int = 10) -> None:
-        self.demonstrations = _some(demonstrations)
+        self.demonstrations = _checked(demonstrations)
         self.every = check_count("every", every, 1)
         self._order = rng.permutation(len(demonstrations))
 
@@ -97,10 +100,10 @@ class InitialTeacher:
 
 
 class AskedTeacher:
-    """Demonstrates when the learner's competence stalls, as if asked.
+    """Demonstrates when the learner's competence stalls, as if the learner had asked.
 
-    Every ``patience`` movements it looks how near the learner has come to each demonstrated outcome; if the mean
-    distance fell by less than ``threshold`` of itself since the last look, it demonstrates.
+    Every ``patience`` movements it looks how near the learner has come to each demonstrated outcome. It demonstrates if
+    the mean distance fell by less than a share of ``threshold`` since the last look.
     """
 
     def __init__(
@@ -112,7 +115,7 @@ class AskedTeacher:
         threshold: float = 0.01,
         choose: Choose = least_explored,
     ) -> None:
-        self.demonstrations = _some(demonstrations)
+        self.demonstrations = _checked(demonstrations)
         self.rng = rng
         self.patience = check_count("patience", patience, 1)
         self.threshold = threshold
@@ -129,7 +132,7 @@ class AskedTeacher:
         return self.choose(self.demonstrations, memory, self.rng)
 
     def _distance_left(self, memory: Memory) -> float:
-        if len(memory) == 0:  # a learner that has yet to move stalls, too
+        if len(memory) == 0:  # a learner that has not moved yet stalls, too
             return np.inf
         distances = [
             np.linalg.norm(memory.outcomes[memory.near_outcomes(d.context, d.outcome, 1)] - d.outcome)
@@ -138,7 +141,7 @@ class AskedTeacher:
         return float(np.mean(distances))
 
 
-def _some(demonstrations: Sequence[Demonstration]) -> Sequence[Demonstration]:
+def _checked(demonstrations: Sequence[Demonstration]) -> Sequence[Demonstration]:
     if not demonstrations:
         raise ValueError("a teacher needs at least one demonstration; use no teacher to learn alone")
     shapes = {(np.shape(shown.context), np.shape(shown.outcome)) for shown in demonstrations}
