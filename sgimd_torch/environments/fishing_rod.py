@@ -3,8 +3,8 @@
 Section 4 of Nguyen & Oudeyer (2014); the model is ``fishing_rod.xml``. A movement is open loop, so its whole sequence
 of commands, noise included, is computed first and then run.    outcome = FishingRod().execute(context, theta, rng)
 
-``casting.py`` says where the float lands. If it has not met the water ``HOLD`` seconds after the movement's end, the
-line is let out.
+``rod_physics.py`` says where the float lands. If it has not met the water ``HOLD`` seconds after the movement's end,
+the line is let out.
 """
 
 from __future__ import annotations
@@ -26,18 +26,18 @@ MODEL = Path(__file__).with_name("fishing_rod.xml")
 JOINTS = ("yaw", "shoulder", "elbow", "forearm_roll", "wrist_pitch", "wrist_yaw")
 JOINT_RANGES = Box(np.array([-1.6, 0.1, -1.2, -0.6, -0.4, -1.4]), np.array([1.6, 1.5, 0.8, 0.6, 1.4, 1.4]))  # rad
 DURATIONS = (0.8, 1.6)  # s, of a movement
-HOLD = 0.15  # s, the last posture is held before the line is let out
+HOLD = 0.15  # s, how long the last posture is held before the line is let out
 CORRELATION = 0.96  # of the motor noise from one step to the next
-LONGEST = 60.0  # s, of a recording to replay
+LONGEST = 60.0  # s, the longest recording that can be replayed
 
-_BLOCK = 128  # movements side by side, so that memory stays small and Ctrl-C is heard
+_BLOCK = 128  # movements side by side: little memory, and Ctrl-C works between two blocks
 
 
 class FishingRod:
-    """theta in [0, 1]^25 to the landing point of the float (m) on the water plane.
+    """theta in [0, 1]^25 -> the landing point of the float (m) on the water plane.
 
-    One rod serves one Python thread at a time; its batches use threads of their own. Where a simulation diverges, a
-    ``SimulationError`` is raised, and MuJoCo itself adds a line to ``MUJOCO_LOG.TXT`` in the current directory.
+    A rod can be used by one Python thread at a time; its batches use threads of their own. When a simulation diverges,
+    a ``SimulationError`` is raised, and MuJoCo itself adds a line to ``MUJOCO_LOG.TXT`` in the current directory.
 
     Args:
         noise: motor noise (s): standard deviation of the command (rad) for each rad/s of commanded speed; 0 for none.
@@ -45,7 +45,7 @@ class FishingRod:
         max_yaw: half range of the base's yaw offset (rad), a context; 0 leaves it out.
         max_wind: half range of a side wind on the float along x (N), a context; 0 leaves it out. The float weighs
             0.2 N.
-        threads: for ``execute_many``; None for one a core.
+        threads: for ``execute_many``; None for one per core.
 
     Raises:
         ValueError: a negative or non-finite noise or range, no thread, or ``outcomes`` that do not contain ``rest``.
@@ -95,7 +95,7 @@ class FishingRod:
         Args:
             context: ``(context_dim,)`` inside ``contexts``.
             theta: ``(25,)`` in [0, 1].
-            rng: of the motor noise; draws the same number of values whatever theta is.
+            rng: of the motor noise; the number of draws does not depend on theta.
 
         Returns:
             ``(2,)`` m, where the float landed.
@@ -109,7 +109,7 @@ class FishingRod:
         return self._execute(context[None], theta[None], [rng])[0]
 
     def execute_many(self, contexts: ArrayLike, thetas: ArrayLike, rngs: Sequence[np.random.Generator]) -> Array:
-        """Run many movements side by side on threads; row i equals ``execute`` of row i bit for bit.
+        """Run many movements side by side on threads; row i equals ``execute`` for row i bit for bit.
 
         Args:
             contexts: ``(n, context_dim)``.
@@ -131,14 +131,14 @@ class FishingRod:
         return np.concatenate([self._execute(contexts[block], thetas[block], rngs[block]) for block in blocks])
 
     def record(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Recording:
-        """As ``execute``, but keeping every step, for films and close looks; takes twice as long."""
+        """As ``execute``, but it keeps every step, for films and for a closer look; takes twice as long."""
         context, theta = check_movement(self, context, theta)
         commands, end = self._commands(theta, rng), self.primitive.duration(theta) + HOLD
         outcome = self._cast(context[None], theta[None], [commands], np.array([end]))[0]
         return self._caster.record(outcome, commands, end, self._yaw_wind(context[None]))
 
     def replay(self, times: ArrayLike, trajectory: ArrayLike) -> Array:
-        """Where the float lands when the arm is led along a recorded trajectory, without noise, in the zero context.
+        """Where the float lands when the arm follows a recorded trajectory, without noise, in the context 0.
 
         Args:
             times: ``(n_times,)`` s, increasing from 0.
@@ -149,7 +149,7 @@ class FishingRod:
 
         Raises:
             ValueError: shapes that do not fit, values that are not finite, or times that do not increase from 0 or
-                go beyond 60 s.
+                exceed 60 s.
             SimulationError: the simulation diverged.
         """
         trajectory = check_vector("trajectory", trajectory, len(JOINTS), "one column for each joint, in rad")
@@ -189,18 +189,18 @@ class FishingRod:
         return yaw_wind
 
     def _times(self, end: float) -> Array:
-        """When the commands up to ``end`` (s) are given; one more, as sensors show the state *before* each step."""
+        """Times (s) of the commands up to ``end``, and one more, as sensors show the state *before* each step."""
         step = self.model.opt.timestep
         return step * np.arange(int(np.ceil(end / step)) + 1)
 
     def _commands(self, theta: Array, rng: np.random.Generator) -> Array:
-        """``(n_steps, 6)`` rad: the trajectory of theta with motor noise in proportion to its speed."""
+        """``(n_steps, 6)`` rad: the trajectory of theta, with motor noise proportional to its speed."""
         check_rng(rng)
         times = self._times(self.primitive.duration(theta) + HOLD)
         trajectory = self.primitive.at(theta, times)
         if not self.noise:
             return trajectory
-        # As many draws for a short movement as for a long one: movement i meets the same noise whatever came before.
+        # A short movement draws as often as a long one, so that the stream goes on in the same way after both.
         draws = rng.standard_normal((self._draws, len(JOINTS)))[: len(times)]
         draws[1:] *= math.sqrt(1 - CORRELATION**2)
         noise = lfilter([1.0], [1.0, -CORRELATION], draws, axis=0)  # AR(1) of unit variance

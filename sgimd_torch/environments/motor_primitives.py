@@ -1,9 +1,9 @@
-"""Motor primitives and the correspondence problem: theta to joint trajectories, and back.
+"""Motor primitives and the correspondence problem: from theta to joint trajectories, and back.
 
 Section 4.1 of Nguyen & Oudeyer (2014). Each joint has four knots, its positions at 0, delta/3, 2 delta/3 and delta; a
 trajectory is their Gaussian distance weighting (eq. 5). A demonstrated trajectory is translated to the theta that
-reproduces it closest (eq. 6).     times, trajectory = primitive.trajectory(theta)
-                                   theta_d = primitive.correspondence(times_d, trajectory_d)
+reproduces it most closely (eq. 6).
+    times, trajectory = primitive.trajectory(theta); theta_d = primitive.correspondence(times_d, trajectory_d)
 """
 
 from __future__ import annotations
@@ -55,11 +55,11 @@ class GaussianPrimitive:
         return self._weights(phases) @ self._knots(theta).T
 
     def trajectory(self, theta: ArrayLike, rate: float = 50.0) -> tuple[Array, Array]:
-        """The whole movement as a recording: ``(n_times,)`` s from 0 to delta, and ``(n_times, n_joints)`` rad.
+        """A whole movement as a recording: times ``(n_times,)`` s from 0 to delta, angles ``(n_times, n_joints)`` rad.
 
         Args:
             theta: ``(theta_dim,)`` in [0, 1].
-            rate: samples a second, at least; the last sample falls on delta.
+            rate: the fewest samples per second; the last sample is at delta.
 
         Raises:
             ValueError: theta has another shape or leaves the box.
@@ -70,11 +70,11 @@ class GaussianPrimitive:
         return times, self.at(theta, times)
 
     def correspondence(self, times: ArrayLike, trajectory: ArrayLike) -> Array:
-        """theta_d, the policy that reproduces a demonstrated trajectory closest, eq. (6).
+        """theta_d, the policy that reproduces a demonstrated trajectory most closely, eq. (6).
 
-        The demonstration's own duration is delta; one shorter or longer than ``durations`` is fitted in its shape and
-        played at the nearest pace allowed. For a fixed delta eq. (5) is linear in the knots, so each joint is one
-        bounded linear least squares (trust-region reflective, the paper's algorithm), exact up to its tolerance.
+        delta is the demonstration's own duration. If ``durations`` do not include it, the shape is fitted and played in
+        the nearest duration allowed. For a fixed delta eq. (5) is linear in the knots, so each joint is one bounded
+        linear least squares problem (trust-region reflective, the paper's algorithm), exact up to its tolerance.
 
         Args:
             times: ``(n_times,)`` s, increasing, at least ``n_knots`` of them.
@@ -93,7 +93,7 @@ class GaussianPrimitive:
         weights = self._weights((times - times[0]) / span)
         low, sides = self.joints.low, self.joints.sides
         scaled = (trajectory - low) / sides
-        # Free least squares first: exact where the knots stay inside, but for rounding; lsq_linear only comes near.
+        # Least squares without bounds is exact, up to rounding, where the knots stay inside. lsq_linear is not.
         knots = np.linalg.lstsq(weights, scaled, rcond=None)[0]
         for joint in np.flatnonzero((np.abs(knots - 0.5) > 0.5 + 1e-9).any(axis=0)):
             knots[:, joint] = lsq_linear(weights, scaled[:, joint], bounds=(0.0, 1.0), method="trf", tol=1e-12).x
@@ -102,7 +102,7 @@ class GaussianPrimitive:
         return self.policies.clip(np.append(knots.T.ravel(), pace))
 
     def residual(self, theta: ArrayLike, times: ArrayLike, trajectory: ArrayLike) -> float:
-        """What of a demonstration theta does not reproduce: d of eq. (6), as root mean square (rad).
+        """How far theta is from reproducing a demonstration: d of eq. (6), as root mean square (rad).
 
         Raises:
             ValueError: as ``correspondence``.

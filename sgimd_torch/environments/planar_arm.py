@@ -1,4 +1,4 @@
-"""A planar arm whose reachable set and inverse are known exactly: for tests, quick ablations and first steps.
+"""A planar arm with exactly known reachable set and inverse, for tests, quick ablations and first steps.
 
 arm = PlanarArm(); outcome = arm.execute(arm.observe(rng), theta, rng)
 """
@@ -13,17 +13,17 @@ from sgimd_torch.spaces import Array, Box, check_count, check_vector, first_entr
 
 
 class PlanarArm:
-    """An arm of equal links in the plane; the outcome is where its end stands.
+    """An arm of equal links in the plane; the outcome is the position of its end.
 
-    ``theta`` in [0, 1]^n_joints is scaled to joint angles, .5 being 0: the first joint turns in [-pi, pi], the others
-    bend in [-max_angle, max_angle]. What it can reach is exactly the ring ``min_radius`` <= radius <= ``length``.
+    ``theta`` in [0, 1]^n_joints is scaled to joint angles, .5 to the angle 0: the first joint turns in [-pi, pi], the
+    others bend in [-max_angle, max_angle]. It can reach exactly the ring ``min_radius`` <= radius <= ``length``.
 
     Args:
         n_joints: at least 2.
         length: of the whole arm, m.
         max_angle: rad, in (0, pi]; None means 2 pi / n_joints, the least that leaves no hole in the ring.
-        noise: standard deviation of every joint angle, rad; what it does to the outcome depends on the movement.
-        context: whether a context turns the whole arm, by an angle in [-pi/4, pi/4]; ``rest`` is that of context 0.
+        noise: standard deviation of every joint angle, rad; its effect on the outcome depends on the movement.
+        context: whether a context turns the whole arm, by an angle in [-pi/4, pi/4]; ``rest`` is in the context 0.
         outcomes: T; None means the square around the ring.
 
     Raises:
@@ -52,7 +52,7 @@ class PlanarArm:
         self.rest.flags.writeable = False
         self.length, self.noise = length, noise
         self._limits = np.array([np.pi] + [max_angle] * (n_joints - 1))
-        # Among bends up to max_angle, equal ones bring the end closest (Cauchy's arm lemma), until they close a circle.
+        # Of bends up to max_angle, equal ones bring the end closest (Cauchy's arm lemma), until they close a circle.
         self._max_bend = min(max_angle, 2 * np.pi / n_joints)
         self.min_radius = max(0.0, self._radius(self._max_bend))
         self.outcome_noise = self._mean_outcome_noise()
@@ -62,7 +62,7 @@ class PlanarArm:
         return self.contexts.sample(rng)
 
     def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
-        """``(2,)`` m, where the end stands after one movement.
+        """``(2,)`` m, where the end is after one movement.
 
         Raises:
             ValueError: ``context`` is not one point of C, or ``theta`` not one of Pi.
@@ -70,13 +70,13 @@ class PlanarArm:
         """
         context, theta = check_movement(self, context, theta)
         check_rng(rng)
-        # Drawn without noise too: it moves no stream.
+        # Also drawn without noise: the stream then goes on in the same way.
         angles = self.angles(theta) + self.noise * rng.standard_normal(len(theta))
         directions = np.cumsum(angles) + context.sum()  # an empty context sums to 0
         return self.length / len(theta) * np.array([np.cos(directions).sum(), np.sin(directions).sum()])
 
     def angles(self, theta: ArrayLike) -> Array:
-        """``(..., n_joints)`` rad, by how much each joint turns or bends without noise; ``theta`` ``(..., n_joints)``.
+        """``(..., n_joints)`` rad, the angle of each joint without noise; ``theta`` is ``(..., n_joints)``.
 
         Raises:
             ValueError: ``theta`` is not in Pi.
@@ -84,9 +84,9 @@ class PlanarArm:
         return (2 * self.policies.check("theta", theta, "was a goal passed instead?") - 1) * self._limits
 
     def correspondence(self, times: ArrayLike, trajectory: ArrayLike) -> Array:
-        """theta_d, the policy that holds the last posture of a demonstrated trajectory: the inverse of ``angles``.
+        """theta_d, the policy that takes the last posture of a demonstrated trajectory: the inverse of ``angles``.
 
-        The outcome is where the arm ends, so how it came there leaves no trace in theta, and eq. (6) is solved exactly.
+        The outcome depends only on the last posture, which theta_d meets exactly: this solves eq. (6).
 
         Args:
             times: ``(n_times,)`` s, increasing.
@@ -121,7 +121,7 @@ class PlanarArm:
         return is_reachable
 
     def solve(self, context: ArrayLike, goal: ArrayLike) -> Array:
-        """``(n_joints,)`` a theta that reaches ``goal`` without noise: equal bends, the first joint for the direction.
+        """``(n_joints,)`` a theta that reaches ``goal`` without noise: equal bends; the first joint sets the direction.
 
         Raises:
             ValueError: ``goal`` is not one reachable point ``(2,)``, or ``context`` not one of C.
@@ -140,7 +140,7 @@ class PlanarArm:
         return self.policies.clip((angles / self._limits + 1) / 2)
 
     def _radius(self, bend: float) -> float:
-        """How far the end is when all joints but the first bend alike: falls from the length to 0 at a full turn."""
+        """How far the end is when all joints but the first have this bend: from the length down to 0 at a full turn."""
         n = self.policies.dim
         return float(self.length / n * np.cos((np.arange(n) - (n - 1) / 2) * bend).sum())
 

@@ -1,4 +1,4 @@
-"""The world as the learner meets it: observe a context, execute a movement, see its outcome.
+"""What an environment is for a learner: observe a context, execute a movement, see its outcome.
 
 Section 2.1 of Nguyen & Oudeyer (2014): M(c, theta) = tau. An environment of your own needs the seven members of
 `Environment`: three boxes, ``rest``, ``outcome_noise``, ``observe`` and ``execute``.
@@ -17,11 +17,11 @@ from sgimd_torch.spaces import Array, Box
 
 
 class Environment(Protocol):
-    """What a learner can move and see. Nothing carries over from one movement to the next."""
+    """What a learner can observe and execute. Nothing carries over from one movement to the next."""
 
     @property
     def contexts(self) -> Box:
-        """C; ``dim`` 0 when every movement starts alike."""
+        """C; ``dim`` 0 when all movements start in the same way."""
         ...
 
     @property
@@ -31,7 +31,7 @@ class Environment(Protocol):
 
     @property
     def outcomes(self) -> Box:
-        """T, from which goals are drawn. Outcomes may fall outside."""
+        """T, from which goals are drawn. Outcomes may lie outside."""
         ...
 
     @property
@@ -41,7 +41,7 @@ class Environment(Protocol):
 
     @property
     def outcome_noise(self) -> float:
-        """Typical standard deviation (m), per dimension, of an outcome executed again; 0 if it is always the same."""
+        """Typical standard deviation (m), per dimension, of the outcomes of one movement; 0 if they never differ."""
         ...
 
     def observe(self, rng: np.random.Generator) -> Array:
@@ -49,7 +49,7 @@ class Environment(Protocol):
         ...
 
     def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
-        """``(outcome_dim,)`` of one movement, tau = M(c, theta); noise comes from ``rng`` alone.
+        """``(outcome_dim,)`` of one movement, tau = M(c, theta); all noise comes from ``rng``.
 
         Raises:
             ValueError: ``context`` is not one point of C or ``theta`` not one of Pi; see `check_movement`.
@@ -68,10 +68,10 @@ class BatchEnvironment(Environment, Protocol):
 
 
 class SimulationError(RuntimeError):
-    """A simulation gave no usable outcome; ``theta`` ``(theta_dim,)`` is what was being executed."""
+    """A simulation gave no usable outcome; ``theta`` ``(theta_dim,)`` is the movement that was executed."""
 
     def __init__(self, theta: Array, reason: str) -> None:
-        super().__init__(theta, reason)  # both in args, or it could not travel between processes
+        super().__init__(theta, reason)  # both in args: other processes rebuild the error from them
         self.theta, self.reason = theta, reason
 
     def __str__(self) -> str:
@@ -84,7 +84,7 @@ def execute_many(
     """Many movements: together if the environment can, else one by one, with the same outcomes.
 
     Args:
-        environment: any; a `BatchEnvironment` is asked once.
+        environment: any; a `BatchEnvironment` is called once for all.
         contexts: ``(n, context_dim)`` in C.
         thetas: ``(n, theta_dim)`` in Pi.
         rngs: n streams, one for each movement, so that no outcome depends on what else is in the batch.
@@ -96,7 +96,7 @@ def execute_many(
         ValueError: the numbers of rows differ, or a row lies outside C or Pi.
         SimulationError: a movement has no finite outcome.
     """
-    # Copies, which the environment may write into.
+    # Copies, so that an environment may write into them.
     contexts = environment.contexts.check("contexts", contexts).copy()
     thetas = environment.policies.check("thetas", thetas, "were goals passed instead?").copy()
     if not contexts.ndim == thetas.ndim == 2 or not len(contexts) == len(thetas) == len(rngs):
@@ -109,7 +109,7 @@ def execute_many(
 
 
 def check_movement(environment: Environment, context: ArrayLike, theta: ArrayLike) -> tuple[Array, Array]:
-    """One point of C and one of Pi, as float64: the first line of an ``execute``.
+    """One point of C and one of Pi, as float64; to be called first in an ``execute``.
 
     Raises:
         ValueError: another shape, NaN or infinity, or a point outside its box.
@@ -122,7 +122,7 @@ def check_movement(environment: Environment, context: ArrayLike, theta: ArrayLik
 
 
 def check_rest(environment: Environment) -> None:
-    """Refuse an environment whose ``rest`` is not one point of T, before a learner is built on it.
+    """Refuse an environment whose ``rest`` is not one point of T, before a learner is built for it.
 
     Raises:
         ValueError: another shape, NaN or infinity, or a point outside T.
@@ -132,7 +132,7 @@ def check_rest(environment: Environment) -> None:
 
 
 def check_rng(rng: object) -> None:
-    """Refuse what is no random stream, before anything is drawn from it.
+    """Refuse what is not a random stream, before anything is drawn from it.
 
     Raises:
         TypeError: it is not a Generator.

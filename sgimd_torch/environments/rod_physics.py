@@ -1,12 +1,12 @@
-"""Casting: the arm follows commands in MuJoCo, the line swings, and the float lands on the water.
+"""Physics of the fishing rod: the arm follows commands in MuJoCo, the line swings, and the float lands on the water.
 
-The physics under section 4 of Nguyen & Oudeyer (2014); ``fishing_rod.py`` says what is commanded. All commands are
-known before a movement begins, so they run in C, many movements side by side.
+Section 4 of Nguyen & Oudeyer (2014); ``fishing_rod.py`` says what is commanded. All commands are known before a
+movement begins, so they run in C, many movements side by side.
     landings, diverged = Caster(path, posture).cast([commands], ends)
 
-Where the float lands: at the first point where it meets the water (z = 0), on the line between two steps. If it has
-not met the water when the commands end, the line is let out: the float flies on freely with the velocity it has, the
-wind pushing it, and lands where its parabola meets the water. So every movement has exactly one landing point.
+The float lands at the first point where it meets the water (z = 0), interpolated between two steps. If it has not met
+the water when the commands end, the line is let out: the float flies on freely with its velocity and the push of the
+wind, and lands where this parabola meets the water. So every movement has exactly one landing point.
 """
 
 from __future__ import annotations
@@ -22,22 +22,23 @@ from mujoco import rollout
 
 from sgimd_torch.spaces import Array
 
-TOP_SPEED = 500.0  # rad/s; 100,000 random movements stay far below, a diverging simulation runs through it
+TOP_SPEED = 500.0  # rad/s; 100,000 random movements stay far below, a diverging simulation exceeds it
 
 _STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
-_CHUNK = 90  # steps run in C before looking whether the float has landed
+_CHUNK = 90  # steps in C between two checks whether the float has landed
 
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """A movement step by step, to look at.
+    """A movement step by step.
 
-    ``outcome`` ``(2,)`` m, where the float landed, and ``landed`` (s) when; ``let_out`` (s) when the line was let out,
-    None if the float met the water before; ``states`` ``(n_steps, n_state)``, MuJoCo's full physics state every
-    ``step`` seconds from 0 to ``landed`` or just beyond; ``floats`` ``(n_steps, 6)``, position (m) and velocity (m/s)
-    that a float on the line has in them; ``push`` (m/s^2) of the wind on a float that flies freely, along x.
+    ``outcome`` ``(2,)`` m is where the float landed, and ``landed`` (s) when. ``let_out`` (s) is when the line was let
+    out, None if the float met the water before. ``states`` ``(n_steps, n_state)`` are MuJoCo's full physics states
+    every ``step`` seconds, from 0 to ``landed`` or just beyond; ``floats`` ``(n_steps, 6)`` are position (m) and
+    velocity (m/s) of the float on its line in them. ``push`` (m/s^2) is the acceleration of a freely flying float by
+    the wind, along x, and ``gravity`` (m/s^2) that downwards.
 
-    When the line is let out, arm and rod go on holding their last posture; the float has left the line of ``states``.
+    After the line was let out, arm and rod hold their last posture, and the float is no longer that of ``states``.
     """
 
     outcome: Array
@@ -50,7 +51,7 @@ class Recording:
     gravity: float
 
     def float_at(self, time: float) -> Array:
-        """``(3,)`` m, where the float is at ``time`` (s); from ``landed`` on it lies on the water."""
+        """``(3,)`` m, where the float is at ``time`` (s); after ``landed`` it lies on the water."""
         if time >= self.landed:
             return np.append(self.outcome, 0.0)
         if self.let_out is None or time <= self.let_out:
@@ -65,18 +66,18 @@ class Recording:
 
 
 class Caster:
-    """The rod in MuJoCo, always cast from the same start configuration.
+    """The rod in MuJoCo; all movements begin in the same start configuration.
 
     Args:
         path: of the MuJoCo model, ``fishing_rod.xml``.
         posture: ``(6,)`` rad, of the arm at the start.
-        threads: for several movements at once; None for one a core.
+        threads: for several movements at once; None for one per core.
     """
 
     def __init__(self, path: Path, posture: Array, threads: int | None = None) -> None:
         self.model = model = mujoco.MjModel.from_xml_path(str(path))
         self.steps = 0
-        """Simulated so far, of all movements together."""
+        """Physics steps simulated so far, of all movements together."""
         self.timestep = float(model.opt.timestep)
         self._gravity = -float(model.opt.gravity[2])
         self._float_mass = float(model.body("float").mass[0])
@@ -86,15 +87,15 @@ class Caster:
         """The start configuration, a full physics state; and ``(6,)``, position (m) and velocity (m/s) of its float."""
 
     def cast(self, commands: list[Array], ends: Array, yaw_wind: Array | None = None) -> tuple[Array, np.ndarray]:
-        """Run movements side by side; each is the same, bit for bit, whatever is beside it.
+        """Run movements side by side; each gives the same, bit for bit, as it would alone.
 
         Args:
-            commands: n times ``(n_steps, 6)`` rad, one for each time step.
+            commands: n times ``(n_steps, 6)`` rad, a row for each time step.
             ends: ``(n,)`` s, when the line is let out: within the last step.
             yaw_wind: ``(n, 2)``, offset of the base's yaw (rad) and force of the wind on the float along x (N).
 
         Returns:
-            ``(n, 2)`` m where the floats landed, and ``(n,)`` which simulations diverged.
+            ``(n, 2)`` m, where the floats landed, and ``(n,)``, whether the simulation diverged.
         """
         n = len(commands)
         steps = np.array([len(c) for c in commands])
@@ -109,7 +110,7 @@ class Caster:
             for k, row in enumerate(flying):
                 last = min(stop, int(steps[row])) - start
                 speed, track = run[k, :last, speeds], seen[k, :last]
-                if not (speed.max() < TOP_SPEED and speed.min() > -TOP_SPEED):  # also when it is NaN
+                if not (speed.max() < TOP_SPEED and speed.min() > -TOP_SPEED):  # NaN too
                     diverged[row] = True
                 elif track[:, 2].min() <= 0:
                     wet = int((track[:, 2] <= 0).argmax())
@@ -125,7 +126,7 @@ class Caster:
         return landings, diverged
 
     def record(self, outcome: Array, commands: Array, end: float, yaw_wind: Array | None = None) -> Recording:
-        """The movement that ``cast`` has found to land at ``outcome``, step by step."""
+        """The movement that, by ``cast``, lands at ``outcome``, step by step."""
         states, controls = self._begin([commands], yaw_wind)
         run, seen = self._rollout(states, controls)
         states, floats, push = np.concatenate([states, run[0]]), seen[0], float(controls[0, 0, 6]) / self._float_mass
@@ -161,7 +162,7 @@ class Caster:
         return home, data.sensordata.copy()
 
     def _begin(self, commands: list[Array], yaw_wind: Array | None) -> tuple[Array, Array]:
-        """``(n, n_state)`` where movements begin, and ``(n, n_steps, 7)`` what drives them, each held after its end."""
+        """``(n, n_state)`` start states, and ``(n, n_steps, 7)`` controls; the last ones of a movement are held."""
         n = len(commands)
         controls = np.zeros((n, max(map(len, commands)), self.model.nu))
         for k, sequence in enumerate(commands):
@@ -176,13 +177,13 @@ class Caster:
         return states, controls
 
     def _let_out(self, seen: Array, wind: float) -> tuple[float, float]:
-        """Free flight from the float's position and velocity ``(6,)``."""
+        """Where a float of this position and velocity ``(6,)`` lands after a free flight."""
         x, y, _, dx, dy, _ = seen.tolist()
         flight = self._flight(seen)
         return x + (dx + wind / self._float_mass * flight / 2) * flight, y + dy * flight
 
     def _flight(self, seen: Array) -> float:
-        """How long (s) a float of this position and velocity flies freely."""
+        """How long (s) the free flight of a float of this position and velocity takes."""
         z, dz = float(seen[2]), float(seen[5])
         return (dz + math.sqrt(dz * dz + 2 * self._gravity * max(z, 0.0))) / self._gravity
 
@@ -197,7 +198,7 @@ class Caster:
         self.steps += n * n_steps
         run = np.empty((n, n_steps, states.shape[1]))
         seen = np.empty((n, n_steps, self.model.nsensordata))
-        # The wrapper's own checks and copies would cost as much as four steps; shapes are right by construction.
+        # MuJoCo's own checks and copies would take as long as four steps; the shapes are right by construction.
         pool.rollout(
             [self.model] * n, data, states, controls, state=run, sensordata=seen, nstep=n_steps, skip_checks=True
         )
