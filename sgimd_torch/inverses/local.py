@@ -1,7 +1,7 @@
-"""Local inverse model L^-1: which movement should land on the goal, judging by what similar movements did?
+"""Local inverse model L^-1: which movement should land on the goal, judging by the outcomes of similar movements?
 
-Section 4.4.2 and eqs. (8) and (9) of Nguyen & Oudeyer (2014). Many movements reach one place, and averaging unlike ones
-reaches none of their places; so pick one region of policy space that is near the goal *and* reliable, and stay in it.
+Section 4.4.2 and eqs. (8) and (9) of Nguyen & Oudeyer (2014). Different movements can reach the same place, but their
+mean may land elsewhere. So it averages in one region of policy space only, which is near the goal *and* reliable.
     inverse = LocalInverse(memory); estimate = inverse(context, goal); estimate.theta
 """
 
@@ -14,16 +14,20 @@ from sgimd_torch.spaces import Array, Estimate
 
 
 class LocalInverse:
-    """Mean theta of the most reliable neighbourhood, weighted towards the goal. It changes and draws nothing.
+    """Mean theta of the most reliable neighbourhood, weighted towards the goal. It only reads, and draws nothing.
 
     Args:
-        h_max: how many of the nearest outcomes are weighed against each other, eq. (8).
-        k_max: exemplars at most in a neighbourhood K_h.
-        dist_n: the paper's distN, radius of a neighbourhood in policy space. None: 0.6 in 25 dimensions, and
-            growing with the square root of their number, as distances in a unit cube do.
-        alpha: what a metre of spread costs, in metres of distance to the goal.
-        width: of the Gaussian of eq. (9), in mean distances between the neighbourhood's outcomes and the goal. Wide, it
-            averages the neighbourhood; narrow, it follows the exemplar nearest to the goal.
+        memory: of the learner.
+        h_max: how many of the nearest outcomes are compared, eq. (8).
+        k_max: the most exemplars in a neighbourhood K_h.
+        dist_n: the paper's distN, radius of a neighbourhood in policy space. None: 0.6 in 25 dimensions, otherwise
+            proportional to the square root of their number, like distances in a unit cube.
+        alpha: metres of distance to the goal that one metre of spread counts for.
+        width: of the Gaussian of eq. (9), in mean distances between the neighbourhood's outcomes and the goal. A wide
+            one averages the neighbourhood, a narrow one follows the exemplar nearest to the goal.
+
+    Raises:
+        ValueError: ``width`` is not positive.
     """
 
     def __init__(
@@ -46,7 +50,7 @@ class LocalInverse:
         self.width = width
 
     def __call__(self, context: Array, goal: Array) -> Estimate:
-        """theta_g, and K_best ordered from the policy nearest to its centre theta_h outwards.
+        """theta_g, and K_best in the order of distance from its centre theta_h, nearest first.
 
         Raises:
             RuntimeError: the memory is empty.
@@ -54,7 +58,7 @@ class LocalInverse:
         rows = self._most_reliable(context, goal)
         thetas, outcomes = self.memory.thetas[rows], self.memory.outcomes[rows]
         theta = gaussian_weights(goal, outcomes, self.width) @ thetas  # eq. (9)
-        # A mean lies among what it averages; rounding must not put it 1e-16 outside Pi.
+        # A mean lies between the values that it averages; rounding must not put it 1e-16 outside Pi.
         return Estimate(np.clip(theta, thetas.min(axis=0), thetas.max(axis=0)), thetas, outcomes, context)
 
     def _most_reliable(self, context: Array, goal: Array) -> Rows:
@@ -66,14 +70,14 @@ class LocalInverse:
 
 
 class NearestNeighbour:
-    """The movement whose outcome came nearest, as it was: the field's simplest inverse model."""
+    """The remembered movement whose outcome is nearest to the goal: the field's simplest inverse model."""
 
     def __init__(self, memory: Memory, k: int = 10) -> None:
         self.memory = memory
         self.k = k
 
     def __call__(self, context: Array, goal: Array) -> Estimate:
-        """theta of the nearest outcome, and the ``k`` exemplars with the nearest outcomes, nearest first.
+        """theta of the nearest outcome, and the ``k`` exemplars of the nearest outcomes, nearest first.
 
         Raises:
             RuntimeError: the memory is empty.
@@ -84,13 +88,13 @@ class NearestNeighbour:
 
 
 def gaussian_weights(goal: Array, outcomes: Array, width: float) -> Array:
-    """beta of eq. (9): ``(k,)``, summing to one, a Gaussian of each distance between ``outcomes`` and ``goal``.
+    """beta of eq. (9): ``(k,)`` with sum 1, a Gaussian of the distances between ``outcomes`` and ``goal``.
 
-    The paper leaves the Gaussian's width open: here ``width`` mean distances, and at least a millimetre.
+    The paper does not give its width: here it is ``width`` mean distances, and at least a millimetre.
     """
     distances = _distances(outcomes, goal)
     scaled = distances / max(1e-3, width * distances.mean())
-    weights = np.exp(0.5 * (scaled.min() ** 2 - scaled**2))  # the nearest weighs 1 before normalising: none underflow
+    weights = np.exp(0.5 * (scaled.min() ** 2 - scaled**2))  # the nearest has 1, so the sum cannot be 0
     return weights / weights.sum()
 
 
@@ -104,9 +108,9 @@ def _near_goal(memory: Memory, context: Array, goal: Array, k: int) -> Rows:
 def _spreads(outcomes: Array, neighbourhoods: list[Rows]) -> Array:
     """``(h,)`` metres: the standard deviation of the outcomes within each neighbourhood.
 
-    Deviation: the paper takes the variance, which is neither a distance nor large enough to matter next to one. A
-    movement without neighbours has no deviation, yet is not sure: it gets the median of the others'. Where none has
-    neighbours all get 0, and the nearest to the goal is chosen.
+    Deviation: the paper takes the variance, which is neither a distance nor large enough to matter beside one. A
+    movement without neighbours has no deviation, but is not certain: it gets the median of the others. If none has
+    neighbours, all get 0, and the movement nearest to the goal is chosen.
     """
     spreads = np.array([_standard_deviation(outcomes[rows]) for rows in neighbourhoods])
     known = ~np.isnan(spreads)
@@ -118,7 +122,7 @@ def _standard_deviation(outcomes: Array) -> float:
     if n < 2:
         return np.nan
     deviations = outcomes - outcomes.sum(axis=0) / n
-    return float(np.sqrt((deviations * deviations).sum() / (n - 1)))  # n - 1: else small neighbourhoods look reliable
+    return float(np.sqrt((deviations * deviations).sum() / (n - 1)))  # by n, small neighbourhoods look reliable
 
 
 def _distances(outcomes: Array, goal: Array) -> Array:

@@ -1,6 +1,6 @@
-"""Local inverse model corrected to first order: a weighted regression of theta on outcome near the goal.
+"""Local inverse model, corrected to first order by a weighted regression of theta on outcome near the goal.
 
-Deviation: the paper stops at the weighted mean of eq. (9); this goes on from it.
+Deviation: the paper stops at the weighted mean of eq. (9); this goes on from there.
     inverse = LocallyLinear(memory); estimate = inverse(context, goal); estimate.theta
 """
 
@@ -12,19 +12,24 @@ from sgimd_torch.inverses.local import LocalInverse, gaussian_weights
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, Estimate
 
-_COINCIDENT = 1e-12  # metres: outcomes spread less than this are one outcome, and have no slope
+_COINCIDENT = 1e-12  # m: outcomes that spread less count as one outcome, which has no slope
 
 
 class LocallyLinear:
-    """:class:`LocalInverse`, corrected to first order: eq. (9) averages, so it answers with a theta that should land on
-    the weighted mean of the outcomes; a weighted ridge regression of theta on outcome supplies the rest of the way.
+    """:class:`LocalInverse`, corrected to first order. Its mean theta, eq. (9), should land on the weighted mean of the
+    outcomes; a weighted ridge regression of theta on outcome corrects it from there to the goal.
 
-    The answer stays in the box around all that was ever executed, since a far goal extrapolates far.
+    The answer is clipped to the box around all that was ever executed, because far goals extrapolate far.
 
     Args:
-        ridge: relative to the variance of the outcomes, > 0; the larger, the closer to :class:`LocalInverse`. It is
-            also what settles outcomes that lie on a line, or are fewer than there are slopes.
-        h_max, k_max, dist_n, alpha, width: as for :class:`LocalInverse`, which averages fewer and more closely.
+        memory: of the learner.
+        ridge: relative to the variance of the outcomes, > 0; the larger, the closer to :class:`LocalInverse`. It also
+            makes the regression unique when outcomes lie on a line, or are fewer than its slopes.
+        h_max, k_max, dist_n, alpha, width: as in :class:`LocalInverse`, whose defaults average fewer exemplars with a
+            narrower Gaussian.
+
+    Raises:
+        ValueError: ``ridge`` or ``width`` is not positive.
     """
 
     def __init__(

@@ -1,7 +1,7 @@
-"""Inverse by the forward model: of all movements like those that came near, which should land nearest, and reliably?
+"""Inverse by the forward model: of all movements similar to the nearest ones, which should land nearest, and reliably?
 
-Not in Nguyen & Oudeyer (2014), whose inverse model, eqs. (8) and (9), looks at outcomes alone. Here candidates descend
-the expected squared distance to the goal, the predicted noise included: among redundant movements the reliable win.
+Not in Nguyen & Oudeyer (2014), whose inverse model, eqs. (8) and (9), only knows outcomes. Here candidates descend the
+expected squared distance to the goal, predicted noise included: of several movements to a goal a reliable one wins.
     inverse = ModelInverse(memory, model, environment.policies); inverse(context, goal).theta
 """
 
@@ -18,23 +18,25 @@ from sgimd_torch.inverses.locally_linear import LocallyLinear
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, Box, Estimate, check_count
 
-_TOGETHER = 64  # goals in one batch, about 50 MB
+_GOALS_PER_BATCH = 64  # about 50 MB
 
 
 class ModelInverse:
-    """Descends from ``start``'s estimate and the movements that landed nearest, to what ``model`` expects to be best.
+    """Descends from the estimate of ``start`` and from the nearest remembered movements to what ``model`` expects to be
+    best.
 
-    It reads the model and trains it never, so that looking changes nothing: call ``model.refresh(memory)`` in the loop
-    that adds to the memory. Until the model is good enough for ``trust`` it answers as ``start`` does.
+    It never trains the model, so that an evaluation changes nothing: call ``model.refresh(memory)`` in the loop that
+    adds to the memory. Until the model is good enough for ``trust`` it answers like ``start``.
 
     Args:
-        memory: read for candidates and anchors.
+        memory: gives candidates and anchors; only read.
         model: predicts.
         policies: Pi; nothing outside is proposed.
-        start: another inverse model, whose estimate is one of the candidates; None for :class:`LocallyLinear`.
-        k: candidates besides, the remembered movements that landed nearest the goal.
-        anchors: neighbours in policy space, of each candidate, by which predictions for it are corrected.
-        steps, step: of the descent, in sides of ``policies``. Many small steps end nearer the start than few large.
+        start: another inverse model, whose estimate is one candidate; None for :class:`LocallyLinear`.
+        k: number of further candidates, the remembered movements that landed nearest to the goal.
+        anchors: number of neighbours in policy space that correct the predictions for a candidate.
+        steps, step: of the descent; ``step`` in sides of ``policies``. Many small steps end nearer to the start than
+            few large ones.
         trust: how far to trust the model.
 
     Raises:
@@ -67,11 +69,11 @@ class ModelInverse:
 
     @property
     def trusted(self) -> bool:
-        """Whether the model is good enough to be asked."""
+        """Whether the model is good enough to be used."""
         return self.model.relative_error <= self.trust.error
 
     def __call__(self, context: Array, goal: Array) -> Estimate:
-        """The candidate that should do best, with the neighbours that ``start`` gives.
+        """The candidate that should be best, with the neighbours that ``start`` gives.
 
         Raises:
             RuntimeError: the memory is empty.
@@ -79,7 +81,7 @@ class ModelInverse:
         return self.many(context, goal[None])[0]
 
     def many(self, context: Array, goals: Array) -> list[Estimate]:
-        """An estimate for each of ``(n, outcome_dim)`` goals, several times as fast as one by one.
+        """An estimate for each of ``(n, outcome_dim)`` goals, several times faster than one by one.
 
         Raises:
             RuntimeError: the memory is empty.
@@ -88,8 +90,8 @@ class ModelInverse:
         if not self.trusted:
             return estimates
         found: list[Estimate] = []
-        for first in range(0, len(goals), _TOGETHER):
-            some = slice(first, first + _TOGETHER)
+        for first in range(0, len(goals), _GOALS_PER_BATCH):
+            some = slice(first, first + _GOALS_PER_BATCH)
             found += self._descended(context, goals[some], estimates[some])
         return found
 

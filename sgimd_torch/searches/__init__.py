@@ -1,1 +1,1 @@
-"""Searches: from a first guess to a goal, movement by movement (section 4.4.2)."""
+"""Searches: movement by movement from a first guess towards a goal (section 4.4.2)."""

@@ -1,7 +1,7 @@
-"""CMA-ES as a search: the evolution strategy that the field would reach for, in the place of Nelder-Mead.
+"""CMA-ES as a search: the field's usual evolution strategy, instead of Nelder-Mead.
 
-Hansen & Ostermeier (2001), by Hansen's own package ``cma``; section 4.4.2 of Nguyen & Oudeyer (2014) is what it rivals.
-``sgim_d(environment, seed, correspondence=..., search=cma_es)``
+Hansen & Ostermeier (2001), by Hansen's own package ``cma``; a rival of section 4.4.2 of Nguyen & Oudeyer (2014).
+    learner = sgim_d(environment, seed, correspondence=..., search=cma_es)
 """
 
 from __future__ import annotations
@@ -22,15 +22,16 @@ except ImportError as error:
 def cma_es(policies: Box, rng: np.random.Generator, *, sd: float = 0.05, population: int | None = 4) -> Search:
     """Covariance matrix adaptation on the distance to the goal, around theta_g, which is executed first.
 
-    It starts anew for each goal, and of the estimate it uses theta_g alone: its distribution has no place for what is
-    remembered. Nothing is printed or written, and its draws are all from ``rng``.
+    Each goal starts a new strategy. Of the estimate it uses theta_g only, because its distribution cannot take over
+    remembered exemplars. It prints and writes nothing, and all its draws are from ``rng``.
 
     Args:
         policies: Pi; nothing outside is proposed.
-        sd: of the first generation, in sides of ``policies``, as that of `perturb`.
+        rng: draws the generations.
+        sd: standard deviation of the first generation, in sides of ``policies``, as in `perturb`.
         population: movements of a generation, at least 3; None for cma's own number, 4 + 3 ln(theta_dim). Deviation:
-            that is 13 for the rod, so that of a goal's 15 movements all but one would be the first generation and
-            whatever it teaches would go unused. With 4 (two mirrored pairs) there are three generations.
+            that is 13 for the rod, so that nearly all of a goal's 15 movements would be the first generation, and
+            nothing would be left to use what it taught. With 4 (two mirrored pairs) there are three generations.
 
     Raises:
         ValueError: a number out of its range, or a Pi of one dimension.
@@ -44,16 +45,16 @@ def cma_es(policies: Box, rng: np.random.Generator, *, sd: float = 0.05, populat
     options = {
         "bounds": [0, 1],
         "randn": lambda *shape: rng.standard_normal(shape),
-        "seed": math.nan,  # the package would seed numpy's global stream
+        "seed": math.nan,  # otherwise the package seeds numpy's global stream
         "verb_log": 0,  # writes no files
-        "verbose": -10,  # prints nothing, looks for no file of signals
+        "verbose": -10,  # prints nothing, reads no file of signals
         **({} if population is None else {"popsize": population}),
     }
 
     def search(start: Estimate, goal: Array) -> Generator[Array, Array, None]:
         theta = policies.check("theta of the estimate", start.theta)
         yield theta
-        # In sides of Pi, whatever its units.
+        # In sides of Pi, so that the units of Pi do not matter.
         centre = np.clip((theta - policies.low) / policies.sides, 0, 1)
         strategy = CMAEvolutionStrategy(centre, sd, options)
         while not strategy.stop():

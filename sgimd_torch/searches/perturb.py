@@ -16,10 +16,12 @@ from sgimd_torch.spaces import Array, Box, Estimate, Search
 def perturb(policies: Box, rng: np.random.Generator, *, sd: float = 0.05) -> Search:
     """Gaussian noise around the best theta so far, remembered or executed here, clipped to ``policies``; never ends.
 
-    It executes theta_g first where that is new: a copy of a remembered theta has its outcome already.
+    It executes theta_g first, unless it is a copy of a remembered theta, whose outcome is known.
 
     Args:
-        sd: of the noise, in sides of ``policies``.
+        policies: Pi; nothing outside is proposed.
+        rng: draws the noise.
+        sd: standard deviation of the noise, in sides of ``policies``.
 
     Raises:
         ValueError: ``sd`` is not positive.

@@ -1,7 +1,7 @@
-"""Searches: given a first guess, which movement to try next so that the outcome comes nearer the goal?
+"""Nelder & Mead's simplex: which movement to try next, so that the outcome comes nearer to the goal?
 
-Section 4.4.2 of Nguyen & Oudeyer (2014), local optimisation: Nelder & Mead's simplex (Lagarias et al. 1998), and the
-field's simplest alternative. A search is a generator, so it can be paused, counted and interrupted at any movement:
+Section 4.4.2 of Nguyen & Oudeyer (2014), local optimisation (Lagarias et al. 1998). A search is a generator, so it can
+be paused, counted and interrupted at any movement:
     search = nelder_mead(policies)(estimate, goal); theta = next(search); theta = search.send(outcome) ...
 """
 
@@ -31,28 +31,28 @@ def nelder_mead(
 ) -> Search:
     """Downhill simplex on the distance to the goal, around theta_g and its neighbours.
 
-    It executes theta_g first, but for the noise. The neighbours are vertices with the outcomes they already have:
-    remembering costs no movement (and takes outcomes of nearby contexts for those of this one). Those that lie on a
-    line, plane ... through better vertices are left out, as a flat simplex cannot turn.
+    The first movement is theta_g, with noise. Neighbours become vertices with their remembered outcomes, which costs no
+    movement (but takes outcomes in nearby contexts for outcomes in this one). A neighbour on a line, plane ... through
+    better vertices is left out, as a flat simplex cannot turn.
 
     Args:
         policies: Pi; nothing outside is proposed.
-        rng: draws the noise, and the directions of the steps that stand in for missing neighbours.
-        noise: standard deviation of what is added to each parameter of every movement, in sides of ``policies``; the
-            vertex is where the movement went. Deviation: the paper adds none. But a simplex searches the flat through
-            its vertices, and neighbours from memory span the same flat again and again: without new directions the
-            learner soon repeats itself, and its inverse model cannot tell what is noise from what is not.
+        rng: draws the noise, and the directions of the steps that replace missing neighbours.
+        noise: standard deviation of the noise on each parameter of every movement, in sides of ``policies``; the vertex
+            is the noisy movement. Deviation: the paper adds none. But a simplex searches the flat through its vertices,
+            and neighbours from memory span the same flat again and again. Without new directions the learner soon
+            repeats itself, and its inverse model cannot tell noise from the effect of theta.
         step: size of those steps, root mean square over the parameters, in sides of ``policies``. Deviation: the usual
-            first simplex steps along one coordinate at a time, but one knot of one joint often moves the float hardly
-            at all; these steps go in random directions, and stand for the noise of these movements.
+            first simplex steps along one coordinate at a time, but one knot of one joint often hardly moves the float.
+            These steps go in random directions, and no noise is added to them.
         complete: fill the simplex up to theta_dim + 1 vertices, the paper's 26, at one movement each. False: only up to
             outcome_dim + 1, so that with some neighbours the first reflection is the second movement. The search then
-            stays in the flat through its vertices, where, theta being redundant, the goal usually can be met as well.
+            stays in the flat through its vertices, which usually contains a solution, because theta is redundant.
             Deviation: False is the default, as 25 steps would be the whole budget of a goal.
         adaptive: Gao & Han's coefficients (2012), gentler in high dimensions.
-        xatol, fatol: it ends when all vertices are this near the best, in theta and in metres from the goal. Below the
-            noise of the outcomes a simplex cannot tell better from worse, so by default it ends early (a deviation: the
-            paper names no such end) and the next one begins from the memory that it has enriched.
+        xatol, fatol: it ends when all vertices are this near to the best, in theta and in metres from the goal. Below
+            the noise of the outcomes a simplex cannot tell better from worse, so by default it ends early, and the next
+            search begins with more in memory. Deviation: the paper names no such end.
 
     Raises:
         ValueError: ``step`` is not in (0, 0.5], or ``noise`` not in [0, 0.5].
@@ -89,9 +89,9 @@ def nelder_mead(
 
 
 def limit(attempt: Generator[Movement, Array, None], n: int) -> Generator[Movement, Array, None]:
-    """The first ``n`` movements of ``attempt``, which is then closed; closing this one closes it, too.
+    """The first ``n`` movements of ``attempt``, which is closed afterwards, or when this generator is closed.
 
-    All ``n`` outcomes reach ``attempt``; whatever it proposes after the last is dropped.
+    ``attempt`` is sent all ``n`` outcomes; what it proposes after the last one is dropped.
 
     Raises:
         ValueError: ``n`` is negative.
@@ -110,29 +110,34 @@ def simplex_descent(
     xatol: float = 1e-4,
     fatol: float = 1e-4,
 ) -> Generator[Array, float, None]:
-    """Nelder & Mead's method from a simplex with known values: yields points, is sent their values.
+    """Nelder & Mead's method from a simplex with known values: yields points and is sent their values.
 
     It visits the points that ``scipy.optimize.minimize(method="Nelder-Mead")`` visits after its first simplex, bit for
-    bit (among equal values the newest ranks last, as Lagarias et al. ask; scipy leaves that to its unstable sort).
+    bit. (Of equal values the newest ranks last, as Lagarias et al. demand; in scipy that depends on an unstable sort.)
 
     Args:
-        vertices: ``(n + 1, dim)``. With n < dim the search stays in the n-dimensional flat through them, but for
-            ``place``.
+        vertices: ``(n + 1, dim)``. With n < dim the search stays in the n-dimensional flat through them, unless
+            ``place`` leads out.
         values: ``(n + 1,)``.
-        place: moves a point to where it may be tried, into a box by clipping it, say; None leaves it where it is. (By
-            clipping alone a simplex whose vertices all lie on one face of the box cannot leave it.)
+        place: moves a point to where it may be tried, for example clips it into a box; None leaves it where it is. (By
+            clipping alone, a simplex with all vertices on one face of the box cannot leave this face.)
         adaptive: coefficients that depend on n.
-        xatol, fatol: it ends when all vertices are this near the best, in every coordinate and in value.
+        xatol, fatol: it ends when all vertices are this near to the best, in every coordinate and in value.
+
+    Raises:
+        ValueError: fewer than two vertices, or not one value for each.
     """
     if len(vertices) < 2 or len(values) != len(vertices):
-        raise ValueError(f"a simplex needs two vertices or more, a value each, got {len(vertices)} and {len(values)}")
+        raise ValueError(
+            f"a simplex needs two vertices or more and a value for each, got {len(vertices)} and {len(values)}"
+        )
     order = values.argsort(kind="stable")
     vertices, values = vertices[order], values[order]
     n = len(vertices) - 1
     expansion, contraction, shrinkage = (1 + 2 / n, 0.75 - 1 / (2 * n), 1 - 1 / n) if adaptive else (2.0, 0.5, 0.5)
 
     def beyond(centre: Array, distance: float) -> Array:
-        """On the line from the worst vertex through the ``centre`` of the others; -1 is the worst, 0 the centre."""
+        """A point on the line from the worst vertex (-1) through the ``centre`` of the others (0)."""
         point = (1 + distance) * centre - distance * vertices[-1]
         return point if place is None else place(point)
 
@@ -165,9 +170,9 @@ def simplex_descent(
 
 
 class _Flat:
-    """The affine hull of a simplex under construction: which points or axes lead out of it?"""
+    """The flat (affine hull) through the vertices of an unfinished simplex: which points lie outside?"""
 
-    _SINE = 0.1  # a vertex less steep above the flat than 6 degrees makes a simplex that hardly turns
+    _SINE = 0.1  # of 6 degrees: with a vertex at a smaller angle to the flat, a simplex hardly turns
 
     def __init__(self, origin: Array, shortest: float) -> None:
         self._origin = origin
@@ -175,13 +180,13 @@ class _Flat:
         self._basis = np.empty((0, len(origin)))  # orthonormal rows
 
     def lacks(self, point: Array) -> bool:
-        """Whether ``point`` lies clearly outside, and so may become a vertex."""
+        """Whether ``point`` is far enough outside to become a vertex."""
         edge = point - self._origin
         outside, length = np.linalg.norm(self._across(edge)), np.linalg.norm(edge)
         return bool(outside > self._shortest and outside > self._SINE * length)
 
     def widen(self, point: Array) -> None:
-        """Make ``point`` a vertex."""
+        """Add ``point`` as a vertex."""
         across = self._across(point - self._origin)
         self._basis = np.vstack((self._basis, across / np.linalg.norm(across)))
 
@@ -197,11 +202,11 @@ class _Flat:
 def _step_out(policies: Box, theta: Array, flat: _Flat, rng: np.random.Generator, step: float) -> Array:
     """A random step from ``theta`` that leads out of the flat and stays in the box.
 
-    Coordinates that would leave the box are mirrored: clipping them would flatten the simplex. In a corner of a box of
-    few dimensions mirroring may do so, too; then any direction is tried.
+    A coordinate that would leave the box steps the other way, because clipping it would flatten the simplex. In a
+    corner of a box of few dimensions this may flatten it, too; then random directions are tried.
     """
     direction = flat.direction_out(rng)
-    for _ in range(100):  # in vain for a step no longer than xatol
+    for _ in range(100):  # never enough for a step no longer than xatol
         change = step * np.sqrt(policies.dim) * policies.sides * direction
         forth, back = theta + change, theta - change
         vertex = policies.clip(np.where((forth < policies.low) | (forth > policies.high), back, forth))
@@ -213,7 +218,7 @@ def _step_out(policies: Box, theta: Array, flat: _Flat, rng: np.random.Generator
 
 
 def _towards(goal: Array, descent: Generator[Array, float, None]) -> Generator[Array, Array, None]:
-    """``descent`` sent the distances to ``goal`` of the outcomes that this one is sent."""
+    """Turns ``descent``, which is sent distances to ``goal``, into a search, which is sent outcomes."""
     try:
         theta = next(descent)
         while True:

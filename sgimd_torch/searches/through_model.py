@@ -1,8 +1,8 @@
-"""Searches through the forward model: which movement should land nearer, and reliably, judging by its gradient?
+"""Searches through the forward model: by its gradient, which movement should land nearer to the goal, and reliably?
 
 Not in Nguyen & Oudeyer (2014); swaps for the simplex of section 4.4.2, which needs no model.
     search = gradient_search(policies, rng, model=model); movements = search(estimate, goal); theta = next(movements)
-Until the model is good enough for ``trust`` each of them is the simplex.
+Until the model is good enough for ``trust``, each of these searches is the simplex.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from sgimd_torch.spaces import Array, Box, Estimate, Search, check_count
 
 Propose = Callable[[Anchored, torch.Tensor, torch.Tensor, Box, float, np.random.Generator], torch.Tensor]
 """(anchored, starts ``(n, theta_dim)``, goal ``(1, outcome_dim)``, policies, radius, rng) -> proposals, of which the
-one that is expected to do best is taken; none is farther than the radius from its start, see ``Anchored.descend``."""
+one that should be best is taken; none is farther than the radius from its start, see ``Anchored.descend``."""
 
-_RADII: Final = (0.02, 0.3)  # sides, root mean square: between the noise of a movement and leaving the neighbourhood
+_RADII: Final = (0.02, 0.3)  # sides, root mean square: smaller is less than the noise, larger leaves the neighbourhood
 
 
 def descend(
@@ -37,7 +37,7 @@ def descend(
     steps: int = 5,
     step: float = 0.03,
 ) -> torch.Tensor:
-    """Down the gradient of the expected squared distance, the noise included."""
+    """Descent of the gradient of the expected squared distance, noise included."""
     return anchored.descend(starts, goal, policies, steps=steps, step=step, radius=radius)
 
 
@@ -52,9 +52,9 @@ def gauss_newton(
     steps: int = 3,
     damping: float = 1e-3,
 ) -> torch.Tensor:
-    """The least change that meets the goal to first order, again and again; ``damping`` is in m^2 for a side squared.
+    """Repeatedly the smallest change that meets the goal to first order; ``damping`` is in m^2 for a side squared.
 
-    It looks at the landing point alone, not at its spread.
+    It only uses the predicted landing point, not its spread.
     """
     low, high, sides = (anchored.tensor(values) for values in (policies.low, policies.high, policies.sides))
     theta = starts
@@ -79,7 +79,7 @@ def screen(
     *,
     draws: int = 64,
 ) -> torch.Tensor:
-    """Variations of the starts, root mean square half the radius; no gradient."""
+    """Variations of the starts, root mean square half the radius, without a gradient."""
     thetas = starts.double().cpu().numpy()[np.arange(draws) % len(starts)]
     return anchored.tensor(policies.clip(rng.normal(thetas, radius / 2 * policies.sides)))
 
@@ -96,20 +96,20 @@ def gradient_search(
     residual: bool = True,
     trust: Trust = TRUST,
 ) -> Search:
-    """Every movement is planned anew through the model, from theta_g and what has landed nearest; it never ends.
+    """Every movement is planned through the model, from theta_g and the movements that landed nearest; it never ends.
 
     Predictions are anchored at the neighbours of the estimate, all proposals in one batch. Each outcome becomes an
-    anchor, too, so that what the model missed here corrects the next prediction; and proposals keep to a trust region,
-    which grows when the change of the outcome is what was predicted, and shrinks when it is not.
+    anchor, too, so that the model's error here corrects the next prediction. Proposals stay in a trust region, which
+    grows when the outcome changes as predicted, and shrinks when it does not.
 
     Args:
         policies: Pi; nothing outside is proposed.
         rng: draws the noise.
-        model: predicts; whoever runs the loop refreshes it.
-        propose: from where a candidate may begin to where it should go: ``descend``, ``gauss_newton`` or ``screen``.
-        noise: as that of ``nelder_mead``: without it the memory soon holds too few different movements.
-        candidates: how many remembered movements are starting points.
-        radius: of the trust region at the beginning, root mean square over the parameters, in sides of ``policies``.
+        model: predicts; the caller's loop refreshes it.
+        propose: from starting points to proposals: ``descend``, ``gauss_newton`` or ``screen``.
+        noise: as in ``nelder_mead``: without it the memory soon holds too few different movements.
+        candidates: number of remembered movements to start from.
+        radius: of the trust region at first, root mean square over the parameters, in sides of ``policies``.
         residual: False leaves the outcomes of this search out of the anchors, for comparison.
         trust: how far to trust the model.
 
@@ -158,13 +158,13 @@ def polished_simplex(
     radius: float = 0.15,
     trust: Trust = TRUST,
 ) -> Search:
-    """Nelder & Mead's simplex, begun where the model would go: one descent for each simplex, not for each movement.
+    """Nelder & Mead's simplex from where the model would go: one descent for each simplex, not for each movement.
 
     Args:
-        policies, rng, model, propose, candidates, radius, trust: as ``gradient_search``.
+        policies, rng, model, propose, candidates, radius, trust: as in ``gradient_search``.
 
     Raises:
-        ValueError: as ``gradient_search``.
+        ValueError: as in ``gradient_search``.
     """
     _check(policies, model, candidates, radius)
     simplex = nelder_mead(policies, rng)
@@ -188,7 +188,7 @@ def _check(policies: Box, model: ForwardModel, candidates: int, radius: float) -
 
 
 def _anchored(model: ForwardModel, context: Array, thetas: Array, outcomes: Array, trust: Trust) -> Anchored:
-    """The same anchors for all candidates, taken to be of this ``context``."""
+    """Predictions with the same anchors for all candidates, as if all were from this ``context``."""
     contexts = np.broadcast_to(context, (1, len(thetas), len(context)))
     return Anchored(model, context, contexts, thetas[None], outcomes[None], trust)
 
