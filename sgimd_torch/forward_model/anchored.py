@@ -1,8 +1,8 @@
-"""Anchored predictions: what the forward model says, corrected by what it missed nearby.
+"""Anchored predictions: those of the forward model, corrected by its errors at executed movements nearby, the anchors.
 
-Not in Nguyen & Oudeyer (2014). With one anchor k it is tau_k + L(theta) - L(theta_k); with many, a Gaussian process of
-what the network missed at each of them, whose variance grows away from all of them: a network is wrong where little was
-executed, and whatever searches through it finds just those places.
+Not in Nguyen & Oudeyer (2014). With one anchor k it is tau_k + L(theta) - L(theta_k). With many it is a Gaussian
+process of the network's errors at the anchors, whose variance grows away from them: a network is wrong where little was
+executed, and a search through it finds just those places.
     near = Anchored(model, context, thetas, outcomes); theta = near.descend(candidates, goals, policies)
 """
 
@@ -24,16 +24,16 @@ class Trust:
     """How far to trust the model.
 
     Args:
-        reach: distance in policy space over which an anchor tells something; None for .08 sqrt(theta_dim).
-        noise: standard deviation (m) of an outcome executed again, at most; see ``Environment.outcome_noise``.
-        share: how much of the variances that the model predicts is believed, of noise and of disagreement. A network
-            that has yet to learn calls its own errors noise, twice the true deviation late in a life on the fishing rod
-            and more early on, and would not let the anchors correct it. 1 is for outcomes as noisy as it says.
-        doubt: standard deviation (m) of the network's error where no anchor is near; where it misses the anchors by
-            more, that counts.
-        caution: weight of the anchored prediction's variance against the squared distance; 1 would be its expectation,
-            but the minimum over many candidates picks out those whose error flatters them.
-        error: ``ForwardModel.relative_error`` above which the model is not used at all.
+        reach: length scale in policy space of what an anchor tells; None for .08 sqrt(theta_dim).
+        noise: largest standard deviation (m) of the outcomes of one movement; see ``Environment.outcome_noise``.
+        share: how much of the model's predicted variances counts, of noise and of disagreement. A network that has not
+            learnt enough takes its own errors for noise (twice the true deviation late in a run on the fishing rod, and
+            more early), so that the anchors would not correct it. 1 is for outcomes that are as noisy as it says.
+        doubt: standard deviation (m) of the network's error where no anchor is near; its error at the anchors counts
+            instead if that is larger.
+        caution: weight of the anchored prediction's variance against the squared distance. 1 would be the expectation,
+            but the minimum over many candidates selects those whose error makes them look good.
+        error: ``ForwardModel.relative_error`` above which the model is not used.
         anchors: False predicts by the network alone, for comparison.
 
     Raises:
@@ -64,14 +64,14 @@ TRUST: Final = Trust()
 
 
 class Anchored:
-    """Of n candidates: the squared distance to a goal that is to be expected of each, and the way down.
+    """For n candidates: the expected squared distance of each to a goal, and its descent.
 
     Args:
         model: predicts.
         context: ``(context_dim,)`` in which the candidates will be executed.
-        contexts: ``(n, m, context_dim)`` in which the anchors were.
+        contexts: ``(n, m, context_dim)`` in which the anchors were executed.
         thetas: ``(n, m, theta_dim)`` of the m anchors of each candidate; n may be 1, the same for all.
-        outcomes: ``(n, m, outcome_dim)`` m, where they landed.
+        outcomes: ``(n, m, outcome_dim)`` m, where the anchors landed.
         trust: how far to trust the model.
     """
 
@@ -92,12 +92,12 @@ class Anchored:
             self._doubt, self._weights = doubt[:, 0] ** 2, self._inverse @ missed
 
     def tensor(self, values: Array) -> torch.Tensor:
-        """In the precision and where the model is."""
+        """``values`` in the precision of the model, and where it is."""
         return torch.tensor(values, dtype=torch.float32, device=self.model.input_mean.device)
 
     def predict(self, theta: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """Where ``(n, theta_dim)`` should land, ``(n, outcome_dim)`` m, and ``(n,)`` m^2 of spread about it: noise,
-        disagreement of the members, and doubt counted with ``caution``."""
+        """Where ``theta`` ``(n, theta_dim)`` should land, ``(n, outcome_dim)`` m, and the spread ``(n,)`` m^2 about it:
+        noise, disagreement of the members, and doubt weighted with ``caution``."""
         means, variances = self.model.landing(self.context, theta)
         landing = means.mean(dim=0)
         spread = self.trust.share * (variances.mean(dim=0) + means.var(dim=0, correction=0)).sum(dim=-1)
@@ -111,7 +111,7 @@ class Anchored:
         return landing + correction, spread + landing.shape[-1] * self.trust.caution * doubt
 
     def expected(self, theta: torch.Tensor, goals: torch.Tensor) -> torch.Tensor:
-        """``(n,)`` m^2: squared distance to ``goals``, the spread included, so that the reliable win."""
+        """``(n,)`` m^2: squared distance to ``goals`` plus the spread, so that reliable movements win."""
         landing, spread = self.predict(theta)
         return ((landing - goals) ** 2).sum(dim=-1) + spread
 
@@ -125,15 +125,15 @@ class Anchored:
         step: float,
         radius: float | None = None,
     ) -> torch.Tensor:
-        """``(n, theta_dim)``: where ``steps`` of Adam lead, each of about ``step`` sides of ``policies``.
+        """``(n, theta_dim)``: ``theta`` after ``steps`` of Adam, each of about ``step`` sides of ``policies``.
 
         Args:
-            radius: it goes no farther from ``theta`` than this, root mean square over the parameters, in sides.
+            radius: the farthest that it goes from ``theta``, root mean square over the parameters, in sides.
         """
         low, high, sides = (self.tensor(values) for values in (policies.low, policies.high, policies.sides))
         start = theta
         mean, square = torch.zeros_like(theta), torch.zeros_like(theta)
-        for i in range(1, steps + 1):  # torch's own Adam would have to be built for every goal
+        for i in range(1, steps + 1):  # torch's own Adam would have to be made for every goal
             theta = theta.detach().requires_grad_(True)
             (gradient,) = torch.autograd.grad(self.expected(theta, goals).sum(), theta)
             gradient = gradient * sides
@@ -147,9 +147,9 @@ class Anchored:
 
     @staticmethod
     def within(start: torch.Tensor, theta: torch.Tensor, sides: torch.Tensor, radius: float) -> torch.Tensor:
-        """The nearest points to ``theta`` in the trust region of ``start``: ``radius`` sides, root mean square."""
-        change, most = (theta - start) / sides, radius * theta.shape[-1] ** 0.5
-        return start + sides * change * (most / change.norm(dim=-1, keepdim=True).clamp(min=most))
+        """The points nearest to ``theta`` in the trust region of ``start``: ``radius`` sides, root mean square."""
+        change, longest = (theta - start) / sides, radius * theta.shape[-1] ** 0.5
+        return start + sides * change * (longest / change.norm(dim=-1, keepdim=True).clamp(min=longest))
 
     def _kernel(self, squared_distances: torch.Tensor) -> torch.Tensor:
         return (-squared_distances / (2 * self.reach**2)).exp()

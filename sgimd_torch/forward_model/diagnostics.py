@@ -1,6 +1,6 @@
-"""Is the forward model to be believed? Where it errs, whether its spread is honest, whether refining a guess helps.
+"""Can the forward model be believed? Where its errors are, whether its spread is right, whether refining a guess helps.
 
-Not in Nguyen & Oudeyer (2014). Ask it of predictions made before the model learnt from what they predict (prequential
+Not in Nguyen & Oudeyer (2014). Use predictions that were made before the model learnt from their outcomes (prequential
 analysis: Dawid, J. R. Stat. Soc. A 147, 1984); on exemplars that it was trained on, any model looks good.
     spread = np.hypot(prediction.epistemic, prediction.aleatoric); coverage(outcomes, prediction.mean, spread)
 """
@@ -16,19 +16,19 @@ from scipy.stats import chi2
 from sgimd_torch.spaces import Array, Box, check_count, check_vector, first_entry
 
 LEVELS: Final = (0.5, 0.8, 0.95)
-_NO_REFINING: Final = ("imitate", "global")  # movements with a goal that start from no estimate of how to reach it
+_NOT_REFINING: Final = ("imitate", "global")  # movements with a goal that do not start from an estimate for it
 
 
 class CellErrors(NamedTuple):
-    """Of a grid, an axis for each outcome dimension: mean ``errors`` (m), NaN in empty cells, and ``counts``."""
+    """Mean ``errors`` (m), NaN in empty cells, and ``counts`` on a grid with an axis for each outcome dimension."""
 
     errors: Array
     counts: NDArray[np.int64]
 
 
 class Windows(NamedTuple):
-    """Of n_windows: the row of the ``last`` prediction in each, ``(n_windows,)``, mean ``errors`` ``(n_windows,)`` m,
-    and ``coverages`` ``(n_windows, n_levels)``."""
+    """For each window: the row of its ``last`` prediction ``(n_windows,)``, mean ``errors`` ``(n_windows,)`` m, and
+    ``coverages`` ``(n_windows, n_levels)``."""
 
     last: NDArray[np.int64]
     errors: Array
@@ -36,8 +36,8 @@ class Windows(NamedTuple):
 
 
 class Improvements(NamedTuple):
-    """Of n goals, ``(n,)`` each: distance (m) that the ``first`` movement was off, that of the ``nearest``, the first
-    among them, and how many ``movements`` there were."""
+    """For each goal, ``(n,)``: distance (m) of the ``first`` movement from it, that of the ``nearest`` movement, the
+    first one included, and the number of ``movements``."""
 
     first: Array
     nearest: Array
@@ -45,23 +45,23 @@ class Improvements(NamedTuple):
 
     @property
     def share(self) -> float:
-        """Of the goals with a second movement, those where a later one came nearer; NaN if there is none.
+        """Share of the goals with two movements or more where a later one came nearer; NaN without such goals.
 
-        Noise alone makes the best of several nearer than the first, so a useless search does not score 0.
+        By noise alone the best of several is nearer than the first, so a useless search does not get 0.
         """
         refined = self.movements > 1
         return float((self.nearest < self.first)[refined].mean()) if refined.any() else float("nan")
 
 
 def coverage(observed: ArrayLike, mean: ArrayLike, spread: ArrayLike, levels: ArrayLike = LEVELS) -> Array:
-    """Which share of the outcomes fell inside the region that should hold a share of ``levels``.
+    """Which share of the outcomes fell inside the regions that should contain the shares ``levels``.
 
-    The regions are ellipsoids along the axes, of a Gaussian with independent dimensions. Less than the level: the model
-    is overconfident; more: too cautious.
+    The regions are ellipsoids along the axes, of a Gaussian with independent dimensions. With less than the level the
+    model is overconfident, with more it is too cautious.
 
     Args:
         observed, mean: ``(n, outcome_dim)`` m, n >= 1.
-        spread: ``(n, outcome_dim)`` m, standard deviations > 0: epistemic and aleatoric ones, squared and added.
+        spread: ``(n, outcome_dim)`` m, standard deviations > 0: the root of epistemic plus aleatoric ones, squared.
         levels: ``(n_levels,)`` between 0 and 1.
 
     Returns:
@@ -75,11 +75,11 @@ def coverage(observed: ArrayLike, mean: ArrayLike, spread: ArrayLike, levels: Ar
 
 
 def error_by_cell(observed: ArrayLike, mean: ArrayLike, box: Box, cells: int = 10) -> CellErrors:
-    """Distance between prediction and outcome, by where the outcome was; those outside ``box`` do not count.
+    """Distance between prediction and outcome, by the place of the outcome; those outside ``box`` do not count.
 
     Args:
         observed, mean: ``(n, outcome_dim)`` m.
-        box: T, or the part of it to look at.
+        box: T, or a part of it.
         cells: along each side of ``box``, of equal size.
 
     Raises:
@@ -102,11 +102,11 @@ def running(
     """How error and coverage change from one window of predictions to the next.
 
     Args:
-        observed, mean, spread, levels: as for ``coverage``, in the order in which they were lived.
-        window: predictions in each, at least: what would be left over is spread over all of them. Fewer make one.
+        observed, mean, spread, levels: as in ``coverage``, in the order of movements.
+        window: predictions in each window, at least: the rest is spread over all windows. Fewer give one window.
 
     Raises:
-        ValueError: as ``coverage``, or ``window`` is less than 1.
+        ValueError: as in ``coverage``, or ``window`` is less than 1.
     """
     check_count("window", window, 1)
     observed, mean, spread = _checked(observed, mean, spread)
@@ -122,8 +122,8 @@ def running(
 def improvements(goals: ArrayLike, outcomes: ArrayLike, origins: ArrayLike) -> Improvements:
     """How much nearer to its goal the learner comes by refining its first guess; one entry for each goal pursued.
 
-    A goal is pursued as long as consecutive movements have it. Imitation is left out, and so are the random movements
-    of the global regime, next to which any guess would shine.
+    A goal is pursued as long as consecutive movements have it. Imitation does not count, nor do the random movements of
+    the global regime, compared with which any guess would look good.
 
     Args:
         goals, outcomes: ``(n, outcome_dim)`` m, in order of movements; NaN where there was none.
@@ -137,10 +137,10 @@ def improvements(goals: ArrayLike, outcomes: ArrayLike, origins: ArrayLike) -> I
     if goals.ndim != 2 or goals.shape != outcomes.shape or origins.shape != goals.shape[:1]:
         shapes = f"{goals.shape}, {outcomes.shape} and {origins.shape}"
         raise ValueError(f"goals, outcomes and origins must be (n, outcome_dim) twice and (n,), got {shapes}")
-    rows = np.flatnonzero(np.isfinite(goals).all(axis=1) & ~np.isin(origins, _NO_REFINING))
+    rows = np.flatnonzero(np.isfinite(goals).all(axis=1) & ~np.isin(origins, _NOT_REFINING))
     reached = check_vector("outcomes", outcomes[rows], goals.shape[1], "every movement towards a goal has one")
     distances = np.linalg.norm(reached - goals[rows], axis=1)
-    pursuit = np.cumsum(np.any(goals[1:] != goals[:-1], axis=1))  # NaN differs from NaN, too
+    pursuit = np.cumsum(np.any(goals[1:] != goals[:-1], axis=1))  # also NaN != NaN
     begins = np.flatnonzero(np.diff(np.append(0, pursuit)[rows], prepend=-1))
     nearest = np.minimum.reduceat(distances, begins) if len(begins) else np.empty(0)
     return Improvements(distances[begins], nearest, np.diff(begins, append=len(rows)))
@@ -148,7 +148,7 @@ def improvements(goals: ArrayLike, outcomes: ArrayLike, origins: ArrayLike) -> I
 
 def _checked(observed: ArrayLike, *others: ArrayLike) -> tuple[Array, ...]:
     """``(n, outcome_dim)`` each, n >= 1: observed, mean, and a spread above 0 if it is given."""
-    observed = np.asarray(observed, dtype=np.float64)
+    observed = np.asarray(observed)
     if observed.ndim != 2 or 0 in observed.shape:
         raise ValueError(f"observed must be (n, outcome_dim) with at least one outcome, got {observed.shape}")
     arrays = [check_vector("observed", observed, observed.shape[1])]

@@ -1,7 +1,7 @@
-"""An ensemble of networks, each with a prediction and the noise it expects around it, in one batched product a layer.
+"""An ensemble of networks; each predicts a value and its noise. One batched product per layer computes all of them.
 
 Deep ensembles (Lakshminarayanan, Pritzel & Blundell, NeurIPS 2017). A plain LightningModule, which any of Lightning's
-loops can train; ``forward_model.py`` trains it online.
+loops can train; ``model.py`` trains it online.
     means, log_variances = Ensemble(25, 2, torch.Generator())(inputs)
 """
 
@@ -22,16 +22,16 @@ _LOG_VARIANCES: Final = (-9.0, 3.0)  # of standardised outcomes: a noise of 1 % 
 
 
 class Ensemble(LightningModule):
-    """Inputs and outputs are standardised by whoever uses it.
+    """The caller standardises inputs and outputs.
 
     Args:
-        n_inputs, n_outputs: sizes of both.
+        n_inputs, n_outputs: their dimensions.
         generator: draws the weights.
-        members: networks; each starts from other weights.
+        members: number of networks; each starts from other weights.
         hidden: units of each hidden layer.
         noise_heads: whether the predicted noise depends on the input; if not, it is one number for each output.
-        lr: of Adam.
-        beta: 0 is the likelihood itself; .5 keeps noisy inputs from being given up on (Seitzer et al., ICLR 2022).
+        lr: learning rate of Adam.
+        beta: 0 is the likelihood itself; with .5 noisy inputs are learnt, too (Seitzer et al., ICLR 2022).
     """
 
     def __init__(
@@ -64,7 +64,7 @@ class Ensemble(LightningModule):
         return mean, log_variance.clamp(*_LOG_VARIANCES)
 
     def training_step(self, batch: tuple[torch.Tensor, torch.Tensor], batch_idx: int = 0) -> torch.Tensor:
-        """Negative log likelihood of ``(inputs, outputs)``, ``(members, n, ...)`` each: every member has its own."""
+        """Loss for ``(inputs, outputs)``, ``(members, n, ...)`` each: negative log likelihood, weighted by ``beta``."""
         inputs, outputs = batch
         mean, log_variance = self(inputs)
         loss = nll(mean, log_variance, outputs)
@@ -76,5 +76,5 @@ class Ensemble(LightningModule):
 
 
 def nll(mean: torch.Tensor, log_variance: torch.Tensor, values: torch.Tensor) -> torch.Tensor:
-    """Negative log likelihood of each of the ``values``, but for a constant."""
+    """Negative log likelihood of each of the ``values``, up to a constant."""
     return 0.5 * (log_variance + (values - mean) ** 2 * (-log_variance).exp())

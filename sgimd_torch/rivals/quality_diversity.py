@@ -1,7 +1,7 @@
-"""Quality diversity: fill an archive of outcomes with the movements that reach them, another school's learners.
+"""Quality diversity: learners of another school, which fill an archive of outcomes with movements that reach them.
 
-MAP-Elites (Mouret & Clune 2015) and CMA-ME (Fontaine et al. 2020), by the package ``ribs``. They too end with a
-movement for every outcome that they found, but they aim at no goal: they vary movements that led somewhere new.
+MAP-Elites (Mouret & Clune 2015) and CMA-ME (Fontaine et al. 2020), by the package ``ribs``. They, too, end with a
+movement for every outcome that they found, but without goals: they vary movements that led somewhere new.
     learner = map_elites(environment, seed)        learner = cma_me(environment, seed)
 """
 
@@ -23,8 +23,8 @@ try:
 except ImportError as error:
     raise ImportError(f"quality diversity needs ribs: pip install 'sgimd-torch[rivals]' ({error})") from error
 
-_CELLS = 400  # by default: 20 x 20, of .1 m in the fishing task, as the tiles of its benchmark
-_MOST_CELLS = 1_000_000  # ribs keeps an array over all of them
+_DEFAULT_CELLS = 400  # 20 x 20, of .1 m in the fishing task, like the tiles of its benchmark
+_MAX_CELLS = 1_000_000  # ribs keeps an array of all of them
 
 
 def map_elites(
@@ -36,19 +36,18 @@ def map_elites(
     batch: int = 10,
     cells: int | None = None,
 ) -> Learner:
-    """MAP-Elites: Gaussian variations of elites, drawn evenly from the cells of T that were reached.
+    """MAP-Elites: Gaussian variations of elites, which are drawn evenly from the cells of T that were reached.
 
     Args:
         environment: its boxes are read; it is not executed.
         seed: of this learner's stream.
-        first: uniform movements to begin with.
-        sd: of the variations, in sides of Pi, as that of `perturb`; what leaves Pi is clipped.
+        first: number of uniform movements at the start.
+        sd: standard deviation of the variations, in sides of Pi, as in `perturb`; what leaves Pi is clipped.
         batch: movements between two looks at the archive.
         cells: for each dimension of T; None for about 400 in all.
 
     Raises:
-        ValueError: a number out of its range, or an environment with contexts, which an archive over T cannot tell
-            apart.
+        ValueError: a number out of its range, or an environment with contexts, which an archive over T does not know.
     """
     if not 0 < sd < np.inf:
         raise ValueError(f"sd must be positive and finite, got {sd}; without noise nothing new is tried")
@@ -77,15 +76,16 @@ def cma_me(
     """CMA-ME: CMA-ES that climbs towards new cells of the archive, and restarts from an elite when it finds none.
 
     Args:
-        environment, seed, cells: as of `map_elites`.
-        emitters: of the improvement type, which take turns, all from the centre of Pi. Deviation: Fontaine et al. have
-            15, which would leave each some 25 generations of a run on the rod.
-        sd: of the first generation and after a restart, in sides of Pi; what leaves Pi is clipped. Deviation: pyribs'
-            examples begin wider, but from the middle of a box of many dimensions that leads into its corners.
+        environment, seed, cells: as in `map_elites`.
+        emitters: number of emitters of the improvement type, which take turns; all start at the centre of Pi.
+            Deviation: Fontaine et al. have 15, of which each would get some 25 generations in a run on the rod.
+        sd: standard deviation of the first generation and after a restart, in sides of Pi; what leaves Pi is clipped.
+            Deviation: pyribs' examples start wider, but from the middle of a box of many dimensions that leads into its
+            corners.
         batch: movements of a generation, at least 2; None for 4 + 3 ln(theta_dim).
 
     Raises:
-        ValueError: as `map_elites`.
+        ValueError: as in `map_elites`.
     """
     if not 0 < sd < np.inf:
         raise ValueError(f"sd must be positive and finite, got {sd}; without noise nothing new is tried")
@@ -102,19 +102,19 @@ def cma_me(
 
 
 class QualityDiversity:
-    """The movements of emitters, batch after batch; the archive hears of a batch when all of it was executed.
+    """The movements of emitters, batch after batch; the archive is told of a batch when all of it was executed.
 
-    The objective, by which elites replace each other, is little effort: minus the mean square of a movement's distance
-    from the middle of Pi, in its sides. Outcomes outside T count for the nearest cell of its border. In a T far larger
-    than what can be reached nearly all outcomes share a few cells, and little is left to vary.
+    The objective, which decides between elites of one cell, is little effort: minus the mean square of a movement's
+    distance from the middle of Pi, in sides. Outcomes outside T count for the nearest cell of its border. In a T far
+    larger than what can be reached nearly all outcomes share a few cells, and few elites are left to vary.
 
-    Each attempt is one movement; one that is interrupted before its outcome was told is proposed again.
+    Each attempt is one movement; if it is interrupted before its outcome is told, it is proposed again.
 
     Args:
         policies: Pi.
         archive: over T, of movements in sides of Pi.
-        emitters: propose a batch each, in turns. Deviation: what lies outside Pi is clipped here, where CMA-ES itself
-            would draw again, without end once its mean lies in a corner of many dimensions.
+        emitters: propose one batch each, in turns. Deviation: what lies outside Pi is clipped here. CMA-ES itself would
+            draw again, and never end once its mean lies in a corner of many dimensions.
         origin: of the movements, for the log.
     """
 
@@ -149,9 +149,9 @@ def _archive(environment: Environment, rng: np.random.Generator, cells: int | No
     if environment.contexts.dim:
         raise ValueError(f"quality diversity knows one context only, got contexts of dim {environment.contexts.dim}")
     outcomes = environment.outcomes
-    cells = max(2, round(_CELLS ** (1 / outcomes.dim))) if cells is None else check_count("cells", cells, 1)
-    if cells**outcomes.dim > _MOST_CELLS:
-        raise ValueError(f"cells must be {_MOST_CELLS} in all at most, got {cells} in {outcomes.dim} dimensions")
+    cells = max(2, round(_DEFAULT_CELLS ** (1 / outcomes.dim))) if cells is None else check_count("cells", cells, 1)
+    if cells**outcomes.dim > _MAX_CELLS:
+        raise ValueError(f"cells must be {_MAX_CELLS} in all at most, got {cells} in {outcomes.dim} dimensions")
     ranges = list(zip(outcomes.low, outcomes.high, strict=True))
     return GridArchive(
         solution_dim=environment.policies.dim, dims=[cells] * outcomes.dim, ranges=ranges, seed=_seed(rng)

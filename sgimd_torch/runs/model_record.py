@@ -109,8 +109,8 @@ class RunModel:
             "model/ms": 1000 * self._seconds / self._refreshes,
             "model/improved": self._improved(),
         }
-        if refresh.foreseen is not None:
-            self._foreseen(refresh.first, memory.outcomes[refresh.first :], refresh.foreseen)
+        if refresh.predicted is not None:
+            self._foreseen(refresh.first, memory.outcomes[refresh.first :], refresh.predicted)
         if refresh.diverged:
             self._news.append(f"movement {movements}: training diverged; the forward model keeps its last good weights")
         self._say_whether_asked(movements, error)

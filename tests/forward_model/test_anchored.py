@@ -38,8 +38,8 @@ def anchored(model, memory, rows, trust=EXACT):
 
 def network(model, thetas):
     """Landing points by the network alone, and what is believed of the spread that it predicts: a tenth."""
-    foreseen = model.predict(NO_CONTEXT, thetas)
-    return foreseen.mean, 0.1 * (foreseen.epistemic**2 + foreseen.aleatoric**2).sum(axis=-1)
+    predicted = model.predict(NO_CONTEXT, thetas)
+    return predicted.mean, 0.1 * (predicted.epistemic**2 + predicted.aleatoric**2).sum(axis=-1)
 
 
 def predict(near, thetas):

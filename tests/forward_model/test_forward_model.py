@@ -169,7 +169,7 @@ def test_adams_moments_survive_a_refresh():
     model = ForwardModel(0, 3, 2, rate=0.2)
     model.refresh(remembered(100))
     model.refresh(remembered(200))
-    steps = {int(state["step"]) for state in model._optimizer.state.values()}
+    steps = {int(state["step"]) for state in model._online.optimizer.state.values()}
     assert steps == {40}
 
 
@@ -177,22 +177,22 @@ def test_learning_stops_when_what_is_held_out_gets_no_better():
     assert ForwardModel(0, 3, 2, rate=100).refresh(noise_only(60)).steps < 2500
 
 
-def test_a_refresh_says_what_was_foreseen_of_the_new_exemplars_before_it_learnt_from_them():
+def test_a_refresh_says_what_was_predicted_for_the_new_exemplars_before_it_learnt_from_them():
     model, memory = ForwardModel(0, 3, 2), remembered(160)
     first = model.refresh(remembered(100))  # the same hundred
-    assert (first.first, first.foreseen) == (0, None)
+    assert (first.first, first.predicted) == (0, None)
     before = model.predict(NO_CONTEXT, memory.thetas[100:])
     second = model.refresh(memory)
     assert second.first == 100
-    for foreseen, predicted in zip(second.foreseen, before, strict=True):
-        np.testing.assert_array_equal(foreseen, predicted)
-    assert not np.array_equal(second.foreseen.mean, model.predict(NO_CONTEXT, memory.thetas[100:]).mean)
+    for told, expected in zip(second.predicted, before, strict=True):
+        np.testing.assert_array_equal(told, expected)
+    assert not np.array_equal(second.predicted.mean, model.predict(NO_CONTEXT, memory.thetas[100:]).mean)
 
 
 def test_after_a_divergence_the_weights_before_it_stand():
     model = taught(remembered(100))
     before, prediction = weights(model), model.predict(NO_CONTEXT, np.full(3, 0.5))
-    model.lr, model._optimizer = 1e30, None
+    model.lr, model._online.optimizer = 1e30, None
     assert model.refresh(remembered(200)).diverged
     assert torch.equal(weights(model), before)
     np.testing.assert_array_equal(model.predict(NO_CONTEXT, np.full(3, 0.5)).mean, prediction.mean)
@@ -200,10 +200,10 @@ def test_after_a_divergence_the_weights_before_it_stand():
     assert not model.refresh(remembered(300)).diverged
 
 
-def test_weights_that_are_finite_but_lost_count_as_a_divergence_too():
+def test_finite_weights_with_a_large_error_count_as_a_divergence_too():
     model = taught(remembered(300), rate=1.0)
     before, error = weights(model), model.relative_error
-    model.lr, model._optimizer = 1.0, None
+    model.lr, model._online.optimizer = 1.0, None
     assert model.refresh(remembered(400)).diverged
     assert torch.equal(weights(model), before)
     assert model.relative_error == pytest.approx(error, rel=0.2)  # of more exemplars held out
@@ -218,7 +218,7 @@ def test_a_refresh_that_is_interrupted_has_changed_nothing(monkeypatch):
     for model in (ForwardModel(0, 3, 2), whole):
         before, error = weights(model), model.relative_error
         with monkeypatch.context() as patch:
-            patch.setattr(model, "_held_out", interrupted)  # after the first steps
+            patch.setattr(model._online, "judge", interrupted)  # after the first steps
             with pytest.raises(KeyboardInterrupt):
                 model.refresh(remembered(200))
         assert torch.equal(weights(model), before)
@@ -245,11 +245,11 @@ def test_on_a_gpu_it_learns_as_well(unseen):
 
 def test_the_weights_have_moved_to_where_they_are_trained_before_any_exemplar_does(monkeypatch):
     model, order = ForwardModel(0, 3, 2), []
-    for name in ("_begin", "_tensor"):
-        step = getattr(model, name)
-        monkeypatch.setattr(model, name, lambda *args, name=name, step=step: (order.append(name), step(*args))[1])
+    for part, name in ((model._online, "prepare"), (model, "_tensor")):
+        step = getattr(part, name)
+        monkeypatch.setattr(part, name, lambda *args, name=name, step=step: (order.append(name), step(*args))[1])
     model.refresh(remembered(100))
-    assert order[0] == "_begin"
+    assert order[0] == "prepare"
     assert "_tensor" in order
 
 
@@ -318,7 +318,7 @@ def test_a_loaded_model_learns_on(tmp_path):
     loaded = ForwardModel.load(tmp_path / "model.safetensors", every=20, rate=1.0)
     assert loaded.refresh(remembered(110)) is None
     refresh = loaded.refresh(remembered(120))
-    assert (refresh.first, refresh.steps, len(refresh.foreseen.mean)) == (100, 20, 20)
+    assert (refresh.first, refresh.steps, len(refresh.predicted.mean)) == (100, 20, 20)
 
 
 def test_a_model_that_is_not_there_is_called_missing(tmp_path):

@@ -217,7 +217,7 @@ def test_a_divergence_is_told_and_recorded(tmp_path):
     with directory:
         for episode in remember(memory, 150):
             if episode.index == 99:
-                model.lr, model._optimizer = 1e30, None
+                model.lr, model._online.optimizer = 1e30, None
             if episode.index == 149:
                 model.lr = 1e-2
             learnt = watched.episode(episode, memory)

@@ -164,11 +164,11 @@ def test_no_proposal_leaves_the_trust_region_of_its_start_or_the_box(model, inve
 
 def radii(model, estimate, goal, outcome, n=5, **options):
     """Those of ``n`` movements in a world where each lands as ``outcome`` (predicted, nearest so far) says."""
-    seen, foresee = [], []
+    seen, asked = [], []
 
     def watched(anchored, starts, goal, policies, radius, rng):
         seen.append(radius)
-        foresee[:] = [anchored]
+        asked[:] = [anchored]
         return descend(anchored, starts, goal, policies, radius, rng)
 
     search = gradient_search(ARM.policies, stream(0, "search"), model=model, propose=watched, noise=0.0, **options)
@@ -176,14 +176,14 @@ def radii(model, estimate, goal, outcome, n=5, **options):
     theta = next(attempt)
     for _ in range(n - 1):
         with torch.no_grad():
-            predicted = foresee[0].predict(foresee[0].tensor(theta[None]))[0][0].double().numpy()
+            predicted = asked[0].predict(asked[0].tensor(theta[None]))[0][0].double().numpy()
         outcomes.append(outcome(predicted, min(outcomes, key=lambda landed: np.linalg.norm(landed - goal))))
         theta = attempt.send(outcomes[-1])
     return seen
 
 
 def test_the_trust_region_grows_where_the_world_agrees_and_shrinks_where_it_does_not(model, inverse):
-    goal = np.array([3.0, 3.0])  # never reached, so that there is always a change to be foreseen
+    goal = np.array([3.0, 3.0])  # never reached, so that there is always a change to be predicted
     estimate = inverse(NO_CONTEXT, goal)
     agreeing = radii(model, estimate, goal, lambda predicted, _: predicted, radius=0.1)
     assert agreeing == pytest.approx([0.1, 0.15, 0.225, 0.3, 0.3])
