@@ -1,6 +1,6 @@
-"""Measure the fishing rod: is it stable, quick, smooth and noisy as it should be, and where does its float fall?
+"""Measure the fishing rod: is it stable, fast, smooth and noisy enough, and where does its float fall?
 
-Prints one line for each property with what is wanted, and ends with exit code 1 if any is missed.
+Prints one line for each property and what is wanted, and ends with exit code 1 if one is not met.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def landings(rod: FishingRod, thetas: Array, name: str) -> tuple[int, Array]:
 def cost(rod: FishingRod, movements: int = 300) -> tuple[float, float]:
     """Median time (ms) of executing one movement, and median ratio to C stepping alone over as many steps.
 
-    The C stepping moves the arm, too: from one random posture to the next, in one call.
+    C stepping also moves the arm, from one random posture to the next, in one call.
     """
     data, postures, times, ratios = mujoco.MjData(rod.model), stream(SEED, "postures"), [], []
     for row, theta in enumerate(stream(SEED, "cost").random((movements, 25))):
@@ -65,7 +65,7 @@ def cost(rod: FishingRod, movements: int = 300) -> tuple[float, float]:
 
 
 def main() -> int:
-    """Measure everything and judge it."""
+    """Measure all properties and judge them."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument(
         "--movements", type=at_least(10), default=100_000, help="random movements, at least 10 (default: %(default)s)"
@@ -83,7 +83,7 @@ def main() -> int:
     deviations = repeated.std(axis=1, ddof=1)
     ordered = np.sort(deviations.mean(axis=1))
     spread = float(ordered[-20:].mean() / ordered[:20].mean())
-    # Were all movements' outcomes one Gaussian about their means, standardised deviations would have kurtosis 3.
+    # If all movements scattered by the same Gaussian about their means, the kurtosis would be 3.
     pooled = ((repeated - repeated.mean(axis=1, keepdims=True)) / deviations.mean()).ravel()
     kurtosis = float((pooled**4).mean() / (pooled**2).mean() ** 2)
 

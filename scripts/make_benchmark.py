@@ -1,7 +1,7 @@
-"""Make the benchmark set: one goal in each tile of what several learners reached together (section 5.2 of the paper).
+"""Make the benchmark set: one goal in each tile that several learners reached together (section 5.2 of the paper).
 
-Random, SAGG-RIAC and SGIM-D each live for some seeds; their landing points are pooled; the tiles' side is chosen so
-that about 358 of them, the paper's number, were reached; one goal is drawn at random in each.
+Random, SAGG-RIAC and SGIM-D are run with several seeds each, and their landing points are put together. The side of the
+tiles is chosen so that about 358 of them, the paper's number, were reached. One goal is drawn at random in each.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from sgimd_torch.teachers import PeriodicTeacher
 
 
 def outcomes_of(algorithm: str, seed: int, movements: int) -> Array:
-    """``(movements, 2)`` m, where the float landed in one life."""
+    """``(movements, 2)`` m, where the float landed in one run."""
     rod = FishingRod(threads=1)
     teacher = None
     if algorithm == "random":
@@ -40,22 +40,20 @@ def outcomes_of(algorithm: str, seed: int, movements: int) -> Array:
 
 
 def main() -> None:
-    """Run the learners, pool, tile, draw, write."""
+    """Run the learners, tile what they reached, draw the goals and write the file."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=writable_file, default=SHIPPED, help="file to write (default: the shipped one)")
     parser.add_argument(
-        "--seed", type=at_least(0), default=2000, help="first seed of runs and draw (default: %(default)s)"
+        "--seed", type=at_least(0), default=2000, help="of the first run and of the draw (default: %(default)s)"
     )
     parser.add_argument("--runs", type=at_least(1), default=4, help="runs of each learner (default: %(default)s)")
     parser.add_argument("--movements", type=at_least(1), default=5000, help="of each run (default: %(default)s)")
-    parser.add_argument(
-        "--tiles", type=at_least(1), default=358, help="how many are wanted, about (default: %(default)s)"
-    )
+    parser.add_argument("--tiles", type=at_least(1), default=358, help="about how many (default: %(default)s)")
     parser.add_argument("--processes", type=at_least(1), default=2, help="(default: %(default)s)")
     options = parser.parse_args()
-    lives = list(product(("random", "sagg-riac", "sgim-d"), range(options.seed, options.seed + options.runs)))
+    runs = list(product(("random", "sagg-riac", "sgim-d"), range(options.seed, options.seed + options.runs)))
     with ProcessPoolExecutor(options.processes) as pool:
-        pending = [pool.submit(outcomes_of, *life, options.movements) for life in lives]
+        pending = [pool.submit(outcomes_of, *each, options.movements) for each in runs]
         pooled = np.concatenate([future.result() for future in tqdm(pending, desc="learning")])
     box = FishingRod().outcomes
 

@@ -1,10 +1,9 @@
 """Make the shipped demonstrations of demonstrator 3: simulated kinesthetic recordings on the fishing rod.
 
-The paper's demonstrator 3 was a person who led the arm by hand. These recordings are *simulated* in that person's
-manner as the paper describes it: every joint moves monotonically from the start configuration to an end posture, all
-with the same shape, scaled; end postures come from one habit, with the variation of a hand, and are chosen so that the
-landing points spread evenly over the plane. The pace wavers smoothly, as a hand's does, so no recording is exactly a
-motor primitive.
+The paper's demonstrator 3 was a person who led the arm by hand. These recordings are *simulated* as the paper describes
+that person's: every joint moves monotonically from the start configuration to an end posture, all with the same shape,
+scaled. End postures follow one rule, with variations like those of a hand, and are chosen so that the landing points
+spread evenly over the plane. The speed varies smoothly, as with a hand, so no recording is exactly a motor primitive.
 """
 
 from __future__ import annotations
@@ -21,13 +20,13 @@ from sgimd_torch.spaces import Array, Demonstration, stream
 
 RATE = 50  # Hz
 DURATIONS = (1.0, 1.4)  # s
-HAND = 0.04  # rad, how much a hand's end postures vary
-TREMOR = 0.4  # part of the pace that wavers
+HAND = 0.04  # rad, standard deviation of end postures, as of a hand
+TREMOR = 0.4  # how much the speed varies, relative to the speed
 
 
 def end_posture(turn: float, stretch: float) -> Array:
-    """``(6,)`` rad, the teacher's habit: ``turn`` in [-1, 1] from right to left, ``stretch`` in [-1, 1] from far behind
-    to far ahead. Yaw and wrist share the turn; shoulder, elbow and wrist share the stretch."""
+    """``(6,)`` rad, the rule of the teacher: ``turn`` in [-1, 1] from right to left, ``stretch`` in [-1, 1] from far
+    behind to far ahead. Yaw and wrist make the turn; shoulder, elbow and wrist make the stretch."""
     middle = (JOINT_RANGES.low + JOINT_RANGES.high) / 2
     sideways = np.array([1.5, 0.0, 0.0, 0.0, 0.0, 1.2])
     ahead = np.array([0.0, -0.65, 0.1, 0.0, -0.75, 0.0])
@@ -45,13 +44,13 @@ def lead(end: Array, rng: np.random.Generator) -> tuple[Array, Array]:
         rng.normal(0, TREMOR / 2, (1, 6)) * np.sin(2 * np.pi * (f * times[:, None] + rng.random((1, 6))))
         for f in (2.0, 3.5, 5.0, 7.0)
     )
-    speed = pace[:, None] * np.maximum(1 + waver, 0.1)  # never backwards: the movement is monotone
+    speed = pace[:, None] * np.maximum(1 + waver, 0.1)  # never backwards, so that the movement is monotone
     share = np.concatenate([np.zeros((1, 6)), np.cumsum((speed[1:] + speed[:-1]) / 2, axis=0)])
     return times, start + share / share[-1] * (end - start)
 
 
 def farthest_points(points: Array, n: int) -> list[int]:
-    """Rows of ``n`` of the ``points``, each as far as can be from those before it, from the one nearest the mean on."""
+    """Rows of ``n`` of the ``points``: the one nearest to the mean, then always the farthest from the chosen ones."""
     chosen = [int(np.linalg.norm(points - points.mean(axis=0), axis=1).argmin())]
     distances = np.full(len(points), np.inf)
     while len(chosen) < n:
@@ -61,7 +60,7 @@ def farthest_points(points: Array, n: int) -> list[int]:
 
 
 def main() -> None:
-    """Record many movements, keep those that spread evenly."""
+    """Record many movements, and keep those that spread evenly."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=writable_file, default=SHIPPED, help="file to write (default: the shipped one)")
     parser.add_argument(

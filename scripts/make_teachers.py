@@ -1,9 +1,9 @@
 """Make the shipped demonstrations of demonstrators 1 and 2: robots that learnt alone, by SAGG-RIAC, and now teach.
 
-Section 5.3 of the paper. Some SAGG-RIAC learners live on the fishing rod; what they remember is pooled.
+Section 5.3 of the paper. Several SAGG-RIAC learners are run on the fishing rod, and their memories are put together.
 Demonstrator 1 is naive: its demonstrations are exemplars drawn at random. Demonstrator 2 is careful: its demonstrations
-are spread evenly over what was reached and, of some exemplars that landed on the same tile, each is the one that lands
-most reliably when it is executed again. What is recorded are joint trajectories, as for demonstrator 3, so the learner
+are spread evenly over what was reached, and each is, of some exemplars that landed on the same tile, the one that lands
+most reliably when it is executed again. The recordings are joint trajectories, as for demonstrator 3, so the learner
 has to find theta_d by itself.
 """
 
@@ -26,7 +26,7 @@ from sgimd_torch.environments.protocol import execute_many
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Array, Demonstration, stream
 
-CANDIDATES = 10  # exemplars at most that demonstrator 2 compares on a tile
+CANDIDATES = 10  # the most exemplars that demonstrator 2 compares on a tile
 EXECUTIONS = 10  # of each of them
 
 
@@ -40,33 +40,33 @@ def memory_of(seed: int, movements: int) -> tuple[Array, Array]:
 
 
 def demonstrate(rod: FishingRod, theta: Array, outcome: Array) -> Demonstration:
-    """The trajectory of ``theta`` as it is commanded, recorded at 50 Hz, and where the float had landed."""
+    """The commanded trajectory of ``theta``, recorded at 50 Hz, and where the float had landed."""
     return Demonstration(np.zeros(0), *rod.primitive.trajectory(theta), outcome)
 
 
 def on_tiles(outcomes: Array, n: int) -> list[np.ndarray]:
-    """Rows of the ``outcomes`` ``(m, 2)`` m, tile by tile; the tiles are so large that about 1.1 n of them hold any."""
+    """Rows of the ``outcomes`` ``(m, 2)`` m, tile by tile; of tiles so large that about 1.1 n of them have any."""
     side = min(np.linspace(0.05, 0.4, 141), key=lambda side: abs(len(np.unique(outcomes // side, axis=0)) - 1.1 * n))
     _, tile_of = np.unique(outcomes // side, axis=0, return_inverse=True)
     return [np.flatnonzero(tile_of == tile) for tile in range(tile_of.max() + 1)]
 
 
 def execute_again(rod: FishingRod, thetas: Array, rng: np.random.Generator) -> Array:
-    """``(EXECUTIONS, n, 2)`` m, where each of ``(n, theta_dim)`` lands, each time with motor noise of its own."""
+    """``(EXECUTIONS, n, 2)`` m, where each of ``(n, theta_dim)`` lands, every time with other motor noise."""
     copies = np.tile(thetas, (EXECUTIONS, 1))
     rngs = [stream(int(rng.integers(2**32)), "re-execution", k) for k in range(len(copies))]
     return execute_many(rod, np.zeros((len(copies), 0)), copies, rngs).reshape(EXECUTIONS, len(thetas), 2)
 
 
 def most_reliable(landed: Array) -> tuple[int, Array]:
-    """Of ``(n_executions, n, 2)`` m the column that varies least, and of its landing points the most typical."""
+    """The column of ``(n_executions, n, 2)`` m that varies least, and the most typical of its landing points."""
     best = int(landed.var(axis=0).sum(axis=1).argmin())
     typical = np.linalg.norm(landed[:, best] - landed[:, best].mean(axis=0), axis=1).argmin()
     return best, landed[typical, best]
 
 
 def careful(rod: FishingRod, thetas: Array, outcomes: Array, n: int, rng: np.random.Generator) -> list[Demonstration]:
-    """From each of ``n`` tiles, spread evenly, the most reliable of some exemplars that landed there.
+    """From each of ``n`` evenly spread tiles, the most reliable of some exemplars that landed there.
 
     Raises:
         ValueError: too few tiles were reached.
@@ -85,7 +85,7 @@ def careful(rod: FishingRod, thetas: Array, outcomes: Array, n: int, rng: np.ran
 
 
 def main() -> None:
-    """Let the learners live, then choose what each demonstrator shows."""
+    """Run the learners, then choose what each demonstrator shows."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument(
         "--out",

@@ -1,4 +1,4 @@
-"""Option types of the scripts in this folder: counts and files, checked by argparse before anything is computed."""
+"""Option types of the scripts in this folder: counts and files, which argparse checks before anything is computed."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 
 def at_least(least: int) -> Callable[[str], int]:
-    """An argparse type: a whole number from ``least`` on."""
+    """An argparse type: a whole number of at least ``least``."""
 
     def count(text: str) -> int:
         try:
