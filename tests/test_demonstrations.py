@@ -178,7 +178,7 @@ def test_a_file_that_cannot_be_right_is_refused_by_name(
 
 
 @pytest.mark.parametrize("content", [b"", b"times,angles\n0,1\n", b"PK\x03\x04", b"\x93NUMPY\x01\x00", b"\x80\x04]."])
-def test_what_is_no_archive_is_refused(tmp_path: Path, content: bytes) -> None:
+def test_anything_but_an_archive_is_refused(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "other.npz").write_bytes(content)
     with pytest.raises(ValueError, match="no demonstration file"):
         load_demonstrations(tmp_path / "other.npz")
@@ -194,7 +194,7 @@ def test_a_single_array_is_refused_and_so_is_a_folder(tmp_path: Path) -> None:
         load_demonstrations(tmp_path / "none.npz")
 
 
-def test_a_refusal_says_what_the_file_is_not_and_never_advises_pickle(tmp_path: Path) -> None:
+def test_the_error_says_what_the_file_is_not_and_never_advises_pickle(tmp_path: Path) -> None:
     (tmp_path / "text.npz").write_text("0.1 0.2\n")
     (tmp_path / "pickled.npz").write_bytes(pickle.dumps(some()))
     np.savez(tmp_path / "objects.npz", **fields() | {"times": np.array([{}] * 5)})
@@ -289,7 +289,7 @@ def test_the_recordings_share_one_shape_scaled_to_different_end_postures() -> No
         phases = recording.times / recording.times[-1]
         shapes += [np.interp(np.linspace(0, 1, 11), phases, column) for column in share.T]
     spread = np.std(shapes, axis=0)
-    assert 3e-3 < spread.max() < 0.15  # of a way of 1: one shape, but a hand is no machine
+    assert 3e-3 < spread.max() < 0.15  # relative to the whole way: one shape, but with a hand's variation
     assert np.std([r.trajectory[-1] for r in RECORDINGS], axis=0).max() > 0.3  # rad
 
 
@@ -306,7 +306,7 @@ def test_no_recording_is_exactly_a_motor_primitive() -> None:
     skill = FishingRod(noise=0.0, threads=1).primitive
     residuals = [skill.residual(skill.correspondence(r.times, r.trajectory), r.times, r.trajectory) for r in RECORDINGS]
     assert np.mean(residuals) > 1e-3
-    assert np.max(residuals) < 0.2  # yet the correspondence makes sense of all
+    assert np.max(residuals) < 0.2  # but the correspondence can translate all of them
 
 
 def test_the_recorded_landing_points_are_those_of_the_recorded_trajectories() -> None:

@@ -17,7 +17,7 @@ NO_CONTEXT = np.zeros(0)
 
 
 def perfect(arm: PlanarArm):
-    """The inverse that cannot be improved upon."""
+    """The exact inverse."""
 
     def inverse(context: Array, goal: Array) -> Estimate:
         theta = arm.solve(context, goal)
@@ -79,7 +79,7 @@ def test_the_movement_that_is_judged_is_not_one_of_its_own_repeats() -> None:
 
 
 @pytest.mark.parametrize("counts", [{"repeats": -1}, {"repeats": 1}, {"repeats": 2.5}, {"movements": -1}])
-def test_a_count_that_is_none_is_refused(counts: dict[str, int]) -> None:
+def test_a_count_out_of_its_range_is_refused(counts: dict[str, int]) -> None:
     arm = PlanarArm(5)
     with pytest.raises(ValueError, match=f"{next(iter(counts))} must be"):
         evaluate(perfect(arm), arm, np.array([[0.5, 0.5]]), **{"seed": 0, "movements": 0} | counts)
@@ -104,7 +104,7 @@ def test_the_repeats_leave_the_errors_of_eq_10_of_a_noise_free_arm_as_they_were(
     assert np.array_equal(few.errors, many.errors)
 
 
-def test_the_same_streams_see_the_same_and_every_evaluation_of_a_run_has_its_own() -> None:
+def test_the_same_streams_give_the_same_and_every_evaluation_of_a_run_has_its_own() -> None:
     arm, goals = PlanarArm(5, noise=0.05), np.array([[0.5, 0.5], [-0.3, 0.2]])
 
     def look(seed: int, movements: int) -> Evaluation:
@@ -124,7 +124,7 @@ def test_no_two_executions_of_an_evaluation_share_their_noise() -> None:
     assert (evaluation.scatter > 0).all()
 
 
-def test_looking_remembers_nothing() -> None:
+def test_an_evaluation_remembers_nothing() -> None:
     arm = PlanarArm(5)
     memory = knowing(arm, [0.5] * 5, [0.6] * 5)
     evaluate(LocalInverse(memory), arm, np.array([[0.5, 0.5]]), 0, 0)
@@ -138,13 +138,13 @@ def test_nothing_can_be_evaluated_before_the_first_movement() -> None:
 
 
 @pytest.mark.parametrize("goals", [np.zeros((3, 3)), np.full((3, 2), np.nan), np.zeros(2), np.zeros((0, 2))])
-def test_what_are_no_goals_is_refused(goals: Array) -> None:
+def test_anything_but_goals_is_refused(goals: Array) -> None:
     arm = PlanarArm(5)
     with pytest.raises(ValueError, match="goals must"):
         evaluate(perfect(arm), arm, goals, 0, 0)
 
 
-def test_a_context_that_is_none_is_refused() -> None:
+def test_a_context_of_another_kind_is_refused() -> None:
     arm = PlanarArm(5, context=True)
     memory = Memory(1, 5, 2)
     memory.add([0.0], np.full(5, 0.5), [1.0, 0.0])
@@ -277,7 +277,7 @@ def test_a_benchmark_that_cannot_be_right_is_refused(
         load_benchmark(tmp_path / "goals.npz")
 
 
-def test_what_is_no_benchmark_is_refused(tmp_path: Path) -> None:
+def test_anything_but_a_benchmark_is_refused(tmp_path: Path) -> None:
     np.savez(tmp_path / "other.npz", goals=np.zeros((3, 2)))
     np.save(tmp_path / "one.npy", np.zeros((3, 2)))
     for name in ("other.npz", "one.npy"):

@@ -23,7 +23,7 @@ class Pursuit:
         self.contexts: list[Array] = []
         self.outcomes: list[list[float]] = []
         self.n_ended = 0
-        self._held: list[Attempt] = []  # what nobody holds, Python would close by itself
+        self._held: list[Attempt] = []  # Python would close a generator that is not kept
 
     def attempt(self, context: Array) -> Attempt:
         self._held.append(self._pursue(context))
@@ -94,7 +94,7 @@ def test_ask_and_tell_alternate() -> None:
         *([1e300, 0.0], [0.0, -1e101], [1j, 0.0], [True, False], ["0", "1"]),
     ],
 )
-def test_an_outcome_that_is_none_changes_nothing_and_is_still_waited_for(outcome: object) -> None:
+def test_an_impossible_outcome_changes_nothing_and_the_learner_still_waits(outcome: object) -> None:
     pursuit = Pursuit()
     robot = learner(pursuit)
     step(robot)
@@ -109,7 +109,7 @@ def test_an_outcome_that_is_none_changes_nothing_and_is_still_waited_for(outcome
 
 
 @pytest.mark.parametrize("value", [np.nan, 1e300])
-def test_the_error_of_an_outcome_that_cannot_be_names_its_theta(value: float) -> None:
+def test_the_error_of_an_impossible_outcome_names_its_theta(value: float) -> None:
     robot = learner(Pursuit())
     step(robot)
     robot.ask(NO_CONTEXT)
@@ -140,7 +140,7 @@ def test_after_the_imitation_the_learner_is_on_its_own_again_with_a_new_attempt(
     assert robot.memory.thetas[-2:, 0].tolist() == [0.0, 0.1]
 
 
-def test_a_demonstration_cuts_into_the_imitation_of_the_one_before() -> None:
+def test_a_demonstration_interrupts_the_imitation_of_the_one_before() -> None:
     robot = learner(Pursuit(), repeats=None)
     robot.watch(LESSON)
     for _ in range(5):
@@ -194,7 +194,7 @@ def test_a_demonstration_brings_its_own_context() -> None:
     assert robot.memory.contexts.ravel().tolist() == [0.1, 0.7]
 
 
-def test_an_interrupted_learner_forgets_what_it_asked_for_and_begins_anew() -> None:
+def test_an_interrupted_learner_forgets_what_it_asked_for_and_begins_again() -> None:
     pursuit = Pursuit(n=3)
     robot = learner(pursuit)
     step(robot)
@@ -209,7 +209,7 @@ def test_an_interrupted_learner_forgets_what_it_asked_for_and_begins_anew() -> N
 
 
 @pytest.mark.parametrize("context", [[0.0, 0.0], [np.nan], 0.0, "north"])
-def test_a_context_that_is_none_is_refused(context: object) -> None:
+def test_a_context_of_another_kind_is_refused(context: object) -> None:
     with pytest.raises(ValueError, match="context"):
         learner(Pursuit(), context_dim=1).ask(context)
 
@@ -242,7 +242,7 @@ def test_a_social_strategy_without_a_correspondence_is_refused() -> None:
         Learner(Memory(0, 4, 2), Pursuit(), social=Imitate(ARM.policies, stream(0, "imitate")))
 
 
-def test_a_strategy_of_no_movement_at_all_is_an_error_not_an_endless_loop() -> None:
+def test_a_strategy_without_any_movement_is_an_error_not_an_endless_loop() -> None:
     with pytest.raises(RuntimeError, match="yield"):
         learner(Pursuit(n=0)).ask(NO_CONTEXT)
 

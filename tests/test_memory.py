@@ -1,4 +1,4 @@
-"""Memory: neighbours are those of exact arithmetic, exemplars stay as lived, and files survive or say why not."""
+"""Memory: neighbours are those of exact arithmetic, exemplars never change, and files are read or say why not."""
 
 from pathlib import Path
 
@@ -93,7 +93,7 @@ def test_near_policies_are_those_of_brute_force_within_the_radius(large: Memory,
         assert found[0] == row
 
 
-def test_the_radius_includes_its_own_border_and_may_hold_nobody() -> None:
+def test_the_radius_includes_its_own_border_and_may_contain_nothing() -> None:
     memory = remember(np.array([[0.0], [0.5], [1.0]]), np.zeros((3, 2)))
     assert memory.near_policies(NO_CONTEXT, np.array([0.0]), 3, within=0.5).tolist() == [0, 1]
     assert memory.near_policies(NO_CONTEXT, np.array([2.0]), 3, within=0.5).tolist() == []
@@ -269,7 +269,7 @@ def test_a_file_whose_content_does_not_fit_is_refused(tmp_path: Path, change: di
         Memory.load(tmp_path / "memory.npz")
 
 
-def test_what_is_not_npz_or_not_there_is_told_apart(tmp_path: Path) -> None:
+def test_a_file_of_another_kind_and_a_missing_one_have_different_errors(tmp_path: Path) -> None:
     np.save(tmp_path / "array.npy", np.zeros(3))
     (tmp_path / "text").write_text("theta, outcome\n")
     for name in ("array.npy", "text"):

@@ -27,7 +27,7 @@ def goals(n: int = 100) -> Array:
 
 @cache
 def errors(name: str, seed: int, last: int) -> dict[int, float]:
-    """Mean error (m) of one life after 1000, 2000, 5000 and 10,000 movements."""
+    """Mean error (m) of one run after 1000, 2000, 5000 and 10,000 movements."""
     learner = make(name, ARM, seed)
     lessons = demonstrations(ARM, 50, seed)
     teacher = PeriodicTeacher(lessons, stream(seed, "teacher"), every=30) if name in TAUGHT else None

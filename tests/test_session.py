@@ -1,4 +1,4 @@
-"""A life in an environment: five learners, exact counts, independent streams, and replays that execute nothing."""
+"""The main loop: five learners, exact counts, independent streams, and replays that execute nothing."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -55,7 +55,7 @@ def recorded(episodes: Sequence[Episode]) -> list[Recorded]:
 
 
 @every_algorithm
-def test_a_life_has_exactly_as_many_movements_as_asked_for(name: str) -> None:
+def test_a_run_has_exactly_as_many_movements_as_asked_for(name: str) -> None:
     arm = PlanarArm(5, noise=0.01)
     learner = make(name, arm)
     teacher = teacher_of(arm) if name in TAUGHT else None
@@ -83,7 +83,7 @@ def test_all_movements_stay_inside_the_policy_space(name: str) -> None:
 
 
 @every_algorithm
-def test_the_same_seed_lives_the_same_life_and_another_seed_another(name: str) -> None:
+def test_the_same_seed_makes_the_same_run_and_another_seed_another(name: str) -> None:
     arm = PlanarArm(5, noise=0.01)
     first, again, other = (summary(life(name, arm, 100, seed)) for seed in (1, 1, 2))
     assert first == again
@@ -154,7 +154,7 @@ def test_a_replay_proposes_every_theta_again_without_executing(name: str) -> Non
 
 @every_algorithm
 @pytest.mark.parametrize("stopped", [1, 37, 95])
-def test_a_life_resumed_from_its_record_ends_as_if_never_stopped(name: str, stopped: int) -> None:
+def test_a_run_resumed_from_its_record_ends_as_if_never_stopped(name: str, stopped: int) -> None:
     arm = PlanarArm(5, noise=0.01)
     whole = life(name, arm, 150)
     resumed = life(name, arm, 150, execute=replay(recorded(whole)[:stopped], live(arm, 0)))
@@ -231,7 +231,7 @@ def test_a_context_holds_from_the_first_movement_of_an_attempt_to_its_last(name:
         assert len(np.unique(contexts)) > 1 or name == "imitation"
 
 
-def test_a_life_may_be_left_at_any_time_and_gone_on_with() -> None:
+def test_a_run_may_be_left_at_any_time_and_gone_on_with() -> None:
     arm = PlanarArm(5)
     learner = make("sagg-riac", arm)
     for episode in run(learner, arm, 0, movements=100):
@@ -283,7 +283,7 @@ def test_sgim_d_without_a_teacher_is_sagg_riac() -> None:
 
 
 @pytest.mark.parametrize("context", [False, True])
-def test_a_life_in_two_parts_is_the_whole_life(context: bool) -> None:
+def test_a_run_in_two_parts_is_the_whole_run(context: bool) -> None:
     arm = PlanarArm(5, noise=0.05, context=context)
     whole = [e.outcome for e in run(sagg_riac(arm, 0), arm, 0, movements=60)]
     learner = sagg_riac(arm, 0)
@@ -294,7 +294,7 @@ def test_a_life_in_two_parts_is_the_whole_life(context: bool) -> None:
 
 
 @pytest.mark.parametrize("counts", [{"movements": 0}, {"movements": 1.5}, {"first": -1}, {"first": 11}])
-def test_a_life_of_no_movements_or_one_that_begins_after_its_end_is_refused(counts: dict[str, int]) -> None:
+def test_a_run_without_movements_or_that_begins_after_its_end_is_refused(counts: dict[str, int]) -> None:
     arm = PlanarArm(5)
     with pytest.raises(ValueError, match=f"{next(iter(counts))} must be"):
         next(run(sagg_riac(arm, 0), arm, 0, **{"movements": 10} | counts))
@@ -328,7 +328,7 @@ def test_an_environment_may_write_into_what_it_is_given_and_spoils_no_record() -
 
 
 @every_algorithm
-def test_nothing_that_a_life_hands_out_can_change_what_is_remembered(name: str) -> None:
+def test_nothing_that_a_run_hands_out_can_change_what_is_remembered(name: str) -> None:
     arm = PlanarArm(5)
     learner, teacher = make(name, arm), teacher_of(arm) if name in TAUGHT else None
     for episode in run(learner, arm, 0, movements=60, teacher=teacher):

@@ -1,4 +1,4 @@
-"""Errors of the words that all modules speak: which entry is wrong, in one line, however long the array."""
+"""Errors in what all modules use: which entry is wrong, in one line, however long the array; and read-only records."""
 
 import numpy as np
 import pytest
@@ -51,7 +51,7 @@ def test_a_count_may_be_any_whole_number_that_is_large_enough(value: int):
 
 
 @pytest.mark.parametrize("value", [1, -1, 2.0, 2.5, np.float64(3), np.nan, "3", None, np.arange(3)])
-def test_what_is_no_count_is_refused(value: object):
+def test_anything_but_a_count_is_refused(value: object):
     assert ">= 2, got " in refused(check_count, value, 2)
 
 
@@ -90,7 +90,7 @@ def test_a_point_is_one_vector_not_several():
 
 
 @pytest.mark.parametrize("value", [True, False, np.True_])
-def test_a_switch_is_no_count(value: object):
+def test_true_and_false_are_no_counts(value: object):
     assert f"got {value!r}" in refused(check_count, value, 0)
 
 

@@ -23,7 +23,7 @@ FAR = np.array([-0.9, 0.3])
 
 
 class Diary:
-    """Goals that are always the same one, and a list of what came of them."""
+    """Always the same goal, and a list of what it was told."""
 
     def __init__(self, goal: Array = FAR) -> None:
         self.goal = goal
@@ -98,7 +98,7 @@ def live(attempt: Attempt, memory: Memory | None = None, n: int = 10_000) -> lis
 
 
 def plan(*thetas: Array) -> Search:
-    """A search that executes these, whatever comes of them."""
+    """A search that executes these, whatever their outcomes are."""
 
     def search(start: Estimate, goal: Array) -> Generator[Array, Array, None]:
         for theta in thetas:  # noqa: UP028 - a tuple takes no outcomes
@@ -123,7 +123,7 @@ def imitation(goals: Diary, repeats: int | None = 4, *, memory: Memory | None = 
 
 
 def attempts(goals: Diary) -> Iterator[tuple[str, Callable[[], Attempt]]]:
-    """Every strategy that moves, ready to begin, as a learner with 50 movements behind it would."""
+    """Every strategy that moves, ready to begin, as in a learner that has made 50 movements."""
     memory = remembering(50)
     simplex = nelder_mead(ARM.policies, stream(0, "search"), step=0.3)
     yield "goal babbling", lambda: babbling(memory, goals, global_range=(0.5, 0.5)).attempt(NO_CONTEXT)
@@ -188,7 +188,7 @@ def test_babbling_is_one_uniform_movement_without_a_goal() -> None:
     assert all(attempt[0].goal is None and attempt[0].origin == "babble" for attempt in moves)
 
 
-def test_resting_is_one_movement_of_none() -> None:
+def test_resting_yields_none_once() -> None:
     assert live(Rest().attempt(NO_CONTEXT)) == [None]
 
 
@@ -233,7 +233,7 @@ def test_the_less_competent_the_likelier_a_movement_is_global(reached: float, pr
     assert origins.count("global") / 2000 == pytest.approx(probability, abs=5 * 0.011)
 
 
-def test_a_search_that_ends_before_the_budget_is_begun_anew_from_what_is_known_by_then() -> None:
+def test_a_search_that_ends_before_the_budget_is_followed_by_one_that_knows_more() -> None:
     memory, starts = remembering(20), []
 
     def one_movement(start: Estimate, goal: Array) -> Generator[Array, Array, None]:
@@ -331,7 +331,7 @@ def test_emulation_of_an_outcome_outside_the_task_space_does_nothing() -> None:
     assert goals.entries == []
 
 
-def test_remembering_stores_the_demonstrated_pair_and_moves_not_at_all() -> None:
+def test_remembering_stores_the_demonstrated_pair_and_does_not_move() -> None:
     memory = Memory(0, 5, 2)
     assert live(Remember(memory).attempt(NO_CONTEXT, THETA_D, LESSON)) == []
     assert memory.thetas.tolist() == [THETA_D.tolist()]
@@ -354,7 +354,7 @@ def having_made(*parts: float, context: Array = NO_CONTEXT) -> Memory:
 
 
 def make_way(attempt: Attempt, memory: Memory, *parts: float, context: Array = NO_CONTEXT) -> int:
-    """How many movements it makes when they make these parts of the way, and a demonstration interrupts the next."""
+    """How many movements it makes when they come these parts of the way, and a demonstration interrupts the next."""
     move = next(attempt)
     for n, part in enumerate(parts, start=1):
         memory.add(context, move.theta, way(part))

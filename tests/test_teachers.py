@@ -105,7 +105,7 @@ def test_the_demonstration_comes_from_the_tile_that_the_learner_reached_least() 
     assert set(choices(QUARTERS, memory)) == {(4.0, 4.0), (4.0, 0.0)}  # once each, the others twice
 
 
-def test_among_tiles_reached_alike_each_is_as_likely_whatever_it_holds() -> None:
+def test_tiles_that_were_reached_equally_often_are_equally_likely() -> None:
     crowded = [*QUARTERS, lesson(0.1, 0.1), lesson(0.2, 0.2)]
     counts = choices(crowded, reached(), n=4000)
     # Four tiles, the first with three demonstrations: 1/4 each and 1/12 each. Standard errors .007 and .0044.
@@ -118,7 +118,7 @@ def test_tiles_without_a_demonstration_are_never_chosen_and_need_not_be_reached(
     assert set(choices(diagonal, reached([1.0, 1.0]))) == {(4.0, 4.0)}
 
 
-def test_what_is_reached_outside_the_demonstrated_box_counts_for_no_tile() -> None:
+def test_outcomes_outside_the_demonstrated_box_count_for_no_tile() -> None:
     far = reached(*[[x, y] for x in (-9.0, 2.0, 9.0) for y in (-9.0, 2.0, 9.0) if (x, y) != (2.0, 2.0)], [1e9, -1e9])
     assert len(choices(QUARTERS, far)) == 4
     just = reached([4.0 + 1e-9, 4.0], [4.0, 4.0 + 1e-9], [-1e-9, 0.0])
@@ -150,7 +150,7 @@ def test_demonstrations_on_a_line_or_on_one_point_have_tiles_too() -> None:
     assert set(choices([lesson(0.3, 0.3)], reached([5.0, -5.0], [0.3, 0.3]))) == {(0.3, 0.3)}
 
 
-def test_any_demonstration_is_as_likely_where_the_teacher_chooses_at_random() -> None:
+def test_all_demonstrations_are_equally_likely_when_the_teacher_chooses_at_random() -> None:
     rng = stream(0, "teacher")
     counts = Counter(id(at_random(LESSONS, reached([0.0, 0.0]), rng)) for _ in range(9000))
     assert len(counts) == 9
@@ -173,7 +173,7 @@ def test_the_asked_teacher_looks_only_when_its_patience_is_over() -> None:
     assert list(course(teacher, reached([0.0, 0.0]), 60)) == [20, 30, 40, 50]  # the first look only compares
 
 
-def test_the_asked_teacher_does_not_take_a_learner_that_rests_for_one_that_progresses() -> None:
+def test_the_asked_teacher_demonstrates_to_a_learner_that_rests() -> None:
     teacher = AskedTeacher([lesson(1.0, 0.0)], stream(0, "teacher"), patience=10)
     assert list(course(teacher, reached(), 40)) == [10, 20, 30]
 
@@ -196,7 +196,7 @@ def test_the_asked_teacher_judges_by_all_its_demonstrations() -> None:
         partial(AskedTeacher, patience=30),
     ],
 )
-def test_a_teacher_without_demonstrations_or_with_no_time_is_refused(make: Callable[..., Teacher]) -> None:
+def test_a_teacher_without_demonstrations_or_with_a_wrong_period_is_refused(make: Callable[..., Teacher]) -> None:
     with pytest.raises(ValueError, match="at least one demonstration"):
         make([], stream(0, "teacher"))
     (word,) = make.keywords

@@ -23,7 +23,7 @@ def end_of(arm: PlanarArm, theta: ArrayLike, context: ArrayLike = NO_CONTEXT) ->
 
 
 class Slope:
-    """The least a user writes: one parameter, and an outcome twice as far."""
+    """The least that a user writes: one parameter, and an outcome of twice its value."""
 
     contexts, policies, outcomes = Box.cube(0, 1, 0), Box.cube(0, 1, 1), Box.cube(0, 2, 1)
     rest, outcome_noise = np.zeros(1), 0.0
@@ -129,7 +129,7 @@ def test_correspondence_finds_the_theta_whose_angles_a_trajectory_ends_with(n_jo
     assert arm.policies.contains(found)
 
 
-def test_a_posture_at_its_limits_is_taken_and_rounding_forgiven():
+def test_a_posture_at_its_limits_is_accepted_also_with_rounding():
     arm = PlanarArm(2, max_angle=1.0)
     assert arm.correspondence([0.0], [[np.pi * (1 + 1e-15), -1.0 - 1e-15]]).tolist() == [1.0, 0.0]
 
@@ -209,7 +209,7 @@ def test_no_bends_bring_the_end_closer_than_the_inner_radius():
     assert not arm.reachable([arm.min_radius - 1e-9, 0])
 
 
-def test_announced_noise_is_that_of_outcomes_executed_again():
+def test_outcome_noise_is_that_of_movements_executed_again():
     arm, rng = PlanarArm(5, length=2.0, noise=0.01), stream(3, "environment")
     thetas = stream(3, "theta").uniform(size=(4000, 5))
     difference = [arm.execute(NO_CONTEXT, theta, rng) - arm.execute(NO_CONTEXT, theta, rng) for theta in thetas]
@@ -226,7 +226,7 @@ def test_a_stretched_arm_is_noisier_than_a_folded_one():
     assert deviations[0] > 1.5 * deviations[1]
 
 
-def test_taking_the_noise_away_moves_no_stream():
+def test_without_noise_the_stream_goes_on_in_the_same_way():
     streams = [stream(5, "environment") for _ in range(2)]
     for noise, rng in zip((0.0, 0.1), streams, strict=True):
         PlanarArm(noise=noise).execute(NO_CONTEXT, np.full(7, 0.5), rng)
@@ -259,6 +259,6 @@ def test_an_impossible_arm_is_refused(options):
         PlanarArm(**options)
 
 
-def test_a_seed_in_the_place_of_a_generator_is_refused():
+def test_a_seed_instead_of_a_generator_is_refused():
     with pytest.raises(TypeError, match="got int; was the seed passed instead of a Generator"):
         PlanarArm(5).execute(NO_CONTEXT, np.full(5, 0.5), 0)

@@ -107,7 +107,7 @@ def test_the_float_lands_where_its_path_first_crosses_the_water(rod: FishingRod)
 
 
 @pytest.mark.parametrize("wind", [0.0, 0.05, -0.05])
-def test_a_float_still_in_the_air_at_the_end_flies_on_as_a_stone_does(wind: float) -> None:
+def test_a_float_still_in_the_air_at_the_end_flies_on_like_a_stone(wind: float) -> None:
     rod = FishingRod(noise=0.0, max_wind=0.05, threads=1)
     n_flown = 0
     for theta in movements(20):
@@ -157,7 +157,7 @@ def test_a_batch_on_two_threads_equals_one_thread_and_single_movements_bit_for_b
     assert np.array_equal(batches[0], ones)
 
 
-def test_noise_draws_as_much_whatever_theta() -> None:
+def test_the_number_of_draws_does_not_depend_on_theta() -> None:
     noisy = FishingRod(noise=0.03, threads=1)
     short, long = movements(2)
     short[-1], long[-1] = 0.0, 1.0
@@ -262,7 +262,7 @@ def test_a_divergence_is_an_error_that_names_its_theta() -> None:
 
 
 @pytest.mark.usefixtures("mujoco_log")
-def test_after_a_divergence_the_next_movement_is_as_ever(rod: FishingRod) -> None:
+def test_after_a_divergence_the_next_movement_is_the_same_as_without_it(rod: FishingRod) -> None:
     fragile, theta = unstable(), movements(1)[0]
     with pytest.raises(SimulationError):
         cast(fragile, theta)
@@ -351,12 +351,12 @@ def test_an_impossible_rod_is_refused(options: dict[str, object], name: str) -> 
         (np.zeros((2, 3, 2)), np.zeros((2, 3, 6)), "times must|n > 1"),
     ],
 )
-def test_what_is_no_recording_is_not_replayed(rod: FishingRod, times: Array, trajectory: Array, message: str) -> None:
+def test_only_a_recording_is_replayed(rod: FishingRod, times: Array, trajectory: Array, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         rod.replay(times, trajectory)
 
 
-def test_a_seed_in_the_place_of_a_generator_is_refused(rod: FishingRod) -> None:
+def test_a_seed_instead_of_a_generator_is_refused(rod: FishingRod) -> None:
     theta = movements(1)[0]
     with pytest.raises(TypeError, match="was the seed passed"):
         rod.execute(NO_CONTEXT, theta, 0)

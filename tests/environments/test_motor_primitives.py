@@ -190,7 +190,7 @@ def test_arguments_are_left_as_they_were() -> None:
         (np.arange(2.0), np.zeros(2), "samples"),
     ],
 )
-def test_what_is_no_recording_is_refused(times: Array, trajectory: Array, message: str) -> None:
+def test_anything_but_a_recording_is_refused(times: Array, trajectory: Array, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         primitive().correspondence(times, trajectory)
     with pytest.raises(ValueError, match=message):

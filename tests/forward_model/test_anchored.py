@@ -1,4 +1,4 @@
-"""Anchored predictions: exact where something landed, the network's far away, and doubted in between."""
+"""Anchored predictions: exact at executed movements, the network's far away, and doubted in between."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ def memory():
 
 @pytest.fixture(scope="module")
 def model(memory):
-    """Good enough to be asked, and still wrong by some cm."""
+    """Good enough to be used, but still wrong by some cm."""
     model = ForwardModel(0, 7, 2, rate=1.0)
     model.refresh(memory)
     return model
@@ -37,7 +37,7 @@ def anchored(model, memory, rows, trust=EXACT):
 
 
 def network(model, thetas):
-    """Landing points by the network alone, and what is believed of the spread that it predicts: a tenth."""
+    """Landing points by the network alone, and a tenth of the spread that it predicts."""
     predicted = model.predict(NO_CONTEXT, thetas)
     return predicted.mean, 0.1 * (predicted.epistemic**2 + predicted.aleatoric**2).sum(axis=-1)
 
@@ -47,7 +47,7 @@ def predict(near, thetas):
         return [part.numpy() for part in near.predict(near.tensor(thetas))]
 
 
-def test_what_landed_is_predicted_where_it_landed(model, memory):
+def test_a_remembered_movement_is_predicted_where_it_landed(model, memory):
     rows = np.arange(20)
     for near in (anchored(model, memory, rows), anchored(model, memory, rows[:1])):
         n = near.thetas.shape[1]
@@ -72,14 +72,14 @@ def test_by_default_an_anchor_tells_something_over_eight_hundredths_of_the_diago
 
 
 @pytest.mark.parametrize("doubt", [0.001, 0.3])
-def test_far_from_all_anchors_the_network_alone_is_left_and_all_the_doubt(model, memory, doubt):
+def test_far_from_all_anchors_the_network_counts_alone_with_all_the_doubt(model, memory, doubt):
     rows, far = np.arange(20), np.full((1, 7), 5.0)
     near = anchored(model, memory, rows, Trust(doubt=doubt, caution=3.0))
     landing, spread = predict(near, far)
     expected_landing, expected_spread = network(model, far)
     np.testing.assert_allclose(landing, expected_landing, rtol=1e-5)
     missed = np.sqrt(((memory.outcomes[rows] - network(model, memory.thetas[rows])[0]) ** 2).mean())
-    assert 0.001 < missed < 0.3  # where it misses the anchors by more than it should, that counts
+    assert 0.001 < missed < 0.3  # where it misses the anchors by more than ``doubt``, that counts
     np.testing.assert_allclose(spread - expected_spread, 3.0 * 2 * max(doubt, missed) ** 2, rtol=1e-3)
 
 
@@ -93,7 +93,7 @@ def test_doubt_grows_from_nothing_at_an_anchor_and_counts_by_caution(model, memo
     assert doubt[0] < 0.001 * doubt[-1]
 
 
-def test_of_a_noisy_anchor_as_much_is_believed_as_there_is_more_doubt_than_noise(memory):
+def test_a_noisy_anchor_counts_by_the_ratio_of_doubt_to_doubt_and_noise(memory):
     model = ForwardModel(0, 7, 2)  # untrained: it says 0 and is wrong by up to a metre
     model.weights[-1].data[:] = 0.0
     model.biases[-1].data[..., 2:] = 3.0  # and it calls all of that noise
@@ -105,7 +105,7 @@ def test_of_a_noisy_anchor_as_much_is_believed_as_there_is_more_doubt_than_noise
     np.testing.assert_allclose(predict(near, memory.thetas[:1])[0], memory.outcomes[:1], rtol=1e-3)
 
 
-def test_of_the_spread_that_the_model_predicts_a_share_is_believed(memory):
+def test_a_share_of_the_spread_that_the_model_predicts_counts(memory):
     model = ForwardModel(0, 7, 2)
     model.weights[-1].data[:] = 0.0  # untrained: it says 0
     model.biases[-1].data[..., 2:] = np.log(0.5)  # with a noise of .5 m^2
@@ -148,7 +148,7 @@ def network_in(model, context, thetas):
 
 
 @pytest.mark.parametrize("anchors", [True, False])
-def test_the_gradient_of_what_is_expected_equals_finite_differences(model, memory, anchors):
+def test_the_gradient_of_the_expected_distance_equals_finite_differences(model, memory, anchors):
     near = anchored(model, memory, np.arange(40), Trust(noise=0.01, anchors=anchors))
     theta, goals, step = near.tensor(memory.thetas[38:42] + 0.02), near.tensor(memory.outcomes[50:54]), 3e-3
     gradient = gradient_at(near, theta, goals)
@@ -223,7 +223,7 @@ def test_a_descent_of_no_steps_stays_where_it_is(model, memory):
 
 
 def test_a_step_is_a_share_of_each_side_whatever_the_unit(memory):
-    """Parameters in other units, learnt in these: the way down is the same."""
+    """Parameters in other units, learnt in these: the descent is the same."""
     paths = []
     for scale in (np.ones(7), BOX.sides):
         scaled, policies = Memory(0, 7, 2), Box(np.zeros(7), scale)
@@ -240,7 +240,7 @@ def test_a_step_is_a_share_of_each_side_whatever_the_unit(memory):
 
 @pytest.mark.parametrize("name", ["reach", "noise", "doubt", "error"])
 @pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf])
-def test_lengths_and_errors_that_are_no_positive_numbers_are_refused(name, value):
+def test_lengths_and_errors_that_are_not_positive_are_refused(name, value):
     with pytest.raises(ValueError, match=f"{name} must be positive and finite, got {value}"):
         Trust(**{name: value})
 

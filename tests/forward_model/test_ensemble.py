@@ -85,14 +85,14 @@ def test_without_noise_heads_the_noise_is_a_number_of_its_own_for_each_output():
     assert (gradient[..., 2:] == 6).all()  # it is learnt from all six
 
 
-def test_the_likelihood_is_that_of_a_gaussian_but_for_the_constant():
+def test_the_likelihood_is_that_of_a_gaussian_up_to_a_constant():
     mean, log_variance, values = random(3, 5, 2)
     expected = -norm.logpdf(values.numpy(), mean.numpy(), np.exp(log_variance.numpy() / 2)) - math.log(2 * math.pi) / 2
     np.testing.assert_allclose(nll(mean, log_variance, values).numpy(), expected, rtol=1e-5)
 
 
 @pytest.mark.parametrize(("beta", "given_up"), [(0.0, 4.0), (0.5, 2.0), (1.0, 1.0)])
-def test_with_beta_what_is_taken_for_noise_is_less_given_up_on(beta, given_up):
+def test_with_beta_outputs_taken_for_noise_keep_a_larger_gradient(beta, given_up):
     networks, outputs = ensemble(beta=beta), random(MEMBERS, 6, 2)
     networks.weights[-1].data[:] = 0.0
     networks.biases[-1].data[..., 2:] = math.log(4.0)  # a variance of 4, everywhere, and a mean of 0

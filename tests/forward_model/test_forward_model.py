@@ -140,7 +140,7 @@ def test_torchs_own_generator_and_threads_are_left_alone():
     assert torch.get_num_threads() == threads
 
 
-def test_a_refresh_waits_for_enough_that_is_new():
+def test_a_refresh_waits_for_enough_new_exemplars():
     model, memory = ForwardModel(0, 3, 2, every=50, rate=1.0), remembered(49)
     assert model.refresh(memory) is None
     assert not model.trained
@@ -173,7 +173,7 @@ def test_adams_moments_survive_a_refresh():
     assert steps == {40}
 
 
-def test_learning_stops_when_what_is_held_out_gets_no_better():
+def test_learning_stops_when_held_out_exemplars_are_predicted_no_better():
     assert ForwardModel(0, 3, 2, rate=100).refresh(noise_only(60)).steps < 2500
 
 
@@ -189,7 +189,7 @@ def test_a_refresh_says_what_was_predicted_for_the_new_exemplars_before_it_learn
     assert not np.array_equal(second.predicted.mean, model.predict(NO_CONTEXT, memory.thetas[100:]).mean)
 
 
-def test_after_a_divergence_the_weights_before_it_stand():
+def test_after_a_divergence_the_weights_before_it_are_back():
     model = taught(remembered(100))
     before, prediction = weights(model), model.predict(NO_CONTEXT, np.full(3, 0.5))
     model.lr, model._online.optimizer = 1e30, None
@@ -228,7 +228,7 @@ def test_a_refresh_that_is_interrupted_has_changed_nothing(monkeypatch):
 
 
 @pytest.mark.skipif(torch.cuda.is_available(), reason="there is a GPU")
-def test_a_model_for_a_gpu_that_is_not_there_says_so_and_stays_untrained():
+def test_a_model_for_a_missing_gpu_says_so_and_stays_untrained():
     model = ForwardModel(0, 3, 2, accelerator="cuda")
     with pytest.raises(Exception, match="CUDA"):
         model.refresh(remembered(100))
@@ -262,7 +262,7 @@ def test_a_copy_for_another_process_predicts_the_same_and_learns_on(model, unsee
 
 
 @pytest.mark.parametrize("noise_heads", [True, False])
-def test_a_saved_model_predicts_the_same_and_knows_as_well_how_far_to_be_trusted(tmp_path, unseen, noise_heads):
+def test_a_saved_model_predicts_the_same_and_keeps_its_relative_error(tmp_path, unseen, noise_heads):
     model = taught(remembered(100), noise_heads=noise_heads, members=2, hidden=(8,))
     model.save(tmp_path / "model.safetensors")
     loaded = ForwardModel.load(tmp_path / "model.safetensors")
@@ -298,7 +298,7 @@ def test_a_saved_model_predicts_the_same_and_knows_as_well_how_far_to_be_trusted
         ),
     ],
 )
-def test_a_file_that_is_no_such_model_is_refused(tmp_path, model, spoil, words):
+def test_a_file_that_is_not_a_forward_model_is_refused(tmp_path, model, spoil, words):
     path = tmp_path / "model.safetensors"
     model.save(path)
     about = {"version": "1", "model": json.dumps({**model.sizes, **model.shape})}
@@ -321,7 +321,7 @@ def test_a_loaded_model_learns_on(tmp_path):
     assert (refresh.first, refresh.steps, len(refresh.predicted.mean)) == (100, 20, 20)
 
 
-def test_a_model_that_is_not_there_is_called_missing(tmp_path):
+def test_a_file_that_does_not_exist_is_called_missing(tmp_path):
     with pytest.raises(FileNotFoundError, match="no forward model"):
         ForwardModel.load(tmp_path / "model.safetensors")
 

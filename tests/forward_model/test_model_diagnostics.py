@@ -37,7 +37,7 @@ def test_outcomes_drawn_from_the_predicted_gaussian_fill_each_region_to_its_leve
     np.testing.assert_allclose(coverage(drawn_from(mean, spread), mean, spread, levels), levels, atol=FOUR_ERRORS)
 
 
-def test_a_model_that_doubts_too_little_or_too_much_is_found_out():
+def test_coverage_shows_a_model_that_doubts_too_little_or_too_much():
     mean, spread = np.zeros((N, 2)), np.full((N, 2), 0.1)
     outcomes = drawn_from(mean, spread)
     # In the plane the squared distance is exponential: half as much spread leaves 1 - (1 - level)^(1/4) inside.
@@ -46,7 +46,7 @@ def test_a_model_that_doubts_too_little_or_too_much_is_found_out():
     assert (coverage(outcomes, mean, 2 * spread) > np.array(LEVELS) + 0.04).all()
 
 
-def test_the_region_is_an_ellipse_along_the_axes_and_no_box_or_circle():
+def test_the_region_is_an_ellipse_along_the_axes_not_a_box_or_circle():
     mean, spread = np.zeros((5, 2)), np.tile([0.1, 1.0], (5, 1))
     edge = np.sqrt(-2 * np.log(1 - 0.8))  # of the 80 % region, in standard deviations
     outcomes = np.array([[0.99 * edge, 0], [1.01 * edge, 0], [0, 9.9 * edge], [0, 10.1 * edge], [0.8 * edge, 8 * edge]])
@@ -55,7 +55,7 @@ def test_the_region_is_an_ellipse_along_the_axes_and_no_box_or_circle():
     assert coverage(outcomes * 0.1, mean, spread, [0.8]) == pytest.approx(2 / 5)
 
 
-def test_a_spread_of_each_prediction_own_counts():
+def test_each_prediction_counts_with_its_own_spread():
     mean, spread = np.zeros((2, 1)), np.array([[0.1], [10.0]])
     assert coverage([[1.0], [1.0]], mean, spread, [0.5]) == 0.5
 
@@ -77,7 +77,7 @@ def test_what_makes_no_sense_is_refused_in_words(observed, mean, spread, levels,
         coverage(observed, mean, spread, levels)
 
 
-def test_errors_are_told_by_the_cell_in_which_the_outcome_was():
+def test_errors_are_given_for_the_cell_in_which_the_outcome_was():
     observed = np.array([[-0.5, 0.5], [-0.5, 0.5], [1.0, -1.0], [5.0, 0.0]])  # the third in a corner, the last outside
     mean = observed + np.array([[0.3, 0.4], [0.0, 0.1], [-2.0, 0.0], [0.0, 9.0]])
     errors, counts = error_by_cell(observed, mean, T, 2)
@@ -120,7 +120,7 @@ LIFE = [
     (2.0, 1.9, "local"),  # the second goal: nothing better follows
     (2.0, 1.0, "local"),
     (None, None, ""),
-    (2.0, 1.8, "local"),  # a goal anew, with one movement only
+    (2.0, 1.8, "local"),  # the first goal again, with one movement only
     (1.0, 0.0, "global"),  # never more than that
 ]
 
@@ -142,7 +142,7 @@ def test_refinements_are_counted_goal_by_goal_without_imitation_and_chance(dim):
 
 
 @pytest.mark.parametrize("life", [[], LIFE[:1], LIFE[5:7], LIFE[10:]])
-def test_without_a_refinement_there_is_no_share(life):
+def test_without_refinements_there_is_no_share(life):
     assert np.isnan(improvements(*lived(life)).share)
 
 

@@ -34,7 +34,7 @@ def test_goals_are_uniform_before_the_first_fit_and_where_nothing_progresses():
         assert np.abs(counts - 200).max() < 5 * np.sqrt(2000 * 0.1 * 0.9)  # five standard deviations
 
 
-def test_what_lies_before_the_last_memory_goals_is_forgotten():
+def test_goals_before_the_last_memory_ones_are_forgotten():
     goals = AlpGmm(NO_CONTEXTS, LINE, stream(3, "goals"), memory=60, uniform=0.0)
     practise(goals, 60, 0.0, 0.3)
     practise(goals, 400, 0.7, 1.0, seed=1)  # long enough that few goals are nearest to one of the first 60

@@ -1,4 +1,4 @@
-"""Every kind of goals keeps the same promises; and what the interest map's rivals without a tree do with progress."""
+"""Every goal model keeps the same promises; and what the interest map's rivals without a tree do with progress."""
 
 from functools import partial
 
@@ -35,7 +35,7 @@ ALL = pytest.mark.parametrize(
 
 
 @ALL
-def test_every_kind_of_goals_takes_the_same_place(make):
+def test_every_goal_model_can_be_used_in_the_same_way(make):
     goals = make(LINE, SQUARE, stream(20, "goals"))
     for _ in range(120):
         goal = goals.sample([0.5])
@@ -45,7 +45,7 @@ def test_every_kind_of_goals_takes_the_same_place(make):
 
 
 @ALL
-def test_only_sampling_draws_whatever_the_kind_of_goals(make):
+def test_every_goal_model_draws_only_when_it_samples(make):
     rng = stream(23, "goals")
     goals = make(LINE, SQUARE, rng)
     for index in range(110):
@@ -99,7 +99,7 @@ def test_what_is_not_an_attempt_at_a_goal_of_the_map_is_refused(make, context, g
 
 @ALL
 @pytest.mark.parametrize("gain", [-0.01, 1.01, np.nan, np.inf])
-def test_a_gain_that_is_none_is_refused(make, gain):
+def test_a_gain_outside_its_range_is_refused(make, gain):
     goals = make(LINE, SQUARE, stream(21, "goals"))
     with pytest.raises(ValueError, match=r"gain must lie in \[0, 1\], got"):
         goals.add([0.5], [0.5, 0.5], -0.5, "autonomous", gain)

@@ -35,7 +35,7 @@ def test_absolute_progress_is_the_change_between_the_halves_of_the_history(compe
     assert interest(competences, progress=absolute_progress) == pytest.approx(expected)
 
 
-def test_absolute_progress_of_a_long_history_looks_at_its_window_alone():
+def test_absolute_progress_of_a_long_history_looks_only_at_its_window():
     competences = [0, 0, 0, -1, -1, -0.5, -0.25, 0]
     for window, expected in (
         (4, 0.3125),  # |(-.25 + 0) - (-1 - .5)| / 4
@@ -67,14 +67,14 @@ def test_by_default_interest_is_the_mean_gain_whatever_the_competences(gains, ex
     assert interest(changing, gains=gains, progress=gained_progress) == pytest.approx(expected)
 
 
-def test_gained_progress_looks_at_its_window_alone():
+def test_gained_progress_looks_only_at_its_window():
     gains = [1, 0, 0.2, 0.4, 0.6, 0]
     for window, expected in ((4, 1.2 / 4), (6, 2.2 / 6), (24, 2.2 / 6)):
         assert interest([-0.5] * 6, gains=gains, window=window) == pytest.approx(expected)
     assert interest([-0.5] * 30, gains=[1] * 6 + [0.25] * 24) == pytest.approx(0.25)  # the default window is 24
 
 
-def test_a_measure_of_ones_own_is_given_the_window_oldest_first():
+def test_a_users_own_measure_is_given_the_window_oldest_first():
     windows: list[tuple[list[float], list[float], list[float]]] = []
 
     def remember(points: Array, competences: Array, gains: Array) -> float:
@@ -86,7 +86,7 @@ def test_a_measure_of_ones_own_is_given_the_window_oldest_first():
     assert windows[-1] == ([0.01, 0.02, 0.03, 0.04, 0.05, 0.06], competences[1:], gains[1:])
 
 
-def test_interest_of_a_strategy_counts_its_own_goals_alone():
+def test_interest_of_a_strategy_counts_only_its_own_goals():
     competences = [-1, -0.4, -1, -0.4, 0, -0.4, 0, -0.4]  # autonomous rises, imitate stands still
     gains = [0.3, 0, 0.1, 0, 0.1, 0, 0.3, 0]
     for progress, expected in ((absolute_progress, 0.5), (gained_progress, 0.2)):
@@ -117,7 +117,7 @@ def test_paired_progress_compares_each_goal_with_the_nearest_earlier_one(places,
     assert paired(np.array(places)[:, None], np.array(competences)) == pytest.approx(expected)
 
 
-def test_paired_progress_sees_its_window_alone():
+def test_paired_progress_looks_only_at_its_window():
     points, competences = np.array([[0.1], [0.9], [0.9], [0.11], [0.12]]), np.array([0, -1, -1, -1, -1.0])
     assert paired(points, competences, window=5) == pytest.approx(2 / 4)
     assert paired(points, competences, window=4) == 0  # the first is forgotten

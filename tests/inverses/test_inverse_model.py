@@ -146,7 +146,7 @@ def test_a_strong_ridge_leaves_the_weighted_mean() -> None:
     assert ridged.theta == pytest.approx(LocalInverse(memory, k_max=20, width=1.0)(NO_CONTEXT, goal).theta)
 
 
-def test_the_linear_model_does_not_care_in_which_unit_outcomes_are_measured() -> None:
+def test_the_linear_model_does_not_depend_on_the_unit_of_outcomes() -> None:
     memory, _ = linear_world(noise=0.02)
     goal = np.array([0.3, 0.2])
     metres = LocallyLinear(memory, ridge=0.5)(NO_CONTEXT, goal)
@@ -238,6 +238,6 @@ def test_a_gaussian_without_width_is_refused() -> None:
             LocalInverse(line({0.0: 0.0}), width=width)
 
 
-def test_a_ridge_of_nothing_is_refused() -> None:
+def test_a_ridge_of_zero_is_refused() -> None:
     with pytest.raises(ValueError, match="ridge"):
         LocallyLinear(line({0.0: 0.0}), ridge=0.0)

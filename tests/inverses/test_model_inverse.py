@@ -128,7 +128,7 @@ def test_it_stays_in_the_box_at_a_goal_out_of_reach(taught):
     assert theta.min() == 0.0 or theta.max() == 1.0
 
 
-def test_looking_changes_nothing_and_answers_alike(taught, goals):
+def test_asking_changes_nothing_and_gives_the_same_answer_again(taught, goals):
     memory, model = taught
     before, random = [values.clone() for values in model.state_dict().values()], torch.random.get_rng_state()
     inverse = ModelInverse(memory, model, ARM.policies)
@@ -137,7 +137,7 @@ def test_looking_changes_nothing_and_answers_alike(taught, goals):
     assert torch.equal(torch.random.get_rng_state(), random)
 
 
-def test_before_the_model_has_learnt_it_answers_as_its_start():
+def test_before_the_model_has_learnt_it_answers_like_its_start():
     memory = Memory(0, 2, 2)
     memory.add(NO_CONTEXT, np.array([0.2, 0.4]), np.array([0.1, 0.3]))
     inverse = ModelInverse(memory, ForwardModel(0, 2, 2), Box.cube(0.0, 1.0, 2), start=NearestNeighbour(memory))
@@ -146,7 +146,7 @@ def test_before_the_model_has_learnt_it_answers_as_its_start():
     np.testing.assert_array_equal(inverse.many(NO_CONTEXT, np.zeros((2, 2)))[1].theta, [0.2, 0.4])
 
 
-def test_it_answers_as_its_start_until_the_model_is_good_enough_and_from_then_on_otherwise(taught, goals):
+def test_it_answers_like_its_start_only_until_the_model_is_good_enough(taught, goals):
     memory, model = taught
     asked, answered = (
         ModelInverse(memory, model, ARM.policies, trust=Trust(error=share * model.relative_error))
@@ -158,7 +158,7 @@ def test_it_answers_as_its_start_until_the_model_is_good_enough_and_from_then_on
     assert not np.array_equal(asked(NO_CONTEXT, goals[0]).theta, start)
 
 
-def test_a_memory_of_fewer_exemplars_than_candidates_and_anchors_will_do(taught):
+def test_a_memory_may_have_fewer_exemplars_than_candidates_and_anchors(taught):
     memory = executed(ARM, stream(3, "thetas").random((3, 7)))
     assert ARM.policies.contains(ModelInverse(memory, taught[1], ARM.policies)(NO_CONTEXT, np.zeros(2)).theta)
 

@@ -59,7 +59,7 @@ def test_an_interruption_at_any_movement_costs_nothing(make):
 
 
 @BOTH
-def test_the_archive_hears_of_a_batch_when_all_its_movements_were_made(make):
+def test_the_archive_is_told_of_a_batch_when_all_its_movements_were_made(make):
     learner = make(ARM, 4, batch=8, **({"first": 8} if make is map_elites else {}))
     found = []
     for _ in range(24):
@@ -86,7 +86,7 @@ def test_variations_of_elites_spread_by_sd_and_elites_are_of_little_effort():
 
 
 @BOTH
-def test_policies_of_any_box_and_outcomes_outside_of_t_are_taken(make):
+def test_policies_may_be_of_any_box_and_outcomes_outside_of_t(make):
     policies = Box(np.array([-5.0, 0.0, 3.0]), np.array([5.0, 1000.0, 3.001]))
     learner = make(Elsewhere(policies, Box.cube(-1, 1, 2), ARM.contexts), 8)
     for index in range(230):

@@ -84,7 +84,7 @@ def test_the_first_generation_spreads_by_sd_of_each_side() -> None:
     assert np.sqrt(np.mean(np.square(steps), axis=0)) == pytest.approx([0.02, 0.02], rel=0.25)  # five standard errors
 
 
-def test_it_ends_by_itself_where_all_movements_do_the_same() -> None:
+def test_it_ends_by_itself_where_all_movements_have_the_same_outcome() -> None:
     world = World(2, UNIT)
     world.jacobian = np.zeros((25, 2))
     assert len(world.run(cma_es(UNIT, stream(2, "search")), 500)) < 20

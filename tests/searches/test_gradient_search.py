@@ -119,9 +119,7 @@ def test_a_polished_simplex_begins_nearer_than_the_estimate_and_then_is_a_simple
 
 
 @pytest.mark.parametrize(("residual", "anchors"), [(True, True), (True, False), (False, True), (False, False)])
-def test_what_the_model_misses_here_is_put_right_by_the_outcomes_of_the_search(
-    memory, biased, inverse, goals, residual, anchors
-):
+def test_the_outcomes_of_the_search_correct_the_models_error_here(memory, biased, inverse, goals, residual, anchors):
     def estimate(context, goal):  # whose only neighbour lies far away, and tells nothing of the bias here
         far = [np.linalg.norm(memory.outcomes - goal, axis=1).argmax()]
         return inverse(context, goal)._replace(thetas=memory.thetas[far], outcomes=memory.outcomes[far])
@@ -135,7 +133,7 @@ def test_what_the_model_misses_here_is_put_right_by_the_outcomes_of_the_search(
         assert found.mean() > 0.1
 
 
-def test_neighbours_of_the_estimate_put_the_first_movement_right_already(memory, biased, goals):
+def test_neighbours_of_the_estimate_already_correct_the_first_movement(memory, biased, goals):
     many = LocallyLinear(memory)
     first = [
         nearest(partial(gradient_search, model=biased, propose=FINE, noise=0.0, trust=trust), many, goals[:5], 1).mean()
@@ -182,7 +180,7 @@ def radii(model, estimate, goal, outcome, n=5, **options):
     return seen
 
 
-def test_the_trust_region_grows_where_the_world_agrees_and_shrinks_where_it_does_not(model, inverse):
+def test_the_trust_region_grows_where_the_prediction_is_right_and_shrinks_where_it_is_not(model, inverse):
     goal = np.array([3.0, 3.0])  # never reached, so that there is always a change to be predicted
     estimate = inverse(NO_CONTEXT, goal)
     agreeing = radii(model, estimate, goal, lambda predicted, _: predicted, radius=0.1)

@@ -335,7 +335,7 @@ def tenfold(movement: Array) -> Array:
 @pytest.mark.parametrize("n", [1, 2, 30, 100, 101])
 def test_limit_stops_after_exactly_n_movements_and_passes_every_outcome_on(n: int) -> None:
     diary = Diary()
-    attempt = diary.attempt()  # held here: what nobody holds, Python would close by itself
+    attempt = diary.attempt()  # kept: Python would close it otherwise
     movements = drive(limit(attempt, n), tenfold)
     expected = np.arange(min(n, 100.0))
     assert np.array_equal(np.ravel(movements), expected)
@@ -343,7 +343,7 @@ def test_limit_stops_after_exactly_n_movements_and_passes_every_outcome_on(n: in
     assert diary.n_ended == 1
 
 
-def test_a_limit_of_nothing_executes_nothing() -> None:
+def test_a_limit_of_zero_executes_nothing() -> None:
     diary = Diary()
     assert drive(limit(diary.attempt(), 0), tenfold) == []
     assert diary.outcomes == []
@@ -351,7 +351,7 @@ def test_a_limit_of_nothing_executes_nothing() -> None:
 
 def test_closing_a_limited_attempt_ends_the_attempt_at_once() -> None:
     diary = Diary()
-    attempt = diary.attempt()  # held here: what nobody holds, Python would close by itself
+    attempt = diary.attempt()  # kept: Python would close it otherwise
     limited = limit(attempt, 30)
     next(limited)
     limited.send(np.array([5.0]))
