@@ -1,6 +1,7 @@
 """The figures of section 6 of Nguyen & Oudeyer (2014), and what each change of SGIM-D makes; one function for each.
 
-data = Data(read_results("results/paper.csv"), Path("runs")); FIGURES["errors"](data).savefig("errors.png")
+data = Data(read_results("results/paper.csv"), Path("runs"))
+save_figure(partial(FIGURES["errors"], data), Path("errors"), "png")
 """
 
 from __future__ import annotations
@@ -14,8 +15,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from evidence import NotRun, rng, shared
-from read_results import LAST, Evaluated
+from judging import NotRun, shared
+from read_results import LAST, LEARNERS, Evaluated
 from sgimd_torch.demonstrations import SHIPPED, load_demonstrations
 from sgimd_torch.environments.fishing_rod import JOINTS
 from sgimd_torch.figures import movements as plots_of_movements
@@ -24,7 +25,7 @@ from sgimd_torch.figures.results import Difference, SeedCurves, forest, goal_dis
 from sgimd_torch.runs.process import say
 from sgimd_torch.runs.read import Run, read_run
 from sgimd_torch.spaces import Array, Box
-from sgimd_torch.views.statistics import Interval, difference_interval, iqm_interval, paired_differences
+from sgimd_torch.views.statistics import Interval, difference_interval, iqm_interval, paired_differences, rng
 
 BAND = "thick: interquartile mean, band: its 95 % interval, thin: seeds"
 DEMONSTRATORS = {
@@ -38,6 +39,7 @@ PANELS = {
     "teaching": "Taught otherwise",
     "letter": "The paper to the letter",
 }
+MOVING = (("random", "sagg-riac"), ("imitation", "sgim-d"))  # the learners of the paper that execute movements
 REACH = 1.5  # m; the float hardly ever lands farther from the base
 
 
@@ -80,8 +82,8 @@ def errors(data: Data) -> Figure:
     """(a): the five learners."""
     figure = _figure(8, 5.6)
     ax = figure.subplots()
-    lines = seed_curves(ax, [data.curves(name, name, NAMES[name]) for name in NAMES])
-    for name in NAMES:
+    lines = seed_curves(ax, [data.curves(name, name, NAMES[name]) for name in LEARNERS])
+    for name in LEARNERS:
         floors = np.array(list(data.results[name].at(LAST, "floors").values()))
         if len(floors):
             ax.plot(LAST, _interval(floors).value, "_", color=COLOURS[name], markersize=20, markeredgewidth=2.5)
@@ -114,13 +116,12 @@ def demonstrators(data: Data) -> Figure:
 
 def landing(data: Data) -> Figure:
     """(c): where the float landed, all seeds together on one scale, and the number of tiles reached."""
-    runs = {name: data.runs(name) for name in NAMES if name != "observation"}  # which moves nothing
+    runs = {name: data.runs(name) for row in MOVING for name in row}
     landed = {name: np.concatenate([_landed(run) for run in found]) for name, found in runs.items()}
     box = Box.cube(-REACH, REACH, 2)
     most = max(float(tile_counts(outcomes, box).max()) for outcomes in landed.values())
     figure = _figure(14, 9)
-    rows = [[*row, "tiles"] for row in np.reshape(list(landed), (2, 2)).tolist()]
-    axes = figure.subplot_mosaic(rows, width_ratios=[1, 1, 0.9])
+    axes = figure.subplot_mosaic([[*row, "tiles"] for row in MOVING], width_ratios=[1, 1, 0.9])
     for name, outcomes in landed.items():
         shown = _demonstrated(runs[name]) if name == "sgim-d" else None
         mesh = landing_points(axes[name], outcomes, box, demonstrated=shown, most=most, colour_bar=False)
@@ -237,7 +238,7 @@ def _difference(data: Data, variant: Evaluated) -> Difference:
 
 
 def _tiles_reached(ax: Axes, data: Data) -> None:
-    names = [name for name in NAMES if name in data.results and data.results[name].at(LAST, "tiles")]
+    names = [name for name in LEARNERS if name in data.results and data.results[name].at(LAST, "tiles")]
     for place, name in enumerate(names):
         tiles = np.array(list(data.results[name].at(LAST, "tiles").values()))
         found = _interval(tiles)

@@ -1,4 +1,4 @@
-"""Reading results/paper.csv: every evaluation of every run of the comparison, by variant.
+"""The tables in results/, read back: every evaluation of every run by variant, goals, coverages.
 
 results = read_results("results/paper.csv"); results["sgim-d"].at(5000)    # {seed: mean error (m)}
 """
@@ -11,6 +11,7 @@ import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,12 @@ HEADER = (
     *("mean_error_m", "noise_floor_m", "tiles_reached"),
 )
 GOALS_HEADER = ("variant", "seed", "n_goals", "n_near")
-LAST = 5000  # movements in the life of a learner of the paper
+MODEL_HEADER = (
+    *("run", "predicted", "error_m", "inside_50_last", "inside_80_last", "inside_95_last"),
+    *("inside_50_late", "inside_80_late", "inside_95_late", "improved", "refreshes", "diverged", "ms_per_refresh"),
+)
+LEARNERS: Final = ("random", "sagg-riac", "observation", "imitation", "sgim-d")  # the paper's five
+LAST: Final = 5000  # movements in the life of a learner of the paper
 
 
 class ResultsError(ValueError):
@@ -69,16 +75,16 @@ def read_results(path: str | os.PathLike[str]) -> dict[str, Evaluated]:
     """
     runs: dict[str, tuple[str, str, float]] = {}
     values: dict[str, dict[tuple[int, int], tuple[float, float, float]]] = {}
-    for where, row in _rows(path, HEADER):
+    for where, row in read_rows(path, HEADER):
         variant, seed, movements = row["variant"], _count(row, "seed", where), _count(row, "movements", where)
-        run = (row["experiment"], row["teacher"], _number(row, "task_space", where))
+        run = (row["experiment"], row["teacher"], number(row, "task_space", where))
         if runs.setdefault(variant, run) != run:
             raise ResultsError(f"{where}: {variant} is {run}, on an earlier line {runs[variant]}; rename one")
         found = values.setdefault(variant, {})
         if (seed, movements) in found:
             raise ResultsError(f"{where}: seed {seed} of {variant} is there twice at {movements} movements")
-        floor = _number(row, "noise_floor_m", where) if row["noise_floor_m"] not in ("", "nan") else math.nan
-        found[seed, movements] = (_number(row, "mean_error_m", where), floor, _count(row, "tiles_reached", where))
+        floor = number(row, "noise_floor_m", where) if row["noise_floor_m"] not in ("", "nan") else math.nan
+        found[seed, movements] = (number(row, "mean_error_m", where), floor, _count(row, "tiles_reached", where))
     if not values:
         raise ResultsError(f"{path} has no line below its header; is the comparison still to be run?")
     return {variant: _evaluated(variant, runs[variant], found) for variant, found in values.items()}
@@ -90,10 +96,8 @@ def read_goals(path: str | os.PathLike[str]) -> dict[str, Array]:
     Raises:
         ResultsError: a line makes no sense.
     """
-    if not Path(path).exists():
-        return {}
     found: dict[str, list[tuple[int, int]]] = {}
-    for where, row in _rows(path, GOALS_HEADER):
+    for where, row in read_rows(path, GOALS_HEADER, optional=True):
         goals, near = _count(row, "n_goals", where), _count(row, "n_near", where)
         if not near <= goals or goals == 0:
             raise ResultsError(f"{where}: n_near must be at most n_goals, and n_goals above 0, got {near} and {goals}")
@@ -101,21 +105,33 @@ def read_goals(path: str | os.PathLike[str]) -> dict[str, Array]:
     return {variant: np.array(counts, dtype=np.float64) for variant, counts in found.items()}
 
 
-def _evaluated(
-    variant: str, run: tuple[str, str, float], found: dict[tuple[int, int], tuple[float, float, float]]
-) -> Evaluated:
-    seeds, movements = (np.unique([key[k] for key in found]) for k in range(2))
-    columns = np.full((3, len(seeds), len(movements)), np.nan)
-    for (seed, when), row in found.items():
-        columns[:, np.searchsorted(seeds, seed), np.searchsorted(movements, when)] = row
-    return Evaluated(variant, *run, seeds, movements, *columns)
+def read_coverages(path: str | os.PathLike[str]) -> dict[str, Array]:
+    """Variant -> ``(n_seeds,)``, the share of outcomes in the model's 80 % regions from 2000 movements on; {} without
+    file.
+
+    Raises:
+        ResultsError: a line makes no sense.
+    """
+    found: dict[str, list[float]] = {}
+    for where, row in read_rows(path, MODEL_HEADER, optional=True):
+        if row["inside_80_late"] != "nan":
+            found.setdefault(row["run"].split("/")[0], []).append(number(row, "inside_80_late", where))
+    return {variant: np.array(shares) for variant, shares in found.items()}
 
 
-def _rows(path: str | os.PathLike[str], header: tuple[str, ...]) -> Iterator[tuple[str, dict[str, str]]]:
-    """Where each line stands, for messages, and its fields by name."""
+def read_rows(
+    path: str | os.PathLike[str], header: tuple[str, ...], *, optional: bool = False
+) -> Iterator[tuple[str, dict[str, str]]]:
+    """Where each line stands, for messages, and its fields by name; nothing of an ``optional`` table without file.
+
+    Raises:
+        ResultsError: it is missing, cannot be read, or is another table.
+    """
     try:
         text = Path(path).read_text(encoding="utf-8")
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
+        if optional:
+            return
         raise ResultsError(f"{path} does not exist; experiments/compare.py writes it") from None
     except OSError as error:
         raise ResultsError(f"{path} cannot be read: {error.strerror}") from error
@@ -132,7 +148,22 @@ def _rows(path: str | os.PathLike[str], header: tuple[str, ...]) -> Iterator[tup
         yield where, dict(zip(header, fields, strict=True))
 
 
-def _number(row: dict[str, str], name: str, where: str) -> float:
+def _evaluated(
+    variant: str, run: tuple[str, str, float], found: dict[tuple[int, int], tuple[float, float, float]]
+) -> Evaluated:
+    seeds, movements = (np.unique([key[k] for key in found]) for k in range(2))
+    columns = np.full((3, len(seeds), len(movements)), np.nan)
+    for (seed, when), row in found.items():
+        columns[:, np.searchsorted(seeds, seed), np.searchsorted(movements, when)] = row
+    return Evaluated(variant, *run, seeds, movements, *columns)
+
+
+def number(row: dict[str, str], name: str, where: str) -> float:
+    """A finite number of 0 or more.
+
+    Raises:
+        ResultsError: it is none; the message says where.
+    """
     try:
         value = float(row[name])
     except ValueError:
