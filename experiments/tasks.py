@@ -20,7 +20,7 @@ from sgimd_torch.runs.children import Child
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.log import RunError, make_folder
 from sgimd_torch.runs.read import Run, read_run
-from sgimd_torch.runs.tasks import ARMS, arm_benchmark
+from sgimd_torch.runs.tasks import arm_benchmark
 from sgimd_torch.spaces import Array
 from tables import Key, Table
 from variants import EXPERIMENTS, FEW, FORWARD_MODEL, HALF, PAPER, TABLES, teacher_of
@@ -168,8 +168,8 @@ def tiles_reached(outcomes: Array, benchmark: Benchmark) -> int:
 
 @cache
 def _benchmark(environment: str, path: Path | None) -> Benchmark:
-    if path is None and environment in ARMS:
-        return arm_benchmark(PlanarArm(ARMS[environment]))
+    if path is None and environment.startswith("planar-arm-"):
+        return arm_benchmark(PlanarArm(int(environment[11:])))
     return load_benchmark(path or SHIPPED)
 
 

@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import Any, Final
 
 from sgimd_torch.demonstrations import SHIPPED, load_demonstrations, save_demonstrations
-from sgimd_torch.runs.config import ALGORITHMS, Config
+from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.log import make_folder
-from sgimd_torch.runs.tasks import ARMS
 
 Variant = dict[str, Any]
+ARMS: Final = ("planar-arm-7", "planar-arm-50")
 SGIM_D: Final[Variant] = {"algorithm": "sgim-d"}
 SAGG_RIAC: Final[Variant] = {"algorithm": "sagg-riac"}
 # The parts that the paper names, where measurements spoke for others; for who has no goals of his own only the inverse.
@@ -143,7 +143,7 @@ def make_subsets(folder: Path) -> None:
 def teacher_of(config: Config) -> str:
     """Who demonstrates: the number of the demonstrator, the file's name, or "structured" for the postures that an arm
     is shown; "" for who learns alone."""
-    if "teacher" not in ALGORITHMS[config.algorithm]:
+    if "teacher" not in config.used:
         return ""
     if config.environment in ARMS and config.demonstrations is None:
         return "structured"

@@ -25,7 +25,8 @@ from tqdm import tqdm
 
 from options import at_least
 from sgimd_torch.runs.build import build
-from sgimd_torch.runs.config import MODEL_SEARCHES, Config
+from sgimd_torch.runs.catalogue import CATALOGUE
+from sgimd_torch.runs.config import Config
 from sgimd_torch.session import live, run
 from sgimd_torch.spaces import Array, Estimate
 from sgimd_torch.strategies import GoalBabbling
@@ -93,10 +94,11 @@ def main() -> int:
     parser.add_argument("--movements", type=at_least(200), default=5000, help="of each run (5000)")
     parser.add_argument("--seed", type=at_least(0), default=1000, help="of the runs (1000)")
     parser.add_argument("--training", type=float, default=Config.training, help="steps for each movement (%(default)s)")
-    parser.add_argument("--search", choices=MODEL_SEARCHES, help="only this one, beside the simplex")
+    through_model = [word for word, entry in CATALOGUE["search"].items() if "model" in entry.uses.values()]
+    parser.add_argument("--search", choices=through_model, help="only this one, beside the simplex")
     options = parser.parse_args()
     torch.set_num_threads(1)
-    searches = [options.search] if options.search else [*MODEL_SEARCHES]
+    searches = [options.search] if options.search else through_model
     print(f"{options.movements} movements, seed {options.seed}, {options.training:g} steps each")
     print(f"training, refining and both over physics\n{HEAD}")
     simplex = 0.0

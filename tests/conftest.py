@@ -5,7 +5,8 @@ import pytest
 
 from runs import arguments, csv_of
 from sgimd_torch.evaluation import Benchmark, save_benchmark
-from sgimd_torch.runs.run import main
+from sgimd_torch.runs.command_line import main
+from sgimd_torch.runs.process import command
 
 
 @pytest.fixture(scope="session")
@@ -20,7 +21,7 @@ def go(benchmark):
     """Run in this process; later options win. Returns the exit code."""
 
     def go(out, *options):
-        return main([*arguments(out, benchmark), *map(str, options)])
+        return command(main, [*arguments(out, benchmark), *map(str, options)])
 
     return go
 

@@ -18,9 +18,9 @@ from sgimd_torch.evaluation import Evaluation
 from sgimd_torch.goals.regions import Region
 from sgimd_torch.runs import model_record as run_model
 from sgimd_torch.runs.build import RunParts
+from sgimd_torch.runs.clock import Seconds
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.directory import RunDirectory
-from sgimd_torch.runs.process import Seconds
 from sgimd_torch.runs.tables import EVALUATION, read_table
 from sgimd_torch.spaces import Array, Box, Episode
 from sgimd_torch.strategies import GoalBabbling

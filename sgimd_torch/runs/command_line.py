@@ -1,102 +1,163 @@
-"""From a command line to a ``Config``: an option for each of its fields, explained by its docstring, and --resume.
+"""Let one learner live, evaluate it now and then, and write everything to one run directory, OUT/NAME/seed-003.
 
-config, resume = parse(["--algorithm", "sagg-riac", "--goals", "uniform", "--resume"])
+Examples:
+  sgimd run --algorithm sgim-d --seed 3
+  sgimd run --algorithm sgim-d --seed 3 --resume              after Ctrl-C, or with more --movements
+  sgimd run --algorithm sagg-riac --goals uniform --name uniform-goals --movements 2000
+  sgimd run --environment mypackage.toss:make                 on a robot of your own
 """
 
 from __future__ import annotations
 
 import argparse
-import difflib
 import re
+import shlex
 import sys
+import textwrap
 from collections.abc import Sequence
 from dataclasses import fields
-from typing import Any, NoReturn
+from typing import Any, Final, NoReturn, get_type_hints
 
 import jsonargparse
 
-from sgimd_torch.runs.config import Config
+from sgimd_torch.runs.catalogue import CATALOGUE
+from sgimd_torch.runs.config import Config, dashed, options
+from sgimd_torch.runs.process import did_you_mean, loading
+
+FLAGS: Final = {
+    "resume": "Go on with a stopped or killed run, or lengthen a finished one.",
+    "accept_loss": "With --resume: go on though movements that were made are missing from the log; a copy is kept.",
+}
+_WANTED: Final = {
+    "int": "a whole number",
+    "float": "a number",
+    "bool": "true or false",
+    "int | None": "a whole number, or null",
+    "tuple[int, ...] | None": "whole numbers such as 250,500, or [], or null",
+}
+_BOOL: Final = ("true", "false")
 
 
-def parse(argv: Sequence[str], description: str | None = None) -> tuple[Config, bool]:
-    """The run that a command line asks for, and whether to resume it.
+def main(argv: Sequence[str] | None = None) -> int:
+    """The command ``sgimd run``; 0 when the run has finished. It raises what ``carry_out`` raises."""
+    argv = sys.argv[1:] if argv is None else argv
+    config, flags = parse(argv, __doc__)
+    again = [sys.executable, "-m", "sgimd_torch", "run", *argv, *([] if flags["resume"] else ["--resume"])]
+    with loading():
+        from sgimd_torch.runs.run import carry_out  # after --help
+    print(carry_out(config, **flags, again=shlex.join(again)))
+    return 0
+
+
+def parse(
+    argv: Sequence[str], description: str | None = None, prog: str = "sgimd run"
+) -> tuple[Config, dict[str, bool]]:
+    """The run that a command line asks for, and its flags.
 
     Raises:
         SystemExit: with code 2 and a message on stderr when it makes no sense, 0 after ``--help``.
     """
     parser = _Parser(
-        prog="run.py",
+        prog=prog,
         usage="%(prog)s [--OPTION VALUE ...] [--resume]",
         description=description,
-        epilog="Dashes work too: --task-space is --task_space. null stands for nothing.",
+        epilog="null stands for nothing. Underscores in the place of dashes are understood, too.",
         formatter_class=_Help,
     )
-    parser.add_class_arguments(Config)
-    parser.add_argument(
-        "--resume", action="store_true", help="Go on with a stopped or killed run, or lengthen a finished one."
-    )
-    options = {f"--{field.name}" for field in fields(Config)} | {"--resume", "--help"}
-    arguments: list[str] = []
-    waiting = False  # the word before was an option that takes a value
-    for argument in argv:
-        typed, equals, value = argument.partition("=")
-        if typed.startswith("--"):  # --task-space is --task_space
-            name = typed.replace("-", "_").replace("__", "--", 1)
-            if name not in options:
-                near = difflib.get_close_matches(name, options, 1, 0.7)
-                parser.error(f"unknown option {argument}" + (f"; did you mean {near[0]}?" if near else ""))
-            arguments.append(name)
-            waiting = not equals and name not in ("--resume", "--help")
-            if not equals:
-                parser.typed[name[2:]] = typed, ""
-                continue
-            if name in ("--resume", "--help"):
-                parser.error(f"{typed} takes no value, got {value!r}")
-        elif waiting:
-            value, waiting = argument, False
-            name, typed = arguments[-1], parser.typed[arguments[-1][2:]][0]
-        elif argument == "-h":
-            arguments.append(argument)
-            continue
-        else:
-            parser.error(f"{argument!r} belongs to no option; an option begins with -- and takes one value")
-        parser.typed[name[2:]] = typed, value
-        if not value and name in ("--out", "--benchmark", "--demonstrations"):
-            parser.error(f"{typed} must be a path, got an empty one")
-        if name in ("--evaluate_at", "--floor_at") and re.fullmatch(r"\d+(,\d+)*", value):
-            value = f"[{value}]"
-        arguments[-1] = f"{name}={value}"
-    values = parser.parse_args(arguments).as_dict()
-    resume = values.pop("resume")
+    hints, groups = get_type_hints(Config), dict[str, Any]()
+    for each in fields(Config):
+        about = options()[each.name]
+        group = groups.get(about.group) or groups.setdefault(about.group, parser.add_argument_group(about.group))
+        wanted = _WANTED.get(str(each.type), "")
+        text = f"{about.about} ({wanted}{wanted and '; '}default: {_told(each.default)}){_choices(each.name)}"
+        metavar = f"{{{','.join(_BOOL)}}}" if each.type == "bool" else each.name.upper()
+        group.add_argument(
+            f"--{dashed(each.name)}", type=hints[each.name], default=each.default, metavar=metavar, help=text
+        )
+    for flag, text in FLAGS.items():
+        groups[next(iter(groups))].add_argument(f"--{dashed(flag)}", action="store_true", help=text)
+    values = parser.parse_args(parser.joined(argv)).as_dict()
+    flags = {flag: bool(values.pop(flag)) for flag in FLAGS}
     try:
-        return Config(**values), resume
+        return Config(**values), flags
     except ValueError as error:
         parser.error(str(error))
 
 
-class _Help(jsonargparse.DefaultHelpFormatter, argparse.RawDescriptionHelpFormatter):
-    """Keeps the lines of the examples; names types for people."""
+def _told(value: Any) -> str:
+    """A default, as the command line has it."""
+    return (
+        {None: "null", True: "true", False: "false"}.get(value, str(value))
+        if not isinstance(value, float)
+        else f"{value:g}"
+    )
 
-    def _expand_help(self, action: argparse.Action) -> str:
-        text = super()._expand_help(action)
-        return text.replace("<class 'Path'>", "path").replace("Path |", "path |").replace(_INTS, "int,int,... | null")
+
+def _choices(name: str) -> str:
+    """What the catalogue has for an option, a line each."""
+    entries = CATALOGUE.get(name, {})
+    lines = [f"\n  {word}: {entry.about}" for word, entry in entries.items()]
+    return "".join([*lines, "\n  or package.module:attribute, one of your own"]) if lines else ""
 
 
-_INTS = "Optional[tuple[int, ...]]"
-_WANTED = {"int": "a whole number", "float": "a number", "bool": "true or false"}
-_WANTED |= {f"{name} | None": f"{wanted}, or null" for name, wanted in _WANTED.items()}
-_WANTED["tuple[int, ...] | None"] = "whole numbers such as 250,500, or [], or null"
+class _Help(argparse.RawTextHelpFormatter):
+    """Keeps lines, each wrapped by itself."""
+
+    def _split_lines(self, text: str, width: int) -> list[str]:
+        lines: list[str] = []
+        for line in text.splitlines():
+            indent = len(line) - len(line.lstrip())
+            lines += textwrap.wrap(line, width, subsequent_indent=" " * (indent and indent + 2))
+        return lines
 
 
 class _Parser(jsonargparse.ArgumentParser):
-    def __init__(self, **options: Any) -> None:
-        super().__init__(**options)
+    def __init__(self, **arguments: Any) -> None:
+        super().__init__(**arguments)
         self.typed: dict[str, tuple[str, str]] = {}  # by field: the option as it was typed, and its value
+
+    def joined(self, argv: Sequence[str]) -> list[str]:
+        """Each option and its value as one word, spelt with dashes; what belongs to no option is refused."""
+        names = {f"--{dashed(each.name)}": each.name for each in fields(Config)}
+        flags = {*(f"--{dashed(flag)}" for flag in FLAGS), "--help"}
+        words: list[str] = []
+        waiting = ""  # the option before, if it takes a value
+        for word in argv:
+            typed, equals, value = word.partition("=")
+            if waiting and not typed.startswith("--"):
+                words[-1] = self._with_value(waiting, names[waiting], self.typed[names[waiting]][0], word)
+                waiting = ""
+            elif typed.startswith("--"):
+                option = dashed(typed)
+                if option not in names and option not in flags:
+                    self.error(f"unknown option {word}{did_you_mean(option, {*names, *flags})}")
+                if option in flags and equals:
+                    self.error(f"{typed} takes no value, got {value!r}")
+                words.append(option)
+                waiting = option if option in names and not equals else ""
+                if option in names:
+                    self.typed[names[option]] = typed, value
+                    if equals:
+                        words[-1] = self._with_value(option, names[option], typed, value)
+            elif word == "-h":
+                words.append(word)
+            else:
+                self.error(f"{word!r} belongs to no option; an option begins with -- and takes one value")
+        return words
+
+    def _with_value(self, option: str, name: str, typed: str, value: str) -> str:
+        self.typed[name] = typed, value
+        kind = str(Config.__dataclass_fields__[name].type)
+        if not value and "Path" in kind:
+            self.error(f"{typed} must be a path, got an empty one")
+        if "tuple" in kind and re.fullmatch(r"\d+(,\d+)*", value):
+            value = f"[{value}]"
+        return f"{option}={value}"
 
     def error(self, message: str, ex: Exception | None = None) -> NoReturn:
         key = re.search(r'[Kk]ey "(\w+)"', message)
         if key and key[1] in self.typed:
-            kinds = {field.name: str(field.type) for field in fields(Config)}
+            kinds = {each.name: str(each.type) for each in fields(Config)}
             typed, value = self.typed[key[1]]
             message = f"{typed} must be {_WANTED.get(kinds[key[1]], 'text')}, got {value}"
         print(f"error: {message}\n--help lists all options", file=sys.stderr)

@@ -1,83 +1,145 @@
-"""What goes along with a run: signals that stop it cleanly, a clock for its parts, a line that shows how far it is."""
+"""What all commands share: signals, standard streams, exit codes, messages, progress.
+
+    sys.exit(command(main))    # main(argv) returns the exit code; what it raises becomes one line and an exit code
+
+Exit codes: 0 done, 1 it failed under way, 2 the request is wrong, 130 stopped by Ctrl-C, 143 stopped by SIGTERM.
+"""
 
 from __future__ import annotations
 
-import math
+import difflib
+import importlib
 import os
 import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from functools import wraps
 from types import FrameType
-from typing import Any, ParamSpec, Self
+from typing import Any, Final, Self
 
-from tqdm import tqdm
-
-from sgimd_torch.session import Execute
-from sgimd_torch.spaces import Array, Episode
-
-P = ParamSpec("P")
-REPORT_EVERY = 10.0  # s, from one line to the next where there is no terminal
+REPORT_EVERY: Final = 10.0  # s, from one line of progress to the next where there is no terminal
+SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
 
 
-class Seconds:
-    """Where the time goes, counted on from the ``before`` of a resumed run."""
+class Stopped(KeyboardInterrupt):
+    """A signal asked the command to stop."""
 
-    def __init__(self, before: dict[str, Any]) -> None:
-        self.physics: float = before.get("seconds_physics", 0.0)
-        self.evaluation: float = before.get("seconds_evaluation", 0.0)
-        self.learner = 0.0
-
-    def of_physics(self, execute: Execute) -> Execute:
-        """``execute``, timed; what it takes is not the learner's."""
-
-        def timed(index: int, context: Array, theta: Array) -> Array:
-            begun = time.perf_counter()
-            try:
-                return execute(index, context, theta)
-            finally:
-                taken = time.perf_counter() - begun
-                self.physics += taken
-                self.learner -= taken
-
-        return timed
-
-    def of_learner(self, episodes: Iterator[Episode]) -> Iterator[Episode]:
-        """``episodes``, timed: asking, telling, watching and the teacher's choice."""
-        begun = time.perf_counter()
-        for episode in episodes:
-            self.learner += time.perf_counter() - begun
-            yield episode
-            begun = time.perf_counter()
-
-    @contextmanager
-    def of_evaluation(self) -> Iterator[None]:
-        """Times an evaluation and its writing."""
-        begun = time.perf_counter()
-        try:
-            yield
-        finally:
-            self.evaluation += time.perf_counter() - begun
-
-    def summary(self) -> dict[str, float]:
-        """As summary.json has them."""
-        named = {"physics": self.physics, "learner": self.learner, "evaluation": self.evaluation}
-        return {f"seconds_{name}": round(seconds, 3) for name, seconds in named.items()}
-
-
-class Stopped(Exception):
-    """A signal asked the run to stop."""
-
-    def __init__(self, signum: int) -> None:
+    def __init__(self, signum: int = signal.SIGINT) -> None:
         super().__init__(signum)
         self.exit_code = 128 + signum
 
 
+class Failed(RuntimeError):
+    """The request was right, and it failed under way: exit code 1."""
+
+
+def dispatch(prog: str, commands: Mapping[str, tuple[str, str]], help_text: str, argv: Sequence[str]) -> int:
+    """Run the command that the first word names.
+
+    Args:
+        prog: what the user typed to come here.
+        commands: name -> the module whose ``main(argv)`` it is, and one line about it.
+        help_text: for ``--help``.
+        argv: the words after ``prog``.
+
+    Returns:
+        The exit code.
+    """
+
+    def chosen(words: Sequence[str]) -> int:
+        if not words or words[0] in ("-h", "--help"):
+            print(help_text)
+            return 0 if words else 2
+        name = words[0]
+        if name not in commands:
+            raise ValueError(
+                f"unknown command {name!r}, known are {', '.join(commands)}{did_you_mean(name, commands)}; "
+                f"{prog} --help explains them"
+            )
+        with loading():
+            module = importlib.import_module(commands[name][0])
+        return int(module.main(words[1:]))
+
+    return command(chosen, argv)
+
+
+def command(main: Callable[[Sequence[str]], int], argv: Sequence[str] | None = None) -> int:
+    """Run ``main`` on the words of the command line, whatever happens to signals, standard streams and files.
+
+    Returns:
+        The exit code. A ``ValueError``, an error of a file and a missing package are the request's fault.
+    """
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:  # it was closed
+            setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_WRONLY), "w"))
+        getattr(sys, name).reconfigure(errors="backslashreplace")  # a name that the locale cannot write
+    before = [signal.getsignal(signum) for signum in SIGNALS]
+    _on_signals(_stop)
+    code, lost = 0, None
+    try:
+        code = main(sys.argv[1:] if argv is None else argv)
+    except SystemExit as end:
+        code = int(end.code or 0)
+    except KeyboardInterrupt as stop:
+        code = getattr(stop, "exit_code", 130)
+    except Failed as error:
+        say(f"error: {error}")
+        code = 1
+    except (ValueError, ImportError) as error:
+        say(f"error: {error}")
+        code = 2
+    except OSError as error:
+        if error.filename is not None:
+            say(f"error: {error.filename} cannot be read or written: {error.strerror}")
+        elif error.errno is None:  # raised by us, with all that there is to say
+            say(f"error: {error}")
+        else:  # of stdout, or the disk
+            lost = error
+        code = 2
+    for signum, handler in zip(SIGNALS, before, strict=True):
+        signal.signal(signum, handler)
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except OSError as error:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())  # else the interpreter would complain
+            lost = error if stream is sys.stdout else lost
+    if lost is not None:
+        if isinstance(lost, BrokenPipeError):
+            return 0 if code == 2 else code
+        say(f"error: not everything could be written: {lost.strerror}")
+        return 1
+    return code
+
+
+@contextmanager
+def loading() -> Iterator[None]:
+    """Within, libraries are imported: half of one cannot be interrupted cleanly, so a signal ends the process."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = [signal.getsignal(signum) for signum in SIGNALS]
+    _on_signals(lambda signum, _: os._exit(128 + signum))
+    try:
+        yield
+    finally:
+        for signum, handler in zip(SIGNALS, before, strict=True):
+            signal.signal(signum, handler)
+
+
+def _on_signals(handler: Callable[[int, FrameType | None], object]) -> None:
+    for signum in SIGNALS:
+        signal.signal(signum, handler)
+
+
+def _stop(signum: int, frame: FrameType | None) -> None:
+    raise Stopped(signum)
+
+
 class Stopping:
-    """Ctrl-C and SIGTERM, heard between two movements, or at once where that breaks nothing."""
+    """Within, SIGINT and SIGTERM wait for the next ``check()``, or for ``at_once()``; a context manager."""
 
     def __init__(self) -> None:
         self._signum = 0
@@ -86,8 +148,7 @@ class Stopping:
 
     def __enter__(self) -> Self:
         if threading.current_thread() is threading.main_thread():
-            for signum in (signal.SIGINT, signal.SIGTERM):
-                self._handlers[signum] = signal.signal(signum, self._hear)
+            self._handlers = {signum: signal.signal(signum, self._hear) for signum in SIGNALS}
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -117,44 +178,70 @@ class Stopping:
 
 
 class Progress:
-    """A live line on a terminal; elsewhere a plain one now and then."""
+    """A bar with an estimate of the time left on a terminal; elsewhere a plain line now and then. A context manager.
 
-    def __init__(self, title: str, recorded: int, total: int) -> None:
-        self._title, self._recorded, self._total = title, recorded, total
-        self._bar = self._start("replaying" if recorded else title, 0, recorded or total)
-        self._begun = self._reported = time.monotonic()
+    Args:
+        title: what is going on.
+        total: how much there is to do.
+        done: how much of it was done before; it does not count for the speed.
+        unit: what is counted.
+        every: seconds between two plain lines.
+    """
+
+    def __init__(
+        self, title: str, total: int, done: int = 0, *, unit: str = "movements", every: float = REPORT_EVERY
+    ) -> None:
+        self._unit, self._every = unit, every
+        self._bar: Any = None
+        self.begin(title, total, done)
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._bar.close()
-
-    def show(self, movements: int, error: float | None) -> None:
-        """So many movements are done; the last evaluation's mean error was ``error`` (m)."""
-        self._bar.update()
-        if error is not None:
-            self._bar.set_postfix_str(f"error {error:.4f} m", refresh=False)
-        if movements == self._recorded < self._total:  # the rate is that of living, not of replaying
+        if self._bar is not None:
             self._bar.close()
-            self._bar = self._start(self._title, movements, self._total)
-            self._begun = self._reported = time.monotonic()
+
+    def begin(self, title: str, total: int, done: int = 0) -> None:
+        """Another part begins, with a speed of its own."""
+        self._title, self._total, self._first = title, total, done
+        if self._bar is not None:
+            self._bar.close()
+        if sys.stderr.isatty():
+            from tqdm import tqdm  # only a terminal needs it
+
+            self._bar = tqdm(desc=title, initial=done, total=total, unit=f" {self._unit}", dynamic_ncols=True)
+        self._begun = self._reported = time.monotonic()
+
+    def show(self, done: int, note: str = "") -> None:
+        """So much is done, earlier parts counted."""
+        if self._bar is not None:
+            self._bar.set_postfix_str(note, refresh=False)
+            self._bar.update(done - self._bar.n)
+            return
         now = time.monotonic()
-        if self._bar.disable and now - self._reported >= REPORT_EVERY and movements > self._recorded:
-            self._reported = now
-            rate = (movements - self._recorded) / (now - self._begun)
-            left = (self._total - movements) / rate
-            parts = [f"{movements} of {self._total} movements", f"{rate:.0f}/s", f"{left:.0f} s left"]
-            say(f"{self._title}: {', '.join(parts)}, error {metres(error)}")
-
-    def _start(self, title: str, initial: int, total: int) -> Any:
-        silent = not sys.stderr.isatty()
-        return tqdm(desc=title, initial=initial, total=total, unit=" movements", disable=silent, dynamic_ncols=True)
+        if now - self._reported < self._every or done <= self._first:
+            return
+        self._reported = now
+        rate = (done - self._first) / (now - self._begun)
+        left = clock((self._total - done) / rate)
+        parts = [f"{done} of {self._total} {self._unit}", f"{rate:.3g}/s", f"{left} left", note]
+        say(f"{self._title}: {', '.join(filter(None, parts))}")
 
 
-def metres(length: float | None) -> str:
-    """A length for people."""
-    return "not measured" if length is None or math.isnan(length) else f"{length:.4f} m"
+def clock(seconds: float) -> str:
+    """``45 s``, ``3:20``, ``2:03:20``."""
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    if hours:
+        return f"{hours}:{minutes:02}:{rest:02}"
+    return f"{minutes}:{rest:02}" if minutes else f"{rest} s"
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """``; did you mean grid?``, or nothing where no known name is near."""
+    near = difflib.get_close_matches(name.lower().replace("_", "-"), list(known), 1, 0.5)
+    return f"; did you mean {near[0]}?" if near else ""
 
 
 def say(*messages: str) -> None:
@@ -164,50 +251,9 @@ def say(*messages: str) -> None:
             print(message, file=sys.stderr, flush=True)
 
 
-def telling_errors(main: Callable[P, int]) -> Callable[P, int]:
-    """``main``; files that make no sense or cannot be read or written end it with a line and the exit code 2, Ctrl-C
-    with 130."""
-
-    @wraps(main)
-    def guarded(*args: P.args, **kwargs: P.kwargs) -> int:
-        try:
-            return main(*args, **kwargs)
-        except ValueError as error:
-            say(f"error: {error}")
-        except OSError as error:
-            if error.filename is not None:
-                say(f"error: {error.filename} cannot be read or written: {error.strerror}")
-            elif error.errno is None:  # raised by us, it says all itself
-                say(f"error: {error}")
-            else:  # most likely of stdout; ``with_streams`` tells
-                raise
-        except KeyboardInterrupt:
-            return 130
-        return 2
-
-    return guarded
+def with_streams(main: Callable[[], int]) -> int:  # until the scripts that use it follow
+    return command(lambda _: main())
 
 
-def with_streams(main: Callable[[], int]) -> int:
-    """``main``, whatever becomes of stdout and stderr; the exit code, 1 where stdout could not be written."""
-    for name in ("stdout", "stderr"):
-        if getattr(sys, name) is None:  # it was closed
-            setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_WRONLY), "w"))
-        getattr(sys, name).reconfigure(errors="backslashreplace")  # a name that the locale cannot write
-    code, lost = 0, None
-    try:
-        code = main()
-    except SystemExit as end:
-        code = int(end.code or 0)
-    except OSError as error:  # those of files are caught where they are used
-        lost = error
-    for stream in (sys.stdout, sys.stderr):
-        try:
-            stream.flush()
-        except OSError as error:
-            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())  # else the interpreter would complain
-            lost = error if stream is sys.stdout else lost
-    if lost is not None and not isinstance(lost, BrokenPipeError):
-        say(f"error: not everything could be written: {lost.strerror}")
-        code = code or 1
-    return code
+def telling_errors(main: Any) -> Any:  # likewise
+    return main

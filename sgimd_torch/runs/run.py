@@ -1,29 +1,19 @@
-"""Let one learner live, evaluate it now and then, and write everything to one run directory, OUT/NAME/seed-003.
+"""One life: replay what was recorded, live on, evaluate now and then, write everything to one run directory.
 
-Examples:
-  python experiments/run.py --algorithm sgim-d --seed 3
-  python experiments/run.py --algorithm sgim-d --seed 3 --resume              after Ctrl-C, or with more --movements
-  python experiments/run.py --algorithm sagg-riac --goals uniform --name uniform-goals --movements 2000
+print(carry_out(Config(seed=3), resume=False, accept_loss=False, again="sgimd run --seed 3 --resume"))
 """
 
 from __future__ import annotations
 
 import importlib.metadata
 import json
-import os
+import math
 import platform
-import shlex
-import signal
 import subprocess
-import sys
 import time
-from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
-
-if __name__ == "__main__":  # Ctrl-C while the libraries below are loading
-    signal.signal(signal.SIGINT, lambda *_: os._exit(130))
 
 import numpy as np
 
@@ -34,61 +24,52 @@ from sgimd_torch.goals.interest_map import InterestMap
 from sgimd_torch.goals.regions import Region
 from sgimd_torch.runs.board import RunBoard
 from sgimd_torch.runs.build import RunParts, build
-from sgimd_torch.runs.command_line import parse
-from sgimd_torch.runs.config import Config
+from sgimd_torch.runs.clock import Seconds
+from sgimd_torch.runs.config import Config, having
 from sgimd_torch.runs.directory import RunDirectory
-from sgimd_torch.runs.log import Columns
+from sgimd_torch.runs.log import Columns, RunError
 from sgimd_torch.runs.model_record import RunModel
-from sgimd_torch.runs.process import Progress, Seconds, Stopped, Stopping, metres, say, with_streams
+from sgimd_torch.runs.process import Failed, Progress, Stopped, Stopping, say
 from sgimd_torch.session import ReplayError, live, replay, run
 from sgimd_torch.strategies import GoalBabbling
 
-# These may change when a run is resumed: they say how long it lasts, where it lies and how it is looked at. Files count
-# by their content, which is recorded as a checksum.
-FREE: Final = (
-    *("movements", "out", "name", "evaluate_at", "repeats", "floor_at", "threads", "board"),
-    *("benchmark", "benchmark_crc32", "demonstrations"),
-)
-EVALUATION_SETTINGS: Final = ("repeats", "floor_at", "benchmark_crc32")  # all evaluations of a run share these
+# Files count by their content, of which a checksum is recorded; a benchmark may be another one when a run is resumed.
+MAY_CHANGE: Final = (*having("on_resume"), "benchmark_crc32")
+EVALUATION_SETTINGS: Final = (*having("evaluates"), "benchmark_crc32")  # all evaluations of a run share these
 FLUSH_EVERY = 1.0  # s, what a killed run loses at most
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Run from the command line.
+def carry_out(config: Config, *, resume: bool, accept_loss: bool, again: str) -> str:
+    """Make a run, or go on with one; what came of it, in a line.
 
-    Returns:
-        The exit code: 0 finished; 2 the request is wrong; 1 it failed under way; 130 or 143 a signal stopped it.
+    Args:
+        config: of the run.
+        resume: go on with what is there.
+        accept_loss: also if movements are missing from its log.
+        again: the command that goes on, for whoever stops it.
+
+    Raises:
+        ValueError, OSError: the request is wrong.
+        Failed: it failed under way.
+        Stopped: by a signal.
     """
-    argv = sys.argv[1:] if argv is None else argv
-    try:
-        config, resume = parse(argv, __doc__)
-    except SystemExit as end:  # --help, or an option that cannot be
-        return int(end.code or 0)
     with Stopping() as stopping:
-        try:
-            with stopping.at_once():
-                parts = build(config)
-            directory = open_directory(config, parts, resume)
-        except (ValueError, OSError) as error:  # RunError, too
-            return _fail(error, 2)
-        except Stopped as stop:
-            return stop.exit_code
+        with stopping.at_once():
+            parts = build(config)
+        directory = open_directory(config, parts, resume)
         try:
             with directory:
-                say(*config.without_effect, *directory.notes, *correspondence_of(parts))
-                report = run_in(directory, config, parts, stopping)
-        except Stopped as stop:
-            again = shlex.join([sys.executable, os.path.relpath(__file__), *argv, *([] if resume else ["--resume"])])
+                say(*config.without_effect, *parts.notes, *directory.notes, *correspondence_of(parts))
+                return run_in(directory, config, parts, stopping)
+        except Stopped:
             say(f"stopped after {directory.summary.get('movements', 0)} movements; to go on: {again}")
-            return stop.exit_code
+            raise
         except ReplayError as error:
-            return _fail(error, 2)
+            raise RunError(str(error)) from error
         except (SimulationError, ValueError) as error:
-            return _fail(error, 1)
+            raise Failed(str(error)) from error
         except OSError as error:
-            return _fail(f"{directory.path} cannot be written: {error}; is the disk full? --resume goes on", 1)
-    print(report)
-    return 0
+            raise Failed(f"{directory.path} cannot be written: {error}; is the disk full? --resume goes on") from error
 
 
 def run_in(directory: RunDirectory, config: Config, parts: RunParts, stopping: Stopping) -> str:
@@ -103,7 +84,7 @@ def run_in(directory: RunDirectory, config: Config, parts: RunParts, stopping: S
     execute = replay(recorded, seconds.of_physics(live(parts.environment, config.seed)))
     wanted = set(config.evaluations)
     model = RunModel(directory, parts.model, 0.0 if parts.trust is None else parts.trust.error)
-    movements, flushed = 0, time.monotonic()
+    movements, flushed, title = 0, time.monotonic(), f"{config.variant} seed {config.seed}"
 
     def begin() -> None:
         directory.begin()
@@ -134,7 +115,7 @@ def run_in(directory: RunDirectory, config: Config, parts: RunParts, stopping: S
     finished = False
     with (
         RunBoard(directory, config, parts, seconds, partial(regions_of, parts)) as board,
-        Progress(f"{config.variant} seed {config.seed}", len(recorded), config.movements) as progress,
+        Progress("replaying" if recorded else title, len(recorded) or config.movements) as progress,
     ):
         try:
             if not recorded:
@@ -164,7 +145,9 @@ def run_in(directory: RunDirectory, config: Config, parts: RunParts, stopping: S
                     flushed = time.monotonic()
                 if movements > len(recorded):
                     say(*model.news())
-                progress.show(movements, directory.evaluations.last.get("mean_error_m"))
+                progress.show(movements, _error_so_far(directory))
+                if movements == len(recorded) < config.movements:
+                    progress.begin(title, config.movements, movements)
                 stopping.check()
             finished = True
             say(*model.news(ended=True))
@@ -173,8 +156,15 @@ def run_in(directory: RunDirectory, config: Config, parts: RunParts, stopping: S
             if movements >= len(recorded):  # else the summary that was found counts for more
                 summarise(finished=finished)
     error, floor = (directory.summary[name] for name in ("mean_error_m", "noise_floor_m"))
-    found = "not evaluated" if error is None else f"mean error {error:.4f} m, noise floor {metres(floor)}"
+    measured = "not measured" if floor is None or math.isnan(floor) else f"{floor:.4f} m"
+    found = "not evaluated" if error is None else f"mean error {error:.4f} m, noise floor {measured}"
     return f"{directory.path}: {movements} movements, {found}"
+
+
+def _error_so_far(directory: RunDirectory) -> str:
+    """Of the last evaluation, for the line of progress."""
+    error = directory.evaluations.last.get("mean_error_m")
+    return "" if error is None else f"error {error:.4f} m"
 
 
 def evaluate_in(
@@ -236,7 +226,7 @@ def open_directory(config: Config, parts: RunParts, resume: bool) -> RunDirector
     directory = RunDirectory(
         config.directory,
         settings,
-        free=FREE,
+        free=MAY_CHANGE,
         columns=Columns(environment.contexts.dim, environment.policies.dim, environment.outcomes.dim),
         region_dims=len(regions[0].low) if regions else None,
         versions=versions(),
@@ -281,12 +271,3 @@ def _differs(columns: Columns, recorded: bytes, now: bytes) -> str:
         f"movement {were[0]} is replayed otherwise than recorded: {'; '.join(differences[:3])}{more}. "
         "Was it recorded by another version, or on another processor?"
     )
-
-
-def _fail(error: Exception | str, code: int) -> int:
-    say(f"error: {error}")
-    return code
-
-
-if __name__ == "__main__":
-    sys.exit(with_streams(main))

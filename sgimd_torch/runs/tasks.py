@@ -1,33 +1,89 @@
-"""Where learners live: the fishing rod of the paper and planar arms, with goals to be judged by and somebody who shows.
+"""Tasks: an environment with what a study of it needs - goals to be judged by, demonstrations, their correspondence.
 
-Benchmark and demonstrations of the rod are shipped files. Those of an arm, whose geometry is known exactly, are made
-here, the same for every seed.    arm = PlanarArm(ARMS["planar-arm-7"]); arm_benchmark(arm); arm_demonstrations(arm)
+Benchmark and demonstrations of the fishing rod are shipped files. Those of a planar arm, whose geometry is known
+exactly, are made here, the same for every seed. An environment of your own may come alone, or as a ``Task``:
+    def make(): return Task(Toss(), benchmark=my_goals, demonstrations=Path("shown.npz"), correspondence=translate)
 """
 
 from __future__ import annotations
 
-from typing import Final
+import zlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
+from scipy.stats import qmc
 
+from sgimd_torch.algorithms import Correspondence
+from sgimd_torch.demonstrations import SHIPPED as SHIPPED_DEMONSTRATIONS
+from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.evaluation import Benchmark, tile_goals
-from sgimd_torch.spaces import Array, Demonstration, stream
+from sgimd_torch.environments.protocol import Environment
+from sgimd_torch.evaluation import SHIPPED as SHIPPED_BENCHMARK
+from sgimd_torch.evaluation import Benchmark, load_benchmark, tile_goals
+from sgimd_torch.spaces import Array, Box, Demonstration, stream
 
-ROD: Final = "fishing-rod"
-ARMS: Final = {"planar-arm-7": 7, "planar-arm-50": 50}  # how many joints
-ENVIRONMENTS: Final = (ROD, *ARMS)
+if TYPE_CHECKING:
+    from sgimd_torch.environments.fishing_rod import FishingRod
+
 SIDE: Final = 0.1  # m, of a benchmark tile; it leaves 311 goals in the disc of radius 1 m that these arms reach
 SHOWN: Final = 127  # demonstrations, as many as each shipped demonstrator recorded
 SAMPLES: Final = 5  # of each of them
+MOST_GOALS: Final = 500  # of a task that brings none
+STRETCH: Final = 3.0  # times longer or shorter than the robot can move: its speed is not the reason
+MISFIT: Final = 0.5  # rad; a larger misfit means that this robot cannot make the movement
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """What can be learnt, and how it is judged.
+
+    Args:
+        environment: where the learner lives.
+        benchmark: goals to be judged by: a file, or a function that makes them; None for goals all over T.
+        demonstrations: what a teacher has to show: a file, or a function that makes it; None for no teacher.
+        correspondence: (times, trajectory) -> theta_d, eq. (6); None for the environment's own, if it has one.
+        misfit: demonstration -> how far (rad) it is from what the robot can play; raises ValueError where it cannot be
+            translated. None for the correspondence alone.
+        n_joints: columns of a demonstrated trajectory; None for any.
+    """
+
+    environment: Environment
+    benchmark: Path | Callable[[], Benchmark] | None = None
+    demonstrations: Path | Callable[[], Sequence[Demonstration]] | None = None
+    correspondence: Correspondence | None = None
+    misfit: Callable[[Demonstration], float] | None = None
+    n_joints: int | None = None
+
+
+def fishing_rod(*, noise: float, task_space: float, threads: int) -> Task:
+    """The paper's task; goals come from a square of half side ``task_space`` m."""
+    from sgimd_torch.environments.fishing_rod import JOINTS, FishingRod  # MuJoCo is loaded only for those who fish
+
+    rod = FishingRod(noise=noise, outcomes=Box.cube(-task_space, task_space, 2), threads=threads)
+    return Task(
+        rod,
+        SHIPPED_BENCHMARK,
+        SHIPPED_DEMONSTRATIONS,
+        rod.primitive.correspondence,
+        partial(_misfit, rod),
+        len(JOINTS),
+    )
+
+
+def planar_arm(*, n_joints: int) -> Task:
+    """An arm without noise whose outcome is where it ends."""
+    arm = PlanarArm(n_joints)
+    return Task(arm, partial(arm_benchmark, arm), partial(arm_demonstrations, arm), arm.correspondence, None, n_joints)
 
 
 def arm_benchmark(arm: PlanarArm) -> Benchmark:
     """One random goal in each tile of T, without those that the arm cannot reach; always the same ones."""
     box = arm.outcomes
-    middles = [np.arange(low + SIDE / 2, high, SIDE) for low, high in zip(box.low, box.high, strict=True)]
-    tiles = np.stack(np.meshgrid(*middles), axis=-1).reshape(-1, box.dim)
-    goals = tile_goals(tiles, box, SIDE, stream(0, "goals for an arm"), at_least=1)
+    goals = tile_goals(_grid(box, SIDE), box, SIDE, stream(0, "goals for an arm"), at_least=1)
     return Benchmark(type(arm).__name__, goals[arm.reachable(goals)], SIDE)
 
 
@@ -40,9 +96,129 @@ def arm_demonstrations(arm: PlanarArm) -> list[Demonstration]:
     return [_led_to(arm, end) for end in ends]
 
 
+def goals_all_over(environment: Environment) -> Benchmark:
+    """At most 500 goals over T, for a task that brings none: a grid in one or two dimensions, Sobol points above."""
+    box = environment.outcomes
+    per_side = int(MOST_GOALS ** (1 / box.dim))
+    if box.dim <= 2:
+        steps = (np.arange(per_side) + 0.5) / per_side
+        points = np.stack(np.meshgrid(*[steps] * box.dim), axis=-1).reshape(-1, box.dim)
+    else:
+        points = qmc.Sobol(box.dim, scramble=False).random_base2(int(np.log2(MOST_GOALS)))[1:]
+    return Benchmark(type(environment).__name__, box.low + points * box.sides, float(box.sides.max()) / per_side)
+
+
+def benchmark_of(task: Task, file: Path | None) -> tuple[Benchmark, str | None]:
+    """The goals of a run and the checksum of their file, None of goals that are made.
+
+    Args:
+        task: brings the goals where there is no file.
+        file: takes their place.
+
+    Raises:
+        ValueError: they do not fit the environment, or the file is damaged.
+        OSError: there is no such file.
+    """
+    source = task.benchmark if file is None else file
+    if isinstance(source, Path):
+        path = _existing("benchmark", source)
+        benchmark, checksum = load_benchmark(path), _checksum(path)
+    else:
+        benchmark, checksum = goals_all_over(task.environment) if source is None else source(), None
+    benchmark.check(task.environment)
+    return benchmark, checksum
+
+
+def demonstrations_of(task: Task, file: Path | None) -> tuple[Sequence[Demonstration], list[float], str | None]:
+    """What a teacher can show, what the correspondence leaves of each (rad), and the checksum of the file.
+
+    Args:
+        task: brings the demonstrations where there is no file.
+        file: takes their place.
+
+    Raises:
+        ValueError: there are none, or one cannot be translated, or the file is damaged.
+        OSError: there is no such file.
+    """
+    source = task.demonstrations if file is None else file
+    if source is None:
+        raise ValueError(
+            f"{type(task.environment).__name__} comes without demonstrations, and this algorithm needs a teacher; "
+            "give --demonstrations FILE, or choose one that learns alone: --algorithm sagg-riac"
+        )
+    if not isinstance(source, Path):
+        made = source()
+        return made, [0.0] * len(made), None
+    path, robot = _existing("demonstrations", source), task.environment
+    found = load_demonstrations(
+        path, n_joints=task.n_joints, outcome_dim=robot.outcomes.dim, context_dim=robot.contexts.dim
+    )
+    misfits: list[float] = []
+    for row, demonstration in enumerate(found):
+        try:
+            if task.misfit is not None:
+                misfits.append(task.misfit(demonstration))
+            else:
+                correspondence_of(task)(demonstration.times, demonstration.trajectory)
+                misfits.append(0.0)
+        except ValueError as error:
+            raise ValueError(f"{path}: recording {row} cannot be translated: {error}") from error
+    return found, misfits, _checksum(path)
+
+
+def correspondence_of(task: Task) -> Correspondence:
+    """From a demonstrated trajectory to theta.
+
+    Raises:
+        ValueError: neither the task nor its environment has one.
+    """
+    found = task.correspondence or getattr(task.environment, "correspondence", None)
+    if found is None:
+        raise ValueError(
+            f"{type(task.environment).__name__} has no correspondence, so demonstrations cannot be translated; give it "
+            "a method correspondence(times, trajectory) -> theta, or return Task(environment, correspondence=...)"
+        )
+    return found
+
+
+def _misfit(rod: FishingRod, demonstration: Demonstration) -> float:
+    times, trajectory = demonstration.times, demonstration.trajectory
+    duration, (shortest, longest) = times[-1] - times[0], rod.primitive.durations
+    if not shortest / STRETCH <= duration <= longest * STRETCH:
+        raise ValueError(
+            f"it lasts {duration:g} s, the robot's movements {shortest:g} to {longest:g} s; "
+            "was it recorded in milliseconds?"
+        )
+    residual = rod.primitive.residual(rod.primitive.correspondence(times, trajectory), times, trajectory)
+    if residual > MISFIT:
+        raise ValueError(
+            f"it is {residual:.2f} rad (root mean square) away from anything that the robot can play; "
+            "was it recorded in degrees, or with the joints in another order?"
+        )
+    return residual
+
+
+def _grid(box: Box, side: float) -> Array:
+    """``(n, dim)``, the middles of tiles."""
+    middles = [np.arange(low + side / 2, high, side) for low, high in zip(box.low, box.high, strict=True)]
+    return np.stack(np.meshgrid(*middles), axis=-1).reshape(-1, box.dim)
+
+
 def _led_to(arm: PlanarArm, end: Array) -> Demonstration:
     context = np.empty(0)
     theta = arm.solve(context, end)
     times = np.linspace(0.0, 1.0, SAMPLES)
     outcome = arm.execute(context, theta, stream(0, "demonstrations by an arm"))
     return Demonstration(context, times, np.outer(times, arm.angles(theta)), outcome)
+
+
+def _existing(what: str, path: Path) -> Path:
+    if path.is_dir():
+        raise IsADirectoryError(f"{what}: {path} is a directory, a file was wanted")
+    if not path.is_file():
+        raise FileNotFoundError(f"{what}: there is no file {path}")
+    return path
+
+
+def _checksum(path: Path) -> str:
+    return f"{zlib.crc32(path.read_bytes()):08x}"

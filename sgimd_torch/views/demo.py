@@ -24,12 +24,12 @@ if __name__ == "__main__":  # Ctrl-C while the libraries below are loading
     signal.signal(signal.SIGINT, lambda *_: os._exit(130))
 
 from sgimd_torch.figures.learning import NAMES
+from sgimd_torch.runs.catalogue import ROD
 from sgimd_torch.runs.children import ChildFailed, learn
 from sgimd_torch.runs.command_line import parse
 from sgimd_torch.runs.log import make_folder
 from sgimd_torch.runs.process import say, with_streams
 from sgimd_torch.runs.read import read_run
-from sgimd_torch.runs.tasks import ROD
 from sgimd_torch.views.demo_figure import draw, table
 
 ALGORITHMS = ("sgim-d", "random")

@@ -13,9 +13,9 @@ from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import Benchmark, save_benchmark
 from sgimd_torch.runs.build import build
+from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.config import ALGORITHMS, Config
 from sgimd_torch.runs.read import read_run
-from sgimd_torch.runs.run import main
 from sgimd_torch.runs.tasks import ARMS, arm_benchmark, arm_demonstrations
 from sgimd_torch.spaces import Demonstration, stream
 from sgimd_torch.views import demo

@@ -18,9 +18,9 @@ from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.evaluation import Benchmark, save_benchmark
 from sgimd_torch.runs import run as run_script
 from sgimd_torch.runs.build import build
+from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.config import ALGORITHMS, KNOWN, MODEL_SEARCHES, Config
 from sgimd_torch.runs.read import read_run
-from sgimd_torch.runs.run import main
 from sgimd_torch.spaces import Demonstration, stream
 
 

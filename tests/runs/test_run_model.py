@@ -17,12 +17,12 @@ from sgimd_torch.evaluation import Benchmark, save_benchmark
 from sgimd_torch.forward_model.model import ForwardModel
 from sgimd_torch.memory import Memory
 from sgimd_torch.runs.build import LEAST_NOISE, build
+from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.config import MODEL_SEARCHES, Config
 from sgimd_torch.runs.directory import RunDirectory
 from sgimd_torch.runs.log import Columns
 from sgimd_torch.runs.model_record import LEGEND, RunModel
 from sgimd_torch.runs.read import read_run
-from sgimd_torch.runs.run import main
 from sgimd_torch.spaces import Episode, Move, stream
 
 MOVEMENTS = 170

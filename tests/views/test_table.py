@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from sgimd_torch.evaluation import Benchmark, save_benchmark
+from sgimd_torch.runs.command_line import main as live
 from sgimd_torch.runs.read import read_run
-from sgimd_torch.runs.run import main as live
 from sgimd_torch.views.table import main
 
 

@@ -130,7 +130,7 @@ def remember(run: Run, parts: RunParts, start: int, stop: int) -> None:
     memory, correspondence = parts.learner.memory, parts.correspondence
     by_observation = isinstance(parts.learner.social, Remember)  # the others remember only what they did themselves
     for row in range(start, min(stop, len(run.index))):
-        if by_observation and run.demonstration[row] >= 0:
+        if by_observation and correspondence is not None and run.demonstration[row] >= 0:
             shown = parts.demonstrations[run.demonstration[row]]
             memory.add(shown.context, correspondence(shown.times, shown.trajectory), shown.outcome)
         if run.origin[row]:

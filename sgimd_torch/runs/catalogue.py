@@ -1,0 +1,336 @@
+"""Everything that a word of the command line can name, one record each, and anything else as package.module:attribute.
+
+    find("goals", "grid").load()                    # ProgressGrid; imported now
+    find("goals", "mypackage.goals:Curious")        # of your own
+A record says which options of a run go to which parameter. From that follows how a run is put together, which options
+have no effect in it, what ``--help`` says and what figures call it. There is no other list of names.
+"""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import os
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from typing import Any, Final
+
+from sgimd_torch.runs.process import did_you_mean
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One thing with a name.
+
+    Args:
+        at: where it is, ``package.module:attribute``.
+        about: what it is, for ``--help``.
+        uses: its parameter -> the option of a run that it takes, or the part that a run shares with it: "model",
+            "trust", "policies", "correspondence". An option that is None leaves the parameter at its own default.
+        fixed: its parameter -> value; a text with a colon is an attribute, loaded like ``at``.
+        also: options that matter with it, though they go elsewhere.
+        ignores: options that have no effect with it, though others use them.
+        learns_with: of an inverse: the one that answers while it learns, if that is another one.
+        label, colour: what figures call it, and how they draw it.
+    """
+
+    at: str
+    about: str
+    uses: Mapping[str, str] = field(default_factory=dict)
+    fixed: Mapping[str, object] = field(default_factory=dict)
+    also: tuple[str, ...] = ()
+    ignores: tuple[str, ...] = ()
+    learns_with: str | None = None
+    label: str = ""
+    colour: str = "black"
+
+    @property
+    def options(self) -> list[str]:
+        """Names of all options and shared parts that matter with it."""
+        return [*self.uses.values(), *self.also]
+
+    def load(self) -> Any:
+        """The thing itself.
+
+        Raises:
+            ValueError: a package that it needs is not installed, or broken.
+        """
+        return load(self.at)
+
+    def arguments(self) -> dict[str, Any]:
+        """``fixed``, loaded."""
+        return {
+            name: load(value) if isinstance(value, str) and ":" in value else value
+            for name, value in self.fixed.items()
+        }
+
+
+_PURSUES: Final = {
+    "goals": "goals",
+    "inverse": "inverse",
+    "search": "search",
+    "judge": "competence",
+    "budget": "budget",
+}
+_TAUGHT: Final = ("teacher", "demonstrations")
+_SHOWN: Final = {"correspondence": "correspondence"}
+_PROGRESS: Final = {"window": "window", "progress": "progress"}
+_MODEL: Final = {"model": "model", "trust": "trust"}
+_AIM: Final = ("focus",)  # is on the goal pursued: without goals there is none
+_IN_THE_PACKAGE: Final = "sgimd_torch"
+
+
+def _at(place: str, about: str, **more: Any) -> Entry:
+    return Entry(f"{_IN_THE_PACKAGE}.{place}", about, **more)
+
+
+ROD: Final = "fishing-rod"  # where runs lived before there was a choice
+# Colours after Okabe & Ito: told apart with any colour vision, and in grey.
+CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
+    "algorithm": {
+        "random": _at(
+            "algorithms:random_exploration", "uniform movements", ignores=_AIM, label="Random", colour="#7f7f7f"
+        ),
+        "sagg-riac": _at("algorithms:sagg_riac", "goal babbling", uses=_PURSUES, label="SAGG-RIAC", colour="#0072b2"),
+        "observation": _at(
+            "algorithms:observation",
+            "watches and remembers, never moves",
+            uses=_SHOWN,
+            also=_TAUGHT,
+            ignores=_AIM,
+            label="Observation",
+            colour="#cc79a7",
+        ),
+        "imitation": _at(
+            "algorithms:imitation",
+            "repeats the last demonstration with variations",
+            uses={**_SHOWN, "epsilon": "epsilon"},
+            also=_TAUGHT,
+            label="Imitation",
+            colour="#009e73",
+        ),
+        "sgim-d": _at(
+            "algorithms:sgim_d",
+            "goal babbling and short imitations",
+            uses={**_PURSUES, **_SHOWN, "social": "social"},
+            also=_TAUGHT,
+            label="SGIM-D",
+            colour="#d55e00",
+        ),
+        "map-elites": _at(
+            "rivals.quality_diversity:map_elites",
+            "fills an archive of outcomes (extra rivals)",
+            ignores=_AIM,
+            label="MAP-Elites",
+        ),
+        "cma-me": _at(
+            "rivals.quality_diversity:cma_me",
+            "the same with evolution strategies (extra rivals)",
+            ignores=_AIM,
+            label="CMA-ME",
+        ),
+    },
+    "environment": {
+        ROD: _at(
+            "runs.tasks:fishing_rod",
+            "the paper's arm with a rod, in MuJoCo",
+            uses={"noise": "noise", "task_space": "task_space", "threads": "threads"},
+        ),
+        "planar-arm-7": _at("runs.tasks:planar_arm", "7 joints, no noise", fixed={"n_joints": 7}),
+        "planar-arm-50": _at("runs.tasks:planar_arm", "50 joints, no noise", fixed={"n_joints": 50}),
+    },
+    "goals": {
+        "interest-map": _at("goals.interest_map:InterestMap", "where competence changes, in regions", uses=_PROGRESS),
+        "grid": _at("goals.progress_grid:ProgressGrid", "the same in cells that never split", uses=_PROGRESS),
+        "alp-gmm": _at("goals.alp_gmm:AlpGmm", "Gaussians of high progress (extra rivals)"),
+        "uniform": _at("goals.interest_map:UniformGoals", "the same everywhere", ignores=("competence",)),
+    },
+    "progress": {
+        "gained": _at("goals.regions:gained_progress", "how much attempts raise the competence at their own goals"),
+        "absolute": _at("goals.regions:absolute_progress", "newer competences against older ones, the paper's eq. (3)"),
+        "signed": _at("goals.regions:signed_progress", "the same, but falling competence does not count"),
+        "paired": _at("goals.regions:paired_progress", "difference from the competence at the nearest earlier goal"),
+    },
+    "competence": {
+        "memory": _at("algorithms:remembered", "by all movements ever made, as in the paper"),
+        "attempt": _at("algorithms:attempted", "by those made for this goal"),
+    },
+    "search": {
+        "nelder-mead": _at("searches.simplex:nelder_mead", "a simplex of neighbours, a little noise on every movement"),
+        "nelder-mead-exact": _at("searches.simplex:nelder_mead", "without the noise", fixed={"noise": 0.0}),
+        "nelder-mead-complete": _at(
+            "searches.simplex:nelder_mead",
+            "which first fills up the paper's simplex of 26, too",
+            fixed={"noise": 0.0, "complete": True},
+        ),
+        "perturb": _at("searches.perturb:perturb", "the best so far plus noise"),
+        "cma-es": _at("searches.cma_es:cma_es", "an evolution strategy (extra rivals)"),
+        "gradient": _at(
+            "searches.through_model:gradient_search",
+            "down the gradient of a forward model (extra forward, like those below)",
+            uses={**_MODEL, "residual": "residual"},
+        ),
+        "gauss-newton": _at(
+            "searches.through_model:gradient_search",
+            "each movement planned anew",
+            uses={**_MODEL, "residual": "residual"},
+            fixed={"propose": "sgimd_torch.searches.through_model:gauss_newton"},
+        ),
+        "screened": _at(
+            "searches.through_model:gradient_search",
+            "the best of 64 variations",
+            uses={**_MODEL, "residual": "residual"},
+            fixed={"propose": "sgimd_torch.searches.through_model:screen", "noise": 0.0},
+        ),
+        "nelder-mead-polished": _at(
+            "searches.through_model:polished_simplex", "a simplex from where the gradient would go", uses=_MODEL
+        ),
+    },
+    "inverse": {
+        "linear": _at("inverses.locally_linear:LocallyLinear", "eq. (9) corrected to first order"),
+        "paper": _at("inverses.local:LocalInverse", "the weighted mean of eq. (9)"),
+        "nearest": _at("inverses.local:NearestNeighbour", "the movement that came nearest"),
+        "model": _at(
+            "inverses.through_model:ModelInverse",
+            "linear when learning, through a forward model in evaluations (extra forward); it pays for learners that "
+            "explore and misleads the imitation learner",
+            uses={**_MODEL, "policies": "policies"},
+            learns_with="linear",
+        ),
+    },
+    "social": {
+        "imitate": _at(
+            "algorithms:imitating", "repeat it a few times", uses={"repeats": "imitations", "epsilon": "epsilon"}
+        ),
+        "emulate": _at("algorithms:emulating", "pursue its outcome in the learner's own way"),
+    },
+    "teacher": {
+        "periodic": _at(
+            "teachers:PeriodicTeacher", "one every so many movements", uses={"every": "every", "choose": "choice"}
+        ),
+        "initial": _at("teachers:InitialTeacher", "all at the start", uses={"every": "every"}),
+        "asked": _at(
+            "teachers:AskedTeacher", "when the learner stalls", uses={"patience": "every", "choose": "choice"}
+        ),
+    },
+    "choice": {
+        "least-explored": _at("teachers:least_explored", "the one whose outcome the learner has reached least"),
+        "random": _at("teachers:at_random", "any"),
+    },
+}
+# Parts that others share: built once a run, and only if one of those uses them.
+SHARED: Final = {
+    "model": _at(
+        "forward_model.model:ForwardModel",
+        "the forward model",
+        uses={"members": "members", "noise_heads": "noise_heads", "rate": "training", "focus": "focus"},
+    ),
+    "trust": _at("forward_model.anchored:Trust", "how far to trust it", uses={"anchors": "anchored"}),
+}
+# What a thing of your own must offer: its call, and the members of what the call gives.
+_WANTED: Final[dict[str, tuple[str, tuple[str, ...]]]] = {
+    "algorithm": ("(environment, seed, ...) -> a Learner", ("ask", "tell", "watch", "memory")),
+    "environment": (
+        "() -> an environment or a Task",
+        ("contexts", "policies", "outcomes", "rest", "outcome_noise", "observe", "execute"),
+    ),
+    "goals": ("(contexts, outcomes, rng) -> a goal model", ("sample", "add")),
+    "progress": ("(goals, competences, gains) of a region -> its interest", ()),
+    "competence": ("(memory, measure) -> a judge of competence", ("__call__",)),
+    "search": ("(policies, rng) -> a search", ("__call__",)),
+    "inverse": ("(memory) -> an inverse model", ("__call__",)),
+    "social": ("(goal babbling, outcomes, rng) -> a social strategy", ("attempt",)),
+    "teacher": ("(demonstrations, rng) -> a teacher", ("offer",)),
+    "choice": ("(demonstrations, memory, rng) -> a demonstration", ()),
+}
+
+
+def find(kind: str, word: str) -> Entry:
+    """The record of what ``word`` names.
+
+    Raises:
+        ValueError: it is neither in the catalogue nor an attribute that can be loaded and called.
+    """
+    known = CATALOGUE[kind]
+    if word in known:
+        return known[word]
+    if ":" not in word:
+        raise ValueError(
+            f"unknown {kind} {word!r}, known are {', '.join(known)}, and package.module:attribute for one of your own"
+            f"{did_you_mean(word, known)}"
+        )
+    made = load(word, f"{kind} {word}")
+    call, _ = _WANTED[kind]
+    if not callable(made):
+        raise ValueError(f"{kind} {word} must be called as {call}, but it is a {type(made).__name__}")
+    parameters = _keywords(made)
+    possible = {name: option for entry in known.values() for name, option in entry.uses.items()}
+    uses = {name: option for name, option in possible.items() if name in parameters}
+    also = _TAUGHT if kind == "algorithm" and "correspondence" in uses else ()
+    return Entry(word, "of your own", uses=uses, also=also)
+
+
+def check(kind: str, word: str, made: object) -> None:
+    """Refuse what lacks members that one of its kind has.
+
+    Raises:
+        ValueError: with the names of what is missing.
+    """
+    call, members = _WANTED[kind]
+    missing = [name for name in members if not hasattr(made, name)]
+    if missing:
+        raise ValueError(
+            f"{kind} {word} gave a {type(made).__name__} without {', '.join(missing)}; wanted {call}, "
+            f"which has {', '.join(members)}"
+        )
+
+
+def load(place: str, what: str = "") -> Any:
+    """The attribute at ``package.module:attribute``; packages of the working directory are found, too.
+
+    Raises:
+        ValueError: no such module or attribute, or the module cannot be imported; its own error is shown.
+    """
+    module, _, attribute = place.partition(":")
+    what = what or place
+    here = os.getcwd()
+    if here not in sys.path:
+        sys.path.append(here)
+    try:
+        found: Any = importlib.import_module(module)
+    except Exception as error:  # whatever that module does when it is imported
+        if isinstance(error, ImportError) and module.startswith(_IN_THE_PACKAGE):
+            raise ValueError(str(error)) from error  # it names the extra that is missing
+        raise ValueError(
+            f"{what}: the module {module} cannot be imported: {type(error).__name__}: {error}; "
+            f"is it installed, or in {here}?"
+        ) from error
+    for name in attribute.split("."):
+        if not hasattr(found, name):
+            near = get_close_matches(name, [each for each in dir(found) if not each.startswith("_")], 3, 0.5)
+            slip = f"; did you mean {' or '.join(near)}?" if near else ""
+            raise ValueError(f"{what}: {module} has no {attribute}{slip}")
+        found = getattr(found, name)
+    return found
+
+
+def label(algorithm: str) -> str:
+    """What figures call an algorithm; the word itself where they have no other name."""
+    entry = CATALOGUE["algorithm"].get(algorithm)
+    return entry.label if entry and entry.label else algorithm
+
+
+def colour(algorithm: str) -> str:
+    """How figures draw an algorithm."""
+    entry = CATALOGUE["algorithm"].get(algorithm)
+    return entry.colour if entry else "black"
+
+
+def _keywords(made: Callable[..., Any]) -> set[str]:
+    try:
+        parameters = inspect.signature(made).parameters.values()
+    except (TypeError, ValueError):  # a builtin says nothing of its parameters
+        return set()
+    return {parameter.name for parameter in parameters if parameter.kind is not parameter.POSITIONAL_ONLY}
