@@ -17,16 +17,11 @@ Examples:
 from __future__ import annotations
 
 import argparse
-import os
-import signal
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Final
-
-if __name__ == "__main__":  # Ctrl-C while the libraries below are loading
-    signal.signal(signal.SIGINT, lambda *_: os._exit(130))
 
 import jinja2
 import numpy as np
@@ -38,7 +33,7 @@ from paper_claims import PAPER_CLAIMS
 from read_results import LAST, Evaluated, ResultsError, read_coverages, read_goals, read_results
 from sgimd_torch.files import write_bytes
 from sgimd_torch.runs.log import make_folder
-from sgimd_torch.runs.process import telling_errors, with_streams
+from sgimd_torch.runs.process import command
 from sgimd_torch.views.statistics import iqm_interval, metres, rng, show
 from variants import EXPERIMENTS
 
@@ -180,7 +175,6 @@ def _check_place(path: Path) -> None:
         )
 
 
-@telling_errors
 def main(argv: Sequence[str] | None = None) -> int:
     """Make the pages; the exit code is 2, and no page is changed, where the rows make no sense."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -210,4 +204,4 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(with_streams(main))
+    sys.exit(command(main))

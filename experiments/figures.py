@@ -17,25 +17,19 @@ Example:
 from __future__ import annotations
 
 import argparse
-import os
-import signal
 import sys
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-
-if __name__ == "__main__":  # Ctrl-C while the libraries below are loading
-    signal.signal(signal.SIGINT, lambda *_: os._exit(130))
 
 from judging import NotRun
 from paper_figures import FIGURES, Data
 from read_results import read_results
 from sgimd_torch.figures.save import save_figure
 from sgimd_torch.runs.log import make_folder
-from sgimd_torch.runs.process import telling_errors, with_streams
+from sgimd_torch.runs.process import command
 
 
-@telling_errors
 def main(argv: Sequence[str] | None = None) -> int:
     """Draw what can be drawn; the exit code is 2 when the results make no sense."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -58,4 +52,4 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(with_streams(main))
+    sys.exit(command(main))

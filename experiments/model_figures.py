@@ -19,17 +19,12 @@ import argparse
 import csv
 import io
 import math
-import os
-import signal
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
-
-if __name__ == "__main__":  # Ctrl-C while the libraries below are loading
-    signal.signal(signal.SIGINT, lambda *_: os._exit(130))
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -44,7 +39,7 @@ from sgimd_torch.files import write_bytes
 from sgimd_torch.forward_model.diagnostics import LEVELS, coverage, error_by_cell, improvements, running
 from sgimd_torch.runs.log import RunError, make_folder
 from sgimd_torch.runs.model_record import REFRESHES, prediction_columns
-from sgimd_torch.runs.process import telling_errors, with_streams
+from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import Run, read_run
 from sgimd_torch.spaces import Array, Box
 
@@ -200,7 +195,6 @@ def _printed(cells: dict[str, Any]) -> list[str]:
     return [cells["run"], str(cells["predicted"]), f"{cells['error_m']:.3f}", *inside, improved, *learnt]
 
 
-@telling_errors
 def main(argv: Sequence[str] | None = None) -> int:
     """Draw and tell; the exit code is 2 when a run makes no sense."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -228,4 +222,4 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(with_streams(main))
+    sys.exit(command(main))

@@ -140,7 +140,9 @@ def read_rows(
     lines = csv.reader(text.splitlines())
     first = next(lines, [])
     if tuple(first) != header:
-        raise ResultsError(f"{path} must begin with {','.join(header)}, got {','.join(first)[:100]!r}")
+        raise ResultsError(
+            f"{path} must begin with {','.join(header)}, got {','.join(first)[:100]!r}; is it another table?"
+        )
     for fields in lines:
         where = f"{path}, line {lines.line_num}"
         if len(fields) != len(header):
