@@ -20,12 +20,11 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from judging import NotRun
-from read_results import number, read_rows
+from read_results import number, read_rows, read_seeds
 from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.environments.fishing_rod import JOINTS, FishingRod
 from sgimd_torch.files import write_bytes
 from sgimd_torch.runs.process import say
-from sgimd_torch.runs.read import read_run
 from sgimd_torch.spaces import Array, stream
 from sgimd_torch.views.statistics import SEED, Anova, anova
 from variants import shipped
@@ -125,10 +124,7 @@ def mean_thetas(folder: Path, variant: str) -> Array:
         NotRun: fewer than 2 runs are finished.
         RunError: one is damaged.
     """
-    paths = sorted(config.parent for config in folder.glob(f"{variant}/seed-*/config.json"))
-    if paths:
-        say(f"reading {folder}/{variant}: {len(paths)} runs")
-    runs = [run for run in map(read_run, paths) if run.summary.get("finished")]
+    runs = [run for run in read_seeds(folder, variant) if run.summary.get("finished")]
     if len(runs) < 2:
         raise NotRun(f"{variant}, {len(runs)} finished in {folder}, at least 2 are needed")
     return np.stack([run.thetas[np.isfinite(run.thetas).all(axis=1)].mean(axis=0) for run in runs])

@@ -31,7 +31,7 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 from tqdm import tqdm
 
-from paper_figures import REACH
+from figures import REACH
 from read_results import MODEL_HEADER
 from sgimd_torch.figures import predictions as plots
 from sgimd_torch.figures.save import save_figure

@@ -1,6 +1,7 @@
-"""The tables in results/, read back: every evaluation of every run by variant, goals, coverages.
+"""What the experiments left, read back: the tables in results/, and the runs of a variant.
 
 results = read_results("results/paper.csv"); results["sgim-d"].at(5000)    # {seed: mean error (m)}
+runs = read_seeds(Path("runs"), "sgim-d")
 """
 
 from __future__ import annotations
@@ -11,11 +12,12 @@ import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sgimd_torch.runs.process import say
+from sgimd_torch.runs.read import Run, read_run
 from sgimd_torch.spaces import Array
 
 HEADER = (
@@ -35,36 +37,33 @@ class ResultsError(ValueError):
     """A table of results that is missing or damaged."""
 
 
+class Values(NamedTuple):
+    """Of one evaluation of one run: m, m, and how many tiles; ``floors`` is NaN where the noise was not measured."""
+
+    errors: float
+    floors: float
+    tiles: float
+
+
 @dataclass(frozen=True, eq=False)
 class Evaluated:
-    """All evaluations of one variant.
-
-    ``seeds`` ``(n_seeds,)`` and ``movements`` ``(n,)`` increase; ``errors`` and ``floors`` (m) and ``tiles`` are
-    ``(n_seeds, n)``, NaN where that seed was not evaluated or the noise not measured. ``experiment`` and ``teacher``
-    are as in the file; ``task_space`` is half the side (m) of the square of goals.
-    """
+    """All evaluations of one variant of an experiment, by seed and movements."""
 
     variant: str
     experiment: str
-    teacher: str
-    task_space: float
-    seeds: NDArray[np.int64]
-    movements: NDArray[np.int64]
-    errors: Array
-    floors: Array
-    tiles: Array
+    rows: dict[tuple[int, int], Values]
 
     def at(self, movements: int, values: str = "errors") -> dict[int, float]:
         """Seed -> value of "errors", "floors" or "tiles" after so many movements, of the seeds that have one."""
-        column = getattr(self, values)[:, self.movements == movements]
-        pairs = zip(self.seeds.tolist(), column.tolist(), strict=True)
-        return {seed: value[0] for seed, value in pairs if value and math.isfinite(value[0])}
+        found = {seed: getattr(row, values) for (seed, when), row in sorted(self.rows.items()) if when == movements}
+        return {seed: value for seed, value in found.items() if math.isfinite(value)}
 
     def curves(self, last: int = LAST) -> tuple[Array, Array]:
         """Movements ``(n,)`` and errors ``(n_seeds, n)`` m up to ``last``, of the seeds that have all evaluations."""
-        early = self.movements <= last
-        whole = np.isfinite(self.errors[:, early]).all(axis=1)
-        return self.movements[early].astype(np.float64), self.errors[whole][:, early]
+        times, seeds = sorted({when for _, when in self.rows if when <= last}), sorted({seed for seed, _ in self.rows})
+        whole = [seed for seed in seeds if all((seed, when) in self.rows for when in times)]
+        errors = [[self.rows[seed, when].errors for when in times] for seed in whole]
+        return np.array(times, dtype=np.float64), np.array(errors).reshape(len(whole), len(times))
 
 
 def read_results(path: str | os.PathLike[str]) -> dict[str, Evaluated]:
@@ -73,21 +72,21 @@ def read_results(path: str | os.PathLike[str]) -> dict[str, Evaluated]:
     Raises:
         ResultsError: there is no such table, or a line of it makes no sense; the message names the line.
     """
+    found: dict[str, Evaluated] = {}
     runs: dict[str, tuple[str, str, float]] = {}
-    values: dict[str, dict[tuple[int, int], tuple[float, float, float]]] = {}
     for where, row in read_rows(path, HEADER):
         variant, seed, movements = row["variant"], _count(row, "seed", where), _count(row, "movements", where)
         run = (row["experiment"], row["teacher"], number(row, "task_space", where))
         if runs.setdefault(variant, run) != run:
             raise ResultsError(f"{where}: {variant} is {run}, on an earlier line {runs[variant]}; rename one")
-        found = values.setdefault(variant, {})
-        if (seed, movements) in found:
+        rows = found.setdefault(variant, Evaluated(variant, row["experiment"], {})).rows
+        if (seed, movements) in rows:
             raise ResultsError(f"{where}: seed {seed} of {variant} is there twice at {movements} movements")
         floor = number(row, "noise_floor_m", where) if row["noise_floor_m"] not in ("", "nan") else math.nan
-        found[seed, movements] = (number(row, "mean_error_m", where), floor, _count(row, "tiles_reached", where))
-    if not values:
+        rows[seed, movements] = Values(number(row, "mean_error_m", where), floor, _count(row, "tiles_reached", where))
+    if not found:
         raise ResultsError(f"{path} has no line below its header; is the comparison still to be run?")
-    return {variant: _evaluated(variant, runs[variant], found) for variant, found in values.items()}
+    return found
 
 
 def read_goals(path: str | os.PathLike[str]) -> dict[str, Array]:
@@ -150,14 +149,16 @@ def read_rows(
         yield where, dict(zip(header, fields, strict=True))
 
 
-def _evaluated(
-    variant: str, run: tuple[str, str, float], found: dict[tuple[int, int], tuple[float, float, float]]
-) -> Evaluated:
-    seeds, movements = (np.unique([key[k] for key in found]) for k in range(2))
-    columns = np.full((3, len(seeds), len(movements)), np.nan)
-    for (seed, when), row in found.items():
-        columns[:, np.searchsorted(seeds, seed), np.searchsorted(movements, when)] = row
-    return Evaluated(variant, *run, seeds, movements, *columns)
+def read_seeds(folder: Path, variant: str) -> list[Run]:
+    """All runs of a variant in a folder of run directories, finished or not; there may be none.
+
+    Raises:
+        RunError: one is damaged.
+    """
+    paths = sorted(config.parent for config in folder.glob(f"{variant}/seed-*/config.json"))
+    if paths:
+        say(f"reading {folder}/{variant}: {len(paths)} runs")
+    return [read_run(path) for path in paths]
 
 
 def number(row: dict[str, str], name: str, where: str) -> float:

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_hex
 
-from figures import main
-from judging import NotRun
+from figures import FIGURES, Data, main
+from judging import NotRun, Results
 from paper import MOVEMENTS, SEEDS, TRUE, error, spread, write_paper
-from paper_figures import FIGURES, Data
 from read_results import LEARNERS, read_results
 from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.environments.fishing_rod import JOINTS
@@ -38,7 +37,7 @@ def paper(tmp_path_factory):
 
 @pytest.fixture
 def data(paper, runs):
-    return Data(read_results(paper), runs)
+    return Data(Results(read_results(paper)), runs)
 
 
 def draw(*options):
@@ -196,7 +195,7 @@ def test_figures_without_their_data_are_left_out_and_the_others_are_drawn(tmp_pa
     ],
 )
 def test_only_those_figures_are_left_out_that_need_a_variant(tmp_path, missing, left_out):
-    data = Data(read_results(write_paper(tmp_path / "paper.csv", without=[missing])), tmp_path)
+    data = Data(Results(read_results(write_paper(tmp_path / "paper.csv", without=[missing]))), tmp_path)
     for name in set(FIGURES) - NEEDS_RUNS - left_out:
         assert FIGURES[name](data).axes
     for name in left_out:
@@ -206,7 +205,7 @@ def test_only_those_figures_are_left_out_that_need_a_variant(tmp_path, missing, 
 
 def test_a_single_seed_is_drawn_without_an_interval(tmp_path):
     paper = write_paper(tmp_path / "paper.csv", **{name.replace("-", "_"): {"seeds": [0]} for name in TRUE})
-    (ax,) = FIGURES["errors"](Data(read_results(paper), tmp_path)).axes
+    (ax,) = FIGURES["errors"](Data(Results(read_results(paper)), tmp_path)).axes
     line = lines_of(ax)["Random (1 seed)"]
     np.testing.assert_allclose(line.get_ydata(), [error(0.2, 0, movements) for movements in MOVEMENTS])
 
