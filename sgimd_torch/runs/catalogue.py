@@ -12,7 +12,7 @@ import importlib
 import inspect
 import os
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from typing import Any, Final
@@ -285,6 +285,22 @@ def check(kind: str, word: str, made: object) -> None:
             f"{kind} {word} gave a {type(made).__name__} without {', '.join(missing)}; wanted {call}, "
             f"which has {', '.join(members)}"
         )
+
+
+def check_call(
+    kind: str, word: str, make: Callable[..., Any], arguments: Sequence[Any], options: Mapping[str, Any]
+) -> None:
+    """Refuse what cannot be called as one of its kind is.
+
+    Raises:
+        ValueError: with the call that was wanted.
+    """
+    try:
+        inspect.signature(make).bind(*arguments, **options)
+    except TypeError as error:
+        raise ValueError(f"{kind} {word} cannot be called as {_WANTED[kind][0]}: {error}") from error
+    except ValueError:  # a builtin says nothing of its parameters
+        pass
 
 
 def load(place: str, what: str = "") -> Any:
