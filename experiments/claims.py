@@ -42,7 +42,7 @@ PAGES: Final = ("RESULTS", "FORWARD_MODEL")
 MADE: Final = "<!-- Made by experiments/claims.py"
 ANOVA: Final = ("means compared", "of", "dimensions of theta in which they differ", "smallest p", "largest p")
 ON_ARMS: Final = (250, 500, 1000, 2000)
-# Of the forward model's page: how the names of variants end, and when their errors are told.
+# Of the forward model's page: how the names of variants end, and at which movements they are evaluated.
 MODEL_TABLES: Final = {
     "forward-model": ("", (500, 1000, 2000, LAST)),
     "planar-arm-7": ("-arm-7", ON_ARMS),
@@ -135,13 +135,13 @@ def _last_error(variant: Evaluated) -> float:
 def variants_table(names: Sequence[str], columns: Mapping[str, Cell]) -> str:
     """One row for each variant, with a dash where something was not run."""
 
-    def told(cell: Cell, name: str) -> str:
+    def shown(cell: Cell, name: str) -> str:
         try:
             return cell(name)
         except NotRun:
             return "-"
 
-    return markdown([*columns], [[told(cell, name) for cell in columns.values()] for name in names])
+    return markdown([*columns], [[shown(cell, name) for cell in columns.values()] for name in names])
 
 
 def verdicts_table(what: str, verdicts: Sequence[Verdict]) -> str:

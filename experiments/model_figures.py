@@ -1,9 +1,10 @@
-"""Was the forward model right, and did it know where not? A figure of each variant's first run, and one table of all.
+"""Was the forward model right, and did it know where it was wrong? A figure for each variant, one table.
 
-Judged by predictions made before the model learnt from what they predict. The figure shows where the last ones went
-wrong, whether the spread was honest, and how both came about; table.csv has the numbers of the table, unrounded.
+Only predictions count that were made before the model learnt from what they predict. The figure, of a variant's first
+run, shows where the last predictions were wrong, whether the spread was honest, and how both changed with time. The
+table has a row for each run; table.csv has its numbers unrounded.
 
-  predicted   exemplars predicted before they were learnt from
+  predicted   exemplars predicted before the model learnt from them
   error       distance (m) from prediction to outcome, mean over the last 1000
   inside      share of outcomes inside the regions of 50 / 80 / 95 %: of the last 1000, then from 2000 movements on
   improved    share of the goals with several movements where a later one came nearer than the first
@@ -85,7 +86,9 @@ def read_model_run(path: Path) -> ModelRun:
     """
     run, file = read_run(path), path / "predictions.csv"
     if not file.exists():
-        raise RunError(f"{path} has no predictions.csv: it ran without a forward model; see --inverse model of run.py")
+        raise RunError(
+            f"{path} has no predictions.csv: it ran without a forward model; see --inverse model of sgimd run"
+        )
     dim = run.outcomes.shape[1]
     table = _read(file, prediction_columns(dim))
     lived = np.flatnonzero(np.isfinite(run.outcomes).all(axis=1))
@@ -110,7 +113,7 @@ def read_model_run(path: Path) -> ModelRun:
 
 
 def row(model_run: ModelRun) -> dict[str, Any]:
-    """Its line of the table, by column; NaN for what there is none of."""
+    """Its row of the table, by column; NaN where there is nothing to measure."""
     errors = np.linalg.norm(model_run.observed - model_run.mean, axis=1)
     run, refreshes = model_run.run, len(model_run.refreshes["diverged"])
     seconds = run.summary.get("seconds_model")
@@ -155,7 +158,7 @@ def figure_of(model_run: ModelRun) -> Figure:
     plots.coverage_over_time(axes["coverage"], ends, windows.coverages[:, LEVELS.index(0.8)])
     diverged = refreshes["diverged"] > 0
     plots.held_out_over_time(axes["held out"], refreshes["movements"], refreshes["held_out"], diverged)
-    figure.suptitle(f"{model_run.name}: {len(observed)} predictions, each made before it was learnt from")
+    figure.suptitle(f"{model_run.name}: {len(observed)} predictions, each made before the model learnt from it")
     return figure
 
 
@@ -183,20 +186,20 @@ def _read(path: Path, names: Sequence[str]) -> Array:
 
 
 def _printed(cells: dict[str, Any]) -> list[str]:
-    def told(value: float, form: str) -> str:
+    def shown(value: float, form: str) -> str:
         return "-" if math.isnan(value) else f"{value:{form}}"
 
     inside = [
-        " / ".join(told(100 * cells[f"inside_{100 * level:.0f}_{when}"], ".0f") for level in LEVELS)
+        " / ".join(shown(100 * cells[f"inside_{100 * level:.0f}_{when}"], ".0f") for level in LEVELS)
         for when in ("last", "late")
     ]
-    learnt = f"{cells['refreshes']}, {cells['diverged']} diverged", told(cells["ms_per_refresh"], ".1f")
-    improved = told(100 * cells["improved"], ".0f")
+    learnt = f"{cells['refreshes']}, {cells['diverged']} diverged", shown(cells["ms_per_refresh"], ".1f")
+    improved = shown(100 * cells["improved"], ".0f")
     return [cells["run"], str(cells["predicted"]), f"{cells['error_m']:.3f}", *inside, improved, *learnt]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Draw and tell; the exit code is 2 when a run makes no sense."""
+    """Draw the figures, write and print the table; the exit code is 2 when a run makes no sense."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("runs", type=Path, nargs="+", metavar="RUN", help="a run directory: runs/sgim-d/seed-003")
     parser.add_argument("--out", type=Path, default=Path("results/model"), help="default: %(default)s")
