@@ -1,4 +1,4 @@
-"""The package as users get it: built, installed into an empty environment outside the checkout, and put to work there."""
+"""The package as users get it: built, installed into an empty environment away from the checkout, and put to work."""
 
 import os
 import signal
@@ -12,9 +12,10 @@ import pytest
 from runs import ROOT
 
 pytestmark = pytest.mark.slow
-SHORT = (
-    ["--environment", "planar-arm-7", "--algorithm", "sgim-d", "--movements", "3000", "--evaluate-at", "1000", "--repeats", "2", "--out", "runs"]
-)
+SHORT = [
+    *("--environment", "planar-arm-7", "--algorithm", "sgim-d", "--movements", "3000"),
+    *("--evaluate-at", "1000", "--repeats", "2", "--out", "runs"),
+]
 
 
 @pytest.fixture(scope="module")

@@ -163,7 +163,7 @@ def test_without_its_packages_a_run_with_a_model_is_refused_and_says_what_to_ins
     process = start(program, *arguments(tmp_path / "out", *MODEL))
     _, errors = process.communicate()
     assert process.returncode == 2
-    assert "error: the forward model needs sgimd-torch[forward]" in errors
+    assert "error: the forward model needs torch: pip install 'sgimd-torch[forward]'" in errors
     assert "Traceback" not in errors
     assert not (tmp_path / "out").exists()
 
