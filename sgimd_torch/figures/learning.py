@@ -19,23 +19,12 @@ from matplotlib.colors import ListedColormap, LogNorm
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullLocator
 
+from sgimd_torch.catalogue import CATALOGUE
 from sgimd_torch.figures.axes import colour_bar, coloured_regions, note, over_movements, water_plane
 from sgimd_torch.spaces import Array, Box
 
-COLOURS = {  # after Okabe & Ito: told apart with any colour vision, and in grey
-    "random": "#7f7f7f",
-    "sagg-riac": "#0072b2",
-    "observation": "#cc79a7",
-    "imitation": "#009e73",
-    "sgim-d": "#d55e00",
-}
-NAMES = {
-    "random": "Random",
-    "sagg-riac": "SAGG-RIAC",
-    "observation": "Observation",
-    "imitation": "Imitation",
-    "sgim-d": "SGIM-D",
-}
+COLOURS = {word: entry.colour for word, entry in CATALOGUE["algorithm"].items()}
+NAMES = {word: entry.label for word, entry in CATALOGUE["algorithm"].items()}
 
 
 class Curve(NamedTuple):

@@ -11,10 +11,10 @@ from functools import partial, wraps
 from typing import TYPE_CHECKING, Any, Final
 
 from sgimd_torch.algorithms import Correspondence
+from sgimd_torch.catalogue import CATALOGUE, SHARED, check, check_call
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.learner import Learner
-from sgimd_torch.runs.catalogue import CATALOGUE, SHARED, check, check_call
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.tasks import Task, benchmark_of, correspondence_of, demonstrations_of
 from sgimd_torch.spaces import Array, Demonstration, Estimate, stream

@@ -22,9 +22,9 @@ from typing import Any, Final, NoReturn, get_type_hints
 
 import jsonargparse
 
-from sgimd_torch.runs.catalogue import CATALOGUE
+from sgimd_torch.catalogue import CATALOGUE, did_you_mean
 from sgimd_torch.runs.config import Config, dashed, options
-from sgimd_torch.runs.process import did_you_mean, loading
+from sgimd_torch.runs.process import loading
 
 FLAGS: Final = {
     "resume": "Go on with a stopped or killed run, or lengthen a finished one.",

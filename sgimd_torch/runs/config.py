@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from sgimd_torch.runs.catalogue import CATALOGUE, ROD, SHARED, Entry, find
+from sgimd_torch.catalogue import CATALOGUE, ROD, SHARED, Entry, find
 
 
 class Option(NamedTuple):

@@ -7,17 +7,18 @@ Exit codes: 0 done, 1 it failed under way, 2 the request is wrong, 130 stopped b
 
 from __future__ import annotations
 
-import difflib
 import importlib
 import os
 import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import Any, Final, NamedTuple, Self
+
+from sgimd_torch.catalogue import did_you_mean
 
 REPORT_EVERY: Final = 10.0  # s, from one line of progress to the next where there is no terminal
 SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
@@ -251,12 +252,6 @@ def clock(seconds: float) -> str:
     if hours:
         return f"{hours}:{minutes:02}:{rest:02}"
     return f"{minutes}:{rest:02}" if minutes else f"{rest} s"
-
-
-def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """``; did you mean grid?``, or nothing where no known name is near."""
-    near = difflib.get_close_matches(name.lower().replace("_", "-"), list(known), 1, 0.5)
-    return f"; did you mean {near[0]}?" if near else ""
 
 
 def say(*messages: str) -> None:

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from runs import ROOT
+from sgimd_torch.catalogue import CATALOGUE, SHARED, Entry, check, colour, find, label, load
 from sgimd_torch.runs.build import _OF_THE_ROBOT, build, task_of
-from sgimd_torch.runs.catalogue import CATALOGUE, SHARED, Entry, check, colour, find, label, load
 from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.config import Config, dashed, from_settings, words
 from sgimd_torch.runs.process import command

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from runs import csv_of
+from sgimd_torch.catalogue import CATALOGUE
 from sgimd_torch.demonstrations import save_demonstrations
 from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import Benchmark, save_benchmark
 from sgimd_torch.runs.build import build
-from sgimd_torch.runs.catalogue import CATALOGUE
 from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.process import command

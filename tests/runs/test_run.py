@@ -13,12 +13,12 @@ import pytest
 
 import sgimd_torch
 from runs import MOVEMENTS, ROOT, arguments, csv_of
+from sgimd_torch.catalogue import CATALOGUE
 from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
 from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.evaluation import Benchmark, save_benchmark
 from sgimd_torch.runs import run as run_script
 from sgimd_torch.runs.build import build
-from sgimd_torch.runs.catalogue import CATALOGUE
 from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.process import command

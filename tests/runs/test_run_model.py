@@ -12,12 +12,12 @@ from tensorboard.plugins.custom_scalar import layout_pb2
 from tensorboard.util.tensor_util import make_ndarray
 
 from runs import EAGER, LIVE, RUN, signal_after, start
+from sgimd_torch.catalogue import CATALOGUE
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import Benchmark, save_benchmark
 from sgimd_torch.forward_model.model import ForwardModel
 from sgimd_torch.memory import Memory
 from sgimd_torch.runs.build import LEAST_NOISE, build
-from sgimd_torch.runs.catalogue import CATALOGUE
 from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.directory import RunDirectory

@@ -16,10 +16,10 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from sgimd_torch.catalogue import ROD
 from sgimd_torch.demonstrations import SHIPPED, load_demonstrations
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.figures.learning import NAMES
-from sgimd_torch.runs.catalogue import ROD
 from sgimd_torch.runs.log import RunError
 from sgimd_torch.runs.read import find_runs, read_run
 from sgimd_torch.runs.tasks import arm_demonstrations
