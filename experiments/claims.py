@@ -1,138 +1,207 @@
-"""Tables and verdicts of results/RESULTS.md, computed from results/paper.csv; the prose around them stays as it is.
+"""The pages results/RESULTS.md and results/FORWARD_MODEL.md: what was claimed, our numbers, and whether it holds.
 
-Each table replaces what stands between its two marker lines:
+Each page is a template in experiments/pages/ that holds the prose, with the tables put in by name. Change the template,
+not the page. The tables come from the rows in --results, which compare.py leaves there:
 
-  <!-- claims -->     the paper's claims, each with its bar, our number and a verdict      <!-- end of claims -->
-  <!-- learners -->   the five learners: errors, mean over life, improvement, tiles        <!-- end of learners -->
-  <!-- ablations -->  the same of all other variants                                       <!-- end of ablations -->
+  RESULTS         paper.csv, and where they are there goals.csv and anova.csv
+  FORWARD_MODEL   forward_model.csv, and where it is there the table of model_figures.py (--table)
 
-Intervals are bootstrapped with a fixed seed, so that the same results give the same file. Where results/goals.csv
-(variant,seed,n_goals,n_near) lies beside the results, the claim on goals in the large space is judged from it.
+Intervals are bootstrapped with a fixed seed, so that the same rows give the same page. The analyses of variance need
+run directories: --runs makes them anew and keeps their rows in anova.csv.
 
-Example:
-  python experiments/claims.py --results results/paper.csv --out results/RESULTS.md
+Examples:
+  python experiments/claims.py                                  both pages, from the rows in results/
+  python experiments/claims.py --runs runs --only RESULTS       and the analyses of variance anew
 """
 
 from __future__ import annotations
 
 import argparse
-import os
-import signal
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
+from typing import Final
 
-if __name__ == "__main__":  # Ctrl-C while the libraries below are loading
-    signal.signal(signal.SIGINT, lambda *_: os._exit(130))
-
+import jinja2
 import numpy as np
 
-from evidence import Evidence, NotRun, metres, rng, shared, show
-from judgements import Row, judge
-from pages import count_verdicts, markdown, read_page, verdicts_table, write_page
-from read_results import LAST, Evaluated, read_goals, read_results
-from sgimd_torch.runs.process import telling_errors, with_streams
-from sgimd_torch.spaces import Array
-from sgimd_torch.views.statistics import difference_interval, improvement_interval, iqm_interval, mean_over_life
+from anova import anova_cells, update_anova
+from judging import NotRun, Results, Verdict, judge
+from model_claims import MODEL_CLAIMS, SIMPLEX
+from paper_claims import PAPER_CLAIMS
+from read_results import LAST, Evaluated, ResultsError, read_coverages, read_goals, read_results
+from sgimd_torch.files import write_bytes
+from sgimd_torch.runs.log import make_folder
+from sgimd_torch.runs.process import command
+from sgimd_torch.views.statistics import iqm_interval, metres, rng, show
+from variants import EXPERIMENTS
 
-EMPTY = """# Results
-
-Numbers are interquartile means over seeds, in brackets their 95 % bootstrap intervals, in metres unless they say
-otherwise. `experiments/claims.py` writes the tables; `experiments/over_seeds.py` explains the statistics.
-
-## The paper's claims
-
-<!-- claims -->
-<!-- end of claims -->
-
-## The five learners
-
-<!-- learners -->
-<!-- end of learners -->
-
-## Ablations, rivals and other teaching
-
-<!-- ablations -->
-<!-- end of ablations -->
-"""
-COLUMNS = (
-    *("experiment", "variant", "seeds", "error at 1000 (m)", "error at 5000 (m)", "mean over life (m)"),
-    *("SGIM-D better, probability", "difference to SGIM-D (m)", "tiles reached"),
-)
+TEMPLATES: Final = Path(__file__).with_name("pages")
+PAGES: Final = ("RESULTS", "FORWARD_MODEL")
+MADE: Final = "<!-- Made by experiments/claims.py"
+ANOVA: Final = ("means compared", "of", "dimensions of theta in which they differ", "smallest p", "largest p")
+ON_ARMS: Final = (250, 500, 1000, 2000)
+# Of the forward model's page: how the names of variants end, and at which movements they are evaluated.
+MODEL_TABLES: Final = {
+    "forward-model": ("", (500, 1000, 2000, LAST)),
+    "planar-arm-7": ("-arm-7", ON_ARMS),
+    "planar-arm-50": ("-arm-50", ON_ARMS),
+}
+Page = tuple[list[Verdict], dict[str, str]]  # its verdicts, and its tables by name
+Cell = Callable[[str], str]  # what a column of a table says of a variant; raises NotRun where that is nothing
 
 
-def variants_table(variants: Sequence[Evaluated], evidence: Evidence) -> str:
-    """One line for each variant: how it did, and how SGIM-D did beside it, at 5000 movements unless told otherwise.
-
-    A difference is that of the variant to SGIM-D, above 0 where SGIM-D is better, on the seeds that both have.
-    """
-    return markdown(COLUMNS, [_line(variant.variant, evidence) for variant in variants])
-
-
-def _line(name: str, evidence: Evidence) -> list[str]:
-    at_the_end = evidence.results[name].at(LAST)
-
-    def told(tell: Callable[[], str]) -> str:
-        try:
-            return tell()
-        except NotRun:
-            return "-"
-
-    def improvement() -> str:
-        return show(improvement_interval(evidence.errors("sgim-d"), evidence.errors(name), rng=rng()))
-
-    def difference() -> str:
-        pairs = shared(evidence.at(name), evidence.at("sgim-d"))
-        few = f" ({len(pairs[0])} pairs)" if len(pairs[0]) < len(at_the_end) else ""
-        return metres(difference_interval(*pairs, rng=rng())).removesuffix(" m") + few
-
-    def iqm(values: Callable[[], Array], form: str) -> str:
-        return told(lambda: show(iqm_interval(values(), rng=rng()), form))
-
-    itself = name == "sgim-d"
-    return [
-        evidence.results[name].experiment,
-        name,
-        str(len(at_the_end)),
-        iqm(lambda: evidence.errors(name, 1000), ".3f"),
-        iqm(lambda: evidence.errors(name), ".3f"),
-        iqm(lambda: mean_over_life(*evidence.curves(name)), ".3f"),
-        "" if itself else told(improvement),
-        "" if itself else told(difference),
-        iqm(lambda: np.array(list(evidence.at(name, values="tiles").values())), ".0f"),
-    ]
-
-
-def tables(rows: Sequence[Row], evidence: Evidence) -> dict[str, str]:
-    """The three tables by the names of their places; learners from the worst to the best."""
-    variants = evidence.results.values()
-    learners = sorted((v for v in variants if v.experiment == "learners"), key=lambda v: -_mean_error(v))
-    others = [variant for variant in variants if variant.experiment != "learners"]
-    return {
-        "claims": verdicts_table("claim of the paper", rows),
-        "learners": variants_table(learners, evidence),
-        "ablations": variants_table(others, evidence),
+def paper_page(folder: Path) -> Page:
+    """Of results/RESULTS.md; learners from the worst to the best, other variants in the order of their rows."""
+    results = Results(read_results(folder / "paper.csv"), read_goals(folder / "goals.csv"))
+    verdicts, variants = judge(PAPER_CLAIMS, results), results.variants
+    learners = sorted((v for v in variants.values() if v.experiment == "learners"), key=lambda v: -_last_error(v))
+    others = [variant for variant in variants.values() if variant.experiment != "learners"]
+    better, difference = _beside(results, lambda _: "sgim-d", LAST)
+    columns = {
+        "experiment": lambda name: variants[name].experiment,
+        **_errors(results, (1000, LAST), ".3f"),
+        "mean over life (m)": lambda name: show(iqm_interval(results.lives(name), rng=rng()), ".3f"),
+        "SGIM-D better, probability": better,
+        "difference to SGIM-D (m)": difference,
+        "tiles reached": lambda name: show(results.iqm(name, values="tiles"), ".0f"),
+    }
+    return verdicts, {
+        "claims": verdicts_table("claim of the paper", verdicts),
+        "learners": variants_table([variant.variant for variant in learners], columns),
+        "ablations": variants_table([variant.variant for variant in others], columns),
+        "anova": markdown(ANOVA, anova_cells(folder / "anova.csv")),
     }
 
 
-def _mean_error(variant: Evaluated) -> float:
-    """At the end; inf where it was never evaluated there."""
+def model_page(folder: Path, table: Path) -> Page:
+    """Of results/FORWARD_MODEL.md; variants in the order of ``EXPERIMENTS``."""
+    results = Results(read_results(folder / "forward_model.csv"), coverages=read_coverages(table))
+    verdicts = judge(MODEL_CLAIMS, results)
+    tables = {"bars": verdicts_table("what", verdicts)}
+    for experiment, (ending, times) in MODEL_TABLES.items():
+        better, difference = _beside(results, partial(_plain_learner, ending), times[-1])
+        columns = {
+            **_errors(results, times, ".4f"),
+            f"difference to the plain learner at {times[-1]} (m)": difference,
+            "plain better, probability": better,
+        }
+        names = [name for name in EXPERIMENTS[experiment] if name in results.variants]
+        tables[experiment] = variants_table(names, columns)
+    return verdicts, tables
+
+
+def _errors(results: Results, times: Sequence[int], form: str) -> dict[str, Cell]:
+    """A variant's name, how many of its seeds came to the last of these ``times``, its errors at each of them."""
+
+    def error(when: int) -> Cell:
+        return lambda name: show(results.iqm(name, when), form)
+
+    return {
+        "variant": str,
+        "seeds": lambda name: str(len(results.variants[name].at(times[-1]))),
+        **{f"error at {when} (m)": error(when) for when in times},
+    }
+
+
+def _beside(results: Results, plain: Callable[[str], str], movements: int) -> tuple[Cell, Cell]:
+    """How likely the ``plain`` learner of a variant is better; and by how much, above 0 where it errs less, on the
+    seeds that both have. Nothing for the plain learner itself."""
+
+    def better(name: str) -> str:
+        return "" if name == plain(name) else show(results.improvement(plain(name), name, movements))
+
+    def difference(name: str) -> str:
+        if name == plain(name):
+            return ""
+        pairs, _ = results.pairs(name, plain(name), movements)
+        few = f" ({len(pairs)} pairs)" if len(pairs) < len(results.at(name, movements)) else ""
+        return metres(results.difference(name, plain(name), movements)).removesuffix(" m") + few
+
+    return better, difference
+
+
+def _plain_learner(ending: str, name: str) -> str:
+    """The same learner without model and with the simplex."""
+    return next((each for each in ("sagg-riac", "imitation") if name.startswith(each)), SIMPLEX) + ending
+
+
+def _last_error(variant: Evaluated) -> float:
+    """Mean over seeds at the end; inf where it was never evaluated there."""
     return float(np.mean(list(variant.at(LAST).values()) or [np.inf]))
 
 
-@telling_errors
+def variants_table(names: Sequence[str], columns: Mapping[str, Cell]) -> str:
+    """One row for each variant, with a dash where something was not run."""
+
+    def shown(cell: Cell, name: str) -> str:
+        try:
+            return cell(name)
+        except NotRun:
+            return "-"
+
+    return markdown([*columns], [[shown(cell, name) for cell in columns.values()] for name in names])
+
+
+def verdicts_table(what: str, verdicts: Sequence[Verdict]) -> str:
+    """One row for each claim; ``what`` heads the first column."""
+    cells = [(row.claim, row.bar, row.number, f"**{row.verdict}**") for row in verdicts]
+    return markdown((what, "bar", "our number [95 % interval]", "verdict"), cells)
+
+
+def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A table; one without rows says so."""
+    if not rows:
+        return "Not run."
+    lines = [head, ["---"] * len(head), *([cell.replace("|", "\\|") for cell in row] for row in rows)]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def render(name: str, tables: Mapping[str, str]) -> str:
+    """The text of a page: its template with the ``tables`` put in."""
+    loader = jinja2.FileSystemLoader(TEMPLATES)
+    environment = jinja2.Environment(loader=loader, undefined=jinja2.StrictUndefined, keep_trailing_newline=True)
+    template = f"{name}.md.j2"
+    text = environment.get_template(template).render(tables=tables)
+    return f"{MADE} from experiments/pages/{template}; change that file, not this one. -->\n\n{text}"
+
+
+def _check_place(path: Path) -> None:
+    """Raises ResultsError where a page of another kind would be lost."""
+    if path.is_file() and not path.read_bytes().startswith(MADE.encode()):
+        raise ResultsError(
+            f"{path} was not made by claims.py and is left as it is; move it away, or name another --out"
+        )
+
+
 def main(argv: Sequence[str] | None = None) -> int:
-    """Write the tables; the exit code is 2 when the results or the file make no sense."""
+    """Make the pages; the exit code is 2, and no page is changed, where the rows make no sense."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--results", type=Path, default=Path("results/paper.csv"), help="default: %(default)s")
-    parser.add_argument("--out", type=Path, default=Path("results/RESULTS.md"), help="default: %(default)s")
+    results = Path("results")
+    parser.add_argument("--results", type=Path, default=results, help="folder of the rows (default: %(default)s)")
+    parser.add_argument("--table", type=Path, help="of model_figures.py (default: model/table.csv in --results)")
+    parser.add_argument("--runs", type=Path, help="run directories, to make the analyses of variance anew")
+    parser.add_argument("--out", type=Path, default=results, help="folder of the pages (default: %(default)s)")
+    parser.add_argument("--only", choices=PAGES, help="this page alone")
     options = parser.parse_args(argv)
-    evidence = Evidence(read_results(options.results), read_goals(options.results.with_name("goals.csv")))
-    rows = judge(evidence)
-    write_page(options.out, read_page(options.out, EMPTY), tables(rows, evidence))
-    print(f"{options.out}: {len(rows)} claims, of which {count_verdicts(rows)}")
+    folder, table = options.results, options.table or options.results / "model" / "table.csv"
+    makers = {"RESULTS": lambda: paper_page(folder), "FORWARD_MODEL": lambda: model_page(folder, table)}
+    paths = {name: options.out / f"{name}.md" for name in PAGES if options.only in (None, name)}
+    for path in paths.values():
+        _check_place(path)
+    if options.runs is not None:
+        update_anova(folder / "anova.csv", options.runs)
+    pages = {name: makers[name]() for name in paths}
+    texts = {name: render(name, tables) for name, (_, tables) in pages.items()}
+    make_folder(options.out)
+    for name, path in paths.items():
+        write_bytes(path, texts[name].encode())
+        found = [row.verdict for row in pages[name][0]]
+        counts = ", ".join(f"{found.count(verdict)} {verdict}" for verdict in dict.fromkeys(found))
+        print(f"{path}: {len(found)} claims: {counts}")
     return 0
 
 
 if __name__ == "__main__":
-    sys.exit(with_streams(main))
+    sys.exit(command(main))

@@ -1,9 +1,10 @@
-"""Was the forward model right, and did it know where not? A figure of each variant's first run, and one table of all.
+"""Was the forward model right, and did it know where it was wrong? A figure for each variant, one table.
 
-Judged by predictions made before the model learnt from what they predict. The figure shows where the last ones went
-wrong, whether the spread was honest, and how both came about; table.csv has the numbers of the table, unrounded.
+Only predictions count that were made before the model learnt from what they predict. The figure, of a variant's first
+run, shows where the last predictions were wrong, whether the spread was honest, and how both changed with time. The
+table has a row for each run; table.csv has its numbers unrounded.
 
-  predicted   exemplars predicted before they were learnt from
+  predicted   exemplars predicted before the model learnt from them
   error       distance (m) from prediction to outcome, mean over the last 1000
   inside      share of outcomes inside the regions of 50 / 80 / 95 %: of the last 1000, then from 2000 movements on
   improved    share of the goals with several movements where a later one came nearer than the first
@@ -19,38 +20,32 @@ import argparse
 import csv
 import io
 import math
-import os
-import signal
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
-if __name__ == "__main__":  # Ctrl-C while the libraries below are loading
-    signal.signal(signal.SIGINT, lambda *_: os._exit(130))
-
 import numpy as np
-from matplotlib import rc_context
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 from tqdm import tqdm
 
-from figures import STYLE
+from figures import REACH
+from read_results import MODEL_HEADER
 from sgimd_torch.figures import predictions as plots
+from sgimd_torch.figures.save import save_figure
 from sgimd_torch.files import write_bytes
 from sgimd_torch.forward_model.diagnostics import LEVELS, coverage, error_by_cell, improvements, running
-from sgimd_torch.runs.log import RunError, make_folder, write_whole
+from sgimd_torch.runs.log import RunError, make_folder
 from sgimd_torch.runs.model_record import REFRESHES, prediction_columns
-from sgimd_torch.runs.process import telling_errors, with_streams
+from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import Run, read_run
 from sgimd_torch.spaces import Array, Box
 
-LAST: Final = 1000  # predictions
+NEWEST: Final = 1000  # predictions
 LATE: Final = 2000  # movements, from which on the spread is to be honest
-REACH: Final = 1.5  # m; the float hardly ever lands farther from the base
-INSIDE: Final = tuple(f"inside_{100 * level:.0f}{when}" for when in ("_last", "_late") for level in LEVELS)
-COLUMNS: Final = ("run", "predicted", "error_m", *INSIDE, "improved", "refreshes", "diverged", "ms_per_refresh")
 HEAD: Final = (
     *("run", "predicted", "error (m)", "inside 50 / 80 / 95 %", f"from {LATE} on", "improved (%)"),
     *("refreshes", "ms each"),
@@ -59,7 +54,7 @@ HEAD: Final = (
 
 @dataclass(frozen=True, eq=False)
 class ModelRun:
-    """What the forward model of one run foretold.
+    """What the forward model of one run predicted.
 
     ``movements`` ``(n,)``: executed before each of the predicted ones; ``observed``, ``mean`` and ``spread``
     ``(n, outcome_dim)`` m; ``refreshes`` ``(n_refreshes,)`` for each of its columns.
@@ -91,7 +86,9 @@ def read_model_run(path: Path) -> ModelRun:
     """
     run, file = read_run(path), path / "predictions.csv"
     if not file.exists():
-        raise RunError(f"{path} has no predictions.csv: it ran without a forward model; see --inverse model of run.py")
+        raise RunError(
+            f"{path} has no predictions.csv: it ran without a forward model; see --inverse model of sgimd run"
+        )
     dim = run.outcomes.shape[1]
     table = _read(file, prediction_columns(dim))
     lived = np.flatnonzero(np.isfinite(run.outcomes).all(axis=1))
@@ -116,28 +113,28 @@ def read_model_run(path: Path) -> ModelRun:
 
 
 def row(model_run: ModelRun) -> dict[str, Any]:
-    """Its line of the table, by column; NaN for what there is none of."""
+    """Its row of the table, by column; NaN where there is nothing to measure."""
     errors = np.linalg.norm(model_run.observed - model_run.mean, axis=1)
     run, refreshes = model_run.run, len(model_run.refreshes["diverged"])
     seconds = run.summary.get("seconds_model")
-    inside = (model_run.inside(slice(-LAST, None)), model_run.inside(model_run.movements >= LATE))
+    inside = (model_run.inside(slice(-NEWEST, None)), model_run.inside(model_run.movements >= LATE))
     values = (
         model_run.name,
         len(errors),
-        float(errors[-LAST:].mean()),
+        float(errors[-NEWEST:].mean()),
         *np.concatenate(inside).tolist(),
         improvements(run.goals, run.outcomes, run.origin).share,
         refreshes,
         int(model_run.refreshes["diverged"].sum()),
         1e3 * seconds / refreshes if isinstance(seconds, int | float) else math.nan,
     )
-    return dict(zip(COLUMNS, values, strict=True))
+    return dict(zip(MODEL_HEADER, values, strict=True))
 
 
 def figure_of(model_run: ModelRun) -> Figure:
     """Where predictions went wrong, whether the spread was honest, and both over time; maps only of the plane."""
     observed, mean, refreshes = model_run.observed, model_run.mean, model_run.refreshes
-    is_plane, last = observed.shape[1] == 2, slice(-LAST, None)
+    is_plane, last = observed.shape[1] == 2, slice(-NEWEST, None)
     over_time = ["error", "coverage", "held out"]
     figure = Figure(figsize=(17, 10) if is_plane else (12, 10), layout="constrained")
     rows: Any = [["map", "cells", "calibration"], over_time] if is_plane else [["calibration", "error"], over_time[1:]]
@@ -161,7 +158,7 @@ def figure_of(model_run: ModelRun) -> Figure:
     plots.coverage_over_time(axes["coverage"], ends, windows.coverages[:, LEVELS.index(0.8)])
     diverged = refreshes["diverged"] > 0
     plots.held_out_over_time(axes["held out"], refreshes["movements"], refreshes["held_out"], diverged)
-    figure.suptitle(f"{model_run.name}: {len(observed)} predictions, each made before it was learnt from")
+    figure.suptitle(f"{model_run.name}: {len(observed)} predictions, each made before the model learnt from it")
     return figure
 
 
@@ -188,25 +185,21 @@ def _read(path: Path, names: Sequence[str]) -> Array:
     return np.array(rows).reshape(-1, len(names))
 
 
-def _save(figure: Figure, path: Path) -> None:
-    png = io.BytesIO()
-    figure.savefig(png, format="png", dpi=130)
-    write_bytes(path, png.getvalue())
-
-
 def _printed(cells: dict[str, Any]) -> list[str]:
-    def told(value: float, form: str) -> str:
+    def shown(value: float, form: str) -> str:
         return "-" if math.isnan(value) else f"{value:{form}}"
 
-    inside = [" / ".join(told(100 * cells[name], ".0f") for name in INSIDE[k : k + 3]) for k in (0, 3)]
-    learnt = f"{cells['refreshes']}, {cells['diverged']} diverged", told(cells["ms_per_refresh"], ".1f")
-    improved = told(100 * cells["improved"], ".0f")
+    inside = [
+        " / ".join(shown(100 * cells[f"inside_{100 * level:.0f}_{when}"], ".0f") for level in LEVELS)
+        for when in ("last", "late")
+    ]
+    learnt = f"{cells['refreshes']}, {cells['diverged']} diverged", shown(cells["ms_per_refresh"], ".1f")
+    improved = shown(100 * cells["improved"], ".0f")
     return [cells["run"], str(cells["predicted"]), f"{cells['error_m']:.3f}", *inside, improved, *learnt]
 
 
-@telling_errors
 def main(argv: Sequence[str] | None = None) -> int:
-    """Draw and tell; the exit code is 2 when a run makes no sense."""
+    """Draw the figures, write and print the table; the exit code is 2 when a run makes no sense."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("runs", type=Path, nargs="+", metavar="RUN", help="a run directory: runs/sgim-d/seed-003")
     parser.add_argument("--out", type=Path, default=Path("results/model"), help="default: %(default)s")
@@ -218,12 +211,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     make_folder(options.out)
     first = {name.split("/")[0]: name for name in reversed(found)}
     for name in tqdm(first.values(), "drawing", disable=quiet):
-        with rc_context(STYLE):
-            _save(figure_of(found[name]), options.out / f"{name.replace('/', '-')}.png")
+        save_figure(partial(figure_of, found[name]), options.out / name.replace("/", "-"), "png")
     rows = [row(run) for run in found.values()]
     table = io.StringIO()
-    csv.DictWriter(table, COLUMNS, lineterminator="\n").writerows([dict(zip(COLUMNS, COLUMNS, strict=True)), *rows])
-    write_whole(options.out / "table.csv", table.getvalue())
+    csv.writer(table, lineterminator="\n").writerows([MODEL_HEADER, *(each.values() for each in rows)])
+    write_bytes(options.out / "table.csv", table.getvalue().encode())
     lines = [HEAD, *map(_printed, rows)]
     widths = [max(map(len, cells)) for cells in zip(*lines, strict=True)]
     for cells in lines:
@@ -233,4 +225,4 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(with_streams(main))
+    sys.exit(command(main))

@@ -1,6 +1,7 @@
-"""Reading results/paper.csv: every evaluation of every run of the comparison, by variant.
+"""What the experiments left, read back: the tables in results/, and the runs of a variant.
 
 results = read_results("results/paper.csv"); results["sgim-d"].at(5000)    # {seed: mean error (m)}
+runs = read_seeds(Path("runs"), "sgim-d")
 """
 
 from __future__ import annotations
@@ -11,10 +12,12 @@ import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sgimd_torch.runs.process import say
+from sgimd_torch.runs.read import Run, read_run
 from sgimd_torch.spaces import Array
 
 HEADER = (
@@ -22,43 +25,45 @@ HEADER = (
     *("mean_error_m", "noise_floor_m", "tiles_reached"),
 )
 GOALS_HEADER = ("variant", "seed", "n_goals", "n_near")
-LAST = 5000  # movements in the life of a learner of the paper
+MODEL_HEADER = (
+    *("run", "predicted", "error_m", "inside_50_last", "inside_80_last", "inside_95_last"),
+    *("inside_50_late", "inside_80_late", "inside_95_late", "improved", "refreshes", "diverged", "ms_per_refresh"),
+)
+LEARNERS: Final = ("random", "sagg-riac", "observation", "imitation", "sgim-d")  # the paper's five
+LAST: Final = 5000  # movements in the life of a learner of the paper
 
 
 class ResultsError(ValueError):
     """A table of results that is missing or damaged."""
 
 
+class Values(NamedTuple):
+    """Of one evaluation of one run: m, m, and how many tiles; ``floors`` is NaN where the noise was not measured."""
+
+    errors: float
+    floors: float
+    tiles: float
+
+
 @dataclass(frozen=True, eq=False)
 class Evaluated:
-    """All evaluations of one variant.
-
-    ``seeds`` ``(n_seeds,)`` and ``movements`` ``(n,)`` increase; ``errors`` and ``floors`` (m) and ``tiles`` are
-    ``(n_seeds, n)``, NaN where that seed was not evaluated or the noise not measured. ``experiment`` and ``teacher``
-    are as in the file; ``task_space`` is half the side (m) of the square of goals.
-    """
+    """All evaluations of one variant of an experiment, by seed and movements."""
 
     variant: str
     experiment: str
-    teacher: str
-    task_space: float
-    seeds: NDArray[np.int64]
-    movements: NDArray[np.int64]
-    errors: Array
-    floors: Array
-    tiles: Array
+    rows: dict[tuple[int, int], Values]
 
     def at(self, movements: int, values: str = "errors") -> dict[int, float]:
         """Seed -> value of "errors", "floors" or "tiles" after so many movements, of the seeds that have one."""
-        column = getattr(self, values)[:, self.movements == movements]
-        pairs = zip(self.seeds.tolist(), column.tolist(), strict=True)
-        return {seed: value[0] for seed, value in pairs if value and math.isfinite(value[0])}
+        found = {seed: getattr(row, values) for (seed, when), row in sorted(self.rows.items()) if when == movements}
+        return {seed: value for seed, value in found.items() if math.isfinite(value)}
 
     def curves(self, last: int = LAST) -> tuple[Array, Array]:
         """Movements ``(n,)`` and errors ``(n_seeds, n)`` m up to ``last``, of the seeds that have all evaluations."""
-        early = self.movements <= last
-        whole = np.isfinite(self.errors[:, early]).all(axis=1)
-        return self.movements[early].astype(np.float64), self.errors[whole][:, early]
+        times, seeds = sorted({when for _, when in self.rows if when <= last}), sorted({seed for seed, _ in self.rows})
+        whole = [seed for seed in seeds if all((seed, when) in self.rows for when in times)]
+        errors = [[self.rows[seed, when].errors for when in times] for seed in whole]
+        return np.array(times, dtype=np.float64), np.array(errors).reshape(len(whole), len(times))
 
 
 def read_results(path: str | os.PathLike[str]) -> dict[str, Evaluated]:
@@ -67,21 +72,21 @@ def read_results(path: str | os.PathLike[str]) -> dict[str, Evaluated]:
     Raises:
         ResultsError: there is no such table, or a line of it makes no sense; the message names the line.
     """
+    found: dict[str, Evaluated] = {}
     runs: dict[str, tuple[str, str, float]] = {}
-    values: dict[str, dict[tuple[int, int], tuple[float, float, float]]] = {}
-    for where, row in _rows(path, HEADER):
+    for where, row in read_rows(path, HEADER):
         variant, seed, movements = row["variant"], _count(row, "seed", where), _count(row, "movements", where)
-        run = (row["experiment"], row["teacher"], _number(row, "task_space", where))
+        run = (row["experiment"], row["teacher"], number(row, "task_space", where))
         if runs.setdefault(variant, run) != run:
             raise ResultsError(f"{where}: {variant} is {run}, on an earlier line {runs[variant]}; rename one")
-        found = values.setdefault(variant, {})
-        if (seed, movements) in found:
+        rows = found.setdefault(variant, Evaluated(variant, row["experiment"], {})).rows
+        if (seed, movements) in rows:
             raise ResultsError(f"{where}: seed {seed} of {variant} is there twice at {movements} movements")
-        floor = _number(row, "noise_floor_m", where) if row["noise_floor_m"] not in ("", "nan") else math.nan
-        found[seed, movements] = (_number(row, "mean_error_m", where), floor, _count(row, "tiles_reached", where))
-    if not values:
+        floor = number(row, "noise_floor_m", where) if row["noise_floor_m"] not in ("", "nan") else math.nan
+        rows[seed, movements] = Values(number(row, "mean_error_m", where), floor, _count(row, "tiles_reached", where))
+    if not found:
         raise ResultsError(f"{path} has no line below its header; is the comparison still to be run?")
-    return {variant: _evaluated(variant, runs[variant], found) for variant, found in values.items()}
+    return found
 
 
 def read_goals(path: str | os.PathLike[str]) -> dict[str, Array]:
@@ -90,10 +95,8 @@ def read_goals(path: str | os.PathLike[str]) -> dict[str, Array]:
     Raises:
         ResultsError: a line makes no sense.
     """
-    if not Path(path).exists():
-        return {}
     found: dict[str, list[tuple[int, int]]] = {}
-    for where, row in _rows(path, GOALS_HEADER):
+    for where, row in read_rows(path, GOALS_HEADER, optional=True):
         goals, near = _count(row, "n_goals", where), _count(row, "n_near", where)
         if not near <= goals or goals == 0:
             raise ResultsError(f"{where}: n_near must be at most n_goals, and n_goals above 0, got {near} and {goals}")
@@ -101,21 +104,33 @@ def read_goals(path: str | os.PathLike[str]) -> dict[str, Array]:
     return {variant: np.array(counts, dtype=np.float64) for variant, counts in found.items()}
 
 
-def _evaluated(
-    variant: str, run: tuple[str, str, float], found: dict[tuple[int, int], tuple[float, float, float]]
-) -> Evaluated:
-    seeds, movements = (np.unique([key[k] for key in found]) for k in range(2))
-    columns = np.full((3, len(seeds), len(movements)), np.nan)
-    for (seed, when), row in found.items():
-        columns[:, np.searchsorted(seeds, seed), np.searchsorted(movements, when)] = row
-    return Evaluated(variant, *run, seeds, movements, *columns)
+def read_coverages(path: str | os.PathLike[str]) -> dict[str, Array]:
+    """Variant -> ``(n_seeds,)``, the share of outcomes in the model's 80 % regions from 2000 movements on; {} without
+    file.
+
+    Raises:
+        ResultsError: a line makes no sense.
+    """
+    found: dict[str, list[float]] = {}
+    for where, row in read_rows(path, MODEL_HEADER, optional=True):
+        if row["inside_80_late"] != "nan":
+            found.setdefault(row["run"].split("/")[0], []).append(number(row, "inside_80_late", where))
+    return {variant: np.array(shares) for variant, shares in found.items()}
 
 
-def _rows(path: str | os.PathLike[str], header: tuple[str, ...]) -> Iterator[tuple[str, dict[str, str]]]:
-    """Where each line stands, for messages, and its fields by name."""
+def read_rows(
+    path: str | os.PathLike[str], header: tuple[str, ...], *, optional: bool = False
+) -> Iterator[tuple[str, dict[str, str]]]:
+    """Where each line stands, for messages, and its fields by name; nothing of an ``optional`` table without file.
+
+    Raises:
+        ResultsError: it is missing, cannot be read, or is another table.
+    """
     try:
         text = Path(path).read_text(encoding="utf-8")
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
+        if optional:
+            return
         raise ResultsError(f"{path} does not exist; experiments/compare.py writes it") from None
     except OSError as error:
         raise ResultsError(f"{path} cannot be read: {error.strerror}") from error
@@ -124,7 +139,9 @@ def _rows(path: str | os.PathLike[str], header: tuple[str, ...]) -> Iterator[tup
     lines = csv.reader(text.splitlines())
     first = next(lines, [])
     if tuple(first) != header:
-        raise ResultsError(f"{path} must begin with {','.join(header)}, got {','.join(first)[:100]!r}")
+        raise ResultsError(
+            f"{path} must begin with {','.join(header)}, got {','.join(first)[:100]!r}; is it another table?"
+        )
     for fields in lines:
         where = f"{path}, line {lines.line_num}"
         if len(fields) != len(header):
@@ -132,7 +149,24 @@ def _rows(path: str | os.PathLike[str], header: tuple[str, ...]) -> Iterator[tup
         yield where, dict(zip(header, fields, strict=True))
 
 
-def _number(row: dict[str, str], name: str, where: str) -> float:
+def read_seeds(folder: Path, variant: str) -> list[Run]:
+    """All runs of a variant in a folder of run directories, finished or not; there may be none.
+
+    Raises:
+        RunError: one is damaged.
+    """
+    paths = sorted(config.parent for config in folder.glob(f"{variant}/seed-*/config.json"))
+    if paths:
+        say(f"reading {folder}/{variant}: {len(paths)} runs")
+    return [read_run(path) for path in paths]
+
+
+def number(row: dict[str, str], name: str, where: str) -> float:
+    """A finite number of 0 or more.
+
+    Raises:
+        ResultsError: it is none; the message says where.
+    """
     try:
         value = float(row[name])
     except ValueError:

@@ -22,7 +22,7 @@ import numpy as np
 
 from sgimd_torch import Demonstration, InterestMap, PeriodicTeacher, PlanarArm, evaluate, run, sgim_d, stream
 from sgimd_torch.board.writer import Board, read_events
-from sgimd_torch.runs import run as experiment
+from sgimd_torch.runs import command_line as experiment
 from sgimd_torch.runs.board import RunBoard
 from sgimd_torch.strategies import GoalBabbling
 

@@ -24,8 +24,8 @@ import torch
 from tqdm import tqdm
 
 from options import at_least
+from sgimd_torch.catalogue import CATALOGUE
 from sgimd_torch.runs.build import build
-from sgimd_torch.runs.catalogue import CATALOGUE
 from sgimd_torch.runs.config import Config
 from sgimd_torch.session import live, run
 from sgimd_torch.spaces import Array, Estimate

@@ -6,16 +6,22 @@ import sys
 from typing import Final
 
 from sgimd_torch import __version__
-from sgimd_torch.runs.process import dispatch
+from sgimd_torch.runs.process import Command, dispatch
 
 COMMANDS: Final = {
-    "run": ("sgimd_torch.runs.command_line", "let one learner live, evaluate it, write everything to one directory"),
-    "sweep": ("sgimd_torch.runs.sweep", "many runs: options crossed with each other and with seeds, in parallel"),
-    "table": ("sgimd_torch.views.table", "what runs came to, over their seeds"),
-    "report": ("sgimd_torch.views.report.command", "one page about one run, or about many side by side"),
-    "watch": ("sgimd_torch.views.watch", "TensorBoard on the boards of runs, also while they are under way"),
-    "film": ("sgimd_torch.views.film.command", "a film of what a run has learnt"),
-    "demo": ("sgimd_torch.views.demo", "SGIM-D beside random exploration: one figure, one table"),
+    "run": Command(
+        "sgimd_torch.runs.command_line", "let one learner live, evaluate it, write everything to a directory"
+    ),
+    "sweep": Command(
+        "sgimd_torch.runs.sweep", "many runs: options crossed with each other and with seeds, in parallel"
+    ),
+    "table": Command("sgimd_torch.views.table", "what runs came to, over their seeds"),
+    "report": Command(
+        "sgimd_torch.views.report.command", "one page about one run, or about many side by side", "report"
+    ),
+    "watch": Command("sgimd_torch.views.watch", "TensorBoard on the boards of runs, also while they are under way"),
+    "film": Command("sgimd_torch.views.film.command", "a film of what a run has learnt", "film"),
+    "demo": Command("sgimd_torch.views.demo", "SGIM-D beside random exploration: one figure, one table", "plot"),
 }
 HELP: Final = f"""usage: sgimd COMMAND [OPTIONS]
 
@@ -23,7 +29,7 @@ A robot arm learns where its float can land, by its own curiosity and by imitati
 (SGIM-D; Nguyen & Oudeyer, 2014).
 
 commands:
-{"".join(f"  {name:8}{about}{chr(10)}" for name, (_, about) in COMMANDS.items())}
+{"".join(f"  {name:8}{each.about}{chr(10)}" for name, each in COMMANDS.items())}
 examples:
   sgimd demo                                         see it learn, in a minute or two
   sgimd run --algorithm sgim-d --seed 3              one life of 5000 movements, into runs/sgim-d/seed-003

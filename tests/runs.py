@@ -12,8 +12,10 @@ import sgimd_torch
 ROOT = Path(sgimd_torch.__file__).parents[1]
 MOVEMENTS = 90
 CSV = ("episodes.csv", "evaluation.csv", "regions.csv")
+RUN = "import sys; from sgimd_torch.runs import command_line, process"
+LIVE = f"{RUN}; sys.exit(process.command(command_line.main, sys.argv[1:]))"
 # Every movement goes to disk at once, so that a test can wait for the k-th.
-EAGER = "import sys; from sgimd_torch.runs import run; run.FLUSH_EVERY = 0; sys.exit(run.main(sys.argv[1:]))"
+EAGER = LIVE.replace("process;", "process, run; run.FLUSH_EVERY = 0;")
 
 
 def arguments(out, benchmark):

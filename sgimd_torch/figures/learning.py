@@ -17,25 +17,14 @@ from matplotlib.collections import PatchCollection, PolyCollection, QuadMesh
 from matplotlib.colorbar import Colorbar
 from matplotlib.colors import ListedColormap, LogNorm
 from matplotlib.lines import Line2D
-from matplotlib.patches import Rectangle
-from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
+from matplotlib.ticker import LogLocator, NullLocator
 
+from sgimd_torch.catalogue import CATALOGUE
+from sgimd_torch.figures.axes import colour_bar, coloured_regions, note, over_movements, water_plane
 from sgimd_torch.spaces import Array, Box
 
-COLOURS = {  # after Okabe & Ito: told apart with any colour vision, and in grey
-    "random": "#7f7f7f",
-    "sagg-riac": "#0072b2",
-    "observation": "#cc79a7",
-    "imitation": "#009e73",
-    "sgim-d": "#d55e00",
-}
-NAMES = {
-    "random": "Random",
-    "sagg-riac": "SAGG-RIAC",
-    "observation": "Observation",
-    "imitation": "Imitation",
-    "sgim-d": "SGIM-D",
-}
+COLOURS = {word: entry.colour for word, entry in CATALOGUE["algorithm"].items()}
+NAMES = {word: entry.label for word, entry in CATALOGUE["algorithm"].items()}
 
 
 class Curve(NamedTuple):
@@ -88,10 +77,8 @@ def error_curves(ax: Axes, runs: Mapping[str, Sequence[Curve]]) -> dict[str, Dra
         drawn[algorithm] = DrawnCurve(line, floor, band)
     handles = [*(curve.mean for curve in drawn.values()), Line2D([], [], color="black", linestyle="--", linewidth=1.2)]
     ax.legend(handles, [*(str(curve.mean.get_label()) for curve in drawn.values()), "noise floor of each"])
-    ax.set(xlabel="movements executed", ylabel="mean distance to benchmark goals (m)")
-    ax.set_xlim(left=0)
+    over_movements(ax, "mean distance to benchmark goals (m)")
     ax.set_ylim(bottom=0)
-    ax.grid(alpha=0.3)
     return drawn
 
 
@@ -129,9 +116,7 @@ def landing_points(
         ax.plot(*demonstrated.T, "x", color=COLOURS["sgim-d"], markersize=5, markeredgewidth=1.3, label=label)
     outside = len(outcomes) - int(box.contains(outcomes).sum())
     if outside:
-        text = f"{outside} of {len(outcomes)} landed outside"
-        white = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 2}
-        ax.text(0.5, 0.015, text, transform=ax.transAxes, ha="center", va="bottom", fontsize="small", bbox=white)
+        note(ax, f"{outside} of {len(outcomes)} landed outside")
     water_plane(ax, box)
     return mesh
 
@@ -148,9 +133,7 @@ def histogram(ax: Axes, points: Array, box: Box, *, side: float, most: float | N
 
 def count_bar(axes: Sequence[Axes], mesh: QuadMesh, label: str) -> Colorbar:
     """One colour bar, in whole numbers, for all histograms that share the scale of ``mesh``."""
-    figure = axes[0].get_figure()
-    assert figure is not None
-    bar = figure.colorbar(mesh, ax=list(axes), label=label)
+    bar = colour_bar(axes, mesh, label)
     bar.ax.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     bar.ax.yaxis.set_major_formatter("{x:.0f}")
     bar.ax.yaxis.set_minor_locator(NullLocator())
@@ -184,21 +167,12 @@ def interest_map(
     Raises:
         ValueError: regions that are not of the plane, as when contexts are part of them, or numbers that do not match.
     """
-    if lows.shape != highs.shape or lows.shape != (len(interests), 2):
-        raise ValueError(
-            f"regions must be (n, 2), (n, 2) and (n,), got {lows.shape}, {highs.shape}, {interests.shape}; "
-            "a map over contexts too has to be cut at one context first"
-        )
-    patches = [Rectangle((low[0], low[1]), *(high - low)) for low, high in zip(lows, highs, strict=True)]
-    regions = PatchCollection(patches, cmap="Oranges", edgecolor="0.35", linewidth=0.8)
-    regions.set_array(interests)
-    regions.set_clim(0, max(float(interests.max()), 1e-6))
-    ax.add_collection(regions)
-    _colour_bar(ax, regions, "interest: recent change of competence")
+    drawn = coloured_regions(ax, lows, highs, interests, "Oranges", (0, max(float(interests.max()), 1e-6)))
+    colour_bar([ax], drawn, "interest: recent change of competence")
     if goals is not None:
         ax.plot(*goals.T, ".", color="#0072b2", markersize=4, label=f"last {len(goals)} goals")
     water_plane(ax, Box(lows.min(axis=0), highs.max(axis=0)))
-    return regions
+    return drawn
 
 
 def _edges(box: Box, side: float) -> tuple[Array, Array]:
@@ -209,22 +183,3 @@ def _edges(box: Box, side: float) -> tuple[Array, Array]:
         for low, high in zip(box.low, box.high, strict=True)
     )
     return x, y
-
-
-def _colour_bar(ax: Axes, drawn: QuadMesh | PatchCollection, label: str) -> Colorbar:
-    figure = ax.get_figure()
-    assert figure is not None
-    return figure.colorbar(drawn, ax=ax, label=label)
-
-
-def water_plane(ax: Axes, box: Box) -> None:
-    """Axes in metres, equal aspect, all of ``box`` in sight and the robot's base marked."""
-    ax.plot(0, 0, "^", color="black", markeredgecolor="white", markersize=10, label="base of the arm")
-    ax.set(
-        xlim=(box.low[0], box.high[0]), ylim=(box.low[1], box.high[1]), aspect="equal", xlabel="x (m)", ylabel="y (m)"
-    )
-    ax.xaxis.set_major_locator(MaxNLocator(4))
-    ax.yaxis.set_major_locator(MaxNLocator(4))
-    ax.legend(
-        loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, frameon=False, borderaxespad=0.2, handletextpad=0.2
-    )

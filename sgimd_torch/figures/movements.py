@@ -1,7 +1,7 @@
 """Figures of movements and goals: demonstrated joint trajectories, noise, competence, and where curiosity goes.
 
-Sections 4.1, 4.5, 5.3 and 6 of Nguyen & Oudeyer (2014). As in ``plots``, each function draws on the axes it is given
-and returns what it drew.   trajectories(figure.subplots(2, 3).flat, demonstrations, fitted, names=JOINTS)
+Sections 4.1, 4.5, 5.3 and 6 of Nguyen & Oudeyer (2014). Each function draws on the axes it is given and returns what
+it drew.   trajectories(figure.subplots(2, 3).flat, demonstrations, fitted, names=JOINTS)
 """
 
 from __future__ import annotations
@@ -13,9 +13,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PatchCollection, PathCollection
 from matplotlib.lines import Line2D
-from matplotlib.patches import Ellipse, Rectangle
+from matplotlib.patches import Ellipse
 
-from sgimd_torch.figures.learning import COLOURS, water_plane
+from sgimd_torch.figures.axes import colour_bar, coloured_regions, water_plane
+from sgimd_torch.figures.learning import COLOURS
 from sgimd_torch.spaces import Array, Box, Demonstration
 
 _DEMONSTRATED, _FITTED = "0.55", COLOURS["sgim-d"]
@@ -138,10 +139,10 @@ def competence_map(ax: Axes, lows: Array, highs: Array, competences: Array) -> P
     Raises:
         ValueError: regions that are not of the plane, or numbers that do not match.
     """
-    regions = _regions(ax, lows, highs, np.ma.masked_invalid(competences), "viridis", (-1.0, 0.0))
-    _bar([ax], regions, "mean competence: 0 met, -1 not at all")
+    drawn = coloured_regions(ax, lows, highs, np.ma.masked_invalid(competences), "viridis", (-1.0, 0.0))
+    colour_bar([ax], drawn, "mean competence: 0 met, -1 not at all")
     water_plane(ax, Box(lows.min(axis=0), highs.max(axis=0)))
-    return regions
+    return drawn
 
 
 def interest_over_time(axes: Iterable[Axes], regions: Mapping[str, np.ndarray]) -> list[PatchCollection]:
@@ -166,13 +167,13 @@ def interest_over_time(axes: Iterable[Axes], regions: Mapping[str, np.ndarray]) 
     for ax, movements in zip(axes, picked, strict=False):
         now = regions["movements"] == movements
         lows, highs = (np.stack([regions[f"{side}_{k}"][now] for k in (0, 1)], axis=1) for side in ("low", "high"))
-        drawn.append(_regions(ax, lows, highs, regions["interest"][now], "Oranges", (0.0, most)))
+        drawn.append(coloured_regions(ax, lows, highs, regions["interest"][now], "Oranges", (0.0, most)))
         water_plane(ax, Box(lows.min(axis=0), highs.max(axis=0)))
         _legend_off(ax)
         ax.set_title(f"after {movements} movements: {now.sum()} region{'s' * bool(now.sum() > 1)}", fontsize="medium")
     for ax in axes[len(drawn) :]:
         ax.set_visible(False)
-    _bar(axes, drawn[-1], "interest: recent change of competence")
+    colour_bar(axes, drawn[-1], "interest: recent change of competence")
     return drawn
 
 
@@ -194,29 +195,10 @@ def chosen_goals(ax: Axes, goals: Array, times: Array, box: Box | None = None) -
     if goals.ndim != 2 or goals.shape[1] != 2 or not 0 < len(goals) == len(times):
         raise ValueError(f"needs (n, 2) goals and (n,) times, n > 0, got {goals.shape} and {np.shape(times)}")
     points = ax.scatter(goals[:, 0], goals[:, 1], c=times, s=14, cmap="viridis", linewidths=0)
-    _bar([ax], points, "movements executed before")
+    colour_bar([ax], points, "movements executed before")
     margin = 1e-3 + 0.05 * np.ptp(goals, axis=0)
     water_plane(ax, Box(goals.min(axis=0) - margin, goals.max(axis=0) + margin) if box is None else box)
     return points
-
-
-def _regions(
-    ax: Axes, lows: Array, highs: Array, values: Array, colours: str, limits: tuple[float, float]
-) -> PatchCollection:
-    if lows.shape != highs.shape or lows.shape != (len(values), 2):
-        raise ValueError(f"regions must be (n, 2), (n, 2) and (n,), got {lows.shape}, {highs.shape}, {values.shape}")
-    patches = [Rectangle((low[0], low[1]), *(high - low)) for low, high in zip(lows, highs, strict=True)]
-    regions = PatchCollection(patches, cmap=colours, edgecolor="0.35", linewidth=0.6)
-    regions.set_array(values)
-    regions.set_clim(*limits)
-    ax.add_collection(regions)
-    return regions
-
-
-def _bar(axes: Sequence[Axes], drawn: PatchCollection | PathCollection, label: str) -> None:
-    figure = axes[0].get_figure()
-    assert figure is not None
-    figure.colorbar(drawn, ax=axes, label=label)
 
 
 def _rgb(colour: str) -> tuple[float, float, float]:

@@ -1,7 +1,7 @@
 """Figures of the forward model: where it was wrong, by how much, and whether it knew.
 
-As in ``plots``, each function draws on the axis it is given and returns what it drew. ``model_diagnostics`` computes
-what they show.   predictions(ax, outcomes, prediction.mean, box); calibration(ax, levels, {"all": coverage(...)})
+Each function draws on the axis it is given and returns what it drew. ``forward_model/diagnostics.py`` computes what
+they show.   predictions(ax, outcomes, prediction.mean, box); calibration(ax, levels, {"all": coverage(...)})
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from matplotlib.colors import ListedColormap
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from sgimd_torch.figures.learning import COLOURS, water_plane
+from sgimd_torch.figures.axes import GREY, colour_bar, note, over_movements, water_plane
+from sgimd_torch.figures.learning import COLOURS
 from sgimd_torch.forward_model.diagnostics import LEVELS, CellErrors
 from sgimd_torch.spaces import Array, Box
 
-_GREY = "0.45"
 _LINES = (COLOURS["sgim-d"], COLOURS["sagg-riac"], COLOURS["imitation"], COLOURS["observation"])
 _ERRORS = ListedColormap(colormaps["YlOrRd"](np.linspace(0.15, 1.0, 256)))  # the smallest is seen against white
 
@@ -52,8 +52,8 @@ def predictions(ax: Axes, observed: Array, mean: Array, box: Box, *, most: float
     ax.scatter(observed[:, 0], observed[:, 1], c=distances, s=7, cmap=_ERRORS, vmin=0, vmax=most, linewidths=0)
     outside = len(observed) - int(box.contains(observed).sum())
     if outside:
-        _note(ax, f"{outside} of {len(observed)} landed outside")
-    _bar(ax, lines, "predicted to observed (m)", beyond=bool((distances > most).any()))
+        note(ax, f"{outside} of {len(observed)} landed outside")
+    colour_bar([ax], lines, "predicted to observed (m)", extend=_extend(distances, most))
     water_plane(ax, box)
     return lines
 
@@ -85,7 +85,7 @@ def error_map(ax: Axes, cells: CellErrors, box: Box, *, most: float | None = Non
         middle = (x[column : column + 2].mean(), y[row : row + 2].mean())
         ink = "white" if errors[row, column] > 0.6 * most else "0.15"
         ax.text(*middle, f"{counts[row, column]}", ha="center", va="center", fontsize=7, color=ink)
-    _bar(ax, mesh, "mean error (m)", beyond=bool((errors > most).any()))
+    colour_bar([ax], mesh, "mean error (m)", extend=_extend(errors, most))
     water_plane(ax, box)
     return mesh
 
@@ -107,7 +107,7 @@ def calibration(ax: Axes, levels: Array, coverages: Mapping[str, Array]) -> dict
     if len(coverages) > len(_LINES):
         raise ValueError(f"calibration shows at most {len(_LINES)} lines, got {len(coverages)}")
     marked = [k for k, level in enumerate(levels) if np.isclose(level, LEVELS).any()]
-    ax.plot([0, 1], [0, 1], "--", color=_GREY, linewidth=1.2, label="ideal")
+    ax.plot([0, 1], [0, 1], "--", color=GREY, linewidth=1.2, label="ideal")
     for level in levels[marked]:
         ax.axvline(level, color="0.85", linewidth=1, zorder=0)
     drawn = {}
@@ -115,7 +115,7 @@ def calibration(ax: Axes, levels: Array, coverages: Mapping[str, Array]) -> dict
         told = " / ".join(f"{100 * shares[k]:.0f}" for k in marked)
         (drawn[label],) = ax.plot(levels, shares, "o-", color=colour, markersize=6, markevery=marked)
         drawn[label].set_label(f"{label}: {told} %" if told else label)
-    words: dict[str, Any] = {"color": _GREY, "fontsize": "small", "transform": ax.transAxes}
+    words: dict[str, Any] = {"color": GREY, "fontsize": "small", "transform": ax.transAxes}
     ax.text(0.04, 0.62, "too cautious", **words)
     ax.text(0.96, 0.38, "overconfident", ha="right", **words)
     ax.set(xlim=(0, 1), ylim=(0, 1), aspect="equal", xlabel="level of the region", ylabel="outcomes inside")
@@ -129,7 +129,7 @@ def calibration(ax: Axes, levels: Array, coverages: Mapping[str, Array]) -> dict
 def error_over_time(ax: Axes, movements: Array, errors: Array) -> Line2D:
     """Mean error (m) of the predictions in each window, ``(n,)``, against the movements at its end."""
     (line,) = ax.plot(movements, errors, "o-", color=COLOURS["sgim-d"], markersize=4)
-    _over_time(ax, "mean error of predictions (m)")
+    over_movements(ax, "mean error of predictions (m)")
     ax.set_ylim(bottom=0)
     return line
 
@@ -139,9 +139,9 @@ def coverage_over_time(
 ) -> Line2D:
     """Share of the outcomes inside the region of one ``level`` in each window, ``(n,)``; ``band`` is what will do."""
     ax.axhspan(*band, color="0.9", zorder=0, label=f"{100 * band[0]:.0f} to {100 * band[1]:.0f} %")
-    ax.axhline(level, linestyle="--", color=_GREY, linewidth=1.2, label="ideal")
+    ax.axhline(level, linestyle="--", color=GREY, linewidth=1.2, label="ideal")
     (line,) = ax.plot(movements, coverages, "o-", color=COLOURS["sgim-d"], markersize=4)
-    _over_time(ax, f"outcomes inside the {100 * level:.0f} % region")
+    over_movements(ax, f"outcomes inside the {100 * level:.0f} % region")
     ax.set_ylim(0, 1)
     ax.yaxis.set_major_formatter(lambda share, _: f"{100 * share:.0f} %")
     ax.legend(loc="lower right", ncols=2)
@@ -151,37 +151,23 @@ def coverage_over_time(
 def held_out_over_time(ax: Axes, movements: Array, held_out: Array, diverged: NDArray[np.bool_]) -> Line2D:
     """Negative log likelihood of what is held out, after each refresh ``(n,)``; those that diverged as crosses.
 
-    Values far above all others, as of the first refresh, are cut off and told in words.
+    Values far above all others, as of the first refresh, are cut off, and a note says so.
     """
     (line,) = ax.plot(movements, held_out, "o-", color=COLOURS["sgim-d"], markersize=3, linewidth=1.2)
     if diverged.any():
         ax.plot(movements[diverged], held_out[diverged], "X", color="black", label=f"{diverged.sum()} diverged")
         ax.legend()
-    _over_time(ax, "held-out negative log likelihood")
+    over_movements(ax, "held-out negative log likelihood")
     lower, upper = np.quantile(held_out, (0.25, 0.75))
     above = held_out[held_out > upper + 3 * (upper - lower)]  # Tukey's outer fence
     if len(above):
         rest = held_out[held_out < above.min()]
         margin = 0.1 * np.ptp(rest) + 1e-6
         ax.set_ylim(rest.min() - margin, rest.max() + margin)
-        _note(ax, f"{len(above)} of {len(held_out)} lie above, up to {above.max():.1f}", top=True)
+        note(ax, f"{len(above)} of {len(held_out)} lie above, up to {above.max():.1f}", top=True)
     return line
 
 
-def _over_time(ax: Axes, label: str) -> None:
-    ax.set(xlabel="movements executed", ylabel=label)
-    ax.set_xlim(left=0)
-    ax.grid(alpha=0.3)
-
-
-def _note(ax: Axes, text: str, *, top: bool = False) -> None:
-    """Words at the lower or upper edge."""
-    white = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 2}
-    height, side = (0.985, "top") if top else (0.015, "bottom")
-    ax.text(0.5, height, text, transform=ax.transAxes, ha="center", va=side, fontsize="small", bbox=white)
-
-
-def _bar(ax: Axes, drawn: LineCollection | QuadMesh, label: str, *, beyond: bool) -> None:
-    figure = ax.get_figure()
-    assert figure is not None
-    figure.colorbar(drawn, ax=ax, label=label, extend="max" if beyond else "neither")
+def _extend(values: Array, most: float) -> str:
+    """An arrow where values lie beyond the end of the scale."""
+    return "max" if (values > most).any() else "neither"

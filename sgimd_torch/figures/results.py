@@ -1,7 +1,7 @@
 """Figures over seeds: error curves with intervals, where goals lie, and what each change of the learner makes.
 
-Section 6 of Nguyen & Oudeyer (2014). As in ``plots``, each function draws on the axis it is given and returns what it
-drew. Whoever computed the statistics passes them in; here nothing is computed but positions.
+Section 6 of Nguyen & Oudeyer (2014). Each function draws on the axis it is given and returns what it drew. The caller
+computes the statistics.   seed_curves(ax, curves); forest(ax, differences, reference="SGIM-D")
 """
 
 from __future__ import annotations
@@ -13,12 +13,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import QuadMesh
 from matplotlib.lines import Line2D
-from matplotlib.ticker import MaxNLocator
 
+from sgimd_torch.figures.axes import GREY, over_movements, plane
 from sgimd_torch.figures.learning import COLOURS, NAMES, histogram
 from sgimd_torch.spaces import Array, Box
-
-_GREY = "0.45"
 
 
 class SeedCurves(NamedTuple):
@@ -62,10 +60,8 @@ def seed_curves(ax: Axes, runs: Sequence[SeedCurves]) -> list[Line2D]:
         ax.fill_between(run.movements, run.low, run.high, color=colour, alpha=0.22, linewidth=0)
         label = f"{run.label} ({_seeds(len(run.errors))})"
         lines += ax.plot(run.movements, run.centre, f"o{style}", color=colour, markersize=4, label=label)
-    ax.set(xlabel="movements executed", ylabel="mean distance to benchmark goals (m)")
-    ax.set_xlim(left=0)
+    over_movements(ax, "mean distance to benchmark goals (m)")
     ax.set_ylim(bottom=0)
-    ax.grid(alpha=0.3)
     ax.legend(handles=lines)
     return lines
 
@@ -77,11 +73,7 @@ def goal_histogram(ax: Axes, goals: Array, box: Box, *, side: float, most: float
         ValueError: ``box`` is not of the plane.
     """
     mesh = histogram(ax, goals, box, side=side, most=most)
-    ax.set(
-        xlim=(box.low[0], box.high[0]), ylim=(box.low[1], box.high[1]), aspect="equal", xlabel="x (m)", ylabel="y (m)"
-    )
-    ax.xaxis.set_major_locator(MaxNLocator(4))
-    ax.yaxis.set_major_locator(MaxNLocator(4))
+    plane(ax, box)
     return mesh
 
 
@@ -106,8 +98,8 @@ def goal_distances(ax: Axes, runs: Mapping[str, Sequence[Array]], *, reach: floa
             ax.step(*_shares(goals), where="post", color=colour, linewidth=0.7, alpha=0.35)
         label = f"{NAMES[algorithm]} ({_seeds(len(seeds))})"
         lines += ax.step(*_shares(np.concatenate(list(seeds))), where="post", color=colour, label=label)
-    ax.axvline(reach, color=_GREY, linestyle=":")
-    ax.text(1.1 * reach, 0.97, f"reach, about {reach:g} m", transform=ax.get_xaxis_transform(), va="top", color=_GREY)
+    ax.axvline(reach, color=GREY, linestyle=":")
+    ax.text(1.1 * reach, 0.97, f"reach, about {reach:g} m", transform=ax.get_xaxis_transform(), va="top", color=GREY)
     ax.set(xscale="log", yscale="log", xlabel="distance from the base (m)", ylabel="goals within that distance (%)")
     ax.set_ylim(0.02, 150)
     for axis in (ax.xaxis, ax.yaxis):
@@ -129,7 +121,7 @@ def forest(ax: Axes, differences: Sequence[Difference], *, reference: str) -> li
     marks = []
     for height, row in enumerate(ordered):
         certain = row.low > 0 or row.high < 0
-        ax.plot(row.seeds, np.full(len(row.seeds), height), "|", color=_GREY, markersize=7, alpha=0.6, zorder=1)
+        ax.plot(row.seeds, np.full(len(row.seeds), height), "|", color=GREY, markersize=7, alpha=0.6, zorder=1)
         ax.plot([row.low, row.high], [height, height], color="black", linewidth=1.8, solid_capstyle="butt")
         face = "black" if certain else "white"
         marks += ax.plot(row.centre, height, "o", color="black", markerfacecolor=face, markersize=6.5)

@@ -16,7 +16,7 @@ try:
     import torch
     from lightning import LightningModule
 except ImportError as error:
-    raise ImportError(f"the forward model needs sgimd-torch[forward]: {error}") from error
+    raise ImportError(f"the forward model needs torch: pip install 'sgimd-torch[forward]' ({error})") from error
 
 _LOG_VARIANCES: Final = (-9.0, 3.0)  # of standardised outcomes: a noise of 1 % to 450 % of their spread
 

@@ -20,7 +20,7 @@ try:
     from safetensors import SafetensorError, safe_open
     from safetensors.torch import save
 except ImportError as error:
-    raise ImportError(f"the forward model needs sgimd-torch[forward]: {error}") from error
+    raise ImportError(f"the forward model needs torch: pip install 'sgimd-torch[forward]' ({error})") from error
 
 from sgimd_torch.files import write_bytes
 from sgimd_torch.forward_model.ensemble import Ensemble

@@ -11,10 +11,10 @@ from functools import partial, wraps
 from typing import TYPE_CHECKING, Any, Final
 
 from sgimd_torch.algorithms import Correspondence
+from sgimd_torch.catalogue import CATALOGUE, SHARED, check, check_call
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.learner import Learner
-from sgimd_torch.runs.catalogue import CATALOGUE, SHARED, check
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.tasks import Task, benchmark_of, correspondence_of, demonstrations_of
 from sgimd_torch.spaces import Array, Demonstration, Estimate, stream
@@ -92,7 +92,9 @@ def task_of(config: Config) -> Task:
     """
     entry = config.entry("environment")
     options = {name: getattr(config, option) for name, option in entry.uses.items()}
-    made = entry.load()(**entry.arguments(), **options)
+    make = partial(entry.load(), **entry.arguments(), **options)
+    check_call("environment", config.environment, make, (), {})
+    made = make()
     task = made if isinstance(made, Task) else Task(made)
     check("environment", config.environment, task.environment)
     return task
@@ -146,6 +148,7 @@ def _checked(kind: str, word: str, make: Callable[..., Any]) -> Callable[..., An
 
     @wraps(make)
     def made(*arguments: Any, **options: Any) -> Any:
+        check_call(kind, word, make, arguments, options)
         part = make(*arguments, **options)
         check(kind, word, part)
         return part

@@ -10,19 +10,21 @@ Examples:
 from __future__ import annotations
 
 import argparse
+import json
 import re
 import shlex
 import sys
 import textwrap
 from collections.abc import Sequence
 from dataclasses import fields
+from pathlib import Path
 from typing import Any, Final, NoReturn, get_type_hints
 
 import jsonargparse
 
-from sgimd_torch.runs.catalogue import CATALOGUE
+from sgimd_torch.catalogue import CATALOGUE, did_you_mean
 from sgimd_torch.runs.config import Config, dashed, options
-from sgimd_torch.runs.process import did_you_mean, loading
+from sgimd_torch.runs.process import loading
 
 FLAGS: Final = {
     "resume": "Go on with a stopped or killed run, or lengthen a finished one.",
@@ -86,11 +88,7 @@ def parse(
 
 def _told(value: Any) -> str:
     """A default, as the command line has it."""
-    return (
-        {None: "null", True: "true", False: "false"}.get(value, str(value))
-        if not isinstance(value, float)
-        else f"{value:g}"
-    )
+    return str(value) if isinstance(value, str | Path) else json.dumps(value)
 
 
 def _choices(name: str) -> str:

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from sgimd_torch.runs.catalogue import CATALOGUE, ROD, SHARED, Entry, find
+from sgimd_torch.catalogue import CATALOGUE, ROD, SHARED, Entry, find
 
 
 class Option(NamedTuple):
@@ -50,15 +50,17 @@ class Option(NamedTuple):
             if isinstance(number, int | float) and not (
                 self.least <= number <= self.most and number > self.above and number < math.inf
             ):
-                raise ValueError(f"{name} must be {self._bounds()}, got {number}{self.slip and f'; {self.slip}'}")
+                raise ValueError(
+                    f"{name} must be {self._bounds(type(number))}, got {number}{self.slip and f'; {self.slip}'}"
+                )
 
-    def _bounds(self) -> str:
-        bounded = self.most < math.inf
+    def _bounds(self, kind: type) -> str:
+        least, most, above = (f"{bound:g}".replace("e+0", "e") for bound in (self.least, self.most, self.above))
         if self.above > -math.inf:
-            return f"above {self.above:g}" + (f" and at most {self.most:g}" if bounded else "")
-        if bounded and self.least > -math.inf:
-            return f"from {self.least:g} to {self.most:g}"
-        return f"at most {self.most:g}" if bounded else f"finite and at least {self.least:g}"
+            return f"above {above}" + (f" and at most {most}" if self.most < math.inf else "")
+        if self.most < math.inf:
+            return f"from {least} to {most}" if self.least > -math.inf else f"at most {most}"
+        return f"at least {least}" if kind is int else f"finite and at least {least}"
 
 
 def option(default: Any, group: str, about: str, *, before: Any = ..., **more: Any) -> Any:

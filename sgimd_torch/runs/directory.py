@@ -13,14 +13,10 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from sgimd_torch.runs.config import Config
+from sgimd_torch.runs.config import before_there_was_a_choice
 from sgimd_torch.runs.log import Columns, RunError, dropped, make_folder, read_json, write_json
 from sgimd_torch.runs.tables import Evaluations
 
-_ONCE = {  # settings of runs that were made before there was a choice
-    name: getattr(Config, name)
-    for name in ("environment", "members", "noise_heads", "training", "focus", "anchored", "residual")
-}
 _UNFINISHED = ("lock", "versions.json")  # what a run killed before its config.json may have left, besides *.part
 
 
@@ -134,7 +130,7 @@ class RunDirectory:
             return None
         if not resume:
             raise RunError(f"{self.path} holds a run already; go on with it by --resume, or choose another --out")
-        before = {**_ONCE, **before}
+        before = {**before_there_was_a_choice(), **before}
         differ = [
             f"{name} was {before.get(name)}, now {settings.get(name)}"
             for name in dict.fromkeys((*settings, *before))

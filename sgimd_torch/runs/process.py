@@ -7,17 +7,18 @@ Exit codes: 0 done, 1 it failed under way, 2 the request is wrong, 130 stopped b
 
 from __future__ import annotations
 
-import difflib
 import importlib
 import os
 import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from types import FrameType
-from typing import Any, Final, Self
+from typing import Any, Final, NamedTuple, Self
+
+from sgimd_torch.catalogue import did_you_mean
 
 REPORT_EVERY: Final = 10.0  # s, from one line of progress to the next where there is no terminal
 SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
@@ -35,12 +36,20 @@ class Failed(RuntimeError):
     """The request was right, and it failed under way: exit code 1."""
 
 
-def dispatch(prog: str, commands: Mapping[str, tuple[str, str]], help_text: str, argv: Sequence[str]) -> int:
+class Command(NamedTuple):
+    """A command: the ``module`` whose ``main(argv)`` it is, one line ``about`` it, and the ``extra`` that it needs."""
+
+    module: str
+    about: str
+    extra: str = ""
+
+
+def dispatch(prog: str, commands: Mapping[str, Command], help_text: str, argv: Sequence[str]) -> int:
     """Run the command that the first word names.
 
     Args:
         prog: what the user typed to come here.
-        commands: name -> the module whose ``main(argv)`` it is, and one line about it.
+        commands: by name.
         help_text: for ``--help``.
         argv: the words after ``prog``.
 
@@ -48,7 +57,7 @@ def dispatch(prog: str, commands: Mapping[str, tuple[str, str]], help_text: str,
         The exit code.
     """
 
-    def chosen(words: Sequence[str]) -> int:
+    def call(words: Sequence[str]) -> int:
         if not words or words[0] in ("-h", "--help"):
             print(help_text)
             return 0 if words else 2
@@ -58,11 +67,18 @@ def dispatch(prog: str, commands: Mapping[str, tuple[str, str]], help_text: str,
                 f"unknown command {name!r}, known are {', '.join(commands)}{did_you_mean(name, commands)}; "
                 f"{prog} --help explains them"
             )
-        with loading():
-            module = importlib.import_module(commands[name][0])
+        chosen = commands[name]
+        try:
+            with loading():
+                module = importlib.import_module(chosen.module)
+        except ModuleNotFoundError as error:
+            if not chosen.extra:
+                raise
+            slip = f"pip install 'sgimd-torch[{chosen.extra}]' brings it"
+            raise ImportError(f"{prog} {name} needs {error.name}, which is not installed; {slip}") from error
         return int(module.main(words[1:]))
 
-    return command(chosen, argv)
+    return command(call, argv)
 
 
 def command(main: Callable[[Sequence[str]], int], argv: Sequence[str] | None = None) -> int:
@@ -236,12 +252,6 @@ def clock(seconds: float) -> str:
     if hours:
         return f"{hours}:{minutes:02}:{rest:02}"
     return f"{minutes}:{rest:02}" if minutes else f"{rest} s"
-
-
-def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """``; did you mean grid?``, or nothing where no known name is near."""
-    near = difflib.get_close_matches(name.lower().replace("_", "-"), list(known), 1, 0.5)
-    return f"; did you mean {near[0]}?" if near else ""
 
 
 def say(*messages: str) -> None:

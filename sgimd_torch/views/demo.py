@@ -23,8 +23,8 @@ from types import FrameType
 if __name__ == "__main__":  # Ctrl-C while the libraries below are loading
     signal.signal(signal.SIGINT, lambda *_: os._exit(130))
 
+from sgimd_torch.catalogue import ROD
 from sgimd_torch.figures.learning import NAMES
-from sgimd_torch.runs.catalogue import ROD
 from sgimd_torch.runs.children import ChildFailed, learn
 from sgimd_torch.runs.command_line import parse
 from sgimd_torch.runs.log import make_folder

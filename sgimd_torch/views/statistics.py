@@ -2,13 +2,13 @@
 
 After Agarwal et al. (2021), "Deep reinforcement learning at the edge of the statistical precipice": few seeds, so every
 number comes with an interval. ``errors`` are mean benchmark errors (m), one for each seed; smaller is better.
-    iqm_interval(errors, rng=rng); ratio_interval(ours, theirs, rng=rng); improvement_interval(ours, theirs, rng=rng)
+    iqm_interval(errors, rng=rng()); ratio_interval(ours, theirs, rng=rng()); show(iqm_interval(errors, rng=rng()))
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from scipy import stats
@@ -17,6 +17,7 @@ from sgimd_torch.spaces import Array
 
 LEVEL = 0.95
 RESAMPLES = 9999
+SEED: Final = 2014  # of the bootstrap: each number draws from its own default_rng(SEED), whatever else is computed
 
 
 class Interval(NamedTuple):
@@ -42,6 +43,21 @@ class Anova(NamedTuple):
     def smallest(self) -> float:
         """p of "the groups have the same mean in all dimensions": Bonferroni's, the smallest p times their number."""
         return float(self.adjusted.min())
+
+
+def rng() -> np.random.Generator:
+    """A fresh stream for one number."""
+    return np.random.default_rng(SEED)
+
+
+def show(found: Interval, form: str = ".2f", unit: str = "") -> str:
+    """``0.48 [0.45, 0.52]``, a unit behind."""
+    return f"{found.value:{form}} [{found.low:{form}}, {found.high:{form}}]" + (f" {unit}" if unit else "")
+
+
+def metres(found: Interval, form: str = "+.4f") -> str:
+    """A difference in metres, sign shown: ``−0.0103 [−0.0162, −0.0074] m``."""
+    return show(found, form, "m").replace("-", "−")
 
 
 def interquartile_mean(values: Array) -> Array:

@@ -1,15 +1,14 @@
 """Open TensorBoard on the boards that runs have made, also while they are still under way. For this machine alone.
 
 Examples:
-  python experiments/run.py --algorithm sgim-d --board true &
-  scripts/watch                                         all boards below runs
-  scripts/watch runs/sgim-d --port 7007                 those of one learner, elsewhere
+  sgimd run --algorithm sgim-d --board true &
+  sgimd watch                                         all boards below runs
+  sgimd watch runs/sgim-d --port 7007                 those of one learner, elsewhere
 """
 
 from __future__ import annotations
 
 import argparse
-import signal
 import socket
 import subprocess
 import sys
@@ -17,8 +16,10 @@ import tempfile
 import time
 import urllib.request
 from collections.abc import Sequence
+from importlib.util import find_spec
 from pathlib import Path
-from typing import IO
+
+from sgimd_torch.runs.process import Failed, say
 
 PORTS = 50  # how many are tried
 POINTS = 100_000  # that TensorBoard keeps of each curve, which is all; 0, documented as all, shows none
@@ -40,27 +41,28 @@ TensorBoard shows {boards} of {runs} at  {url}   (Ctrl-C ends it)
 def main(argv: Sequence[str] | None = None) -> int:
     """Serve until Ctrl-C or SIGTERM.
 
-    Returns:
-        The exit code: 2 the request is wrong, 1 TensorBoard failed, 130 or 143 a signal ended it.
+    Raises:
+        ValueError: the request is wrong, or tensorboard is not installed.
+        Failed: TensorBoard ended by itself.
     """
     parser = argparse.ArgumentParser(
-        prog="watch", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False
+        prog="sgimd watch",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
     )
     parser.add_argument("runs", nargs="?", type=Path, default=Path("runs"), help="where to look for boards (runs)")
     parser.add_argument("--port", type=int, default=6006, help="the first port to try (6006)")
-    try:
-        options = parser.parse_args(argv)
-        boards = boards_below(options.runs)
-        port = free_port(options.port)
-    except SystemExit as end:  # --help, or an option that cannot be
-        return int(end.code or 0)
-    except (ValueError, OSError) as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
+    options = parser.parse_args(argv)
+    if find_spec("tensorboard") is None:
+        raise ValueError("watching needs tensorboard, which is not installed; pip install 'sgimd-torch[board]'")
+    boards = boards_below(options.runs)
+    port = free_port(options.port)
     if port != options.port:
-        print(f"port {options.port} is taken, {port} is free", file=sys.stderr)
+        say(f"port {options.port} is taken, {port} is free")
     shown = "1 board" if boards == 1 else f"{boards} boards"
-    return serve(options.runs, port, WHERE.format(boards=shown, runs=options.runs, url=f"http://127.0.0.1:{port}"))
+    serve(options.runs, port, WHERE.format(boards=shown, runs=options.runs, url=f"http://127.0.0.1:{port}"))
+    return 0
 
 
 def boards_below(runs: Path) -> int:
@@ -96,27 +98,27 @@ def free_port(first: int) -> int:
     raise ValueError(f"no port from {first} on is free; give another --port")
 
 
-def serve(runs: Path, port: int, where: str) -> int:
-    """Run TensorBoard, and say ``where`` to look once it answers."""
+def serve(runs: Path, port: int, where: str) -> None:
+    """Run TensorBoard, and say ``where`` to look once it answers.
+
+    Raises:
+        Failed: it ended by itself.
+    """
     command = [sys.executable, "-m", "tensorboard.main", "--logdir", str(runs), "--host", "127.0.0.1"]
     command += ["--port", str(port), "--reload_interval", "5"]
     command += ["--samples_per_plugin", ",".join(f"{plugin}={POINTS}" for plugin in ("scalars", "images", "text"))]
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-    signal.signal(signal.SIGTERM, _terminated)
     with tempfile.TemporaryFile() as log:
         process = subprocess.Popen(command, stdout=log, stderr=log, stdin=subprocess.DEVNULL, start_new_session=True)
         try:
             wait_for(f"http://127.0.0.1:{port}/data/environment", process)
             print(where, flush=True)
             process.wait()
-        except KeyboardInterrupt:
-            return 130
-        except _Terminated:
-            return 143
         finally:
             process.terminate()
             process.wait()
-        return _failed(log)
+        log.seek(0)
+        lines = log.read().decode(errors="replace").strip().splitlines()
+        raise Failed("\n".join(["TensorBoard ended by itself; it said:", *lines[-12:]]))
 
 
 def wait_for(address: str, process: subprocess.Popen[bytes]) -> None:
@@ -130,22 +132,3 @@ def wait_for(address: str, process: subprocess.Popen[bytes]) -> None:
             time.sleep(0.1)
         else:
             return
-
-
-class _Terminated(Exception):
-    """SIGTERM."""
-
-
-def _terminated(*_: object) -> None:
-    raise _Terminated
-
-
-def _failed(log: IO[bytes]) -> int:
-    log.seek(0)
-    lines = log.read().decode(errors="replace").strip().splitlines()
-    print("error: TensorBoard ended by itself; it said:", *lines[-12:], sep="\n", file=sys.stderr)
-    return 1
-
-
-if __name__ == "__main__":
-    sys.exit(main())

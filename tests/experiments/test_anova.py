@@ -1,14 +1,18 @@
 """The analyses of variance of movements: what is compared, what counts as one movement, and where the table goes."""
 
+import csv
+
 import numpy as np
 import pytest
 
-import anova as command
-from anova import compare, main, mean_thetas, random_thetas, shown_by
-from claims import EMPTY
-from evidence import NotRun
+import anova
+from anova import COMPARISONS, anova_cells, compare, mean_thetas, random_thetas, shown_by
+from claims import main
+from judging import NotRun
+from paper import write_paper
 from sgimd_torch.demonstrations import save_demonstrations
 from sgimd_torch.environments.fishing_rod import FishingRod
+from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.spaces import Demonstration
 
@@ -24,7 +28,7 @@ def demonstrators(tmp_path, monkeypatch):
     for number, each in thetas.items():
         shown = [Demonstration(np.zeros(0), *primitive.trajectory(theta), np.zeros(2)) for theta in each]
         save_demonstrations(tmp_path / f"{number}.npz", shown)
-    monkeypatch.setattr(command, "shipped", lambda number: tmp_path / f"{number}.npz")
+    monkeypatch.setattr(anova, "shipped", lambda number: tmp_path / f"{number}.npz")
     return thetas
 
 
@@ -42,8 +46,8 @@ def runs(tmp_path_factory, go):
     return out
 
 
-def found(lines, groups):
-    (line,) = (line for line in lines if line.groups == groups)
+def found(compared, groups):
+    (line,) = (line for line in compared if line.groups == groups)
     return line
 
 
@@ -60,12 +64,12 @@ def test_random_movements_are_uniform_and_those_of_two_demonstrators_differ():
 
 
 def test_a_structured_demonstrator_differs_from_random_movements_where_it_is_structured(demonstrators, runs):
-    lines = compare(runs)
-    structured = found(lines, "demonstrator 3, random movements")
+    compared, missing = compare(runs)
+    structured = found(compared, "demonstrator 3, random movements")
     assert structured.rows == "60, 60 movements"
     assert (structured.found.adjusted < 0.001).tolist() == [True] * SHIFTED + [False] * 21
-    assert found(lines, "demonstrator 1, random movements").found.rejected == 0
-    assert "2.npz; scripts/make_teachers.py makes it" in found(lines, "demonstrator 2, random movements").found
+    assert found(compared, "demonstrator 1, random movements").found.rejected == 0
+    assert "2.npz; scripts/make_teachers.py makes it" in missing["demonstrator 2, random movements"]
 
 
 def test_a_run_counts_as_one_movement_its_mean(runs):
@@ -75,45 +79,70 @@ def test_a_run_counts_as_one_movement_its_mean(runs):
 
 
 def test_runs_that_are_missing_or_not_finished_are_told(demonstrators, runs):
-    lines = compare(runs)
-    assert found(lines, "SGIM-D taught by demonstrator 3, Random").rows == "2, 2 runs"
-    told = f"not run: sgim-d-teacher-2, 1 finished in {runs}, at least 2 are needed"
-    assert found(lines, "SGIM-D taught by demonstrator 2, Random").found == told
-    assert found(lines, "SGIM-D taught by demonstrators 1, 2, 3").found == told
+    compared, missing = compare(runs)
+    assert found(compared, "SGIM-D taught by demonstrator 3, Random").rows == "2, 2 runs"
+    told = f"sgim-d-teacher-2, 1 finished in {runs}, at least 2 are needed"
+    assert missing["SGIM-D taught by demonstrator 2, Random"] == told
+    assert missing["SGIM-D taught by demonstrators 1, 2, 3"] == told
     with pytest.raises(NotRun, match="nobody, 0 finished"):
         mean_thetas(runs, "nobody")
 
 
-@pytest.mark.parametrize("before", [None, EMPTY, "Prose.\n<!-- anova -->\nold\n<!-- end of anova -->\nMore.\n"])
-def test_the_table_is_told_and_written_in_its_place(demonstrators, tmp_path, capsys, before):
-    out = tmp_path / "new/RESULTS.md"
-    if before is not None:
-        out.parent.mkdir()
-        out.write_text(before)
-    assert main(["--runs", str(tmp_path / "none"), "--out", str(out)]) == 0
-    text = out.read_text()
-    table = text[text.index("<!-- anova -->\n") : text.index("<!-- end of anova -->")]
+def make_page(out, runs):
+    """The exit code of making RESULTS.md in ``out`` with the analyses of variance of ``runs``."""
+    write_paper(out / "paper.csv")
+    options = ["--results", out, "--runs", runs, "--out", out, "--only", "RESULTS"]
+    return command(main, list(map(str, options)))
+
+
+def test_the_table_is_kept_and_written_in_its_place(demonstrators, runs, tmp_path, capsys):
+    assert make_page(tmp_path, runs) == 0
+    text, said = (tmp_path / "RESULTS.md").read_text(), capsys.readouterr().err
+    table = text[text.index("| means compared |") : text.index("The paper rejects randomness")]
     assert "| demonstrator 3, random movements | 60, 60 movements | 4 of 25 |" in table
-    assert "not run: sgim-d-teacher-1, 0 finished" in table
-    assert "\nold\n" not in table
-    assert "| demonstrator 3, random movements |" in capsys.readouterr().out
-    kept = EMPTY if before is None else before
-    assert text.startswith(kept[:7])
-    assert text.count("<!-- claims -->") == kept.count("<!-- claims -->")
-    assert main(["--runs", str(tmp_path / "none"), "--out", str(out)]) == 0
-    assert out.read_text() == text
+    assert "| SGIM-D taught by demonstrator 2, Random | - | not run |" in table
+    assert [line.split(" | ")[0] for line in table.splitlines()[2:9]] == [f"| {groups}" for groups in COMPARISONS]
+    assert "SGIM-D taught by demonstrator 2, Random: not run: sgim-d-teacher-2, 1 finished" in said
+    with open(tmp_path / "anova.csv", newline="") as file:
+        rows = {row["compared"]: row for row in csv.DictReader(file)}
+    p = found(compare(runs)[0], "SGIM-D taught by demonstrator 3, Random").found.adjusted
+    kept = rows["SGIM-D taught by demonstrator 3, Random"]
+    assert (float(kept["smallest_p"]), float(kept["largest_p"])) == (p.min(), p.max())
+    assert len(rows) == len(COMPARISONS) - 3  # of demonstrator 2 nothing
 
 
-def test_a_place_marked_by_half_is_refused_and_left_alone(demonstrators, tmp_path, capsys):
-    out = tmp_path / "RESULTS.md"
-    out.write_text("<!-- anova -->\n")
-    assert main(["--runs", str(tmp_path), "--out", str(out)]) == 2
-    assert "and below it the line <!-- end of anova -->" in capsys.readouterr().err
-    assert out.read_text() == "<!-- anova -->\n"
+def test_without_run_directories_the_rows_of_earlier_ones_are_kept(demonstrators, runs, tmp_path, capsys):
+    assert make_page(tmp_path, runs) == 0
+    page, table = ((tmp_path / name).read_text() for name in ("RESULTS.md", "anova.csv"))
+    assert make_page(tmp_path, tmp_path / "none") == 0
+    assert (tmp_path / "RESULTS.md").read_text() == page
+    assert (tmp_path / "anova.csv").read_text() == table
+    assert "Random: not run: sgim-d, 0 finished" in (said := capsys.readouterr().err)
+    assert "its row stays as it was" in said
+
+
+def test_what_was_never_compared_says_so(tmp_path):
+    assert anova_cells(tmp_path / "none.csv") == [[groups, "-", "not run", "", ""] for groups in COMPARISONS]
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("demonstrator 1\n", "anova.csv must begin with compared,of,differ"),
+        ("{header}\na,b,1,25,0.1\n", "anova.csv, line 2 has 5 fields, not 6"),
+        ("{header}\na,b,1,25,small,1\n", "anova.csv, line 2: smallest_p must be a finite number"),
+    ],
+)
+def test_a_damaged_table_is_refused_and_no_page_written(tmp_path, capsys, text, says):
+    write_paper(tmp_path / "paper.csv")
+    (tmp_path / "anova.csv").write_text(text.format(header=",".join(anova.HEADER)))
+    assert command(main, ["--results", str(tmp_path), "--out", str(tmp_path), "--only", "RESULTS"]) == 2
+    assert f"error: {tmp_path}/{says}" in capsys.readouterr().err
+    assert not (tmp_path / "RESULTS.md").exists()
 
 
 def test_a_damaged_recording_is_named(demonstrators, tmp_path, capsys):
     (tmp_path / "3.npz").write_text("junk")
-    assert main(["--runs", str(tmp_path), "--out", str(tmp_path / "RESULTS.md")]) == 2
+    assert make_page(tmp_path / "out", tmp_path) == 2
     assert f"error: {tmp_path / '3.npz'} is no demonstration file" in capsys.readouterr().err
-    assert not (tmp_path / "RESULTS.md").exists()
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["paper.csv"]

@@ -1,18 +1,21 @@
-"""The verdicts on the paper's claims, and the tables that stand in results/RESULTS.md."""
+"""The verdicts on the paper's claims, the tables that stand in results/RESULTS.md, and how pages are made."""
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from claims import main
-from evidence import Evidence
-from judgements import CLAIMS, at_least, at_most, judge
+from claims import PAGES, main
+from judging import Results, at_least, at_most, judge
 from paper import SEEDS, TRUE, error, rows, spread, write_paper
+from paper_claims import PAPER_CLAIMS
 from read_results import ResultsError, read_goals, read_results
+from sgimd_torch.runs.process import command
 from sgimd_torch.views.statistics import Interval
 
-NAMES = [claim for claim, _, _ in CLAIMS]
+NAMES = [claim.text for claim in PAPER_CLAIMS]
+SHIPPED = Path(__file__).parents[2] / "results"
 
 
 def write_goals(path, sgim_d=(40, 60, 50), sagg_riac=(1, 0, 2)):
@@ -29,7 +32,12 @@ def results(tmp_path):
 
 
 def judged(results):
-    return judge(Evidence(read_results(results), read_goals(results.with_name("goals.csv"))))
+    return judge(PAPER_CLAIMS, Results(read_results(results), read_goals(results.with_name("goals.csv"))))
+
+
+def make_page(results, out):
+    """The exit code of making RESULTS.md."""
+    return command(main, ["--results", str(results.parent), "--out", str(out), "--only", "RESULTS"])
 
 
 def verdicts(results):
@@ -127,10 +135,15 @@ def cells(text, variant):
     return [cell.strip() for cell in line.strip("|").split("|")]
 
 
+def section(text, title):
+    """What stands below a title of the page."""
+    return re.search(rf"^##+ {title}$(.*?)(?=^##|\Z)", text, re.S | re.M)[1]
+
+
 def test_the_tables_give_each_variant_beside_sgim_d(results, tmp_path):
-    out = tmp_path / "new" / "RESULTS.md"
-    assert main(["--results", str(results), "--out", str(out)]) == 0
-    text = out.read_text()
+    out = tmp_path / "new"
+    assert make_page(results, out) == 0
+    text = (out / "RESULTS.md").read_text()
     experiment, _, seeds, early, late, _, better, difference, tiles = cells(text, "uniform-goals")
     assert (experiment, seeds) == ("ablations", str(SEEDS))
     middle = [spread(seed) for seed in range(1, 5)]
@@ -140,51 +153,65 @@ def test_the_tables_give_each_variant_beside_sgim_d(results, tmp_path):
     assert difference.startswith("+0.0050 [+0.00")
     assert tiles.startswith("292 [")
     assert cells(text, "sgim-d")[6:8] == ["", ""]
-    learners = text[text.index("<!-- learners -->") : text.index("<!-- end of learners -->")]
+    learners = section(text, "The five learners")
     order = re.findall(r"\| learners \| ([\w-]+)", learners)
     assert order == ["observation", "random", "sagg-riac", "imitation", "sgim-d"]  # the best last
     assert "uniform-goals" not in learners
+    assert "| uniform-goals |" in section(text, "Ablations, rivals and other teaching")
+    assert [line.split(" | ")[0][2:] for line in section(text, "The paper's claims").splitlines()[4:21]] == NAMES
 
 
-def test_the_same_results_give_the_same_file_and_prose_stays(results, tmp_path):
-    out = tmp_path / "RESULTS.md"
-    assert main(["--results", str(results), "--out", str(out)]) == 0
-    first = out.read_text()
-    prose = first.replace("## The five learners", "## Five of them\n\nBy hand, with a | and <!-- a comment -->.")
-    out.write_text(prose)
-    assert main(["--results", str(results), "--out", str(out)]) == 0
-    assert out.read_text() == prose
+def prose(text):
+    return [line for line in text.splitlines() if not line.startswith("|")]
+
+
+def test_the_same_results_give_the_same_file_and_only_tables_change(results, tmp_path):
+    page = tmp_path / "RESULTS.md"
+    assert make_page(results, tmp_path) == 0
+    first = page.read_text()
+    assert make_page(results, tmp_path) == 0
+    assert page.read_text() == first
     write_paper(results, sgim_d={"last": 0.13})
-    assert main(["--results", str(results), "--out", str(out)]) == 0
-    changed = out.read_text()
-    assert changed != prose
-    between = r"(<!-- (\w+) -->).*?(<!-- end of \2 -->)"
-    assert re.sub(between, "", changed, flags=re.S) == re.sub(between, "", prose, flags=re.S)
+    assert make_page(results, tmp_path) == 0
+    assert page.read_text() != first
+    assert prose(page.read_text()) == prose(first)
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "# Results\n",
-        "<!-- claims -->\n<!-- end of claims -->\n",  # no place for the others
-        "<!-- end of claims -->\n<!-- claims -->\n",
-        "<!-- claims -->\n<!-- claims -->\n<!-- end of claims -->\n",
-    ],
-)
-def test_a_file_without_its_markers_is_left_alone(results, tmp_path, capsys, text):
-    out = tmp_path / "RESULTS.md"
-    out.write_text(text)
-    assert main(["--results", str(results), "--out", str(out)]) == 2
-    assert "must hold the line <!-- " in capsys.readouterr().err
-    assert out.read_text() == text
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["RESULTS.md", "goals.csv", "paper.csv"]
+def test_the_shipped_pages_are_what_the_shipped_rows_and_templates_make(tmp_path, capsys):
+    """Change a template or the rows in results/, then run experiments/claims.py."""
+    assert command(main, ["--results", str(SHIPPED), "--out", str(tmp_path)]) == 0
+    for name in PAGES:
+        made, shipped = ((folder / f"{name}.md").read_text(encoding="utf-8") for folder in (tmp_path, SHIPPED))
+        assert made == shipped
+        assert f"experiments/pages/{name}.md.j2" in made.splitlines()[0]
+    assert "17 claims: 10 holds, 5 cannot say, 2 does not hold" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_a_page_of_another_kind_is_left_alone(tmp_path, capsys, name):
+    page = tmp_path / f"{name}.md"
+    page.write_text("# My thesis\n")
+    assert command(main, ["--results", str(SHIPPED), "--out", str(tmp_path)]) == 2
+    assert f"error: {page} was not made by claims.py" in capsys.readouterr().err
+    assert page.read_text() == "# My thesis\n"
+    assert [path.name for path in tmp_path.iterdir()] == [page.name]
+
+
+def test_a_page_that_cannot_be_written_is_named(results, tmp_path, capsys):
+    (tmp_path / "file").write_text("")
+    assert make_page(results, tmp_path / "file") == 2
+    assert f"{tmp_path / 'file'} is no folder" in capsys.readouterr().err
+    (tmp_path / "out" / "RESULTS.md").mkdir(parents=True)
+    assert make_page(results, tmp_path / "out") == 2
+    assert "RESULTS.md is a directory" in capsys.readouterr().err
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["RESULTS.md"]
 
 
 def test_seeds_that_only_one_side_has_are_left_out_of_pairs_and_that_is_told(results, tmp_path):
     text = [line for line in results.read_text().splitlines() if ",grid," not in line]
     results.write_text("\n".join([*text, *rows("grid", seeds=range(4, SEEDS + 3))]) + "\n")
-    assert main(["--results", str(results), "--out", str(tmp_path / "R.md")]) == 0
-    grid = cells((tmp_path / "R.md").read_text(), "grid")
+    assert make_page(results, tmp_path) == 0
+    grid = cells((tmp_path / "RESULTS.md").read_text(), "grid")
     assert grid[2] == "5"
     assert grid[7].endswith("(2 pairs)")
 
@@ -217,17 +244,19 @@ def test_a_malformed_table_is_refused_in_one_line(results, tmp_path, capsys, spo
     results.write_text(spoil(results.read_text()))
     with pytest.raises(ResultsError, match=message):
         read_results(results)
-    out = tmp_path / "RESULTS.md"
-    assert main(["--results", str(results), "--out", str(out)]) == 2
+    assert make_page(results, tmp_path) == 2
     said = capsys.readouterr().err
     assert said.startswith(f"error: {results}")
     assert said.count("\n") == 1
-    assert not out.exists()
+    assert not (tmp_path / "RESULTS.md").exists()
 
 
 def test_a_table_that_is_not_there_is_refused_with_where_it_comes_from(tmp_path, capsys):
-    assert main(["--results", str(tmp_path / "none.csv"), "--out", str(tmp_path / "R.md")]) == 2
-    assert "none.csv does not exist; experiments/compare.py writes" in capsys.readouterr().err
+    assert make_page(tmp_path / "none" / "paper.csv", tmp_path) == 2
+    assert "none/paper.csv does not exist; experiments/compare.py writes" in capsys.readouterr().err
+    (tmp_path / "paper.csv").write_text("")  # the table in the place of its folder
+    assert make_page(tmp_path / "paper.csv" / "paper.csv", tmp_path) == 2
+    assert "paper.csv/paper.csv does not exist; experiments/compare.py writes" in capsys.readouterr().err
 
 
 def test_goals_that_are_more_than_there_are_are_refused(results):
@@ -240,5 +269,6 @@ def test_the_help_teaches(capsys):
     with pytest.raises(SystemExit):
         main(["--help"])
     said = capsys.readouterr().out
-    assert "<!-- end of claims -->" in said
-    assert "python experiments/claims.py --results" in said
+    assert all(name in said for name in PAGES)
+    assert "experiments/pages/" in said
+    assert "python experiments/claims.py --runs runs" in said

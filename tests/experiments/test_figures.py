@@ -4,17 +4,17 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_hex
 
-from evidence import NotRun
-from figures import main
+from figures import FIGURES, Data, main
+from judging import NotRun, Results
 from paper import MOVEMENTS, SEEDS, TRUE, error, spread, write_paper
-from paper_figures import FIGURES, Data
-from read_results import read_results
+from read_results import LEARNERS, read_results
 from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.environments.fishing_rod import JOINTS
 from sgimd_torch.figures.learning import COLOURS, NAMES
+from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
 
-LEARNERS = [("random", 1), ("sagg-riac", 1), ("imitation", 1), ("sgim-d", 1), ("sagg-riac", 100), ("sgim-d", 100)]
+LIVED = [("random", 1), ("sagg-riac", 1), ("imitation", 1), ("sgim-d", 1), ("sagg-riac", 100), ("sgim-d", 100)]
 NEEDS_RUNS = {"landing", "goals"}
 
 
@@ -22,7 +22,7 @@ NEEDS_RUNS = {"landing", "goals"}
 def runs(tmp_path_factory, go):
     """Two seeds of the learners that are pooled, 40 movements each, the 30th after a demonstration."""
     out = tmp_path_factory.mktemp("runs")
-    for algorithm, task_space in LEARNERS:
+    for algorithm, task_space in LIVED:
         name = algorithm if task_space == 1 else f"{algorithm}-large"
         for seed in (0, 1) if name in ("random", "sgim-d-large") else (0,):
             options = f"--algorithm {algorithm} --name {name} --task_space {task_space} --seed {seed}"
@@ -37,7 +37,12 @@ def paper(tmp_path_factory):
 
 @pytest.fixture
 def data(paper, runs):
-    return Data(read_results(paper), runs)
+    return Data(Results(read_results(paper)), runs)
+
+
+def draw(*options):
+    """The exit code of the command."""
+    return command(main, list(map(str, options)))
 
 
 def lines_of(ax):
@@ -51,7 +56,7 @@ def middle(last):
 
 
 def test_every_figure_is_written_whole_in_both_forms(paper, runs, tmp_path, capsys):
-    assert main(["--results", str(paper), "--runs", str(runs), "--out", str(tmp_path)]) == 0
+    assert draw("--results", paper.parent, "--runs", runs, "--out", tmp_path) == 0
     assert {path.name for path in tmp_path.iterdir()} == {
         f"{name}.{kind}" for name in FIGURES for kind in ("png", "svg")
     }
@@ -64,7 +69,7 @@ def test_every_figure_is_written_whole_in_both_forms(paper, runs, tmp_path, caps
 
 def test_the_same_results_give_the_same_files(paper, tmp_path):
     for out in ("a", "b"):
-        assert main(["--results", str(paper), "--only", "errors", "--out", str(tmp_path / out)]) == 0
+        assert draw("--results", paper.parent, "--only", "errors", "--out", tmp_path / out) == 0
     for kind in ("png", "svg"):
         assert (tmp_path / "a" / f"errors.{kind}").read_bytes() == (tmp_path / "b" / f"errors.{kind}").read_bytes()
 
@@ -72,7 +77,7 @@ def test_the_same_results_give_the_same_files(paper, tmp_path):
 def test_the_errors_of_five_learners_show_their_seeds_their_number_and_their_noise(data):
     (ax,) = FIGURES["errors"](data).axes
     lines = lines_of(ax)
-    assert set(lines) == {f"{name} ({SEEDS} seeds)" for name in NAMES.values()}
+    assert set(lines) == {f"{name} ({SEEDS} seeds)" for name in map(NAMES.get, LEARNERS)}
     line = lines[f"SGIM-D ({SEEDS} seeds)"]
     assert to_hex(line.get_color()) == COLOURS["sgim-d"]
     np.testing.assert_array_equal(line.get_xdata(), MOVEMENTS)
@@ -130,8 +135,17 @@ def test_landing_points_of_all_seeds_are_pooled_on_one_scale(data):
     shown = {int(row) for run in data.runs("sgim-d") for row in run.demonstration if row >= 0}
     assert len(crosses.get_xdata()) == len(shown) > 0
     tiles = axes["Tiles after 5000 movements"]
-    assert [label.get_text() for label in tiles.get_yticklabels()] == list(NAMES.values())
+    assert [label.get_text() for label in tiles.get_yticklabels()] == [NAMES[name] for name in LEARNERS]
     assert 300 + (SEEDS - 1) / 2 in [line.get_xdata()[0] for line in tiles.lines]
+
+
+@pytest.mark.parametrize("name", ["errors", "demonstrators", "landing"])
+def test_an_algorithm_more_leaves_the_figures_of_the_paper_as_they_are(data, monkeypatch, name):
+    before = [(ax.get_title(), [*lines_of(ax)], len(ax.get_yticklabels())) for ax in FIGURES[name](data).axes]
+    monkeypatch.setitem(NAMES, "toddler", "Toddler")
+    monkeypatch.setitem(COLOURS, "toddler", "#000000")
+    after = [(ax.get_title(), [*lines_of(ax)], len(ax.get_yticklabels())) for ax in FIGURES[name](data).axes]
+    assert after == before
 
 
 def test_the_goals_of_the_large_space_are_those_the_learner_chose_each_once(data):
@@ -163,12 +177,12 @@ def test_variants_are_sorted_and_their_difference_to_sgim_d_is_that_of_the_seeds
 
 def test_figures_without_their_data_are_left_out_and_the_others_are_drawn(tmp_path, capsys):
     paper = write_paper(tmp_path / "paper.csv", without=["sagg-riac"])
-    assert main(["--results", str(paper), "--runs", str(tmp_path / "none"), "--out", str(tmp_path / "out")]) == 0
+    assert draw("--results", paper.parent, "--runs", tmp_path / "none", "--out", tmp_path / "out") == 0
     assert {path.stem for path in (tmp_path / "out").iterdir()} == {"variants", "trajectories"}
     said = capsys.readouterr().out
-    assert "landing is left out, for want of run directories" in said
+    assert "landing is left out; not run: run directories" in said
     for name in ("errors", "demonstrators", "large_space"):
-        assert f"{name} is left out, for want of sagg-riac\n" in said
+        assert f"{name} is left out; not run: sagg-riac\n" in said
 
 
 @pytest.mark.parametrize(
@@ -181,7 +195,7 @@ def test_figures_without_their_data_are_left_out_and_the_others_are_drawn(tmp_pa
     ],
 )
 def test_only_those_figures_are_left_out_that_need_a_variant(tmp_path, missing, left_out):
-    data = Data(read_results(write_paper(tmp_path / "paper.csv", without=[missing])), tmp_path)
+    data = Data(Results(read_results(write_paper(tmp_path / "paper.csv", without=[missing]))), tmp_path)
     for name in set(FIGURES) - NEEDS_RUNS - left_out:
         assert FIGURES[name](data).axes
     for name in left_out:
@@ -191,7 +205,7 @@ def test_only_those_figures_are_left_out_that_need_a_variant(tmp_path, missing, 
 
 def test_a_single_seed_is_drawn_without_an_interval(tmp_path):
     paper = write_paper(tmp_path / "paper.csv", **{name.replace("-", "_"): {"seeds": [0]} for name in TRUE})
-    (ax,) = FIGURES["errors"](Data(read_results(paper), tmp_path)).axes
+    (ax,) = FIGURES["errors"](Data(Results(read_results(paper)), tmp_path)).axes
     line = lines_of(ax)["Random (1 seed)"]
     np.testing.assert_allclose(line.get_ydata(), [error(0.2, 0, movements) for movements in MOVEMENTS])
 
@@ -202,8 +216,7 @@ def test_damage_ends_with_one_line_and_no_traceback(paper, runs, tmp_path, capsy
     table.write_text(paper.read_text() + ("junk\n" if damage == "table" else ""))
     (folder / "random" / "seed-000").mkdir(parents=True)
     (folder / "random" / "seed-000" / "config.json").write_text("{")
-    options = ["--results", str(table), "--runs", str(folder), "--out", str(tmp_path / "out"), "--only", "landing"]
-    assert main(options) == 2
+    assert draw("--results", tmp_path, "--runs", folder, "--out", tmp_path / "out", "--only", "landing") == 2
     said = capsys.readouterr().err.splitlines()
     assert said[-1].startswith("error: ")
     assert str(table if damage == "table" else folder) in said[-1]
@@ -211,7 +224,7 @@ def test_damage_ends_with_one_line_and_no_traceback(paper, runs, tmp_path, capsy
 
 def test_a_file_in_the_way_of_the_figures_is_named(paper, tmp_path, capsys):
     (tmp_path / "out").write_text("thesis")
-    assert main(["--results", str(paper), "--out", str(tmp_path / "out")]) == 2
+    assert draw("--results", paper.parent, "--out", tmp_path / "out") == 2
     assert f"{tmp_path / 'out'} is no folder" in capsys.readouterr().err
 
 

@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 
-from evidence import Evidence
-from model_claims import BARS, JUDGED, judge, main, read_coverages
+from claims import main
+from judging import Results, judge
+from model_claims import BARS, JUDGED, MODEL_CLAIMS
 from paper import HEADER, SEEDS, spread
-from read_results import ResultsError, read_results
+from read_results import MODEL_HEADER, ResultsError, read_coverages, read_results
+from sgimd_torch.runs.process import command
 
 TRUE = {  # variant: experiment, its errors (m) by movements
     "sgim-d": ("forward-model", {500: 0.1, 1000: 0.08, 2000: 0.06, 3000: 0.05, 5000: 0.045}),
@@ -34,13 +36,13 @@ def write(path, *, without=(), **spoilt):
 
 
 def verdicts(path, coverages=HONEST):
-    rows = judge(Evidence(read_results(path), {}), coverages)
+    rows = judge(MODEL_CLAIMS, Results(read_results(path), coverages=coverages))
     return {row.claim: row.verdict for row in rows}
 
 
 def test_where_every_bar_is_cleared_every_one_holds(tmp_path):
     found = verdicts(write(tmp_path / "x.csv"))
-    assert len(found) == len(JUDGED) * (len(BARS) + 1)
+    assert len(found) == len(JUDGED) * len(BARS)
     assert set(found.values()) == {"holds"}
 
 
@@ -87,28 +89,45 @@ def test_a_spread_may_be_neither_overconfident_nor_too_cautious(tmp_path, share,
     assert found["calibration: `model`"] == verdict
 
 
-def test_the_page_keeps_its_prose_and_gets_its_tables(tmp_path, capsys):
-    results, page = write(tmp_path / "x.csv"), tmp_path / "page.md"
-    table = tmp_path / "table.csv"
-    table.write_text("run,inside_80_late\nmodel/seed-000,0.8\nmodel/seed-001,0.82\ngradient/seed-000,nan\n")
-    options = ["--results", str(results), "--out", str(page), "--table", str(table)]
-    assert main(options) == 0
-    page.write_text(page.read_text().replace("# The forward model\n", "# The forward model\n\nProse.\n"))
-    assert main(options) == 0
-    text = page.read_text()
-    assert "\nProse.\n" in text
+def write_table(path, *lines):
+    """The table of model_figures.py: of each run its name and the share in its 80 % regions."""
+    rows = [{"run": run, "inside_80_late": share} for run, share in lines]
+    text = [",".join(MODEL_HEADER), *(",".join(str(row.get(name, 1)) for name in MODEL_HEADER) for row in rows)]
+    path.write_text("\n".join(text) + "\n")
+
+
+def make_page(tmp_path):
+    """The exit code of making FORWARD_MODEL.md from the rows there."""
+    options = ["--results", tmp_path, "--table", tmp_path / "table.csv", "--out", tmp_path, "--only", "FORWARD_MODEL"]
+    return command(main, list(map(str, options)))
+
+
+def test_the_page_has_its_prose_and_gets_its_tables(tmp_path, capsys):
+    write(tmp_path / "forward_model.csv")
+    write_table(tmp_path / "table.csv", ("model/seed-000", 0.8), ("model/seed-001", 0.82), ("gradient/seed-000", "nan"))
+    assert make_page(tmp_path) == 0
+    text = (tmp_path / "FORWARD_MODEL.md").read_text()
+    assert "\n# The forward model\n" in text
     assert "0.81 [0.80, 0.82], single runs 0.80 to 0.82" in text
     (line,) = (line for line in text.splitlines() if line.startswith("| sagg-riac-model |"))
     assert "−0.01" in line  # compared with sagg-riac, not with SGIM-D
     assert "9 holds, 1 cannot say" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("text", ["variant,x\nmodel,1\n", "run,inside_80_late\nmodel/seed-000,much\n"])
-def test_a_table_of_something_else_is_refused_and_the_page_untouched(tmp_path, capsys, text):
-    (tmp_path / "table.csv").write_text(text)
-    with pytest.raises(ResultsError, match=r"table\.csv is no table of model_figures\.py"):
-        read_coverages(tmp_path / "table.csv")
-    results, page = write(tmp_path / "x.csv"), tmp_path / "page.md"
-    assert main(["--results", str(results), "--out", str(page), "--table", str(tmp_path / "table.csv")]) == 2
-    assert "error:" in capsys.readouterr().err
-    assert not page.exists()
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (lambda text: "variant,x\nmodel,1\n", "table.csv must begin with run,predicted"),
+        (lambda text: text.replace("0.8,", "much,"), "table.csv, line 2: inside_80_late must be a finite number"),
+    ],
+)
+def test_a_table_of_something_else_is_refused_and_the_page_untouched(tmp_path, capsys, spoil, message):
+    table = tmp_path / "table.csv"
+    write_table(table, ("model/seed-000", 0.8))
+    table.write_text(spoil(table.read_text()))
+    with pytest.raises(ResultsError, match=message):
+        read_coverages(table)
+    write(tmp_path / "forward_model.csv")
+    assert make_page(tmp_path) == 2
+    assert f"error: {tmp_path}" in capsys.readouterr().err
+    assert not (tmp_path / "FORWARD_MODEL.md").exists()

@@ -9,6 +9,7 @@ import pytest
 
 from model_figures import LATE, figure_of, main, read_model_run, row
 from sgimd_torch.runs.log import Columns
+from sgimd_torch.runs.process import command
 from sgimd_torch.spaces import Episode, Move, stream
 
 FIRST = 50  # exemplars that are learnt before anything is predicted
@@ -67,7 +68,7 @@ def short(tmp_path):
 def refused(path, capsys, *options):
     """What main says of a run that it refuses, without having written anything."""
     out = path.parents[2] / "refused"
-    assert main([str(path), *options, "--out", str(out)]) == 2
+    assert command(main, [str(path), *options, "--out", str(out)]) == 2
     assert not out.exists()
     said = capsys.readouterr().err.splitlines()
     assert len(said) == 1
@@ -75,7 +76,7 @@ def refused(path, capsys, *options):
 
 
 def test_the_table_tells_error_coverage_refinements_and_refreshes(honest, tmp_path, capsys):
-    assert main([str(honest), "--out", str(tmp_path / "out")]) == 0
+    assert command(main, [str(honest), "--out", str(tmp_path / "out")]) == 0
     (told,) = table_of(tmp_path / "out")
     assert told["run"] == "sgim-d/seed-000"
     assert told["predicted"] == 3000 - FIRST
@@ -111,18 +112,18 @@ def test_an_overconfident_model_is_told_from_an_honest_and_a_cautious_one(tmp_pa
 
 def test_what_is_not_known_is_a_dash_and_not_a_number(tmp_path, capsys):
     path = write_run(tmp_path / "x" / "seed-000", summary={})
-    assert main([str(path), "--out", str(tmp_path / "out")]) == 0
+    assert command(main, [str(path), "--out", str(tmp_path / "out")]) == 0
     line = capsys.readouterr().out.splitlines()[1]
     assert "- / - / -" in line  # it never came to 2000 movements
     assert line.endswith("-")  # nor says its summary how long refreshes took
 
 
 def test_each_run_gets_a_line_and_the_first_of_a_variant_a_figure_the_same_again(short, honest, tmp_path):
-    assert main([str(short), str(honest), "--out", str(tmp_path / "both")]) == 0
+    assert command(main, [str(short), str(honest), "--out", str(tmp_path / "both")]) == 0
     assert [told["run"] for told in table_of(tmp_path / "both")] == ["sgim-d/seed-001", "sgim-d/seed-000"]
     files = {path.name for path in (tmp_path / "both").iterdir()}
     assert files == {"sgim-d-seed-001.png", "table.csv"}
-    assert main([str(short), "--out", str(tmp_path / "again")]) == 0
+    assert command(main, [str(short), "--out", str(tmp_path / "again")]) == 0
     pictures = [(tmp_path / out / "sgim-d-seed-001.png").read_bytes() for out in ("both", "again")]
     assert pictures[0] == pictures[1]
     assert pictures[0].endswith(b"IEND\xaeB`\x82")
@@ -220,9 +221,9 @@ def test_two_runs_of_one_name_are_not_drawn_over_each_other(short, capsys):
 
 def test_what_stands_in_the_way_of_the_figures_is_named(short, tmp_path, capsys):
     (tmp_path / "file").write_text("")
-    assert main([str(short), "--out", str(tmp_path / "file")]) == 2
+    assert command(main, [str(short), "--out", str(tmp_path / "file")]) == 2
     assert f"{tmp_path / 'file'} is no folder" in capsys.readouterr().err
     (tmp_path / "out" / "sgim-d-seed-001.png").mkdir(parents=True)
-    assert main([str(short), "--out", str(tmp_path / "out")]) == 2
+    assert command(main, [str(short), "--out", str(tmp_path / "out")]) == 2
     assert "sgim-d-seed-001.png is a directory" in capsys.readouterr().err
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["sgim-d-seed-001.png"]

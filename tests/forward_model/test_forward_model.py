@@ -368,4 +368,4 @@ def test_numbers_out_of_their_range_are_refused(options):
 def test_without_its_packages_it_says_what_to_install():
     program = "import sys; sys.modules['lightning'] = None\nimport sgimd_torch.forward_model.model"
     run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
-    assert "ImportError: the forward model needs sgimd-torch[forward]" in run.stderr
+    assert "ImportError: the forward model needs torch: pip install 'sgimd-torch[forward]'" in run.stderr

@@ -8,15 +8,17 @@ import numpy as np
 import pytest
 
 from runs import csv_of
+from sgimd_torch.catalogue import CATALOGUE
 from sgimd_torch.demonstrations import save_demonstrations
 from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import Benchmark, save_benchmark
 from sgimd_torch.runs.build import build
 from sgimd_torch.runs.command_line import main
-from sgimd_torch.runs.config import ALGORITHMS, Config
+from sgimd_torch.runs.config import Config
+from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
-from sgimd_torch.runs.tasks import ARMS, arm_benchmark, arm_demonstrations
+from sgimd_torch.runs.tasks import arm_benchmark, arm_demonstrations
 from sgimd_torch.spaces import Demonstration, stream
 from sgimd_torch.views import demo
 from sgimd_torch.views.film import command as film
@@ -25,12 +27,14 @@ from sgimd_torch.views.report.data import demonstrated, read_life
 from tasks import tiles_reached
 
 NO_CONTEXT = np.empty(0)
+ALGORITHMS = CATALOGUE["algorithm"]
+ARMS = {"planar-arm-7": 7, "planar-arm-50": 50}
 
 
 def live(out, *options):
     """The exit code of a short run; later options win."""
     short = ("--environment", "planar-arm-7", "--seed", 3, "--movements", 70, "--evaluate_at", 40, "--repeats", 2)
-    return main([str(word) for word in (*short, "--out", out, *options)])
+    return command(main, [str(word) for word in (*short, "--out", out, *options)])
 
 
 @pytest.fixture(scope="module")
@@ -148,7 +152,7 @@ def test_noise_and_task_space_are_the_rods(tmp_path, reference, capsys):
     assert live(tmp_path, "--noise", 0.5, "--task_space", 100) == 0
     said = capsys.readouterr().err
     assert "--noise has no effect with --environment planar-arm-7\n" in said
-    assert "--task_space has no effect with --environment planar-arm-7\n" in said
+    assert "--task-space has no effect with --environment planar-arm-7\n" in said
     assert csv_of(tmp_path / "sgim-d" / "seed-003") == csv_of(reference)
     assert not Config(noise=0.5, task_space=100.0).without_effect
 

@@ -11,17 +11,19 @@ from tensorboard.backend.event_processing.event_file_loader import EventFileLoad
 from tensorboard.plugins.custom_scalar import layout_pb2
 from tensorboard.util.tensor_util import make_ndarray
 
-from runs import EAGER, signal_after, start
+from runs import EAGER, LIVE, RUN, signal_after, start
+from sgimd_torch.catalogue import CATALOGUE
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import Benchmark, save_benchmark
 from sgimd_torch.forward_model.model import ForwardModel
 from sgimd_torch.memory import Memory
 from sgimd_torch.runs.build import LEAST_NOISE, build
 from sgimd_torch.runs.command_line import main
-from sgimd_torch.runs.config import MODEL_SEARCHES, Config
+from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.directory import RunDirectory
 from sgimd_torch.runs.log import Columns
 from sgimd_torch.runs.model_record import LEGEND, RunModel
+from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.spaces import Episode, Move, stream
 
@@ -46,7 +48,7 @@ def arguments(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def live(arguments):
-    return lambda out, *options: main(arguments(out, *options))
+    return lambda out, *options: command(main, arguments(out, *options))
 
 
 @pytest.fixture(scope="module")
@@ -146,7 +148,7 @@ def test_a_replay_that_fails_leaves_the_record_of_the_model_as_it_was(tmp_path, 
 
 def test_a_run_without_a_model_writes_no_record_of_one_and_loads_no_library_for_it(tmp_path, arguments):
     loaded = "{'torch', 'lightning', 'safetensors'} & set(sys.modules)"
-    program = f"import run, sys; code = run.main(sys.argv[1:]); print({loaded}); sys.exit(code)"
+    program = f"{RUN}; code = command_line.main(sys.argv[1:]); print({loaded}); sys.exit(code)"
     process = start(program, *arguments(tmp_path, "--movements", 60))
     output, errors = process.communicate()
     assert process.returncode == 0, errors
@@ -157,11 +159,11 @@ def test_a_run_without_a_model_writes_no_record_of_one_and_loads_no_library_for_
 
 
 def test_without_its_packages_a_run_with_a_model_is_refused_and_says_what_to_install(tmp_path, arguments):
-    program = "import sys; sys.modules['lightning'] = None; import run; sys.exit(run.main(sys.argv[1:]))"
+    program = f"import sys; sys.modules['lightning'] = None; {LIVE}"
     process = start(program, *arguments(tmp_path / "out", *MODEL))
     _, errors = process.communicate()
     assert process.returncode == 2
-    assert "error: the forward model needs sgimd-torch[forward]" in errors
+    assert "error: the forward model needs torch: pip install 'sgimd-torch[forward]'" in errors
     assert "Traceback" not in errors
     assert not (tmp_path / "out").exists()
 
@@ -256,7 +258,10 @@ def test_options_of_a_model_that_is_not_there_are_named():
     given = {"members": 5, "noise_heads": False, "training": 1.0, "focus": 0.5, "anchored": False, "residual": False}
 
     def named(**options):
-        return {note.split()[0].removeprefix("--"): note for note in Config(**given, **options).without_effect}
+        return {
+            note.split()[0].removeprefix("--").replace("-", "_"): note
+            for note in Config(**given, **options).without_effect
+        }
 
     assert named().keys() == given.keys()
     assert "without a forward model, see --search and --inverse" in named()["members"]
@@ -273,10 +278,10 @@ def test_options_of_a_model_that_is_not_there_are_named():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ("--members 0", "members must be at least 1, got 0"),
-        ("--members 101", "members must be at most 100, got 101"),
+        ("--members 0", "members must be from 1 to 100, got 0"),
+        ("--members 101", "members must be from 1 to 100, got 101"),
         ("--members 1.5", "--members must be a whole number, got 1.5"),
-        ("--training 0", "training must be above 0 and at most 100 steps a movement, got 0"),
+        ("--training 0", "training must be above 0 and at most 100, got 0.0; it counts steps a movement"),
         ("--training 101", "training must be above 0 and at most 100"),
         ("--training .nan", "training must be above 0"),
         ("--focus 0.8", "focus must be from 0 to 0.75, got 0.8"),
@@ -294,7 +299,7 @@ def test_options_that_make_no_sense_are_refused(tmp_path, live, capsys, options,
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("search", MODEL_SEARCHES)
+@pytest.mark.parametrize("search", [word for word, entry in CATALOGUE["search"].items() if "model" in entry.uses])
 def test_a_search_through_the_model_makes_one_of_the_size_of_its_robot(search):
     environments = {"planar-arm-50": (50, LEAST_NOISE), "fishing-rod": (25, None)}
     for environment, (theta_dim, noise) in environments.items():

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from runs import ROOT
+from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.views.watch import boards_below, free_port, main
 
@@ -29,9 +30,9 @@ def runs(tmp_path_factory, go):
 
 
 def watching(runs, port):
-    command = [sys.executable, str(ROOT / "experiments" / "watch.py"), str(runs), "--port", str(port)]
+    words = [sys.executable, "-m", "sgimd_torch", "watch", str(runs), "--port", str(port)]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    return subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    return subprocess.Popen(words, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
 @pytest.fixture(scope="module")
@@ -142,15 +143,15 @@ def test_a_port_that_is_taken_is_passed_over():
 
 @pytest.mark.parametrize(("options", "says"), [(["--port", "0"], "1 to 65535"), (["--prot", "1"], "--prot")])
 def test_an_option_that_cannot_be_is_refused(runs, capsys, options, says):
-    assert main([str(runs), *options]) == 2
+    assert command(main, [str(runs), *options]) == 2
     assert says in capsys.readouterr().err
 
 
 def test_runs_without_a_board_are_told_how_to_get_one(tmp_path, go, capsys):
     assert go(tmp_path) == 0
-    assert main([str(tmp_path)]) == 2
+    assert command(main, [str(tmp_path)]) == 2
     assert "--board true" in capsys.readouterr().err
-    assert main([str(tmp_path / "nowhere")]) == 2
+    assert command(main, [str(tmp_path / "nowhere")]) == 2
     assert "no directory" in capsys.readouterr().err
 
 

@@ -68,7 +68,7 @@ class Shot:
         return f"goal {_place(self.goal)}   {time:.2f} s{'   line let out' if let_out else ''}"
 
 
-class NoGraphics(RuntimeError):
+class NoGraphics(ImportError):
     """MuJoCo finds no OpenGL to draw with."""
 
 

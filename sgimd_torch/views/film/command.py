@@ -10,116 +10,90 @@ from __future__ import annotations
 import argparse
 import os
 import re
-import signal
 import sys
 from collections.abc import Iterator, Sequence
-from dataclasses import fields
 from pathlib import Path
-from types import FrameType
-from typing import Any
+from typing import Any, Protocol
 
-if __name__ == "__main__":
-    signal.signal(signal.SIGINT, lambda *_: os._exit(130))  # Ctrl-C while the libraries below are loading
-    if sys.platform == "linux":
-        os.environ.setdefault("MUJOCO_GL", "egl")  # draws without a display
-    try:
-        import mujoco  # noqa: F401
-    except (ImportError, AttributeError, RuntimeError) as error:  # each kind of OpenGL fails in its own way
-        asked = os.environ.get("MUJOCO_GL")
-        print(f"error: MUJOCO_GL={asked} cannot be had here ({error}); set MUJOCO_GL=egl, or unset it", file=sys.stderr)
-        sys.exit(2)
+if "mujoco" not in sys.modules and sys.platform == "linux":
+    os.environ.setdefault("MUJOCO_GL", "egl")  # draws without a display
+try:
+    import mujoco
+except (ImportError, AttributeError, RuntimeError) as error:  # each kind of OpenGL fails in its own way
+    asked = os.environ.get("MUJOCO_GL")
+    raise ImportError(f"MUJOCO_GL={asked} cannot be had here ({error}); set MUJOCO_GL=egl, or unset it") from error
 
 import numpy as np
 from tqdm import tqdm
 
-from sgimd_torch.environments.fishing_rod import FishingRod
+from sgimd_torch.environments.rod_physics import Recording
 from sgimd_torch.runs.build import RunParts, build
-from sgimd_torch.runs.config import Config
+from sgimd_torch.runs.config import Config, from_settings
 from sgimd_torch.runs.log import RunError
-from sgimd_torch.runs.process import say, with_streams
 from sgimd_torch.runs.read import Run, read_run
-from sgimd_torch.spaces import Array, stream
+from sgimd_torch.spaces import Array, Box, stream
 from sgimd_torch.strategies import Remember
-
-try:
-    from sgimd_torch.views.film.camera import (
-        Camera,
-        Frame,
-        NoGraphics,
-        Shot,
-        count_frames,
-        shoot,
-        write_film,
-        write_sheet,
-    )
-except ImportError as error:
-    print(f"error: {error}", file=sys.stderr)
-    sys.exit(2)
+from sgimd_torch.views.film.camera import Camera, Frame, Shot, count_frames, shoot, write_film, write_sheet
 
 AFTER = (100, 500, 1000, 5000)
 EXAMPLES = """examples:
-  scripts/film runs/sgim-d/seed-003                               six goals all around, into runs/sgim-d/seed-003.mp4
-  scripts/film runs/sgim-d/seed-003 --goals 0.3,0.6 -0.5,0.4      these two
-  scripts/film runs/sgim-d/seed-003 --time-lapse                  each goal after 100, 500, 1000 and 5000 movements
-  scripts/film runs/sgim-d/seed-003 --time-lapse --after 50,200   after 50 and 200
+  sgimd film runs/sgim-d/seed-003                               six goals all around, into runs/sgim-d/seed-003.mp4
+  sgimd film runs/sgim-d/seed-003 --goals 0.3,0.6 -0.5,0.4      these two
+  sgimd film runs/sgim-d/seed-003 --time-lapse                  each goal after 100, 500, 1000 and 5000 movements
+  sgimd film runs/sgim-d/seed-003 --time-lapse --after 50,200   after 50 and 200
 """
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Infer, cast, film.
+class Filmed(Protocol):
+    """An environment that can be filmed: ``model`` is MuJoCo's, ``record`` executes and keeps what happened."""
 
-    Returns:
-        The exit code: 0 done; 2 the request is wrong, or there is no OpenGL; 130 stopped by Ctrl-C or SIGTERM.
+    model: mujoco.MjModel
+    outcomes: Box
+    contexts: Box
+
+    def record(self, context: Array, theta: Array, rng: np.random.Generator) -> Recording:
+        """One movement, with the noise of ``rng``."""
+        ...
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Infer, cast, film; 0 when the film is there.
+
+    Raises:
+        ValueError, OSError, ImportError: the request is wrong, or there is nothing to draw with.
     """
     options = _options(argv)
-    previous = [signal.signal(number, _interrupt) for number in (signal.SIGINT, signal.SIGTERM)]
-    try:
-        run = read_run(options.run)
-        parts = build(config_of(run))
-        rod = parts.environment
-        if not isinstance(rod, FishingRod):
-            raise RunError(f"{run.path} is of {run.config['environment']}; a film shows the fishing rod only")
-        goals = rod.outcomes.check("goals", options.goals or _spread(parts.benchmark.goals), "in metres")
-        stages = _stages(run, options)
-        width = options.width or (480 if len(stages) > 1 else 640)
-        with Camera(rod.model, width=width, height=width * 3 // 4) as camera:
-            shots = _cast(run, parts, rod, goals, stages, say_movements=len(stages) > 1)
-            _film(options, camera, [[stage[k] for stage in shots] for k in range(len(goals))])
-    except KeyboardInterrupt:
-        say("stopped; no film was written")
-        return 130
-    except (NoGraphics, ImportError, OSError, ValueError) as error:  # RunError, too
-        say(f"error: {error}")
-        return 2
-    finally:
-        for number, handler in zip((signal.SIGINT, signal.SIGTERM), previous, strict=True):
-            signal.signal(number, handler)
+    run = read_run(options.run)
+    parts = build(config_of(run))
+    robot: Any = parts.environment
+    if not (hasattr(robot, "record") and hasattr(robot, "model")):
+        raise RunError(
+            f"{run.path} is of {run.config['environment']}, which cannot be filmed: it has no model of MuJoCo and no "
+            "method record(context, theta, rng)"
+        )
+    goals = robot.outcomes.check("goals", options.goals or _spread(parts.benchmark.goals), "in metres")
+    stages = _stages(run, options)
+    width = options.width or (480 if len(stages) > 1 else 640)
+    with Camera(robot.model, width=width, height=width * 3 // 4) as camera:
+        shots = _cast(run, parts, robot, goals, stages, say_movements=len(stages) > 1)
+        _film(options, camera, [[stage[k] for stage in shots] for k in range(len(goals))])
     for movements, stage in zip(stages, shots, strict=True):
         missed = np.array([shot.missed for shot in stage])
         print(
-            f"after {movements} movements: {missed.mean():.3f} m from the goal on the mean, {missed.max():.3f} at most"
+            f"after {movements} movements: mean distance to the goal {missed.mean():.3f} m, at most {missed.max():.3f}"
         )
     print(f"Film {options.out}" + (f", sheet {options.sheet}" if options.sheet else ""))
     return 0
 
 
 def config_of(run: Run) -> Config:
-    """The choices that made a run, of its config.json; those that it does not name were not there to make.
+    """The choices that made a run.
 
     Raises:
         RunError: they make no sense.
     """
-    values: dict[str, Any] = {}
-    for field in fields(Config):
-        value = run.config.get(field.name)
-        if isinstance(value, list):
-            value = tuple(value)
-        elif isinstance(value, str) and "Path" in str(field.type):
-            value = Path(value)
-        if field.name in run.config:
-            values[field.name] = value
     try:
-        return Config(**values)
+        return from_settings(run.config)
     except (TypeError, ValueError) as error:
         raise RunError(f"{run.path}/config.json does not describe a run of this version: {error}") from error
 
@@ -141,11 +115,11 @@ def remember(run: Run, parts: RunParts, start: int, stop: int) -> None:
 
 
 def _cast(
-    run: Run, parts: RunParts, rod: FishingRod, goals: Array, stages: Sequence[int], *, say_movements: bool
+    run: Run, parts: RunParts, robot: Filmed, goals: Array, stages: Sequence[int], *, say_movements: bool
 ) -> list[list[Shot]]:
     """For each stage, the run's answer to each goal; a goal meets the same motor noise at every stage."""
     shots = []
-    context = (rod.contexts.low + rod.contexts.high) / 2
+    context = (robot.contexts.low + robot.contexts.high) / 2
     title = f"{run.config['name'] or run.config['algorithm']}, seed {run.config['seed']}"
     for before, movements in zip((0, *stages), stages, strict=False):
         remember(run, parts, before, movements)
@@ -158,7 +132,7 @@ def _cast(
         stage = []
         for k, goal in enumerate(goals):
             theta = parts.inverse(context, goal).theta
-            recording = rod.record(context, theta, stream(run.config["seed"], "film", k))
+            recording = robot.record(context, theta, stream(run.config["seed"], "film", k))
             shown = f"after {movements} movements" if say_movements else f"{title}, after {movements} movements"
             stage.append(Shot(recording, goal, shown, landed))
         shots.append(stage)
@@ -207,7 +181,7 @@ def _spread(goals: Array) -> Array:
 
 def _options(argv: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
-        prog="scripts/film",
+        prog="sgimd film",
         description=__doc__,
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
@@ -263,11 +237,3 @@ def _width(text: str) -> int:
     if width % 8 or not 160 <= width <= 1280:
         raise argparse.ArgumentTypeError(f"must be from 160 to 1280 in steps of 8, got {text!r}")
     return width
-
-
-def _interrupt(number: int, frame: FrameType | None) -> None:
-    raise KeyboardInterrupt
-
-
-if __name__ == "__main__":
-    sys.exit(with_streams(main))

@@ -21,7 +21,7 @@ if __name__ == "__main__":  # Ctrl-C while the libraries below are loading
 
 from tqdm import tqdm
 
-from sgimd_torch.runs.catalogue import ROD
+from sgimd_torch.catalogue import ROD
 from sgimd_torch.runs.log import RunError, write_whole
 from sgimd_torch.runs.process import say, with_streams
 from sgimd_torch.views.report.data import Life, Variant, find, read_life

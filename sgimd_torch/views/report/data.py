@@ -16,16 +16,15 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from evidence import rng
+from sgimd_torch.catalogue import ROD
 from sgimd_torch.demonstrations import SHIPPED, load_demonstrations
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.figures.learning import NAMES
-from sgimd_torch.runs.catalogue import ROD
 from sgimd_torch.runs.log import RunError
 from sgimd_torch.runs.read import find_runs, read_run
 from sgimd_torch.runs.tasks import arm_demonstrations
 from sgimd_torch.spaces import Array
-from sgimd_torch.views.statistics import Interval, iqm_interval, mean_over_life, ratio_interval
+from sgimd_torch.views.statistics import Interval, iqm_interval, mean_over_life, ratio_interval, rng
 
 EARLY: Final = 1000  # movements, of the column beside the last error
 GOALS: Final = 100  # the last ones are shown

@@ -16,13 +16,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from PIL import Image
 
-from evidence import rng
 from sgimd_torch.figures.learning import COLOURS, interest_map, landing_points
 from sgimd_torch.figures.movements import interest_over_time
 from sgimd_torch.figures.results import Difference, forest
 from sgimd_torch.spaces import Box
 from sgimd_torch.views.report.data import Life, Variant, demonstrated
-from sgimd_torch.views.statistics import difference_interval, paired_differences
+from sgimd_torch.views.statistics import difference_interval, paired_differences, rng
 
 REACH: Final = 1.5  # m; the float hardly ever lands farther from the base
 MOST_CURVES: Final = 8

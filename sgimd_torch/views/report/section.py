@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from sgimd_torch.runs.catalogue import ROD
+from sgimd_torch.catalogue import ROD
 from sgimd_torch.views.report import figures
 from sgimd_torch.views.report.data import GOALS, Life, Variant
 from sgimd_torch.views.report.films import Film, command

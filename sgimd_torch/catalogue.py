@@ -12,12 +12,10 @@ import importlib
 import inspect
 import os
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from typing import Any, Final
-
-from sgimd_torch.runs.process import did_you_mean
 
 
 @dataclass(frozen=True)
@@ -124,12 +122,14 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
             "fills an archive of outcomes (extra rivals)",
             ignores=_AIM,
             label="MAP-Elites",
+            colour="#56b4e9",
         ),
         "cma-me": _at(
             "rivals.quality_diversity:cma_me",
             "the same with evolution strategies (extra rivals)",
             ignores=_AIM,
             label="CMA-ME",
+            colour="#e69f00",
         ),
     },
     "environment": {
@@ -287,6 +287,22 @@ def check(kind: str, word: str, made: object) -> None:
         )
 
 
+def check_call(
+    kind: str, word: str, make: Callable[..., Any], arguments: Sequence[Any], options: Mapping[str, Any]
+) -> None:
+    """Refuse what cannot be called as one of its kind is.
+
+    Raises:
+        ValueError: with the call that was wanted.
+    """
+    try:
+        inspect.signature(make).bind(*arguments, **options)
+    except TypeError as error:
+        raise ValueError(f"{kind} {word} cannot be called as {_WANTED[kind][0]}: {error}") from error
+    except ValueError:  # a builtin says nothing of its parameters
+        pass
+
+
 def load(place: str, what: str = "") -> Any:
     """The attribute at ``package.module:attribute``; packages of the working directory are found, too.
 
@@ -326,6 +342,12 @@ def colour(algorithm: str) -> str:
     """How figures draw an algorithm."""
     entry = CATALOGUE["algorithm"].get(algorithm)
     return entry.colour if entry else "black"
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """``; did you mean grid?``, or nothing where no known name is near."""
+    near = get_close_matches(name.lower().replace("_", "-"), list(known), 1, 0.5)
+    return f"; did you mean {near[0]}?" if near else ""
 
 
 def _keywords(made: Callable[..., Any]) -> set[str]:

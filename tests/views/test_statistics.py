@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from sgimd_torch.spaces import stream
-from sgimd_torch.views import statistics as over_seeds
+from sgimd_torch.views import statistics
 from sgimd_torch.views.statistics import (
     anova,
     difference_interval,
@@ -55,7 +55,7 @@ def test_the_same_stream_gives_the_same_interval():
 
 
 def test_an_interval_holds_the_truth_about_as_often_as_it_says(rng, monkeypatch):
-    monkeypatch.setattr(over_seeds, "RESAMPLES", 499)
+    monkeypatch.setattr(statistics, "RESAMPLES", 499)
     found = [iqm_interval(rng.normal(size=10), rng=rng) for _ in range(400)]
     share = np.mean([each.low <= 0 <= each.high for each in found])
     assert 0.90 < share < 0.98  # .945 measured on 2000; its standard error here is .011

@@ -1,0 +1,209 @@
+"""How a claim is judged: what it is judged on, the bar it has to clear, and one loop for all of them.
+
+A bar counts as cleared only if the whole 95 % interval clears it. If the interval straddles the bar, or runs are
+missing, nothing can be said.
+    results = Results(read_results("results/paper.csv"))
+    judge([Claim("half of Random's error", "ratio ≤ 0.50", ratio_at_most("sgim-d", "random", 0.5))], results)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from read_results import LAST, Evaluated
+from sgimd_torch.spaces import Array
+from sgimd_torch.views.statistics import (
+    Interval,
+    difference_interval,
+    improvement_interval,
+    interquartile_mean,
+    interval,
+    iqm_interval,
+    mean_over_life,
+    metres,
+    movements_to_reach,
+    ratio_interval,
+    rng,
+    show,
+)
+
+HOLDS: Final = "holds"
+FAILS: Final = "does not hold"
+OPEN: Final = "cannot say"
+Judged = tuple[str, str]  # our number in words, and the verdict
+
+
+class NotRun(LookupError):
+    """A claim, a table or a figure needs runs or evaluations that are not there; the message names them."""
+
+
+@dataclass(frozen=True, eq=False)
+class Results:
+    """What is claimed is judged on this: ``variants`` as of ``read_results``, and for some claims ``goals`` as of
+    ``read_goals`` and ``coverages`` as of ``read_coverages``.
+
+    Errors are in metres, intervals hold 95 % of a bootstrap over seeds. All methods raise ``NotRun`` where fewer than 2
+    seeds have what they need.
+    """
+
+    variants: Mapping[str, Evaluated]
+    goals: Mapping[str, Array] = field(default_factory=dict)
+    coverages: Mapping[str, Array] = field(default_factory=dict)
+
+    def at(self, variant: str, movements: int = LAST, values: str = "errors") -> dict[int, float]:
+        """Seed -> value of "errors", "floors" or "tiles"."""
+        found = self.variants[variant].at(movements, values) if variant in self.variants else {}
+        if len(found) < 2:
+            what = f": {len(found)} with {values} at {movements}" if variant in self.variants else ""
+            raise NotRun(f"{variant}{what}")
+        return found
+
+    def errors(self, variant: str, movements: int = LAST) -> Array:
+        """``(n_seeds,)``."""
+        return _array(self.at(variant, movements))
+
+    def curves(self, variant: str) -> tuple[Array, Array]:
+        """``(n,)`` movements and ``(n_seeds, n)`` errors, of the seeds that were evaluated at each of them."""
+        self.at(variant)
+        movements, errors = self.variants[variant].curves()
+        if len(errors) < 2 or len(movements) < 2:
+            raise NotRun(f"{variant}: {len(errors)} whole curves")
+        return movements, errors
+
+    def lives(self, variant: str) -> Array:
+        """``(n_seeds,)``, the mean of each error curve over its movements."""
+        return mean_over_life(*self.curves(variant))
+
+    def iqm(self, variant: str, movements: int = LAST, values: str = "errors") -> Interval:
+        """The interquartile mean over seeds."""
+        return iqm_interval(_array(self.at(variant, movements, values)), rng=rng())
+
+    def pairs(self, ours: str, theirs: str, movements: int = LAST) -> tuple[dict[int, float], dict[int, float]]:
+        """Errors of both by seed, of the seeds that both have."""
+        return shared(self.at(ours, movements), self.at(theirs, movements))
+
+    def difference(self, ours: str, theirs: str, movements: int = LAST) -> Interval:
+        """Ours - theirs, paired by seed."""
+        return difference_interval(*self.pairs(ours, theirs, movements), rng=rng())
+
+    def ratio(self, ours: str, theirs: str, movements: int = LAST) -> Interval:
+        """Ours / theirs."""
+        return ratio_interval(self.errors(ours, movements), self.errors(theirs, movements), rng=rng())
+
+    def improvement(self, ours: str, theirs: str, movements: int = LAST) -> Interval:
+        """The probability that a run of ours errs less than one of theirs."""
+        return improvement_interval(self.errors(ours, movements), self.errors(theirs, movements), rng=rng())
+
+    def floor_ratio(self, ours: str, theirs: str) -> Interval:
+        """Our errors / their noise floors, paired by seed."""
+        errors, floors = shared(self.at(ours), self.at(theirs, values="floors"))
+        return ratio_interval(_array(errors), _array(floors), rng=rng(), paired=True)
+
+    def time_to_reach(self, ours: str, theirs: str, *, unit: float = 1.0, at_most: float) -> Interval:
+        """When our mean curve comes down to where theirs ends, in movements / ``unit``; ``at_most`` if later."""
+        movements, curves = self.curves(ours)
+
+        def time(curves: Array, errors: Array) -> Array:
+            means = interquartile_mean(np.swapaxes(curves, -1, -2))
+            return np.minimum(movements_to_reach(movements, means, interquartile_mean(errors)) / unit, at_most)
+
+        return interval(time, curves, self.errors(theirs), rng=rng())
+
+
+def shared(ours: dict[int, float], theirs: dict[int, float]) -> tuple[dict[int, float], dict[int, float]]:
+    """Both, cut down to the seeds that both have.
+
+    Raises:
+        NotRun: fewer than 2.
+    """
+    seeds = [seed for seed in ours if seed in theirs]
+    if len(seeds) < 2:
+        raise NotRun("fewer than 2 seeds in common")
+    return {seed: ours[seed] for seed in seeds}, {seed: theirs[seed] for seed in seeds}
+
+
+class Claim(NamedTuple):
+    """What is claimed, the bar in words, and what judges it: gives our number in words and the verdict."""
+
+    text: str
+    bar: str
+    judged: Callable[[Results], Judged]
+
+
+class Verdict(NamedTuple):
+    """One line of a table of verdicts."""
+
+    claim: str
+    bar: str
+    number: str
+    verdict: str
+
+
+def judge(claims: Iterable[Claim], results: Results) -> list[Verdict]:
+    """All claims in order; "cannot say" where something was not run.
+
+    Raises:
+        ValueError: errors that no ratio can be made of, such as 0.
+    """
+    return [Verdict(claim.text, claim.bar, *_judged(claim, results)) for claim in claims]
+
+
+def _judged(claim: Claim, results: Results) -> Judged:
+    try:
+        return claim.judged(results)
+    except NotRun as missing:
+        return f"not run: {missing}", OPEN
+
+
+def at_most(found: Interval, bar: float, upper: float | None = None) -> str:
+    """Is it ``bar`` or less? ``upper``: how far the interval may reach, the bar itself unless given."""
+    if found.value <= bar and found.high <= (bar if upper is None else upper):
+        return HOLDS
+    return FAILS if found.low > bar else OPEN
+
+
+def at_least(found: Interval, bar: float) -> str:
+    """Is it ``bar`` or more?"""
+    return at_most(Interval(-found.value, -found.high, -found.low), -bar)
+
+
+def below_zero(found: Interval) -> str:
+    """Do ours err less, for certain?"""
+    if found.high < 0:
+        return HOLDS
+    return FAILS if found.low > 0 else OPEN
+
+
+def all_of(*verdicts: str) -> str:
+    """One that fails fails all; else one that is open leaves all open."""
+    return next((verdict for verdict in (FAILS, OPEN) if verdict in verdicts), HOLDS)
+
+
+def ratio_at_most(
+    ours: str, theirs: str, bar: float, *, upper: float | None = None, movements: int = LAST
+) -> Callable[[Results], Judged]:
+    """Judges our error over theirs; ``upper`` as of ``at_most``."""
+
+    def judged(results: Results) -> Judged:
+        ratio = results.ratio(ours, theirs, movements)
+        return f"ratio {show(ratio)}", at_most(ratio, bar, upper)
+
+    return judged
+
+
+def errs_less(ours: str, theirs: str) -> Callable[[Results], Judged]:
+    """Judges our error less theirs, paired by seed, at the end."""
+
+    def judged(results: Results) -> Judged:
+        difference = results.difference(ours, theirs)
+        return metres(difference), below_zero(difference)
+
+    return judged
+
+
+def _array(values: dict[int, float]) -> Array:
+    return np.array(list(values.values()))

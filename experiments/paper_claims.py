@@ -1,0 +1,175 @@
+"""The claims of section 6 of Nguyen & Oudeyer (2014), each with the bar that it has to clear and how it is judged.
+
+for verdict in judge(PAPER_CLAIMS, results): print(verdict.claim, verdict.verdict)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Final
+
+import numpy as np
+
+from judging import (
+    FAILS,
+    HOLDS,
+    OPEN,
+    Claim,
+    Judged,
+    NotRun,
+    Results,
+    all_of,
+    at_least,
+    at_most,
+    below_zero,
+    errs_less,
+    ratio_at_most,
+    shared,
+)
+from read_results import LAST, LEARNERS
+from sgimd_torch.spaces import Array
+from sgimd_torch.views.statistics import (
+    Interval,
+    difference_interval,
+    improvement_interval,
+    interquartile_mean,
+    interval,
+    metres,
+    rng,
+    show,
+)
+
+OTHERS: Final = tuple(learner for learner in LEARNERS if learner != "sgim-d")
+ROBUST: Final = "SGIM-D − SAGG-RIAC, and SGIM-D − Imitation taught alike, at 5000 < 0"
+
+
+def _sagg_riac_beats_random(results: Results) -> Judged:
+    difference, ratio = results.difference("sagg-riac", "random"), results.ratio("sagg-riac", "random")
+    return f"{metres(difference)}; ratio {show(ratio)}", all_of(below_zero(difference), at_most(ratio, 0.85))
+
+
+def _imitation_beats_random(results: Results) -> Judged:
+    difference, ratio = results.difference("imitation", "random"), results.ratio("imitation", "sagg-riac")
+    return f"{metres(difference)}; {show(ratio)} times sagg-riac", below_zero(difference)
+
+
+def _beats_the_others(errors: Callable[[Results, str], Array]) -> Callable[[Results], Judged]:
+    def judged(results: Results) -> Judged:
+        ours, theirs = errors(results, "sgim-d"), {other: errors(results, other) for other in OTHERS}
+        found = {other: improvement_interval(ours, each, rng=rng()) for other, each in theirs.items()}
+        return _listed(found), all_of(*(at_least(each, 0.95) for each in found.values()))
+
+    return judged
+
+
+def _near_the_noise(results: Results) -> Judged:
+    ratio = results.floor_ratio("sgim-d", "sgim-d")
+    return f"{show(ratio)} times the noise floor", at_most(ratio, 1.25)
+
+
+def _fast(results: Results) -> Judged:
+    found = results.time_to_reach("sgim-d", "random", at_most=LAST)
+    return f"{show(found, '.0f')} movements", at_most(found, np.nextafter(1000, 0))
+
+
+def _robust_to(teacher: int) -> Callable[[Results], Judged]:
+    taught = "" if teacher == 3 else f"-teacher-{teacher}"
+
+    def judged(results: Results) -> Judged:
+        found = {other: results.difference(f"sgim-d{taught}", other) for other in ("sagg-riac", f"imitation{taught}")}
+        numbers = "; ".join(f"{other} {metres(each)}" for other, each in found.items())
+        return numbers, all_of(*map(below_zero, found.values()))
+
+    return judged
+
+
+def _large_space_costs_sagg_riac_more(results: Results) -> Judged:
+    names = ("sagg-riac-large", "sagg-riac", "sgim-d-large", "sgim-d")
+
+    def times(*errors: Array) -> Array:
+        large, small, our_large, our_small = map(interquartile_mean, errors)
+        return (large / small) / (our_large / our_small)
+
+    found = interval(times, *map(results.errors, names), rng=rng())
+    own = results.ratio("sagg-riac-large", "sagg-riac")
+    above_one = below_zero(Interval(1 - found.value, 1 - found.high, 1 - found.low))
+    return f"SAGG-RIAC's ratio {show(own)}, {show(found)} times SGIM-D's", above_one
+
+
+def _goals_are_near(results: Results) -> Judged:
+    for variant in ("sgim-d-large", "sagg-riac-large"):
+        if len(results.goals.get(variant, ())) < 2:
+            raise NotRun(f"goals of {variant}")
+
+    def times(ours: Array, theirs: Array) -> Array:
+        """Shares of near goals, all seeds together; half a goal more for theirs, which avoids a division by zero."""
+        (our_goals, our_near), (goals, near) = (np.moveaxis(c.sum(axis=-2), -1, 0) for c in (ours, theirs))
+        return (our_near / our_goals) / ((near + 0.5) / (goals + 1))
+
+    ours, theirs = results.goals["sgim-d-large"], results.goals["sagg-riac-large"]
+    found = interval(times, ours, theirs, rng=rng())
+    shares = [100 * counts[:, 1].sum() / counts[:, 0].sum() for counts in (ours, theirs)]
+    return f"{shares[0]:.1f} % against {shares[1]:.2f} %: {show(found, '.0f')} times", at_least(found, 10)
+
+
+def _range(results: Results) -> Judged:
+    found = {learner: results.iqm(learner, values="tiles") for learner in ("random", "sagg-riac", "sgim-d")}
+    random, sagg_riac, sgim_d = found.values()
+    return _listed(found, ".0f"), all_of(_apart(random, sagg_riac), _apart(sagg_riac, sgim_d))
+
+
+def _no_late_damage(results: Results) -> Judged:
+    late, early = shared(results.at("sgim-d-long", 2 * LAST), results.at("sgim-d-long"))
+    found = difference_interval(late, early, rng=rng())
+    return metres(found), FAILS if found.low > 0 else HOLDS
+
+
+def _apart(lower: Interval, upper: Interval) -> str:
+    if lower.high < upper.low:
+        return HOLDS
+    return FAILS if upper.high < lower.low else OPEN
+
+
+def _listed(found: Mapping[str, Interval], form: str = ".2f") -> str:
+    return "; ".join(f"{variant} {show(each, form)}" for variant, each in found.items())
+
+
+PAPER_CLAIMS: Final = (
+    Claim(
+        "SGIM-D halves Random's error",
+        "ratio at 5000 ≤ 0.50, interval up to 0.55",
+        ratio_at_most("sgim-d", "random", 0.5, upper=0.55),
+    ),
+    Claim("SAGG-RIAC clearly beats Random", "SAGG-RIAC − Random at 5000 < 0, ratio ≤ 0.85", _sagg_riac_beats_random),
+    Claim("Imitation beats Random", "Imitation − Random at 5000 < 0", _imitation_beats_random),
+    Claim(
+        "SGIM-D beats every other learner",
+        "P(improvement) at 5000 ≥ 0.95 against each",
+        _beats_the_others(Results.errors),
+    ),
+    Claim("... and all along", "the same of the error's mean over life", _beats_the_others(Results.lives)),
+    Claim("SGIM-D approaches the noise level", "error at 5000 ≤ 1.25 times its noise floor", _near_the_noise),
+    Claim("SGIM-D is fast from the start", "below Random's error at 5000 in < 1000 movements", _fast),
+    Claim("SGIM-D is robust: demonstrator 1, naive", ROBUST, _robust_to(1)),
+    Claim("SGIM-D is robust: demonstrator 2, careful", ROBUST, _robust_to(2)),
+    Claim("SGIM-D is robust: demonstrator 3", ROBUST, _robust_to(3)),
+    Claim(
+        "SGIM-D works in a 10⁴ times larger task space",
+        "ratio large to small ≤ 1.20",
+        ratio_at_most("sgim-d-large", "sgim-d", 1.2),
+    ),
+    Claim("... where SAGG-RIAC loses clearly more", "its ratio > SGIM-D's", _large_space_costs_sagg_riac_more),
+    Claim(
+        "... because SGIM-D aims where it can reach",
+        "goals within 1.5 m: share ≥ 10 times SAGG-RIAC's",
+        _goals_are_near,
+    ),
+    Claim("Range: Random < SAGG-RIAC < SGIM-D", "tiles reached at 5000, intervals apart", _range),
+    Claim("No late damage", "error at 10,000 − at 5000: interval not wholly above 0", _no_late_damage),
+    Claim("The tree earns its place", "SGIM-D − uniform goals at 5000 < 0", errs_less("sgim-d", "uniform-goals")),
+    Claim(
+        "... in the large space",
+        "SGIM-D − uniform goals at 5000 < 0",
+        errs_less("sgim-d-large", "sgim-d-uniform-large"),
+    ),
+)

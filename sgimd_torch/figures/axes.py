@@ -1,0 +1,83 @@
+"""What figures share: the water plane, coloured regions on it, movements along the x axis, colour bars, notes.
+
+Each function draws on the axes it is given.   mesh = ax.pcolormesh(x, y, z); colour_bar([ax], mesh, "error (m)")
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import PatchCollection
+from matplotlib.colorbar import Colorbar
+from matplotlib.patches import Rectangle
+from matplotlib.ticker import MaxNLocator
+
+from sgimd_torch.spaces import Array, Box
+
+GREY: Final = "0.45"
+
+
+def plane(ax: Axes, box: Box) -> None:
+    """Axes in metres, equal aspect, all of ``box`` in sight."""
+    ax.set(
+        xlim=(box.low[0], box.high[0]), ylim=(box.low[1], box.high[1]), aspect="equal", xlabel="x (m)", ylabel="y (m)"
+    )
+    ax.xaxis.set_major_locator(MaxNLocator(4))
+    ax.yaxis.set_major_locator(MaxNLocator(4))
+
+
+def water_plane(ax: Axes, box: Box) -> None:
+    """The ``plane`` with the robot's base marked, and a legend above."""
+    ax.plot(0, 0, "^", color="black", markeredgecolor="white", markersize=10, label="base of the arm")
+    plane(ax, box)
+    ax.legend(
+        loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, frameon=False, borderaxespad=0.2, handletextpad=0.2
+    )
+
+
+def coloured_regions(
+    ax: Axes, lows: Array, highs: Array, values: Array, colours: str, limits: tuple[float, float]
+) -> PatchCollection:
+    """Rectangles from ``lows`` to ``highs``, ``(n_regions, 2)`` m, coloured by their ``values`` ``(n_regions,)``.
+
+    Returns:
+        One rectangle for each region, in their order; their array holds the values.
+
+    Raises:
+        ValueError: regions that are not of the plane, as when contexts are part of them, or numbers that do not match.
+    """
+    if lows.shape != highs.shape or lows.shape != (len(values), 2):
+        raise ValueError(
+            f"regions must be (n, 2), (n, 2) and (n,), got {lows.shape}, {highs.shape}, {values.shape}; "
+            "a map over contexts too has to be cut at one context first"
+        )
+    patches = [Rectangle((low[0], low[1]), *(high - low)) for low, high in zip(lows, highs, strict=True)]
+    drawn = PatchCollection(patches, cmap=colours, edgecolor="0.35", linewidth=0.8)
+    drawn.set_array(values)
+    drawn.set_clim(*limits)
+    ax.add_collection(drawn)
+    return drawn
+
+
+def over_movements(ax: Axes, label: str) -> None:
+    """Movements along the x axis, ``label`` along the other."""
+    ax.set(xlabel="movements executed", ylabel=label)
+    ax.set_xlim(left=0)
+    ax.grid(alpha=0.3)
+
+
+def colour_bar(axes: Sequence[Axes], drawn: ScalarMappable, label: str, *, extend: str = "neither") -> Colorbar:
+    """One bar for all ``axes`` that share the scale of ``drawn``; ``extend`` is matplotlib's."""
+    figure = axes[0].get_figure()
+    assert figure is not None
+    return figure.colorbar(drawn, ax=list(axes), label=label, extend=extend)
+
+
+def note(ax: Axes, text: str, *, top: bool = False) -> None:
+    """Words at the lower or upper edge."""
+    white = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 2}
+    height, side = (0.985, "top") if top else (0.015, "bottom")
+    ax.text(0.5, height, text, transform=ax.transAxes, ha="center", va=side, fontsize="small", bbox=white)
