@@ -219,8 +219,8 @@ def test_a_report_shows_an_arm_beside_the_rod_with_what_each_was_shown(tmp_path,
     assert "planar-arm-7" in page
     assert "judged by different benchmarks" in page
     assert "left out" not in page.lower()
-    assert f"scripts/film {tmp_path / 'rod' / 'seed-003'}" in page
-    assert f"scripts/film {tmp_path / 'arm' / 'seed-003'}" not in page
+    assert f"sgimd film {tmp_path / 'rod' / 'seed-003'}" in page
+    assert f"sgimd film {tmp_path / 'arm' / 'seed-003'}" not in page
 
 
 def test_a_report_marks_the_postures_that_the_arm_was_shown(reference):
