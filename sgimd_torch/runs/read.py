@@ -6,16 +6,20 @@ run = read_run("runs/sgim-d/seed-003"); run.outcomes, run.evaluation["mean_error
 from __future__ import annotations
 
 import os
+import zlib
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sgimd_torch.runs.config import Config, from_settings, having, options
 from sgimd_torch.runs.log import Columns, RunError, read_json
 from sgimd_torch.runs.tables import EVALUATION, read_table
 from sgimd_torch.spaces import Array
+
+LONGEST_LINE: Final = 1 << 16  # bytes, of a log
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,3 +117,32 @@ def find_runs(out: str | os.PathLike[str]) -> dict[str, list[Path]]:
     if not found:
         raise RunError(f"{out} holds no runs; they lie in OUT/NAME/seed-000")
     return found
+
+
+def finished(config: Config) -> bool:
+    """Whether this run is on disk, from its first movement to its last, with these options and all its evaluations."""
+    try:
+        summary, settings = (read_json(config.directory / name, missing={}) for name in ("summary.json", "config.json"))
+        if not summary.get("finished") or movements_on_disk(config.directory) != config.movements:
+            return False
+        found, place = from_settings(settings), having("place")
+        same = all(getattr(found, name) == getattr(config, name) for name in options() if name not in place)
+        files = [(name, getattr(config, name)) for name in ("benchmark", "demonstrations")]
+        return same and all(
+            path is None or settings.get(f"{name}_crc32") in (None, f"{zlib.crc32(path.read_bytes()):08x}")
+            for name, path in files
+        )
+    except (ValueError, OSError):  # damaged, or by another version: the run itself says it when it goes on
+        return False
+
+
+def movements_on_disk(path: Path) -> int:
+    """How many movements the log of a run directory holds, by the index of its last whole line."""
+    try:
+        with (path / "episodes.csv").open("rb") as log:
+            log.seek(max(0, log.seek(0, os.SEEK_END) - LONGEST_LINE))
+            last = log.read().rpartition(b"\n")[0].rpartition(b"\n")[2]
+    except OSError:
+        return 0
+    index = last.partition(b",")[0]
+    return int(index) + 1 if index.isdigit() else 0

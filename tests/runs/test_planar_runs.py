@@ -2,7 +2,6 @@
 
 import json
 import re
-import sys
 
 import numpy as np
 import pytest
@@ -24,7 +23,7 @@ from sgimd_torch.views import demo
 from sgimd_torch.views.film import command as film
 from sgimd_torch.views.report import command as report
 from sgimd_torch.views.report.data import demonstrated, read_life
-from tasks import tiles_reached
+from tables import tiles_reached
 
 NO_CONTEXT = np.empty(0)
 ALGORITHMS = CATALOGUE["algorithm"]
@@ -196,11 +195,8 @@ def test_a_report_with_films_leaves_out_those_of_an_arm(tmp_path, reference):
     assert "<video" not in (tmp_path / "page.html").read_text()
 
 
-def test_the_demo_is_of_the_rod(monkeypatch, capsys):
-    monkeypatch.setattr(sys, "argv", ["demo", "--", "--environment", "planar-arm-7"])
-    with pytest.raises(SystemExit) as end:
-        demo.main()
-    assert end.value.code == 2
+def test_the_demo_is_of_the_rod(capsys):
+    assert command(demo.main, ["--", "--environment", "planar-arm-7"]) == 2
     assert "the demo shows the fishing rod" in capsys.readouterr().err
 
 
