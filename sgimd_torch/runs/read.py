@@ -1,12 +1,12 @@
 """Reading run directories: everything that a run has written, as arrays. Figures and tables are made from this alone.
 
-run = read_run("runs/sgim-d/seed-003"); run.outcomes, run.evaluation["mean_error_m"]    # runfiles.py explains the files
+run = read_run("runs/sgim-d/seed-003"); run.outcomes, run.evaluation["mean_error_m"]    # log.py explains the files
 """
 
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sgimd_torch.runs.log import Columns, RunError, read_json
-from sgimd_torch.runs.tables import EVALUATION, read_table
+from sgimd_torch.runs.tables import EVALUATION, Found, Table, small_table
 from sgimd_torch.spaces import Array
 
 
@@ -25,8 +25,12 @@ class Run:
     ``index`` ``(n,)``, ``origin`` ``(n,)`` names, "" at rest, ``demonstration`` ``(n,)`` row of the demonstration just
     before, -1 if there was none; ``contexts``, ``thetas``, ``goals`` and ``outcomes`` ``(n, dim)``, NaN where there was
     none. ``evaluation`` has an array for each column, an entry for each evaluation; ``regions`` likewise, with an entry
-    for each region at each evaluation, None for a learner without interest map. ``config``, ``versions``, ``summary``:
-    as in their files.
+    for each region at each evaluation, None for a goal model without regions; ``predictions`` and ``refreshes``
+    likewise, None without a forward model. ``config``, ``versions``, ``summary``: as in their files.
+
+    ``damage``: file name -> number of its first bad line, where reading ended, such as ``{"evaluation.csv": 3}``; the
+    names of the columns are line 1. ``unchecked``: names of the files without checksums, which an earlier version
+    wrote: in them, a changed number is noticed only if it cannot be.
     """
 
     path: Path
@@ -42,6 +46,10 @@ class Run:
     outcomes: Array
     evaluation: dict[str, Array]
     regions: dict[str, np.ndarray] | None
+    predictions: dict[str, np.ndarray] | None = None
+    refreshes: dict[str, np.ndarray] | None = None
+    damage: dict[str, int] = field(default_factory=dict)
+    unchecked: tuple[str, ...] = ()
 
     def chosen_goals(self) -> Array:
         """``(n, outcome_dim)``, the goals that the learner set itself, in order, each once though it takes several
@@ -54,29 +62,20 @@ class Run:
 def read_run(path: str | os.PathLike[str]) -> Run:
     """What a run has written so far, be it finished, stopped or under way; a torn last line is left out.
 
+    A file that is damaged is read up to there, and ``damage`` says where.
+
     Raises:
-        RunError: there is no run at ``path``, or its files are damaged.
+        RunError: there is no run at ``path``, or one of its files cannot be read at all.
     """
     path = Path(path)
     config = read_json(path / "config.json", missing=None)
     if config is None:
         raise RunError(f"{path} is no run directory, it has no config.json; runs lie in OUT/NAME/seed-000")
-    try:
-        log = (path / "episodes.csv").read_bytes()
-    except FileNotFoundError:
-        log = b""
-    except OSError as error:
-        raise RunError(f"{path}/episodes.csv cannot be read: {error.strerror}") from error
-    header, newline, body = log.partition(b"\n")
-    try:
-        just_begun = not newline and b"index,".startswith(header[:6])
-        columns = Columns(0, 0, 0) if just_begun else Columns.of(header + newline)
-    except RunError as error:
-        raise RunError(f"{path}/episodes.csv: {error}") from error
-    rows = [line.decode().rstrip("\n").split(",") for line in columns.whole_lines(body)]
-    ends = np.cumsum([3, columns.context_dim, columns.theta_dim, columns.outcome_dim, columns.outcome_dim])
-    numbers = np.array([[field or "nan" for field in row[3:-1]] for row in rows], dtype=np.float64)
-    contexts, thetas, goals, outcomes = np.split(numbers.reshape(len(rows), ends[-1] - 3), ends[1:-1] - 3, axis=1)
+    files = _Files(path)
+    log = files.content("episodes.csv") or b""
+    columns = _columns(path / "episodes.csv", log)
+    rows = files.parse(columns.table(path), log, grows=True).rows
+    contexts, thetas, goals, outcomes = columns.split(rows)
     return Run(
         path=path,
         config=config,
@@ -89,8 +88,12 @@ def read_run(path: str | os.PathLike[str]) -> Run:
         thetas=thetas,
         goals=goals,
         outcomes=outcomes,
-        evaluation=read_table(path / "evaluation.csv", EVALUATION) or {name: np.empty(0) for name in EVALUATION},
-        regions=read_table(path / "regions.csv"),
+        evaluation=files.table("evaluation.csv") or {name: np.empty(0) for name in EVALUATION},
+        regions=files.table("regions.csv"),
+        predictions=files.table("predictions.csv", grows=True),
+        refreshes=files.table("refreshes.csv", grows=True),
+        damage=files.damage,
+        unchecked=tuple(files.unchecked),
     )
 
 
@@ -106,3 +109,47 @@ def find_runs(out: str | os.PathLike[str]) -> dict[str, list[Path]]:
     if not found:
         raise RunError(f"{out} holds no runs; they lie in OUT/NAME/seed-000")
     return found
+
+
+class _Files:
+    """The tables of a run directory; gathers what ``Run`` tells of damage."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.damage: dict[str, int] = {}
+        self.unchecked: list[str] = []
+
+    def content(self, name: str) -> bytes | None:
+        try:
+            return (self.path / name).read_bytes()
+        except FileNotFoundError:
+            return None
+        except OSError as error:
+            raise RunError(f"{self.path / name} cannot be read: {error.strerror}") from error
+
+    def parse(self, table: Table, content: bytes, *, grows: bool) -> Found:
+        found, name = table.parse(content), table.path.name
+        if found.bad is not None and not (grows and found.torn):
+            self.damage[name] = found.bad
+        if not found.checked:
+            self.unchecked.append(name)
+        return found
+
+    def table(self, name: str, *, grows: bool = False) -> dict[str, np.ndarray] | None:
+        content = self.content(name)
+        if content is None:
+            return None
+        header = content.partition(b"\n")[0]
+        table = small_table(self.path / name, header.count(b"low_") + header.count(b"predicted_"))
+        return table.arrays(self.parse(table, content, grows=grows))
+
+
+def _columns(path: Path, log: bytes) -> Columns:
+    """Of a log; none where its first line is still being written."""
+    header, newline, _ = log.partition(b"\n")
+    if not newline and b"index,".startswith(header[:6]):
+        return Columns(0, 0, 0)
+    try:
+        return Columns.of(header + newline)
+    except RunError as error:
+        raise RunError(f"{path}: {error}") from error

@@ -62,8 +62,9 @@ def files_of(directory):
 
 
 def table(path):
-    header, *lines = path.read_text().splitlines()
-    return header.split(","), np.array([line.split(",") for line in lines], dtype=np.float64)
+    header, *lines = (line.split(",") for line in path.read_text().splitlines())
+    assert header[-1] == "crc32"
+    return header[:-1], np.array([line[:-1] for line in lines], dtype=np.float64)
 
 
 def curves_of(directory):
@@ -146,7 +147,9 @@ def test_a_replay_that_fails_leaves_the_record_of_the_model_as_it_was(tmp_path, 
 
 def test_a_run_without_a_model_writes_no_record_of_one_and_loads_no_library_for_it(tmp_path, arguments):
     loaded = "{'torch', 'lightning', 'safetensors'} & set(sys.modules)"
-    program = f"import run, sys; code = run.main(sys.argv[1:]); print({loaded}); sys.exit(code)"
+    program = (
+        f"import sys; from sgimd_torch.runs.run import main; code = main(sys.argv[1:]); print({loaded}); sys.exit(code)"
+    )
     process = start(program, *arguments(tmp_path, "--movements", 60))
     output, errors = process.communicate()
     assert process.returncode == 0, errors
@@ -157,7 +160,8 @@ def test_a_run_without_a_model_writes_no_record_of_one_and_loads_no_library_for_
 
 
 def test_without_its_packages_a_run_with_a_model_is_refused_and_says_what_to_install(tmp_path, arguments):
-    program = "import sys; sys.modules['lightning'] = None; import run; sys.exit(run.main(sys.argv[1:]))"
+    without = "import sys; sys.modules['lightning'] = None; from sgimd_torch.runs.run import main"
+    program = f"{without}; sys.exit(main(sys.argv[1:]))"
     process = start(program, *arguments(tmp_path / "out", *MODEL))
     _, errors = process.communicate()
     assert process.returncode == 2
