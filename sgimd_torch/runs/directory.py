@@ -183,7 +183,7 @@ class RunDirectory:
             raise RunError(f"{log} does not begin with {start}...; restore it, or choose another --out")
         self.lines, self._kept, n = found.lines, found.size, len(found.lines)
         self._lost = max(0, self.summary.get("movements", 0) - n)
-        damaged = found.bad is not None and not found.torn
+        damaged = found.damage is not None
         if self._lost and not accept_loss:
             raise RunError(
                 f"{log} holds {n} movements{f', line {found.bad} is damaged' if damaged else ''}, but summary.json "

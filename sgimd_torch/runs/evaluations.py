@@ -23,7 +23,7 @@ class Evaluations:
     """
 
     def __init__(self, directory: Path, region_dims: int | None, notes: list[str]) -> None:
-        tables = [small_table(directory / "evaluation.csv")]
+        tables = [small_table(directory / "evaluation.csv", 0)]
         if region_dims is not None:
             tables.append(small_table(directory / "regions.csv", region_dims))
         self._rows: dict[Table, dict[int, Rows]] = {}  # by the number of movements before the evaluation

@@ -23,6 +23,7 @@ ever reads half of it.
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -68,20 +69,29 @@ class Columns:
         return self.table(Path()).header
 
     @classmethod
-    def of(cls, header: bytes) -> Columns:
-        """Those that a log's first line names.
+    def of(cls, directory: Path) -> Columns:
+        """Those that the first line of a run's log names; none where there is none yet.
 
         Raises:
             RunError: it is not the first line of a log.
+            OSError: the log cannot be read.
         """
+        log = directory / "episodes.csv"
+        if not os.path.lexists(log):
+            return cls(0, 0, 0)
+        with log.open("rb") as file:
+            header = file.readline()
         columns = cls(*(header.count(name) for name in (b"context_", b"theta_", b"outcome_")))
-        if header != columns.header:
-            raise RunError(f"a log begins with the names of its columns, this one with {header[:60]!r}; was it edited?")
-        return columns
+        if header == columns.header:
+            return columns
+        if not header.endswith(b"\n") and b"index,".startswith(header[:6]):  # it is still being written
+            return cls(0, 0, 0)
+        names = f"the names of its columns, this one with {header[:60]!r}"
+        raise RunError(f"{log}: a log begins with {names}; was it edited?")
 
     def table(self, directory: Path) -> Table:
         """The log of a run."""
-        return Table(directory / "episodes.csv", self.names, _in_order)
+        return Table(directory / "episodes.csv", self.names, grows=True, standing=_in_order)
 
     def line(self, episode: Episode, demonstration: int | None) -> bytes:
         """One episode; ``demonstration`` is the row of the one that came just before it."""

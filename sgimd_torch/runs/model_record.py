@@ -62,7 +62,7 @@ class RunModel:
         self._model, self._trust = model, trust
         dims = directory.columns.outcome_dim
         self._predictions = small_table(directory.path / "predictions.csv", dims)
-        self._refreshes = small_table(directory.path / "refreshes.csv")
+        self._refreshes = small_table(directory.path / "refreshes.csv", dims)
         self._tables = (self._predictions, self._refreshes) if model is not None else ()
         self._asked = False
         self._learnt = 0  # refreshes so far

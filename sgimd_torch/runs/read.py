@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sgimd_torch.runs.log import Columns, RunError, read_json
-from sgimd_torch.runs.tables import EVALUATION, Found, Table, small_table
+from sgimd_torch.runs.tables import EVALUATION, SMALL, small_table
 from sgimd_torch.spaces import Array
 
 
@@ -71,10 +71,15 @@ def read_run(path: str | os.PathLike[str]) -> Run:
     config = read_json(path / "config.json", missing=None)
     if config is None:
         raise RunError(f"{path} is no run directory, it has no config.json; runs lie in OUT/NAME/seed-000")
-    files = _Files(path)
-    log = files.content("episodes.csv") or b""
-    columns = _columns(path / "episodes.csv", log)
-    rows = files.parse(columns.table(path), log, grows=True).rows
+    try:
+        columns = Columns.of(path)
+        log = columns.table(path)
+        small = [small_table(path / name) for name in SMALL if os.path.lexists(path / name)]
+        found = {table.path.name: table.read() for table in (log, *small)}
+    except OSError as error:
+        raise RunError(f"{error.filename} cannot be read: {error.strerror}") from error
+    rows = found[log.path.name].rows
+    arrays = {table.path.name: table.arrays(found[table.path.name]) for table in small}
     contexts, thetas, goals, outcomes = columns.split(rows)
     return Run(
         path=path,
@@ -88,12 +93,12 @@ def read_run(path: str | os.PathLike[str]) -> Run:
         thetas=thetas,
         goals=goals,
         outcomes=outcomes,
-        evaluation=files.table("evaluation.csv") or {name: np.empty(0) for name in EVALUATION},
-        regions=files.table("regions.csv"),
-        predictions=files.table("predictions.csv", grows=True),
-        refreshes=files.table("refreshes.csv", grows=True),
-        damage=files.damage,
-        unchecked=tuple(files.unchecked),
+        evaluation=arrays.get("evaluation.csv", {name: np.empty(0) for name in EVALUATION}),
+        regions=arrays.get("regions.csv"),
+        predictions=arrays.get("predictions.csv"),
+        refreshes=arrays.get("refreshes.csv"),
+        damage={name: table.damage for name, table in found.items() if table.damage is not None},
+        unchecked=tuple(name for name, table in found.items() if not table.checked),
     )
 
 
@@ -109,47 +114,3 @@ def find_runs(out: str | os.PathLike[str]) -> dict[str, list[Path]]:
     if not found:
         raise RunError(f"{out} holds no runs; they lie in OUT/NAME/seed-000")
     return found
-
-
-class _Files:
-    """The tables of a run directory; gathers what ``Run`` tells of damage."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self.damage: dict[str, int] = {}
-        self.unchecked: list[str] = []
-
-    def content(self, name: str) -> bytes | None:
-        try:
-            return (self.path / name).read_bytes()
-        except FileNotFoundError:
-            return None
-        except OSError as error:
-            raise RunError(f"{self.path / name} cannot be read: {error.strerror}") from error
-
-    def parse(self, table: Table, content: bytes, *, grows: bool) -> Found:
-        found, name = table.parse(content), table.path.name
-        if found.bad is not None and not (grows and found.torn):
-            self.damage[name] = found.bad
-        if not found.checked:
-            self.unchecked.append(name)
-        return found
-
-    def table(self, name: str, *, grows: bool = False) -> dict[str, np.ndarray] | None:
-        content = self.content(name)
-        if content is None:
-            return None
-        header = content.partition(b"\n")[0]
-        table = small_table(self.path / name, header.count(b"low_") + header.count(b"predicted_"))
-        return table.arrays(self.parse(table, content, grows=grows))
-
-
-def _columns(path: Path, log: bytes) -> Columns:
-    """Of a log; none where its first line is still being written."""
-    header, newline, _ = log.partition(b"\n")
-    if not newline and b"index,".startswith(header[:6]):
-        return Columns(0, 0, 0)
-    try:
-        return Columns.of(header + newline)
-    except RunError as error:
-        raise RunError(f"{path}: {error}") from error

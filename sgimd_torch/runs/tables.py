@@ -12,7 +12,7 @@ import os
 import re
 import zlib
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 from pathlib import Path
 from typing import Final
@@ -22,6 +22,7 @@ import numpy as np
 from sgimd_torch.files import write_bytes
 from sgimd_torch.spaces import Array
 
+SMALL: Final = ("evaluation.csv", "regions.csv", "predictions.csv", "refreshes.csv")
 EVALUATION: Final = ("movements", "mean_error_m", "median_error_m", "p90_error_m", "noise_floor_m")
 REFRESHES: Final = ("movements", "exemplars", "steps", "held_out", "relative_error", "diverged")
 Rows = list[list[str]]
@@ -35,13 +36,15 @@ class Found:
     """What the file of a table held, up to its first bad line.
 
     ``lines``, without the header, as they stand there; ``size`` (bytes) of header and lines; ``tail``, what comes after
-    them; ``checked``: the lines have checksums, which those written by earlier versions lack.
+    them; ``checked``: the lines have checksums, which those written by earlier versions lack; ``grows``: it is written
+    line by line.
     """
 
     lines: list[bytes]
     size: int
     tail: bytes
     checked: bool
+    grows: bool
 
     @property
     def rows(self) -> Rows:
@@ -54,14 +57,15 @@ class Found:
         return (len(self.lines) + 2 if self.size else 1) if self.tail else None
 
     @property
-    def torn(self) -> bool:
-        """Whether only the end of the last line is missing: its writer was killed, or is still writing."""
-        return self.tail != b"" and b"\n" not in self.tail
+    def damage(self) -> int | None:
+        """The same, unless only the end of the last line of a file that grows is missing: its writer was killed there,
+        or is still writing."""
+        return None if self.grows and b"\n" not in self.tail else self.bad
 
     def first(self, n: int) -> Found:
         """Its first ``n`` lines; the next one counts as bad."""
         rest = b"".join(self.lines[n:])
-        return Found(self.lines[:n], self.size - len(rest), rest + self.tail, self.checked)
+        return replace(self, lines=self.lines[:n], size=self.size - len(rest), tail=rest + self.tail)
 
 
 class Table:
@@ -70,11 +74,14 @@ class Table:
     Args:
         path: of the file; nothing is written before ``begin`` or ``replace``.
         names: of the columns, crc32 left out.
+        grows: it is written line by line, rather than replaced whole.
         standing: (rows) -> how many of them, from the first on, make sense together.
     """
 
-    def __init__(self, path: Path, names: Sequence[str], standing: Callable[[Rows], int] = len) -> None:
-        self.path, self.names, self._standing = path, tuple(names), standing
+    def __init__(
+        self, path: Path, names: Sequence[str], *, grows: bool = False, standing: Callable[[Rows], int] = len
+    ) -> None:
+        self.path, self.names, self._grows, self._standing = path, tuple(names), grows, standing
         self.header = ",".join((*names, "crc32")).encode() + b"\n"
         self._pending = bytearray()
         self._begun = False
@@ -92,10 +99,10 @@ class Table:
         header, *lines = content.splitlines(keepends=True) or [b""]
         checked = header != ",".join(self.names).encode() + b"\n"
         if checked and header != self.header:
-            return Found([], 0, content, checked)
+            return Found([], 0, content, checked, self._grows)
         is_good = _is_sealed if checked else self._is_possible
         n = next((k for k, line in enumerate(lines) if not is_good(line)), len(lines))
-        found = Found(lines, len(content), b"", checked).first(n)
+        found = Found(lines, len(content), b"", checked, self._grows).first(n)
         return found.first(self._standing(found.rows))
 
     def notes(self, found: Found, outlook: str) -> list[str]:
@@ -165,22 +172,29 @@ def numbers(values: Array | None, dim: int) -> list[str]:
     return [""] * dim if values is None else [repr(value) for value in values.tolist()]
 
 
-def small_table(path: Path, dims: int = 0) -> Table:
+def small_table(path: Path, dims: int | None = None) -> Table:
     """One of the tables beside the log, by the name of its file.
 
     Args:
         path: of evaluation.csv, regions.csv, predictions.csv or refreshes.csv.
-        dims: of C x T for regions, of outcomes for predictions.
+        dims: of C x T for regions, of outcomes for predictions; None for those that the file names.
     """
-    corners = (f"{corner}_{k}" for corner in ("low", "high") for k in range(dims))
-    parts = (f"{part}_{k}" for part in ("outcome", "predicted", "epistemic", "aleatoric") for k in range(dims))
-    names = {
-        "evaluation.csv": EVALUATION,
-        "regions.csv": ("movements", "path", *corners, "attempts", "goals", "competence", "interest"),
-        "predictions.csv": ("exemplar", *parts),
-        "refreshes.csv": REFRESHES,
-    }
-    return Table(path, names[path.name], _whole_maps if path.name == "regions.csv" else len)
+    if dims is None:
+        with path.open("rb") as file:
+            header = file.readline()
+        dims = header.count(b"low_") + header.count(b"predicted_")
+    match path.name:
+        case "evaluation.csv":
+            return Table(path, EVALUATION)
+        case "regions.csv":
+            corners = (f"{corner}_{k}" for corner in ("low", "high") for k in range(dims))
+            names = ("movements", "path", *corners, "attempts", "goals", "competence", "interest")
+            return Table(path, names, standing=_whole_maps)
+        case "predictions.csv":
+            parts = ("outcome", "predicted", "epistemic", "aleatoric")
+            return Table(path, ("exemplar", *(f"{part}_{k}" for part in parts for k in range(dims))), grows=True)
+        case _:
+            return Table(path, REFRESHES, grows=True)
 
 
 def _whole_maps(rows: Rows) -> int:
