@@ -204,13 +204,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("runs", type=Path, nargs="+", metavar="RUN", help="a run directory: runs/sgim-d/seed-003")
     parser.add_argument("--out", type=Path, default=Path("results/model"), help="default: %(default)s")
     options = parser.parse_args(argv)
-    quiet = not sys.stderr.isatty()
-    found = {run.name: run for run in map(read_model_run, tqdm(options.runs, "reading", disable=quiet))}
+    found = {run.name: run for run in map(read_model_run, tqdm(options.runs, "reading", disable=None))}
     if len(found) < len(options.runs):
         raise RunError("two of these runs have the same name; draw them apart, each with its own --out")
     make_folder(options.out)
     first = {name.split("/")[0]: name for name in reversed(found)}
-    for name in tqdm(first.values(), "drawing", disable=quiet):
+    for name in tqdm(first.values(), "drawing", disable=None):
         save_figure(partial(figure_of, found[name]), options.out / name.replace("/", "-"), "png")
     rows = [row(run) for run in found.values()]
     table = io.StringIO()
