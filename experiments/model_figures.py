@@ -36,9 +36,9 @@ from figures import REACH
 from read_results import MODEL_HEADER
 from sgimd_torch.figures import predictions as plots
 from sgimd_torch.figures.save import save_figure
-from sgimd_torch.files import write_bytes
+from sgimd_torch.files import make_folder, write_text
 from sgimd_torch.forward_model.diagnostics import LEVELS, coverage, error_by_cell, improvements, running
-from sgimd_torch.runs.log import RunError, make_folder
+from sgimd_torch.runs.log import RunError
 from sgimd_torch.runs.model_record import REFRESHES, prediction_columns
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import Run, read_run
@@ -214,7 +214,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     rows = [row(run) for run in found.values()]
     table = io.StringIO()
     csv.writer(table, lineterminator="\n").writerows([MODEL_HEADER, *(each.values() for each in rows)])
-    write_bytes(options.out / "table.csv", table.getvalue().encode())
+    write_text(options.out / "table.csv", table.getvalue())
     lines = [HEAD, *map(_printed, rows)]
     widths = [max(map(len, cells)) for cells in zip(*lines, strict=True)]
     for cells in lines:
