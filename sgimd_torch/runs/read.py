@@ -120,19 +120,24 @@ def find_runs(out: str | os.PathLike[str]) -> dict[str, list[Path]]:
 
 
 def finished(config: Config) -> bool:
-    """Whether this run is on disk, from its first movement to its last, with these options and all its evaluations."""
+    """Whether this run is on disk with these options, undamaged to its last movement and its last evaluation."""
+    path = config.directory
     try:
-        summary, settings = (read_json(config.directory / name, missing={}) for name in ("summary.json", "config.json"))
-        if not summary.get("finished") or movements_on_disk(config.directory) != config.movements:
+        summary, settings = (read_json(path / name, missing={}) for name in ("summary.json", "config.json"))
+        if not summary.get("finished") or movements_on_disk(path) != config.movements:
             return False
+        header, newline, body = (path / "episodes.csv").read_bytes().partition(b"\n")
+        whole = len(Columns.of(header + newline).whole_lines(body)) == config.movements
+        evaluation = read_table(path / "evaluation.csv", EVALUATION) or {"movements": np.empty(0)}
+        evaluated = not config.evaluations or config.movements in evaluation["movements"]
         found, place = from_settings(settings), having("place")
         same = all(getattr(found, name) == getattr(config, name) for name in options() if name not in place)
         files = [(name, getattr(config, name)) for name in ("benchmark", "demonstrations")]
-        return same and all(
-            path is None or settings.get(f"{name}_crc32") in (None, f"{zlib.crc32(path.read_bytes()):08x}")
-            for name, path in files
+        return (whole and evaluated and same) and all(
+            file is None or settings.get(f"{name}_crc32") in (None, f"{zlib.crc32(file.read_bytes()):08x}")
+            for name, file in files
         )
-    except (ValueError, OSError):  # damaged, or by another version: the run itself says it when it goes on
+    except (ValueError, OSError):  # of another version, or beyond reading: the run itself says so when it goes on
         return False
 
 

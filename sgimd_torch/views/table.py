@@ -77,6 +77,8 @@ def _readable(out: Path) -> tuple[list[Run], list[str]]:
         try:
             run = read_run(path)
             _milliseconds(run, "physics")
+            if run.damage:
+                raise RunError("; ".join(f"{path}/{name} is damaged at line {n}" for name, n in run.damage.items()))
             runs.append(run)
         except RunError as error:
             wrong.append(str(error))

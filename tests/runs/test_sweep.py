@@ -164,14 +164,18 @@ def test_a_run_is_finished_when_it_has_all_movements_and_evaluations_with_these_
     assert finished(short(out, threads=2))  # the same results
 
 
-@pytest.mark.parametrize("damage", ["torn log", "no log", "no summary", "junk summary", "junk config", "no config"])
-def test_a_damaged_run_is_not_finished(copied, damage):
-    name = {"log": "episodes.csv"}.get(damage.split()[1], f"{damage.split()[1]}.json")
+@pytest.mark.parametrize("name", ["episodes.csv", "evaluation.csv", "summary.json", "config.json"])
+@pytest.mark.parametrize("damage", ["missing", "junk", "torn", "edited"])
+def test_a_damaged_run_is_not_finished(copied, name, damage):
     path = copied.directory / name
-    if damage.startswith("no"):
+    content = path.read_bytes()
+    half = len(content) // 2
+    changed = {"junk": b"[junk", "torn": content[:-3], "edited": content[:half] + b"\0" + content[half + 1 :]}
+    if damage == "missing":
         path.unlink()
     else:
-        path.write_bytes(b"[junk" if damage.startswith("junk") else path.read_bytes()[:-3])
+        path.write_bytes(changed[damage])
+        assert path.read_bytes() != content
     assert not finished(copied)
 
 

@@ -89,13 +89,15 @@ def test_a_folder_without_runs_is_refused(tmp_path, capsys):
     assert "holds no runs" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("damage", ["no summary", "junk log", "directory", "summary is a list"])
+@pytest.mark.parametrize("damage", ["no summary", "junk log", "junk in the log", "directory", "summary is a list"])
 def test_a_damaged_run_is_named_in_one_line_below_the_others(copied, capsys, damage):
     run = copied / "random" / "seed-001"
     if damage == "no summary":
         (run / "summary.json").unlink()
     elif damage == "junk log":
         (run / "episodes.csv").write_text("junk")
+    elif damage == "junk in the log":
+        (run / "episodes.csv").write_bytes((run / "episodes.csv").read_bytes().replace(b"\n7,", b"\n77,"))
     elif damage == "directory":
         (run / "episodes.csv").unlink()
         (run / "episodes.csv").mkdir()
