@@ -13,17 +13,20 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
+
+import numpy as np
 
 from sgimd_torch.catalogue import did_you_mean
 from sgimd_torch.files import make_folder
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.log import RunError
 from sgimd_torch.runs.process import command, say
-from sgimd_torch.runs.read import read_run
+from sgimd_torch.runs.read import finished, read_run
 from sgimd_torch.runs.sweep import add_options, sweep, title
-from tables import GOALS, RESULTS, Key, Table, goal_row, result_rows
+from tables import GOALS, RESULTS, Key, Table, as_text, goal_row, result_rows
 from variants import EXPERIMENTS, FEW, HALF, make_subsets, tables_of
 
 EXAMPLES: Final = f"""experiments: {", ".join(EXPERIMENTS)}
@@ -34,6 +37,7 @@ examples:
   python experiments/compare.py forward-model planar-arm-7 planar-arm-50
   python experiments/compare.py ablations --only uniform-goals grid
   python experiments/compare.py --dry-run                         what is still to be done
+  python experiments/compare.py --verify 10 --lot 7               ten rows of the tables, drawn by lot, made again
 
 Exit code: 0 all runs are in the tables, 1 some failed, 2 the request is wrong, 130 or 143 stopped by a signal.
 """
@@ -50,6 +54,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     options = _options(argv)
     wanted = runs_of(options.experiments, options.only, options.seeds, options.out)
+    if options.verify:
+        return verify(wanted, options)
     names = dict.fromkeys(table for name, _ in wanted for table in tables_of(name))
     rows = {table: table_in(options.results, table).rows() for table in names}
     left = [(name, config) for name, config in wanted if last_row(config) not in rows[tables_of(name)[0]]]
@@ -71,6 +77,46 @@ def main(argv: Sequence[str] | None = None) -> int:
     failures = sweep(list(runs), options.processes, on_end=on_end)
     say(f"{len(runs) - len(failures)} runs ended well, {len(failures)} failed: {where}", *failures)
     return 1 if failures else 0
+
+
+def verify(wanted: Sequence[tuple[str, Config]], options: argparse.Namespace) -> int:
+    """Draw rows of the tables by lot, make each again by a run of its own, and compare.
+
+    Such a run lives as long as its row says and is evaluated then alone, which changes nothing in it.
+
+    Returns:
+        0 if all are equal, else 1.
+    """
+    shipped = {table: table_in(options.results, table).rows() for name, _ in wanted for table in tables_of(name)[:1]}
+    found = [
+        (name, config, row)
+        for name, config in wanted
+        for row in shipped[tables_of(name)[0]].values()
+        if row[:2] == [name, config.variant] and row[4] == str(config.seed)
+    ]
+    drawn = sorted(np.random.default_rng(options.lot).permutation(len(found))[: options.verify].tolist())
+    again = {}
+    for number in drawn:
+        name, config, row = found[number]
+        movements = int(row[5])
+        out = options.out / f"verify-{options.lot}" / f"{name}-{movements}"
+        again[number] = replace(config, movements=movements, evaluate_at=(movements,), out=out)
+    say(f"{len(again)} rows of {len(found)}, made again in {options.out}/verify-{options.lot}")
+    if options.dry_run:
+        print("".join(f"{title(config)} at {config.movements}\n" for config in again.values()), end="")
+        return 0
+    make_subsets(options.out / "demonstrations")
+    failures = sweep(list(again.values()), options.processes)
+    differ = 0
+    for number, config in again.items():
+        name, _, row = found[number]
+        made = result_rows(name, config, read_run(config.directory)) if finished(config) else []
+        now = [as_text(value) for value in made[-1]] if made else []
+        equal = now == row
+        differ += not equal
+        print(f"{'equal ' if equal else 'DIFFERS'} {','.join(row)}" + ("" if equal else f"  now {now}"))
+    say(f"{len(again) - differ} of {len(again)} rows are equal", *failures)
+    return 1 if differ else 0
 
 
 def runs_of(
@@ -139,6 +185,10 @@ def _options(argv: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "--results", type=Path, default=Path("results"), help="folder of the tables (default: %(default)s)"
     )
+    parser.add_argument(
+        "--verify", type=int, default=0, metavar="N", help="make N rows of the tables again, in a folder of their own"
+    )
+    parser.add_argument("--lot", type=int, default=0, help="seed of the lot that draws them (default: %(default)s)")
     options = parser.parse_args(argv)
     options.experiments = list(dict.fromkeys(options.experiments)) or list(EXPERIMENTS)
     _check_names(options.experiments, options.only)

@@ -39,9 +39,9 @@ from sgimd_torch.figures.save import save_figure
 from sgimd_torch.files import make_folder, write_text
 from sgimd_torch.forward_model.diagnostics import LEVELS, coverage, error_by_cell, improvements, running
 from sgimd_torch.runs.log import RunError
-from sgimd_torch.runs.model_record import REFRESHES, prediction_columns
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import Run, read_run
+from sgimd_torch.runs.tables import WHOLE, small_table
 from sgimd_torch.spaces import Array, Box
 
 NEWEST: Final = 1000  # predictions
@@ -65,7 +65,7 @@ class ModelRun:
     observed: Array
     mean: Array
     spread: Array
-    refreshes: dict[str, Array]
+    refreshes: dict[str, np.ndarray]
 
     @property
     def name(self) -> str:
@@ -85,31 +85,28 @@ def read_model_run(path: Path) -> ModelRun:
         RunError: it has no model, has predicted nothing yet, or its files are damaged or do not belong together.
     """
     run, file = read_run(path), path / "predictions.csv"
-    if not file.exists():
-        raise RunError(
-            f"{path} has no predictions.csv: it ran without a forward model; see --inverse model of sgimd run"
-        )
-    dim = run.outcomes.shape[1]
-    table = _read(file, prediction_columns(dim))
+    if run.predictions is None:
+        raise RunError(f"{path} has no {file.name}: it ran without a forward model; see --inverse model of sgimd run")
+    exemplars, *values = _checked(run, file.name, run.predictions).values()
     lived = np.flatnonzero(np.isfinite(run.outcomes).all(axis=1))
-    table = table[table[:, 0] < len(lived)]
-    rows = table[:, 0].astype(np.int64)
+    rows = exemplars[exemplars < len(lived)]
     if not len(rows):
         raise RunError(f"{file} holds no prediction of a movement yet; the model learns from 50 before its first")
-    if (rows != table[:, 0]).any() or rows[0] < 0 or (np.diff(rows) <= 0).any():
+    if (np.diff(exemplars) <= 0).any():
         raise RunError(f"{file} must name exemplars by whole numbers that increase; was it edited?")
-    observed, mean, epistemic, aleatoric = np.split(table[:, 1:], 4, axis=1)
+    observed, mean, epistemic, aleatoric = np.split(np.stack(values, axis=1)[: len(rows)], 4, axis=1)
     differ = (observed != run.outcomes[lived[rows]]).any(axis=1)
     if differ.any():
         raise RunError(f"{file}: exemplar {rows[differ][0]} is another one in episodes.csv; is it another run's file?")
     spread = np.hypot(epistemic, aleatoric)
     if not (spread > 0).all():
         raise RunError(f"{file}: exemplar {rows[(spread <= 0).any(axis=1)][0]} has a spread of 0; was it edited?")
-    refreshes = _read(path / "refreshes.csv", REFRESHES)
-    if not len(refreshes) or not np.isin(refreshes[:, -1], (0, 1)).all():
+    if run.refreshes is None:
+        raise RunError(f"{path}/refreshes.csv is missing; was it deleted?")
+    refreshes = _checked(run, "refreshes.csv", run.refreshes)
+    if not len(refreshes["diverged"]) or not np.isin(refreshes["diverged"], (0, 1)).all():
         raise RunError(f"{path}/refreshes.csv must hold a refresh, and 0 or 1 for diverged; was it cut or edited?")
-    columns = dict(zip(REFRESHES, refreshes.T, strict=True))
-    return ModelRun(run, lived[rows], observed, mean, spread, columns)
+    return ModelRun(run, lived[rows], observed, mean, spread, refreshes)
 
 
 def row(model_run: ModelRun) -> dict[str, Any]:
@@ -162,27 +159,22 @@ def figure_of(model_run: ModelRun) -> Figure:
     return figure
 
 
-def _read(path: Path, names: Sequence[str]) -> Array:
-    """``(n, len(names))``; a torn last line is left out, as of the log."""
-    try:
-        *lines, _ = path.read_text(encoding="utf-8").split("\n")
-    except FileNotFoundError:
-        raise RunError(f"{path} is missing; was it deleted?") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise RunError(f"{path} cannot be read: {error}") from error
-    if not lines or lines[0] != ",".join(names):
-        found = lines[0][:60] if lines else "no line"
-        raise RunError(f"{path} must begin with {','.join(names)}, got {found}; was it edited?")
-    rows = []
-    for number, line in enumerate(lines[1:], start=2):
-        try:
-            fields = [float(field) for field in line.split(",")]
-        except ValueError:
-            fields = []
-        if len(fields) != len(names) or not all(map(math.isfinite, fields)):
-            raise RunError(f"{path}, line {number}: needs {len(names)} numbers, got {line[:60]!r}; was it edited?")
-        rows.append(fields)
-    return np.array(rows).reshape(-1, len(names))
+def _checked(run: Run, name: str, table: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """The ``table`` of a model as it is.
+
+    Raises:
+        RunError: it is damaged, or of other outcomes.
+    """
+    path, bad = run.path / name, run.damage.get(name, 1)
+    names = small_table(path, run.outcomes.shape[1]).names
+    if name not in run.damage and tuple(table) == names:
+        return table
+    line = path.read_text(errors="replace").split("\n")[bad - 1][:60]
+    if bad == 1:
+        raise RunError(f"{path} must begin with {','.join(names)}, got {line}; was it edited?")
+    whole = ", ".join(column for column in names if column in WHOLE)
+    wanted = f"{len(names)} numbers" + ("" if name in run.unchecked else " and their checksum")
+    raise RunError(f"{path}, line {bad}: needs {wanted}, got {line!r} (whole ones for {whole}); was it edited?")
 
 
 def _printed(cells: dict[str, Any]) -> list[str]:

@@ -83,7 +83,7 @@ class Table:
             RunError: see ``rows``.
             OSError: it cannot be written; then it is as it was.
         """
-        new = [[_field(value) for value in row] for row in rows]
+        new = [[as_text(value) for value in row] for row in rows]
         with _alone(self.path.parent):
             merged = self.rows() | {self._key(row): row for row in new}
             write_text(self.path, _text([self.columns, *merged.values()]))
@@ -153,6 +153,6 @@ def _text(rows: Sequence[Sequence[str]]) -> str:
     return text.getvalue()
 
 
-def _field(value: object) -> str:
-    """Numbers read back exactly; NaN is left empty."""
+def as_text(value: object) -> str:
+    """A field of a table. Numbers read back exactly; NaN is left empty."""
     return "" if isinstance(value, float) and math.isnan(value) else str(value)
