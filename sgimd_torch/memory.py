@@ -161,7 +161,8 @@ class _Neighbours:
 
     def append(self, keys: Array) -> None:
         self.keys.append(keys)
-        self._index.add(keys.astype(np.float32))
+        with np.errstate(over="ignore"):  # faiss then finds nothing near, and ``nearest`` compares all rows
+            self._index.add(keys.astype(np.float32))
 
     def nearest(self, queries: Array, k: int, within: float = np.inf) -> list[Rows]:
         """For each of ``queries`` ``(m, dim)`` at most ``k`` rows not farther than ``within``, nearest first; ties stay
@@ -171,7 +172,8 @@ class _Neighbours:
         keys = self.keys.rows
         if len(keys) <= k + self._SPARE:
             return [_rank(keys, query, k, within) for query in queries]
-        squared32, proposed = self._index.search(queries.astype(np.float32), k + self._SPARE)
+        with np.errstate(over="ignore"):
+            squared32, proposed = self._index.search(queries.astype(np.float32), k + self._SPARE)
         proposed.sort(axis=1)  # the stable sort below then leaves ties in order of row number
         squared = _squared_distances(keys[proposed], queries[:, None])
         order = squared.argsort(axis=1, kind="stable")[:, :k]
