@@ -20,7 +20,7 @@ from sgimd_torch.spaces import Array, Demonstration, stream
 
 RATE = 50  # Hz
 DURATIONS = (1.0, 1.4)  # s
-HAND = 0.04  # rad, standard deviation of end postures, as of a hand
+HAND = 0.04  # rad, standard deviation of the hand at end postures
 TREMOR = 0.4  # how much the speed varies, relative to the speed
 
 

@@ -39,23 +39,24 @@ def check_vector(name: str, value: ArrayLike, dim: int, hint: str = "") -> Array
     """``value`` as float64 of shape ``(..., dim)``, every entry finite and at most 1e100 in size.
 
     Raises:
-        ValueError: it does not hold real numbers (but complex ones, text, True and False, dates, a mask), has another
-            last axis, or an entry is NaN, infinite or so large that squared distances may overflow.
+        ValueError: anything but real numbers (complex numbers, text, True and False, dates, masked arrays), another
+            last axis, or an entry that is NaN, infinite or so large that squared distances may overflow.
     """
     slip = f"; {hint}" if hint else ""
     try:
         array = np.asarray(value)
-    except ValueError as error:
+    except (TypeError, ValueError) as error:
         raise ValueError(f"{name} must be real numbers of shape (..., {dim}), got {_in_short(value)}{slip}") from error
-    if array.dtype.kind not in "fiu" or isinstance(value, np.ma.MaskedArray):
-        kind = "a masked array" if isinstance(value, np.ma.MaskedArray) else array.dtype
+    masked = isinstance(value, np.ma.MaskedArray)
+    if masked or array.dtype.kind not in "fiu":
+        kind = "a masked array" if masked else array.dtype
         raise ValueError(f"{name} must be real numbers of shape (..., {dim}), got {kind} {_in_short(value)}{slip}")
     if array.ndim == 0 or array.shape[-1] != dim:
         raise ValueError(f"{name} must have shape (..., {dim}), got {array.shape}{slip}")
     array = array.astype(np.float64, copy=False)
     usable = np.abs(array) <= _LARGEST  # NaN is not
     if not usable.all():
-        raise ValueError(f"{name} must be finite, {_LARGEST:g} at most, but {first_entry(array, ~usable)}{slip}")
+        raise ValueError(f"{name} must be finite and within +-{_LARGEST:g}, but {first_entry(array, ~usable)}{slip}")
     return array
 
 

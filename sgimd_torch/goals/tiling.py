@@ -60,22 +60,14 @@ class Tiling:
         self._ends = np.where(self._highs == self.box.high, np.inf, self._highs)
 
     def add(self, context: ArrayLike, goal: ArrayLike, competence: float, strategy: str, gain: float) -> int:
-        """Give a goal to the region in which it lies, and return the index of that region.
-
-        Raises:
-            ValueError: see `check_attempt`.
-        """
+        """Give a goal to the region in which it lies, and return the index of that region."""
         point = check_attempt(self.contexts, self.outcomes, context, goal, competence, gain)
         index = int(self._contain(point).argmax())
         self.regions[index] = self.regions[index].extend(point, competence, gain, strategy)
         return index
 
     def sample(self, context: ArrayLike) -> Array:
-        """Decide a goal, section 3.2.2: a mode, a region that contains the context, a goal in it.
-
-        Raises:
-            ValueError: ``context`` is not one point of C.
-        """
+        """Decide a goal, section 3.2.2: a mode, a region that contains the context, a goal in it."""
         context = check_in(self.contexts, "context", context)
         mode = 1 + self._rng.choice(3, p=self._modes)
         if mode == 2:

@@ -6,16 +6,20 @@ run = read_run("runs/sgim-d/seed-003"); run.outcomes, run.evaluation["mean_error
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+import zlib
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sgimd_torch.runs.config import Config, from_settings, having, options
 from sgimd_torch.runs.log import Columns, RunError, read_json
 from sgimd_torch.runs.tables import EVALUATION, read_table
 from sgimd_torch.spaces import Array
+
+LONGEST_LINE: Final = 1 << 16  # bytes, of a log
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +30,8 @@ class Run:
     before, -1 if there was none; ``contexts``, ``thetas``, ``goals`` and ``outcomes`` ``(n, dim)``, NaN where there was
     none. ``evaluation`` has an array for each column, an entry for each evaluation; ``regions`` likewise, with an entry
     for each region at each evaluation, None for a learner without interest map. ``config``, ``versions``, ``summary``:
-    as in their files.
+    as in their files. ``damage``: file name -> number of its first bad line, where reading ended, such as
+    ``{"episodes.csv": 301}``; the names of the columns are line 1.
     """
 
     path: Path
@@ -42,6 +47,7 @@ class Run:
     outcomes: Array
     evaluation: dict[str, Array]
     regions: dict[str, np.ndarray] | None
+    damage: dict[str, int] = field(default_factory=dict)
 
     def chosen_goals(self) -> Array:
         """``(n, outcome_dim)``, the goals that the learner set itself, in order, each once though it takes several
@@ -53,6 +59,8 @@ class Run:
 
 def read_run(path: str | os.PathLike[str]) -> Run:
     """What a run has written so far, be it finished, stopped or under way; a torn last line is left out.
+
+    A log that is damaged before its last line is read up to there, and ``damage`` says where.
 
     Raises:
         RunError: there is no run at ``path``, or its files are damaged.
@@ -73,7 +81,9 @@ def read_run(path: str | os.PathLike[str]) -> Run:
         columns = Columns(0, 0, 0) if just_begun else Columns.of(header + newline)
     except RunError as error:
         raise RunError(f"{path}/episodes.csv: {error}") from error
-    rows = [line.decode().rstrip("\n").split(",") for line in columns.whole_lines(body)]
+    lines = columns.whole_lines(body)
+    cut_short = b"\n" in body[sum(map(len, lines)) :]  # a line without its end is still being written
+    rows = [line.decode().rstrip("\n").split(",") for line in lines]
     ends = np.cumsum([3, columns.context_dim, columns.theta_dim, columns.outcome_dim, columns.outcome_dim])
     numbers = np.array([[field or "nan" for field in row[3:-1]] for row in rows], dtype=np.float64)
     contexts, thetas, goals, outcomes = np.split(numbers.reshape(len(rows), ends[-1] - 3), ends[1:-1] - 3, axis=1)
@@ -91,6 +101,7 @@ def read_run(path: str | os.PathLike[str]) -> Run:
         outcomes=outcomes,
         evaluation=read_table(path / "evaluation.csv", EVALUATION) or {name: np.empty(0) for name in EVALUATION},
         regions=read_table(path / "regions.csv"),
+        damage={"episodes.csv": len(lines) + 2} if cut_short else {},
     )
 
 
@@ -106,3 +117,37 @@ def find_runs(out: str | os.PathLike[str]) -> dict[str, list[Path]]:
     if not found:
         raise RunError(f"{out} holds no runs; they lie in OUT/NAME/seed-000")
     return found
+
+
+def finished(config: Config) -> bool:
+    """Whether this run is on disk with these options, undamaged to its last movement and its last evaluation."""
+    path = config.directory
+    try:
+        summary, settings = (read_json(path / name, missing={}) for name in ("summary.json", "config.json"))
+        if not summary.get("finished") or movements_on_disk(path) != config.movements:
+            return False
+        header, newline, body = (path / "episodes.csv").read_bytes().partition(b"\n")
+        whole = len(Columns.of(header + newline).whole_lines(body)) == config.movements
+        evaluation = read_table(path / "evaluation.csv", EVALUATION) or {"movements": np.empty(0)}
+        evaluated = not config.evaluations or config.movements in evaluation["movements"]
+        found, place = from_settings(settings), having("place")
+        same = all(getattr(found, name) == getattr(config, name) for name in options() if name not in place)
+        files = [(name, getattr(config, name)) for name in ("benchmark", "demonstrations")]
+        return (whole and evaluated and same) and all(
+            file is None or settings.get(f"{name}_crc32") in (None, f"{zlib.crc32(file.read_bytes()):08x}")
+            for name, file in files
+        )
+    except (ValueError, OSError):  # of another version, or beyond reading: the run itself says so when it goes on
+        return False
+
+
+def movements_on_disk(path: Path) -> int:
+    """How many movements the log of a run directory holds, by the index of its last whole line."""
+    try:
+        with (path / "episodes.csv").open("rb") as log:
+            log.seek(max(0, log.seek(0, os.SEEK_END) - LONGEST_LINE))
+            last = log.read().rpartition(b"\n")[0].rpartition(b"\n")[2]
+    except OSError:
+        return 0
+    index = last.partition(b",")[0]
+    return int(index) + 1 if index.isdigit() else 0
