@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from sgimd_torch.demonstrations import SHIPPED, load_demonstrations, save_demonstrations
+from sgimd_torch.files import make_folder
 from sgimd_torch.runs.config import Config
-from sgimd_torch.runs.log import make_folder
 
 Variant = dict[str, Any]
 ARMS: Final = ("planar-arm-7", "planar-arm-50")

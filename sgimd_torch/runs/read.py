@@ -1,6 +1,6 @@
 """Reading run directories: everything that a run has written, as arrays. Figures and tables are made from this alone.
 
-run = read_run("runs/sgim-d/seed-003"); run.outcomes, run.evaluation["mean_error_m"]    # runfiles.py explains the files
+run = read_run("runs/sgim-d/seed-003"); run.outcomes, run.evaluation["mean_error_m"]    # log.py explains the files
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from sgimd_torch.runs.config import Config, from_settings, having, options
 from sgimd_torch.runs.log import Columns, RunError, read_json
-from sgimd_torch.runs.tables import EVALUATION, read_table
+from sgimd_torch.runs.tables import EVALUATION, SMALL, small_table
 from sgimd_torch.spaces import Array
 
 LONGEST_LINE: Final = 1 << 16  # bytes, of a log
@@ -29,9 +29,12 @@ class Run:
     ``index`` ``(n,)``, ``origin`` ``(n,)`` names, "" at rest, ``demonstration`` ``(n,)`` row of the demonstration just
     before, -1 if there was none; ``contexts``, ``thetas``, ``goals`` and ``outcomes`` ``(n, dim)``, NaN where there was
     none. ``evaluation`` has an array for each column, an entry for each evaluation; ``regions`` likewise, with an entry
-    for each region at each evaluation, None for a learner without interest map. ``config``, ``versions``, ``summary``:
-    as in their files. ``damage``: file name -> number of its first bad line, where reading ended, such as
-    ``{"episodes.csv": 301}``; the names of the columns are line 1.
+    for each region at each evaluation, None for a goal model without regions; ``predictions`` and ``refreshes``
+    likewise, None without a forward model. ``config``, ``versions``, ``summary``: as in their files.
+
+    ``damage``: file name -> number of its first bad line, where reading ended, such as ``{"evaluation.csv": 3}``; the
+    names of the columns are line 1. ``unchecked``: names of the files without checksums, which an earlier version
+    wrote: in them, a changed number is noticed only if it cannot be.
     """
 
     path: Path
@@ -47,7 +50,10 @@ class Run:
     outcomes: Array
     evaluation: dict[str, Array]
     regions: dict[str, np.ndarray] | None
+    predictions: dict[str, np.ndarray] | None = None
+    refreshes: dict[str, np.ndarray] | None = None
     damage: dict[str, int] = field(default_factory=dict)
+    unchecked: tuple[str, ...] = ()
 
     def chosen_goals(self) -> Array:
         """``(n, outcome_dim)``, the goals that the learner set itself, in order, each once though it takes several
@@ -60,33 +66,25 @@ class Run:
 def read_run(path: str | os.PathLike[str]) -> Run:
     """What a run has written so far, be it finished, stopped or under way; a torn last line is left out.
 
-    A log that is damaged before its last line is read up to there, and ``damage`` says where.
+    A file that is damaged is read up to there, and ``damage`` says where.
 
     Raises:
-        RunError: there is no run at ``path``, or its files are damaged.
+        RunError: there is no run at ``path``, or one of its files cannot be read at all.
     """
     path = Path(path)
     config = read_json(path / "config.json", missing=None)
     if config is None:
         raise RunError(f"{path} is no run directory, it has no config.json; runs lie in OUT/NAME/seed-000")
     try:
-        log = (path / "episodes.csv").read_bytes()
-    except FileNotFoundError:
-        log = b""
+        columns = Columns.of(path)
+        log = columns.table(path)
+        small = [small_table(path / name) for name in SMALL if os.path.lexists(path / name)]
+        found = {table.path.name: table.read() for table in (log, *small)}
     except OSError as error:
-        raise RunError(f"{path}/episodes.csv cannot be read: {error.strerror}") from error
-    header, newline, body = log.partition(b"\n")
-    try:
-        just_begun = not newline and b"index,".startswith(header[:6])
-        columns = Columns(0, 0, 0) if just_begun else Columns.of(header + newline)
-    except RunError as error:
-        raise RunError(f"{path}/episodes.csv: {error}") from error
-    lines = columns.whole_lines(body)
-    cut_short = b"\n" in body[sum(map(len, lines)) :]  # a line without its end is still being written
-    rows = [line.decode().rstrip("\n").split(",") for line in lines]
-    ends = np.cumsum([3, columns.context_dim, columns.theta_dim, columns.outcome_dim, columns.outcome_dim])
-    numbers = np.array([[field or "nan" for field in row[3:-1]] for row in rows], dtype=np.float64)
-    contexts, thetas, goals, outcomes = np.split(numbers.reshape(len(rows), ends[-1] - 3), ends[1:-1] - 3, axis=1)
+        raise RunError(f"{error.filename} cannot be read: {error.strerror}") from error
+    rows = found[log.path.name].rows
+    arrays = {table.path.name: table.arrays(found[table.path.name]) for table in small}
+    contexts, thetas, goals, outcomes = columns.split(rows)
     return Run(
         path=path,
         config=config,
@@ -99,9 +97,12 @@ def read_run(path: str | os.PathLike[str]) -> Run:
         thetas=thetas,
         goals=goals,
         outcomes=outcomes,
-        evaluation=read_table(path / "evaluation.csv", EVALUATION) or {name: np.empty(0) for name in EVALUATION},
-        regions=read_table(path / "regions.csv"),
-        damage={"episodes.csv": len(lines) + 2} if cut_short else {},
+        evaluation=arrays.get("evaluation.csv", {name: np.empty(0) for name in EVALUATION}),
+        regions=arrays.get("regions.csv"),
+        predictions=arrays.get("predictions.csv"),
+        refreshes=arrays.get("refreshes.csv"),
+        damage={name: table.damage for name, table in found.items() if table.damage is not None},
+        unchecked=tuple(name for name, table in found.items() if not table.checked),
     )
 
 
@@ -126,10 +127,9 @@ def finished(config: Config) -> bool:
         summary, settings = (read_json(path / name, missing={}) for name in ("summary.json", "config.json"))
         if not summary.get("finished") or movements_on_disk(path) != config.movements:
             return False
-        header, newline, body = (path / "episodes.csv").read_bytes().partition(b"\n")
-        whole = len(Columns.of(header + newline).whole_lines(body)) == config.movements
-        evaluation = read_table(path / "evaluation.csv", EVALUATION) or {"movements": np.empty(0)}
-        evaluated = not config.evaluations or config.movements in evaluation["movements"]
+        run = read_run(path)
+        whole = len(run.index) == config.movements and not run.damage
+        evaluated = not config.evaluations or config.movements in run.evaluation["movements"]
         found, place = from_settings(settings), having("place")
         same = all(getattr(found, name) == getattr(config, name) for name in options() if name not in place)
         files = [(name, getattr(config, name)) for name in ("benchmark", "demonstrations")]
