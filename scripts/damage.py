@@ -4,6 +4,7 @@ All draw from a generator, so that a seed and a number name a file.
     damaged(content, rng)           bits, bytes, pieces, numbers and sizes, without any checksum made anew
     rewritten_npz(content, rng)     a whole zip file of arrays whose headers, numbers or names are others
     rewritten_model(content, rng)   a whole safetensors file whose header or numbers are others, its checksum right
+    rewritten_text(content, rng)    another value in a json object, or in a table, its checksum right
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import re
 import struct
 import tempfile
 import zipfile
+import zlib
 from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
@@ -108,7 +110,7 @@ def rewritten_npz(content: bytes, rng: np.random.Generator) -> bytes:
         case 5 | 6:
             members[name] = _other_value(members[name], rng)
         case _:
-            members[name] = _zeros(int(rng.integers(1, 129))) if rng.random() < 0.1 else rng.bytes(200)
+            members[name] = _zeros(pick((16, 60, 100), rng)) if rng.random() < 0.1 else rng.bytes(200)
     buffer = io.BytesIO()
     method = pick((zipfile.ZIP_STORED, *3 * (zipfile.ZIP_DEFLATED,), zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA), rng)
     with zipfile.ZipFile(buffer, "w", method) as archive:
@@ -192,3 +194,22 @@ def _other_tensors(header: dict[str, Any], content: bytes, rng: np.random.Genera
         path = Path(folder) / "model.safetensors"
         write_model(path, json.loads(header["__metadata__"]["model"]), state)
         return path.read_bytes()
+
+
+def rewritten_text(content: bytes, rng: np.random.Generator) -> bytes:
+    """A json file with another value or text, or a table in which a field is another, its line's checksum right."""
+    if content.startswith(b"{"):
+        if rng.random() < 0.3:
+            return pick(_TEXTS, rng).encode()
+        said = json.loads(content)
+        said[pick(list(said), rng)] = pick((0, -1, 1e300, True, None, "3", [], {}, [[[]]] * 99, "x" * 10_000), rng)
+        return json.dumps(said).encode()
+    header, *lines = content.splitlines()
+    line = int(rng.integers(len(lines)))
+    fields = lines[line].split(b",")[:-1]
+    fields[int(rng.integers(len(fields)))] = pick(
+        (*_NUMBERS, b"", b"x", b"-inf", b"\xff", b"R" * 99, b"R.999999.999999"), rng
+    )
+    body = b",".join(fields)
+    lines[line] = body + b",%08x" % zlib.crc32(body)
+    return b"\n".join((header, *lines, b""))

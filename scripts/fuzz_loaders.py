@@ -4,14 +4,19 @@
     scripts/fuzz_loaders.py --files 300 --loaders model --keep bad   # and keep the files that showed a fault
 Four of five files are damaged (`damage.damaged`); they must be refused, or hold what the file held before. One of five
 is another file in the same format whose checksums are right; it must be refused, or hold finite numbers. A process of
-its own loads them, which may not take more memory or time for a file than stated, and which ends at a warning, too.
+its own loads them, which may not take more memory or time for a file than stated; a warning counts as a fault, too. Of
+a run directory one file is changed at a time. There a damaged table may be read up to the damage, if `Run.damage` says
+so, and one cut at the end of a line reads as the run did when it was under way. Its json files have no checksum: a
+value of them that is another is counted as "json".
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 import resource
+import shutil
 import signal
 import subprocess
 import sys
@@ -28,19 +33,21 @@ from typing import Any, Final
 
 import numpy as np
 
-from damage import Change, damaged, rewritten_model, rewritten_npz
+from damage import Change, damaged, pick, rewritten_model, rewritten_npz, rewritten_text
 from options import at_least
 
 ROOT = Path(__file__).resolve().parent.parent
 SECONDS: Final = 5  # a file
-MEBIBYTES: Final = 1024  # of address space, above what the process has before
-GOOD: Final = ("refused", "the same", "another valid file")
+MEBIBYTES: Final = 512  # of address space, above what the process has before
+GOOD: Final = ("refused", "the same", "told", "as earlier", "json", "another valid file")
+_NO_ROWS: Final = np.empty(0, dtype=np.str_)
 FAULTS: Final = ("changed unnoticed", "traceback", "out of time", "out of memory")
 
 
 @dataclass(frozen=True)
 class Loader:
-    """``save`` writes a good file, ``load`` gives its content as arrays by name, ``rewritten`` makes another file."""
+    """``save`` writes a good file or folder, ``load`` gives its content as arrays by "file:name", ``rewritten`` makes
+    another file. With "file:told" in its content, the loader has said that the file is damaged."""
 
     save: Callable[[Path], None]
     load: Callable[[Path], dict[str, Any]]
@@ -119,19 +126,54 @@ def _load_model(path: Path) -> dict[str, Any]:
     return {**state, "about": str({**model.sizes, **model.shape})}
 
 
+def _save_run(path: Path) -> None:
+    from sgimd_torch.runs import command_line, process
+
+    words = (
+        "--environment planar-arm-7 --inverse model --movements 120 --evaluate_at 60,120 --repeats 0 --name run --out"
+    )
+    with contextlib.redirect_stdout(None), contextlib.redirect_stderr(None):
+        code = process.command(command_line.main, [*words.split(), str(path.parent / "runs")])
+    assert code == 0
+    shutil.move(path.parent / "runs/run/seed-000", path)
+
+
+def _load_run(path: Path) -> dict[str, Any]:
+    from sgimd_torch.runs.read import read_run
+
+    run = read_run(path)
+    log = ("index", "origin", "demonstration", "contexts", "thetas", "goals", "outcomes")
+    tables = {name: getattr(run, name) or {} for name in ("evaluation", "regions", "predictions", "refreshes")}
+    tables |= {"episodes": {name: getattr(run, name) for name in log}}
+    found = {
+        f"{table}.csv:{name}": values.astype(str) for table, each in tables.items() for name, values in each.items()
+    }
+    for name in ("config", "versions", "summary"):
+        found |= {f"{name}.json:{key}": str(value) for key, value in getattr(run, name).items()}
+    return found | {f"{name}:told": "" for name in (*run.damage, *run.unchecked)}
+
+
 LOADERS: Final = {
     "benchmark": Loader(_save_benchmark, _load_benchmark, rewritten_npz),
     "demonstrations": Loader(_save_demonstrations, _load_demonstrations, rewritten_npz),
     "memory": Loader(_save_memory, _load_memory, rewritten_npz),
     "model": Loader(_save_model, _load_model, rewritten_model),
+    "run": Loader(_save_run, _load_run, rewritten_text),
 }
 
 
-def fuzzed(loader: Loader, good: bytes, name: str, seed: int, index: int) -> tuple[bytes, bool]:
-    """File ``index`` of a seed, and whether it is damaged; otherwise it is another file."""
+def files_of(path: Path) -> dict[Path, bytes]:
+    """The files of a loader, with their content, in order."""
+    files = [path] if path.is_file() else sorted(file for file in path.iterdir() if file.name != "lock")
+    return {file: file.read_bytes() for file in files}
+
+
+def changed(name: str, whole: dict[Path, bytes], seed: int, index: int) -> tuple[Path, bytes, bool]:
+    """Change ``index`` of a seed: of which file, its new content, and whether it is damage rather than another file."""
     rng = np.random.default_rng([seed, zlib.crc32(name.encode()), index])
-    change = loader.rewritten if index % 5 == 4 else damaged
-    return change(good, rng), change is damaged
+    path = pick(list(whole), rng)
+    change = LOADERS[name].rewritten if index % 5 == 4 else damaged
+    return path, change(whole[path], rng), change is damaged
 
 
 def judge(loader: Loader, path: Path, good: dict[str, Any], is_damaged: bool) -> str:
@@ -148,58 +190,90 @@ def judge(loader: Loader, path: Path, good: dict[str, Any], is_damaged: bool) ->
     except Exception:
         traceback.print_exc()
         return "traceback"
-    if _bytes_of(content) == _bytes_of(good):
+    differ = {name for name in {*good, *content} if not name.endswith(":told") and not _equal(good, content, name)}
+    if not differ:
         return "the same"
-    numbers = [value for value in content.values() if not isinstance(value, str)]
-    if not is_damaged and all(np.isfinite(value).all() for value in numbers):
-        return "another valid file"
-    return "changed unnoticed"
+    if all(_earlier(content.get(name, _NO_ROWS), good.get(name, _NO_ROWS)) for name in differ):
+        if all(f"{name.partition(':')[0]}:told" in content for name in differ):
+            return "told"
+        if good.keys() == content.keys():
+            return "as earlier"
+    if all(".json:" in name for name in differ):
+        return "json"
+    numbers = [array for array in map(np.asarray, content.values()) if array.dtype.kind in "fiu"]
+    return (
+        "changed unnoticed" if is_damaged or not all(map(np.all, map(np.isfinite, numbers))) else "another valid file"
+    )
 
 
-def _bytes_of(content: dict[str, Any]) -> dict[str, tuple[Any, ...]]:
-    arrays = {name: np.asarray(value) for name, value in content.items()}
-    return {name: (array.dtype, array.shape, array.tobytes()) for name, array in arrays.items()}
+def _equal(good: dict[str, Any], content: dict[str, Any], name: str) -> bool:
+    if name not in good or name not in content:
+        return False
+    one, other = np.asarray(good[name]), np.asarray(content[name])
+    return one.shape == other.shape and one.tolist() == other.tolist()
 
 
-def child(name: str, first: int, files: int, seed: int) -> None:
-    """Load them one after another; prints what came of each. A file out of time ends the process."""
+def _earlier(shorter: Any, longer: Any) -> bool:
+    """Whether a column of a table holds the first entries of another."""
+    one, other = np.asarray(shorter), np.asarray(longer)
+    return min(one.ndim, other.ndim) > 0 and one.dtype.kind == "U" and one.tolist() == other[: len(one)].tolist()
+
+
+def child(name: str, path: Path) -> None:
+    """Make a good file, then load what is there at each line of the standard input, and print what came of it."""
     loader = LOADERS[name]
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "file"
-        loader.save(path)
-        whole, good = path.read_bytes(), loader.load(path)
-        warnings.simplefilter("error")
-        held = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
-        resource.setrlimit(resource.RLIMIT_AS, (held + MEBIBYTES * 2**20,) * 2)
-        for index in range(first, files):
-            content, is_damaged = fuzzed(loader, whole, name, seed, index)
-            path.write_bytes(content)
-            del content
-            begun = time.perf_counter()
-            signal.setitimer(signal.ITIMER_REAL, SECONDS)  # nobody handles this signal: it ends the process
-            verdict = judge(loader, path, good, is_damaged)
-            signal.setitimer(signal.ITIMER_REAL, 0)
-            print(f"{verdict}\t{time.perf_counter() - begun:.4f}", flush=True)
-        print(f"peak\t{resource.getrusage(resource.RUSAGE_SELF).ru_maxrss}", flush=True)
+    loader.save(path)
+    good = loader.load(path)
+    warnings.simplefilter("error")
+    held = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (held + MEBIBYTES * 2**20,) * 2)
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    print("ready", flush=True)
+    for line in sys.stdin:
+        signal.setitimer(signal.ITIMER_REAL, SECONDS)  # nobody handles this signal: it ends the process
+        begun = time.perf_counter()
+        verdict = judge(loader, path, good, line == "damaged\n")
+        seconds = time.perf_counter() - begun
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        print(f"{verdict}\t{seconds}\t{resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before}", flush=True)
 
 
-def verdicts(name: str, files: int, seed: int) -> Iterator[tuple[str, float]]:
-    """What came of each file and the seconds it took; at the end "peak" and the memory (KiB) at its largest."""
+def verdicts(name: str, files: int, seed: int, keep: Path | None) -> Iterator[tuple[str, float, int]]:
+    """What came of each file, the seconds it took, and the memory (KiB) that the process needed so far to load."""
     done = 0
     while done < files:
-        words = [sys.executable, __file__, "--child", str(done), "--files", str(files), "--seed", str(seed)]
-        environment = {**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
-        process = subprocess.Popen([*words, "--loaders", name], stdout=subprocess.PIPE, text=True, env=environment)
-        assert process.stdout is not None
-        for line in process.stdout:
-            verdict, number = line.split("\t")
-            done += verdict != "peak"
-            yield verdict, float(number)
-        if process.wait() == -signal.SIGALRM:
-            done += 1
-            yield "out of time", SECONDS
-        elif process.returncode:
-            sys.exit(f"{name}: the process that loads ended with {process.returncode} at file {done}")
+        with tempfile.TemporaryDirectory() as folder, _started(name, Path(folder) / "saved") as process:
+            assert process.stdin is not None
+            assert process.stdout is not None
+            process.stdout.readline()
+            whole = files_of(Path(folder) / "saved")
+            for index in range(done, files):
+                path, content, is_damaged = changed(name, whole, seed, index)
+                path.write_bytes(content)
+                print("damaged" if is_damaged else "other", file=process.stdin, flush=True)
+                verdict, *numbers = process.stdout.readline().split("\t")
+                if not verdict and process.wait() != -signal.SIGALRM:
+                    sys.exit(f"{name}: the process that loads ended with {process.returncode} at file {index}")
+                done += 1
+                seconds, memory = numbers or (SECONDS, 0)
+                yield verdict or "out of time", float(seconds), int(memory)
+                if keep is not None and verdict not in GOOD:
+                    keep.mkdir(parents=True, exist_ok=True)
+                    (keep / f"{name}-{index}-{path.name}").write_bytes(content)
+                path.write_bytes(whole[path])
+                if not verdict:
+                    break
+
+
+@contextlib.contextmanager
+def _started(name: str, path: Path) -> Iterator[subprocess.Popen[str]]:
+    words = [sys.executable, __file__, "--child", str(path), "--loaders", name]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
+    with subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
 
 
 def main() -> None:
@@ -209,42 +283,25 @@ def main() -> None:
     parser.add_argument("--seed", type=at_least(0), default=0, help="of all changes (default: %(default)s)")
     parser.add_argument("--loaders", nargs="+", choices=LOADERS, default=list(LOADERS), help="(default: all)")
     parser.add_argument("--keep", type=Path, help="a folder for the files that show a fault")
-    parser.add_argument("--child", type=int, help=argparse.SUPPRESS)
+    parser.add_argument("--child", type=Path, help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.child is not None:
-        child(options.loaders[0], options.child, options.files, options.seed)
+        child(options.loaders[0], options.child)
         return
-    faults = 0
-    print("| loader | files | " + " | ".join((*GOOD, *FAULTS)) + " | slowest (s) | memory (MiB) |")
+    print("| loader | files | " + " | ".join((*GOOD, *FAULTS)) + " | slowest (ms) | memory (MiB) |")
     print("|---" * (len(GOOD) + len(FAULTS) + 4) + "|")
+    faults = 0
     for name in options.loaders:
         counts: Counter[str] = Counter()
-        slowest = peak = 0.0
-        for verdict, number in verdicts(name, options.files, options.seed):
-            if verdict == "peak":
-                peak = max(peak, number)
-                continue
-            if verdict in FAULTS and options.keep is not None:
-                _keep(options.keep, name, options.seed, counts.total())
+        slowest, memory = 0.0, 0
+        for verdict, seconds, held in verdicts(name, options.files, options.seed, options.keep):
             counts[verdict] += 1
-            slowest = max(slowest, number)
-        fields = (
-            name,
-            counts.total(),
-            *(counts[each] for each in (*GOOD, *FAULTS)),
-            f"{slowest:.2f}",
-            round(peak / 1024),
-        )
+            slowest, memory = max(slowest, seconds), max(memory, held)
+        each = (counts[verdict] for verdict in (*GOOD, *FAULTS))
+        fields = (name, counts.total(), *each, round(1000 * slowest), round(memory / 1024))
         print("| " + " | ".join(map(str, fields)) + " |", flush=True)
-        faults += sum(counts[each] for each in FAULTS)
+        faults += sum(counts[verdict] for verdict in FAULTS)
     sys.exit(1 if faults else 0)
-
-
-def _keep(folder: Path, name: str, seed: int, index: int) -> None:
-    folder.mkdir(parents=True, exist_ok=True)
-    path = folder / f"{name}-{seed}-{index}"
-    LOADERS[name].save(path)
-    path.write_bytes(fuzzed(LOADERS[name], path.read_bytes(), name, seed, index)[0])
 
 
 if __name__ == "__main__":
