@@ -20,6 +20,7 @@ from sgimd_torch.spaces import Array, check_point, check_vector
 Rows = NDArray[np.int64]
 
 _VERSION: Final = 1
+_MOST_DIMS: Final = 100_000  # of a table in a file
 _NO_CONTEXT: Final = "an environment without contexts gives np.zeros(0)"
 _EPSILON32: Final = float(np.finfo(np.float32).eps)
 _LARGEST32: Final = float(np.finfo(np.float32).max)  # what faiss reports where float32 overflowed
@@ -160,7 +161,8 @@ class _Neighbours:
 
     def append(self, keys: Array) -> None:
         self.keys.append(keys)
-        self._index.add(keys.astype(np.float32))
+        with np.errstate(over="ignore"):  # faiss then finds nothing near, and ``nearest`` compares all rows
+            self._index.add(keys.astype(np.float32))
 
     def nearest(self, queries: Array, k: int, within: float = np.inf) -> list[Rows]:
         """For each of ``queries`` ``(m, dim)`` at most ``k`` rows not farther than ``within``, nearest first; ties stay
@@ -170,7 +172,8 @@ class _Neighbours:
         keys = self.keys.rows
         if len(keys) <= k + self._SPARE:
             return [_rank(keys, query, k, within) for query in queries]
-        squared32, proposed = self._index.search(queries.astype(np.float32), k + self._SPARE)
+        with np.errstate(over="ignore"):
+            squared32, proposed = self._index.search(queries.astype(np.float32), k + self._SPARE)
         proposed.sort(axis=1)  # the stable sort below then leaves ties in order of row number
         squared = _squared_distances(keys[proposed], queries[:, None])
         order = squared.argsort(axis=1, kind="stable")[:, :k]
@@ -203,12 +206,16 @@ def _read_only_view(array: Array) -> Array:
 
 
 def _read(path: str | os.PathLike[str]) -> tuple[float, Array, Array, Array]:
-    names = ("version", "context_weight", "contexts", "thetas", "outcomes")
-    version, weight, *tables = read_npz(path, "saved Memory", "Memory.save", names)
-    if version.shape != () or version != _VERSION:
-        raise ValueError(f"{path} has version {version}, this code reads {_VERSION}; was it saved by a newer one?")
-    if weight.shape != () or any(t.dtype != np.float64 or t.ndim != 2 or len(t) != len(tables[0]) for t in tables):
+    names = ("context_weight", "contexts", "thetas", "outcomes")
+    weight, *tables = read_npz(path, "saved Memory", "Memory.save", _VERSION, names)
+    fitting = all(t.dtype == np.float64 and t.ndim == 2 and len(t) == len(tables[0]) for t in tables)
+    if weight.shape != () or weight.dtype.kind not in "iuf" or not fitting:
         shapes = [f"{array.dtype} {array.shape}" for array in (weight, *tables)]
         raise ValueError(f"{path} must hold a number and three float64 tables of equal length, got {shapes}")
+    if not 0 <= weight < np.inf:
+        raise ValueError(f"{path} has context_weight {weight}, which must be finite and >= 0")
+    dims = [table.shape[1] for table in tables]
+    if not (dims[1] and dims[2]) or max(dims) > _MOST_DIMS:  # room is made for a table without rows, too
+        raise ValueError(f"{path} must have 1 to {_MOST_DIMS} dimensions of theta and outcome, got {dims[1:]}")
     contexts, thetas, outcomes = (check_vector(f"a table of {path}", table, table.shape[1]) for table in tables)
     return float(weight), contexts, thetas, outcomes
