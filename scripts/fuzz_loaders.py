@@ -132,7 +132,7 @@ def _save_run(path: Path) -> None:
     words = (
         "--environment planar-arm-7 --inverse model --movements 120 --evaluate_at 60,120 --repeats 0 --name run --out"
     )
-    with contextlib.redirect_stdout(None), contextlib.redirect_stderr(None):
+    with open(os.devnull, "w") as nothing, contextlib.redirect_stdout(nothing), contextlib.redirect_stderr(nothing):
         code = process.command(command_line.main, [*words.split(), str(path.parent / "runs")])
     assert code == 0
     shutil.move(path.parent / "runs/run/seed-000", path)
