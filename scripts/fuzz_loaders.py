@@ -132,7 +132,7 @@ def _save_run(path: Path) -> None:
     words = (
         "--environment planar-arm-7 --inverse model --movements 120 --evaluate_at 60,120 --repeats 0 --name run --out"
     )
-    with contextlib.redirect_stdout(None), contextlib.redirect_stderr(None):
+    with open(os.devnull, "w") as nothing, contextlib.redirect_stdout(nothing), contextlib.redirect_stderr(nothing):
         code = process.command(command_line.main, [*words.split(), str(path.parent / "runs")])
     assert code == 0
     shutil.move(path.parent / "runs/run/seed-000", path)
@@ -227,7 +227,7 @@ def child(name: str, path: Path) -> None:
     warnings.simplefilter("error")
     held = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (held + MEBIBYTES * 2**20,) * 2)
-    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    before = _peak()
     print("ready", flush=True)
     for line in sys.stdin:
         signal.setitimer(signal.ITIMER_REAL, SECONDS)  # nobody handles this signal: it ends the process
@@ -235,7 +235,13 @@ def child(name: str, path: Path) -> None:
         verdict = judge(loader, path, good, line == "damaged\n")
         seconds = time.perf_counter() - begun
         signal.setitimer(signal.ITIMER_REAL, 0)
-        print(f"{verdict}\t{seconds}\t{resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before}", flush=True)
+        print(f"{verdict}\t{seconds}\t{_peak() - before}", flush=True)
+
+
+def _peak() -> int:
+    """The most memory (KiB) that this process has held; the system's own count takes that of its parent for it."""
+    lines = Path("/proc/self/status").read_text().splitlines()
+    return next(int(line.split()[1]) for line in lines if line.startswith("VmHWM"))
 
 
 def verdicts(name: str, files: int, seed: int, keep: Path | None) -> Iterator[tuple[str, float, int]]:
