@@ -191,7 +191,7 @@ def test_a_line_that_no_run_writes_is_refused_by_the_name_of_the_run_though_its_
     body = b",".join([field, b"100", b"15", b"0.5", b"0.2", b"0"])
     line = body + b",%08x\n" % zlib.crc32(body)
     (path / "refreshes.csv").write_bytes(b"movements,exemplars,steps,held_out,relative_error,diverged,crc32\n" + line)
-    with pytest.raises(RunError, match="run has a table that holds what no run writes .*was it edited"):
+    with pytest.raises(RunError, match=r"run has a table that holds what no run writes .*was it edited"):
         read_run(path)
 
 
