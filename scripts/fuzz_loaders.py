@@ -194,10 +194,7 @@ def judge(loader: Loader, path: Path, good: dict[str, Any], is_damaged: bool) ->
     if not differ:
         return "the same"
     if all(_earlier(content.get(name, _NO_ROWS), good.get(name, _NO_ROWS)) for name in differ):
-        if all(f"{name.partition(':')[0]}:told" in content for name in differ):
-            return "told"
-        if good.keys() == content.keys():
-            return "as earlier"
+        return "told" if all(f"{name.partition(':')[0]}:told" in content for name in differ) else "as earlier"
     if all(".json:" in name for name in differ):
         return "json"
     numbers = [array for array in map(np.asarray, content.values()) if array.dtype.kind in "fiu"]

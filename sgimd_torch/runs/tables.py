@@ -28,6 +28,7 @@ REFRESHES: Final = ("movements", "exemplars", "steps", "held_out", "relative_err
 Rows = list[list[str]]
 WHOLE: Final = ("movements", "attempts", "goals", "exemplar", "exemplars", "steps", "diverged")
 _CELL: Final = r"R(\.[0-9]{1,6})+"  # the path of a cell of a grid
+_PART_OF_A_HEADER: Final = re.compile(rb"[a-z0-9_,]*")
 _MAY_BE_NAN: Final = ("noise_floor_m", "competence")  # not measured; no goals
 
 
@@ -59,8 +60,11 @@ class Found:
     @property
     def damage(self) -> int | None:
         """The same, unless only the end of the last line of a file that grows is missing: its writer was killed there,
-        or is still writing."""
-        return None if self.grows and b"\n" not in self.tail else self.bad
+        or is still writing. A file that is replaced whole is never empty."""
+        if not self.size and not self.grows:
+            return 1
+        cut = self.grows and b"\n" not in self.tail and (self.size > 0 or _PART_OF_A_HEADER.fullmatch(self.tail))
+        return None if cut else self.bad
 
     def first(self, n: int) -> Found:
         """Its first ``n`` lines; the next one counts as bad."""

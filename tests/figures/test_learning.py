@@ -134,7 +134,7 @@ def test_one_colour_bar_serves_histograms_that_share_a_scale():
     assert len(figure.axes) == 3
     assert bar.ax.get_ylabel() == "movements"
     assert [tick for tick in bar.get_ticks() if 1 <= tick <= 40] == [1, 2, 5, 10, 20]
-    assert (bar.vmin, bar.vmax) == (1, 40)
+    assert (bar.vmin, bar.vmax) == pytest.approx((1, 40))  # older releases come back from logarithms
 
 
 def test_a_histogram_is_nothing_but_tiles(ax):

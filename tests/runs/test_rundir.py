@@ -1,5 +1,6 @@
 """The run directory's files: exact numbers, lines that tell whether they are as they were written, clear refusals."""
 
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -165,6 +166,40 @@ def test_a_last_line_without_its_end_is_damage_only_where_a_file_is_replaced_who
     assert len(run.index) == 2
     assert len(run.predictions["exemplar"]) == len(run.refreshes["movements"]) == 1
     assert run.damage == {"evaluation.csv": 3, "regions.csv": 2}
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "damaged"),
+    [
+        ("evaluation.csv", b"", True),  # it is replaced whole, header and all
+        ("regions.csv", b"", True),
+        ("predictions.csv", b"", False),  # its header has not come yet
+        ("predictions.csv", b"exemplar,outco", False),
+        ("predictions.csv", b"exemplar,out\xff\x00", True),
+        ("refreshes.csv", b"movements;", True),
+    ],
+)
+def test_a_table_without_a_whole_header_is_damaged_unless_it_has_just_begun(tmp_path, name, content, damaged):
+    path = write(tmp_path / "run", [])
+    (path / name).write_bytes(content)
+    assert read_run(path).damage == ({name: 1} if damaged else {})
+
+
+@pytest.mark.parametrize("field", [b"x", b"", b"1e300", b"9" * 30, b"\xff"])
+def test_a_line_that_no_run_writes_is_refused_by_the_name_of_the_run_though_its_checksum_is_right(tmp_path, field):
+    path = write(tmp_path / "run", [])
+    body = b",".join([field, b"100", b"15", b"0.5", b"0.2", b"0"])
+    line = body + b",%08x\n" % zlib.crc32(body)
+    (path / "refreshes.csv").write_bytes(b"movements,exemplars,steps,held_out,relative_error,diverged,crc32\n" + line)
+    with pytest.raises(RunError, match=r"run has a table that holds what no run writes .*was it edited"):
+        read_run(path)
+
+
+@pytest.mark.parametrize("content", ["[" * 100_000, '{"a": ' * 100_000, '{"a": ' + "1" * 5000 + "}", " " * (2**24 + 1)])
+def test_json_that_is_too_deep_or_too_long_is_refused_by_its_name(tmp_path, content):
+    path = write(tmp_path / "run", [], config=content)
+    with pytest.raises(RunError, match=r"config\.json cannot be read"):
+        read_run(path)
 
 
 def test_a_bad_line_before_others_is_damage_of_the_log(tmp_path):
