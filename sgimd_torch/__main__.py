@@ -9,9 +9,7 @@ from sgimd_torch import __version__
 from sgimd_torch.runs.process import Command, dispatch
 
 COMMANDS: Final = {
-    "run": Command(
-        "sgimd_torch.runs.command_line", "let one learner live, evaluate it, write everything to a directory"
-    ),
+    "run": Command("sgimd_torch.runs.command_line", "run one learner, evaluate it, write everything to a directory"),
     "sweep": Command(
         "sgimd_torch.runs.sweep", "many runs: options crossed with each other and with seeds, in parallel"
     ),

@@ -43,7 +43,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         [f"--seed={options.seed}", f"--movements={options.movements}", f"--out={options.out}", *options.more]
     )
     if base.environment != ROD:
-        raise ValueError("--environment is not free here: the demo shows the fishing rod")
+        raise ValueError("--environment cannot be given here: the demo shows the fishing rod")
     if not base.evaluations:
         raise ValueError("--evaluate-at [] leaves nothing to draw; choose some movements, or leave it out")
     with loading():
@@ -82,7 +82,7 @@ def _options(argv: Sequence[str] | None) -> argparse.Namespace:
         if name in ("--seed", "--movements", "--out"):
             raise ValueError(f"{name} is the demo's own; it goes before --")
         if name in ("--algorithm", "--name"):
-            raise ValueError(f"{name} is not free here: the demo compares sgim-d and random by their own names")
+            raise ValueError(f"{name} cannot be given here: the demo compares sgim-d and random by their own names")
     return options
 
 

@@ -1,4 +1,4 @@
-"""The catalogue: what it says of each thing is true, and a thing of one's own is as good as one of ours."""
+"""The catalogue: what it says of each thing is true, and a user's own parts work like ours."""
 
 import inspect
 import re
@@ -149,7 +149,7 @@ def test_an_environment_of_ones_own_lives_is_evaluated_and_resumed(toss, capsys)
     own = ("--environment", "toss:Toss", "--algorithm", "sagg-riac", "--out", "runs", *SHORT)
     assert command(main, own) == 0
     said = capsys.readouterr().err
-    assert "Toss brings no goals to be judged by" in said
+    assert "Toss has no benchmark goals" in said
     run = read_run(toss / "runs/sagg-riac/seed-000")
     assert run.outcomes.shape == (40, 1)
     assert run.evaluation["movements"].tolist() == [20, 40]

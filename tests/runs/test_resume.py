@@ -147,7 +147,7 @@ def test_a_log_that_lacks_movements_is_gone_on_with_only_when_the_loss_is_accept
     assert go(tmp_path, "--resume") == 2
     message = capsys.readouterr().err
     assert f"episodes.csv holds {kept} movements" in message
-    assert "summary.json knows of 90; was it cut, emptied or deleted?" in message
+    assert "summary.json counts 90; was it cut, emptied or deleted?" in message
     assert ("line 42 is damaged" in message) == (damage is flip)
     assert f"the {90 - kept} missing ones again with --accept-loss" in message
     assert files_of(directory) == before

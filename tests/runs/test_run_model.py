@@ -183,13 +183,13 @@ def test_a_model_that_is_asked_is_announced_once(tmp_path, live, capsys):
     ("options", "why", "rows"),
     [
         (("--movements", 40), "there were too few exemplars to train it", 0),
-        (("--movements", 60, "--training", 0.02), r"its relative error is \d\.\d+, to be trusted it needs 0\.25", 1),
+        (("--movements", 60, "--training", 0.02), r"its relative error is \d\.\d+, it is trusted up to 0\.25", 1),
     ],
 )
 def test_a_model_that_nobody_ever_asked_is_no_secret(tmp_path, live, capsys, options, why, rows):
     assert live(tmp_path, *MODEL, *options) == 0
     said = capsys.readouterr().err
-    instead = "the local inverse model answers and the simplex searches in its place"
+    instead = "the local inverse model answers and the simplex searches instead"
     assert re.search(f"the forward model is not asked, {instead}: {why}\n", said)
     directory = tmp_path / "sgim-d" / "seed-003"
     assert len((directory / "refreshes.csv").read_text().splitlines()) == 1 + rows
@@ -282,7 +282,7 @@ def test_options_of_a_model_that_is_not_there_are_named():
         ("--members 0", "members must be from 1 to 100, got 0"),
         ("--members 101", "members must be from 1 to 100, got 101"),
         ("--members 1.5", "--members must be a whole number, got 1.5"),
-        ("--training 0", "training must be above 0 and at most 100, got 0.0; it counts steps a movement"),
+        ("--training 0", "training must be above 0 and at most 100, got 0.0; it is a number of steps per movement"),
         ("--training 101", "training must be above 0 and at most 100"),
         ("--training .nan", "training must be above 0"),
         ("--focus 0.8", "focus must be from 0 to 0.75, got 0.8"),

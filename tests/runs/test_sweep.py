@@ -83,11 +83,11 @@ def test_values_and_further_options_become_those_of_the_runs():
         ("--vary goals=", "--vary must be like"),
         ("--vary =uniform", "--vary must be like"),
         ("--vary goals=grid,,uniform", "--vary must be like"),
-        ("--vary seed=0,1", "--seed is not free here: --seeds takes them"),
-        ("--vary name=a,b", "--name is not free here"),
-        ("--vary out=a,b", "--out is not free here: all runs of a sweep go to one --out"),
-        ("--seed 3", "--seed is not free here: --seeds takes them, such as 5, 0-19 or 0,3,7-9"),
-        ("--name=mine", "--name is not free here"),
+        ("--vary seed=0,1", "--seed cannot be given here: --seeds takes them"),
+        ("--vary name=a,b", "--name cannot be given here"),
+        ("--vary out=a,b", "--out cannot be given here: all runs of a sweep go to one --out"),
+        ("--seed 3", "--seed cannot be given here: --seeds takes them, such as 5, 0-19 or 0,3,7-9"),
+        ("--name=mine", "--name cannot be given here"),
         ("--vary goals=grid --vary goals=uniform", "--goals is there twice"),
         ("--vary task_space=1,2 --task-space 3", "--task-space is there twice"),
         ("--gaols uniform", "unknown option --gaols; did you mean --goals?"),
@@ -275,7 +275,7 @@ def test_a_run_that_a_killed_sweep_left_behind_is_waited_for_and_taken_up(tmp_pa
     os.kill(pid, signal.SIGSTOP)  # it keeps the run in hand and gets no further
     assert locked(config.directory / "lock")
     second = start(SWEEP, *options)
-    while "random seed 0: waiting for another process, which has this run in hand" not in second.stderr.readline():
+    while "random seed 0: waiting for another process, which writes this run" not in second.stderr.readline():
         assert second.poll() is None
     for signum in (signal.SIGINT, signal.SIGCONT):  # it ends in the middle, and the second sweep goes on with it
         os.kill(pid, signum)
