@@ -226,7 +226,7 @@ def _check_names(experiments: Sequence[str], only: Sequence[str]) -> None:
             raise ValueError(f"{name} is an experiment, no variant; experiments go before --only")
         if name in homes and name not in known:
             where = " and ".join(homes[name])
-            raise ValueError(f"{name} is a variant of {where}, but only {', '.join(experiments)} was asked for")
+            raise ValueError(f"{name} is a variant of {where}, you named {', '.join(experiments)}")
         _check_known("variant", name, known)
 
 

@@ -220,11 +220,11 @@ def test_looking_at_what_is_to_be_done_writes_nothing(tmp_path, monkeypatch, cap
         (["learnres"], "unknown experiment 'learnres', known are learners, .*did you mean learners?"),
         (["grid"], "grid is a variant, of ablations; write ablations --only grid"),
         (["ablations", "--only", "gird"], "unknown variant 'gird', known are uniform-goals, .*did you mean grid?"),
-        (["learners", "--only", "grid"], "grid is a variant of ablations, but only learners was asked for"),
+        (["learners", "--only", "grid"], "grid is a variant of ablations, you named learners"),
         (["sgim-d"], "sgim-d is a variant, of learners and forward-model; write learners --only sgim-d"),
         (
             ["long", "--only", "sgim-d"],
-            "sgim-d is a variant of learners and forward-model, but only long was asked for",
+            "sgim-d is a variant of learners and forward-model, you named long",
         ),
         (["--only", "grid", "ablations"], "ablations is an experiment, no variant; experiments go before --only"),
         (["--seeds", ""], "--seeds: must be like 5, 0-19 or 0,3,7-9, got ''"),
