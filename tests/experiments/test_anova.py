@@ -118,7 +118,7 @@ def test_without_run_directories_the_rows_of_earlier_ones_are_kept(demonstrators
     assert (tmp_path / "RESULTS.md").read_text() == page
     assert (tmp_path / "anova.csv").read_text() == table
     assert "Random: not run: sgim-d, 0 finished" in (said := capsys.readouterr().err)
-    assert "its row stays as it was" in said
+    assert "its row stays the same" in said
 
 
 def test_what_was_never_compared_says_so(tmp_path):

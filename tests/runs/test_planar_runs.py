@@ -213,7 +213,7 @@ def test_a_report_shows_an_arm_beside_the_rod_with_what_each_was_shown(tmp_path,
     assert report.main([str(tmp_path), "--out", str(tmp_path / "page.html")]) == 0
     page = (tmp_path / "page.html").read_text()
     assert "planar-arm-7" in page
-    assert "judged by different benchmarks" in page
+    assert "evaluated on different benchmarks" in page
     assert "left out" not in page.lower()
     assert f"sgimd film {tmp_path / 'rod' / 'seed-003'}" in page
     assert f"sgimd film {tmp_path / 'arm' / 'seed-003'}" not in page

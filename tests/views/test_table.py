@@ -1,4 +1,4 @@
-"""The table of what runs came to."""
+"""The table of the results of runs."""
 
 import json
 import shutil
