@@ -92,7 +92,7 @@ def model_page(folder: Path, table: Path) -> Page:
 
 
 def _errors(results: Results, times: Sequence[int], form: str) -> dict[str, Cell]:
-    """A variant's name, how many of its seeds came to the last of these ``times``, its errors at each of them."""
+    """A variant's name, how many of its seeds reached the last of these ``times``, its errors at each of them."""
 
     def error(when: int) -> Cell:
         return lambda name: show(results.iqm(name, when), form)

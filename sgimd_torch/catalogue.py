@@ -174,7 +174,7 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
         ),
         "gauss-newton": _at(
             "searches.through_model:gradient_search",
-            "each movement planned anew",
+            "a new plan for each movement",
             uses={**_MODEL, "residual": "residual"},
             fixed={"propose": "sgimd_torch.searches.through_model:gauss_newton"},
         ),

@@ -74,7 +74,7 @@ def dispatch(prog: str, commands: Mapping[str, Command], help_text: str, argv: S
         except ModuleNotFoundError as error:
             if not chosen.extra:
                 raise
-            slip = f"pip install 'sgimd-torch[{chosen.extra}]' brings it"
+            slip = f"pip install 'sgimd-torch[{chosen.extra}]' installs it"
             raise ImportError(f"{prog} {name} needs {error.name}, which is not installed; {slip}") from error
         return int(module.main(words[1:]))
 

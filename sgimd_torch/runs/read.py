@@ -74,7 +74,7 @@ def read_run(path: str | os.PathLike[str]) -> Run:
     path = Path(path)
     config = read_json(path / "config.json", missing=None)
     if config is None:
-        raise RunError(f"{path} is no run directory, it has no config.json; runs lie in OUT/NAME/seed-000")
+        raise RunError(f"{path} is no run directory, it has no config.json; runs are in OUT/NAME/seed-000")
     try:
         columns = Columns.of(path)
         log = columns.table(path)
@@ -123,7 +123,7 @@ def find_runs(out: str | os.PathLike[str]) -> dict[str, list[Path]]:
     for config in sorted(Path(out).glob("*/seed-*/config.json")):
         found.setdefault(config.parent.parent.name, []).append(config.parent)
     if not found:
-        raise RunError(f"{out} holds no runs; they lie in OUT/NAME/seed-000")
+        raise RunError(f"{out} holds no runs; they are in OUT/NAME/seed-000")
     return found
 
 

@@ -248,7 +248,7 @@ class _Run:
                 stdout=log,
                 stderr=log,
                 env={**os.environ, **one_thread},
-                process_group=0,  # Ctrl-C comes to us alone, and we pass it on
+                process_group=0,  # only we get Ctrl-C, and pass it on
             )
         while not stop.is_set():
             try:

@@ -42,7 +42,7 @@ class Task:
     """What can be learnt, and how it is judged.
 
     Args:
-        environment: where the learner lives.
+        environment: the robot and its world.
         benchmark: goals of evaluation: a file, or a function that makes them; None for goals all over T.
         demonstrations: what a teacher has to show: a file, or a function that makes it; None for no teacher.
         correspondence: (times, trajectory) -> theta_d, eq. (6); None for the environment's own, if it has one.

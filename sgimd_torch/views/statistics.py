@@ -17,7 +17,7 @@ from sgimd_torch.spaces import Array
 
 LEVEL = 0.95
 RESAMPLES = 9999
-SEED: Final = 2014  # of the bootstrap: each number draws from its own default_rng(SEED), whatever else is computed
+SEED: Final = 2014  # of the bootstrap: each number draws from its own default_rng(SEED)
 
 
 class Interval(NamedTuple):

@@ -78,7 +78,7 @@ def test_a_run_counts_as_one_movement_its_mean(runs):
     np.testing.assert_array_equal(means[1], read_run(runs / "sgim-d/seed-001").thetas.mean(axis=0))
 
 
-def test_runs_that_are_missing_or_not_finished_are_told(demonstrators, runs):
+def test_runs_that_are_missing_or_not_finished_are_reported(demonstrators, runs):
     compared, missing = compare(runs)
     assert found(compared, "SGIM-D taught by demonstrator 3, Random").rows == "2, 2 runs"
     told = f"sgim-d-teacher-2, 1 finished in {runs}, at least 2 are needed"

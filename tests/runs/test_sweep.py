@@ -1,4 +1,4 @@
-"""Many runs at once, in real processes: which runs a command line means, what is left to do, how it can end badly."""
+"""Many runs at once, in real processes: which runs a command line means, what is left to do, how runs can fail."""
 
 import os
 import pty
@@ -104,7 +104,7 @@ def test_values_and_further_options_become_those_of_the_runs():
         ("--out file", "file cannot be made: file is no folder"),
     ],
 )
-def test_what_cannot_be_is_refused_before_anything_starts(tmp_path, monkeypatch, capsys, options, message):
+def test_impossible_requests_are_refused_before_anything_starts(tmp_path, monkeypatch, capsys, options, message):
     monkeypatch.chdir(tmp_path)
     Path("file").write_text("")
     assert swept(*options.split()) == 2
@@ -272,7 +272,7 @@ def test_a_run_that_a_killed_sweep_left_behind_is_waited_for_and_taken_up(tmp_pa
     pid = child_of(first, config)
     first.kill()
     first.communicate()
-    os.kill(pid, signal.SIGSTOP)  # it keeps the run in hand and gets no further
+    os.kill(pid, signal.SIGSTOP)  # it still holds the run, but makes no progress
     assert locked(config.directory / "lock")
     second = start(SWEEP, *options)
     while "random seed 0: waiting for another process, which writes this run" not in second.stderr.readline():
@@ -284,7 +284,7 @@ def test_a_run_that_a_killed_sweep_left_behind_is_waited_for_and_taken_up(tmp_pa
     assert finished(config)
 
 
-def test_what_ended_well_is_told_once_each_and_an_error_there_is_a_failure(whole, tmp_path):
+def test_on_end_is_called_once_for_each_finished_run_and_its_error_is_a_failure(whole, tmp_path):
     configs, ended = [whole, short(tmp_path, seed=1)], []
 
     def on_end(config):

@@ -123,7 +123,7 @@ def find(place: Path) -> dict[str, list[Path]]:
         raise RunError(f"{place} {why}; wanted a run's directory, or the --out of sgimd run")
     runs = [path.parent for pattern in ("", "seed-*/", "*/seed-*/") for path in place.glob(f"{pattern}config.json")]
     if not runs:
-        raise RunError(f"{place} holds no runs; they lie in OUT/NAME/seed-000")
+        raise RunError(f"{place} holds no runs; they are in OUT/NAME/seed-000")
     if place in runs:
         return {Path(os.path.abspath(place)).parent.name: [place]}
     folders = {Path(os.path.abspath(run)).parent.name: run.parent for run in sorted(runs)}
