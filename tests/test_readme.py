@@ -32,7 +32,14 @@ def test_the_example_of_the_readme_is_short_enough_to_read():
 
 @pytest.mark.parametrize(
     "name",
-    ["README.md", "CONTRIBUTING.md", "CHANGELOG.md", "docs/runs.md", "experiments/README.md", "sgimd_torch/data/README.md"],
+    [
+        "README.md",
+        "CONTRIBUTING.md",
+        "CHANGELOG.md",
+        "docs/runs.md",
+        "experiments/README.md",
+        "sgimd_torch/data/README.md",
+    ],
 )
 def test_files_that_a_page_names_exist(name):
     page = ROOT / name
