@@ -31,8 +31,7 @@ from judging import NotRun, Results, Verdict, judge
 from model_claims import MODEL_CLAIMS, SIMPLEX
 from paper_claims import PAPER_CLAIMS
 from read_results import LAST, Evaluated, ResultsError, read_coverages, read_goals, read_results
-from sgimd_torch.files import write_bytes
-from sgimd_torch.runs.log import make_folder
+from sgimd_torch.files import make_folder, write_bytes
 from sgimd_torch.runs.process import command
 from sgimd_torch.views.statistics import iqm_interval, metres, rng, show
 from variants import EXPERIMENTS

@@ -1,204 +1,224 @@
-"""Run experiments: every variant for several seeds, one process a core, and what came of them in tables.
+"""Run the paper's experiments, every variant for several seeds, and collect what they come to in tables.
 
-Which variants there are: variants.py. Each run is one of run.py, in OUT/VARIANT/seed-000. When it ends, its evaluations
-go to RESULTS/paper.csv, a line each, those of forward-model and planar-arm-* to RESULTS/forward_model.csv; of the large
-task space the goals that it chose are counted in RESULTS/goals.csv. A variant of two experiments lives only once.
-Start the command again after Ctrl-C or a power cut, or with more seeds: what is in the tables is not run again, and a
-run that was stopped goes on. A run that fails is reported and the others go on.
+variants.py says which variants there are. A run goes to OUT/VARIANT/seed-003. When it ends, each of its evaluations
+becomes a line of RESULTS/paper.csv, or of RESULTS/forward_model.csv for forward-model and planar-arm-*; the goals that
+it chose in the large task space are counted in RESULTS/goals.csv. A variant of two experiments is run once.
 
-Exit status: 0 all runs are in the tables, 1 some failed, 2 the request is wrong, 130 stopped by Ctrl-C.
+Start the same command again after Ctrl-C or a power cut, or with more seeds: what is in the tables is not run again,
+and a run that was stopped goes on. If a run fails, the others go on.
 """
 
 from __future__ import annotations
 
 import argparse
-import difflib
-import os
-import signal
 import sys
-import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Sequence
+from dataclasses import replace
 from pathlib import Path
-from types import FrameType
+from typing import Final
 
-if __name__ == "__main__":  # Ctrl-C while the libraries below are loading
-    signal.signal(signal.SIGINT, lambda *_: os._exit(130))
+import numpy as np
 
-from overview import Overview
-from sgimd_torch.runs.children import Child, ChildFailed, in_use
+from sgimd_torch.catalogue import did_you_mean
+from sgimd_torch.files import make_folder
+from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.log import RunError
-from sgimd_torch.runs.process import say, with_streams
-from tables import Table, read_keys
-from tasks import COLUMNS, Task, tasks_of
-from variants import EXPERIMENTS, make_subsets
+from sgimd_torch.runs.process import command, say
+from sgimd_torch.runs.read import finished, read_run
+from sgimd_torch.runs.sweep import add_options, sweep, title
+from tables import GOALS, RESULTS, Key, Table, as_text, goal_row, result_rows
+from variants import EXPERIMENTS, FEW, HALF, make_subsets, tables_of
 
-EXAMPLES = f"""experiments: {", ".join(EXPERIMENTS)}
+EXAMPLES: Final = f"""experiments: {", ".join(EXPERIMENTS)}
 
 examples:
   python experiments/compare.py                                   everything, 10 seeds each: some hours on two cores
-  python experiments/compare.py learners large-space --seeds 3
+  python experiments/compare.py learners large-space --seeds 0-2
   python experiments/compare.py forward-model planar-arm-7 planar-arm-50
   python experiments/compare.py ablations --only uniform-goals grid
   python experiments/compare.py --dry-run                         what is still to be done
+  python experiments/compare.py --verify 10 --lot 7               ten rows of the tables, drawn by lot, made again
+
+Exit code: 0 all runs are in the tables, 1 some failed, 2 the request is wrong, 130 or 143 stopped by a signal.
 """
+# These measure the noise floor: as much work as all the rest.
+FLOORS: Final = ("learners", "teachers", "long", "letter", "forward-model")
+FLOOR_AT: Final = (5000, 10_000)
 
 
-def carry_out(tasks: Sequence[Task], done: int, processes: int, tables: Mapping[str, Table]) -> list[str]:
-    """Run the ``tasks``, some at once, and harvest each into its ``tables`` as it ends; what failed, with its reason.
+def main(argv: Sequence[str] | None = None) -> int:
+    """Find what is missing in the tables, run it, collect it.
 
-    A run that a killed compare.py left behind is waited for, then harvested like the others.
-
-    Raises:
-        KeyboardInterrupt: Ctrl-C; the runs that were under way are stopped and will go on next time.
-        OSError: a table cannot be written; likewise.
+    Returns:
+        The exit code, 1 where runs failed.
     """
-    overview, failures = Overview(tasks, done), []
-    waiting = list(tasks)
-    running: dict[Child, Task] = {}
+    options = _options(argv)
+    wanted = runs_of(options.experiments, options.only, options.seeds, options.out)
+    if options.verify:
+        return verify(wanted, options)
+    names = dict.fromkeys(table for name, _ in wanted for table in tables_of(name))
+    rows = {table: table_in(options.results, table).rows() for table in names}
+    left = [(name, config) for name, config in wanted if last_row(config) not in rows[tables_of(name)[0]]]
+    where = " and ".join(str(options.results / table) for table in names)
+    say(f"{len(wanted)} runs, {len(wanted) - len(left)} of them in {where} already")
+    if options.dry_run:
+        print("".join(f"{name}: {title(config)}\n" for name, config in left), end="")
+        return 0
+    make_folder(options.results)
+    make_subsets(options.out / "demonstrations")
+    runs: dict[Config, list[str]] = {}  # with the experiments that want it
+    for name, config in left:
+        runs.setdefault(config, []).append(name)
 
-    def failed(error: Exception) -> None:
-        failures.append(str(error))
-        overview.tell(str(error), *(["The others go on."] if waiting or running else []))
+    def on_end(config: Config) -> None:
+        for name in runs[config]:
+            collect(name, config, options.results)
 
-    def ours(task: Task) -> bool:
-        """Whether that run is under way here, for another experiment."""
-        return task.config.directory in (other.config.directory for other in running.values())
-
-    try:
-        while waiting or running:
-            free = (task for task in list(waiting) if not ours(task) and not in_use(task.config.directory))
-            while len(running) < processes and (task := next(free, None)):
-                waiting.remove(task)
-                try:
-                    child = task.start()
-                except (RunError, OSError) as error:
-                    overview.cannot_start(task)
-                    failed(error)
-                    continue
-                running[child] = task
-                overview.started(task, child)
-            idle = len(running) < processes
-            for child in [child for child in running if child.process.poll() is not None]:
-                task = running.pop(child)
-                try:
-                    child.check()
-                    task.harvest(tables)
-                except (ChildFailed, RunError) as error:
-                    if in_use(task.config.directory):  # the run of an earlier start, which had not shown itself yet
-                        waiting.append(task)
-                        overview.again(child)
-                        continue
-                    overview.ended(child, failed=True)
-                    failed(error)
-                else:
-                    overview.ended(child, failed=False)
-            overview.show(elsewhere=sum(not ours(task) for task in waiting) if idle else 0)
-            time.sleep(0.3)
-    finally:
-        for child in running:
-            child.interrupt()
-        for child in running:
-            child.end()
-    return failures
-
-
-def main() -> int:
-    """Find what is missing, run it, write it; the exit status."""
-    options = _options()
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-    signal.signal(signal.SIGTERM, _interrupt)
-    seeds = range(options.first_seed, options.first_seed + options.seeds)
-    begun = False
-    try:
-        tasks = tasks_of(options.experiments, options.only, seeds, options.out)
-        paths = {name: options.results / name for task in tasks for name in task.tables}
-        finished = {name: read_keys(path, *COLUMNS[name])[0] for name, path in paths.items()}
-        left = [task for task in tasks if task.last_row not in finished[task.table]]
-        where = " and ".join(str(paths[name]) for name in dict.fromkeys(task.table for task in tasks))
-        say(f"{len(tasks)} runs, {len(tasks) - len(left)} of them in {where} already")
-        if options.dry_run:
-            print("".join(f"{task.experiment}: {task.title}\n" for task in left), end="")
-            return 0
-        _make_results(options.results)
-        make_subsets(options.out / "demonstrations")
-        tables = {name: Table(path, *COLUMNS[name]) for name, path in paths.items()}
-        begun = True
-        failures = carry_out(left, len(tasks) - len(left), options.processes, tables)
-    except KeyboardInterrupt:
-        say("", "Stopped; the same command goes on from here.")
-        return 130
-    except (RunError, OSError, ValueError) as error:
-        say(f"error: {error}")
-        return 1 if begun else 2
-    say(f"{len(left) - len(failures)} runs ended well, {len(failures)} failed: {where}", *failures)
+    failures = sweep(list(runs), options.processes, on_end=on_end)
+    say(f"{len(runs) - len(failures)} runs ended well, {len(failures)} failed: {where}", *failures)
     return 1 if failures else 0
 
 
-def _make_results(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise RunError(f"--results {folder} cannot be made: {error.strerror}; is a file in the way?") from error
+def verify(wanted: Sequence[tuple[str, Config]], options: argparse.Namespace) -> int:
+    """Draw rows of the tables by lot, make each again by a run of its own, and compare.
+
+    Such a run lives as long as its row says and is evaluated then alone, which changes nothing in it.
+
+    Returns:
+        0 if all are equal, else 1.
+    """
+    shipped = {table: table_in(options.results, table).rows() for name, _ in wanted for table in tables_of(name)[:1]}
+    found = [
+        (name, config, row)
+        for name, config in wanted
+        for row in shipped[tables_of(name)[0]].values()
+        if row[:2] == [name, config.variant] and row[4] == str(config.seed)
+    ]
+    drawn = sorted(np.random.default_rng(options.lot).permutation(len(found))[: options.verify].tolist())
+    again = {}
+    for number in drawn:
+        name, config, row = found[number]
+        movements = int(row[5])
+        out = options.out / f"verify-{options.lot}" / f"{name}-{movements}"
+        again[number] = replace(config, movements=movements, evaluate_at=(movements,), out=out)
+    say(f"{len(again)} rows of {len(found)}, made again in {options.out}/verify-{options.lot}")
+    if options.dry_run:
+        print("".join(f"{title(config)} at {config.movements}\n" for config in again.values()), end="")
+        return 0
+    make_subsets(options.out / "demonstrations")
+    failures = sweep(list(again.values()), options.processes)
+    differ = 0
+    for number, config in again.items():
+        name, _, row = found[number]
+        made = result_rows(name, config, read_run(config.directory)) if finished(config) else []
+        now = [as_text(value) for value in made[-1]] if made else []
+        equal = now == row
+        differ += not equal
+        print(f"{'equal ' if equal else 'DIFFERS'} {','.join(row)}" + ("" if equal else f"  now {now}"))
+    say(f"{len(again) - differ} of {len(again)} rows are equal", *failures)
+    return 1 if differ else 0
 
 
-def _options() -> argparse.Namespace:
+def runs_of(
+    experiments: Sequence[str], only: Sequence[str], seeds: Sequence[int], out: Path
+) -> list[tuple[str, Config]]:
+    """All runs, each with its experiment, seed by seed, so that every variant has its first ones early.
+
+    Args:
+        experiments: names in ``EXPERIMENTS``.
+        only: of their variants only these; empty for all.
+        seeds: of each.
+        out: where runs go; the subsets of ``make_subsets`` lie in ``out/demonstrations``.
+    """
+    found = []
+    for seed in seeds:
+        for experiment in experiments:
+            for variant, line in EXPERIMENTS[experiment].items():
+                if only and variant not in only:
+                    continue
+                changes = dict(line)
+                if changes.get("demonstrations") in (Path(FEW), Path(HALF)):
+                    changes["demonstrations"] = out / "demonstrations" / changes["demonstrations"]
+                floor_at = FLOOR_AT if experiment in FLOORS else ()
+                whole = {"seed": seed, "out": out, "name": variant, "floor_at": floor_at, **changes}
+                found.append((experiment, Config(**whole)))
+    return found
+
+
+def last_row(config: Config) -> Key:
+    """Key of a run's last row; if that is in a table, all its rows are."""
+    return config.variant, str(config.seed), str(config.movements)
+
+
+def table_in(results: Path, name: str) -> Table:
+    """A table of results, by the name of its file."""
+    return Table(results / name, *(GOALS if name == "goals.csv" else RESULTS))
+
+
+def collect(experiment: str, config: Config, results: Path) -> None:
+    """Merge the rows of a finished run, read from its directory, into the tables of its experiment.
+
+    Raises:
+        RunError: its files are damaged, or it was not evaluated at its end.
+        OSError: a table cannot be written.
+    """
+    run = read_run(config.directory)
+    if config.movements not in run.evaluation["movements"]:
+        raise RunError(f"{run.path} has no evaluation after {config.movements} movements, though it ended")
+    evaluations, *others = tables_of(experiment)
+    for name in others:
+        table_in(results, name).merge([goal_row(config, run)])
+    table_in(results, evaluations).merge(result_rows(experiment, config, run))  # last: it is what counts as done
+
+
+def _options(argv: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
-        description=__doc__, epilog=EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter
+        prog="python experiments/compare.py",
+        description=__doc__,
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("experiments", nargs="*", metavar="EXPERIMENT", help="which; none stands for all of them")
     parser.add_argument("--only", nargs="+", default=[], metavar="VARIANT", help="of their variants only these")
-    parser.add_argument("--seeds", type=int, default=10, help="how many (default: %(default)s)")
-    parser.add_argument("--first-seed", type=int, default=0, help="(default: %(default)s)")
-    parser.add_argument(
-        "--processes",
-        type=int,
-        default=os.cpu_count() or 1,
-        help="runs at once (default: one a core, here %(default)s)",
-    )
+    add_options(parser, seeds="0-9")
     parser.add_argument("--out", type=Path, default=Path("runs"), help="where the runs go (default: %(default)s)")
     parser.add_argument(
         "--results", type=Path, default=Path("results"), help="folder of the tables (default: %(default)s)"
     )
-    parser.add_argument("--dry-run", action="store_true", help="only tell what is still to be done")
-    options = parser.parse_args()
+    parser.add_argument(
+        "--verify", type=int, default=0, metavar="N", help="make N rows of the tables again, in a folder of their own"
+    )
+    parser.add_argument("--lot", type=int, default=0, help="seed of the lot that draws them (default: %(default)s)")
+    options = parser.parse_args(argv)
     options.experiments = list(dict.fromkeys(options.experiments)) or list(EXPERIMENTS)
-    _check_names(parser, options)
-    for name, least in (("seeds", 1), ("first_seed", 0), ("processes", 1)):
-        if getattr(options, name) < least:
-            parser.error(f"--{name.replace('_', '-')} must be at least {least}, got {getattr(options, name)}")
+    _check_names(options.experiments, options.only)
     return options
 
 
-def _check_names(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
+def _check_names(experiments: Sequence[str], only: Sequence[str]) -> None:
     homes: dict[str, list[str]] = {}
     for experiment, variants in EXPERIMENTS.items():
         for variant in variants:
             homes.setdefault(variant, []).append(experiment)
-    known = list(EXPERIMENTS)
-    for name in options.experiments:
+    for name in experiments:
         if name in homes and name not in EXPERIMENTS:
-            parser.error(f"{name} is a variant, of {' and '.join(homes[name])}; write {homes[name][0]} --only {name}")
-        if name not in EXPERIMENTS:
-            parser.error(f"unknown experiment {name!r}, known are {', '.join(known)}{_slip(name, known)}")
-    known = [variant for variant, experiments in homes.items() if {*experiments} & {*options.experiments}]
-    for name in options.only:
+            where = " and ".join(homes[name])
+            raise ValueError(f"{name} is a variant, of {where}; write {homes[name][0]} --only {name}")
+        _check_known("experiment", name, EXPERIMENTS)
+    known = [variant for variant, where in homes.items() if {*where} & {*experiments}]
+    for name in only:
         if name in EXPERIMENTS and name not in homes:
-            parser.error(f"{name} is an experiment, no variant; experiments go before --only")
+            raise ValueError(f"{name} is an experiment, no variant; experiments go before --only")
         if name in homes and name not in known:
             where = " and ".join(homes[name])
-            parser.error(f"{name} is a variant of {where}, asked for were {', '.join(options.experiments)}")
-        if name not in homes:
-            parser.error(f"unknown variant {name!r}, known are {', '.join(known)}{_slip(name, known)}")
+            raise ValueError(f"{name} is a variant of {where}, asked for were {', '.join(experiments)}")
+        _check_known("variant", name, known)
 
 
-def _slip(name: str, known: Sequence[str]) -> str:
-    near = difflib.get_close_matches(name.lower().replace("_", "-"), known, 1, 0.5)
-    return f"; did you mean {near[0]}?" if near else ""
-
-
-def _interrupt(signum: int, frame: FrameType | None) -> None:
-    raise KeyboardInterrupt
+def _check_known(what: str, name: str, known: Collection[str]) -> None:
+    if name not in known:
+        raise ValueError(f"unknown {what} {name!r}, known are {', '.join(known)}{did_you_mean(name, known)}")
 
 
 if __name__ == "__main__":
-    sys.exit(with_streams(main))
+    sys.exit(command(main))

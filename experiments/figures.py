@@ -36,7 +36,7 @@ from sgimd_torch.figures import movements as plots_of_movements
 from sgimd_torch.figures.learning import COLOURS, NAMES, count_bar, landing_points, tile_counts
 from sgimd_torch.figures.results import Difference, SeedCurves, forest, goal_distances, goal_histogram, seed_curves
 from sgimd_torch.figures.save import save_figure
-from sgimd_torch.runs.log import make_folder
+from sgimd_torch.files import make_folder
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import Run
 from sgimd_torch.spaces import Array, Box

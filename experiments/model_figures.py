@@ -36,12 +36,12 @@ from figures import REACH
 from read_results import MODEL_HEADER
 from sgimd_torch.figures import predictions as plots
 from sgimd_torch.figures.save import save_figure
-from sgimd_torch.files import write_bytes
+from sgimd_torch.files import make_folder, write_bytes
 from sgimd_torch.forward_model.diagnostics import LEVELS, coverage, error_by_cell, improvements, running
-from sgimd_torch.runs.log import RunError, make_folder
-from sgimd_torch.runs.model_record import REFRESHES, prediction_columns
+from sgimd_torch.runs.log import RunError
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import Run, read_run
+from sgimd_torch.runs.tables import WHOLE, small_table
 from sgimd_torch.spaces import Array, Box
 
 NEWEST: Final = 1000  # predictions
@@ -85,18 +85,17 @@ def read_model_run(path: Path) -> ModelRun:
         RunError: it has no model, has predicted nothing yet, or its files are damaged or do not belong together.
     """
     run, file = read_run(path), path / "predictions.csv"
-    if not file.exists():
+    if run.predictions is None:
         raise RunError(
             f"{path} has no predictions.csv: it ran without a forward model; see --inverse model of sgimd run"
         )
-    dim = run.outcomes.shape[1]
-    table = _read(file, prediction_columns(dim))
+    table = _columns(run, "predictions.csv", run.predictions)
     lived = np.flatnonzero(np.isfinite(run.outcomes).all(axis=1))
     table = table[table[:, 0] < len(lived)]
     rows = table[:, 0].astype(np.int64)
     if not len(rows):
         raise RunError(f"{file} holds no prediction of a movement yet; the model learns from 50 before its first")
-    if (rows != table[:, 0]).any() or rows[0] < 0 or (np.diff(rows) <= 0).any():
+    if (np.diff(rows) <= 0).any():
         raise RunError(f"{file} must name exemplars by whole numbers that increase; was it edited?")
     observed, mean, epistemic, aleatoric = np.split(table[:, 1:], 4, axis=1)
     differ = (observed != run.outcomes[lived[rows]]).any(axis=1)
@@ -105,10 +104,12 @@ def read_model_run(path: Path) -> ModelRun:
     spread = np.hypot(epistemic, aleatoric)
     if not (spread > 0).all():
         raise RunError(f"{file}: exemplar {rows[(spread <= 0).any(axis=1)][0]} has a spread of 0; was it edited?")
-    refreshes = _read(path / "refreshes.csv", REFRESHES)
+    if run.refreshes is None:
+        raise RunError(f"{path}/refreshes.csv is missing; was it deleted?")
+    refreshes = _columns(run, "refreshes.csv", run.refreshes)
     if not len(refreshes) or not np.isin(refreshes[:, -1], (0, 1)).all():
         raise RunError(f"{path}/refreshes.csv must hold a refresh, and 0 or 1 for diverged; was it cut or edited?")
-    columns = dict(zip(REFRESHES, refreshes.T, strict=True))
+    columns = dict(zip(run.refreshes, refreshes.T, strict=True))
     return ModelRun(run, lived[rows], observed, mean, spread, columns)
 
 
@@ -162,27 +163,22 @@ def figure_of(model_run: ModelRun) -> Figure:
     return figure
 
 
-def _read(path: Path, names: Sequence[str]) -> Array:
-    """``(n, len(names))``; a torn last line is left out, as of the log."""
-    try:
-        *lines, _ = path.read_text(encoding="utf-8").split("\n")
-    except FileNotFoundError:
-        raise RunError(f"{path} is missing; was it deleted?") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise RunError(f"{path} cannot be read: {error}") from error
-    if not lines or lines[0] != ",".join(names):
-        found = lines[0][:60] if lines else "no line"
-        raise RunError(f"{path} must begin with {','.join(names)}, got {found}; was it edited?")
-    rows = []
-    for number, line in enumerate(lines[1:], start=2):
-        try:
-            fields = [float(field) for field in line.split(",")]
-        except ValueError:
-            fields = []
-        if len(fields) != len(names) or not all(map(math.isfinite, fields)):
-            raise RunError(f"{path}, line {number}: needs {len(names)} numbers, got {line[:60]!r}; was it edited?")
-        rows.append(fields)
-    return np.array(rows).reshape(-1, len(names))
+def _columns(run: Run, name: str, table: dict[str, np.ndarray]) -> Array:
+    """``(n, n_columns)`` of a table of the model.
+
+    Raises:
+        RunError: it is damaged, or of other outcomes.
+    """
+    path, bad = run.path / name, run.damage.get(name, 1)
+    names = small_table(path, run.outcomes.shape[1]).names
+    if name in run.damage or tuple(table) != names:
+        line = path.read_text(errors="replace").split("\n")[bad - 1][:60]
+        if bad == 1:
+            raise RunError(f"{path} must begin with {','.join(names)}, got {line}; was it edited?")
+        whole = ", ".join(column for column in names if column in WHOLE)
+        wanted = f"{len(names)} numbers" if name in run.unchecked else f"{len(names)} numbers and their checksum"
+        raise RunError(f"{path}, line {bad}: needs {wanted}, got {line!r} (whole ones for {whole}); was it edited?")
+    return np.stack([column.astype(np.float64) for column in table.values()], axis=1)
 
 
 def _printed(cells: dict[str, Any]) -> list[str]:

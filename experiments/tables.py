@@ -1,122 +1,158 @@
-"""Tables that results are appended to as they come: a csv file with one writer at a time, no row twice.
+"""The tables of results: what each finished run comes to, collected from its directory and merged with what is there.
 
-table = Table(Path("goals.csv"), ("variant", "seed", "n_goals"), key=("variant", "seed"))
-table.append([["grid", 0, 7]])
+table = Table(Path("results/paper.csv"), *RESULTS); table.merge(result_rows("learners", config, run)); table.rows()
+A row made again from a run is the row that was there, byte for byte.
 """
 
 from __future__ import annotations
 
 import csv
-import fcntl
 import io
 import math
 import os
-from collections.abc import Sequence
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
+from typing import Final
 
+import numpy as np
+
+from read_results import GOALS_HEADER, HEADER
+from sgimd_torch.evaluation import Benchmark
+from sgimd_torch.files import lock, write_text
+from sgimd_torch.runs.build import task_of
+from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.log import RunError
+from sgimd_torch.runs.read import Run
+from sgimd_torch.runs.tasks import benchmark_of
+from sgimd_torch.spaces import Array
+from variants import teacher_of
 
 Key = tuple[str, ...]
+# Columns, and which of them tell one row from another.
+RESULTS: Final = (HEADER, ("variant", "seed", "movements"))
+GOALS: Final = (GOALS_HEADER, ("variant", "seed"))
+CORNER = -1.0  # m, where the tiles of a benchmark begin in x and y: T's, be it the paper's or an arm's
+NEAR = 1.5  # m from the base: goals farther away cannot be reached
 
 
+@dataclass(frozen=True)
 class Table:
-    """A csv file that rows are appended to; a last line torn off by a power cut is dropped.
+    """A csv file that several processes may add rows to; it is replaced whole.
 
     Args:
-        path: of the file; it is made where there is none.
+        path: of the file, in a folder that is there.
         columns: their names, the first line of the file.
         key: names of the columns that tell one row from another.
-
-    Attributes:
-        keys: of the rows that are there.
-
-    Raises:
-        RunError: the file is another table or damaged, or somebody else is writing it.
-        OSError: it cannot be written.
     """
 
-    def __init__(self, path: Path, columns: Sequence[str], key: Sequence[str]) -> None:
-        self.path = path
-        self._columns = [columns.index(name) for name in key]
-        self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o666)
-        try:
-            _lock(self._file, path)
-            self.keys, whole = read_keys(path, columns, key)
-            os.ftruncate(self._file, whole)
-            if not whole:
-                self._write(_lines([columns]))
-        except BaseException:
-            self.close()
-            raise
+    path: Path
+    columns: Sequence[str]
+    key: Sequence[str]
 
-    def append(self, rows: Sequence[Sequence[object]]) -> None:
-        """On disk when it returns; rows that are there already, by their key, are left out.
+    def rows(self) -> dict[Key, list[str]]:
+        """Every row by its key, none where there is no file. A torn last line counts as missing.
 
         Raises:
-            OSError: the disk is full, say; then none of them is there.
+            RunError: the file is another table, or damaged.
+            OSError: it cannot be read.
         """
-        new = {self._key(row): row for row in rows}
-        new = {key: row for key, row in new.items() if key not in self.keys}
-        self._write(_lines(list(new.values())))
-        self.keys |= new.keys()
-
-    def close(self) -> None:
-        """Let others write."""
-        os.close(self._file)
-
-    def _key(self, row: Sequence[object]) -> Key:
-        return tuple(str(row[column]) for column in self._columns)
-
-    def _write(self, content: bytes) -> None:
-        size = os.fstat(self._file).st_size
         try:
-            left = memoryview(content)
-            while left:
-                left = left[os.write(self._file, left) :]
-            os.fsync(self._file)
-        except OSError as error:
-            os.ftruncate(self._file, size)
-            raise OSError(error.errno, error.strerror, str(self.path)) from error
+            content = self.path.read_bytes()
+        except (FileNotFoundError, NotADirectoryError):
+            return {}
+        header = _text([self.columns]).encode()
+        if not (content.startswith(header) or header.startswith(content)):
+            raise RunError(f"{self.path} must begin with {','.join(self.columns)}; is it another table?")
+        lines = csv.reader(io.StringIO(content[len(header) : content.rfind(b"\n") + 1].decode(errors="replace")))
+        rows: dict[Key, list[str]] = {}
+        for row in lines:
+            if len(row) != len(self.columns) or not all(self._key(row)):
+                where = f"{self.path}, line {lines.line_num + 1}"
+                raise RunError(f"{where} is not a row of {','.join(self.columns)}; was it edited?")
+            rows[self._key(row)] = row
+        return rows
+
+    def merge(self, rows: Sequence[Sequence[object]]) -> None:
+        """Add rows, or put them in the place of those with their key; the others stay as they are and where they are.
+
+        Raises:
+            RunError: see ``rows``.
+            OSError: it cannot be written; then it is as it was.
+        """
+        new = [[as_text(value) for value in row] for row in rows]
+        with _alone(self.path.parent):
+            merged = self.rows() | {self._key(row): row for row in new}
+            write_text(self.path, _text([self.columns, *merged.values()]))
+
+    def _key(self, row: Sequence[str]) -> Key:
+        return tuple(row[self.columns.index(name)] for name in self.key)
 
 
-def read_keys(path: Path, columns: Sequence[str], key: Sequence[str]) -> tuple[set[Key], int]:
-    """The keys of a table's rows, and how many bytes of the file are whole lines; none where there is no file.
+def result_rows(experiment: str, config: Config, run: Run) -> list[list[object]]:
+    """A row of ``RESULTS`` for each evaluation of a finished run."""
+    benchmark = _benchmark(config.environment, config.benchmark)
+    evaluations = zip(*(run.evaluation[name] for name in ("movements", "mean_error_m", "noise_floor_m")), strict=True)
+    return [
+        [
+            *(experiment, config.variant, teacher_of(config), config.task_space, config.seed),
+            *(int(movements), float(error), float(floor)),
+            tiles_reached(run.outcomes[: int(movements)], benchmark),
+        ]
+        for movements, error, floor in evaluations
+    ]
 
-    Raises:
-        RunError: it is another table, or damaged.
+
+def goal_row(config: Config, run: Run) -> list[object]:
+    """A row of ``GOALS``: how many goals a learner chose for itself, and how many of them near enough to be reached."""
+    goals = run.chosen_goals()
+    return [config.variant, config.seed, len(goals), int((np.linalg.norm(goals, axis=1) <= NEAR).sum())]
+
+
+def tiles_reached(outcomes: Array, benchmark: Benchmark) -> int:
+    """How many of the benchmark's tiles, one for each of its goals, hold one of the ``outcomes`` or more.
+
+    Args:
+        outcomes: ``(n, 2)`` m, NaN where the robot was at rest.
+        benchmark: its tiles were laid out from ``CORNER``, whatever T these goals came from.
     """
+    landed = outcomes[np.isfinite(outcomes).all(axis=1)]
+    reached, wanted = (
+        {tuple(tile) for tile in np.floor((points - CORNER) / benchmark.side).tolist()}
+        for points in (landed, benchmark.goals)
+    )
+    return len(reached & wanted)
+
+
+@cache
+def _benchmark(environment: str, path: Path | None) -> Benchmark:
+    return benchmark_of(task_of(Config(environment=environment)), path)[0]
+
+
+@contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """Within, no other process changes a table of this folder."""
+    while True:
+        try:
+            held = lock(folder / ".lock")
+            break
+        except BlockingIOError:
+            time.sleep(0.05)  # the other one takes no longer than it takes to write a file
     try:
-        content = path.read_bytes()
-    except (FileNotFoundError, NotADirectoryError):
-        return set(), 0
-    header = _lines([columns])
-    whole = content.rfind(b"\n") + 1
-    if not (content.startswith(header) or header.startswith(content)):
-        raise RunError(f"{path} must begin with {','.join(columns)}; is it another table?")
-    rows = csv.DictReader(io.StringIO(content[:whole].decode(errors="replace")), restkey="", restval="")
-    keys: set[Key] = set()
-    for row in rows:
-        if "" in row or not all(row[name] for name in key):
-            raise RunError(f"{path}, line {rows.line_num} is not a row of {','.join(columns)}; was it edited?")
-        keys.add(tuple(row[name] for name in key))
-    return keys, whole
+        yield
+    finally:
+        os.close(held)
 
 
-def _lock(file: int, path: Path) -> None:
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        raise RunError(
-            f"{path} is being written by another compare.py; let it end, or name another --results"
-        ) from None
-
-
-def _lines(rows: Sequence[Sequence[object]]) -> bytes:
-    """Numbers read back exactly; NaN is left empty."""
+def _text(rows: Sequence[Sequence[str]]) -> str:
     text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows([map(_field, row) for row in rows])
-    return text.getvalue().encode()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue()
 
 
-def _field(value: object) -> object:
-    return "" if isinstance(value, float) and math.isnan(value) else value
+def as_text(value: object) -> str:
+    """A field of a table. Numbers read back exactly; NaN is left empty."""
+    return "" if isinstance(value, float) and math.isnan(value) else str(value)

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from sgimd_torch.demonstrations import SHIPPED, load_demonstrations, save_demonstrations
+from sgimd_torch.files import make_folder
 from sgimd_torch.runs.config import Config
-from sgimd_torch.runs.log import make_folder
 
 Variant = dict[str, Any]
 ARMS: Final = ("planar-arm-7", "planar-arm-50")
@@ -122,9 +122,13 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
     "forward-model": REFINING,
     **{arm: _on_arm(arm) for arm in ARMS},
 }
-PAPER, FORWARD_MODEL = "paper.csv", "forward_model.csv"
-# Where the rows of an experiment go; of those not named here to ``PAPER``.
-TABLES: Final = dict.fromkeys(("forward-model", *ARMS), FORWARD_MODEL)
+
+
+def tables_of(experiment: str) -> list[str]:
+    """The tables of results that its runs leave rows in; the first has their evaluations."""
+    if experiment in ("forward-model", *ARMS):
+        return ["forward_model.csv"]
+    return ["paper.csv", *(["goals.csv"] if experiment == "large-space" else [])]
 
 
 def make_subsets(folder: Path) -> None:

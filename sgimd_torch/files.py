@@ -1,12 +1,20 @@
-"""Arrays on disk: one ``.npz`` file without pickle, written whole or not at all, and refused by name when broken."""
+"""Files on disk: written whole or not at all, locked by one process at a time, refused by name when they are broken.
+
+Everything that replaces a file or takes a lock goes through here.
+    write_json(folder / "summary.json", {"movements": 90})
+    with replacing(folder / "film.mp4") as partial: encode(frames, partial)
+"""
 
 from __future__ import annotations
 
 import io
+import json
+import math
 import os
 import zipfile
 import zlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -16,19 +24,11 @@ from numpy.typing import NDArray
 _UNREADABLE = (ValueError, TypeError, KeyError, OSError, EOFError, RuntimeError, zipfile.BadZipFile, zlib.error)
 
 
-def write_npz(path: str | os.PathLike[str], arrays: dict[str, Any], *, compressed: bool = False) -> None:
-    """Write ``arrays`` by name; ``path`` holds the old file or the whole new one, and nothing else is left behind.
+@contextmanager
+def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """A file beside ``path``, to be written in the block, which takes the place of ``path`` when the block ends.
 
-    Raises:
-        OSError: ``path`` is a directory, or cannot be written.
-    """
-    buffer = io.BytesIO()
-    (np.savez_compressed if compressed else np.savez)(buffer, **arrays)
-    write_bytes(path, buffer.getvalue())
-
-
-def write_bytes(path: str | os.PathLike[str], content: bytes) -> None:
-    """Write ``content``; ``path`` holds the old file or the whole new one, and nothing else is left behind.
+    ``path`` holds the old file or the whole new one, also after a power cut; after an error nothing else is left.
 
     Raises:
         OSError: ``path`` is a directory, or cannot be written.
@@ -38,13 +38,36 @@ def write_bytes(path: str | os.PathLike[str], content: bytes) -> None:
         raise IsADirectoryError(f"{path} is a directory; was the name of the file left out?")
     partial = path.with_name(f"{path.name}.{os.getpid()}.part")
     try:
-        with open(partial, "wb") as file:
-            file.write(content)
-            file.flush()
+        yield partial
+        with open(partial, "rb+") as file:
             os.fsync(file.fileno())
         os.replace(partial, path)
     finally:
         partial.unlink(missing_ok=True)
+
+
+def write_bytes(path: str | os.PathLike[str], content: bytes) -> None:
+    """Replace ``path``, see ``replacing``."""
+    with replacing(path) as partial:
+        partial.write_bytes(content)
+
+
+def write_text(path: str | os.PathLike[str], content: str) -> None:
+    """Replace ``path`` by text in UTF-8, line ends as they are; see ``replacing``."""
+    write_bytes(path, content.encode())
+
+
+def write_json(path: str | os.PathLike[str], content: Mapping[str, Any]) -> None:
+    """Replace ``path`` by a json object, see ``replacing``; NaN becomes null, since json has none."""
+    finite = {name: None if isinstance(v, float) and not math.isfinite(v) else v for name, v in content.items()}
+    write_text(path, json.dumps(finite, indent=2, allow_nan=False) + "\n")
+
+
+def write_npz(path: str | os.PathLike[str], arrays: dict[str, Any], *, compressed: bool = False) -> None:
+    """Replace ``path`` by an npz file without pickle, which holds ``arrays`` by name; see ``replacing``."""
+    buffer = io.BytesIO()
+    (np.savez_compressed if compressed else np.savez)(buffer, **arrays)
+    write_bytes(path, buffer.getvalue())
 
 
 def read_npz(path: str | os.PathLike[str], kind: str, writer: str, names: Sequence[str]) -> list[NDArray[Any]]:
@@ -68,3 +91,62 @@ def read_npz(path: str | os.PathLike[str], kind: str, writer: str, names: Sequen
     if missing:
         raise ValueError(f"{path} is no {kind}: it lacks {', '.join(missing)}; {slip}")
     return arrays
+
+
+def make_folder(path: Path) -> None:
+    """With its parents, where they are missing.
+
+    Raises:
+        OSError: something is in the way, or it may not be made.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        inside = (place for place in (path, *path.parents) if os.path.lexists(place) and not place.is_dir())
+        blocker = next(inside, None)
+        why = f"{blocker} is no folder" if blocker else f"{error.strerror}"
+        raise OSError(f"{path} cannot be made: {why}; choose another --out") from error
+
+
+def lock(path: str | os.PathLike[str], flags: int = 0) -> int:
+    """Open ``path``, which is made where it is missing, and lock it without waiting.
+
+    Args:
+        path: of the file.
+        flags: of ``os.open``, beside those for reading, writing and making it.
+
+    Returns:
+        The descriptor; the lock is held until it is closed, or the process ends.
+
+    Raises:
+        BlockingIOError: another process holds the lock.
+        OSError: ``path`` cannot be opened, or this system has no such locks.
+    """
+    try:
+        import fcntl  # Windows has none
+    except ImportError as error:
+        raise OSError(f"{path} cannot be locked: this system has no flock; runs need Linux or macOS") from error
+    file = os.open(path, os.O_RDWR | os.O_CREAT | flags, 0o666)
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BaseException:
+        os.close(file)
+        raise
+    return file
+
+
+def locked(path: str | os.PathLike[str]) -> bool:
+    """Whether a process holds the ``lock`` of ``path``; it cannot where there is no such file."""
+    try:
+        import fcntl  # Windows has none, so that nobody holds it
+
+        file = os.open(path, os.O_RDONLY)
+    except (FileNotFoundError, NotADirectoryError, ImportError):
+        return False
+    try:
+        fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)  # shared, so that two who ask do not hinder each other
+    except BlockingIOError:
+        return True
+    finally:
+        os.close(file)
+    return False

@@ -42,7 +42,7 @@ def draw(
     """The pictures, as png.
 
     Args:
-        regions: leaves of the interest map; empty for a learner without one, which gets no picture of it.
+        regions: of the goal model; they get no pictures where there are none, or contexts are part of them.
         space: T, of the plane.
         outcomes, goals, demonstrated: ``(n, 2)`` m, where the float landed; the last own goals; what was demonstrated.
         benchmark, errors: ``(n, 2)`` and ``(n,)`` m, its goals and how far from each the float landed.
@@ -53,7 +53,7 @@ def draw(
         landing_points(ax, outcomes, space, demonstrated=demonstrated if len(demonstrated) else None, side=side)
 
     pictures = {"landed": landed, "error": lambda ax: _errors(ax, benchmark, errors)}
-    if regions:
+    if regions and len(regions[0].low) == space.dim:
         pictures["interest"] = lambda ax: _interest(ax, regions, goals)
         pictures["competence"] = lambda ax: _competence(ax, regions)
     return {name: _png(picture) for name, picture in pictures.items()}

@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from sgimd_torch.goals.regions import Region
-from sgimd_torch.spaces import Array, Box, Episode
+from sgimd_torch.spaces import Array, Box, Episode, check_vector
 
 # By tag, or by what stands before its slash.
 LEGEND: Final = {
@@ -29,9 +29,10 @@ LEGEND: Final = {
     "region_goals": "Goals met in this region, demonstrated ones too, since its parts were cut.",
     "region_reached": "Share of the goals remembered in this region that a movement came within the tolerance of.",
     "region_size": "This region's share of C x T, once.",
-    "grid_competence": "Mean competence of the remembered goals in one cell of a grid that is the same in every run.",
-    "grid_error": "Mean error (m) over the benchmark goals in one cell of a grid that is the same in every run.",
-    "regions/count": "How many regions the interest map has by now.",
+    "grid_competence": "Mean competence of the remembered goals in one cell of a grid that is the same in all "
+    "runs on one benchmark.",
+    "grid_error": "Mean error (m) over the benchmark goals in one cell of this grid.",
+    "regions/count": "How many regions the goal model has by now.",
     "regions": "Over all regions, also those too small for curves of their own: 10 %, half or 90 % lie below this.",
     "regime": "Share of the last movements that came from global exploration, local optimisation, imitation, babbling "
     "or rest.",
@@ -86,7 +87,12 @@ class Grid:
         self.names = [", ".join(cell) for cell in itertools.product(*bounds)]
 
     def sums(self, points: Array, values: Array) -> tuple[Array, Array]:
-        """``(n_cells,)`` twice: how many of the ``points`` ``(n, dim)`` lie in each cell, the sums of their values."""
+        """``(n_cells,)`` twice: how many of the ``points`` ``(n, dim)`` lie in each cell, the sums of their values.
+
+        Raises:
+            ValueError: points of another dimension, or not finite.
+        """
+        points = check_vector("points", points, self.box.dim, "is the grid a part of another task space?")
         inside = self.box.contains(points)
         scaled = (points[inside] - self.box.low) / self.box.sides * self.per_side
         steps = np.minimum(scaled.astype(np.int64), self.per_side - 1)  # the far border belongs to the last cell
@@ -105,7 +111,7 @@ class Curves:
     """Counts what happens in one run.
 
     Args:
-        grid: its part of the plane, cut into cells.
+        grid: the part of T that is cut into cells.
         tolerance: distance (m) at which a goal counts as reached.
         depth: regions have curves of their own down to this level of the tree: at most ``2 ** (depth + 1) - 1``.
     """

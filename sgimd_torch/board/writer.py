@@ -1,6 +1,6 @@
 """A TensorBoard board: where is the robot competent, where does it make progress, what did its teacher do?
 
-Fed from the caller's loop, of which it changes nothing; the steps are movements. ``curves.py`` says what is shown.
+Fed from the caller's loop, of which it changes nothing; the steps are movements. ``scalars.py`` says what is shown.
     with Board("runs/mine", environment.outcomes) as board:
         for episode in run(...):
             board.episode(episode)
@@ -146,18 +146,26 @@ class Board:
         value = _hparams_value(hparams_metadata.SESSION_END_INFO_TAG, session_end_info=ended)
         self._file.write(self.movements, [value])
 
-    def recall(self, *families: str) -> bool:
+    def recall(self, *families: str, needs: Collection[str] = ()) -> bool:
         """Take over, for this movement, what a replay does not make again; ``families`` stand before a tag's slash.
 
+        Args:
+            families: of the tags to take over.
+            needs: tags without which nothing is taken over.
+
         Returns:
-            Whether the event files that are to be replaced held any of it.
+            Whether the event file that is to be replaced held any of it.
         """
-        found = False
-        for event in self._file.before.get(self.movements, ()):
-            values = {v.tag: v.tensor for v in event.summary.value if v.tag.partition("/")[0] in families}
-            self._write(values, event.wall_time)
-            found |= bool(values)
-        return found
+        events = [
+            (event.wall_time, {v.tag: v.tensor for v in event.summary.value if v.tag.partition("/")[0] in families})
+            for event in self._file.before.get(self.movements, ())
+        ]
+        tags = {tag for _, tensors in events for tag in tensors}
+        if not tags.issuperset(needs):
+            return False
+        for wall_time, tensors in events:
+            self._write(tensors, wall_time)
+        return bool(tags)
 
     def publish(self) -> None:
         """Appear under the name that TensorBoard looks for, in the place of earlier event files."""
@@ -198,7 +206,7 @@ class _EventFile:
         directory.mkdir(parents=True, exist_ok=True)
         self._earlier = sorted(directory.glob(f"{_NAME}[0-9][0-9][0-9]"))
         self.before: dict[int, list[Event]] = {}
-        for path in self._earlier:
+        for path in self._earlier[-1:]:  # it took over all that the others held, before it was published
             for event in read_events(path):
                 self.before.setdefault(event.step, []).append(event)
         number = int(self._earlier[-1].name[-3:]) + 1 if self._earlier else 0

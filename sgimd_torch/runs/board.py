@@ -1,6 +1,6 @@
 """The board of a run: what ``run.py`` shows in TensorBoard while it goes on, and after a resume as if it never stopped.
 
-with RunBoard(directory, config, parts, seconds) as board: board.episode(episode); board.evaluation(found)
+with RunBoard(directory, config, parts, seconds, regions) as board: board.episode(episode); board.evaluation(found)
 ``scripts/watch RUNS`` opens TensorBoard on it.
 """
 
@@ -21,14 +21,11 @@ from sgimd_torch.runs.build import RunParts
 from sgimd_torch.runs.clock import Seconds
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.directory import RunDirectory
-from sgimd_torch.runs.tables import EVALUATION, read_table
 from sgimd_torch.spaces import Array, Box, Episode
-from sgimd_torch.strategies import GoalBabbling
 
 if TYPE_CHECKING:
     from sgimd_torch.board.writer import Board
 
-REACH: Final = Box.cube(-1, 1, 2)  # m, what the arm and its line can reach; cells in it compare runs of any task space
 GOALS: Final = 100  # the last ones are drawn
 FIRST: Final = ("algorithm", "goals", "inverse", "movements", "search")  # HParams shows five before one asks for more
 LEGEND: Final = {
@@ -48,7 +45,7 @@ class RunBoard:
         directory: of the run; its event files stay as they are until ``begin``.
         config, parts: of the run.
         seconds: its clock.
-        regions: gives those of the interest map as it is, none for a learner that has no such map.
+        regions: gives those of the goal model as they are, none for one that has none.
     """
 
     def __init__(
@@ -65,19 +62,19 @@ class RunBoard:
         self._goals: deque[Array] = deque(maxlen=GOALS)
         self._demonstrated: list[Array] = []
         self._drawn_at = 0
+        self._timed = False  # earlier event files say when the movements were
         if not config.board:
             return
         from sgimd_torch.board.writer import Board  # loaded only for those who watch
 
-        autonomous = parts.learner.autonomous
-        tolerance = autonomous.tolerance if isinstance(autonomous, GoalBabbling) else 0.02
+        tolerance = getattr(parts.learner.autonomous, "tolerance", 0.02)
+        cells = cells_of(parts.environment.outcomes, parts.benchmark.goals)
         legend, layout = LEGEND, None
         if parts.model is not None:
             legend, layout = {**LEGEND, **run_model.LEGEND}, run_model.LAYOUT
-        self._board = Board(directory.path, REACH, tolerance=tolerance, legend=legend, layout=layout, replace=True)
+        self._board = Board(directory.path, cells, tolerance=tolerance, legend=legend, layout=layout, replace=True)
         settings = {field.name: _plain(field, getattr(config, field.name)) for field in fields(config)}
         self._board.settings(settings, first=FIRST)
-        self._known = read_table(directory.path / "evaluation.csv", EVALUATION) or {}
 
     def __enter__(self) -> Self:
         return self
@@ -103,30 +100,44 @@ class RunBoard:
         replayed = board.movements <= len(self._directory.lines)
         if board.due:
             board.regions(self._regions())
-            if not replayed:
+            recalled = replayed and board.recall("time")
+            self._timed |= recalled
+            if not replayed or (self._timed and not recalled):  # the clock is near what a killed run did not write
                 spent = self._seconds.summary().items()
                 board.scalars({f"time/{name.removeprefix('seconds_')}": value for name, value in spent})
-            else:
-                board.recall("time")
-        if replayed and board.movements in self._directory.evaluations:
-            self._recall_evaluation(board)
 
     def model(self, curves: Mapping[str, float]) -> None:
         """A point for the curves of the forward model, which has just learnt."""
         if self._board is not None:
             self._board.scalars(curves)
 
-    def evaluation(self, found: Evaluation | None) -> None:
-        """Show an evaluation that was made just now, None if there was nothing to evaluate; and pictures, at times."""
+    def evaluation(self, found: Evaluation) -> None:
+        """Show an evaluation that was made just now, and pictures, at times; on disk when it returns."""
         board = self._board
-        if board is None or found is None:
+        if board is None:
             return
-        goals = self._parts.benchmark.goals
-        board.evaluation(goals, found.errors, found.noise_floor)
-        # Drawing takes as long as a hundred movements: when they have doubled, and at the end.
-        if board.movements >= 2 * self._drawn_at or board.movements == self._config.movements:
-            self._drawn_at = board.movements
+        # The error comes last: where an event file holds it, it holds all of this evaluation, see recall_evaluation.
+        if self._draws:
             self._draw(board, found)
+        board.evaluation(self._parts.benchmark.goals, found.errors, found.noise_floor)
+        board.flush()
+
+    def recall_evaluation(self) -> bool:
+        """Take over from earlier event files what they hold of an evaluation after this movement.
+
+        Returns:
+            Whether that is all; else it has to be evaluated again.
+        """
+        board = self._board
+        if board is None:
+            return True
+        if not self._draws:
+            return board.recall("error", "grid_error", needs=("error/mean",))
+        picture = "about/regions" if self._regions() else "map/error" if self._in_the_plane else "error/mean"
+        whole = board.recall("error", "grid_error", "map", "about", needs=("error/mean", picture))
+        if whole:
+            self._drawn_at = board.movements
+        return whole
 
     def begin(self) -> None:
         """The replay is over: take the place of earlier event files."""
@@ -143,33 +154,48 @@ class RunBoard:
         if self._board is not None:
             self._board.finish()
 
-    def _recall_evaluation(self, board: Board) -> None:
-        """What a replay does not make again; of errors for single goals and pictures, what the old event file held."""
-        if board.recall("map", "about"):
-            self._drawn_at = board.movements
-        if not board.recall("error", "grid_error"):
-            row = int(np.flatnonzero(self._known["movements"] == board.movements)[0])
-            names = ("mean", "median", "p90", "noise_floor")
-            values = [float(self._known[column][row]) for column in EVALUATION[1:]]
-            board.scalars({f"error/{name}": value for name, value in zip(names, values, strict=True)})
+    @property
+    def _draws(self) -> bool:
+        """Whether this evaluation gets pictures: when movements have doubled, as they take as long as a hundred, and at
+        the end."""
+        assert self._board is not None
+        return self._board.movements >= 2 * self._drawn_at or self._board.movements == self._config.movements
+
+    @property
+    def _in_the_plane(self) -> bool:
+        return self._parts.environment.outcomes.dim == 2
 
     def _draw(self, board: Board, found: Evaluation) -> None:
         from sgimd_torch.board.pictures import draw, where  # loaded only for those who watch
 
         space, regions = self._parts.environment.outcomes, self._regions()
-        pictures = draw(
-            regions,
-            space,
-            outcomes=self._parts.learner.memory.outcomes,
-            goals=np.array(self._goals).reshape(-1, space.dim),
-            demonstrated=np.array(self._demonstrated).reshape(-1, space.dim),
-            benchmark=self._parts.benchmark.goals,
-            errors=found.errors,
-        )
-        for name, png in pictures.items():
-            board.image(f"map/{name}", png)
+        self._drawn_at = board.movements
+        if self._in_the_plane:
+            pictures = draw(
+                regions,
+                space,
+                outcomes=self._parts.learner.memory.outcomes,
+                goals=np.array(self._goals).reshape(-1, space.dim),
+                demonstrated=np.array(self._demonstrated).reshape(-1, space.dim),
+                benchmark=self._parts.benchmark.goals,
+                errors=found.errors,
+            )
+            for name, png in pictures.items():
+                board.image(f"map/{name}", png)
         if regions:
             board.text("about/regions", where(regions))
+
+
+def cells_of(space: Box, goals: Array) -> Box:
+    """The part of T that is cut into cells: where the benchmark's ``goals`` ``(n, outcome_dim)`` lie, rounded outwards.
+
+    So the cells of runs on one benchmark are the same, however much larger than what can be reached their T is.
+    """
+    sides = np.ptp(goals, axis=0)
+    step = 10 ** np.floor(np.log10(np.where(sides > 0, sides, space.sides))) / 2
+    low = space.clip(np.floor(goals.min(axis=0) / step) * step + 0.0)  # no -0 in the names of cells
+    high = space.clip(np.ceil(goals.max(axis=0) / step) * step + 0.0)
+    return Box(np.where(low < high, low, space.low), np.where(low < high, high, space.high))
 
 
 def _plain(field: Field[Any], value: object) -> bool | float | str:

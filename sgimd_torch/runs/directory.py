@@ -1,21 +1,22 @@
 """The run directory as its one writer sees it: refuse what is not this run, take over what is whole, go on from there.
 
-with RunDirectory(path, settings, ...) as directory: directory.begin(); directory.append(line); directory.flush()
-``runfiles.py`` explains the files.
+with RunDirectory(path, settings, ...) as directory: directory.begin(); directory.log.append(line); ...
+``log.py`` explains the files.
 """
 
 from __future__ import annotations
 
-import fcntl
 import os
 from collections.abc import Mapping, Sequence
+from itertools import count
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from sgimd_torch.files import lock, make_folder, write_bytes, write_json
 from sgimd_torch.runs.config import before_there_was_a_choice
-from sgimd_torch.runs.log import Columns, RunError, dropped, make_folder, read_json, write_json
-from sgimd_torch.runs.tables import Evaluations
+from sgimd_torch.runs.evaluations import Evaluations
+from sgimd_torch.runs.log import Columns, RunError, read_json
 
 _UNFINISHED = ("lock", "versions.json")  # what a run killed before its config.json may have left, besides *.part
 
@@ -28,12 +29,14 @@ class RunDirectory:
         settings: everything that makes the run, as it goes to config.json.
         free: names of settings that may differ when a run is resumed.
         columns: of the log.
-        region_dims: dimensions of C x T, where the learner has an interest map; None where it has none.
+        region_dims: dimensions of C x T, where the goal model has regions; None where it has none.
         versions: what runs it.
         movements: how long the run is to be; the log must not be longer.
         resume: go on with what is there; False refuses a directory that is in use already.
+        accept_loss: go on, too, where the log lacks movements that summary.json knows of: they are lived again.
 
     Attributes:
+        log: its table.
         lines: of the log, as they were found.
         before: the settings it was started or last resumed with; None for a new run.
         summary: the last one, {} if there is none.
@@ -41,8 +44,8 @@ class RunDirectory:
         notes: what a person should know: what was dropped from damaged files, say.
 
     Raises:
-        RunError: it holds a run and ``resume`` is False, or a run with other settings, or something else; or another
-            process writes in it.
+        RunError: it holds a run and ``resume`` is False, or a run with other settings, or something else; or its log
+            lacks movements; or another process writes in it.
         OSError: it cannot be written.
     """
 
@@ -57,15 +60,17 @@ class RunDirectory:
         versions: dict[str, Any],
         resume: bool,
         movements: int,
+        accept_loss: bool = False,
     ) -> None:
-        self.path, self.columns = path, columns
+        self.path, self.columns, self.log = path, columns, columns.table(path)
         self.notes: list[str] = []
-        self.lines: list[bytes] = []
         self.summary: dict[str, Any] = {}
-        self._pending = bytearray()
         _refuse_foreign(path)
         make_folder(path)
-        self._lock = _lock(path)
+        try:
+            self._lock = lock(path / "lock")
+        except BlockingIOError:
+            raise RunError(f"{path} is in use by another process; wait for it, or choose another --out") from None
         try:
             self.before = self._settings_before(settings, free, resume)
             if self.before is not None:
@@ -73,12 +78,13 @@ class RunDirectory:
                 self.summary = self._summary_before()
             elif resume:
                 self.notes.append(f"{path} holds no run yet: it starts from the beginning")
-            self._kept = self._read_log()
+            self._copy = self._read_log(accept_loss)
             if len(self.lines) > movements:
                 raise RunError(f"{path} has {len(self.lines)} movements already, asked for were {movements}")
             self._settings, self._versions = dict(settings), versions
             self.evaluations = Evaluations(path, region_dims, self.notes)
-            self._log: int | None = None
+            for partial in (*path.glob("*.json*.part"), *path.glob("*.csv*.part")):  # of a process that was killed
+                partial.unlink()
         except BaseException:
             os.close(self._lock)
             raise
@@ -91,36 +97,28 @@ class RunDirectory:
     ) -> None:
         """Flush and let go; a disk that is full is not reported twice."""
         try:
-            self.flush()
+            self.log.flush()
         except OSError:
             if error is None:
                 raise
         finally:
-            if self._log is not None:
-                os.close(self._log)
             os.close(self._lock)
 
     def begin(self) -> None:
         """Start to write. Until then what was found stays as it is, so that a replay that fails does no harm."""
         write_json(self.path / "versions.json", self._versions)
         write_json(self.path / "config.json", self._settings)  # from here on it counts as a run
-        self._log = os.open(self.path / "episodes.csv", os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
-        os.ftruncate(self._log, self._kept)
-        if not self._kept:
-            self.append(self.columns.header)
+        if self._copy is not None:
+            write_bytes(self._copy, self.log.path.read_bytes())
+        if self._lost:  # the loss is accepted once
+            self.summarise(**{**self.summary, "movements": len(self.lines), "finished": False})
+        self.log.begin(self._kept)
+        self.log.flush()
         self.evaluations.begin()
 
-    def append(self, line: bytes) -> None:
-        """One more line for the log, on disk with the next ``flush``."""
-        self._pending += line
-
-    def flush(self) -> None:
-        """Hand the log to the operating system: a killed process then loses nothing of it."""
-        while self._pending and self._log is not None:
-            del self._pending[: os.write(self._log, self._pending)]
-
     def summarise(self, **summary: Any) -> None:
-        """Replace summary.json."""
+        """Replace summary.json, once the log is on the disk: it must not know of movements that the log lacks."""
+        self.log.flush(sync=True)
         self.summary = summary
         write_json(self.path / "summary.json", summary)
 
@@ -157,9 +155,8 @@ class RunDirectory:
 
     def _summary_before(self) -> dict[str, Any]:
         summary = self._read_or_note("summary.json")
-        wrong = [
-            name for name, value in summary.items() if name.startswith("seconds_") and type(value) not in (int, float)
-        ]
+        kinds = {name: (int, float) for name in summary if name.startswith("seconds_")} | {"movements": (int,)}
+        wrong = [name for name, kind in kinds.items() if type(summary.get(name, 0)) not in kind]
         if wrong:
             self.notes.append(f"{self.path}/summary.json: {', '.join(wrong)} must be numbers; it counts as missing")
         return {} if wrong else summary
@@ -173,21 +170,31 @@ class RunDirectory:
             return {}
         return found
 
-    def _read_log(self) -> int:
-        """Take over the whole lines; returns how many bytes of the log are whole."""
-        path = self.path / "episodes.csv"
-        content = path.read_bytes() if path.exists() else b""
-        header = self.columns.header
-        if content.startswith(header):
-            self.lines = self.columns.whole_lines(content[len(header) :])
-            kept = len(header) + sum(map(len, self.lines))
-        elif header.startswith(content) or not content.strip(b"\0"):
-            kept = 0
-        else:
-            raise RunError(f"{path} does not begin with {header[:40].decode()}...; restore it, or choose another --out")
-        if kept < len(content):
-            self.notes.append(dropped(path, content[kept:], f"{len(self.lines)} movements are kept"))
-        return kept
+    def _read_log(self, accept_loss: bool) -> Path | None:
+        """Take over the whole lines; returns where the file is to be kept as it was found, if it was not whole."""
+        log, found = self.log.path, self.log.read()
+        begins_otherwise = found.bad == 1 and not self.log.header.startswith(found.tail) and found.tail.strip(b"\0")
+        if begins_otherwise or not found.checked:
+            start = self.log.header[:40].decode()
+            raise RunError(f"{log} does not begin with {start}...; restore it, or choose another --out")
+        self.lines, self._kept, n = found.lines, found.size, len(found.lines)
+        self._lost = max(0, self.summary.get("movements", 0) - n)
+        damaged = found.damage is not None
+        if self._lost and not accept_loss:
+            raise RunError(
+                f"{log} holds {n} movements{f', line {found.bad} is damaged' if damaged else ''}, but summary.json "
+                f"knows of {n + self._lost}; was it cut, emptied or deleted? Restore it, or live the {self._lost} "
+                "missing ones again with --accept-loss, which keeps a copy of what is there"
+            )
+        self.notes += self.log.notes(found, f"{n} movements are kept")
+        if self._lost:
+            self.notes.append(f"{log} lacks {self._lost} movements: {n} are kept, the others will be lived again")
+        if not damaged and not (self._lost and os.path.lexists(log)):
+            return None
+        copies = (log.with_name(f"{log.name}.lost-{k}") for k in count())
+        copy = next(path for path in copies if not os.path.lexists(path))
+        self.notes.append(f"{log} as it was found is kept as {copy}")
+        return copy
 
 
 def _refuse_foreign(path: Path) -> None:
@@ -198,13 +205,3 @@ def _refuse_foreign(path: Path) -> None:
     foreign = [entry for entry in sorted(os.listdir(path)) if entry not in _UNFINISHED and not entry.endswith(".part")]
     if foreign:
         raise RunError(f"{path} holds {', '.join(foreign[:3])} but no run (no config.json); choose another --out")
-
-
-def _lock(path: Path) -> int:
-    lock = os.open(path / "lock", os.O_RDWR | os.O_CREAT, 0o666)
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        os.close(lock)
-        raise RunError(f"{path} is in use by another process; wait for it, or choose another --out") from None
-    return lock

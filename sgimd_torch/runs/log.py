@@ -1,36 +1,37 @@
-"""The files of a run directory: what is in each, how the log is laid out, how json is read, and how files are replaced.
+"""The log of a run, a line for each movement; and all files of a run directory.
 
     config.json      every choice that makes the run
     versions.json    of Python, the libraries and this repository; "before": those of earlier parts of a resumed run
-    episodes.csv     the log, append-only, a line for each movement:
+    episodes.csv     the log, append-only:
                          index, origin ("" at rest), demonstration (its row in the file, when one came just before),
-                         context_*, theta_*, goal_*, outcome_*, crc32 of the fields before it
+                         context_*, theta_*, goal_*, outcome_*
     evaluation.csv   movements, mean_error_m, median_error_m, p90_error_m, noise_floor_m
-    regions.csv      the interest map at each evaluation, a line for each region, corners in C x T
-    predictions.csv  with a forward model: what it foretold of each exemplar before it learnt from it, and what happened
+    regions.csv      the regions of the goal model at each evaluation, a line for each, corners in C x T
+    predictions.csv  with a forward model: what it predicted of each exemplar before learning it, and what happened
     refreshes.csv    with a forward model: a line each time that it has learnt
     summary.json     movements so far, the last evaluation, seconds spent on physics, learning and evaluating
     lock             held by the process that writes
+    *.lost-0         a log as it was found, where movements of it were missing or damaged
 
-Numbers read back exactly, and no time of day is written: equal seeds make the same csv files, byte for byte. All files
-but the log are replaced whole, so that nobody ever reads half of one.
+The csv files have a last column, crc32, the checksum of the fields before it. Numbers read back exactly, and no time of
+day is written: equal seeds make the same csv files, byte for byte. What does not grow is replaced whole, so that nobody
+ever reads half of it.
 
-``rundir.py`` writes a run directory, ``read_runs.py`` reads it, ``evaluations.py`` has the two small tables.
+``tables.py`` writes and reads such lines, ``directory.py`` writes a run directory, ``read.py`` reads it.
 """
 
 from __future__ import annotations
 
 import json
-import math
 import os
-import zlib
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from sgimd_torch.runs.tables import Rows, Table, numbers, sealed
 from sgimd_torch.session import Recorded
 from sgimd_torch.spaces import Array, Episode
 
@@ -49,32 +50,44 @@ class Columns:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """In order."""
+        """In order, that of the checksum left out."""
         return (
             *("index", "origin", "demonstration"),
             *(f"context_{k}" for k in range(self.context_dim)),
             *(f"theta_{k}" for k in range(self.theta_dim)),
             *(f"goal_{k}" for k in range(self.outcome_dim)),
             *(f"outcome_{k}" for k in range(self.outcome_dim)),
-            "crc32",
         )
 
     @property
     def header(self) -> bytes:
         """The first line of the log."""
-        return ",".join(self.names).encode() + b"\n"
+        return self.table(Path()).header
 
     @classmethod
-    def of(cls, header: bytes) -> Columns:
-        """Those that a log's first line names.
+    def of(cls, directory: Path) -> Columns:
+        """Those that the first line of a run's log names; none where there is none yet.
 
         Raises:
             RunError: it is not the first line of a log.
+            OSError: the log cannot be read.
         """
+        log = directory / "episodes.csv"
+        if not os.path.lexists(log):
+            return cls(0, 0, 0)
+        with log.open("rb") as file:
+            header = file.readline()
         columns = cls(*(header.count(name) for name in (b"context_", b"theta_", b"outcome_")))
-        if header != columns.header:
-            raise RunError(f"a log begins with the names of its columns, this one with {header[:60]!r}; was it edited?")
-        return columns
+        if header == columns.header:
+            return columns
+        if not header.endswith(b"\n") and b"index,".startswith(header[:6]):  # it is still being written
+            return cls(0, 0, 0)
+        names = f"the names of its columns, this one with {header[:60]!r}"
+        raise RunError(f"{log}: a log begins with {names}; was it edited?")
+
+    def table(self, directory: Path) -> Table:
+        """The log of a run."""
+        return Table(directory / "episodes.csv", self.names, grows=True, standing=_in_order)
 
     def line(self, episode: Episode, demonstration: int | None) -> bytes:
         """One episode; ``demonstration`` is the row of the one that came just before it."""
@@ -84,41 +97,21 @@ class Columns:
         fields += numbers(move.theta if move else None, self.theta_dim)
         fields += numbers(move.goal if move else None, self.outcome_dim)
         fields += numbers(episode.outcome, self.outcome_dim)
-        body = ",".join(fields).encode()
-        return body + b",%08x\n" % zlib.crc32(body)
+        return sealed(fields)
 
-    def recorded(self, line: bytes) -> Recorded:
-        """What ``session.replay`` needs of a line."""
-        fields = line.decode().split(",")
-        theta = 3 + self.context_dim
-        outcome = theta + self.theta_dim + self.outcome_dim
-        if not fields[theta]:
-            return Recorded(None, None)
-        return Recorded(
-            np.array(fields[theta : theta + self.theta_dim], dtype=np.float64),
-            np.array(fields[outcome : outcome + self.outcome_dim], dtype=np.float64),
-        )
+    def split(self, rows: Rows) -> tuple[Array, Array, Array, Array]:
+        """Contexts, thetas, goals and outcomes ``(n, dim)`` of so many rows of fields, NaN where they are empty."""
+        ends = np.cumsum([self.context_dim, self.theta_dim, self.outcome_dim, self.outcome_dim])
+        fields = [[field or "nan" for field in row[3:]] for row in rows]
+        values = np.array(fields, dtype=np.float64).reshape(len(rows), ends[-1])
+        contexts, thetas, goals, outcomes = np.split(values, ends[:-1], axis=1)
+        return contexts, thetas, goals, outcomes
 
-    def whole_lines(self, body: bytes) -> list[bytes]:
-        """The lines after the header up to the first that is torn, damaged or out of order."""
-        lines: list[bytes] = []
-        for line in body.splitlines(keepends=True):
-            fields, _, checksum = line.rpartition(b",")
-            if checksum != b"%08x\n" % zlib.crc32(fields) or not fields.startswith(b"%d," % len(lines)):
-                break
-            lines.append(line)
-        return lines
-
-
-def numbers(values: Array | None, dim: int) -> list[str]:
-    """Fields that read back exactly; ``dim`` empty ones for None."""
-    return [""] * dim if values is None else [repr(value) for value in values.tolist()]
-
-
-def dropped(path: Path, tail: bytes, outlook: str) -> str:
-    """The note that ``tail`` was not taken over from a damaged file."""
-    n_lines = len(tail.splitlines())
-    return f"{path}: dropped {len(tail)} bytes in {n_lines} line(s), torn or damaged; {outlook}"
+    def recorded(self, lines: Sequence[bytes]) -> list[Recorded]:
+        """What ``session.replay`` needs of them."""
+        _, thetas, _, outcomes = self.split([line.decode().split(",")[:-1] for line in lines])
+        rest = Recorded(None, None)
+        return [rest if np.isnan(o).any() else Recorded(t, o) for t, o in zip(thetas, outcomes, strict=True)]
 
 
 def read_json(path: Path, *, missing: Any) -> Any:
@@ -138,35 +131,6 @@ def read_json(path: Path, *, missing: Any) -> Any:
     return content
 
 
-def make_folder(path: Path) -> None:
-    """With its parents, where they are missing.
-
-    Raises:
-        RunError: something is in the way, or it may not be made.
-    """
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        inside = (place for place in (path, *path.parents) if os.path.lexists(place) and not place.is_dir())
-        blocker = next(inside, None)
-        why = f"{blocker} is no folder" if blocker else f"{error.strerror}"
-        raise RunError(f"{path} cannot be made: {why}; choose another --out") from error
-
-
-def write_json(path: Path, content: Mapping[str, Any]) -> None:
-    """Replace a json file; NaN becomes null, since json has none."""
-    finite = {name: None if isinstance(v, float) and not math.isfinite(v) else v for name, v in content.items()}
-    write_whole(path, json.dumps(finite, indent=2, allow_nan=False) + "\n")
-
-
-def write_whole(path: Path, content: str) -> None:
-    """Replace a file; ``path`` holds the old content or all of the new, also after a power cut."""
-    partial = path.with_name(path.name + ".part")
-    try:
-        with partial.open("w", encoding="utf-8", newline="") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)
+def _in_order(rows: Rows) -> int:
+    """How many lines of a log follow each other."""
+    return next((k for k, row in enumerate(rows) if row[0] != str(k)), len(rows))

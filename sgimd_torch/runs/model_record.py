@@ -15,13 +15,12 @@ import numpy as np
 from sgimd_torch.forward_model.diagnostics import coverage, improvements
 from sgimd_torch.memory import Memory
 from sgimd_torch.runs.directory import RunDirectory
-from sgimd_torch.runs.log import numbers, write_whole
+from sgimd_torch.runs.tables import numbers, sealed, small_table
 from sgimd_torch.spaces import Array, Episode
 
 if TYPE_CHECKING:
     from sgimd_torch.forward_model.model import ForwardModel, Prediction
 
-REFRESHES: Final = ("movements", "exemplars", "steps", "held_out", "relative_error", "diverged")
 LEVEL: Final = 0.8  # of the regions whose coverage the board shows
 LATELY: Final = 500  # movements, over which the board says how often refining a guess helped
 NOT_ASKED: Final = (
@@ -48,12 +47,6 @@ LAYOUT: Final = {
 }
 
 
-def prediction_columns(outcome_dim: int) -> list[str]:
-    """Of predictions.csv."""
-    parts = ("outcome", "predicted", "epistemic", "aleatoric")
-    return ["exemplar", *(f"{part}_{k}" for part in parts for k in range(outcome_dim))]
-
-
 class RunModel:
     """Refreshes the model after every movement and keeps a record; does nothing in a run without one.
 
@@ -67,24 +60,22 @@ class RunModel:
 
     def __init__(self, directory: RunDirectory, model: ForwardModel | None, trust: float) -> None:
         self._model, self._trust = model, trust
-        self._files = {name: directory.path / f"{name}.csv" for name in ("predictions", "refreshes")}
-        columns = {"predictions": prediction_columns(directory.columns.outcome_dim), "refreshes": REFRESHES}
-        self._pending = {name: [",".join(columns[name])] for name in self._files}
-        self._writes = False
+        dims = directory.columns.outcome_dim
+        self._predictions = small_table(directory.path / "predictions.csv", dims)
+        self._refreshes = small_table(directory.path / "refreshes.csv", dims)
+        self._tables = (self._predictions, self._refreshes) if model is not None else ()
         self._asked = False
-        self._refreshes = 0
+        self._learnt = 0  # refreshes so far
         self._lately: deque[tuple[Array, Array, str]] = deque(maxlen=LATELY)
         self._seconds = 0.0
-        self._news: list[str] = []
+        self._news = [note for t in self._tables for note in t.notes(t.read(), "the replay makes them again")]
         self.curves: dict[str, float] = {}
 
     def begin(self) -> None:
         """The replay is over: take the place of earlier files."""
-        self._writes = self._model is not None
-        if self._writes:
-            for path in self._files.values():
-                write_whole(path, "")
-            self.flush()
+        for table in self._tables:
+            table.begin()
+            table.flush()
 
     def episode(self, episode: Episode, memory: Memory) -> bool:
         """Refresh after a movement, lived or replayed; whether the model has learnt, so that ``curves`` are new."""
@@ -98,15 +89,15 @@ class RunModel:
         self._seconds += time.perf_counter() - begun
         if refresh is None:
             return False
-        self._refreshes += 1
+        self._learnt += 1
         error = self._model.relative_error
         fields = [movements, len(memory), refresh.steps, repr(refresh.held_out), repr(error), int(refresh.diverged)]
-        self._pending["refreshes"].append(",".join(map(str, fields)))
+        self._refreshes.append(sealed(list(map(str, fields))))
         self.curves = {
             "model/relative_error": error,
             "model/held_out": refresh.held_out,
             "model/steps": refresh.steps,
-            "model/ms": 1000 * self._seconds / self._refreshes,
+            "model/ms": 1000 * self._seconds / self._learnt,
             "model/improved": self._improved(),
         }
         if refresh.predicted is not None:
@@ -118,13 +109,8 @@ class RunModel:
 
     def flush(self) -> None:
         """Hand everything to the operating system."""
-        if not self._writes:
-            return
-        for name, path in self._files.items():
-            lines, self._pending[name] = self._pending[name], []
-            if lines:
-                with path.open("a", encoding="utf-8", newline="") as file:
-                    file.write("".join(f"{line}\n" for line in lines))
+        for table in self._tables:
+            table.flush()
 
     def news(self, *, ended: bool = False) -> list[str]:
         """What is to be told about the model and was not yet; at the end of a run, too, that it is not asked."""
@@ -142,7 +128,7 @@ class RunModel:
     def _foreseen(self, first: int, outcomes: Array, foreseen: Prediction) -> None:
         parts = (outcomes, *foreseen)
         for row, values in enumerate(np.hstack(parts), first):
-            self._pending["predictions"].append(",".join([str(row), *numbers(values, len(values))]))
+            self._predictions.append(sealed([str(row), *numbers(values, len(values))]))
         spread = np.hypot(foreseen.epistemic, foreseen.aleatoric)
         self.curves["model/error"] = float(np.linalg.norm(outcomes - foreseen.mean, axis=1).mean())
         self.curves["model/coverage"] = float(coverage(outcomes, foreseen.mean, spread, (LEVEL,))[0])

@@ -198,7 +198,7 @@ class Progress:
 
     Args:
         title: what is going on.
-        total: how much there is to do.
+        total: how much there is to do; it may change on the way.
         done: how much of it was done before; it does not count for the speed.
         unit: what is counted.
         every: seconds between two plain lines.
@@ -220,18 +220,21 @@ class Progress:
 
     def begin(self, title: str, total: int, done: int = 0) -> None:
         """Another part begins, with a speed of its own."""
-        self._title, self._total, self._first = title, total, done
+        self._title, self.total, self._first = title, total, done
         if self._bar is not None:
             self._bar.close()
         if sys.stderr.isatty():
             from tqdm import tqdm  # only a terminal needs it
 
-            self._bar = tqdm(desc=title, initial=done, total=total, unit=f" {self._unit}", dynamic_ncols=True)
+            self._bar = tqdm(
+                desc=title, initial=done, total=total, unit=f" {self._unit}", dynamic_ncols=True, smoothing=0.02
+            )
         self._begun = self._reported = time.monotonic()
 
     def show(self, done: int, note: str = "") -> None:
         """So much is done, earlier parts counted."""
         if self._bar is not None:
+            self._bar.total = self.total
             self._bar.set_postfix_str(note, refresh=False)
             self._bar.update(done - self._bar.n)
             return
@@ -240,8 +243,8 @@ class Progress:
             return
         self._reported = now
         rate = (done - self._first) / (now - self._begun)
-        left = clock((self._total - done) / rate)
-        parts = [f"{done} of {self._total} {self._unit}", f"{rate:.3g}/s", f"{left} left", note]
+        left = clock((self.total - done) / rate)
+        parts = [f"{done} of {self.total} {self._unit}", f"{rate:.3g}/s", f"{left} left", note]
         say(f"{self._title}: {', '.join(filter(None, parts))}")
 
 
@@ -255,15 +258,9 @@ def clock(seconds: float) -> str:
 
 
 def say(*messages: str) -> None:
-    """On stderr, at once; a stderr that takes nothing stops nobody."""
+    """On stderr, at once, above a bar of progress if there is one; a stderr that takes nothing stops nobody."""
+    bars = sys.modules.get("tqdm")
+    write: Any = print if bars is None else bars.tqdm.write
     with suppress(OSError):
         for message in messages:
-            print(message, file=sys.stderr, flush=True)
-
-
-def with_streams(main: Callable[[], int]) -> int:  # until the scripts that use it follow
-    return command(lambda _: main())
-
-
-def telling_errors(main: Any) -> Any:  # likewise
-    return main
+            write(message, file=sys.stderr)

@@ -1,21 +1,25 @@
 """Reading run directories: everything that a run has written, as arrays. Figures and tables are made from this alone.
 
-run = read_run("runs/sgim-d/seed-003"); run.outcomes, run.evaluation["mean_error_m"]    # runfiles.py explains the files
+run = read_run("runs/sgim-d/seed-003"); run.outcomes, run.evaluation["mean_error_m"]    # log.py explains the files
 """
 
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+import zlib
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sgimd_torch.runs.config import Config, from_settings, having, options
 from sgimd_torch.runs.log import Columns, RunError, read_json
-from sgimd_torch.runs.tables import EVALUATION, read_table
+from sgimd_torch.runs.tables import EVALUATION, SMALL, small_table
 from sgimd_torch.spaces import Array
+
+LONGEST_LINE: Final = 1 << 16  # bytes, of a log
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,8 +29,12 @@ class Run:
     ``index`` ``(n,)``, ``origin`` ``(n,)`` names, "" at rest, ``demonstration`` ``(n,)`` row of the demonstration just
     before, -1 if there was none; ``contexts``, ``thetas``, ``goals`` and ``outcomes`` ``(n, dim)``, NaN where there was
     none. ``evaluation`` has an array for each column, an entry for each evaluation; ``regions`` likewise, with an entry
-    for each region at each evaluation, None for a learner without interest map. ``config``, ``versions``, ``summary``:
-    as in their files.
+    for each region at each evaluation, None for a goal model without regions; ``predictions`` and ``refreshes``
+    likewise, None without a forward model. ``config``, ``versions``, ``summary``: as in their files.
+
+    ``damage``: file name -> number of its first bad line, where reading ended, such as ``{"evaluation.csv": 3}``; the
+    names of the columns are line 1. ``unchecked``: names of the files without checksums, which an earlier version
+    wrote: in them, a changed number is noticed only if it cannot be.
     """
 
     path: Path
@@ -42,6 +50,10 @@ class Run:
     outcomes: Array
     evaluation: dict[str, Array]
     regions: dict[str, np.ndarray] | None
+    predictions: dict[str, np.ndarray] | None = None
+    refreshes: dict[str, np.ndarray] | None = None
+    damage: dict[str, int] = field(default_factory=dict)
+    unchecked: tuple[str, ...] = ()
 
     def chosen_goals(self) -> Array:
         """``(n, outcome_dim)``, the goals that the learner set itself, in order, each once though it takes several
@@ -54,29 +66,25 @@ class Run:
 def read_run(path: str | os.PathLike[str]) -> Run:
     """What a run has written so far, be it finished, stopped or under way; a torn last line is left out.
 
+    A file that is damaged is read up to there, and ``damage`` says where.
+
     Raises:
-        RunError: there is no run at ``path``, or its files are damaged.
+        RunError: there is no run at ``path``, or one of its files cannot be read at all.
     """
     path = Path(path)
     config = read_json(path / "config.json", missing=None)
     if config is None:
         raise RunError(f"{path} is no run directory, it has no config.json; runs lie in OUT/NAME/seed-000")
     try:
-        log = (path / "episodes.csv").read_bytes()
-    except FileNotFoundError:
-        log = b""
+        columns = Columns.of(path)
+        log = columns.table(path)
+        small = [small_table(path / name) for name in SMALL if os.path.lexists(path / name)]
+        found = {table.path.name: table.read() for table in (log, *small)}
     except OSError as error:
-        raise RunError(f"{path}/episodes.csv cannot be read: {error.strerror}") from error
-    header, newline, body = log.partition(b"\n")
-    try:
-        just_begun = not newline and b"index,".startswith(header[:6])
-        columns = Columns(0, 0, 0) if just_begun else Columns.of(header + newline)
-    except RunError as error:
-        raise RunError(f"{path}/episodes.csv: {error}") from error
-    rows = [line.decode().rstrip("\n").split(",") for line in columns.whole_lines(body)]
-    ends = np.cumsum([3, columns.context_dim, columns.theta_dim, columns.outcome_dim, columns.outcome_dim])
-    numbers = np.array([[field or "nan" for field in row[3:-1]] for row in rows], dtype=np.float64)
-    contexts, thetas, goals, outcomes = np.split(numbers.reshape(len(rows), ends[-1] - 3), ends[1:-1] - 3, axis=1)
+        raise RunError(f"{error.filename} cannot be read: {error.strerror}") from error
+    rows = found[log.path.name].rows
+    arrays = {table.path.name: table.arrays(found[table.path.name]) for table in small}
+    contexts, thetas, goals, outcomes = columns.split(rows)
     return Run(
         path=path,
         config=config,
@@ -89,8 +97,12 @@ def read_run(path: str | os.PathLike[str]) -> Run:
         thetas=thetas,
         goals=goals,
         outcomes=outcomes,
-        evaluation=read_table(path / "evaluation.csv", EVALUATION) or {name: np.empty(0) for name in EVALUATION},
-        regions=read_table(path / "regions.csv"),
+        evaluation=arrays.get("evaluation.csv", {name: np.empty(0) for name in EVALUATION}),
+        regions=arrays.get("regions.csv"),
+        predictions=arrays.get("predictions.csv"),
+        refreshes=arrays.get("refreshes.csv"),
+        damage={name: table.damage for name, table in found.items() if table.damage is not None},
+        unchecked=tuple(name for name, table in found.items() if not table.checked),
     )
 
 
@@ -106,3 +118,36 @@ def find_runs(out: str | os.PathLike[str]) -> dict[str, list[Path]]:
     if not found:
         raise RunError(f"{out} holds no runs; they lie in OUT/NAME/seed-000")
     return found
+
+
+def finished(config: Config) -> bool:
+    """Whether this run is on disk with these options, undamaged to its last movement and its last evaluation."""
+    path = config.directory
+    try:
+        summary, settings = (read_json(path / name, missing={}) for name in ("summary.json", "config.json"))
+        if not summary.get("finished") or movements_on_disk(path) != config.movements:
+            return False
+        run = read_run(path)
+        whole = len(run.index) == config.movements and not run.damage
+        evaluated = not config.evaluations or config.movements in run.evaluation["movements"]
+        found, place = from_settings(settings), having("place")
+        same = all(getattr(found, name) == getattr(config, name) for name in options() if name not in place)
+        files = [(name, getattr(config, name)) for name in ("benchmark", "demonstrations")]
+        return (whole and evaluated and same) and all(
+            file is None or settings.get(f"{name}_crc32") in (None, f"{zlib.crc32(file.read_bytes()):08x}")
+            for name, file in files
+        )
+    except (ValueError, OSError):  # of another version, or beyond reading: the run itself says so when it goes on
+        return False
+
+
+def movements_on_disk(path: Path) -> int:
+    """How many movements the log of a run directory holds, by the index of its last whole line."""
+    try:
+        with (path / "episodes.csv").open("rb") as log:
+            log.seek(max(0, log.seek(0, os.SEEK_END) - LONGEST_LINE))
+            last = log.read().rpartition(b"\n")[0].rpartition(b"\n")[2]
+    except OSError:
+        return 0
+    index = last.partition(b",")[0]
+    return int(index) + 1 if index.isdigit() else 0

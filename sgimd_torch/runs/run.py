@@ -20,7 +20,6 @@ import numpy as np
 import sgimd_torch
 from sgimd_torch.environments.protocol import SimulationError
 from sgimd_torch.evaluation import Evaluation, evaluate
-from sgimd_torch.goals.interest_map import InterestMap
 from sgimd_torch.goals.regions import Region
 from sgimd_torch.runs.board import RunBoard
 from sgimd_torch.runs.build import RunParts, build
@@ -31,7 +30,6 @@ from sgimd_torch.runs.log import Columns, RunError
 from sgimd_torch.runs.model_record import RunModel
 from sgimd_torch.runs.process import Failed, Progress, Stopped, Stopping, say
 from sgimd_torch.session import ReplayError, live, replay, run
-from sgimd_torch.strategies import GoalBabbling
 
 # Files count by their content, of which a checksum is recorded; a benchmark may be another one when a run is resumed.
 MAY_CHANGE: Final = (*having("on_resume"), "benchmark_crc32")
@@ -56,7 +54,7 @@ def carry_out(config: Config, *, resume: bool, accept_loss: bool, again: str) ->
     with Stopping() as stopping:
         with stopping.at_once():
             parts = build(config)
-        directory = open_directory(config, parts, resume)
+        directory = open_directory(config, parts, resume, accept_loss=accept_loss)
         try:
             with directory:
                 say(*config.without_effect, *parts.notes, *directory.notes, *correspondence_of(parts))
@@ -79,7 +77,7 @@ def run_in(directory: RunDirectory, config: Config, parts: RunParts, stopping: S
     if it was killed; the learner's are counted from movement 0 on, since a replay lets it do all its work again.
     """
     rows = {id(demonstration): row for row, demonstration in enumerate(parts.demonstrations)}
-    recorded = [directory.columns.recorded(line) for line in directory.lines]
+    recorded = directory.columns.recorded(directory.lines)
     seconds = Seconds(directory.summary)
     execute = replay(recorded, seconds.of_physics(live(parts.environment, config.seed)))
     wanted = set(config.evaluations)
@@ -91,8 +89,12 @@ def run_in(directory: RunDirectory, config: Config, parts: RunParts, stopping: S
         model.begin()
         board.begin()
 
+    def flush() -> None:
+        board.flush()  # first: of a movement that the log holds, a replay does not know again when it was
+        directory.log.flush()
+
     def summarise(*, finished: bool = False) -> None:
-        directory.flush()
+        flush()
         model.flush()
         last = directory.evaluations.last
         directory.summarise(
@@ -124,24 +126,26 @@ def run_in(directory: RunDirectory, config: Config, parts: RunParts, stopping: S
                 demonstration = episode.demonstration
                 line = directory.columns.line(episode, None if demonstration is None else rows[id(demonstration)])
                 if episode.index >= len(recorded):
-                    directory.append(line)
+                    directory.log.append(line)
                 elif line != directory.lines[episode.index]:
                     raise ReplayError(_differs(directory.columns, directory.lines[episode.index], line))
                 movements = episode.index + 1
                 board.episode(episode)
                 if model.episode(episode, parts.learner.memory):
                     board.model(model.curves)
-                if movements in wanted and movements not in directory.evaluations:
-                    directory.flush()
+                if movements in wanted and not (movements in directory.evaluations and board.recall_evaluation()):
+                    flush()
                     with seconds.of_evaluation():
-                        evaluated = evaluate_in(directory, config, parts, movements, stopping)
-                    board.evaluation(evaluated)
+                        evaluated = evaluate_in(config, parts, movements, stopping)
+                    if evaluated is not None:
+                        board.evaluation(evaluated)
+                        with seconds.of_evaluation():
+                            directory.evaluations.add(movements, evaluated, regions_of(parts))
                 if movements == len(recorded):
                     begin()
                     say(*model.news())
                 if movements > len(recorded) and time.monotonic() - flushed >= FLUSH_EVERY:
                     summarise()
-                    board.flush()
                     flushed = time.monotonic()
                 if movements > len(recorded):
                     say(*model.news())
@@ -167,9 +171,7 @@ def _error_so_far(directory: RunDirectory) -> str:
     return "" if error is None else f"error {error:.4f} m"
 
 
-def evaluate_in(
-    directory: RunDirectory, config: Config, parts: RunParts, movements: int, stopping: Stopping
-) -> Evaluation | None:
+def evaluate_in(config: Config, parts: RunParts, movements: int, stopping: Stopping) -> Evaluation | None:
     """Evaluate the learner as it is now, with streams that the run does not use.
 
     Before its first exemplar there is nothing to infer a movement from, as for the learner by observation before its
@@ -180,9 +182,7 @@ def evaluate_in(
     goals = parts.benchmark.goals
     repeats = config.repeats if config.floor_at is None or movements in config.floor_at else 0
     with stopping.at_once():
-        found = evaluate(parts.inverse, parts.environment, goals, config.seed, movements, repeats=repeats)
-    directory.evaluations.add(movements, found, regions_of(parts))
-    return found
+        return evaluate(parts.inverse, parts.environment, goals, config.seed, movements, repeats=repeats)
 
 
 def correspondence_of(parts: RunParts) -> list[str]:
@@ -208,14 +208,12 @@ def _outside(parts: RunParts) -> list[str]:
 
 
 def regions_of(parts: RunParts) -> list[Region]:
-    """Of the learner's interest map; none if it has no such map."""
-    autonomous = parts.learner.autonomous
-    if isinstance(autonomous, GoalBabbling) and isinstance(autonomous.goals, InterestMap):
-        return autonomous.goals.regions
-    return []
+    """Of the learner's goal model, whichever it is; none if it has no regions."""
+    goals = getattr(parts.learner.autonomous, "goals", None)
+    return list(getattr(goals, "regions", ()))
 
 
-def open_directory(config: Config, parts: RunParts, resume: bool) -> RunDirectory:
+def open_directory(config: Config, parts: RunParts, resume: bool, *, accept_loss: bool = False) -> RunDirectory:
     """The directory of this run; of an earlier part's evaluations it keeps those that the whole run would have.
 
     Raises:
@@ -232,6 +230,7 @@ def open_directory(config: Config, parts: RunParts, resume: bool) -> RunDirector
         versions=versions(),
         resume=resume,
         movements=config.movements,
+        accept_loss=accept_loss,
     )
     same = directory.before is not None and all(
         directory.before.get(key) == settings[key] for key in EVALUATION_SETTINGS
@@ -263,7 +262,7 @@ def _differs(columns: Columns, recorded: bytes, now: bytes) -> str:
     were, are = (line.decode().split(",")[:-1] for line in (recorded, now))
     differences = [
         f"{name} was {old or 'empty'}, now {new or 'empty'}"
-        for name, old, new in zip(columns.names[:-1], were, are, strict=True)
+        for name, old, new in zip(columns.names, were, are, strict=True)
         if old != new
     ]
     more = f"; and {len(differences) - 3} more" if len(differences) > 3 else ""

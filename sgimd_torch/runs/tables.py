@@ -1,170 +1,241 @@
-"""What evaluations leave on disk: evaluation.csv, and regions.csv, the interest map as it was at each of them.
+"""The tables of a run: csv files whose lines end in a checksum, each read up to its first line that is not as written.
 
-Both tables begin each line with the number of movements before the evaluation. ``runfiles.py`` explains all files.
+One line codec for all: the log, which grows, and the small tables, of which those of evaluations are replaced whole.
+    table = Table(folder / "evaluation.csv", EVALUATION); table.replace(rows); table.read().rows
+``log.py`` says what is in each.
 """
 
 from __future__ import annotations
 
 import math
+import os
 import re
-from collections.abc import Iterable, Sequence
+import zlib
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from itertools import groupby
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
-from sgimd_torch.evaluation import Evaluation
-from sgimd_torch.goals.regions import Region
-from sgimd_torch.runs.log import RunError, dropped, numbers, write_whole
+from sgimd_torch.files import write_bytes
+from sgimd_torch.spaces import Array
 
-EVALUATION = ("movements", "mean_error_m", "median_error_m", "p90_error_m", "noise_floor_m")
-_WHOLE = ("movements", "attempts", "goals")  # columns of whole numbers
+SMALL: Final = ("evaluation.csv", "regions.csv", "predictions.csv", "refreshes.csv")
+EVALUATION: Final = ("movements", "mean_error_m", "median_error_m", "p90_error_m", "noise_floor_m")
+REFRESHES: Final = ("movements", "exemplars", "steps", "held_out", "relative_error", "diverged")
+Rows = list[list[str]]
+WHOLE: Final = ("movements", "attempts", "goals", "exemplar", "exemplars", "steps", "diverged")
+_CELL: Final = r"R(\.[0-9]{1,6})+"  # the path of a cell of a grid
+_MAY_BE_NAN: Final = ("noise_floor_m", "competence")  # not measured; no goals
 
 
-class Evaluations:
-    """The evaluations of one run: those found in its directory, then those ``add``-ed.
+@dataclass(frozen=True)
+class Found:
+    """What the file of a table held, up to its first bad line.
 
-    Args:
-        directory: of the run.
-        region_dims: dimensions of C x T, where the learner has an interest map; None where it has none.
-        notes: gets a line for each table of which something was dropped.
+    ``lines``, without the header, as they stand there; ``size`` (bytes) of header and lines; ``tail``, what comes after
+    them; ``checked``: the lines have checksums, which those written by earlier versions lack; ``grows``: it is written
+    line by line.
     """
 
-    def __init__(self, directory: Path, region_dims: int | None, notes: list[str]) -> None:
-        self._errors = _Table(directory / "evaluation.csv", EVALUATION, notes)
-        self._regions = None
-        if region_dims is not None:
-            self._regions = _Table(directory / "regions.csv", _region_columns(region_dims), notes)
-
-    def __contains__(self, movements: int) -> bool:
-        return movements in self._errors.rows
+    lines: list[bytes]
+    size: int
+    tail: bytes
+    checked: bool
+    grows: bool
 
     @property
-    def last(self) -> dict[str, float]:
-        """Its columns, {} before the first."""
-        if not self._errors.rows:
-            return {}
-        row = self._errors.rows[max(self._errors.rows)][0]
-        return dict(zip(EVALUATION, map(float, row.split(",")), strict=True))
+    def rows(self) -> Rows:
+        """The fields of each line, its checksum left out."""
+        return [line.decode().rstrip("\n").split(",")[: -1 if self.checked else None] for line in self.lines]
 
-    def keep(self, movements: Iterable[int]) -> None:
-        """Drop all but those after these numbers of ``movements``."""
-        wanted = set(movements)
-        if self._regions is not None:
-            self._regions.keep(wanted)
-            wanted &= self._regions.rows.keys()
-        self._errors.keep(wanted)
+    @property
+    def bad(self) -> int | None:
+        """Number of the first bad line, the header being line 1; None if there is none."""
+        return (len(self.lines) + 2 if self.size else 1) if self.tail else None
 
-    def begin(self) -> None:
-        """Start to write; from now on every change goes to disk."""
-        if self._regions is not None:
-            self._regions.begin()
-        self._errors.begin()
+    @property
+    def damage(self) -> int | None:
+        """The same, unless only the end of the last line of a file that grows is missing: its writer was killed there,
+        or is still writing."""
+        return None if self.grows and b"\n" not in self.tail else self.bad
 
-    def add(self, movements: int, evaluation: Evaluation, regions: Sequence[Region]) -> None:
-        """Keep an evaluation, and the interest map as it was then."""
-        if self._regions is not None:
-            self._regions.put(movements, [_region_fields(region) for region in regions])
-        errors = evaluation.errors
-        row = [evaluation.mean_error, np.median(errors), np.quantile(errors, 0.9), evaluation.noise_floor]
-        self._errors.put(movements, [numbers(np.array(row), len(row))])
+    def first(self, n: int) -> Found:
+        """Its first ``n`` lines; the next one counts as bad."""
+        rest = b"".join(self.lines[n:])
+        return replace(self, lines=self.lines[:n], size=self.size - len(rest), tail=rest + self.tail)
 
 
-def read_table(path: Path, names: Sequence[str] | None = None) -> dict[str, np.ndarray] | None:
-    """An array for each column, None if there is no such file; ``names`` None takes those of its first line.
+class Table:
+    """A csv file of a run: the names of its columns, then lines that each end in the checksum of their fields.
+
+    Args:
+        path: of the file; nothing is written before ``begin`` or ``replace``.
+        names: of the columns, crc32 left out.
+        grows: it is written line by line, rather than replaced whole.
+        standing: (rows) -> how many of them, from the first on, make sense together.
+    """
+
+    def __init__(
+        self, path: Path, names: Sequence[str], *, grows: bool = False, standing: Callable[[Rows], int] = len
+    ) -> None:
+        self.path, self.names, self._grows, self._standing = path, tuple(names), grows, standing
+        self.header = ",".join((*names, "crc32")).encode() + b"\n"
+        self._pending = bytearray()
+        self._begun = False
+
+    def read(self) -> Found:
+        """What the file holds; nothing if there is none.
+
+        Raises:
+            OSError: it cannot be read.
+        """
+        return self.parse(self.path.read_bytes() if os.path.lexists(self.path) else b"")
+
+    def parse(self, content: bytes) -> Found:
+        """The same of the content of a file."""
+        header, *lines = content.splitlines(keepends=True) or [b""]
+        checked = header != ",".join(self.names).encode() + b"\n"
+        if checked and header != self.header:
+            return Found([], 0, content, checked, self._grows)
+        is_good = _is_sealed if checked else self._is_possible
+        n = next((k for k, line in enumerate(lines) if not is_good(line)), len(lines))
+        found = Found(lines, len(content), b"", checked, self._grows).first(n)
+        return found.first(self._standing(found.rows))
+
+    def notes(self, found: Found, outlook: str) -> list[str]:
+        """For people: what of it was bad, with the ``outlook`` on that, and whether there were no checksums."""
+        notes = []
+        if found.tail:
+            dropped = f"{len(found.tail)} bytes in {len(found.tail.splitlines())} line(s)"
+            notes.append(f"{self.path}: dropped {dropped} from line {found.bad} on, torn or damaged; {outlook}")
+        if not found.checked:
+            notes.append(f"{self.path} was made without checksums: its numbers are taken as they are, and get them now")
+        return notes
+
+    def arrays(self, found: Found) -> dict[str, np.ndarray]:
+        """By column of a table beside the log: integers, the paths of regions, or numbers."""
+        rows = np.array(found.rows, dtype=np.str_).reshape(len(found.lines), len(self.names))
+        kinds = {"path": np.str_, **dict.fromkeys(WHOLE, np.int64)}
+        return {name: rows[:, k].astype(kinds.get(name, np.float64)) for k, name in enumerate(self.names)}
+
+    def begin(self, size: int = 0) -> None:
+        """Keep the first ``size`` bytes of the file; what is appended comes after them."""
+        with self.path.open("ab") as file:
+            file.truncate(size)
+        if not size:
+            self._pending[:0] = self.header
+        self._begun = True
+
+    def append(self, line: bytes) -> None:
+        """One more line, see ``sealed``, for the next ``flush``."""
+        self._pending += line
+
+    def flush(self, *, sync: bool = False) -> None:
+        """Once begun, hand all lines to the operating system, so that a killed process loses none; or to the disk."""
+        if not self._begun:
+            return
+        file = os.open(self.path, os.O_WRONLY | os.O_APPEND)
+        try:
+            while self._pending:
+                del self._pending[: os.write(file, self._pending)]
+            if sync:
+                os.fsync(file)
+        finally:
+            os.close(file)
+
+    def replace(self, rows: Iterable[Sequence[str]]) -> None:
+        """Write the whole table anew."""
+        write_bytes(self.path, self.header + b"".join(map(sealed, rows)))
+
+    def _is_possible(self, line: bytes) -> bool:
+        fields = line.decode(errors="replace").removesuffix("\n").split(",")
+        return line.endswith(b"\n") and len(fields) == len(self.names) and all(map(_can_be, self.names, fields))
+
+
+def sealed(fields: Sequence[str]) -> bytes:
+    """A line: the fields and their checksum.
 
     Raises:
-        RunError: it cannot be read.
+        ValueError: a field that would be read back as something else, such as a name with a comma.
     """
-    if not path.exists():
-        return None
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise RunError(f"{path} cannot be read: {error.strerror}") from error
-    header = content.partition(b"\n")[0].decode(errors="replace") if names is None else ",".join(names)
-    groups, _ = _read_rows(content, header)
-    columns = header.split(",")
-    rows = [row.split(",") for group in groups.values() for row in group]
-    table = np.array(rows, dtype=np.str_).reshape(len(rows), len(columns))
-    return {
-        name: table[:, k] if name == "path" else table[:, k].astype(np.int64 if name in _WHOLE else np.float64)
-        for k, name in enumerate(columns)
-    }
+    body = ",".join(fields)
+    if body.count(",") != len(fields) - 1 or not body.isprintable():
+        raise ValueError(f"fields of a table must be printable and without commas, got {body[:80]!r}")
+    return body.encode() + b",%08x\n" % zlib.crc32(body.encode())
 
 
-class _Table:
-    """A small csv file whose first column is the number of movements; once begun, it is replaced at every change."""
-
-    def __init__(self, path: Path, names: Sequence[str], notes: list[str]) -> None:
-        self.path = path
-        self.header = ",".join(names)
-        self.rows: dict[int, list[str]] = {}
-        self._begun = False
-        if path.exists():
-            content = path.read_bytes()
-            self.rows, whole = _read_rows(content, self.header)
-            if whole < len(content):
-                notes.append(dropped(path, content[whole:], "it will be evaluated again"))
-
-    def begin(self) -> None:
-        self._begun = True
-        self._write()
-
-    def keep(self, movements: set[int]) -> None:
-        self.rows = {key: rows for key, rows in self.rows.items() if key in movements}
-
-    def put(self, movements: int, rows: list[list[str]]) -> None:
-        self.rows[movements] = [",".join([str(movements), *fields]) for fields in rows]
-        if self._begun:
-            self._write()
-
-    def _write(self) -> None:
-        lines = [self.header, *(line for key in sorted(self.rows) for line in self.rows[key])]
-        write_whole(self.path, "".join(f"{line}\n" for line in lines))
+def numbers(values: Array | None, dim: int) -> list[str]:
+    """Fields that read back exactly; ``dim`` empty ones for None."""
+    return [""] * dim if values is None else [repr(value) for value in values.tolist()]
 
 
-def _region_columns(dims: int) -> tuple[str, ...]:
-    corners = [f"{corner}_{k}" for corner in ("low", "high") for k in range(dims)]
-    return ("movements", "path", *corners, "attempts", "goals", "competence", "interest")
+def small_table(path: Path, dims: int | None = None) -> Table:
+    """One of the tables beside the log, by the name of its file.
+
+    Args:
+        path: of evaluation.csv, regions.csv, predictions.csv or refreshes.csv.
+        dims: of C x T for regions, of outcomes for predictions; None for those that the file names.
+    """
+    if dims is None:
+        with path.open("rb") as file:
+            header = file.readline()
+        dims = header.count(b"low_") + header.count(b"predicted_")
+    match path.name:
+        case "evaluation.csv":
+            return Table(path, EVALUATION)
+        case "regions.csv":
+            corners = (f"{corner}_{k}" for corner in ("low", "high") for k in range(dims))
+            names = ("movements", "path", *corners, "attempts", "goals", "competence", "interest")
+            return Table(path, names, standing=_whole_maps)
+        case "predictions.csv":
+            parts = ("outcome", "predicted", "epistemic", "aleatoric")
+            return Table(path, ("exemplar", *(f"{part}_{k}" for part in parts for k in range(dims))), grows=True)
+        case _:
+            return Table(path, REFRESHES, grows=True)
 
 
-def _region_fields(region: Region) -> list[str]:
-    n = len(region.competences)
-    competence = float(region.competences.mean()) if n else math.nan
-    corners = numbers(region.low, len(region.low)) + numbers(region.high, len(region.high))
-    return [region.path, *corners, str(region.attempts), str(n), repr(competence), repr(region.interest())]
-
-
-def _read_rows(content: bytes, header: str) -> tuple[dict[int, list[str]], int]:
-    """Rows by number of movements, and how many bytes they make; what follows the first damaged line is left out."""
-    lines = content.splitlines(keepends=True)
-    if not lines or lines[0] != f"{header}\n".encode():
-        return {}, 0
-    columns = ["movements", *header.split(",")[1:]]
-    groups: dict[int, list[str]] = {}
-    for line in lines[1:]:
-        fields = line.decode(errors="replace").removesuffix("\n").split(",")
-        if not line.endswith(b"\n") or len(fields) != len(columns) or not all(map(_is_value, columns, fields)):
+def _whole_maps(rows: Rows) -> int:
+    """How many rows of regions.csv belong to evaluations that have all their regions."""
+    n = 0
+    for _, regions in groupby(rows, key=lambda row: row[0]):
+        paths = [row[1] for row in regions]
+        if not _tile(paths):
             break
-        groups.setdefault(int(fields[0]), []).append(",".join(fields))
-    if header.startswith("movements,path,"):
-        groups = {movements: rows for movements, rows in groups.items() if _is_whole_tree(rows)}
-    kept = sum(len(row) + 1 for rows in groups.values() for row in rows)
-    return groups, len(lines[0]) + kept
+        n += len(paths)
+    return n
 
 
-def _is_value(column: str, field: str) -> bool:
-    if column in _WHOLE:
-        return re.fullmatch("0|[1-9][0-9]{0,17}", field) is not None
-    if column == "path":
-        return re.fullmatch("R[01]*", field) is not None
-    try:
-        float(field)
-    except ValueError:
-        return False
+def _tile(paths: list[str]) -> bool:
+    """Whether nothing was cut off: these are all leaves of a tree, or all cells of a grid. Other names say nothing."""
+    if all(re.fullmatch("R[01]*", path) for path in paths):
+        return sum(0.5 ** (len(path) - 1) for path in paths) == 1  # each cut halves what its leaves count for
+    if all(re.fullmatch(_CELL, path) for path in paths):
+        cells = np.array([path.split(".")[1:] for path in paths], dtype=np.int64)
+        return len(cells) == np.prod(cells.max(axis=0) + 1)
     return True
 
 
-def _is_whole_tree(rows: list[str]) -> bool:
-    """Whether the regions are all leaves of one tree: each cut halves what its leaves count for."""
-    return sum(0.5 ** (len(row.split(",")[1]) - 1) for row in rows) == 1
+def _is_sealed(line: bytes) -> bool:
+    body, _, checksum = line.rpartition(b",")
+    return checksum == b"%08x\n" % zlib.crc32(body)
+
+
+def _can_be(name: str, field: str) -> bool:
+    """Whether a column can hold this, as far as its name tells: for lines that have no checksum."""
+    if name == "path":
+        return re.fullmatch(f"R[01]*|{_CELL}", field) is not None
+    if name in WHOLE:
+        return re.fullmatch("0|[1-9][0-9]{0,17}", field) is not None
+    try:
+        value = float(field)
+    except ValueError:
+        return False
+    if math.isnan(value):
+        return name in _MAY_BE_NAN
+    if name == "competence":
+        return -1 <= value <= 0
+    is_length = name.endswith("_m") or name.startswith(("epistemic", "aleatoric"))
+    return math.isfinite(value) and (value >= 0 or not is_length)

@@ -5,9 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from matplotlib import rc_context
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+
+try:
+    from matplotlib import rc_context
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+except ImportError as error:
+    raise ImportError(f"the figure needs matplotlib: pip install 'sgimd-torch[plot]' ({error})") from error
 
 from sgimd_torch.demonstrations import SHIPPED, load_demonstrations
 from sgimd_torch.figures.learning import NAMES, Curve, error_curves, interest_map, landing_points, tile_counts

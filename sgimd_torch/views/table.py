@@ -1,95 +1,128 @@
-"""One table of what runs came to: error, noise floor and costs of each learner, over its seeds.
+"""One table of what runs came to: error, noise floor and costs of each variant, over its seeds.
 
-Example:
-  for seed in 0 1 2 3 4; do python experiments/run.py --algorithm sgim-d --seed $seed; done
-  python experiments/table.py runs
+It takes any folder with run directories, OUT/NAME/seed-000. Variants are compared after the last number of movements at
+which all finished runs were evaluated, or after --at; the worst comes first. Errors and noise floors are means over
+seeds in metres, ± the standard deviation; costs are milliseconds for each movement. Runs that are damaged, not finished
+or not evaluated there are left out, and named below the table.
+
+  sgimd table runs
+  sgimd table study --at 2000       also with runs that are still under way, if they have come that far
+
+Exit code: 0 there was something to show, 2 there was not.
 """
 
 from __future__ import annotations
 
 import argparse
-import os
-import signal
-import sys
+import itertools
 from collections.abc import Sequence
 from pathlib import Path
-
-if __name__ == "__main__":  # Ctrl-C while the libraries below are loading
-    signal.signal(signal.SIGINT, lambda *_: os._exit(130))
+from typing import Final
 
 import numpy as np
 
 from sgimd_torch.runs.log import RunError
-from sgimd_torch.runs.process import with_streams
+from sgimd_torch.runs.process import say
 from sgimd_torch.runs.read import Run, find_runs, read_run
+from sgimd_torch.spaces import Array
 
-COLUMNS = ("learner", "seeds", "error at 1000", "at 5000 (m)", "noise floor (m)", "physics (ms)", "learning (ms)")
+EARLY: Final = 1000  # movements, for a column of its own
 
 
-def row(name: str, runs: Sequence[Run], early: int, late: int) -> list[str]:
-    """One learner: means over its runs, and the standard deviation over seeds of the late error.
+def main(argv: Sequence[str] | None = None) -> int:
+    """Print the table, the worst variant first; the exit code, 0.
 
     Raises:
-        RunError: a run was not evaluated after ``late`` movements, or its summary is missing.
+        ValueError: there is nothing to show.
     """
-    evaluated = [run for run in runs if late in run.evaluation["movements"]]
-    if len(evaluated) < len(runs):
-        missing = next(run.path for run in runs if late not in run.evaluation["movements"])
-        raise RunError(f"{missing} has no evaluation after {late} movements; let it run on with --resume, or see --at")
-    errors = _at(runs, late, "mean_error_m")
-    milliseconds = [np.mean([_milliseconds(run, part) for run in runs]) for part in ("physics", "learner")]
-    spread = f" ± {errors.std(ddof=1):.3f}" if len(runs) > 1 else ""
-    return [
+    parser = argparse.ArgumentParser(
+        prog="sgimd table",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("runs", type=Path, metavar="OUT", help="folder of runs: the --out of sgimd run or sgimd sweep")
+    parser.add_argument("--at", type=int, metavar="MOVEMENTS", help="compare after so many movements")
+    options = parser.parse_args(argv)
+    runs, left_out = _readable(options.runs)
+    at = options.at
+    if at is None:
+        left_out += [_unfinished(run) for run in runs if not run.summary.get("finished")]
+        runs = [run for run in runs if run.summary.get("finished")]
+        common = set.intersection(*map(_evaluated, runs)) if runs else set[int]()
+        if runs and not common:
+            raise RunError("finished runs were never evaluated after the same number of movements; --at chooses one")
+        at = max(common, default=0)
+    left_out += [f"{run.path} was not evaluated after {at} movements" for run in runs if at not in _evaluated(run)]
+    variants: dict[str, list[Run]] = {}
+    for run in runs:
+        if at in _evaluated(run):
+            variants.setdefault(run.path.parent.name, []).append(run)
+    if not variants:
+        raise RunError("\n".join(["there is nothing to compare; is --at another number of movements?", *left_out]))
+    errors = (f"error at {EARLY}", f"at {at} (m)", "noise floor (m)")
+    heads = ("variant", "seeds", *errors, "physics (ms)", "learning (ms)")
+    worst_first = sorted(variants.items(), key=lambda variant: -_at(variant[1], at, "mean_error_m").mean())
+    table = [heads, *(_row(name, theirs, at) for name, theirs in worst_first)]
+    widths = [max(map(len, cells)) for cells in zip(*table, strict=True)]
+    for cells in table:
+        print("  ".join(cell.ljust(width) for cell, width in zip(cells, widths, strict=True)).rstrip(), flush=True)
+    say(*(f"left out: {reason}" for reason in left_out))
+    return 0
+
+
+def _readable(out: Path) -> tuple[list[Run], list[str]]:
+    """The runs below ``out``, and what is wrong with those that are damaged."""
+    runs, wrong = [], []
+    for path in itertools.chain.from_iterable(find_runs(out).values()):
+        try:
+            run = read_run(path)
+            _milliseconds(run, "physics")
+            if run.damage:
+                raise RunError("; ".join(f"{path}/{name} is damaged at line {n}" for name, n in run.damage.items()))
+            runs.append(run)
+        except RunError as error:
+            wrong.append(str(error))
+    return runs, wrong
+
+
+def _row(name: str, runs: Sequence[Run], at: int) -> tuple[str, ...]:
+    errors = _at(runs, at, "mean_error_m")
+    return (
         name,
         str(len(runs)),
-        _metres(_at(runs, early, "mean_error_m")),
-        f"{errors.mean():.3f}{spread}",
-        _metres(_at(runs, late, "noise_floor_m")),
-        *(f"{value:.2f}" for value in milliseconds),
-    ]
+        _metres(_at(runs, EARLY, "mean_error_m")),
+        f"{errors.mean():.3f}" + (f" ± {errors.std(ddof=1):.3f}" if len(runs) > 1 else ""),
+        _metres(_at(runs, at, "noise_floor_m")),
+        *(f"{np.mean([_milliseconds(run, part) for run in runs]):.2f}" for part in ("physics", "learner")),
+    )
 
 
-def _metres(lengths: np.ndarray) -> str:
-    mean = lengths.mean()
-    return f"{mean:.3f}" if np.isfinite(mean) else "-"
+def _metres(lengths: Array) -> str:
+    return f"{lengths.mean():.3f}" if np.isfinite(lengths.mean()) else "-"
+
+
+def _evaluated(run: Run) -> set[int]:
+    """After which numbers of movements."""
+    return set(run.evaluation["movements"].astype(int).tolist())
+
+
+def _at(runs: Sequence[Run], movements: int, column: str) -> Array:
+    """``(n_runs,)``, NaN where a run was not evaluated after so many movements."""
+    values = [run.evaluation[column][run.evaluation["movements"] == movements] for run in runs]
+    return np.array([value[0] if value.size else np.nan for value in values])
 
 
 def _milliseconds(run: Run, part: str) -> float:
-    """Of one movement, on the mean."""
+    """Of one movement, on the mean.
+
+    Raises:
+        RunError: the run's summary is missing or damaged.
+    """
     try:
         return 1e3 * float(run.summary[f"seconds_{part}"] / run.summary["movements"])
     except (KeyError, TypeError, ZeroDivisionError) as error:
         raise RunError(f"{run.path}: its summary.json is missing or damaged; --resume writes it again") from error
 
 
-def _at(runs: Sequence[Run], movements: int, column: str) -> np.ndarray:
-    values = [run.evaluation[column][run.evaluation["movements"] == movements] for run in runs]
-    return np.array([value[0] if value.size else np.nan for value in values])
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Print the table, worst learner first.
-
-    Returns:
-        The exit code: 2 when there is nothing to tell.
-    """
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("runs", type=Path, help="where the runs are: the --out of run.py")
-    parser.add_argument("--at", type=int, default=5000, help="movements after which to compare (default: %(default)s)")
-    options = parser.parse_args(argv)
-    try:
-        found = {name: [read_run(path) for path in paths] for name, paths in find_runs(options.runs).items()}
-        found = dict(sorted(found.items(), key=lambda item: -_at(item[1], options.at, "mean_error_m").mean()))
-        rows = [row(name, runs, 1000, options.at) for name, runs in found.items()]
-    except RunError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    table = [[column.replace("5000", str(options.at)) for column in COLUMNS], *rows]
-    widths = [max(map(len, cells)) for cells in zip(*table, strict=True)]
-    for cells in table:
-        print("  ".join(cell.ljust(width) for cell, width in zip(cells, widths, strict=True)).rstrip())
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(with_streams(main))
+def _unfinished(run: Run) -> str:
+    return f"{run.path} is not finished: {len(run.index)} of {run.config.get('movements')} movements; --resume goes on"

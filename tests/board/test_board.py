@@ -1,5 +1,6 @@
 """The board: what its curves count, what its file holds, and that a resumed run leaves one continuous board."""
 
+import dataclasses
 import signal
 import subprocess
 import sys
@@ -13,9 +14,18 @@ from tensorboard.util.tensor_util import make_ndarray
 
 from runs import EAGER, arguments, csv_of, signal_after, start
 from sgimd_torch import InterestMap, PeriodicTeacher, PlanarArm, evaluate, run, stream
+from sgimd_torch.algorithms import random_exploration, sagg_riac
 from sgimd_torch.board.scalars import LEGEND, Curves, Grid, branches
-from sgimd_torch.board.writer import Board
+from sgimd_torch.board.writer import Board, read_events
+from sgimd_torch.environments.fishing_rod import FishingRod
+from sgimd_torch.evaluation import Benchmark, load_benchmark
+from sgimd_torch.inverses.local import LocalInverse
+from sgimd_torch.runs.board import cells_of
+from sgimd_torch.runs.build import build
+from sgimd_torch.runs.config import Config
+from sgimd_torch.runs.process import Stopping
 from sgimd_torch.runs.read import read_run
+from sgimd_torch.runs.run import open_directory, run_in
 from sgimd_torch.spaces import Box, Demonstration, Episode, Move
 from worlds import demonstrations, make
 
@@ -149,6 +159,26 @@ def test_cells_of_a_fixed_grid_lie_below_the_whole_and_have_no_curves_of_their_o
     assert branches(halves, 3) == {"R": halves}
 
 
+@pytest.mark.parametrize("dim", [1, 3])
+def test_points_of_another_dimension_are_refused_rather_than_spread_over_the_diagonal(dim):
+    goals = np.full((4, dim), 0.6)
+    with pytest.raises(ValueError, match=rf"points must have shape \(..., 2\), got \(4, {dim}\)"):
+        Curves(PLANE).of_evaluation(goals, np.ones(4), 0.0)
+    (cell,) = (tag for tag in Curves(Box.cube(-1, 1, dim)).of_evaluation(goals, np.ones(4), 0.0) if "grid" in tag)
+    assert cell.count("outcome_") == dim
+
+
+def test_cells_lie_where_the_goals_of_the_benchmark_do_so_that_task_spaces_of_any_size_have_the_same():
+    goals = load_benchmark().goals
+    for half_side in (1.0, 10.0, 100.0):
+        cells = cells_of(FishingRod(outcomes=Box.cube(-half_side, half_side, 2)).outcomes, goals)
+        assert cells.low.tolist() == [-1, -1]
+        assert cells.high.tolist() == [1, 1]
+    small = cells_of(Box(np.array([0.0, -3, -1]), np.array([0.8, 3, 1])), np.array([[0.1, 0, 0], [0.79, 2.2, 0]]))
+    assert small.low.tolist() == [0.1, 0, -1]  # goals that are all alike in a dimension leave all of it
+    assert small.high.tolist() == [0.8, 2.5, 1]
+
+
 @pytest.mark.parametrize("dim", [1, 2, 3, 6])
 def test_a_grid_has_at_most_sixteen_cells_in_any_dimension(dim):
     assert 1 <= len(Grid(Box.cube(0, 1, dim)).names) <= 16
@@ -263,7 +293,7 @@ def test_a_torn_or_damaged_end_of_the_old_file_is_left_out(tmp_path, tail):
 
 
 def test_a_library_that_is_not_watched_loads_no_tensorboard():
-    program = "import sys, run; assert not {'tensorboard', 'torch'} & set(sys.modules)"
+    program = "import sys, sgimd_torch.runs.run; assert not {'tensorboard', 'torch'} & set(sys.modules)"
     done = subprocess.run(
         [sys.executable, "-c", f"import sys; sys.path[:0] = {sys.path!r}; {program}"], capture_output=True, text=True
     )
@@ -306,6 +336,19 @@ def test_the_curves_of_a_run_are_those_of_its_files(watched):
     assert all(picture[2].startswith(b"\x89PNG") for picture in curves["map/error"].values())
 
 
+def assert_same_board(resumed, whole, apart=()):
+    """Every point of the one is in the other, with the same value where it is none of the clock."""
+    resumed, whole = curves_of(resumed), curves_of(whole)
+    assert resumed.keys() - whole.keys() == set()
+    for tag in whole:
+        family = tag.partition("/")[0]
+        if family in apart:
+            continue
+        assert resumed[tag].keys() == whole[tag].keys(), tag
+        if family not in ("time", "_hparams_") and tag not in ("about/settings", "model/ms"):
+            assert resumed[tag] == whole[tag], tag
+
+
 @pytest.mark.parametrize(("signum", "lines"), [(signal.SIGKILL, 110), (signal.SIGINT, 130)])
 def test_a_run_that_was_stopped_and_resumed_leaves_the_board_of_one_that_never_was(
     tmp_path, go, benchmark, watched, signum, lines
@@ -314,23 +357,180 @@ def test_a_run_that_was_stopped_and_resumed_leaves_the_board_of_one_that_never_w
     process = start(EAGER, *arguments(tmp_path, benchmark), *OPTIONS)
     signal_after(process, directory / "episodes.csv", lines, signum)
     assert go(tmp_path, *OPTIONS, "--resume") == 0
-    resumed, whole = curves_of(directory), curves_of(watched)
-    assert resumed.keys() == whole.keys()
-    for tag in whole:
-        if tag.partition("/")[0] not in ("time", "_hparams_", "about"):
-            assert resumed[tag] == whole[tag], tag
-    assert resumed["time/physics"].keys() == whole["time/physics"].keys()
+    assert_same_board(directory, watched)
+
+
+@pytest.mark.parametrize("flush_every", [0, 3600])
+@pytest.mark.parametrize("when", ["before", "after"])
+def test_a_run_killed_while_it_writes_an_evaluation_loses_no_point_of_the_board(
+    tmp_path, go, benchmark, watched, when, flush_every
+):
+    """The kill comes just before or just after the evaluation of movement 120 enters evaluation.csv."""
+    directory = tmp_path / "sgim-d" / "seed-003"
+    kill = "os.kill(os.getpid(), signal.SIGKILL)"
+    before, after = (kill, "pass") if when == "before" else ("pass", kill)
+    program = (
+        "import os, signal, sys\nfrom sgimd_torch.runs import directory, run\n"
+        "add = directory.Evaluations.add\n"
+        "def add_and_die(self, movements, *found):\n"
+        f"    if movements == 120: {before}\n"
+        "    add(self, movements, *found)\n"
+        f"    if movements == 120: {after}\n"
+        f"directory.Evaluations.add = add_and_die\nrun.FLUSH_EVERY = {flush_every}\nsys.exit(run.main(sys.argv[1:]))"
+    )
+    process = start(program, *arguments(tmp_path, benchmark), *OPTIONS)
+    process.communicate()
+    assert process.returncode == -signal.SIGKILL
+    assert (120 in read_run(directory).evaluation["movements"]) == (when == "after")
+    assert go(tmp_path, *OPTIONS, "--resume") == 0
+    assert_same_board(directory, watched)
+
+
+def test_points_that_an_event_file_lost_are_made_again(tmp_path, go, watched):
+    """From every event of the second evaluation on, and without the file."""
+    whole = events_of(watched)
+    cuts = [k for k, event in enumerate(whole) if event.step == 120] + [len(whole) - 1]
+    assert go(tmp_path, *OPTIONS) == 0
+    directory = tmp_path / "sgim-d" / "seed-003"
+    for kept in cuts:
+        (path,) = directory.glob("events.out.tfevents.*")
+        path.write_bytes(b"".join(records_of(path.read_bytes())[:kept]) + b"torn")
+        assert len(list(read_events(path))) == kept
+        assert go(tmp_path, *OPTIONS, "--resume") == 0
+        assert_same_board(directory, watched)
+    (path,) = directory.glob("events.out.tfevents.*")
+    path.unlink()
+    assert go(tmp_path, *OPTIONS, "--resume") == 0
+    assert_same_board(directory, watched, apart=("time",))
+
+
+def records_of(content):
+    """Of an event file: length, checksum, event, checksum."""
+    records = []
+    while content:
+        size = 16 + int.from_bytes(content[:8], "little")
+        records.append(content[:size])
+        content = content[size:]
+    return records
+
+
+def test_two_event_files_that_a_kill_left_give_each_point_once(tmp_path, go, watched):
+    assert go(tmp_path, *OPTIONS) == 0
+    directory = tmp_path / "sgim-d" / "seed-003"
+    (path,) = directory.glob("events.out.tfevents.*")
+    (directory / "events.out.tfevents.007").write_bytes(path.read_bytes())
+    assert go(tmp_path, *OPTIONS, "--resume") == 0
+    assert_same_board(directory, watched)
+
+
+def test_a_watched_run_made_longer_leaves_the_board_of_a_long_one(tmp_path, go, watched):
+    assert go(tmp_path, *OPTIONS, "--movements", 130) == 0
+    assert go(tmp_path, *OPTIONS, "--resume") == 0
+    assert_same_board(tmp_path / "sgim-d" / "seed-003", watched)
 
 
 def test_a_run_that_was_not_watched_gets_its_board_when_it_is_resumed(tmp_path, go, watched):
     assert go(tmp_path, *OPTIONS, "--board", "false") == 0
     assert go(tmp_path, *OPTIONS, "--resume") == 0
-    resumed, whole = curves_of(tmp_path / "sgim-d" / "seed-003"), curves_of(watched)
-    for tag in ("error/mean", "competence/R", "goals/reached", "regime/local"):
-        assert resumed[tag] == whole[tag]
+    assert_same_board(tmp_path / "sgim-d" / "seed-003", watched, apart=("time",))  # nobody knows when it was
 
 
 def test_an_evaluation_that_is_taken_back_leaves_the_board_too(tmp_path, go):
     assert go(tmp_path, *OPTIONS) == 0
     assert go(tmp_path, *OPTIONS, "--evaluate_at", "120", "--resume") == 0
     assert curves_of(tmp_path / "sgim-d" / "seed-003")["error/mean"].keys() == {120, 160}
+
+
+class Slider:
+    """A robot of ``dim`` sliders, whose outcome is where they are; a context, where there is one, shifts them."""
+
+    outcome_noise = 0.0
+
+    def __init__(self, dim, context_dim=0):
+        self.contexts, self.policies = Box.cube(-0.1, 0.1, context_dim), Box.cube(0, 1, dim)
+        self.outcomes, self.rest = Box.cube(0, 1, dim), np.zeros(dim)
+
+    def observe(self, rng):
+        return self.contexts.sample(rng)
+
+    def execute(self, context, theta, rng):
+        return np.asarray(theta) + np.sum(context)
+
+
+def live_as(out, robot, make, **options):
+    """A watched run of a robot and learner of one's own; returns its directory."""
+    config = Config(environment="planar-arm-7", movements=120, evaluate_at=(60,), repeats=0, board=True, out=out)
+    goals = np.linspace(0.2, 0.9, 5)[:, None].repeat(robot.outcomes.dim, axis=1)
+    learner = make(robot, 0, **options)
+    alone = {"teacher": None, "demonstrations": [], "residuals": [], "model": None, "trust": None}
+    parts = dataclasses.replace(
+        build(config),
+        **{**alone, "environment": robot, "learner": learner, "inverse": LocalInverse(learner.memory)},
+        benchmark=Benchmark("Slider", goals, 0.1),
+    )
+    with Stopping() as stopping, open_directory(config, parts, False) as directory:
+        run_in(directory, config, parts, stopping)
+    return directory.path
+
+
+@pytest.mark.parametrize(("dim", "context_dim", "cells"), [(1, 0, 16), (3, 0, 8), (2, 0, 16), (2, 1, 16), (5, 0, 1)])
+def test_outcomes_of_any_dimension_have_curves_and_cells_and_those_of_the_plane_pictures(
+    tmp_path, dim, context_dim, cells
+):
+    directory = live_as(tmp_path, Slider(dim, context_dim), sagg_riac)
+    curves, read = curves_of(directory), read_run(directory)
+    expected = dict(zip(read.evaluation["movements"], read.evaluation["mean_error_m"], strict=True))
+    assert curves["error/mean"] == pytest.approx(expected, rel=1e-6)
+    assert {"competence/R", "interest/R", "goals/missed_by", "regions/count", "about/regions"} < curves.keys()
+    names = [tag.partition("/")[2] for tag in curves if tag.startswith("grid_error/")]
+    assert 1 <= len(names) <= cells
+    assert all(name.count("..") == dim for name in names)
+    assert sum(curves[f"grid_error/{name}"][120] > 0 for name in names) == len(names)
+    pictures = {tag for tag in curves if tag.startswith("map/")}
+    of_regions = {"map/interest", "map/competence"} if context_dim == 0 else set()
+    assert pictures == ({"map/landed", "map/error"} | of_regions if dim == 2 else set())
+    assert len(read.regions["low_0"])
+    assert f"high_{dim + context_dim - 1}" in read.regions
+
+
+class Halves:
+    """A goal model of one's own, whose two regions are all that a run knows of it."""
+
+    def __init__(self, contexts, outcomes, rng):
+        whole = InterestMap(contexts, outcomes, rng)
+        self.sample, self._add = whole.sample, whole.add
+        (region,) = whole.regions
+        self.regions = region.split(0, 0.5)
+
+    def add(self, context, goal, competence, strategy="autonomous", gain=0.0):
+        self.regions = [self.regions[0].extend(np.array(goal), competence, gain, strategy), self.regions[1]]
+
+
+def test_the_regions_of_any_goal_model_are_shown(tmp_path):
+    directory = live_as(tmp_path, Slider(2), sagg_riac, goals=Halves)
+    read, curves = read_run(directory), curves_of(directory)
+    assert read.regions["path"].tolist() == ["R0", "R1"] * 2
+    assert read.regions["goals"][-2] > 0
+    assert curves["regions/count"] == {50: 2, 100: 2}
+    assert {"competence/R0", "region_size/R1", "map/interest"} < curves.keys()
+
+
+def test_the_cells_of_a_grid_are_shown_and_kept_by_a_resumed_run(tmp_path, go):
+    options = (*OPTIONS, "--goals", "grid")
+    assert go(tmp_path / "whole", *options) == go(tmp_path / "made_longer", *options, "--movements", 130) == 0
+    whole, made_longer = (tmp_path / out / "sgim-d" / "seed-003" for out in ("whole", "made_longer"))
+    read, curves = read_run(whole), curves_of(whole)
+    assert read.damage == {}
+    assert read.regions["path"][:3].tolist() == ["R.0.0", "R.0.1", "R.0.2"]
+    assert len(read.regions["path"]) == 300
+    assert set(curves["regions/count"].values()) == {100}
+    assert {"competence/R", "map/interest", "map/competence", "about/regions"} < curves.keys()
+    assert go(tmp_path / "made_longer", *options, "--resume") == 0
+    assert csv_of(made_longer) == csv_of(whole)
+    assert_same_board(made_longer, whole)
+
+
+def test_a_learner_without_goals_has_a_board_without_regions(tmp_path):
+    directory = live_as(tmp_path, Slider(1), random_exploration)
+    assert read_run(directory).regions is None
+    assert not [tag for tag in curves_of(directory) if tag.startswith(("regions", "competence", "about/regions"))]

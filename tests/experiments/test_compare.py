@@ -3,7 +3,6 @@
 import csv
 import re
 import signal
-import sys
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -11,25 +10,27 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import compare as compare_module
-from overview import Overview
+from compare import collect, last_row, main, runs_of
 from read_results import GOALS_HEADER, HEADER, read_goals, read_results
-from runs import signal_after, start
+from runs import ROOT, signal_after, start
 from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.evaluation import Benchmark
-from sgimd_torch.runs.children import in_use
+from sgimd_torch.files import locked
 from sgimd_torch.runs.command_line import parse
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.log import RunError
+from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import Run, read_run
-from tables import Table
-from tasks import COLUMNS, RESULTS, Task, goal_row, tasks_of, tiles_reached
-from variants import EXPERIMENTS, TABLES, make_subsets, shipped, teacher_of
+from tables import RESULTS, Table, goal_row, tiles_reached
+from variants import ARMS, EXPERIMENTS, make_subsets, shipped, tables_of, teacher_of
 
 # Two variants that live for 40 movements, and one, of an experiment of its own, whose demonstrations are missing.
 TINY = """
-import sys, variants
+import sys
+sys.path.insert(0, "EXPERIMENTS")
+import variants
 from pathlib import Path
+from sgimd_torch.runs.process import command
 tiny = dict(movements=40, evaluate_at=(20,), repeats=2, benchmark=Path(sys.argv.pop(1)))
 variants.EXPERIMENTS.clear()
 variants.EXPERIMENTS["learners"] = {"random": dict(algorithm="random", **tiny)}
@@ -40,8 +41,8 @@ variants.EXPERIMENTS["forward-model"] = variants.EXPERIMENTS["learners"]
 arm = dict(environment="planar-arm-7", movements=40, evaluate_at=(20,))
 variants.EXPERIMENTS["planar-arm-7"] = {"sgim-d-arm-7": dict(algorithm="sgim-d", **arm)}
 import compare
-sys.exit(compare.main())
-"""
+sys.exit(command(compare.main))
+""".replace("EXPERIMENTS", str(ROOT / "experiments"), 1)
 
 
 @pytest.fixture
@@ -50,18 +51,9 @@ def compare(benchmark, tmp_path):
 
     def compare(*options):
         places = ["--out", tmp_path / "runs", "--results", tmp_path / "results"]
-        return start(TINY, benchmark, *places, "--seeds", 1, "--processes", 2, *options)
+        return start(TINY, benchmark, *places, "--seeds", 0, "--processes", 2, *options)
 
     return compare
-
-
-@pytest.fixture
-def handlers():
-    """A comparison in this process leaves its signals as they were."""
-    before = {signum: signal.getsignal(signum) for signum in (signal.SIGINT, signal.SIGTERM)}
-    yield
-    for signum, handler in before.items():
-        signal.signal(signum, handler)
 
 
 def ended(process):
@@ -87,7 +79,7 @@ def test_each_evaluation_is_a_row_the_failed_are_reported_and_a_second_start_doe
     code, _, errors = ended(compare("learners", "large-space", "broken"))
     assert code == 1
     assert sorted(keys_of(tmp_path)) == WHOLE
-    assert "untaught seed 0 failed: error: demonstrations: there is no file nowhere.npz" in errors
+    assert "untaught seed 0 failed: demonstrations: there is no file nowhere.npz" in errors
     assert "2 runs ended well, 1 failed" in errors
     assert "Traceback" not in errors
     header, rows = table(tmp_path / "results/paper.csv")
@@ -120,7 +112,7 @@ def test_each_evaluation_is_a_row_the_failed_are_reported_and_a_second_start_doe
 def test_a_variant_of_two_experiments_is_one_run_in_the_table_of_each(compare, tmp_path):
     code, _, errors = ended(compare("learners", "forward-model", "planar-arm-7"))
     assert code == 0, errors
-    assert {path.name for path in (tmp_path / "results").iterdir()} == {"paper.csv", "forward_model.csv"}
+    assert {path.name for path in (tmp_path / "results").glob("*.csv")} == {"paper.csv", "forward_model.csv"}
     run, arm = (read_run(tmp_path / "runs" / name / "seed-000") for name in ("random", "sgim-d-arm-7"))
     header, rows = table(tmp_path / "results/forward_model.csv")
     assert header == HEADER
@@ -134,14 +126,13 @@ def test_a_variant_of_two_experiments_is_one_run_in_the_table_of_each(compare, t
     assert again == [["learners", *row[1:]] for row in rows if row[1] == "random"]
 
 
-def test_what_is_in_one_table_is_still_to_be_done_for_the_other(tmp_path, monkeypatch, capsys, handlers):
-    results = Table(tmp_path / "paper.csv", *RESULTS)
-    results.append([["learners", "sgim-d", 3, 1.0, 0, 5000, 0.1, "", 7]])
-    results.close()
+def test_what_is_in_one_table_is_still_to_be_done_for_the_other(tmp_path, monkeypatch, capsys):
+    Table(tmp_path / "paper.csv", *RESULTS).merge([["learners", "sgim-d", 3, 1.0, 0, 5000, 0.1, "", 7]])
     monkeypatch.chdir(tmp_path)
-    options = "learners forward-model --only sgim-d --seeds 1 --dry-run --results ."
-    monkeypatch.setattr(sys, "argv", ["compare.py", *options.split()])
-    assert compare_module.main() == 0
+    assert (
+        command(main, ["learners", "forward-model", "--only", "sgim-d", "--seeds", "0", "--dry-run", "--results", "."])
+        == 0
+    )
     said = capsys.readouterr()
     assert said.out == "forward-model: sgim-d seed 0\n"
     assert "2 runs, 1 of them in paper.csv and forward_model.csv already" in said.err
@@ -151,9 +142,9 @@ def test_after_ctrl_c_it_goes_on(compare, tmp_path):
     log = tmp_path / "runs/long-life/seed-000/episodes.csv"
     code, errors = signal_after(compare("long", "learners"), log, 5, signal.SIGINT)
     assert code == 130
-    assert "Stopped; the same command goes on from here." in errors
+    assert "the same command goes on from here" in errors
     assert "Traceback" not in errors
-    assert not in_use(log.parent)
+    assert not locked(log.parent / "lock")
     lived = log.read_bytes()
     assert 0 < lived.count(b"\n") < 601
     code, _, errors = ended(compare("long", "learners"))
@@ -162,54 +153,61 @@ def test_after_ctrl_c_it_goes_on(compare, tmp_path):
     assert sorted(keys_of(tmp_path)) == [("long-life", 20), ("long-life", 600), ("random", 20), ("random", 40)]
 
 
-def test_killed_it_leaves_a_run_that_the_next_start_waits_for_and_harvests_once(compare, tmp_path):
+def test_killed_it_leaves_a_run_that_the_next_start_waits_for_and_collects_once(compare, tmp_path):
     log = tmp_path / "runs/long-life/seed-000/episodes.csv"
     first = compare("long", "--processes", 1)
     while first.poll() is None and not (log.exists() and log.read_bytes().count(b"\n") >= 5):
         time.sleep(0.01)
     first.kill()
     ended(first)
-    assert in_use(log.parent)
+    assert locked(log.parent / "lock")
     code, _, errors = ended(compare("long"))
     assert code == 0, errors
-    assert "waiting for 1 of an earlier start" in errors
+    assert "long-life seed 0: waiting for another process" in errors
     assert keys_of(tmp_path) == [("long-life", 20), ("long-life", 600)]
 
 
-def test_a_run_that_lost_its_rows_is_harvested_again_and_no_goal_is_counted_twice(go, benchmark, tmp_path):
+def test_a_run_that_lost_its_rows_is_collected_again_and_no_goal_is_counted_twice(go, benchmark, tmp_path):
     name = "sgim-d-large"
     config = Config(seed=3, movements=30, name=name, task_space=100.0, benchmark=benchmark, out=tmp_path)
     assert go(tmp_path, "--movements", 30, "--evaluate_at", "20", "--name", name, "--task_space", 100) == 0
-    task, paths = Task("large-space", config), [tmp_path / "paper.csv", tmp_path / "goals.csv"]
+    paths = [tmp_path / "paper.csv", tmp_path / "goals.csv"]
 
-    def harvest():
-        tables = {path.name: Table(path, *COLUMNS[path.name]) for path in paths}
-        known = task.last_row in tables[task.table].keys
-        task.harvest(tables)
-        for each in tables.values():
-            each.close()
+    def collected():
+        known = last_row(config) in Table(paths[0], *RESULTS).rows()
+        collect("large-space", config, tmp_path)
         return known
 
-    assert not harvest()
+    assert not collected()
     whole = [path.read_bytes() for path in paths]
-    assert harvest()
-    paths[0].write_bytes(whole[0][: whole[0].rindex(b"sgim-d-large") + 5])  # the power went while it was written
-    assert not harvest()
+    assert collected()
     assert [path.read_bytes() for path in paths] == whole
+    paths[0].write_bytes(whole[0][: whole[0].rindex(b"sgim-d-large") + 5])  # an earlier version was killed as it wrote
+    assert not collected()
+    assert [path.read_bytes() for path in paths] == whole
+
+
+def test_a_run_that_is_whole_on_disk_is_collected_without_being_run_again(compare, tmp_path):
+    assert ended(compare("learners"))[0] == 0
+    run, results = tmp_path / "runs/random/seed-000", tmp_path / "results/paper.csv"
+    whole, before = results.read_bytes(), {path: path.stat().st_mtime_ns for path in run.iterdir()}
+    results.unlink()
+    assert ended(compare("learners"))[0] == 0
+    assert results.read_bytes() == whole
+    assert {path: path.stat().st_mtime_ns for path in run.iterdir()} == before
 
 
 def test_a_run_that_ended_without_its_last_evaluation_is_no_result(go, benchmark, tmp_path):
     assert go(tmp_path, "--movements", 30, "--evaluate_at", "[]") == 0
-    task = Task("learners", Config(seed=3, movements=30, benchmark=benchmark, out=tmp_path))
+    config = Config(seed=3, movements=30, benchmark=benchmark, out=tmp_path)
     with pytest.raises(RunError, match="seed-003 has no evaluation after 30 movements, though it ended"):
-        task.harvest({})
+        collect("learners", config, tmp_path / "results")
+    assert not (tmp_path / "results").exists()
 
 
-def test_looking_at_what_is_to_be_done_writes_nothing(tmp_path, monkeypatch, capsys, handlers):
+def test_looking_at_what_is_to_be_done_writes_nothing(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    options = "ablations --seeds 2 --dry-run --only grid uniform-goals"
-    monkeypatch.setattr(sys, "argv", ["compare.py", *options.split()])
-    assert compare_module.main() == 0
+    assert command(main, ["ablations", "--seeds", "0-1", "--dry-run", "--only", "grid", "uniform-goals"]) == 0
     wanted = [f"ablations: {name} seed {seed}" for seed in (0, 1) for name in ("uniform-goals", "grid")]
     assert capsys.readouterr().out.splitlines() == wanted
     assert not list(tmp_path.iterdir())
@@ -225,57 +223,46 @@ def test_looking_at_what_is_to_be_done_writes_nothing(tmp_path, monkeypatch, cap
         (["sgim-d"], "sgim-d is a variant, of learners and forward-model; write learners --only sgim-d"),
         (["long", "--only", "sgim-d"], "sgim-d is a variant of learners and forward-model, asked for were long"),
         (["--only", "grid", "ablations"], "ablations is an experiment, no variant; experiments go before --only"),
-        (["--seeds", "0"], "--seeds must be at least 1, got 0"),
-        (["--first-seed", "-1"], "--first-seed must be at least 0, got -1"),
-        (["--processes", "0"], "--processes must be at least 1, got 0"),
+        (["--seeds", ""], "--seeds: must be like 5, 0-19 or 0,3,7-9, got ''"),
+        (["--seeds=-1"], "--seeds: must be like 5, 0-19 or 0,3,7-9, got '-1'"),
+        (["--processes", "0"], "--processes: must be a whole number of at least 1, got '0'"),
         (["--out", "file/runs"], "file/runs/demonstrations cannot be made: file is no folder"),
-        (["--results", "file"], "--results file cannot be made: File exists; is a file in the way?"),
+        (["--results", "file"], "file cannot be made: file is no folder"),
         (["--results", "foreign"], "foreign/paper.csv must begin with experiment,variant"),
     ],
 )
-def test_what_cannot_be_is_refused_with_its_reason(tmp_path, monkeypatch, capsys, handlers, options, message):
+def test_what_cannot_be_is_refused_with_its_reason(tmp_path, monkeypatch, capsys, options, message):
     monkeypatch.chdir(tmp_path)
     Path("file").write_text("")
     Path("foreign").mkdir()
     Path("foreign/paper.csv").write_text("my,thesis\n")
     before = sorted(tmp_path.rglob("*"))
-    monkeypatch.setattr(sys, "argv", ["compare.py", *options])
-    with pytest.raises(SystemExit) as end:  # argparse raises it, where main returns
-        sys.exit(compare_module.main())
-    assert end.value.code == 2
-    assert re.search(message.replace("?", r"\?"), capsys.readouterr().err)
+    assert command(main, options) == 2
+    said = capsys.readouterr().err
+    assert re.search(message.replace("?", r"\?"), said)
+    assert "Traceback" not in said
     written = set(tmp_path.rglob("*")) - set(before)
     assert not [path for path in written if path.suffix in (".csv", ".log")]
 
 
-def test_two_comparisons_do_not_write_one_table(tmp_path, monkeypatch, capsys, handlers):
-    (tmp_path / "results").mkdir()
-    writer = Table(tmp_path / "results/paper.csv", *RESULTS)
-    places = ["--out", str(tmp_path / "runs"), "--results", str(tmp_path / "results")]
-    monkeypatch.setattr(sys, "argv", ["compare.py", *places, "learners"])
-    assert compare_module.main() == 2
-    assert "is being written by another compare.py" in capsys.readouterr().err
-    writer.close()
-
-
-def test_a_run_that_cannot_start_fails_alone(tmp_path):
-    (tmp_path / "stuck").write_text("a file where its directory should be")
-    tasks = [Task("learners", Config(algorithm="random", name="stuck", out=tmp_path))]
-    results = Table(tmp_path / "paper.csv", *RESULTS)
-    (failure,) = compare_module.carry_out(tasks, 0, 1, {"paper.csv": results})
-    assert "stuck" in failure
-    results.close()
+def test_a_run_that_cannot_start_fails_alone(compare, tmp_path):
+    (tmp_path / "runs").mkdir()
+    (tmp_path / "runs/random").write_text("a file where its directory should be")
+    code, _, errors = ended(compare("learners", "planar-arm-7"))
+    assert code == 1
+    assert re.search("random seed 0 failed: .*random is no folder", errors)
+    assert keys_of(tmp_path, "forward_model.csv") == [("sgim-d-arm-7", 20), ("sgim-d-arm-7", 40)]
 
 
 def test_every_variant_is_a_run_that_can_be_and_in_its_table_has_a_name_of_its_own(tmp_path):
-    tasks = tasks_of(list(EXPERIMENTS), [], range(1), tmp_path)
-    assert len({(task.table, task.last_row) for task in tasks}) == len(tasks)
-    assert not [note for task in tasks for note in task.config.without_effect if "--budget" in note]
-    configs = {task.config.directory: task.config for task in tasks}
-    assert all(task.config == configs[task.config.directory] for task in tasks)  # one directory, one run
-    assert {task.experiment for task in tasks if task.table == "forward_model.csv"} == set(TABLES)
-    for task in tasks:
-        assert parse(task.options()) == (task.config, False)
+    wanted = runs_of(list(EXPERIMENTS), [], range(1), tmp_path)
+    assert len({(tables_of(name)[0], last_row(config)) for name, config in wanted}) == len(wanted)
+    assert not [note for _, config in wanted for note in config.without_effect if "--budget" in note]
+    configs = {config.directory: config for _, config in wanted}
+    assert all(config == configs[config.directory] for _, config in wanted)  # one directory, one run
+    assert {name for name, _ in wanted if tables_of(name)[0] == "forward_model.csv"} == {"forward-model", *ARMS}
+    for _, config in wanted:
+        assert parse(config.words())[0] == config
 
 
 def test_teachers_have_the_number_of_the_demonstrator_or_the_name_of_the_file(tmp_path):
@@ -285,9 +272,9 @@ def test_teachers_have_the_number_of_the_demonstrator_or_the_name_of_the_file(tm
     assert teacher_of(replace(taught, algorithm="sagg-riac", demonstrations=shipped(1))) == ""
     assert teacher_of(replace(taught, environment="planar-arm-50")) == "structured"
     assert teacher_of(replace(taught, environment="planar-arm-50", demonstrations=shipped(1))) == "1"
-    (few,) = tasks_of(["teaching"], ["few-demonstrations"], range(1), tmp_path)
-    assert teacher_of(few.config) == "few"
-    assert few.config.demonstrations == tmp_path / "demonstrations/few.npz"
+    ((_, few),) = runs_of(["teaching"], ["few-demonstrations"], range(1), tmp_path)
+    assert teacher_of(few) == "few"
+    assert few.demonstrations == tmp_path / "demonstrations/few.npz"
 
 
 def test_few_are_a_tenth_of_the_demonstrations_and_half_are_those_to_the_right(tmp_path):
@@ -322,46 +309,5 @@ def test_a_goal_counts_once_imitation_and_rest_not_at_all_and_near_is_within_a_m
     origins = ["babble", "local", "global", "imitate", "imitate", "local", "local", "local", ""]
     run = run_with(origins, [none, near, near, shown, shown, edge, far, near, none])
     np.testing.assert_array_equal(run.chosen_goals(), [near, edge, far, near])
-    task = Task("large-space", Config(name="sgim-d-large", seed=7))
-    assert goal_row(task, run) == ["sgim-d-large", 7, 4, 3]
+    assert goal_row(Config(name="sgim-d-large", seed=7), run) == ["sgim-d-large", 7, 4, 3]
     assert len(run_with(["babble"], [none]).chosen_goals()) == 0
-
-
-def test_what_is_left_is_measured_by_the_movements_that_the_robot_has_still_to_make(tmp_path, benchmark):
-    """100 movements each, 3 goals evaluated twice; the noise once, 2 times."""
-    config = Config(algorithm="random", movements=100, evaluate_at=(50,), floor_at=(50,), repeats=2, out=tmp_path)
-    config = replace(config, benchmark=benchmark)
-    task, idle = Task("learners", config), Task("learners", replace(config, algorithm="observation"))
-    assert task.work == 100 + 3 * 2 + 3 * 2
-    assert idle.work == 3 * 2 + 3 * 2
-    log = idle.config.directory / "episodes.csv"
-    log.parent.mkdir(parents=True)
-    log.write_text("index\n" + 100 * "1\n")  # it ended on disk: all that is left is to replay it
-    overview = Overview([task, idle], done=3)
-    assert overview.line(0) == "3 of 5 runs"
-    assert overview.seconds_left() == np.inf
-    overview.cannot_start(idle)
-    assert overview.line(1) == "3 of 5 runs, 1 failed   waiting for 1 of an earlier start"
-
-
-def test_the_time_left_is_what_as_much_work_took_and_replaying_counts_for_a_fifth(tmp_path, benchmark):
-    config = Config(algorithm="random", movements=40, floor_at=(), benchmark=benchmark, out=tmp_path)
-    first, second = (Task("learners", replace(config, seed=seed)) for seed in (0, 1))
-
-    def elapsed_while_running(task, overview):
-        began = time.monotonic()
-        child = task.start()
-        overview.started(task, child)
-        child.process.wait()
-        child.check()
-        assert "40/40" in overview.line(0) or "done" in overview.line(0)
-        overview.ended(child, failed=False)
-        return time.monotonic() - began
-
-    overview = Overview([first, second], done=0)
-    elapsed = elapsed_while_running(first, overview)
-    assert overview.line(0).startswith("1 of 2 runs   ")
-    assert overview.seconds_left() == pytest.approx(elapsed, rel=0.2)
-    overview = Overview([first, second], done=0)  # the first is on disk
-    elapsed = elapsed_while_running(second, overview)
-    assert overview.seconds_left() == pytest.approx(0.2 * elapsed, rel=0.2)

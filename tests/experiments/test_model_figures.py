@@ -188,7 +188,12 @@ def test_a_run_that_has_predicted_nothing_yet_says_what_it_waits_for(short, caps
         ("predictions.csv", 3, "53,0,0,0,0,1,1,1,x", "line 4: needs 9 numbers"),
         ("predictions.csv", 3, "53,0,0,0,nan,1,1,1,1", "line 4: needs 9 numbers"),
         ("predictions.csv", 3, "51,0,0,0,0,1,1,1,1", "whole numbers that increase"),
-        ("predictions.csv", 3, "52.5,0,0,0,0,1,1,1,1", "whole numbers that increase"),
+        (
+            "predictions.csv",
+            3,
+            "52.5,0,0,0,0,1,1,1,1",
+            "line 4: needs 9 numbers, got '52.5,0,0,0,0,1,1,1,1' (whole ones",
+        ),
         ("predictions.csv", 3, "52,0,0,0,0,1,1,1,1", "exemplar 52 is another one in episodes.csv"),
         ("refreshes.csv", 0, "movements,steps", "refreshes.csv must begin with movements,exemplars"),
         ("refreshes.csv", 1, "50,50,20", "refreshes.csv, line 2: needs 6 numbers"),

@@ -2,7 +2,6 @@
 
 import json
 import re
-import sys
 
 import numpy as np
 import pytest
@@ -24,7 +23,7 @@ from sgimd_torch.views import demo
 from sgimd_torch.views.film import command as film
 from sgimd_torch.views.report import command as report
 from sgimd_torch.views.report.data import demonstrated, read_life
-from tasks import tiles_reached
+from tables import tiles_reached
 
 NO_CONTEXT = np.empty(0)
 ALGORITHMS = CATALOGUE["algorithm"]
@@ -196,11 +195,8 @@ def test_a_report_with_films_leaves_out_those_of_an_arm(tmp_path, reference):
     assert "<video" not in (tmp_path / "page.html").read_text()
 
 
-def test_the_demo_is_of_the_rod(monkeypatch, capsys):
-    monkeypatch.setattr(sys, "argv", ["demo", "--", "--environment", "planar-arm-7"])
-    with pytest.raises(SystemExit) as end:
-        demo.main()
-    assert end.value.code == 2
+def test_the_demo_is_of_the_rod(capsys):
+    assert command(demo.main, ["--", "--environment", "planar-arm-7"]) == 2
     assert "the demo shows the fishing rod" in capsys.readouterr().err
 
 
@@ -219,8 +215,8 @@ def test_a_report_shows_an_arm_beside_the_rod_with_what_each_was_shown(tmp_path,
     assert "planar-arm-7" in page
     assert "judged by different benchmarks" in page
     assert "left out" not in page.lower()
-    assert f"scripts/film {tmp_path / 'rod' / 'seed-003'}" in page
-    assert f"scripts/film {tmp_path / 'arm' / 'seed-003'}" not in page
+    assert f"sgimd film {tmp_path / 'rod' / 'seed-003'}" in page
+    assert f"sgimd film {tmp_path / 'arm' / 'seed-003'}" not in page
 
 
 def test_a_report_marks_the_postures_that_the_arm_was_shown(reference):

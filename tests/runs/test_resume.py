@@ -1,13 +1,14 @@
 """Runs that are stopped, killed, damaged or made longer: in the end they are as if nothing had happened."""
 
-import fcntl
+import os
 import signal
 import zlib
 
 import pytest
 
-from runs import EAGER, MOVEMENTS, arguments, csv_of, signal_after, start
+from runs import EAGER, MOVEMENTS, accept_loss, arguments, csv_of, signal_after, start
 from sgimd_torch.evaluation import evaluate
+from sgimd_torch.files import lock
 from sgimd_torch.runs import run as run_script
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.read import read_run
@@ -28,6 +29,7 @@ def test_a_run_that_is_stopped_and_resumed_ends_as_if_it_never_was(
     assert ("--resume" in errors) == (signum == signal.SIGINT)
     before = (directory / "episodes.csv").read_bytes()
     assert lines <= before.count(b"\n") < MOVEMENTS
+    assert read_run(directory).summary["movements"] < before.count(b"\n")  # the log is the first to know
     assert go(tmp_path) == 2  # without --resume nothing is touched
     assert "--resume" in capsys.readouterr().err
     assert (directory / "episodes.csv").read_bytes() == before
@@ -116,24 +118,170 @@ def repeat_last_line(content):
     return content + content.splitlines(keepends=True)[-1]
 
 
+def files_of(directory):
+    return {path.name: path.read_bytes() for path in directory.iterdir()}
+
+
 @pytest.mark.parametrize(
     ("damage", "kept"),
-    [(tear, 89), (zero, 87), (flip, 40), (lose_newline, 89), (append_garbage, 90), (repeat_last_line, 90)],
+    [
+        *[(tear, 89), (zero, 87), (flip, 40), (lose_newline, 89)],
+        (lambda content: b"", 0),
+        (lambda content: None, 0),  # deleted
+        (lambda content: content[:100], 0),  # a part of its first line
+        (lambda content: b"".join(content.splitlines(keepends=True)[:1]), 0),
+        (lambda content: b"".join(content.splitlines(keepends=True)[:31]), 30),  # cut at the end of a line
+    ],
 )
-def test_of_a_damaged_log_what_is_whole_is_kept_and_the_rest_lived_again(tmp_path, go, reference, capsys, damage, kept):
+def test_a_log_that_lacks_movements_is_gone_on_with_only_when_the_loss_is_accepted(
+    tmp_path, go, benchmark, reference, capsys, damage, kept
+):
+    directory = tmp_path / "sgim-d" / "seed-003"
+    assert go(tmp_path) == 0
+    log, damaged = directory / "episodes.csv", damage(reference["episodes.csv"])
+    log.unlink() if damaged is None else log.write_bytes(damaged)
+    run = read_run(directory)
+    assert len(run.index) == kept
+    assert run.damage == ({"episodes.csv": 42} if damage is flip else {})
+    before = files_of(directory)
+    assert go(tmp_path, "--resume") == 2
+    message = capsys.readouterr().err
+    assert f"episodes.csv holds {kept} movements" in message
+    assert "summary.json knows of 90; was it cut, emptied or deleted?" in message
+    assert ("line 42 is damaged" in message) == (damage is flip)
+    assert f"the {90 - kept} missing ones again with --accept-loss" in message
+    assert files_of(directory) == before
+    notes = "\n".join(accept_loss(tmp_path, benchmark))
+    whole = sum(map(len, reference["episodes.csv"].splitlines(keepends=True)[: kept + 1])) if kept else 0
+    if damaged and len(damaged) not in (whole, reference["episodes.csv"].index(b"\n") + 1):
+        assert f"episodes.csv: dropped {len(damaged) - whole} bytes" in notes
+        assert f"{kept} movements are kept" in notes
+    assert f"episodes.csv lacks {90 - kept} movements: {kept} are kept" in notes
+    assert csv_of(directory) == reference
+    if damaged is None:
+        assert not list(directory.glob("*.lost-*"))
+    else:
+        assert f"as it was found is kept as {log}.lost-0" in notes
+        assert (directory / "episodes.csv.lost-0").read_bytes() == damaged
+    assert go(tmp_path, "--resume") == 0  # nothing is missing any more
+
+
+def test_no_copy_of_a_lost_log_is_overwritten_and_a_loss_is_accepted_once(tmp_path, go, benchmark, reference):
+    directory = tmp_path / "sgim-d" / "seed-003"
+    assert go(tmp_path) == 0
+    lines = reference["episodes.csv"].splitlines(keepends=True)
+    for k, kept in enumerate((31, 51)):
+        (directory / "episodes.csv").write_bytes(b"".join(lines[:kept]))
+        accept_loss(tmp_path, benchmark, "--movements", 70)
+        (directory / "episodes.csv").write_bytes(b"".join(lines[:71]))
+        assert (directory / f"episodes.csv.lost-{k}").read_bytes() == b"".join(lines[:kept])
+    assert go(tmp_path, "--resume") == 0
+    assert csv_of(directory) == reference
+    assert (directory / "episodes.csv.lost-0").read_bytes() == b"".join(lines[:31])
+
+
+def test_a_replay_that_fails_leaves_a_lossy_directory_as_it_was(tmp_path, go, benchmark):
+    assert go(tmp_path) == go(tmp_path, "--seed", 4) == 0
+    directory = tmp_path / "sgim-d" / "seed-003"
+    other = (tmp_path / "sgim-d" / "seed-004" / "episodes.csv").read_bytes()
+    (directory / "episodes.csv").write_bytes(other[: other.index(b"\n40,") + 1])
+    before = files_of(directory)
+    with pytest.raises(run_script.ReplayError, match="movement 0"):
+        accept_loss(tmp_path, benchmark)
+    assert files_of(directory) == before
+
+
+@pytest.mark.parametrize(
+    ("damage", "kept", "copied"), [(append_garbage, 90, False), (repeat_last_line, 90, True), (flip, 40, True)]
+)
+def test_of_a_damaged_log_what_is_whole_is_kept_and_the_rest_lived_again(
+    tmp_path, go, reference, capsys, damage, kept, copied
+):
+    """Without asking where nothing says that movements are missing; a last line that has no end is no damage."""
     directory = tmp_path / "sgim-d" / "seed-003"
     assert go(tmp_path) == 0
     log = directory / "episodes.csv"
     damaged = damage(log.read_bytes())
     log.write_bytes(damaged)
+    if kept < 90:
+        (directory / "summary.json").unlink()
     assert len(read_run(directory).index) == kept
+    assert read_run(directory).damage == ({"episodes.csv": kept + 2} if copied else {})
     capsys.readouterr()
     assert go(tmp_path, "--resume") == 0
     dropped = len(damaged) - sum(map(len, reference["episodes.csv"].splitlines(keepends=True)[: kept + 1]))
     messages = capsys.readouterr().err
     assert f"episodes.csv: dropped {dropped} bytes" in messages
+    assert f"from line {kept + 2} on" in messages
     assert f"{kept} movements are kept" in messages
     assert csv_of(directory) == reference
+    copies = list(directory.glob("*.lost-*"))
+    assert [copy.read_bytes() for copy in copies] == [damaged] * copied
+    assert ("is kept as" in messages) == copied
+
+
+def test_a_process_killed_between_log_and_summary_loses_nothing_and_asks_nothing(tmp_path, go, benchmark, reference):
+    directory, dying = tmp_path / "sgim-d" / "seed-003", "sgimd_torch.runs.directory"
+    program = (
+        f"import os, signal, {dying} as directory\n"
+        "write = directory.write_json\n"
+        "def write_or_die(path, content):\n"
+        "    if content.get('movements') == 50 and path.name == 'summary.json':\n"
+        "        os.kill(os.getpid(), signal.SIGKILL)\n"
+        "    write(path, content)\n"
+        f"directory.write_json = write_or_die\n{EAGER}"
+    )
+    process = start(program, *arguments(tmp_path, benchmark))
+    process.communicate()
+    assert process.returncode == -signal.SIGKILL
+    run = read_run(directory)
+    assert (len(run.index), run.summary["movements"], run.damage) == (50, 49, {})
+    assert go(tmp_path, "--resume") == 0
+    assert csv_of(directory) == reference
+
+
+@pytest.mark.parametrize("checked", [True, False])
+@pytest.mark.parametrize(
+    ("name", "column", "line"), [("evaluation.csv", "mean_error_m", 3), ("regions.csv", "competence", 4)]
+)
+def test_an_edited_row_is_told_of_and_made_again(tmp_path, go, reference, capsys, name, column, line, checked):
+    """Also in the tables of earlier versions, which had no checksums, if the number cannot be."""
+    directory = tmp_path / "sgim-d" / "seed-003"
+    assert go(tmp_path) == 0
+    lines = [row.split(",") for row in reference[name].decode().splitlines()]
+    lines[line - 1][lines[0].index(column)] = "-5"
+    text = "".join(",".join(row if checked else row[:-1]) + "\n" for row in lines)
+    (directory / name).write_text(text)
+    run = read_run(directory)
+    first = next(k for k, row in enumerate(lines, 1) if row[0] == lines[line - 1][0])  # of its map
+    assert run.damage == {name: first}
+    assert run.unchecked == (() if checked else (name,))
+    capsys.readouterr()
+    assert go(tmp_path, "--resume") == 0
+    messages = capsys.readouterr().err
+    assert f"{name}: dropped" in messages
+    assert f"from line {first} on, torn or damaged; it will be evaluated again" in messages
+    assert (f"{name} was made without checksums" in messages) == (not checked)
+    assert csv_of(directory) == reference
+    assert read_run(directory).damage == {}
+
+
+def test_a_directory_of_an_earlier_version_is_read_resumed_and_gets_checksums(tmp_path, go, reference, capsys):
+    directory = tmp_path / "sgim-d" / "seed-003"
+    assert go(tmp_path, "--movements", 60) == 0
+    for name in ("evaluation.csv", "regions.csv"):
+        lines = (directory / name).read_text().splitlines()
+        (directory / name).write_text("".join(line.rpartition(",")[0] + "\n" for line in lines))
+    old = read_run(directory)
+    assert old.unchecked == ("evaluation.csv", "regions.csv")
+    assert old.evaluation["movements"].tolist() == [30, 60]
+    capsys.readouterr()
+    assert go(tmp_path, "--resume") == 0
+    messages = capsys.readouterr().err
+    assert messages.count("was made without checksums") == 2
+    assert "evaluated again" not in messages
+    assert csv_of(directory) == reference
+    assert read_run(directory).unchecked == ()
 
 
 @pytest.mark.parametrize("name", ["evaluation.csv", "regions.csv"])
@@ -213,9 +361,9 @@ def test_a_run_is_not_made_shorter(tmp_path, go, capsys):
 
 def test_a_run_that_another_process_writes_is_left_alone(tmp_path, go, capsys):
     assert go(tmp_path, "--movements", 10) == 0
-    with (tmp_path / "sgim-d" / "seed-003" / "lock").open("r+") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        assert go(tmp_path, "--resume") == 2
+    held = lock(tmp_path / "sgim-d" / "seed-003" / "lock")
+    assert go(tmp_path, "--resume") == 2
+    os.close(held)
     assert "in use by another process" in capsys.readouterr().err
     assert go(tmp_path, "--resume") == 0
 
@@ -232,7 +380,9 @@ def test_a_full_disk_is_reported_and_the_run_can_go_on(tmp_path, go, benchmark, 
     assert csv_of(directory) == reference
 
 
-@pytest.mark.parametrize("damage", ['{"seconds_physics": "x"}', "null", "", '{"seconds_physics": null}'])
+@pytest.mark.parametrize(
+    "damage", ['{"seconds_physics": "x"}', "null", "", '{"seconds_physics": null}', '{"movements": "many"}']
+)
 @pytest.mark.parametrize("name", ["summary.json", "versions.json"])
 def test_a_damaged_note_on_the_run_counts_as_missing(tmp_path, go, reference, capsys, name, damage):
     directory = tmp_path / "sgim-d" / "seed-003"

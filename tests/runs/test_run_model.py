@@ -64,8 +64,9 @@ def files_of(directory):
 
 
 def table(path):
-    header, *lines = path.read_text().splitlines()
-    return header.split(","), np.array([line.split(",") for line in lines], dtype=np.float64)
+    header, *lines = (line.split(",") for line in path.read_text().splitlines())
+    assert header[-1] == "crc32"
+    return header[:-1], np.array([line[:-1] for line in lines], dtype=np.float64)
 
 
 def curves_of(directory):

@@ -1,4 +1,6 @@
-"""The run directory's files: exact numbers, lines that tell whether they are whole, and clear refusals."""
+"""The run directory's files: exact numbers, lines that tell whether they are as they were written, clear refusals."""
+
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -7,6 +9,7 @@ from hypothesis import strategies as st
 
 from sgimd_torch.runs.log import Columns, RunError
 from sgimd_torch.runs.read import find_runs, read_run
+from sgimd_torch.runs.tables import sealed, small_table
 from sgimd_torch.spaces import Demonstration, Episode, Move
 
 COLUMNS = Columns(1, 2, 1)
@@ -18,6 +21,10 @@ def write(path, lines, config="{}"):
     (path / "config.json").write_text(config)
     (path / "episodes.csv").write_bytes(COLUMNS.header + b"".join(lines))
     return path
+
+
+def whole_lines(body):
+    return COLUMNS.table(Path()).parse(COLUMNS.header + body).lines
 
 
 def moved(index, theta, goal=None, outcome=0.5):
@@ -44,7 +51,7 @@ def test_a_movement_at_rest_has_neither_theta_nor_outcome(tmp_path):
     demonstration = Demonstration(np.zeros(1), np.zeros(2), np.zeros((2, 1)), np.zeros(1))
     line = COLUMNS.line(Episode(0, np.array([0.5]), None, None, demonstration), 3)
     assert line.startswith(b"0,,3,0.5,,,,,")
-    assert COLUMNS.recorded(line) == (None, None)
+    assert COLUMNS.recorded([line]) == [(None, None)]
     run = read_run(write(tmp_path / "run", [line]))
     assert run.origin.tolist() == [""]
     assert run.demonstration.tolist() == [3]
@@ -57,14 +64,140 @@ def test_no_changed_byte_passes_for_a_whole_line(data):
     body = bytearray(b"".join(lines))
     place = data.draw(st.integers(0, len(body) - 1))
     body[place] = data.draw(st.integers(0, 255).filter(lambda byte: byte != body[place]))
-    whole = COLUMNS.whole_lines(bytes(body))
+    whole = whole_lines(bytes(body))
     assert whole == lines[: len(whole)]
     assert sum(map(len, whole)) <= place  # all before the change, none from it on
 
 
 def test_lines_out_of_order_are_not_a_log():
     lines = [COLUMNS.line(moved(k, [0.1, 0.2]), None) for k in (0, 2, 1)]
-    assert COLUMNS.whole_lines(b"".join(lines)) == lines[:1]
+    assert whole_lines(b"".join(lines)) == lines[:1]
+
+
+ROWS = {  # of each table, two that can be: dimensions, and rows
+    "evaluation.csv": (0, ["30,0.25,0.2,0.5,nan", "60,0.125,0.1,0.25,0.01"]),
+    "regions.csv": (1, ["30,R0,-1.0,0.0,7,5,-0.5,0.25", "30,R1,0.0,1.0,0,0,nan,0.0"]),
+    "predictions.csv": (1, ["50,0.5,0.25,0.1,0.2", "51,-0.5,-0.25,0.1,0.2"]),
+    "refreshes.csv": (0, ["50,50,15,-0.25,0.5,0", "100,98,15,0.75,0.25,1"]),
+}
+
+
+def content_of(name, rows, *, checked=True):
+    """The file of a table, as it is written today, or by versions that knew no checksums."""
+    table = small_table(Path(name), ROWS[name][0])
+    if checked:
+        return table.header + b"".join(sealed(row.split(",")) for row in rows)
+    return "".join(f"{line}\n" for line in (",".join(table.names), *rows)).encode()
+
+
+def run_with(path, name, content):
+    (write(path / "run", []) / name).write_bytes(content)
+    return read_run(path / "run")
+
+
+@pytest.mark.parametrize("name", ROWS)
+@given(data=st.data())
+def test_no_changed_byte_of_a_table_passes_for_a_whole_line(name, data):
+    dims, rows = ROWS[name]
+    table, content = small_table(Path(name), dims), bytearray(content_of(name, rows))
+    place = data.draw(st.integers(len(table.header), len(content) - 1))
+    content[place] = data.draw(st.integers(0, 255).filter(lambda byte: byte != content[place]))
+    found = table.parse(bytes(content))
+    whole = [sealed(row.split(",")) for row in rows][: len(found.lines)]
+    assert found.lines == whole
+    assert found.size == len(table.header) + sum(map(len, whole)) <= place
+    assert found.bad == 2 + len(whole)
+
+
+@pytest.mark.parametrize("checked", [True, False])
+@pytest.mark.parametrize("name", ROWS)
+def test_a_table_is_read_with_its_checksums_and_without(tmp_path, name, checked):
+    dims, rows = ROWS[name]
+    run = run_with(tmp_path, name, content_of(name, rows, checked=checked))
+    assert run.damage == {}
+    assert run.unchecked == (() if checked else (name,))
+    columns = getattr(run, name.removesuffix(".csv"))
+    assert tuple(columns) == small_table(Path(name), dims).names
+    for k, row in enumerate(rows):
+        for field, column in zip(row.split(","), columns.values(), strict=True):
+            assert column[k] == (field if column.dtype.kind == "U" else pytest.approx(float(field), nan_ok=True))
+
+
+@pytest.mark.parametrize("checked", [True, False])
+def test_an_error_edited_to_below_zero_is_noticed(tmp_path, checked):
+    """Its line, and all after it, are left out."""
+    content = content_of("evaluation.csv", ROWS["evaluation.csv"][1], checked=checked)
+    run = run_with(tmp_path, "evaluation.csv", content.replace(b"0.125", b"-5"))
+    assert run.damage == {"evaluation.csv": 3}
+    assert run.evaluation["movements"].tolist() == [30]
+
+
+@pytest.mark.parametrize(
+    ("name", "was", "edited"),
+    [
+        ("evaluation.csv", "60,0.125", "60,nan"),
+        ("evaluation.csv", "0.125", "inf"),
+        ("evaluation.csv", "60,", "6e1,"),
+        ("evaluation.csv", "60,", ""),
+        ("regions.csv", "R1", "R2"),
+        ("regions.csv", "nan,0.0", "nan,nan"),
+        ("regions.csv", "0,0,nan", "0,0,0.5"),
+        ("predictions.csv", "51,-0.5", "51,nan"),
+        ("predictions.csv", "-0.25,0.1", "-0.25,-0.1"),
+        ("predictions.csv", "51,", "51.5,"),
+        ("refreshes.csv", "0.75", "nan"),
+    ],
+)
+def test_without_checksums_what_cannot_be_is_refused_with_its_line(tmp_path, name, was, edited):
+    first, second = ROWS[name][1]
+    assert was in second
+    run = run_with(tmp_path, name, content_of(name, [first, second.replace(was, edited)], checked=False))
+    assert run.damage == {name: 2 if name == "regions.csv" else 3}  # half a map is none
+    assert run.unchecked == (name,)
+
+
+def test_a_last_line_without_its_end_is_damage_only_where_a_file_is_replaced_whole(tmp_path):
+    path = write(tmp_path / "run", [COLUMNS.line(moved(k, [0.1, 0.2]), None) for k in range(3)])
+    for name, (_, rows) in ROWS.items():
+        (path / name).write_bytes(content_of(name, rows)[:-1])
+    (path / "episodes.csv").write_bytes((path / "episodes.csv").read_bytes()[:-9])
+    run = read_run(path)
+    assert len(run.index) == 2
+    assert len(run.predictions["exemplar"]) == len(run.refreshes["movements"]) == 1
+    assert run.damage == {"evaluation.csv": 3, "regions.csv": 2}
+
+
+def test_a_bad_line_before_others_is_damage_of_the_log(tmp_path):
+    lines = [COLUMNS.line(moved(k, [0.1, 0.2]), None) for k in range(3)]
+    run = read_run(write(tmp_path / "run", [lines[0], lines[1].replace(b"0.1", b"0.2"), lines[2]]))
+    assert len(run.index) == 1
+    assert run.damage == {"episodes.csv": 3}
+
+
+@pytest.mark.parametrize(
+    ("paths", "whole"),
+    [
+        (["R"], True),
+        (["R0", "R10", "R11"], True),
+        (["R0", "R10"], False),
+        (["R.0.0", "R.0.1", "R.1.0", "R.1.1"], True),
+        (["R.0.0", "R.0.1", "R.1.0"], False),
+        (["R.3.7"], False),
+        (["left", "right"], True),  # names of a goal model that we do not know
+    ],
+)
+def test_regions_of_a_tree_or_a_grid_are_all_there_or_count_as_damaged(tmp_path, paths, whole):
+    rows = [f"{movements},{path},0.0,1.0,0,0,nan,0.0" for movements in (30, 60) for path in paths]
+    rows[: len(paths)] = ["30,R,0.0,1.0,0,0,nan,0.0"]
+    run = run_with(tmp_path, "regions.csv", content_of("regions.csv", rows))
+    assert run.damage == ({} if whole else {"regions.csv": 3})
+    assert run.regions["path"].tolist() == ["R", *paths * whole]
+
+
+@pytest.mark.parametrize("origin", ["a,b", "two\nlines", "\x00"])
+def test_a_name_that_would_be_read_back_as_something_else_is_refused(origin):
+    with pytest.raises(ValueError, match="must be printable and without commas"):
+        COLUMNS.line(Episode(0, np.zeros(1), Move(np.zeros(2), None, origin), np.zeros(1), None), None)
 
 
 def test_what_is_no_run_is_refused(tmp_path):

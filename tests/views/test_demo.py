@@ -6,16 +6,14 @@ import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
 
+from runs import ROOT
 from sgimd_torch.evaluation import Benchmark, save_benchmark
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.views.demo_figure import draw, table
-
-ROOT = Path(__file__).parent.parent
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +23,7 @@ def benchmark_file(tmp_path_factory):
     return path
 
 
-DEMO = [sys.executable, str(ROOT / "experiments/demo.py")]
+DEMO = [sys.executable, "-m", "sgimd_torch", "demo"]
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
 
 
@@ -128,9 +126,11 @@ def test_stopped_it_says_how_to_go_on_and_leaves_no_process(benchmark_file, tmp_
 @pytest.mark.parametrize(
     ("more", "extra", "message"),
     [
-        (("--seed", "-1"), (), "--seed must be at least 0"),
+        (("--seed", "-1"), (), "seed must be at least 0"),
+        (("--movements", "0"), (), "movements must be at least 1"),
         ((), ("--noise", "-1"), "noise must be finite and at least 0"),
         ((), ("--evaluate_at", "[]"), "leaves nothing to draw"),
+        ((), ("--environment", "planar-arm-7"), "--environment is not free here"),
         ((), ("--seed", "3"), "--seed is the demo's own"),
         ((), ("--movements=3",), "--movements is the demo's own"),
         ((), ("--out", "x"), "--out is the demo's own"),
@@ -161,7 +161,7 @@ def test_when_one_run_fails_the_other_is_stopped(benchmark_file, tmp_path):
     foreign.write_text("not a run")
     code, _, errors = ended(start(tmp_path, benchmark_file, 100_000))
     assert code == 2
-    assert "Random failed: error: " in errors
+    assert "random seed 0 failed: " in errors
     assert "thesis.txt" in errors
     assert "Traceback" not in errors
     assert foreign.read_text() == "not a run"
@@ -169,5 +169,5 @@ def test_when_one_run_fails_the_other_is_stopped(benchmark_file, tmp_path):
 
 def test_the_help_teaches():
     shown = subprocess.run([*DEMO, "--help"], capture_output=True, text=True, check=True, env=ENVIRONMENT)
-    assert "scripts/demo --seed 1" in shown.stdout
+    assert "sgimd demo --seed 1" in shown.stdout
     assert "demo.png" in shown.stdout

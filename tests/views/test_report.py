@@ -1,5 +1,6 @@
 """The report: one file that tells what the runs' own files tell, of one run or of many, whatever became of them."""
 
+import html
 import json
 import re
 import shlex
@@ -9,15 +10,21 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
+from markupsafe import escape
+from matplotlib.figure import Figure
 
 from runs import start
+from sgimd_torch.figures.learning import NAMES
 from sgimd_torch.runs.command_line import parse
+from sgimd_torch.runs.log import Columns
+from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
+from sgimd_torch.spaces import Episode, Move
 from sgimd_torch.views.report import command as report
+from sgimd_torch.views.report import figures
+from sgimd_torch.views.report import page as pages_of
 from sgimd_torch.views.report.data import Variant, read_life
-from sgimd_torch.views.report.films import find_films
-from sgimd_torch.views.report.html import document, tag
-from sgimd_torch.views.report.repeat import AGAIN, doubts
+from sgimd_torch.views.report.record import AGAIN, doubts
 from sgimd_torch.views.statistics import interquartile_mean
 
 ODD = "<b>&'$x\" "
@@ -60,6 +67,8 @@ class Page(HTMLParser):
 
     def handle_starttag(self, name, attributes):
         self.elements.append((name, dict(attributes)))
+        if name == "table":
+            assert self.elements[-2][1]["class"] == "scroll"
         if name not in ("meta", "link", "img"):
             self.open.append(name)
 
@@ -71,6 +80,14 @@ class Page(HTMLParser):
 
     def all(self, name):
         return [text for element, text in self.texts if element == name]
+
+
+def rows_of(text, caption):
+    """The cells of the first table whose caption begins so, head first."""
+    table = text[text.index(f'<p class="soft">{escape(caption)}') :]
+    table = table[table.index("<tr>") : table.index("</tbody>")]
+    cells = [re.findall("<t[hd][^>]*>(.*?)</t[hd]>", row, re.DOTALL) for row in table.split("</tr>")[:-1]]
+    return [[html.unescape(re.sub("<[^>]*>", "", cell)) for cell in row] for row in cells]
 
 
 @pytest.mark.parametrize("name", ["many", "one"])
@@ -98,21 +115,47 @@ def test_names_are_text_and_never_markup(pages):
     page = Page(pages["many"])
     assert ODD in page.all("h2")
     assert not [given for name, given in page.elements if name == "b"]
-    assert "&lt;x&gt;" in document("t", [tag("p", "<x>", title='"')])
-    assert 'title="&quot;"' in tag("p", title='"')
+    assert f"Error curve of {ODD}" in [given.get("alt") for _, given in page.elements]
+
+
+def test_whatever_runs_say_is_text_and_never_markup(copy):
+    """In options and their names, versions and their names, the commit, the path of a run and of a film."""
+    bad = "\"'><script>alert(1)</script>{{ 7 * 7 }}\ud800"
+    (copy / "sgim-d").rename(copy / "<img src=x onerror=alert(1)>")
+    run = copy / "<img src=x onerror=alert(1)>" / "seed-003"
+    for name, of in (("config", ("goals", "environment", "algorithm")), ("versions", ("commit", "numpy", "before"))):
+        content = json.loads((run / f"{name}.json").read_text())
+        (run / f"{name}.json").write_text(json.dumps({**content, **dict.fromkeys(of, bad), bad: bad}))
+    (run / "<b onclick=f()>.mp4").write_bytes(b"not a film")
+    (run.parent / "seed-<u>").mkdir()
+    assert report.main([str(copy)]) == 0
+    assert report.main([str(run)]) == 0
+    for text in ((path / "report.html").read_text(encoding="utf-8") for path in (copy, run)):
+        page = Page(text)
+        assert not {"script", "b", "u"} & {name for name, _ in page.elements}
+        assert all(given["src"].startswith("data:") for name, given in page.elements if name == "img")
+        assert not [key for _, given in page.elements for key in given if key.startswith("on")]
+        assert bad.replace("\ud800", "\\ud800") in page.all("td") + page.all("th")
+        assert "49" not in page.all("td")
 
 
 def test_the_numbers_of_a_run_are_those_of_its_evaluations(pages, runs):
     run = read_run(runs / "sgim-d" / "seed-003")
-    cells = Page(pages["one"]).all("td")
     rows = list(zip(*run.evaluation.values(), strict=True))
     assert len(rows) == 2
-    assert cells[:8] == [f"{value:.4f}" for row in rows for value in row[1:]]
+    evaluations = rows_of(pages["one"], "Every evaluation: distances to the benchmark's goals")
+    assert evaluations[1:] == [[f"{row[0]:.0f}", *(f"{value:.4f}" for value in row[1:])] for row in rows]
     mean, floor = run.evaluation["mean_error_m"][-1], run.evaluation["noise_floor_m"][-1]
     assert f"lands {mean:.3f} m from a goal" in pages["one"]
-    assert f"{mean / floor:.2f} times the noise floor" in pages["one"]
-    local = np.mean(run.origin == "local")
-    assert f"{100 * local:.1f} % local" in pages["one"]
+    errors = dict(zip(*rows_of(pages["one"], "Errors"), strict=True))
+    assert errors["times the floor"] == f"{mean / floor:.2f}"
+    area = (run.evaluation["mean_error_m"][0] + mean) / 2  # of one trapezoid
+    assert errors["error over life (m)"] == f"{area:.3f}"
+    lived = dict(zip(*rows_of(pages["one"], "How it lived"), strict=True))
+    assert lived["movements"] == "60"
+    assert lived["local (%)"] == f"{100 * np.mean(run.origin == 'local'):.1f}"
+    assert lived["demonstrations shown"] == str((run.demonstration >= 0).sum())
+    assert lived["physics (s)"] == f"{run.summary['seconds_physics']:.1f}"
 
 
 def test_the_numbers_of_a_variant_are_interquartile_means_over_its_seeds(pages, runs):
@@ -127,6 +170,18 @@ def test_the_numbers_of_a_variant_are_interquartile_means_over_its_seeds(pages, 
     assert all(f"{error:.4f}" in cells for error in errors)
 
 
+def test_what_a_configuration_names_is_not_executed(copy, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "hostile.py").write_text("open('was-here', 'w')\n")
+    run = copy / "sgim-d" / "seed-003"
+    config = json.loads((run / "config.json").read_text())
+    own = dict.fromkeys(("environment", "goals", "algorithm", "search", "inverse"), "hostile:make")
+    (run / "config.json").write_text(json.dumps({**config, **own}))
+    assert report.main([str(run)]) == 0
+    assert not (tmp_path / "was-here").exists()
+    assert "they are not known without running hostile:make" in (run / "report.html").read_text()
+
+
 def test_only_options_that_differ_are_compared(pages):
     start = pages["many"].index('id="configurations"')
     table = Page(pages["many"][start - 4 : pages["many"].index('id="versions"') - 4]).all("th")
@@ -135,10 +190,10 @@ def test_only_options_that_differ_are_compared(pages):
 
 
 def test_the_commands_make_the_same_runs_again(pages, runs):
-    lines = [code for code in Page(pages["many"]).all("code") if "experiments/run.py" in code]
+    lines = [code for code in Page(pages["many"]).all("code") if "sgimd run" in code]
     assert len(lines) == 3
     for line in lines:
-        words = shlex.split(line[line.index("python ") :].replace("\ndone", "").replace("$seed", "3"))
+        words = shlex.split(line[line.index("sgimd ") :].replace("\ndone", "").replace("$seed", "3"))
         config, _ = parse(words[2:])
         assert str(config.out) == AGAIN
         recorded = read_run(runs / config.variant / "seed-003").config
@@ -147,6 +202,7 @@ def test_the_commands_make_the_same_runs_again(pages, runs):
         assert {k: v for k, v in again.items() if k not in ignored} == {
             k: v for k, v in recorded.items() if k not in ignored
         }
+    assert any("--evaluate-at=" in line for line in lines)
     assert sum("for seed in 3 4; do" in line for line in lines) == 2
 
 
@@ -159,6 +215,7 @@ def test_unfinished_runs_are_counted_and_damaged_ones_named_and_left_out(copy, c
     torn = copy / "sgim-d" / "seed-004"
     lines = (torn / "episodes.csv").read_bytes().splitlines(keepends=True)
     (torn / "episodes.csv").write_bytes(b"".join(lines[:26]) + lines[26][:9])
+    assert read_run(torn).damage == {}  # a line without its end is still being written
     (copy / ODD / "seed-003" / "config.json").write_text("{")
     (copy / ODD / "seed-005").mkdir()
     assert report.main([str(copy)]) == 0
@@ -172,6 +229,110 @@ def test_unfinished_runs_are_counted_and_damaged_ones_named_and_left_out(copy, c
     for name in ("seed-003", "seed-005"):
         assert f"left out, damaged: {copy / ODD / name}" in said
     assert text.count("Left out, damaged: ") == 2
+
+
+def test_a_run_whose_log_is_damaged_in_the_middle_is_called_so_and_its_errors_are_left_out(copy):
+    run = copy / "sgim-d" / "seed-004"
+    lines = (run / "episodes.csv").read_bytes().splitlines(keepends=True)
+    lines[26] = lines[26].replace(b",", b";", 1)
+    (run / "episodes.csv").write_bytes(b"".join(lines))
+    assert read_run(run).damage == {"episodes.csv": 27}  # the names of the columns are line 1
+    assert report.main([str(copy)]) == 0
+    text = (copy / "report.html").read_text(encoding="utf-8")
+    assert "SGIM-D, seed 4: episodes.csv is damaged at line 27; its errors are left out" in text
+    assert "not finished" not in text
+    good = read_run(copy / "sgim-d" / "seed-003")
+    row = next(row for row in rows_of(text, "Errors") if row[0] == "SGIM-D")
+    assert row[1].split() == ["1", "of", "2"]
+    assert row[4] == f"{good.evaluation['mean_error_m'][-1]:.3f}"  # of one seed, so without an interval
+    lived = next(row for row in rows_of(text, "How they lived") if row[0] == "SGIM-D")
+    assert lived[1] == "60"
+    states = [row[2] for row in rows_of(text, "Every run of SGIM-D")[1:]]
+    assert states == ["finished", "episodes.csv is damaged at line 27"]
+
+
+def test_a_damaged_run_alone_has_no_last_error(copy):
+    run = copy / "sgim-d" / "seed-004"
+    lines = (run / "episodes.csv").read_bytes().splitlines(keepends=True)
+    (run / "episodes.csv").write_bytes(b"".join([*lines[:26], b"\n", *lines[27:]]))
+    assert report.main([str(run)]) == 0
+    text = (run / "report.html").read_text(encoding="utf-8")
+    assert "25 of 60 movements on fishing-rod, episodes.csv is damaged at line 27" in text
+    assert rows_of(text, "Errors")[1][4] == "–"
+    assert "m from a goal" not in text
+
+
+@pytest.mark.parametrize("dim", [1, 3])
+def test_of_outcomes_that_are_not_of_the_plane_all_but_the_maps_is_shown(copy, dim):
+    path = copy / "sgim-d" / "seed-003"
+    run, rng = read_run(path), np.random.default_rng(0)
+    columns = Columns(0, 2, dim)
+    lines = [columns.header]
+    for index, origin in enumerate(run.origin):
+        theta, goal, outcome = rng.random(2), rng.random(dim), rng.random(dim)
+        move = Move(theta, goal=goal, origin=str(origin)) if origin else None
+        lines.append(columns.line(Episode(index, np.empty(0), move, outcome if origin else None, None), None))
+    (path / "episodes.csv").write_bytes(b"".join(lines))
+    corners = {1: "0.0,0.0,1.0,1.0", 3: "0.0,0.0,0.0,1.0,1.0,1.0"}[dim]  # of one outcome, with a context
+    names = [f"{end}_{k}" for end in ("low", "high") for k in range({1: 2, 3: 3}[dim])]
+    head = ",".join(["movements", "path", *names, "attempts", "goals", "competence", "interest"])
+    (path / "regions.csv").write_text(f"{head}\n60,R,{corners},3,3,-0.5,0.1\n")
+    life = read_life(path)
+    assert len(life.index) == len(life.regions["movements"]) * 60 == 60
+    assert report.main([str(copy)]) == 0  # beside a seed of the plane
+    shutil.rmtree(copy / "sgim-d" / "seed-004")
+    for place in (path, copy):
+        assert report.main([str(place)]) == 0
+        text = (place / "report.html").read_text(encoding="utf-8")
+        assert f"Its outcomes have {dim} dimension" in text
+        assert f"{run.evaluation['mean_error_m'][-1]:.4f}" in Page(text).all("td")
+    alts = [given["alt"] for name, given in Page((path / "report.html").read_text()).elements if name == "img"]
+    assert alts == ["Error curve of SGIM-D"]
+
+
+def test_names_may_be_more_and_in_any_order(copy, monkeypatch):
+    """Of an algorithm that is new in the tables; it has no colour of its own yet."""
+    (copy / "sgim-d").rename(copy / "sixth")
+    assert report.main([str(copy)]) == 0
+    before = (copy / "report.html").read_text(encoding="utf-8")
+    known = dict(NAMES)
+    for name in known:
+        monkeypatch.delitem(NAMES, name)
+    for name, label in [("other", "Other"), *reversed(known.items()), ("sixth", "The sixth")]:
+        monkeypatch.setitem(NAMES, name, label)
+    assert report.main([str(copy)]) == 0
+    after = (copy / "report.html").read_text(encoding="utf-8")
+    assert rows_of(after, "Errors") == [
+        [cell.replace("sixth", "The sixth") for cell in row] for row in rows_of(before, "Errors")
+    ]
+    assert "The sixth" in Page(after).all("h2")
+    monkeypatch.setitem(NAMES, "sixth", "")  # as of an entry of the catalogue that says nothing of figures
+    assert Variant("sixth", [read_life(copy / "sixth" / "seed-003")]).label == "sixth"
+
+
+def test_algorithms_without_a_colour_of_their_own_can_be_told_apart(copy):
+    lives = []
+    for algorithm in ("sixth", "seventh"):
+        path = shutil.copytree(copy / "sgim-d" / "seed-003", copy / algorithm / "seed-003")
+        config = json.loads((path / "config.json").read_text())
+        (path / "config.json").write_text(json.dumps({**config, "algorithm": algorithm}))
+        lives.append(read_life(path))
+    figure = Figure()
+    figures.curves.__wrapped__(figure, [Variant(life.config["algorithm"], [life]) for life in lives])
+    one, other = figure.axes[0].lines
+    assert one.get_color() == other.get_color()
+    assert one.get_linestyle() != other.get_linestyle()
+
+
+def test_without_motor_noise_nothing_is_divided_by_the_floor(copy):
+    run = copy / "observation" / "seed-003"
+    lines = (run / "evaluation.csv").read_text().splitlines()
+    lines[1:] = [f"{line.rpartition(',')[0]},1e-16" for line in lines[1:]]
+    (run / "evaluation.csv").write_text("\n".join([*lines, ""]))
+    assert report.main([str(run)]) == 0
+    errors = dict(zip(*rows_of((run / "report.html").read_text(), "Errors"), strict=True))
+    assert errors["noise floor (m)"] == "0.000"
+    assert errors["times the floor"] == "–"
 
 
 def test_a_run_that_has_hardly_begun_is_told_of(copy):
@@ -201,7 +362,7 @@ def test_doubtful_versions_are_told(copy, commits, warning):
         versions = json.loads((path / "versions.json").read_text())
         (path / "versions.json").write_text(json.dumps({**versions, "commit": commit}))
         lives.append(read_life(path))
-    said = doubts([Variant("sgim-d", lives)])
+    said = list(doubts([Variant("sgim-d", lives)]))
     assert len(said) == bool(warning)
     assert warning in "".join(said)
 
@@ -220,16 +381,16 @@ def test_doubts_stand_above_the_results_and_the_commit_by_the_commands(copy):
 def test_a_film_beside_a_run_is_kept_in_the_page_and_one_that_is_too_large_is_named(copy, monkeypatch):
     run = copy / "observation" / "seed-003"
     film = copy / "observation" / "seed-003.mp4"
-    assert find_films(run) == []
+    assert pages_of.find_films(run) == []
     film.write_bytes(b"not a film")  # which nothing can decode: then it has no still
     (copy / "observation" / "seed-0030.mp4").write_bytes(b"of another run")
-    assert find_films(run) == [film]
+    assert pages_of.find_films(run) == [film]
     assert report.main([str(run)]) == 0
     videos = [given for name, given in Page((run / "report.html").read_text()).elements if name == "video"]
     assert [video["src"] for video in videos] == ["data:video/mp4;base64,bm90IGEgZmlsbQ=="]
     assert "controls" in videos[0]
     assert "poster" not in videos[0]
-    film.write_bytes(bytes(report.MOST + 1))
+    film.write_bytes(bytes(pages_of.MOST + 1))
     assert report.main([str(run)]) == 0
     text = (run / "report.html").read_text()
     assert "<video" not in text
@@ -237,7 +398,7 @@ def test_a_film_beside_a_run_is_kept_in_the_page_and_one_that_is_too_large_is_na
 
 
 def test_without_a_film_the_page_says_how_to_make_one(pages, runs):
-    assert shlex.join(["scripts/film", str(runs / "sgim-d" / "seed-003")]) in pages["one"]
+    assert shlex.join(["sgimd", "film", str(runs / "sgim-d" / "seed-003")]) in pages["one"]
 
 
 @pytest.mark.parametrize("problem", ["missing", "a file", "empty", "all damaged", "out is a folder", "no such folder"])
@@ -258,7 +419,7 @@ def test_what_cannot_be_reported_ends_with_one_line_and_nothing_written(copy, tm
     else:
         out, wanted = tmp_path / "no" / "page.html", "folder that exists"
     before = sorted(tmp_path.rglob("*"))
-    assert report.main([str(place), "--out", str(out)]) == 2
+    assert command(report.main, [str(place), "--out", str(out)]) == 2
     said = capsys.readouterr()
     assert said.err.startswith("error: ")
     assert said.err.count("\n") == 1
@@ -268,10 +429,11 @@ def test_what_cannot_be_reported_ends_with_one_line_and_nothing_written(copy, tm
 
 
 def test_an_interrupted_report_leaves_nothing(copy):
-    program = "import report, report_page, os, signal, sys\n" + (
-        "draw = report.section\n"
-        "def section(*a):\n    os.kill(os.getpid(), signal.SIGINT); return draw(*a)\n"
-        "report.section = section; sys.exit(report.main(sys.argv[1:]))"
+    program = (
+        "import os, signal, sys\nfrom sgimd_torch.runs import process\n"
+        "from sgimd_torch.views.report import command, figures\ndraw = figures.one_curve\n"
+        "def one_curve(*a):\n    os.kill(os.getpid(), signal.SIGINT); return draw(*a)\n"
+        "figures.one_curve = one_curve; sys.exit(process.command(command.main, sys.argv[1:]))"
     )
     process = start(program, copy / "observation")
     _, said = process.communicate()

@@ -54,6 +54,13 @@ def test_the_same_stream_gives_the_same_interval():
     assert iqm_interval(values, rng=stream(1, "a")) == iqm_interval(values, rng=stream(1, "a"))
 
 
+def test_each_number_draws_from_a_stream_of_its_own_and_is_told_with_its_interval():
+    values = np.array([0.4, 0.5, 0.6])
+    found = iqm_interval(values, rng=statistics.rng())
+    assert found == iqm_interval(values, rng=statistics.rng())  # whatever was computed before
+    assert statistics.show(found, ".1f", "m") == f"0.5 [{found.low:.1f}, {found.high:.1f}] m"
+
+
 def test_an_interval_holds_the_truth_about_as_often_as_it_says(rng, monkeypatch):
     monkeypatch.setattr(statistics, "RESAMPLES", 499)
     found = [iqm_interval(rng.normal(size=10), rng=rng) for _ in range(400)]

@@ -1,5 +1,6 @@
 """The table of what runs came to."""
 
+import json
 import shutil
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 
 from sgimd_torch.evaluation import Benchmark, save_benchmark
 from sgimd_torch.runs.command_line import main as live
+from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.views.table import main
 
@@ -21,8 +23,18 @@ def runs(tmp_path_factory):
     return out
 
 
+@pytest.fixture
+def copied(runs, tmp_path):
+    return shutil.copytree(runs, tmp_path / "runs")
+
+
+def table(*options):
+    """The exit code."""
+    return command(main, [str(option) for option in options])
+
+
 def test_the_table_gives_mean_and_deviation_over_seeds(runs, capsys):
-    assert main([str(runs), "--at", "40"]) == 0
+    assert table(runs, "--at", 40) == 0
     lines = {line.split()[0]: line for line in capsys.readouterr().out.splitlines()}
     errors = [read_run(runs / "random" / f"seed-00{seed}").evaluation["mean_error_m"][-1] for seed in (0, 1)]
     assert f"{np.mean(errors):.3f} ± {abs(errors[0] - errors[1]) / np.sqrt(2):.3f}" in lines["random"]
@@ -30,37 +42,93 @@ def test_the_table_gives_mean_and_deviation_over_seeds(runs, capsys):
     assert "±" not in lines["sgim-d"]
 
 
+def test_variants_are_compared_where_all_finished_runs_were_evaluated_the_last_time(runs, copied, capsys):
+    assert table(copied) == 0
+    said = capsys.readouterr()
+    assert "at 40 (m)" in said.out
+    assert not said.err
+    options = "--algorithm random --name longer --movements 60 --repeats 0 --evaluate_at 20"
+    assert live([*options.split(), "--benchmark", str(runs / "tiny.npz"), "--out", str(copied)]) == 0
+    capsys.readouterr()
+    assert table(copied) == 0  # after 20 and 60 the one, after 20 and 40 the others
+    said = capsys.readouterr()
+    assert "at 20 (m)" in said.out
+    assert len(said.out.splitlines()) == 4
+    error = read_run(copied / "longer/seed-000").evaluation["mean_error_m"][0]
+    assert f"{error:.3f}" in next(line for line in said.out.splitlines() if line.startswith("longer"))
+
+
+def test_a_run_that_is_not_finished_is_named_and_left_out_unless_at_says_where_to_look(copied, capsys):
+    path = copied / "random/seed-001"
+    summary = json.loads((path / "summary.json").read_text())
+    (path / "summary.json").write_text(json.dumps({**summary, "finished": False}))
+    assert table(copied) == 0
+    said = capsys.readouterr()
+    assert next(line for line in said.out.splitlines() if line.startswith("random")).split()[1] == "1"
+    assert said.err == f"left out: {path} is not finished: 40 of 40 movements; --resume goes on\n"
+    assert table(copied, "--at", 20) == 0
+    said = capsys.readouterr()
+    assert next(line for line in said.out.splitlines() if line.startswith("random")).split()[1] == "2"
+    assert not said.err
+
+
+def test_runs_that_share_no_evaluation_want_at(runs, copied, capsys):
+    options = "--algorithm random --name other --movements 50 --repeats 0 --evaluate_at 30"
+    assert live([*options.split(), "--benchmark", str(runs / "tiny.npz"), "--out", str(copied)]) == 0
+    assert table(copied) == 2
+    assert "never evaluated after the same number of movements; --at chooses one" in capsys.readouterr().err
+
+
 def test_a_run_that_is_too_short_is_named(runs, capsys):
-    assert main([str(runs), "--at", "5000"]) == 2
-    assert "seed-000 has no evaluation after 5000 movements" in capsys.readouterr().err
+    assert table(runs, "--at", 5000) == 2
+    assert "seed-000 was not evaluated after 5000 movements" in capsys.readouterr().err
 
 
 def test_a_folder_without_runs_is_refused(tmp_path, capsys):
-    assert main([str(tmp_path)]) == 2
+    assert table(tmp_path) == 2
     assert "holds no runs" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("damage", ["no summary", "junk log", "directory", "summary is a list"])
-def test_a_damaged_run_is_named_in_one_line(runs, tmp_path, capsys, damage):
-    shutil.copytree(runs, tmp_path / "runs")
-    run = tmp_path / "runs" / "random" / "seed-001"
+@pytest.mark.parametrize("damage", ["no summary", "junk log", "junk in the log", "directory", "summary is a list"])
+def test_a_damaged_run_is_named_in_one_line_below_the_others(copied, capsys, damage):
+    run = copied / "random" / "seed-001"
     if damage == "no summary":
         (run / "summary.json").unlink()
     elif damage == "junk log":
         (run / "episodes.csv").write_text("junk")
+    elif damage == "junk in the log":
+        (run / "episodes.csv").write_bytes((run / "episodes.csv").read_bytes().replace(b"\n7,", b"\n77,"))
     elif damage == "directory":
         (run / "episodes.csv").unlink()
         (run / "episodes.csv").mkdir()
     else:
         (run / "summary.json").write_text("[]")
-    assert main([str(tmp_path / "runs"), "--at", "40"]) == 2
-    said = capsys.readouterr().err
-    assert said.count("\n") == 1
-    assert str(run) in said
+    assert table(copied) == 0
+    said = capsys.readouterr()
+    assert said.err.startswith("left out: ")
+    assert said.err.count("\n") == 1
+    assert str(run) in said.err
+    counts = {line.split()[0]: line.split()[1] for line in said.out.splitlines()}
+    assert counts == {"variant": "seeds", "random": "1", "sgim-d": "1"}
+
+
+def test_where_every_run_is_damaged_there_is_nothing_to_show(copied, capsys):
+    for path in copied.glob("*/*/summary.json"):
+        path.unlink()
+    assert table(copied) == 2
+    said = capsys.readouterr()
+    assert not said.out
+    assert "there is nothing to compare" in said.err
+    assert said.err.count("summary.json is missing or damaged") == 3
 
 
 def test_what_was_not_measured_is_a_dash(runs, capsys):
-    assert main([str(runs), "--at", "40"]) == 0  # nothing was evaluated after 1000 movements
+    assert table(runs, "--at", 40) == 0  # nothing was evaluated after 1000 movements
     said = capsys.readouterr().out
     assert "nan" not in said
     assert said.splitlines()[1].split()[2] == "-"
+
+
+def test_the_help_teaches(capsys):
+    assert table("--help") == 0
+    assert "sgimd table study --at 2000" in capsys.readouterr().out

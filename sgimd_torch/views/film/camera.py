@@ -17,7 +17,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import chain, pairwise
-from pathlib import Path
 from typing import Any, Final, Self
 
 import mujoco
@@ -25,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sgimd_torch.environments.rod_physics import Recording
+from sgimd_torch.files import replacing
 from sgimd_torch.spaces import Array
 
 try:
@@ -189,18 +189,14 @@ def write_film(path: str | os.PathLike[str], frames: Iterable[Frame]) -> None:
     Raises:
         OSError: ``path`` cannot be written, or the encoder fails.
     """
-    path, frames = Path(path), iter(frames)
-    partial = path.with_name(f"{path.stem}.{os.getpid()}.part.mp4")
-    try:
+    frames = iter(frames)
+    with replacing(path) as partial:
         partial.touch()  # a folder that takes no files is known before the first frame is drawn
         first = next(frames)
         size = f"{first.shape[1]}x{first.shape[0]}"
         given = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", size, "-r", str(RATE), "-i", "-"]
-        wanted = ["-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "23", "-movflags", "+faststart"]
+        wanted = ["-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "23", "-movflags", "+faststart", "-f", "mp4"]
         _encode([get_ffmpeg_exe(), "-v", "error", *given, *wanted, "-y", str(partial)], chain([first], frames))
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)
 
 
 def _encode(command: Sequence[str], frames: Iterable[Frame]) -> None:
@@ -225,15 +221,10 @@ def write_sheet(path: str | os.PathLike[str], frames: Sequence[Frame], *, column
     Raises:
         OSError: ``path`` cannot be written.
     """
-    path = Path(path)
     height = round(width * frames[0].shape[0] / frames[0].shape[1])
     small = [np.asarray(Image.fromarray(frame).resize((width, height), Image.Resampling.LANCZOS)) for frame in frames]
-    partial = path.with_name(f"{path.name}.{os.getpid()}.part")
-    try:
+    with replacing(path) as partial:
         Image.fromarray(tiled(small, columns)).save(partial, "PNG", optimize=True)
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)
 
 
 def _length(shots: Sequence[Shot]) -> int:

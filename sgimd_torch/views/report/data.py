@@ -1,57 +1,41 @@
-"""What a report tells of runs: each run is read once and cut down to that; statistics are over the seeds of a variant.
+"""What a report tells of runs: each run is read once; statistics are over the seeds of a variant.
 
-lives = [read_life(path) for path in paths]; variant = Variant("sgim-d", lives); variant.final    # IQM and interval (m)
+variants, unread = read(find(Path("runs"))); variants[0].last_error    # interquartile mean and interval (m)
 """
 
 from __future__ import annotations
 
-import zlib
-from collections import Counter
-from collections.abc import Mapping, Sequence
+import os
+import sys
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, reduce
+from functools import cache, cached_property, reduce
 from pathlib import Path
-from typing import Any, Final
+from typing import Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from tqdm import tqdm
 
-from sgimd_torch.catalogue import ROD
-from sgimd_torch.demonstrations import SHIPPED, load_demonstrations
-from sgimd_torch.environments.planar_arm import PlanarArm
+from sgimd_torch.catalogue import CATALOGUE, ROD
 from sgimd_torch.figures.learning import NAMES
+from sgimd_torch.runs.build import task_of
+from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.log import RunError
-from sgimd_torch.runs.read import find_runs, read_run
-from sgimd_torch.runs.tasks import arm_demonstrations
+from sgimd_torch.runs.read import Run, read_run
+from sgimd_torch.runs.tasks import demonstrations_of
 from sgimd_torch.spaces import Array
 from sgimd_torch.views.statistics import Interval, iqm_interval, mean_over_life, ratio_interval, rng
 
-EARLY: Final = 1000  # movements, of the column beside the last error
-GOALS: Final = 100  # the last ones are shown
-PLACE: Final = ("seed", "out", "name", "threads", "board")  # options that do not make one learner differ from another
+NOISELESS: Final = 1e-9  # m; a lower noise floor is rounding, and nothing is divided by it
 _NEEDED: Final = {"algorithm": str, "seed": int, "movements": int}
+
+Item = TypeVar("Item")
 
 
 @dataclass(frozen=True, eq=False)
-class Life:
-    """One run: ``movements`` of the ``wanted`` ones, with its ``config``, ``versions`` and ``summary``.
-
-    ``evaluation`` and ``regions`` are as ``read_run`` gives them. ``landed`` ``(n, 2)`` m is where the float did,
-    ``goals`` ``(n, 2)`` m the last that the learner chose, ``origins`` how many movements came from where ("" at rest),
-    ``shown`` ``(n,)`` the rows of the demonstrations it was given, in order.
-    """
-
-    path: Path
-    config: dict[str, Any]
-    versions: dict[str, Any]
-    summary: dict[str, Any]
-    movements: int
-    evaluation: dict[str, Array]
-    regions: dict[str, np.ndarray] | None
-    landed: Array
-    goals: Array
-    origins: Counter[str]
-    shown: NDArray[np.int64]
+class Life(Run):
+    """A run, with what a report asks of it; contexts and thetas, most of the log, are left out."""
 
     @property
     def seed(self) -> int:
@@ -64,14 +48,36 @@ class Life:
         return str(self.config.get("environment", ROD))
 
     @property
-    def wanted(self) -> int:
-        """How many movements it is to have."""
-        return int(self.config["movements"])
+    def state(self) -> str:
+        """Finished, not finished, or where it is damaged."""
+        if self.damage:
+            return "; ".join(f"{name} is damaged at line {line}" for name, line in self.damage.items())
+        ended = self.summary.get("finished") is True and len(self.index) >= self.config["movements"]
+        return "finished" if ended else "not finished"
 
     @property
-    def finished(self) -> bool:
-        """Whether it came to its end, last evaluation included."""
-        return self.summary.get("finished") is True and self.movements >= self.wanted
+    def evaluated(self) -> int:
+        """Movements before its last evaluation, 0 if there was none."""
+        return int(self.evaluation["movements"][-1]) if len(self.evaluation["movements"]) else 0
+
+    @property
+    def landed(self) -> Array:
+        """``(n, 2)`` m where movements ended; none where outcomes are not of the plane."""
+        return (
+            self.outcomes[np.isfinite(self.outcomes).all(axis=1)] if self.outcomes.shape[1] == 2 else np.empty((0, 2))
+        )
+
+    @property
+    def shown(self) -> NDArray[np.int64]:
+        """``(n,)`` the rows of the demonstrations it was given, in order."""
+        return self.demonstration[self.demonstration >= 0]
+
+    @property
+    def has_map(self) -> bool:
+        """Whether there is an interest map of the plane to draw."""
+        if not self.regions or not len(self.regions["movements"]):
+            return False
+        return self.outcomes.shape[1] == 2 and "low_2" not in self.regions
 
     def at(self, movements: int, column: str = "mean_error_m") -> float:
         """An entry of evaluation.csv, NaN where there is none."""
@@ -85,10 +91,10 @@ class Life:
 
 
 def read_life(path: Path) -> Life:
-    """A run, finished or not.
+    """A run, whatever its state.
 
     Raises:
-        RunError: its files are damaged, or of another kind of run.
+        RunError: nothing can be read of it, or it is of another kind of run.
     """
     try:
         run = read_run(path)
@@ -99,50 +105,62 @@ def read_life(path: Path) -> Life:
     for name, kind in _NEEDED.items():
         if type(run.config.get(name)) is not kind:
             raise RunError(f"{path}/config.json must name {name}, got {run.config.get(name)!r}; was it edited?")
-    if run.outcomes.shape[1] not in (0, 2):  # 0: the log has not begun
-        raise RunError(f"{path} has outcomes of {run.outcomes.shape[1]} dimensions, a report shows those of the plane")
-    outcomes, goals = (values.reshape(-1, 2) for values in (run.outcomes, run.goals))
-    own = goals[np.isfinite(goals[:, 0]) & (run.origin != "imitate")]
-    new = np.append(True, (np.diff(own, axis=0) != 0).any(axis=1))[: len(own)]  # one goal takes several movements
-    return Life(
-        path=path,
-        config=run.config,
-        versions=run.versions,
-        summary=run.summary,
-        movements=len(run.index),
-        evaluation=run.evaluation,
-        regions=run.regions if run.regions and len(run.regions["movements"]) else None,
-        landed=outcomes[np.isfinite(outcomes[:, 0])],
-        goals=own[new][-GOALS:].copy(),
-        origins=Counter(run.origin.tolist()),
-        shown=run.demonstration[run.demonstration >= 0],
-    )
+    whole, nothing = vars(run), np.empty((0, 0))  # the arrays are views of one; copies let it go
+    plane = {name: whole[name].copy() for name in ("goals", "outcomes")}
+    return Life(**{**whole, "contexts": nothing, "thetas": nothing, **plane})
 
 
 def find(place: Path) -> dict[str, list[Path]]:
     """The runs of a run directory, of a variant's folder, or of a folder of variants, by variant, seeds in order.
 
-    A folder called seed-* counts as a run whatever is in it: what is damaged is to be named.
+    Beside a run, a folder called seed-* counts as a run whatever is in it: what is damaged is to be named.
 
     Raises:
         RunError: there is none, or no such folder.
     """
     if not place.is_dir():
         why = "is a file, not a folder" if place.exists() else "does not exist"
-        raise RunError(f"{place} {why}; wanted a run's directory, or the --out of run.py")
-    if (place / "config.json").exists():
-        return {place.resolve().parent.name: [place]}
-    if any(place.glob("seed-*/config.json")):
-        return {place.resolve().name: sorted(path for path in place.glob("seed-*") if path.is_dir())}
-    names = find_runs(place)
-    return {name: sorted(path for path in (place / name).glob("seed-*") if path.is_dir()) for name in names}
+        raise RunError(f"{place} {why}; wanted a run's directory, or the --out of sgimd run")
+    runs = [path.parent for pattern in ("", "seed-*/", "*/seed-*/") for path in place.glob(f"{pattern}config.json")]
+    if not runs:
+        raise RunError(f"{place} holds no runs; they lie in OUT/NAME/seed-000")
+    if place in runs:
+        return {Path(os.path.abspath(place)).parent.name: [place]}
+    folders = {Path(os.path.abspath(run)).parent.name: run.parent for run in sorted(runs)}
+    return {name: sorted(path for path in folder.glob("seed-*") if path.is_dir()) for name, folder in folders.items()}
+
+
+def read(found: Mapping[str, Sequence[Path]]) -> tuple[list[Variant], list[str]]:
+    """The variants, the one with the smallest error first, and a line for each run that cannot be read.
+
+    Raises:
+        RunError: none can be read.
+    """
+    lives: dict[str, list[Life]] = {}
+    unread = []
+    for name, path in counted("reading", [(name, path) for name, paths in found.items() for path in paths]):
+        try:
+            lives.setdefault(name, []).append(read_life(path))
+        except RunError as error:
+            unread.append(str(error))
+    variants = [Variant(name, each) for name, each in lives.items() if each]
+    if not variants:
+        more = f", and {len(unread) - 1} more" if len(unread) > 1 else ""
+        raise RunError(f"no run can be read: {unread[0]}{more}")
+    return sorted(variants, key=lambda v: (v.last_error.value if v.last_error else np.inf, v.name)), unread
+
+
+def counted(what: str, items: Sequence[Item]) -> Iterable[Item]:
+    """``items``; how far they are is shown if it takes long."""
+    interval = 0.2 if sys.stderr.isatty() else 10.0
+    return tqdm(items, what, unit="", delay=1.0, mininterval=interval, disable=len(items) < 2)
 
 
 class Variant:
     """The runs of one variant, one for each seed.
 
     Errors are of the finished runs, at the evaluations that all of them have; where none is finished yet, of all that
-    were evaluated.
+    were evaluated. Those of damaged runs are left out.
 
     Args:
         name: of its folder.
@@ -151,27 +169,18 @@ class Variant:
 
     def __init__(self, name: str, lives: Sequence[Life]) -> None:
         self.name = name
+        self.label = NAMES.get(name) or name
         self.lives = sorted(lives, key=lambda life: life.seed)
-        evaluated = [life for life in self.lives if len(life.evaluation["movements"])]
-        self.finished = [life for life in self.lives if life.finished]
-        self.used = [life for life in evaluated if life.finished] or evaluated
+        self.algorithm = str(self.lives[0].config["algorithm"])
+        evaluated = [life for life in self.lives if life.evaluated and not life.damage]
+        self.used = [life for life in evaluated if life.state == "finished"] or evaluated
         moments = [life.evaluation["movements"] for life in self.used]
         self.evaluated: NDArray[np.int64] = reduce(np.intersect1d, moments or [np.empty(0)]).astype(np.int64)
+        self.last = int(self.evaluated[-1]) if len(self.evaluated) else 0  # movements before the last one
 
-    @property
-    def label(self) -> str:
-        """Its name for people."""
-        return NAMES.get(self.name, self.name)
-
-    @property
-    def algorithm(self) -> str:
-        """Who learns."""
-        return str(self.lives[0].config["algorithm"])
-
-    @property
-    def last(self) -> int:
-        """Movements before the last evaluation that all have; 0 if there is none."""
-        return int(self.evaluated[-1]) if len(self.evaluated) else 0
+    def at(self, movements: int, column: str = "mean_error_m") -> Interval | None:
+        """A column of evaluation.csv over its seeds; None where one of them has no value."""
+        return over_seeds(np.array([life.at(movements, column) for life in self.used]))
 
     @cached_property
     def errors(self) -> Array:
@@ -186,30 +195,26 @@ class Variant:
         return np.array(found, dtype=np.float64).reshape(-1, 3).T
 
     @cached_property
-    def final(self) -> Interval | None:
-        """The last error (m)."""
-        return over_seeds(self.errors[:, -1]) if self.last else None
+    def last_error(self) -> Interval | None:
+        """The error (m) at the last evaluation that all have."""
+        return self.at(self.last)
 
     @cached_property
-    def early(self) -> Interval | None:
-        """The error (m) after ``EARLY`` movements."""
-        return over_seeds(self.errors[:, self.evaluated.tolist().index(EARLY)]) if EARLY in self.evaluated else None
+    def landed(self) -> Array:
+        """``(n, 2)`` m where movements of all its runs ended."""
+        return np.concatenate([life.landed for life in self.lives])
 
-    @cached_property
-    def floor(self) -> Interval | None:
-        """The noise floor (m) of the last evaluation."""
-        return over_seeds(self._floors) if self.last else None
-
-    @cached_property
+    @property
     def ratio(self) -> Interval | None:
-        """The last error over its noise floor."""
-        if self.floor is None or self.final is None or not (self._floors > 0).all():
+        """The last error over its noise floor; None where the robot moves without noise."""
+        floors = np.array([life.at(self.last, "noise_floor_m") for life in self.used])
+        if not self.last_error or not over_seeds(floors) or floors.min() < NOISELESS:
             return None
-        if len(self.used) == 1:
-            return Interval(*(self.final.value / self.floor.value,) * 3)
-        return ratio_interval(self.errors[:, -1], self._floors, rng=rng(), paired=True)
+        if len(floors) == 1:
+            return over_seeds(self.errors[:, -1] / floors)
+        return ratio_interval(self.errors[:, -1], floors, rng=rng(), paired=True)
 
-    @cached_property
+    @property
     def area(self) -> Interval | None:
         """Area under the error curve over its width (m)."""
         if len(self.evaluated) < 2 or not np.isfinite(self.errors).all():
@@ -220,12 +225,8 @@ class Variant:
     def typical(self) -> Life:
         """The run whose last error is the middle one, of an even number the better; it stands for all in maps."""
         if not self.last:
-            return max(self.lives, key=lambda life: life.movements)
+            return max(self.lives, key=lambda life: len(life.index))
         return sorted(self.used, key=lambda life: life.at(self.last))[(len(self.used) - 1) // 2]
-
-    @property
-    def _floors(self) -> Array:
-        return np.array([life.at(self.last, "noise_floor_m") for life in self.used])
 
 
 def over_seeds(values: Array) -> Interval | None:
@@ -236,41 +237,27 @@ def over_seeds(values: Array) -> Interval | None:
 
 
 def demonstrated(lives: Sequence[Life]) -> tuple[Array, str]:
-    """``(n, 2)`` m what the runs were shown, each demonstration once, and what is to be said if they cannot be read."""
-    rows: dict[tuple[str, str | None, str | None], set[int]] = {}
-    for life in lives:
-        source = life.environment, life.config.get("demonstrations"), life.config.get("demonstrations_crc32")
-        rows.setdefault(source, set()).update(life.shown.tolist())
-    outcomes: list[Array] = []
-    for (environment, file, checksum), wanted in rows.items():
-        path, of_arm = Path(file or SHIPPED), file is None and environment.startswith("planar-arm-")
-        try:
-            if of_arm:
-                recordings = arm_demonstrations(PlanarArm(int(environment[11:])))
-            elif wanted and f"{zlib.crc32(path.read_bytes()):08x}" != checksum:
-                return np.empty((0, 2)), f"{path} is not what they were shown any more, so that is left out."
-            else:
-                recordings = load_demonstrations(path, outcome_dim=2) if wanted else []
-            outcomes += [recordings[row].outcome for row in sorted(wanted)]
-        except (OSError, ValueError, IndexError):
-            return np.empty((0, 2)), f"{path}, what they were shown, cannot be read here and is left out."
+    """``(n, 2)`` m what the runs were shown, each demonstration once, and what is to be said if that is not known."""
+    rows = {
+        (life.environment, *(str(life.config.get(f"demonstrations{which}")) for which in ("", "_crc32")), row)
+        for life in lives
+        for row in life.shown.tolist()
+        if len(life.landed)
+    }
+    try:
+        outcomes = [_recorded(environment, *file)[row] for environment, *file, row in sorted(rows)]
+    except (OSError, ValueError, IndexError) as error:
+        return np.empty((0, 2)), f"What they were shown is left out: {error}."
     return np.array(outcomes, dtype=np.float64).reshape(-1, 2), ""
 
 
-def differing(configs: Mapping[str, Sequence[Mapping[str, Any]]]) -> dict[str, dict[str, list[Any]]]:
-    """Option -> variant -> its values, of the options in which not all runs agree; seed and place do not count.
-
-    Args:
-        configs: variant -> the configurations of its runs.
-    """
-    every = [config for group in configs.values() for config in group]
-    names = [name for name in dict.fromkeys(key for config in every for key in config) if name not in PLACE]
-    found = {
-        name: {variant: _distinct([config.get(name) for config in group]) for variant, group in configs.items()}
-        for name in names
-    }
-    return {name: cells for name, cells in found.items() if len(_distinct([v for c in cells.values() for v in c])) > 1}
-
-
-def _distinct(values: Sequence[Any]) -> list[Any]:
-    return [value for k, value in enumerate(values) if value not in values[:k]]
+@cache
+def _recorded(environment: str, file: str, checksum: str) -> list[Array]:
+    """Outcomes of the demonstrations in a ``file``, "None" for those that an environment comes with."""
+    if environment not in CATALOGUE["environment"]:  # what a config.json names is not executed
+        raise ValueError(f"they are not known without running {environment}")
+    path = None if file == "None" else Path(file)
+    found, _, now = demonstrations_of(task_of(Config(environment=environment)), path)
+    if str(now) != checksum:
+        raise ValueError(f"the demonstrations of {environment} have changed")
+    return [demonstration.outcome for demonstration in found]

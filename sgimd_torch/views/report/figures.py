@@ -1,29 +1,34 @@
 """The figures of a report, as small images that can still be read in a column of 400 pixels.
 
-png = image(curve(variant, others))
+source = curves(variants)    # each function gives the address of a png, for the src of an img
 """
 
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
-from typing import Any, Final
+from base64 import b64encode
+from collections import Counter
+from collections.abc import Callable, Sequence
+from functools import wraps
+from typing import Any, Concatenate, Final, ParamSpec
 
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from PIL import Image
 
+from sgimd_torch.figures.axes import over_movements
 from sgimd_torch.figures.learning import COLOURS, interest_map, landing_points
 from sgimd_torch.figures.movements import interest_over_time
 from sgimd_torch.figures.results import Difference, forest
-from sgimd_torch.spaces import Box
-from sgimd_torch.views.report.data import Life, Variant, demonstrated
+from sgimd_torch.spaces import Array, Box
+from sgimd_torch.views.report.data import Life, Variant
 from sgimd_torch.views.statistics import difference_interval, paired_differences, rng
 
-REACH: Final = 1.5  # m; the float hardly ever lands farther from the base
+P = ParamSpec("P")
+REACH: Final = 1.5  # m; a float or the end of an arm hardly ever lands farther from the base
+GOALS: Final = 100  # the last ones are shown
 MOST_CURVES: Final = 8
 STYLE: Final[Any] = {
     "font.size": 11,
@@ -34,177 +39,149 @@ STYLE: Final[Any] = {
     "lines.linewidth": 2,
     "legend.fontsize": 10,
 }
-_LINES: Final = ("-", (0, (5, 2)), (0, (1, 1.4)), (0, (6, 2, 1, 2)))  # variants of one algorithm
+_LINES: Final = ("-", (0, (5, 2)), (0, (1, 1.4)), (0, (6, 2, 1, 2)))  # of variants in one colour
 _MARKERS: Final = "osD^vPX*"
 _COLOURS_OF_PNG: Final = 256  # a palette; enough for maps on one colour scale and smooth letters
 
 
-def image(figure: Figure) -> bytes:
-    """A png with enough pixels for dense screens; the same figure gives the same bytes.
+def data_uri(kind: str, content: bytes) -> str:
+    """A file as an address."""
+    return f"data:{kind};base64,{b64encode(content).decode()}"
 
-    With few colours it is smaller than an svg of the same figure, also where that holds only lines and words.
+
+def png(draw: Callable[Concatenate[Figure, P], None]) -> Callable[P, str]:
+    """A function that gives what ``draw`` draws as the address of a png; the same figure has the same address.
+
+    It has enough pixels for dense screens, and with few colours it is smaller than an svg of the same figure.
     """
-    pixels, png = io.BytesIO(), io.BytesIO()
-    with rc_context(STYLE):
-        figure.savefig(pixels, format="png", dpi=140)
-    with Image.open(pixels) as full:
-        few = full.convert("RGB").quantize(_COLOURS_OF_PNG, dither=Image.Dither.NONE)
-        few.save(png, "png", optimize=True)
-    return png.getvalue()
+
+    @wraps(draw)
+    def address(*args: P.args, **kwargs: P.kwargs) -> str:
+        pixels, content = io.BytesIO(), io.BytesIO()
+        with rc_context(STYLE):
+            figure = Figure(figsize=(6, 5.2), layout="constrained")
+            draw(figure, *args, **kwargs)
+            figure.savefig(pixels, format="png", dpi=140)
+        with Image.open(pixels) as full:
+            few = full.convert("RGB").quantize(_COLOURS_OF_PNG, dither=Image.Dither.NONE)
+            few.save(content, "png", optimize=True)
+        return data_uri("image/png", content.getvalue())
+
+    return address
 
 
-def curves(variants: Sequence[Variant]) -> Figure:
-    """Error against movements: interquartile means over seeds with their intervals."""
-    with rc_context(STYLE):
-        figure = Figure(figsize=(6.8, 4.5), layout="constrained")
-        ax = figure.subplots()
-        before: dict[str, int] = {}
-        for variant in variants:
-            nth = before[variant.algorithm] = before.get(variant.algorithm, -1) + 1
-            _curve(ax, variant, line=_LINES[nth % len(_LINES)], marker=_MARKERS[nth % len(_MARKERS)])
-        _error_axis(ax)
-        ax.legend(handles=_labelled(ax), ncols=1 + (len(variants) > 4))
-    return figure
+@png
+def curves(figure: Figure, variants: Sequence[Variant], behind: Sequence[Variant] = ()) -> None:
+    """Error against movements: interquartile means over seeds with their intervals, other variants in grey ``behind``.
 
-
-def curve(variant: Variant, others: Sequence[Variant]) -> Figure:
-    """One variant's curve, its seeds thin, all others in grey behind."""
-    with rc_context(STYLE):
-        figure = Figure(figsize=(6, 5.2), layout="constrained")
-        ax = figure.subplots()
-        for other in others:
-            ax.plot(other.evaluated, other.curve[0], color="0.8", linewidth=1.2)
-        colour = _colour(variant)
-        if len(variant.used) > 1:
+    One variant alone is shown with its seeds, thin, and its noise floor.
+    """
+    if len(variants) > 1:
+        figure.set_size_inches(6.8, 4.5)
+    ax = figure.subplots()
+    for other in behind:
+        ax.plot(other.evaluated, other.curve[0], color="0.8", linewidth=1.2)
+    before: Counter[str] = Counter()
+    for variant in variants:
+        n, colour, (centre, low, high) = len(variant.used), _colour(variant.algorithm), variant.curve
+        if n > 1:
+            ax.fill_between(variant.evaluated, low, high, color=colour, alpha=0.2, linewidth=0)
+        if n > 1 and len(variants) == 1:
             ax.plot(variant.evaluated, variant.errors.T, color=colour, linewidth=0.7, alpha=0.4)
-        _curve(ax, variant)
-        floors = np.array([[life.at(m, "noise_floor_m") for m in variant.evaluated.tolist()] for life in variant.used])
-        measured = np.isfinite(floors).all(axis=0)
-        where = variant.evaluated[measured]
-        style = "--" if len(where) > 1 else "_"
-        ax.plot(where, floors[:, measured].mean(axis=0), style, color="black", linewidth=1.2, markersize=14)
-        handles = [*_labelled(ax), Line2D([], [], color="black", linestyle="--", linewidth=1.2, label="noise floor")]
-        if others:
-            handles.append(Line2D([], [], color="0.8", label="other variants"))
-            ax.set_xlim(right=1.05 * variant.last)
-        _error_axis(ax)
-        ax.legend(handles=handles)
-    return figure
+        line, marker = _LINES[before[colour] % len(_LINES)], _MARKERS[before[colour] % len(_MARKERS)]
+        before[colour] += 1
+        label = f"{_plain(variant.label)} ({n} seed{'s' * (n > 1)})"
+        ax.plot(variant.evaluated, centre, color=colour, ls=line, marker=marker, markersize=4.5, label=label)
+        if len(variants) == 1:
+            floors = [[life.at(m, "noise_floor_m") for m in variant.evaluated.tolist()] for life in variant.used]
+            _floor(ax, variant.evaluated.astype(np.float64), np.mean(floors, axis=0))
+    if behind:
+        ax.plot([], [], color="0.8", label="other variants")
+        ax.set_xlim(right=1.05 * variants[0].last)
+    _finish(ax, columns=1 + (len(variants) > 4))
 
 
-def one_curve(life: Life) -> Figure:
+@png
+def one_curve(figure: Figure, life: Life) -> None:
     """Of one run: mean, median and 90th percentile of the distances to the benchmark's goals."""
-    with rc_context(STYLE):
-        figure = Figure(figsize=(6, 5.2), layout="constrained")
-        ax = figure.subplots()
-        columns, colour = life.evaluation, COLOURS.get(str(life.config["algorithm"]), "black")
-        when = columns["movements"]
-        ax.fill_between(when, columns["median_error_m"], columns["p90_error_m"], color=colour, alpha=0.12, linewidth=0)
-        ax.plot(when, columns["p90_error_m"], "^:", color=colour, linewidth=1.2, markersize=4, label="90th percentile")
-        ax.plot(when, columns["mean_error_m"], "o-", color=colour, markersize=5, label="mean")
-        ax.plot(when, columns["median_error_m"], "v:", color=colour, linewidth=1.2, markersize=4, label="median")
-        measured = np.isfinite(columns["noise_floor_m"])
-        style = "--" if measured.sum() > 1 else "_"
-        ax.plot(when[measured], columns["noise_floor_m"][measured], style, color="black", linewidth=1.2, markersize=14)
-        floor = Line2D([], [], color="black", linestyle="--", linewidth=1.2, label="noise floor")
-        _error_axis(ax)
-        ax.set_ylabel("distance to benchmark goals (m)")
-        ax.legend(handles=[*_labelled(ax), floor])
-    return figure
+    ax = figure.subplots()
+    columns, colour = life.evaluation, _colour(str(life.config["algorithm"]))
+    when = columns["movements"]
+    ax.fill_between(when, columns["median_error_m"], columns["p90_error_m"], color=colour, alpha=0.12, linewidth=0)
+    ax.plot(when, columns["p90_error_m"], "^:", color=colour, linewidth=1.2, markersize=4, label="90th percentile")
+    ax.plot(when, columns["mean_error_m"], "o-", color=colour, markersize=5, label="mean")
+    ax.plot(when, columns["median_error_m"], "v:", color=colour, linewidth=1.2, markersize=4, label="median")
+    _floor(ax, when, columns["noise_floor_m"])
+    _finish(ax, ylabel="distance to benchmark goals (m)")
 
 
-def differences(variants: Sequence[Variant], reference: Variant) -> Figure | None:
-    """How much larger the last error is than the reference's, seed by seed; None without another one to compare."""
-    theirs = _by_seed(reference)
+def differences(variants: Sequence[Variant], reference: Variant) -> str:
+    """How much larger last errors are than the reference's, seed by seed; "" without 2 seeds that both have."""
+    theirs = {life.seed: life.at(reference.last) for life in reference.used}
     rows = []
     for variant in variants:
-        ours = _by_seed(variant)
-        seeds = [seed for seed in ours if seed in theirs]
-        if variant is reference or variant.last != reference.last or len(seeds) < 2:
+        ours = {life.seed: life.at(variant.last) for life in variant.used if life.seed in theirs}
+        if variant is reference or variant.last != reference.last or len(ours) < 2:
             continue
-        pair = {seed: ours[seed] for seed in seeds}, {seed: theirs[seed] for seed in seeds}
-        rows.append(
-            Difference(_plain(variant.label), paired_differences(*pair), *difference_interval(*pair, rng=rng()))
-        )
-    if not rows:
-        return None
-    with rc_context(STYLE):
-        figure = Figure(figsize=(6.8, 1.1 + 0.36 * len(rows)), layout="constrained")
-        forest(figure.subplots(), rows, reference=_plain(reference.label))
-    return figure
+        pair = ours, {seed: theirs[seed] for seed in ours}
+        interval = difference_interval(*pair, rng=rng())
+        rows.append(Difference(_plain(variant.label), paired_differences(*pair), *interval))
+    return _forest(rows, _plain(reference.label)) if rows else ""
 
 
-def landing(variant: Variant) -> tuple[Figure, str]:
-    """Where the float landed, all seeds together, and what there is to say about the demonstrations."""
-    shown, missing = demonstrated(variant.lives)
-    landed = np.concatenate([life.landed for life in variant.lives])
-    with rc_context(STYLE):
-        figure = Figure(figsize=(6, 5.2), layout="constrained")
-        landing_points(
-            figure.subplots(), landed, Box.cube(-REACH, REACH, 2), demonstrated=shown if len(shown) else None
-        )
-    return figure, missing
+@png
+def _forest(figure: Figure, rows: Sequence[Difference], reference: str) -> None:
+    figure.set_size_inches(6.8, 1.1 + 0.36 * len(rows))
+    forest(figure.subplots(), rows, reference=reference)
 
 
-def interest(life: Life) -> Figure:
+@png
+def landing(figure: Figure, landed: Array, shown: Array) -> None:
+    """Where movements landed, and the demonstrated outcomes; the plane is as large as they need."""
+    far = float(np.quantile(np.abs(landed).max(axis=1), 0.99))
+    reach = far if far > REACH or 0 < far < REACH / 10 else REACH
+    box, side = Box.cube(-reach, reach, 2), reach / 30
+    landing_points(figure.subplots(), landed, box, demonstrated=shown if len(shown) else None, side=side)
+
+
+@png
+def interest(figure: Figure, life: Life) -> None:
     """The interest map at the last evaluation, with the goals chosen before it."""
     assert life.regions is not None
     last = life.regions["movements"] == life.regions["movements"].max()
-    lows, highs = (
-        np.stack([life.regions[f"{corner}_{k}"][last] for k in range(2)], axis=1) for corner in ("low", "high")
-    )
-    with rc_context(STYLE):
-        figure = Figure(figsize=(6, 5.2), layout="constrained")
-        interest_map(figure.subplots(), lows, highs, life.regions["interest"][last], goals=life.goals)
-    return figure
+    lows, highs = (np.stack([life.regions[f"{end}_{k}"][last] for k in (0, 1)], axis=1) for end in ("low", "high"))
+    interest_map(figure.subplots(), lows, highs, life.regions["interest"][last], goals=life.chosen_goals()[-GOALS:])
 
 
-def splitting(life: Life) -> Figure:
-    """Four interest maps of one life."""
+@png
+def splitting(figure: Figure, life: Life) -> None:
+    """Up to four interest maps of one life."""
     assert life.regions is not None
     n = min(4, len(np.unique(life.regions["movements"])))
-    with rc_context(STYLE):
-        figure = Figure(figsize=(6, 5.2), layout="constrained")
-        axes = figure.subplots(1 + (n > 2), min(2, n), squeeze=False)
-        interest_over_time(axes.flat, life.regions)
-        for ax in axes.flat:  # the maps are small
-            ax.set_title(ax.get_title().replace(": ", ":\n"), fontsize=10)
-            ax.tick_params(labelsize=9)
-            ax.label_outer()
-    return figure
+    axes = figure.subplots(1 + (n > 2), min(2, n), squeeze=False)
+    interest_over_time(axes.flat, life.regions)
+    for ax in axes.flat:  # the maps are small
+        ax.set_title(ax.get_title().replace(": ", ":\n"), fontsize=10)
+        ax.tick_params(labelsize=9)
+        ax.label_outer()
 
 
-def has_plane_map(life: Life) -> bool:
-    """Whether there is an interest map to draw."""
-    return life.regions is not None and "low_1" in life.regions and "low_2" not in life.regions
+def _floor(ax: Axes, movements: Array, floors: Array) -> None:
+    """The noise floor, where it was measured."""
+    measured = np.isfinite(floors)
+    style = "--" if measured.sum() > 1 else "_"
+    ax.plot(movements[measured], floors[measured], style, color="black", linewidth=1.2, markersize=14)
+    ax.plot([], [], "--", color="black", linewidth=1.2, label="noise floor")
 
 
-def _curve(ax: Axes, variant: Variant, *, line: Any = "-", marker: str = "o") -> None:
-    centre, low, high = variant.curve
-    n, colour = len(variant.used), _colour(variant)
-    label = f"{_plain(variant.label)} ({n} seed{'s' * (n > 1)})"
-    if n > 1:
-        ax.fill_between(variant.evaluated, low, high, color=colour, alpha=0.2, linewidth=0)
-    ax.plot(variant.evaluated, centre, color=colour, linestyle=line, marker=marker, markersize=4.5, label=label)
-
-
-def _error_axis(ax: Axes) -> None:
-    ax.set(xlabel="movements executed", ylabel="mean distance to benchmark goals (m)")
-    ax.set_xlim(left=0)
+def _finish(ax: Axes, *, ylabel: str = "mean distance to benchmark goals (m)", columns: int = 1) -> None:
+    over_movements(ax, ylabel)
     ax.set_ylim(bottom=0)
-    ax.grid(alpha=0.3)
+    ax.legend(handles=[line for line in ax.lines if not str(line.get_label()).startswith("_")], ncols=columns)
 
 
-def _labelled(ax: Axes) -> list[Line2D]:
-    return [line for line in ax.lines if not str(line.get_label()).startswith("_")]
-
-
-def _colour(variant: Variant) -> str:
-    return COLOURS.get(variant.algorithm, "black")
-
-
-def _by_seed(variant: Variant) -> dict[int, float]:
-    return {life.seed: life.at(variant.last) for life in variant.used}
+def _colour(algorithm: str) -> str:
+    return COLOURS.get(algorithm, "black")
 
 
 def _plain(name: str) -> str:

@@ -1,168 +1,156 @@
-"""The page of a report: what was run, what came of it, curves, maps, films, and how to do it again.
+"""The page of a report: figures, films and numbers of each variant go into template.html.j2, as one file.
 
-html = page(title, variants, sections, place=..., damaged=[...])
+html = page(Path("runs"), variants, unread)    # of data.read; strings from runs are text there, never markup
 """
 
 from __future__ import annotations
 
+import json
+import shlex
+import subprocess
+import sys
+from collections import Counter
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Final
 
 import numpy as np
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from sgimd_torch.views.report import figures
-from sgimd_torch.views.report.data import EARLY, Life, Variant
-from sgimd_torch.views.report.html import Html, document, joined, table, tag
-from sgimd_torch.views.report.record import configurations, repetition, versions
-from sgimd_torch.views.report.repeat import doubts
-from sgimd_torch.views.report.section import drawn
-from sgimd_torch.views.report.words import TERMS, count, show, summary, title
-from sgimd_torch.views.statistics import Interval
+from sgimd_torch.catalogue import ROD
+from sgimd_torch.runs.log import RunError
+from sgimd_torch.views.report import figures, record
+from sgimd_torch.views.report.data import Variant, counted, demonstrated
+from sgimd_torch.views.report.figures import data_uri
+from sgimd_torch.views.statistics import Interval, show
 
+EARLY: Final = 1000  # movements, of the column beside the last error
 ORIGINS: Final = {"global": "global", "local": "local", "imitate": "imitation", "babble": "random", "": "at rest"}
-SHOWN: Final = ("demonstrations shown", "of them different")
+PARTS: Final = {"physics": "physics (s)", "learner": "learning (s)", "evaluation": "evaluation (s)"}
+MOST: Final = 3 * 2**20  # bytes of one film
+ROOM: Final = 5 * 2**20  # bytes of all films of a page
 
 
-def page(
-    place: Path,
-    variants: Sequence[Variant],
-    sections: Sequence[Html],
-    damaged: Sequence[str],
-    *,
-    notes: Sequence[str] = (),
-) -> Html:
-    """Everything, as one file.
+def page(place: Path, variants: Sequence[Variant], unread: Sequence[str]) -> str:
+    """The page.
 
     Args:
         place: where the runs were found.
         variants: the best first, not empty.
-        sections: of the variants, as ``section`` makes them.
-        damaged: a line for each run that could not be read.
-        notes: what else is to be known, such as films that were left out.
+        unread: a line for each run that could not be read.
     """
+    films, notes = read_films(variants)
     lives = [life for variant in variants for life in variant.lives]
-    single = len(lives) == 1
-    body = [
-        tag("header", tag("h1", title(variants)), tag("p", summary(variants), class_="lead"), _navigation(variants)),
-        _warnings(variants, damaged, notes),
-        tag("h2", "Results", id="results"),
-        *([_evaluations(lives[0])] if single else _results(variants)),
-        *([] if single else _overview(variants)),
-        *sections,
-        *configurations(variants),
-        *versions(variants),
-        *repetition(variants),
-        tag(
-            "footer",
-            tag("h2", "Words"),
-            tag("p", TERMS),
-            tag("p", f"Made from {place} by scripts/report.", class_="soft"),
-        ),
-    ]
-    return document(title(variants), body)
-
-
-def _navigation(variants: Sequence[Variant]) -> Html:
-    if len(variants) < 2:
-        return Html()
-    links = [tag("a", variant.label, href=f"#variant-{k}") for k, variant in enumerate(variants)]
-    rest = [tag("a", name, href=f"#{name.lower()}") for name in ("Configurations", "Versions", "Commands")]
-    return tag("nav", tag("ul", *(tag("li", link) for link in (*links, *rest))), aria_label="Sections")
-
-
-def _warnings(variants: Sequence[Variant], damaged: Sequence[str], notes: Sequence[str]) -> Html:
-    cut = [
-        f"{variant.label}, seed {life.seed}: {life.movements} of {life.wanted} movements"
-        for variant in variants
-        for life in variant.lives
-        if not life.finished
-    ]
-    found = doubts(variants)
-    if cut:
-        left_out = any(len(v.used) < len(v.lives) and v.finished for v in variants)
-        rest = "; they are in the maps, but not in the errors over seeds" if left_out else ""
-        found.append(f"{count(len(cut), 'run')} not finished, stopped or still under way{rest}: {'; '.join(cut)}.")
-    found += [f"Left out, damaged: {line}" for line in damaged]
-    found += notes
-    if not found:
-        return Html()
-    return tag(
-        "aside", tag("strong", "Before you rely on this"), tag("ul", *(tag("li", line) for line in found)), role="note"
+    jinja = Environment(
+        loader=FileSystemLoader(Path(__file__).parent), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
+    jinja.filters |= {
+        "interval": _interval,
+        "number": _number,
+        "json": partial(json.dumps, indent=2, ensure_ascii=False),
+        "usual": lambda cells: next((cell for cell in cells if 2 * cells.count(cell) > len(cells)), None),
+        "word": lambda path: shlex.quote(str(path)),
+    }
+    html = jinja.get_template("template.html.j2").render(
+        place=place,
+        variants=variants,
+        single=lives[0] if len(lives) == 1 else None,
+        n_runs=len(lives),
+        warnings=[*record.doubts(variants), *(f"Left out, damaged: {line}" for line in unread), *notes],
+        early=EARLY,
+        lived=lived(variants),
+        films=films,
+        rod=ROD,
+        figures=figures,
+        record=record,
+        counted=counted,
+        demonstrated=demonstrated,
+    )
+    return html.encode(errors="backslashreplace").decode()  # a name may be no text at all
 
 
-def _results(variants: Sequence[Variant]) -> list[Html]:
-    head = ["variant", "seeds", "movements", f"error after {EARLY} (m)", "last error (m)", "noise floor (m)"]
-    rows = [
-        [
-            *(tag("a", v.label, href=f"#variant-{k}"), _seeds(v), str(v.last or "–"), show(v.early), show(v.final)),
-            *(show(v.floor and Interval(*(v.floor.value,) * 3)), show(v.ratio, ".2f"), show(v.area)),
-        ]
-        for k, v in enumerate(variants)
-    ]
-    caption = "Errors, the best variant first; interquartile means over seeds, 95 % intervals in brackets"
-    errors = table([*head, "times the floor", "error over life (m)"], rows, caption=caption)
-    origins = _origins([life for variant in variants for life in variant.lives])
-    shares = [f"{ORIGINS.get(origin, origin)} (%)" for origin in origins]
-    head = ["variant", *shares, *SHOWN, "physics (s)", "learning (s)", "evaluation (s)"]
-    caption = "How they lived: where movements came from, what they were shown, what it cost; means over runs"
-    return [errors, table(head, [[v.label, *_life_cells(v, origins)] for v in variants], caption=caption)]
+def lived(variants: Sequence[Variant]) -> record.Table:
+    """Means over the runs of each variant: movements, shares of where they came from, demonstrations, seconds."""
+    groups = [variant.used or variant.lives for variant in variants]
+    counts = [Counter(origin for life in lives for origin in life.origin.tolist()) for lives in groups]
+    origins = sorted(set().union(*counts), key=lambda origin: ([*ORIGINS, origin].index(origin), origin))
+    rows = []
+    for variant, lives, count in zip(variants, groups, counts, strict=True):
+        shown = [life.shown.tolist() for life in lives]
+        whole = [count.total(), sum(map(len, shown)), sum(len(set(each)) for each in shown)]
+        shares = [100 * count[origin] / max(1, count.total()) for origin in origins]
+        seconds = [float(np.mean([life.seconds(part) for life in lives])) for part in PARTS]
+        cells = [_number(n / len(lives) or np.nan, 0) for n in whole]
+        cells[1:1] = [_number(share or np.nan, 1) for share in shares]
+        rows.append((variant.label, [*cells, *(_number(value, 1) for value in seconds)]))
+    shares_of = [f"{ORIGINS.get(origin, origin)} (%)" for origin in origins]
+    head = ["movements", *shares_of, "demonstrations shown", "of them different", *PARTS.values()]
+    return record.Table(head, rows)
 
 
-def _seeds(variant: Variant) -> str:
-    used, n = len(variant.used), len(variant.lives)
-    return str(n) if used == n else f"{used} of {n}"
+def find_films(run: Path) -> list[Path]:
+    """Of a run directory: what lies in it, and beside it under its name, as ``sgimd film`` writes it."""
+    run = run.resolve()
+    beside = [run.parent / f"{run.name}{kind}.mp4" for kind in ("", "-time-lapse")]
+    return [path for path in (*beside, *sorted(run.glob("*.mp4"))) if path.is_file()]
 
 
-def _origins(lives: Sequence[Life]) -> list[str]:
-    """Those that occur, the usual ones first."""
-    found = {origin for life in lives for origin in life.origins}
-    return [*(origin for origin in ORIGINS if origin in found), *sorted(found - ORIGINS.keys())]
+def make_films(variants: Sequence[Variant]) -> None:
+    """Film the runs of the rod that the page shows, as ``sgimd film`` does, where there is no film yet.
+
+    Raises:
+        RunError: that failed; why is on stderr.
+    """
+    for run in [variant.typical.path for variant in variants if variant.typical.environment == ROD]:
+        if find_films(run):
+            continue
+        command = [sys.executable, "-m", "sgimd_torch", "film", "--", str(run)]
+        with subprocess.Popen(command, stdout=subprocess.DEVNULL) as filming:
+            try:
+                code = filming.wait()
+            except BaseException:
+                filming.terminate()  # it takes its unfinished film away; leaving the block waits for that
+                raise
+        if code == 130:
+            raise KeyboardInterrupt
+        if code:
+            raise RunError(f"{run} could not be filmed, see above; leave out --film")
 
 
-def _life_cells(variant: Variant, origins: Sequence[str]) -> list[str]:
-    lives = variant.used or variant.lives
-    moved = sum(life.movements for life in lives)
-    counts = [sum(life.origins[origin] for life in lives) for origin in origins]
-    shown = [np.mean([len(life.shown) for life in lives]), np.mean([len(set(life.shown.tolist())) for life in lives])]
-    seconds = [np.mean([life.seconds(part) for life in lives]) for part in ("physics", "learner", "evaluation")]
-    return [
-        *(f"{100 * count / moved:.1f}" if count else "–" for count in counts),
-        *(f"{value:.0f}" if value else "–" for value in shown),
-        *(f"{value:.1f}" if np.isfinite(value) else "–" for value in seconds),
-    ]
+def read_films(variants: Sequence[Variant]) -> tuple[dict[str, list[dict[str, str]]], list[str]]:
+    """By variant the films of the run that stands for it, and notes about those that do not fit into a page."""
+    films: dict[str, list[dict[str, str]]] = {variant.name: [] for variant in variants}
+    notes, room = [], ROOM
+    for variant in variants:
+        for path in find_films(variant.typical.path):
+            size = path.stat().st_size
+            if size > min(MOST, room):
+                notes.append(f"The film {path} is too large for this page ({size / 2**20:.1f} MB) and lies beside it.")
+                continue
+            room -= size
+            source = data_uri("video/mp4", path.read_bytes())
+            films[variant.name].append({"name": path.stem, "source": source, "poster": _still(path)})
+    return films, notes
 
 
-def _evaluations(life: Life) -> Html:
-    rows = [
-        [str(int(when)), *(f"{value:.4f}" if np.isfinite(value) else "–" for value in values)]
-        for when, *values in zip(*life.evaluation.values(), strict=True)
-    ]
-    head = ["movements", "mean error (m)", "median (m)", "90th percentile (m)", "noise floor (m)"]
-    shares = [
-        f"{100 * life.origins[o] / life.movements:.1f} % {ORIGINS.get(o, o)}"
-        for o in _origins([life])
-        if life.movements
-    ]
-    told = f"Movements: {', '.join(shares)}. " if shares else ""
-    if len(life.shown):
-        told += f"{count(len(life.shown), 'demonstration')} shown, {len(set(life.shown.tolist()))} different."
-    return joined([table(head, rows, caption="Every evaluation"), tag("p", told)])
+def _still(path: Path) -> str:
+    """The picture half a second before the end, where a landing is shown."""
+    try:
+        from imageio_ffmpeg import get_ffmpeg_exe
+    except ImportError:  # the extra "film" is not installed; a browser then shows the first picture
+        return ""
+    options = ["-sseof", "-0.5", "-i", str(path), "-frames:v", "1", "-q:v", "5", "-f", "mjpeg", "-"]
+    ended = subprocess.run([get_ffmpeg_exe(), "-v", "error", *options], capture_output=True)
+    return data_uri("image/jpeg", ended.stdout) if ended.returncode == 0 and ended.stdout else ""
 
 
-def _overview(variants: Sequence[Variant]) -> list[Html]:
-    evaluated = [variant for variant in variants if variant.last]
-    if len(variants) < 2 or not evaluated:
-        return []
-    best = evaluated[: figures.MOST_CURVES]
-    which = f" The {len(best)} that err least; all are below." if len(best) < len(evaluated) else ""
-    words = f"How the error falls: interquartile means over seeds, bands are 95 % intervals.{which}"
-    found = [drawn(figures.curves(best), f"Error curves of {', '.join(v.label for v in best)}", words, wide=True)]
-    reference = next((variant for variant in evaluated if variant.name == "sgim-d"), evaluated[0])
-    forest = figures.differences(evaluated, reference)
-    if forest is not None:
-        words = f"Last error less that of {reference.label}, paired by seed: interquartile means with 95 % intervals, "
-        words += "full where they exclude 0; ticks are seeds. Left of the line is better."
-        found.append(drawn(forest, f"Differences of error to {reference.label}", words, wide=True))
-    return found
+def _interval(found: Interval | None, form: str = ".3f") -> str:
+    """``0.060 [0.058, 0.062]``; without brackets where there is one seed, a dash where there is nothing."""
+    if found is None:
+        return "–"
+    return f"{found.value:{form}}" if found.low == found.value == found.high else show(found, form)
+
+
+def _number(value: float, digits: int) -> str:
+    return f"{value:.{digits}f}" if np.isfinite(value) else "–"

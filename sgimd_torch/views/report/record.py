@@ -1,87 +1,130 @@
-"""For the record, in a report: what differs between configurations, the versions that made the runs, how to repeat."""
+"""For the record, in a report: doubts, what differs between configurations, versions, and how to repeat the runs.
+
+doubts(variants)    # ["1 run not finished: ..."];   commands(variant.lives)    # ["sgimd run --algorithm=sgim-d ..."]
+"""
 
 from __future__ import annotations
 
 import json
+import shlex
 from collections import Counter
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterator, Sequence
+from typing import Any, Final, NamedTuple
 
-from sgimd_torch.views.report.data import Variant, differing
-from sgimd_torch.views.report.html import Html, table, tag
-from sgimd_torch.views.report.repeat import AGAIN, commands, unknown
+from sgimd_torch.runs.config import before_there_was_a_choice, having, options, words
+from sgimd_torch.views.report.data import Life, Variant
+
+AGAIN: Final = "runs/again"  # a folder that holds no run yet
 
 
-def configurations(variants: Sequence[Variant]) -> list[Html]:
-    """A row for each variant, a column for each option in which not all agree; rare values stand out."""
-    if len(variants) < 2:
-        return []
-    found = differing({variant.name: [life.config for life in variant.lives] for variant in variants})
-    head = tag("h2", "What differs between the configurations", id="configurations")
-    if not found:
-        return [head, tag("p", "Nothing: all runs have the same options but for seed and name.")]
-    told = {
-        name: {key: " or ".join(map(_value, values)) for key, values in cells.items()} for name, cells in found.items()
-    }
-    usual = {name: Counter(cells.values()).most_common(1)[0][0] for name, cells in told.items()}
-    rows = [
-        [
-            variant.label,
-            *(
-                tag("td", cells[variant.name], class_="usual" if cells[variant.name] == usual[name] else "other")
-                for name, cells in told.items()
-            ),
-        ]
-        for variant in variants
+class Table(NamedTuple):
+    """The ``head`` of the columns after the first; ``rows`` of a name and a cell for each of them."""
+
+    head: list[str]
+    rows: list[tuple[str, list[str]]]
+
+
+def doubts(variants: Sequence[Variant]) -> Iterator[str]:
+    """What a reader should know before comparing these runs, a sentence each."""
+    lives = [(variant.label, life) for variant in variants for life in variant.lives]
+    versions = [life.versions for _, life in lives]
+    for name in dict.fromkeys(name for each in versions for name in each if name not in ("before", "platform")):
+        values = list(dict.fromkeys(str(each.get(name)) for each in versions))
+        if len(values) > 1:
+            yield f"The runs were made with different versions of {name}: {', '.join(values)}."
+    if dirty := sum(str(each.get("commit")).endswith("-dirty") for each in versions):
+        yield f"{count(dirty, 'run')} came from a checkout with uncommitted changes; the commit does not tell them."
+    if nowhere := sum(each.get("commit") is None for each in versions):
+        yield f"The commit of {count(nowhere, 'run')} is not known: made outside a git checkout."
+    if resumed := sum(bool(each.get("before")) for each in versions):
+        yield f"{count(resumed, 'run')} went on with other versions than they began with."
+    for variant in variants:
+        own = differing([variant])
+        if own.pop("movements", None):
+            lengths = ", ".join(map(str, sorted({life.config["movements"] for life in variant.lives})))
+            yield f"The runs of {variant.label} are not equally long: {lengths} movements."
+        if own:
+            yield f"The seeds of {variant.label} are not of one configuration: they differ in {', '.join(own)}."
+    lasts = sorted({variant.last for variant in variants if variant.last})
+    if len(lasts) > 1:
+        yield f"Last errors are of different ages: after {', '.join(map(str, lasts))} movements."
+    if len({life.config.get("benchmark_crc32") for _, life in lives}) > 1:
+        yield "The runs were judged by different benchmarks, so their errors cannot be compared."
+    for label, life in lives:
+        if life.damage:
+            yield f"{label}, seed {life.seed}: {life.state}; its errors are left out, maps show what comes before."
+    cut = [
+        f"{of}, seed {life.seed}: {len(life.index)} of {life.config['movements']} movements"
+        for of, life in lives
+        if life.state == "not finished"
     ]
-    caption = "Only options in which not all runs agree; values that most variants share are pale"
-    return [head, table(["variant", *told], rows, caption=caption)]
+    if cut:
+        some = any(variant.used and variant.used[0].state == "finished" for variant in variants)
+        rest = "; the maps show them, the errors over seeds do not count them" if some else ""
+        yield f"{count(len(cut), 'run')} not finished, stopped or still under way{rest}: {'; '.join(cut)}."
 
 
-def versions(variants: Sequence[Variant]) -> list[Html]:
-    """Each set of versions once, and whose runs it made."""
+def versions(variants: Sequence[Variant]) -> Table:
+    """A column for each set of versions, with whose runs it made; a row for each library, the commit first."""
     made: dict[str, Counter[str]] = {}
     for variant in variants:
         for life in variant.lives:
             made.setdefault(json.dumps(life.versions, sort_keys=True), Counter())[variant.label] += 1
     every = [json.loads(text) for text in made]
-    names = list(dict.fromkeys(name for each in every for name in each))
-    heads = ["runs of " + _listed(counts, len(variants)) for counts in made.values()]
-    rows = [[name, *(_value(each.get(name)) for each in every)] for name in sorted(names, key=_first)]
-    return [
-        tag("h2", "Versions", id="versions"),
-        table(["", *heads], rows, caption="What made the runs; one column for each set of versions", notes=True),
-    ]
+    names = sorted({name for each in every for name in each}, key=lambda name: (name != "commit", name))
+    heads = []
+    for counts in made.values():
+        each = ", ".join(f"{label} ({n})" for label, n in counts.items())
+        heads.append(
+            f"all {len(counts)} variants ({counts.total()} runs)" if len(counts) == len(variants) > 3 else each
+        )
+    return Table(heads, [(name, [_told(each.get(name)) for each in every]) for name in names])
 
 
-def repetition(variants: Sequence[Variant]) -> list[Html]:
-    """Command lines, with the commit to go back to."""
+def checkout(variants: Sequence[Variant]) -> str:
+    """What goes back to the commit that made all runs; "" if there is no such one, or it had uncommitted changes."""
     commits = {str(life.versions.get("commit")) for variant in variants for life in variant.lives}
-    (commit,) = commits if len(commits) == 1 else ("None",)
-    clean = commit != "None" and not commit.endswith("-dirty")
-    back = [tag("p", "First: ", tag("code", f"git checkout {commit}"))] if clean else []
-    found = [
-        tag("h2", "Commands to repeat this", id="commands"),
-        tag("p", f"From the root of a checkout, with .venv active; the runs go to {AGAIN}. Defaults are not named."),
-        *back,
-    ]
-    for variant in variants:
-        found += [tag("h3", variant.label), tag("pre", tag("code", "\n".join(commands(variant.lives))))]
-        lost = unknown(variant.lives)
-        if lost:
-            found.append(tag("p", f"Options that this version does not have are missing here: {', '.join(lost)}."))
+    name = commits.pop() if len(commits) == 1 else "None"
+    return "" if name == "None" or name.endswith("-dirty") else shlex.join(["git", "checkout", name])
+
+
+def commands(lives: Sequence[Life]) -> list[str]:
+    """A line of shell for each way in which these runs were configured, nearly always one; defaults are not named."""
+    groups: dict[str, list[int]] = {}
+    for life in lives:
+        config = {**before_there_was_a_choice(), **life.config}
+        algorithm = config.pop("algorithm")
+        if config.get("name") == algorithm:
+            del config["name"]  # a run is called like its algorithm anyway
+        own = {name: value for name, value in config.items() if name == "name" or name not in having("place")}
+        groups.setdefault(shlex.join([f"--algorithm={algorithm}", *words(own)]), []).append(life.seed)
+    lines = []
+    for given, seeds in groups.items():
+        line = f"sgimd run {given} --seed={'$seed' if len(seeds) > 1 else seeds[0]} --out={AGAIN}"
+        lines.append(f"for seed in {' '.join(map(str, seeds))}; do\n  {line}\ndone" if len(seeds) > 1 else line)
+    return lines
+
+
+def unknown(lives: Sequence[Life]) -> list[str]:
+    """Options of the runs that ``sgimd run`` does not have here: a command cannot name them."""
+    return sorted({name for life in lives for name in life.config if not name.endswith("_crc32")} - options().keys())
+
+
+def differing(variants: Sequence[Variant]) -> dict[str, list[str]]:
+    """Option -> for each variant its values as text, of the options in which not all runs agree; not seed and place."""
+    every = [life.config for variant in variants for life in variant.lives]
+    found = {}
+    for name in dict.fromkeys(name for config in every for name in config if name not in having("place")):
+        values = [dict.fromkeys(_told(life.config.get(name)) for life in variant.lives) for variant in variants]
+        if len(set().union(*values)) > 1:
+            found[name] = [" or ".join(each) for each in values]
     return found
 
 
-def _listed(counts: Counter[str], n_variants: int) -> str:
-    if len(counts) == n_variants and n_variants > 3:
-        return f"all {n_variants} variants ({sum(counts.values())} runs)"
-    return ", ".join(f"{label} ({n})" for label, n in counts.items())
+def count(n: int, what: str) -> str:
+    """``1 seed``, ``2 seeds``."""
+    return f"{n} {what}{'s' * (n != 1)}"
 
 
-def _first(name: str) -> tuple[bool, str]:
-    return name != "commit", name
-
-
-def _value(value: Any) -> str:
+def _told(value: Any) -> str:
     return "–" if value is None else value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)

@@ -1,0 +1,77 @@
+"""What evaluations leave on disk: evaluation.csv, and regions.csv, the regions of the goal model at each of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from sgimd_torch.evaluation import Evaluation
+from sgimd_torch.goals.regions import Region
+from sgimd_torch.runs.tables import EVALUATION, Rows, Table, numbers, small_table
+
+
+class Evaluations:
+    """The evaluations of one run: those found in its directory, then those ``add``-ed.
+
+    Args:
+        directory: of the run.
+        region_dims: dimensions of C x T, where the goal model has regions; None where it has none.
+        notes: gets lines on what was dropped.
+    """
+
+    def __init__(self, directory: Path, region_dims: int | None, notes: list[str]) -> None:
+        tables = [small_table(directory / "evaluation.csv", 0)]
+        if region_dims is not None:
+            tables.append(small_table(directory / "regions.csv", region_dims))
+        self._rows: dict[Table, dict[int, Rows]] = {}  # by the number of movements before the evaluation
+        self._begun = False
+        for table in tables:
+            found = table.read()
+            notes += table.notes(found, "it will be evaluated again")
+            self._rows[table] = {}
+            for row in found.rows:
+                self._rows[table].setdefault(int(row[0]), []).append(row)
+
+    def __contains__(self, movements: int) -> bool:
+        return all(movements in rows for rows in self._rows.values())
+
+    @property
+    def last(self) -> dict[str, float]:
+        """Its columns, {} before the first."""
+        errors, *_ = self._rows.values()
+        return dict(zip(EVALUATION, map(float, errors[max(errors)][0]), strict=True)) if errors else {}
+
+    def keep(self, movements: Iterable[int]) -> None:
+        """Drop all but those after these numbers of ``movements``."""
+        wanted = {number for number in movements if number in self}
+        for table, rows in self._rows.items():
+            self._rows[table] = {number: rows[number] for number in wanted}
+
+    def begin(self) -> None:
+        """Start to write; from now on every change goes to disk."""
+        self._begun = True
+        for table in self._rows:
+            self._write(table)
+
+    def add(self, movements: int, evaluation: Evaluation, regions: Sequence[Region]) -> None:
+        """Keep an evaluation, and the regions as they were then."""
+        values = [evaluation.mean_error, np.median(evaluation.errors), np.quantile(evaluation.errors, 0.9)]
+        errors = numbers(np.array([*values, evaluation.noise_floor]), len(EVALUATION) - 1)
+        for table, found in zip(self._rows, ([errors], map(_fields, regions)), strict=False):
+            self._rows[table][movements] = [[str(movements), *fields] for fields in found]
+            if self._begun:
+                self._write(table)
+
+    def _write(self, table: Table) -> None:
+        rows = self._rows[table]
+        table.replace(row for number in sorted(rows) for row in rows[number])
+
+
+def _fields(region: Region) -> list[str]:
+    n = len(region.competences)
+    competence = float(region.competences.mean()) if n else math.nan
+    corners = numbers(region.low, len(region.low)) + numbers(region.high, len(region.high))
+    return [region.path, *corners, str(region.attempts), str(n), repr(competence), repr(float(region.interest()))]
