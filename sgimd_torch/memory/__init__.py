@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from sgimd_torch.files import read_npz, write_npz
 from sgimd_torch.memory.neighbours import PolicyNeighbours, Rows, Table, TreeNeighbours, squared_distances
-from sgimd_torch.spaces import Array, check_point, check_vector, read_only
+from sgimd_torch.spaces import Array, check_point, check_vector
 
 __all__ = ["Memory", "Nearest", "Rows"]
 
@@ -49,7 +49,7 @@ class Memory:
         # A key is the weighted context and an outcome or a theta; without contexts nothing is kept twice.
         self._outcome_side = TreeNeighbours(Table(context_dim + outcome_dim) if context_dim else self._outcomes)
         self._policy_side = PolicyNeighbours(Table(context_dim + theta_dim) if context_dim else self._thetas)
-        self._lowest, self._highest = np.full(theta_dim, np.inf), np.full(theta_dim, -np.inf)
+        self._range, self._ranged = (np.full(theta_dim, np.inf), np.full(theta_dim, -np.inf)), 0
 
     def __len__(self) -> int:
         return len(self._thetas)
@@ -72,7 +72,11 @@ class Memory:
     @property
     def theta_range(self) -> tuple[Array, Array]:
         """``(theta_dim,)`` the least and the greatest value of each parameter so far; infinite for an empty memory."""
-        return read_only(self._lowest), read_only(self._highest)
+        new, self._ranged = self.thetas[self._ranged :], len(self)
+        if len(new):
+            lowest, highest = self._range
+            self._range = np.minimum(lowest, new.min(axis=0)), np.maximum(highest, new.max(axis=0))
+        return self._range
 
     def add(self, context: ArrayLike, theta: ArrayLike, outcome: ArrayLike) -> None:
         """Remember one exemplar: ``(context_dim,)``, ``(theta_dim,)``, ``(outcome_dim,)``.
@@ -136,9 +140,6 @@ class Memory:
             weighted = self.context_weight * contexts
             self._outcome_side.keys.append(np.concatenate((weighted, outcomes), axis=1))
             self._policy_side.keys.append(np.concatenate((weighted, thetas), axis=1))
-        if len(thetas):
-            np.minimum(self._lowest, thetas.min(axis=0), out=self._lowest)
-            np.maximum(self._highest, thetas.max(axis=0), out=self._highest)
 
     def _key(self, context: ArrayLike, point: Array) -> Array:
         context = check_point("context", context, self.context_dim, _NO_CONTEXT)
