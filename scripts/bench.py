@@ -27,6 +27,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from tqdm import tqdm
 
 from options import at_least
@@ -35,6 +36,7 @@ HERE = Path(__file__).resolve().parents[1]
 ALGORITHMS = ("sgim-d", "sagg-riac")
 JOINTS = (25, 50)
 WINDOW = 200  # movements before and after a number of exemplars, over which the overhead there is measured
+Array = NDArray[np.float64]
 Figures = dict[str, float]
 
 
@@ -83,23 +85,25 @@ class Life:
             self.crc = zlib.crc32(np.asarray(episode.outcome).tobytes(), self.crc)
         return 1000 * (time.thread_time() - self._clock.seconds - begun) / n
 
-    def fill(self, n: int) -> list[float]:
+    def fill(self, n: int) -> Array:
         """Remember synthetic movements until there are ``n`` exemplars; how long (s) each took.
 
         As in a life, ten in a row are variations of one movement, and neighbours are asked for now and then.
         """
-        rng, memory, seconds = np.random.default_rng(len(self.learner.memory)), self.learner.memory, []
+        memory = self.learner.memory
+        rng = np.random.default_rng(len(memory))
         missing = max(0, n - len(memory))
         centres = rng.random((missing // 10 + 1, self.arm.policies.dim)).repeat(10, axis=0)[:missing]
         thetas = self.arm.policies.clip(centres + 0.05 * rng.standard_normal(centres.shape))
         directions = np.cumsum(self.arm.angles(thetas), axis=1)
         outcomes = np.stack((np.cos(directions).mean(axis=1), np.sin(directions).mean(axis=1)), axis=1)
+        seconds = np.zeros(missing)
         for row, (theta, outcome) in enumerate(zip(thetas, outcomes, strict=True)):
             begun = time.thread_time()
             memory.add(np.zeros(0), theta, outcome)
             if row % 16 == 0:  # what is remembered is asked for, too: trees and indices grow when they are needed
                 memory.neighbourhoods(memory.near_outcomes(np.zeros(0), outcome, 1), 10)
-            seconds.append(time.thread_time() - begun)
+            seconds[row] = time.thread_time() - begun
         return seconds
 
 
@@ -114,11 +118,11 @@ def overhead(algorithm: str, joints: int, rows: list[int]) -> Figures:
 
 def growth(algorithm: str, joints: int, rows: list[int]) -> Figures:
     """Overhead with synthetic exemplars, the longest additions, and what the memory takes over its raw arrays."""
-    what, life, seconds, found = f"{algorithm}, {joints} joints", Life(algorithm, joints), [0.0], {}
+    what, life, found = f"{algorithm}, {joints} joints", Life(algorithm, joints), {}
     life.overhead(WINDOW)
-    base, first = resident(), 0.0
+    base, first, seconds = resident(), 0.0, list[Array]()
     for n in rows:
-        seconds += life.fill(n)
+        seconds.append(life.fill(n))
         life.overhead(WINDOW // 2)
         ms = life.overhead(3 * WINDOW)
         first = first or ms
@@ -128,8 +132,10 @@ def growth(algorithm: str, joints: int, rows: list[int]) -> Figures:
     memory = life.learner.memory
     raw = sum(array.nbytes for array in (memory.contexts, memory.thetas, memory.outcomes))
     found[f"memory over raw arrays, {joints} joints, {rows[-1]} rows"] = (resident() - base) / raw
-    found[f"longest addition, {joints} joints (ms)"] = 1000 * max(seconds)
-    found[f"99.9th percentile of additions, {joints} joints (ms)"] = 1000 * float(np.quantile(seconds, 0.999))
+    found[f"longest addition, {joints} joints (ms)"] = 1000 * float(np.concatenate(seconds).max())
+    found[f"99.9th percentile of additions, {joints} joints (ms)"] = 1000 * float(
+        np.quantile(np.concatenate(seconds), 0.999)
+    )
     return found
 
 

@@ -130,17 +130,14 @@ class PolicyNeighbours:
             return self._all.nearest(queries, k, within)
         self._all = None
         self._catch_up()
-        keys, queries32 = self.keys.rows, queries.astype(np.float32)
+        keys, queries32 = self.keys.rows, _float32(queries)
         proposed = np.hstack([cells.propose(queries32, k + _SPARE) for cells in self._generations])
-        proposed.sort(axis=1)
-        found = []
-        for query, rows in zip(queries, proposed, strict=True):
-            rows = rows[np.searchsorted(rows, 0) :]  # -1 stands for none
-            if len(rows) < k:  # cells with next to nothing in them, or a query beyond float32
-                rows = np.arange(len(keys))
-            rows, squared = _nearest_of(keys, query, rows, k)
-            found.append(rows[squared <= within * within])
-        return found
+        return [
+            rows[: int((squared <= within * within).sum())]
+            if squared[-1] < np.inf  # too few are proposed where cells are nearly empty, or a query is beyond float32
+            else _rank(keys, query, k, within)
+            for query, rows, squared in zip(queries, *_decide(keys, queries, proposed, k), strict=True)
+        ]
 
     def _catch_up(self) -> None:
         keys = self.keys.rows
@@ -165,11 +162,11 @@ class _Flat:
         squared distance ``(m,)`` in float32 that no other row is below, infinite if there is none."""
         keys = self.keys.rows[self.first :]
         if self._index.ntotal < len(keys):
-            self._index.add(keys[self._index.ntotal :].astype(np.float32))
+            self._index.add(_float32(keys[self._index.ntotal :]))
         if n >= len(keys):
             rows = np.arange(self.first, self.first + len(keys))
             return np.tile(rows, (len(queries), 1)), np.full(len(queries), np.inf)
-        squared32, proposed = self._index.search(queries.astype(np.float32), n)
+        squared32, proposed = self._index.search(_float32(queries), n)
         return proposed + self.first, squared32[:, -1].astype(np.float64)
 
     def nearest(self, queries: Array, k: int, within: float = np.inf) -> list[Rows]:
@@ -178,18 +175,12 @@ class _Flat:
         if len(keys) <= k + _SPARE:
             return [_rank(keys, query, k, within) for query in queries]
         proposed, beyond = self.propose(queries, k + _SPARE)
-        proposed.sort(axis=1)  # the stable sort below then leaves ties in order of row number
-        squared = squared_distances(keys[proposed], queries[:, None])
-        order = squared.argsort(axis=1, kind="stable")[:, :k]
-        squared = np.take_along_axis(squared, order, axis=1)
-        rows = np.take_along_axis(proposed, order, axis=1)
-        inside = (squared <= within * within).sum(axis=1)
-        reaches = np.minimum(np.sqrt(squared[:, -1]), within)
+        found = _decide(keys, queries, proposed, k)
         return [
-            rows[i, : inside[i]]
-            if _surely_proposed(query, float(reaches[i]), float(beyond[i]))
+            rows[: int((squared <= within * within).sum())]
+            if _surely_proposed(query, min(math.sqrt(squared[-1]), within), last)
             else _rank(keys, query, k, within)
-            for i, query in enumerate(queries)
+            for query, rows, squared, last in zip(queries, *found, beyond, strict=True)
         ]
 
 
@@ -201,7 +192,7 @@ class _Cells:
     def __init__(self, rows: Array, first: int, stop: int) -> None:
         self.first, self.stop = first, stop
         n_cells = 4 * math.isqrt(stop - first)
-        centres = rows[:: len(rows) // n_cells][:n_cells].astype(np.float32)
+        centres = _float32(rows[:: len(rows) // n_cells][:n_cells])
         self._centres = faiss.IndexFlatL2(centres.shape[1])
         self._centres.add(centres)
         self._index = faiss.IndexIVFFlat(self._centres, centres.shape[1], n_cells)
@@ -212,7 +203,7 @@ class _Cells:
         """Take in what is new in ``keys`` ``(n, dim)``, all rows of the table."""
         new = keys[self.first + self._index.ntotal : self.stop]
         if len(new):
-            self._index.add(new.astype(np.float32))
+            self._index.add(_float32(new))
 
     def propose(self, queries32: NDArray[np.float32], n: int) -> Rows:
         """``(m, n)`` rows near each of ``(m, dim)`` queries; -1 stands for none."""
@@ -225,6 +216,11 @@ def _check_k(k: int) -> None:
         raise ValueError(f"k must be at least 1, got {k}")
 
 
+def _float32(array: Array) -> NDArray[np.float32]:
+    with np.errstate(over="ignore"):  # infinite is right for what is too large
+        return array.astype(np.float32)
+
+
 def _surely_proposed(query: Array, reach: float, beyond: float) -> bool:
     """Whether all rows within ``reach`` of ``query`` were proposed, if those that were not lie ``beyond``, a squared
     distance in float32.
@@ -234,6 +230,16 @@ def _surely_proposed(query: Array, reach: float, beyond: float) -> bool:
     """
     error = _EPSILON32 * (len(query) + 5) * (reach + math.sqrt((query * query).sum()))
     return beyond == np.inf or ((reach + error) ** 2 < beyond < _LARGEST32)
+
+
+def _decide(keys: Array, queries: Array, proposed: Rows, k: int) -> tuple[Rows, Array]:
+    """Of the rows ``proposed`` ``(m, n)`` for each query the ``k`` nearest, nearest first, and their squared distances,
+    infinite for -1."""
+    proposed.sort(axis=1)  # the stable sort below then leaves ties in order of row number
+    squared = squared_distances(keys[proposed], queries[:, None])
+    squared[proposed < 0] = np.inf
+    order = squared.argsort(axis=1, kind="stable")[:, :k]
+    return np.take_along_axis(proposed, order, axis=1), np.take_along_axis(squared, order, axis=1)
 
 
 def _rank(keys: Array, query: Array, k: int, within: float) -> Rows:
