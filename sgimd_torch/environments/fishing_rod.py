@@ -127,8 +127,13 @@ class FishingRod:
         if not thetas.ndim == contexts.ndim == 2 or not 0 < len(thetas) == len(contexts) == len(rngs):
             rows = f"{contexts.shape}, {thetas.shape} and {len(rngs)} rngs"
             raise ValueError(f"needs n > 0 contexts, thetas and rngs, got {rows}; is it one movement, for execute()?")
-        blocks = [slice(start, start + _BLOCK) for start in range(0, len(thetas), _BLOCK)]
-        return np.concatenate([self._execute(contexts[block], thetas[block], rngs[block]) for block in blocks])
+        # A block takes as many steps as its longest movement, so movements of about the same length run together.
+        order = thetas[:, -1].argsort(kind="stable")
+        outcomes = np.empty((len(thetas), self.outcomes.dim))
+        for start in range(0, len(order), _BLOCK):
+            rows = order[start : start + _BLOCK]
+            outcomes[rows] = self._execute(contexts[rows], thetas[rows], [rngs[row] for row in rows])
+        return outcomes
 
     def record(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Recording:
         """As ``execute``, but it keeps every step, for films and for a closer look; takes twice as long."""

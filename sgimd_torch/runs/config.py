@@ -192,7 +192,7 @@ class Config:
         on_resume=True,
     )
     repeats: int = option(
-        10,
+        3,
         EVALUATION,
         "How often each chosen movement is executed again to measure the noise, at least 2; 0 leaves the noise out.",
         least=0,
