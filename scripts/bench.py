@@ -169,33 +169,33 @@ def evaluation() -> Figures:
 
 
 def movement(n: int = 400) -> Figures:
-    """``execute`` of the fishing rod against stepping as often in C alone, in turns."""
-    import mujoco
+    """``execute`` of the fishing rod against the same steps in C alone, in turns."""
     from mujoco import rollout
 
     from sgimd_torch import FishingRod, stream
 
-    rod = FishingRod()
-    model, state = rod.model, np.zeros((1, mujoco.mj_stateSize(rod.model, mujoco.mjtState.mjSTATE_FULLPHYSICS)))
-    data = mujoco.MjData(model)
-    mujoco.mj_getState(model, data, state[0], mujoco.mjtState.mjSTATE_FULLPHYSICS)
+    rod, calls = FishingRod(), list[tuple[Any, ...]]()
+    step = rollout.Rollout.rollout
+
+    def recording(self: Any, *arguments: Any, **options: Any) -> Any:
+        calls.append((self, [np.copy(a) if isinstance(a, np.ndarray) else a for a in arguments], options))
+        return step(self, *arguments, **options)
+
     ours, alone = 0.0, 0.0
-    with rollout.Rollout(nthread=0) as pool:
-        for i in range(n):
-            theta, rng, steps = rod.policies.sample(stream(0, "bench", i)), stream(1, "bench", i), rod.steps
-            begun = time.process_time()
-            rod.execute(np.zeros(0), theta, rng)
-            ours += time.process_time() - begun
-            taken = rod.steps - steps
-            times = model.opt.timestep * np.arange(taken)
-            controls = np.zeros((1, taken, model.nu))
-            controls[0, :, :6] = rod.primitive.at(theta, times)
-            run = np.empty((1, taken, state.shape[1])), np.empty((1, taken, model.nsensordata))
-            begun = time.process_time()
-            pool.rollout(
-                [model], [data], state, controls, state=run[0], sensordata=run[1], nstep=taken, skip_checks=True
-            )
-            alone += time.process_time() - begun
+    for i in range(n):
+        theta = rod.policies.sample(stream(0, "bench", i))
+        rollout.Rollout.rollout = recording
+        rod.execute(np.zeros(0), theta, stream(1, "bench", i))
+        rollout.Rollout.rollout = step
+        rng = stream(1, "bench", i)
+        begun = time.process_time()
+        rod.execute(np.zeros(0), theta, rng)
+        ours += time.process_time() - begun
+        begun = time.process_time()
+        for pool, arguments, options in calls:
+            step(pool, *arguments, **options)
+        alone += time.process_time() - begun
+        calls.clear()
     return {"execute (ms)": 1000 * ours / n, "execute over C stepping": ours / alone}
 
 

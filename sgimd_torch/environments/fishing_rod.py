@@ -131,8 +131,8 @@ class FishingRod:
         order = thetas[:, -1].argsort(kind="stable")
         outcomes = np.empty((len(thetas), self.outcomes.dim))
         for start in range(0, len(order), _BLOCK):
-            rows = order[start : start + _BLOCK]
-            outcomes[rows] = self._execute(contexts[rows], thetas[rows], [rngs[row] for row in rows])
+            block = order[start : start + _BLOCK]
+            outcomes[block] = self._execute(contexts[block], thetas[block], [rngs[row] for row in block])
         return outcomes
 
     def record(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Recording:
