@@ -195,8 +195,9 @@ class FishingRod:
 
     def _times(self, end: float) -> Array:
         """Times (s) of the commands up to ``end``, and one more, as sensors show the state *before* each step."""
-        step = self.model.opt.timestep
-        return step * np.arange(int(np.ceil(end / step)) + 1)
+        step = self._caster.timestep
+        times: Array = step * np.arange(math.ceil(end / step) + 1)
+        return times
 
     def _commands(self, theta: Array, rng: np.random.Generator) -> Array:
         """``(n_steps, 6)`` rad: the trajectory of theta, with motor noise proportional to its speed."""
@@ -209,6 +210,6 @@ class FishingRod:
         draws = rng.standard_normal((self._draws, len(JOINTS)))[: len(times)]
         draws[1:] *= math.sqrt(1 - CORRELATION**2)
         noise = lfilter([1.0], [1.0, -CORRELATION], draws, axis=0)  # AR(1) of unit variance
-        speed = np.abs(trajectory[1:] - trajectory[:-1]) / self.model.opt.timestep
+        speed = np.abs(trajectory[1:] - trajectory[:-1]) / self._caster.timestep
         trajectory[:-1] += self.noise * speed * noise[:-1]
         return trajectory

@@ -1,4 +1,4 @@
-"""Memory: all exemplars (c, theta, tau) of a learner, and the exact nearest neighbours among them.
+"""Memory: all exemplars (c, theta, tau) of a learner, and the nearest neighbours among them.
 
 Sections 3.2 and 4.4 of Nguyen & Oudeyer (2014): the set M. The outcome side answers "which movements landed near
 there?" (H of eq. 8), the policy side "which movements are like this one?" (K_h of eq. 8).
