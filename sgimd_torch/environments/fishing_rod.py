@@ -196,8 +196,7 @@ class FishingRod:
     def _times(self, end: float) -> Array:
         """Times (s) of the commands up to ``end``, and one more, as sensors show the state *before* each step."""
         step = self._caster.timestep
-        times: Array = step * np.arange(math.ceil(end / step) + 1)
-        return times
+        return step * np.arange(math.ceil(end / step) + 1, dtype=np.float64)
 
     def _commands(self, theta: Array, rng: np.random.Generator) -> Array:
         """``(n_steps, 6)`` rad: the trajectory of theta, with motor noise proportional to its speed."""
