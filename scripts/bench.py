@@ -15,6 +15,7 @@ Examples:
 from __future__ import annotations
 
 import argparse
+import ctypes
 import json
 import os
 import resource
@@ -27,7 +28,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from tqdm import tqdm
 
 from options import at_least
@@ -36,7 +36,6 @@ HERE = Path(__file__).resolve().parents[1]
 ALGORITHMS = ("sgim-d", "sagg-riac")
 JOINTS = (25, 50)
 WINDOW = 200  # movements before and after a number of exemplars, over which the overhead there is measured
-Array = NDArray[np.float64]
 Figures = dict[str, float]
 
 
@@ -85,8 +84,9 @@ class Life:
             self.crc = zlib.crc32(np.asarray(episode.outcome).tobytes(), self.crc)
         return 1000 * (time.thread_time() - self._clock.seconds - begun) / n
 
-    def fill(self, n: int) -> Array:
-        """Remember synthetic movements until there are ``n`` exemplars; how long (s) each took.
+    def fill(self, n: int) -> tuple[float, float]:
+        """Remember synthetic movements until there are ``n`` exemplars; the longest addition (s), and their 99.9th
+        percentile.
 
         As in a life, ten in a row are variations of one movement, and neighbours are asked for now and then.
         """
@@ -104,7 +104,7 @@ class Life:
             if row % 16 == 0:  # what is remembered is asked for, too: trees and indices grow when they are needed
                 memory.neighbourhoods(memory.near_outcomes(np.zeros(0), outcome, 1), 10)
             seconds[row] = time.thread_time() - begun
-        return seconds
+        return float(seconds.max(initial=0)), float(np.quantile(seconds, 0.999)) if missing else 0.0
 
 
 def overhead(algorithm: str, joints: int, rows: list[int]) -> Figures:
@@ -120,9 +120,10 @@ def growth(algorithm: str, joints: int, rows: list[int]) -> Figures:
     """Overhead with synthetic exemplars, the longest additions, and what the memory takes over its raw arrays."""
     what, life, found = f"{algorithm}, {joints} joints", Life(algorithm, joints), {}
     life.overhead(WINDOW)
-    base, first, seconds = resident(), 0.0, list[Array]()
+    base, first, longest, percentile = resident(), 0.0, 0.0, 0.0
     for n in rows:
-        seconds.append(life.fill(n))
+        slowest, percentile = life.fill(n)
+        longest = max(longest, slowest)
         life.overhead(WINDOW // 2)
         ms = life.overhead(3 * WINDOW)
         first = first or ms
@@ -132,7 +133,7 @@ def growth(algorithm: str, joints: int, rows: list[int]) -> Figures:
     memory = life.learner.memory
     raw = sum(array.nbytes for array in (memory.contexts, memory.thetas, memory.outcomes))
     found[f"memory over raw arrays, {joints} joints, {rows[-1]} rows"] = (resident() - base) / raw
-    found[f"longest addition, {joints} joints (ms)"] = 1000 * float(np.concatenate(seconds).max())
+    found[f"longest addition, {joints} joints (ms)"] = 1000 * longest
     found[f"99.9th percentile of additions, {joints} joints (ms)"] = 1000 * float(
         np.quantile(np.concatenate(seconds), 0.999)
     )
@@ -208,7 +209,9 @@ PARTS: dict[str, Callable[..., Figures]] = {
 
 
 def resident() -> int:
-    """Bytes of memory that this process holds now."""
+    """Bytes of memory that this process holds now, without what its allocator keeps for later."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).malloc_trim(0)
     try:
         return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
     except OSError:  # not Linux: the most that it ever held
