@@ -11,8 +11,6 @@ The rows are kept in results/anova.csv, since run directories are not shipped:
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -23,13 +21,14 @@ from judging import NotRun
 from read_results import number, read_rows, read_seeds
 from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.environments.fishing_rod import JOINTS, FishingRod
-from sgimd_torch.files import write_bytes
 from sgimd_torch.runs.process import say
 from sgimd_torch.spaces import Array, stream
 from sgimd_torch.views.statistics import SEED, Anova, anova
+from tables import Table
 from variants import shipped
 
 HEADER: Final = ("compared", "of", "differ", "dimensions", "smallest_p", "largest_p")
+KEY: Final = ("compared",)
 TAUGHT: Final = {1: "sgim-d-teacher-1", 2: "sgim-d-teacher-2", 3: "sgim-d"}  # SGIM-D by who teaches it
 
 
@@ -62,21 +61,24 @@ def compare(runs: Path) -> tuple[list[Compared], dict[str, str]]:
 
 
 def update_anova(path: Path, runs: Path) -> None:
-    """Compare anew and replace the table; what cannot be compared keeps its row, and a line says what it lacks.
+    """Compare anew; what cannot be compared keeps the row that is there, and a line says what it lacks.
 
     Raises:
-        ValueError, OSError: a file is damaged, or the table cannot be written.
+        ValueError: a file is damaged.
+        OSError: the table cannot be written.
     """
-    rows = {row["compared"]: tuple(row.values()) for _, row in read_rows(path, HEADER, optional=True)}
+    table = Table(path, HEADER, KEY)
     found, missing = compare(runs)
-    for groups, rows_of, each in found:
-        p = each.adjusted
-        rows[groups] = (groups, rows_of, str(each.rejected), str(len(p)), repr(float(p.min())), repr(float(p.max())))
+    p = {each.groups: each.found.adjusted for each in found}
+    table.merge(
+        [
+            (groups, rows, each.rejected, len(p[groups]), float(p[groups].min()), float(p[groups].max()))
+            for groups, rows, each in found
+        ]
+    )
+    kept = table.rows()
     for groups, what in missing.items():
-        say(f"{groups}: not run: {what}; " + ("its row stays as it was" if groups in rows else "it gets no row"))
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows([HEADER, *rows.values()])
-    write_bytes(path, text.getvalue().encode())
+        say(f"{groups}: not run: {what}; " + ("its row stays as it was" if (groups,) in kept else "it gets no row"))
 
 
 def anova_cells(path: Path) -> list[list[str]]:

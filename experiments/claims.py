@@ -31,7 +31,7 @@ from judging import NotRun, Results, Verdict, judge
 from model_claims import MODEL_CLAIMS, SIMPLEX
 from paper_claims import PAPER_CLAIMS
 from read_results import LAST, Evaluated, ResultsError, read_coverages, read_goals, read_results
-from sgimd_torch.files import make_folder, write_bytes
+from sgimd_torch.files import make_folder, write_text
 from sgimd_torch.runs.process import command
 from sgimd_torch.views.statistics import iqm_interval, metres, rng, show
 from variants import EXPERIMENTS
@@ -195,7 +195,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     texts = {name: render(name, tables) for name, (_, tables) in pages.items()}
     make_folder(options.out)
     for name, path in paths.items():
-        write_bytes(path, texts[name].encode())
+        write_text(path, texts[name])
         found = [row.verdict for row in pages[name][0]]
         counts = ", ".join(f"{found.count(verdict)} {verdict}" for verdict in dict.fromkeys(found))
         print(f"{path}: {len(found)} claims: {counts}")

@@ -36,7 +36,7 @@ from figures import REACH
 from read_results import MODEL_HEADER
 from sgimd_torch.figures import predictions as plots
 from sgimd_torch.figures.save import save_figure
-from sgimd_torch.files import make_folder, write_bytes
+from sgimd_torch.files import make_folder, write_text
 from sgimd_torch.forward_model.diagnostics import LEVELS, coverage, error_by_cell, improvements, running
 from sgimd_torch.runs.log import RunError
 from sgimd_torch.runs.process import command
@@ -65,7 +65,7 @@ class ModelRun:
     observed: Array
     mean: Array
     spread: Array
-    refreshes: dict[str, Array]
+    refreshes: dict[str, np.ndarray]
 
     @property
     def name(self) -> str:
@@ -86,18 +86,15 @@ def read_model_run(path: Path) -> ModelRun:
     """
     run, file = read_run(path), path / "predictions.csv"
     if run.predictions is None:
-        raise RunError(
-            f"{path} has no predictions.csv: it ran without a forward model; see --inverse model of sgimd run"
-        )
-    table = _columns(run, "predictions.csv", run.predictions)
+        raise RunError(f"{path} has no {file.name}: it ran without a forward model; see --inverse model of sgimd run")
+    exemplars, *values = _checked(run, file.name, run.predictions).values()
     lived = np.flatnonzero(np.isfinite(run.outcomes).all(axis=1))
-    table = table[table[:, 0] < len(lived)]
-    rows = table[:, 0].astype(np.int64)
+    rows = exemplars[exemplars < len(lived)]
     if not len(rows):
         raise RunError(f"{file} holds no prediction of a movement yet; the model learns from 50 before its first")
-    if (np.diff(rows) <= 0).any():
+    if (np.diff(exemplars) <= 0).any():
         raise RunError(f"{file} must name exemplars by whole numbers that increase; was it edited?")
-    observed, mean, epistemic, aleatoric = np.split(table[:, 1:], 4, axis=1)
+    observed, mean, epistemic, aleatoric = np.split(np.stack(values, axis=1)[: len(rows)], 4, axis=1)
     differ = (observed != run.outcomes[lived[rows]]).any(axis=1)
     if differ.any():
         raise RunError(f"{file}: exemplar {rows[differ][0]} is another one in episodes.csv; is it another run's file?")
@@ -106,11 +103,10 @@ def read_model_run(path: Path) -> ModelRun:
         raise RunError(f"{file}: exemplar {rows[(spread <= 0).any(axis=1)][0]} has a spread of 0; was it edited?")
     if run.refreshes is None:
         raise RunError(f"{path}/refreshes.csv is missing; was it deleted?")
-    refreshes = _columns(run, "refreshes.csv", run.refreshes)
-    if not len(refreshes) or not np.isin(refreshes[:, -1], (0, 1)).all():
+    refreshes = _checked(run, "refreshes.csv", run.refreshes)
+    if not len(refreshes["diverged"]) or not np.isin(refreshes["diverged"], (0, 1)).all():
         raise RunError(f"{path}/refreshes.csv must hold a refresh, and 0 or 1 for diverged; was it cut or edited?")
-    columns = dict(zip(run.refreshes, refreshes.T, strict=True))
-    return ModelRun(run, lived[rows], observed, mean, spread, columns)
+    return ModelRun(run, lived[rows], observed, mean, spread, refreshes)
 
 
 def row(model_run: ModelRun) -> dict[str, Any]:
@@ -163,22 +159,22 @@ def figure_of(model_run: ModelRun) -> Figure:
     return figure
 
 
-def _columns(run: Run, name: str, table: dict[str, np.ndarray]) -> Array:
-    """``(n, n_columns)`` of a table of the model.
+def _checked(run: Run, name: str, table: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """The ``table`` of a model as it is.
 
     Raises:
         RunError: it is damaged, or of other outcomes.
     """
     path, bad = run.path / name, run.damage.get(name, 1)
     names = small_table(path, run.outcomes.shape[1]).names
-    if name in run.damage or tuple(table) != names:
-        line = path.read_text(errors="replace").split("\n")[bad - 1][:60]
-        if bad == 1:
-            raise RunError(f"{path} must begin with {','.join(names)}, got {line}; was it edited?")
-        whole = ", ".join(column for column in names if column in WHOLE)
-        wanted = f"{len(names)} numbers" if name in run.unchecked else f"{len(names)} numbers and their checksum"
-        raise RunError(f"{path}, line {bad}: needs {wanted}, got {line!r} (whole ones for {whole}); was it edited?")
-    return np.stack([column.astype(np.float64) for column in table.values()], axis=1)
+    if name not in run.damage and tuple(table) == names:
+        return table
+    line = path.read_text(errors="replace").split("\n")[bad - 1][:60]
+    if bad == 1:
+        raise RunError(f"{path} must begin with {','.join(names)}, got {line}; was it edited?")
+    whole = ", ".join(column for column in names if column in WHOLE)
+    wanted = f"{len(names)} numbers" + ("" if name in run.unchecked else " and their checksum")
+    raise RunError(f"{path}, line {bad}: needs {wanted}, got {line!r} (whole ones for {whole}); was it edited?")
 
 
 def _printed(cells: dict[str, Any]) -> list[str]:
@@ -200,18 +196,17 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("runs", type=Path, nargs="+", metavar="RUN", help="a run directory: runs/sgim-d/seed-003")
     parser.add_argument("--out", type=Path, default=Path("results/model"), help="default: %(default)s")
     options = parser.parse_args(argv)
-    quiet = not sys.stderr.isatty()
-    found = {run.name: run for run in map(read_model_run, tqdm(options.runs, "reading", disable=quiet))}
+    found = {run.name: run for run in map(read_model_run, tqdm(options.runs, "reading", disable=None))}
     if len(found) < len(options.runs):
         raise RunError("two of these runs have the same name; draw them apart, each with its own --out")
     make_folder(options.out)
     first = {name.split("/")[0]: name for name in reversed(found)}
-    for name in tqdm(first.values(), "drawing", disable=quiet):
+    for name in tqdm(first.values(), "drawing", disable=None):
         save_figure(partial(figure_of, found[name]), options.out / name.replace("/", "-"), "png")
     rows = [row(run) for run in found.values()]
     table = io.StringIO()
     csv.writer(table, lineterminator="\n").writerows([MODEL_HEADER, *(each.values() for each in rows)])
-    write_bytes(options.out / "table.csv", table.getvalue().encode())
+    write_text(options.out / "table.csv", table.getvalue())
     lines = [HEAD, *map(_printed, rows)]
     widths = [max(map(len, cells)) for cells in zip(*lines, strict=True)]
     for cells in lines:

@@ -29,6 +29,7 @@ MODEL_HEADER = (
     *("run", "predicted", "error_m", "inside_50_last", "inside_80_last", "inside_95_last"),
     *("inside_50_late", "inside_80_late", "inside_95_late", "improved", "refreshes", "diverged", "ms_per_refresh"),
 )
+UNKNOWN: Final = ("", "nan")
 LEARNERS: Final = ("random", "sagg-riac", "observation", "imitation", "sgim-d")  # the paper's five
 LAST: Final = 5000  # movements in the life of a learner of the paper
 
@@ -82,7 +83,7 @@ def read_results(path: str | os.PathLike[str]) -> dict[str, Evaluated]:
         rows = found.setdefault(variant, Evaluated(variant, row["experiment"], {})).rows
         if (seed, movements) in rows:
             raise ResultsError(f"{where}: seed {seed} of {variant} is there twice at {movements} movements")
-        floor = number(row, "noise_floor_m", where) if row["noise_floor_m"] not in ("", "nan") else math.nan
+        floor = number(row, "noise_floor_m", where) if row["noise_floor_m"] not in UNKNOWN else math.nan
         rows[seed, movements] = Values(number(row, "mean_error_m", where), floor, _count(row, "tiles_reached", where))
     if not found:
         raise ResultsError(f"{path} has no line below its header; is the comparison still to be run?")
@@ -113,7 +114,7 @@ def read_coverages(path: str | os.PathLike[str]) -> dict[str, Array]:
     """
     found: dict[str, list[float]] = {}
     for where, row in read_rows(path, MODEL_HEADER, optional=True):
-        if row["inside_80_late"] != "nan":
+        if row["inside_80_late"] not in UNKNOWN:
             found.setdefault(row["run"].split("/")[0], []).append(number(row, "inside_80_late", where))
     return {variant: np.array(shares) for variant, shares in found.items()}
 

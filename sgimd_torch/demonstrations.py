@@ -1,6 +1,7 @@
 """Demonstrations on disk: recorded joint trajectories, their times and where the float landed.
 
-One ``.npz`` file without pickle, which any numpy reads. The n recordings may differ in length and stand end to end:
+One ``.npz`` file without pickle, which any numpy reads. The n recordings, at most 100,000, may differ in length and
+stand end to end:
     version          ()                   1
     lengths          (n,) int             samples of each recording, 2 or more
     times            (sum,) s             from 0, increasing within each recording
@@ -18,11 +19,12 @@ from pathlib import Path
 
 import numpy as np
 
-from sgimd_torch.files import read_npz, write_npz
+from sgimd_torch.files import UNPACKED, read_npz, write_npz
 from sgimd_torch.spaces import Array, Demonstration, first_entry
 
 VERSION = 1
 SHIPPED = Path(__file__).with_name("data") / "demonstrator_3.npz"
+_MOST = 100_000  # recordings in a file
 _FIELDS = ("lengths", "times", "trajectories", "outcomes", "contexts")
 
 
@@ -46,7 +48,8 @@ def save_demonstrations(path: str | os.PathLike[str], demonstrations: Sequence[D
         "contexts": np.stack([d.context for d in demonstrations]),
     }
     _check(str(path), fields)
-    write_npz(path, {"version": np.array(VERSION), **fields}, compressed=True)
+    small = sum(field.nbytes for field in fields.values()) <= UNPACKED  # a large one that unpacks to much is not read
+    write_npz(path, {"version": np.array(VERSION), **fields}, compressed=small)
 
 
 def load_demonstrations(
@@ -68,11 +71,10 @@ def load_demonstrations(
         OSError: there is no file, or it is a directory.
     """
     source = str(path)
-    version, *arrays = read_npz(path, "demonstration file", "save_demonstrations", ("version", *_FIELDS))
+    arrays = read_npz(path, "demonstration file", "save_demonstrations", VERSION, _FIELDS)
     fields = dict(zip(_FIELDS, arrays, strict=True))
-    if version.shape != () or version != VERSION:
-        raise ValueError(f"{source} has version {version}, this library reads {VERSION}")
     _check(source, fields)
+    fields = {name: field if name == "lengths" else field.astype(np.float64) for name, field in fields.items()}
     for name, field, wanted in (
         ("joints", "trajectories", n_joints),
         ("outcome dimensions", "outcomes", outcome_dim),
@@ -92,8 +94,8 @@ def load_demonstrations(
 
 def _check(source: str, fields: dict[str, np.ndarray]) -> None:
     for name, field in fields.items():
-        if not np.issubdtype(field.dtype, np.integer if name == "lengths" else np.floating):
-            wanted = "integers" if name == "lengths" else "floating-point numbers"
+        if not np.issubdtype(field.dtype, np.integer if name == "lengths" else np.floating) or field.itemsize > 8:
+            wanted = "integers" if name == "lengths" else "floating-point numbers of 64 bits at most"
             raise ValueError(f"{source}: {name} must be {wanted}, got {field.dtype}; was text or a list saved?")
         if field.ndim != (1 if name in ("lengths", "times") else 2):
             raise ValueError(f"{source}: {name} has {field.ndim} axes, shape {field.shape}")
@@ -101,14 +103,17 @@ def _check(source: str, fields: dict[str, np.ndarray]) -> None:
     n = len(lengths)
     if n == 0:
         raise ValueError(f"{source} holds no demonstration")
+    if n > _MOST:
+        raise ValueError(f"{source} holds {n} demonstrations, at most {_MOST} are read; split it")
     if (lengths < 2).any():
         raise ValueError(f"{source}: recording {int(np.argmax(lengths < 2))} has fewer than 2 samples")
     if not len(fields["outcomes"]) == len(fields["contexts"]) == n:
         rows = f"{len(fields['outcomes'])} outcomes, {len(fields['contexts'])} contexts"
         raise ValueError(f"{source}: {n} recordings, but {rows}")
-    if not len(times) == len(fields["trajectories"]) == lengths.sum():
+    total = sum(lengths.tolist())  # of any size; a sum of numpy's may come round to a small number
+    if not len(times) == len(fields["trajectories"]) == total:
         rows = f"{len(times)} times, {len(fields['trajectories'])} postures"
-        raise ValueError(f"{source}: lengths add up to {lengths.sum()} samples, but there are {rows}; is it truncated?")
+        raise ValueError(f"{source}: lengths add up to {total} samples, but there are {rows}; is it truncated?")
     starts = np.cumsum(lengths)[:-1]
     for name in ("times", "trajectories", "outcomes", "contexts"):
         each = np.split(fields[name], starts) if name in ("times", "trajectories") else fields[name]

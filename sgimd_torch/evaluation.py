@@ -162,18 +162,15 @@ def load_benchmark(path: str | os.PathLike[str] = SHIPPED) -> Benchmark:
         ValueError: not such a file, truncated, of another version, without goals, or with numbers that are not finite.
         OSError: there is no file, or it is a directory.
     """
-    names = ("version", "environment", "goals", "side")
-    version, name, goals, side = read_npz(path, "benchmark", "scripts/make_benchmark.py", names)
-    if version.shape != () or version != VERSION:
-        raise ValueError(f"{path} has version {version}, this library reads {VERSION}")
-    return _checked(str(path), name, goals, side)
+    names = ("environment", "goals", "side")
+    return _checked(str(path), *read_npz(path, "benchmark", "scripts/make_benchmark.py", VERSION, names))
 
 
 def _checked(source: str, name: np.ndarray, goals: np.ndarray, side: np.ndarray) -> Benchmark:
-    if name.shape != () or name.dtype.kind != "U":
+    if name.shape != () or name.dtype.kind != "U" or not str(name).isidentifier():
         raise ValueError(f"{source}: environment must be the name of a class, got {name.dtype} {name.shape}")
-    if goals.ndim != 2 or len(goals) == 0:
+    if goals.ndim != 2 or goals.size == 0:
         raise ValueError(f"{source}: goals must have shape (n, outcome_dim) with n > 0, got {goals.shape}")
     if side.shape != () or side.dtype.kind not in "iuf" or not 0 < side < np.inf:
-        raise ValueError(f"{source}: the side of the tiles must be a positive number, got {side}")
+        raise ValueError(f"{source}: the side of the tiles must be a positive number, got {str(side)[:40]}")
     return Benchmark(str(name), check_vector(f"{source}: goals", goals, goals.shape[1]), float(side))

@@ -99,8 +99,10 @@ class GoalBabbling:
     ) -> None:
         if not 0 <= tolerance < np.inf:
             raise ValueError(f"tolerance must be a distance (m), finite and >= 0, got {tolerance}")
-        if not 0 <= global_range[0] <= global_range[1] <= 1:
+        if len(global_range) != 2 or not 0 <= global_range[0] <= global_range[1] <= 1:
             raise ValueError(f"global_range must be two probabilities, the least first, got {global_range}")
+        if not give_up <= 0:
+            raise ValueError(f"give_up must be a competence, 0 at most, got {give_up}")
         self.policies = policies
         self.memory = memory
         self.goals = goals
@@ -188,6 +190,9 @@ class Imitate:
         babbling: its interest map is told the competence at the demonstrated outcome afterwards (emulate a goal,
             section 3.2.3); None to imitate only. A demonstrated outcome outside T is imitated, but never a goal.
         outcomes: T; needed with ``babbling``.
+
+    Raises:
+        ValueError: a number out of its range, or ``babbling`` without ``outcomes``.
     """
 
     def __init__(
@@ -202,6 +207,10 @@ class Imitate:
     ) -> None:
         if (babbling is None) != (outcomes is None):
             raise ValueError("Imitate needs babbling and outcomes together, or neither of them")
+        if repeats is not None:
+            check_count("repeats", repeats, 1)
+        if not 0 <= epsilon < np.inf:
+            raise ValueError(f"epsilon must be a bound of variations, finite and >= 0, got {epsilon}")
         self.policies = policies
         self.rng = rng
         self.repeats = repeats

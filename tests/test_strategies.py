@@ -250,7 +250,8 @@ def test_a_search_that_ends_before_the_budget_is_followed_by_one_that_knows_more
     [
         *({"budget": budget} for budget in (0, 1.5, True)),
         *({"tolerance": tolerance} for tolerance in (np.nan, np.inf, -0.1)),
-        *({"global_range": pair} for pair in ((0.9, 0.1), (-0.1, 0.5), (0.5, 1.1), (np.nan, 0.5))),
+        *({"global_range": pair} for pair in ((0.9, 0.1), (-0.1, 0.5), (0.5, 1.1), (np.nan, 0.5), (0.5,))),
+        *({"give_up": competence} for competence in (np.nan, 0.5)),
     ],
 )
 def test_numbers_that_goal_babbling_cannot_use_are_refused(options: dict[str, object]) -> None:
@@ -305,6 +306,12 @@ def test_a_demonstrated_outcome_outside_the_task_space_is_imitated_but_is_no_goa
 def test_imitation_without_goals_only_imitates() -> None:
     imitate = Imitate(ARM.policies, stream(0, "imitate"), repeats=3)
     assert len(live(imitate.attempt(NO_CONTEXT, THETA_D, LESSON))) == 3
+
+
+@pytest.mark.parametrize(("name", "value"), [("epsilon", np.nan), ("epsilon", -0.1), ("repeats", 0), ("repeats", 1.5)])
+def test_numbers_that_imitation_cannot_use_are_refused(name: str, value: float) -> None:
+    with pytest.raises(ValueError, match=f"{name} must .*got {value}"):
+        Imitate(ARM.policies, stream(0, "imitate"), **{name: value})
 
 
 def test_imitation_takes_babbling_and_task_space_together_or_neither() -> None:

@@ -9,6 +9,7 @@ import venv
 
 import pytest
 
+import sgimd_torch
 from runs import ROOT
 
 pytestmark = pytest.mark.slow
@@ -102,4 +103,4 @@ def test_what_lies_beside_the_code_is_in_the_wheel(installed):
     done = subprocess.run(
         [str(installed / "python"), "-c", program], capture_output=True, text=True, cwd="/", check=True
     )
-    assert done.stdout.strip() == "0.1.0"
+    assert done.stdout.strip() == sgimd_torch.__version__

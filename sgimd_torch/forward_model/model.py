@@ -6,30 +6,24 @@ Not in Nguyen & Oudeyer (2014), who use local models only. `OnlineTrainer` train
 
 from __future__ import annotations
 
-import json
 import math
 import os
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 try:
     import torch
-    from safetensors import SafetensorError, safe_open
-    from safetensors.torch import save
 except ImportError as error:
     raise ImportError(f"the forward model needs torch: pip install 'sgimd-torch[forward]' ({error})") from error
 
-from sgimd_torch.files import write_bytes
 from sgimd_torch.forward_model.ensemble import Ensemble
+from sgimd_torch.forward_model.stored import read_model, write_model
 from sgimd_torch.forward_model.training import OnlineTrainer
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, check_count, check_vector, stream
 
-VERSION: Final = 1
-_SHAPE: Final = ("context_dim", "theta_dim", "outcome_dim", "members", "hidden", "noise_heads")  # in its file
 _FEWEST_EXEMPLARS: Final = 50  # for the first refresh
 _NEAR_A_GOAL: Final = 200  # exemplars that count as near a goal, for ``focus``
 _DIVERGED_ABOVE: Final = 2.0  # relative error, twice that of predicting the mean
@@ -226,48 +220,26 @@ class ForwardModel(Ensemble):
             raise ValueError(f"the model has dimensions {self.sizes}, the {what} {sizes}; is it another robot's?")
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write a safetensors file whose header says in JSON what the model is; it appears whole or not at all.
+        """Write a safetensors file, see ``stored.py``; it appears whole or not at all.
 
         The optimiser's moments are not in it: a loaded model predicts the same, and learns on with new moments.
 
         Raises:
             OSError: ``path`` is a directory, or cannot be written.
         """
-        about = {"version": str(VERSION), "model": json.dumps({**self.sizes, **self.shape})}
-        write_bytes(path, save({k: v.contiguous() for k, v in self.state_dict().items()}, about))
+        write_model(path, {**self.sizes, **self.shape}, self.state_dict())
 
     @classmethod
     def load(cls, path: str | os.PathLike[str], **options: Any) -> ForwardModel:
         """The model that ``save`` wrote; ``options`` are the constructor's options for training.
 
         Raises:
-            ValueError: not such a file, truncated, of another version, or with weights that do not fit or are
-                not finite.
-            OSError: there is no file.
+            ValueError: not such a file, truncated or changed, of another version, or with numbers that no model has.
+            OSError: there is no file, or it may not be read.
         """
-        path = Path(path)
-        if not path.is_file():
-            raise FileNotFoundError(f"there is no forward model {path}")
-        try:
-            with safe_open(str(path), framework="pt") as file:
-                about = file.metadata() or {}
-                state = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118, it is no dict
-        except SafetensorError as error:
-            raise ValueError(f"{path} is no forward model, or was truncated: {error}") from error
-        if about.get("version") != str(VERSION):
-            raise ValueError(f"{path} has version {about.get('version')}, this library reads {VERSION}")
-        try:
-            said = json.loads(about["model"])
-            shape = {name: said[name] for name in _SHAPE}
-        except (KeyError, TypeError, json.JSONDecodeError) as error:
-            raise ValueError(f"{path} does not say what model it holds: {error}") from error
-        model = cls(**{**options, **shape})
-        try:
-            model.load_state_dict(state)
-        except RuntimeError as error:
-            raise ValueError(f"{path} holds weights of another shape than it says: {error}") from error
-        if not all(torch.isfinite(values).all() for values in state.values()):
-            raise ValueError(f"{path} holds weights that are not finite; was it saved while training diverged?")
+        about, state = read_model(path)
+        model = cls(**{**options, **about})
+        model.load_state_dict(state)
         return model
 
     def _tensor(self, values: Array) -> torch.Tensor:

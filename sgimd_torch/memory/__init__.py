@@ -20,6 +20,7 @@ from sgimd_torch.spaces import Array, check_point, check_vector
 __all__ = ["Memory", "Nearest", "Rows"]
 
 _VERSION: Final = 1
+_MOST_DIMS: Final = 100_000  # of a table in a file
 _NO_CONTEXT: Final = "an environment without contexts gives np.zeros(0)"
 
 
@@ -168,12 +169,16 @@ class Nearest:
 
 
 def _read(path: str | os.PathLike[str]) -> tuple[float, Array, Array, Array]:
-    names = ("version", "context_weight", "contexts", "thetas", "outcomes")
-    version, weight, *tables = read_npz(path, "saved Memory", "Memory.save", names)
-    if version.shape != () or version != _VERSION:
-        raise ValueError(f"{path} has version {version}, this code reads {_VERSION}; was it saved by a newer one?")
-    if weight.shape != () or any(t.dtype != np.float64 or t.ndim != 2 or len(t) != len(tables[0]) for t in tables):
+    names = ("context_weight", "contexts", "thetas", "outcomes")
+    weight, *tables = read_npz(path, "saved Memory", "Memory.save", _VERSION, names)
+    fitting = all(t.dtype == np.float64 and t.ndim == 2 and len(t) == len(tables[0]) for t in tables)
+    if weight.shape != () or weight.dtype.kind not in "iuf" or not fitting:
         shapes = [f"{array.dtype} {array.shape}" for array in (weight, *tables)]
         raise ValueError(f"{path} must hold a number and three float64 tables of equal length, got {shapes}")
+    if not 0 <= weight < np.inf:
+        raise ValueError(f"{path} has context_weight {weight}, which must be finite and >= 0")
+    dims = [table.shape[1] for table in tables]
+    if not (dims[1] and dims[2]) or max(dims) > _MOST_DIMS:  # room is made for a table without rows, too
+        raise ValueError(f"{path} must have 1 to {_MOST_DIMS} dimensions of theta and outcome, got {dims[1:]}")
     contexts, thetas, outcomes = (check_vector(f"a table of {path}", table, table.shape[1]) for table in tables)
     return float(weight), contexts, thetas, outcomes

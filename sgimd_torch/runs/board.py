@@ -19,7 +19,7 @@ from sgimd_torch.goals.regions import Region
 from sgimd_torch.runs import model_record as run_model
 from sgimd_torch.runs.build import RunParts
 from sgimd_torch.runs.clock import Seconds
-from sgimd_torch.runs.config import Config
+from sgimd_torch.runs.config import Config, having
 from sgimd_torch.runs.directory import RunDirectory
 from sgimd_torch.spaces import Array, Box, Episode
 
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from sgimd_torch.board.writer import Board
 
 GOALS: Final = 100  # the last ones are drawn
-FIRST: Final = ("algorithm", "goals", "inverse", "movements", "search")  # HParams shows five before one asks for more
 LEGEND: Final = {
     "time": "Seconds spent so far: on physics, by the learner and on evaluations.",
     "map/competence": "The regions, named like the curves, coloured by the mean competence of the goals they remember.",
@@ -74,7 +73,7 @@ class RunBoard:
             legend, layout = {**LEGEND, **run_model.LEGEND}, run_model.LAYOUT
         self._board = Board(directory.path, cells, tolerance=tolerance, legend=legend, layout=layout, replace=True)
         settings = {field.name: _plain(field, getattr(config, field.name)) for field in fields(config)}
-        self._board.settings(settings, first=FIRST)
+        self._board.settings(settings, first=having("leads"))
 
     def __enter__(self) -> Self:
         return self

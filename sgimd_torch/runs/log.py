@@ -27,13 +27,15 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
 from sgimd_torch.runs.tables import Rows, Table, numbers, sealed
 from sgimd_torch.session import Recorded
 from sgimd_torch.spaces import Array, Episode
+
+_LARGEST_JSON: Final = 16 * 2**20  # bytes
 
 
 class RunError(ValueError):
@@ -121,10 +123,13 @@ def read_json(path: Path, *, missing: Any) -> Any:
         RunError: it is damaged, or a directory.
     """
     try:
+        size = path.stat().st_size
+        if size > _LARGEST_JSON:
+            raise ValueError(f"{size} bytes, at most {_LARGEST_JSON} are read")
         content = json.loads(path.read_text(encoding="utf-8"))
     except (FileNotFoundError, NotADirectoryError):
         return missing
-    except (ValueError, OSError) as error:
+    except (ValueError, OSError, RecursionError) as error:
         raise RunError(f"{path} cannot be read ({error}); was it edited, or the disk full?") from error
     if not isinstance(content, dict):
         raise RunError(f"{path} must hold a json object, got {type(content).__name__}; was it edited?")

@@ -80,11 +80,18 @@ def read_run(path: str | os.PathLike[str]) -> Run:
         log = columns.table(path)
         small = [small_table(path / name) for name in SMALL if os.path.lexists(path / name)]
         found = {table.path.name: table.read() for table in (log, *small)}
+        rows = found[log.path.name].rows
+        demonstration = np.array([int(row[2] or -1) for row in rows], dtype=np.int64)
+        contexts, thetas, goals, outcomes = columns.split(rows)
+        arrays = {table.path.name: table.arrays(found[table.path.name]) for table in small}
     except OSError as error:
         raise RunError(f"{error.filename} cannot be read: {error.strerror}") from error
-    rows = found[log.path.name].rows
-    arrays = {table.path.name: table.arrays(found[table.path.name]) for table in small}
-    contexts, thetas, goals, outcomes = columns.split(rows)
+    except RunError:
+        raise
+    except (ValueError, OverflowError) as error:  # a line whose checksum somebody has made anew
+        raise RunError(
+            f"{path} has a table that holds what no run writes ({str(error)[:100]}); was it edited?"
+        ) from error
     return Run(
         path=path,
         config=config,
@@ -92,7 +99,7 @@ def read_run(path: str | os.PathLike[str]) -> Run:
         summary=read_json(path / "summary.json", missing={}),
         index=np.arange(len(rows)),
         origin=np.array([row[1] for row in rows], dtype=np.str_),
-        demonstration=np.array([int(row[2] or -1) for row in rows], dtype=np.int64),
+        demonstration=demonstration,
         contexts=contexts,
         thetas=thetas,
         goals=goals,

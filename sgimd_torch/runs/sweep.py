@@ -84,7 +84,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     for variant in variants if left else []:
         build(variant)  # what cannot be put together is refused before anything starts
     make_folder(out)
-    failures = sweep(configs, options.processes, flags=flags)
+    failures = sweep(left, options.processes, flags=flags)
     say(f"{len(left) - len(failures)} runs ended well, {len(failures)} failed: {out}", *failures)
     return 1 if failures else 0
 

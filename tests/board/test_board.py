@@ -301,7 +301,7 @@ def test_a_library_that_is_not_watched_loads_no_tensorboard():
 
 
 def test_a_board_loads_neither_torch_nor_matplotlib_nor_tensorflow():
-    program = "import sys, sgimd_torch.board; print({'torch', 'matplotlib', 'tensorflow'} & set(sys.modules))"
+    program = "import sys, sgimd_torch.board.writer; print({'torch', 'matplotlib', 'tensorflow'} & set(sys.modules))"
     done = subprocess.run(
         [sys.executable, "-c", f"import sys; sys.path[:0] = {sys.path!r}; {program}"], capture_output=True, text=True
     )
@@ -370,13 +370,14 @@ def test_a_run_killed_while_it_writes_an_evaluation_loses_no_point_of_the_board(
     kill = "os.kill(os.getpid(), signal.SIGKILL)"
     before, after = (kill, "pass") if when == "before" else ("pass", kill)
     program = (
-        "import os, signal, sys\nfrom sgimd_torch.runs import directory, run\n"
+        "import os, signal, sys\nfrom sgimd_torch.runs import command_line, directory, run\n"
         "add = directory.Evaluations.add\n"
         "def add_and_die(self, movements, *found):\n"
         f"    if movements == 120: {before}\n"
         "    add(self, movements, *found)\n"
         f"    if movements == 120: {after}\n"
-        f"directory.Evaluations.add = add_and_die\nrun.FLUSH_EVERY = {flush_every}\nsys.exit(run.main(sys.argv[1:]))"
+        f"directory.Evaluations.add = add_and_die\nrun.FLUSH_EVERY = {flush_every}\n"
+        "sys.exit(command_line.main(sys.argv[1:]))"
     )
     process = start(program, *arguments(tmp_path, benchmark), *OPTIONS)
     process.communicate()

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compare import collect, last_row, main, runs_of
+from compare import collect, compared, last_row, main, runs_of, table_in
 from read_results import GOALS_HEADER, HEADER, read_goals, read_results
 from runs import ROOT, signal_after, start
 from sgimd_torch.demonstrations import load_demonstrations
@@ -21,7 +21,8 @@ from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.log import RunError
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import Run, read_run
-from tables import RESULTS, Table, goal_row, tiles_reached
+from sgimd_torch.runs.sweep import sweep
+from tables import RESULTS, Table, goal_row, result_rows, tiles_reached
 from variants import ARMS, EXPERIMENTS, make_subsets, shipped, tables_of, teacher_of
 
 # Two variants that live for 40 movements, and one, of an experiment of its own, whose demonstrations are missing.
@@ -311,3 +312,35 @@ def test_a_goal_counts_once_imitation_and_rest_not_at_all_and_near_is_within_a_m
     np.testing.assert_array_equal(run.chosen_goals(), [near, edge, far, near])
     assert goal_row(Config(name="sgim-d-large", seed=7), run) == ["sgim-d-large", 7, 4, 3]
     assert len(run_with(["babble"], [none]).chosen_goals()) == 0
+
+
+def test_rows_made_again_are_equal_but_for_rounding_or_differ():
+    row = ["learners", "sgim-d", "3", "1.0", "0", "5000", "0.0426", "", "342"]
+    assert compared(row, list(row)) == "equal"
+    assert compared(row, [*row[:6], "0.04260000000001", "", "342"]) == "rounding"
+    for other in (
+        [*row[:6], "0.0427", "", "342"],
+        [*row[:6], "0.0426", "0.03", "342"],
+        [*row[:6], "0.0426", "", "343"],
+        [*row[:5], "4000", *row[6:]],
+        [],
+    ):
+        assert compared(row, other) == "DIFFERS"
+
+
+def test_rows_are_drawn_by_lot_and_made_again_in_a_folder_of_their_own(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    results = table_in(tmp_path, "forward_model.csv")
+    config = Config(algorithm="sgim-d", environment="planar-arm-7", name="sgim-d-arm-7", movements=20)
+    again = replace(config, evaluate_at=(20,), floor_at=(), out=tmp_path / "first")
+    assert sweep([again], 1) == []
+    (row,) = result_rows("planar-arm-7", again, read_run(again.directory))
+    results.merge([row, [*row[:4], 1, 20, 0.5, "", 7]])
+    words = ["planar-arm-7", "--only", "sgim-d-arm-7", "--results", ".", "--verify", "2", "--processes", "1"]
+    code = command(main, words)
+    said = capsys.readouterr()
+    lines = sorted(said.out.splitlines())
+    assert code == 1
+    assert [line.split()[0] for line in lines] == ["DIFFERS", "equal"]  # the second row was made up
+    assert "1 equal, 0 equal but for rounding" in said.err
+    assert {path.name for path in (tmp_path / "runs").iterdir()} == {"demonstrations", "verify-0"}

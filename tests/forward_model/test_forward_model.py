@@ -12,6 +12,7 @@ from safetensors.torch import load_file, save_file
 
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.forward_model.model import ForwardModel
+from sgimd_torch.forward_model.stored import write_model
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import stream
 
@@ -274,37 +275,85 @@ def test_a_saved_model_predicts_the_same_and_keeps_its_relative_error(tmp_path, 
     assert [path.name for path in tmp_path.iterdir()] == ["model.safetensors"]
 
 
+def changed(state, name, change):
+    """The tensors of a model, one of them replaced."""
+    return {**state, name: change(state[name])}
+
+
+def rewritten(*, version="2", model=None, **said):
+    """Write the same tensors with another header, where None leaves a field out."""
+
+    def write(path, state, about):
+        header = {"version": version, "model": json.dumps({**about, **said}) if model is None else model}
+        save_file(state, path, {name: value for name, value in header.items() if value})
+
+    return write
+
+
+def number(name, change):
+    """Write a file whose checksum is right, but with other numbers in a tensor."""
+    return lambda path, state, about: write_model(path, about, changed(state, name, change))
+
+
 @pytest.mark.parametrize(
     ("spoil", "words"),
     [
         (lambda path, state, about: path.write_bytes(path.read_bytes()[:-100]), "truncated"),
         (lambda path, state, about: path.write_bytes(b"PK not a model"), "no forward model"),
-        (
-            lambda path, state, about: save_file(state, path, {**about, "version": "2"}),
-            "version 2, this library reads 1",
-        ),
+        (lambda path, state, about: path.write_bytes(b""), "no forward model"),
+        (rewritten(version="3"), "version 3, this library reads 2"),
+        (rewritten(version="1"), "no checksum, this library reads 2; train the model again"),
         (lambda path, state, about: save_file(state, path), "version None"),
-        (lambda path, state, about: save_file(state, path, {"version": "1", "model": "{"}), "not say what model"),
-        (lambda path, state, about: save_file(state, path, {"version": "1", "model": "{}"}), "not say .*context_dim"),
+        (rewritten(), "checksum"),
+        (rewritten(model="{"), "not say what model"),
+        (rewritten(model="[" * 100_000), "not say what model"),
+        (rewritten(model="[]"), "not say what model"),
+        (rewritten(model="{}"), "not say .*context_dim"),
+        (rewritten(members=2.5), "not say .*members"),
+        (rewritten(members=True), "not say .*members"),
+        (rewritten(hidden=[]), "not say .*hidden"),
+        (rewritten(hidden=[0]), "not say .*hidden"),
+        (rewritten(noise_heads=1), "not say .*noise_heads"),
+        (rewritten(theta_dim=4), r"another shape .* biases|another shape .* input_mean"),
+        (rewritten(hidden=[100_000, 100_000]), r"another shape .* biases\.0 should be .* \[3, 1, 100000\]"),  # 120 GB
+        (rewritten(members=10**15), "another shape"),
         (
-            lambda path, state, about: save_file(
-                state, path, {"version": "1", "model": json.dumps({**json.loads(about["model"]), "theta_dim": 4})}
-            ),
-            "another shape",
+            lambda path, state, about: write_model(path, about, {**state, "more": state["missed"].clone()}),
+            "another shape .* more",
         ),
-        (
-            lambda path, state, about: save_file({**state, "biases.0": state["biases.0"] * np.nan}, path, about),
-            "not finite",
-        ),
+        (number("missed", torch.Tensor.double), "another shape .* missed"),
+        (number("biases.0", lambda values: values * np.nan), "not finite"),
+        (number("n_seen", torch.neg), "negative n_seen"),
+        (number("missed", lambda values: values - 9), "negative missed"),
+        (number("input_scale", torch.zeros_like), "input_scale that is not positive"),
+        (number("outcome_scale", torch.neg), "outcome_scale that is not positive"),
     ],
 )
 def test_a_file_that_is_not_a_forward_model_is_refused(tmp_path, model, spoil, words):
     path = tmp_path / "model.safetensors"
     model.save(path)
-    about = {"version": "1", "model": json.dumps({**model.sizes, **model.shape})}
-    spoil(path, load_file(path), about)
-    with pytest.raises(ValueError, match=words):
+    spoil(path, load_file(path), {**model.sizes, **model.shape})
+    with pytest.raises(ValueError, match=words) as raised:
         ForwardModel.load(path)
+    assert str(path) in str(raised.value)
+
+
+def test_a_flipped_bit_anywhere_in_a_model_is_noticed(tmp_path):
+    path = tmp_path / "model.safetensors"
+    saved = ForwardModel(1, 2, 1, members=1, hidden=(2,))
+    saved.save(path)
+    content = path.read_bytes()
+    for place in range(len(content)):
+        path.write_bytes(content[:place] + bytes([content[place] ^ 1 << place % 8]) + content[place + 1 :])
+        try:
+            loaded = ForwardModel.load(path)
+        except ValueError as error:
+            loaded, message = None, str(error)
+        if loaded is None:
+            assert str(path) in message
+        else:  # a space of the header, say
+            assert (loaded.sizes, loaded.shape) == (saved.sizes, saved.shape)
+            assert all(torch.equal(loaded.state_dict()[name], kept) for name, kept in saved.state_dict().items())
 
 
 def test_a_slip_in_the_options_of_a_model_to_be_loaded_is_not_blamed_on_the_file(tmp_path, model):

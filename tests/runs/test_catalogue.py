@@ -229,3 +229,14 @@ def test_an_entry_that_is_not_installed_names_its_extra(monkeypatch):
 def test_the_environment_of_a_config_is_the_task_it_names():
     assert len(task_of(Config(environment="planar-arm-50")).environment.policies.low) == 50
     assert isinstance(find("environment", "planar-arm-7"), Entry)
+
+
+@pytest.mark.parametrize("kind", CATALOGUE)
+def test_the_order_of_the_catalogue_means_nothing(kind, monkeypatch):
+    given = {"algorithm": "sagg-riac", "search": "gradient", "residual": False, "epsilon": 0.2, "every": 7}
+    before = Config(**given).without_effect, Config(**{**given, "search": "perturb"}).without_effect
+    monkeypatch.setitem(CATALOGUE, kind, dict(reversed(CATALOGUE[kind].items())))
+    after = Config(**given).without_effect, Config(**{**given, "search": "perturb"}).without_effect
+    assert after == before
+    assert not any("residual" in note for note in after[0])
+    assert any("--residual has no effect with --search perturb" in note for note in after[1])

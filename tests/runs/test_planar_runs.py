@@ -183,10 +183,10 @@ def test_a_run_of_one_environment_is_not_resumed_in_another(tmp_path, capsys, ot
     assert {path.name: path.read_bytes() for path in directory.iterdir()} == before
 
 
-def test_only_the_rod_is_filmed(reference, tmp_path, capsys):
-    assert film.main([str(reference), "--out", str(tmp_path / "arm.mp4")]) == 2
+def test_an_environment_without_a_model_to_draw_is_not_filmed(reference, tmp_path, capsys):
+    assert command(film.main, [str(reference), "--out", str(tmp_path / "arm.mp4")]) == 2
     said = capsys.readouterr().err
-    assert f"error: {reference} is of planar-arm-7; a film shows the fishing rod only\n" in said
+    assert f"error: {reference} is of planar-arm-7, which cannot be filmed: it has no model of MuJoCo" in said
     assert not list(tmp_path.iterdir())
 
 

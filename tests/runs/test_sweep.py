@@ -321,10 +321,11 @@ def on_a_terminal(*options):
 
 
 def test_a_terminal_shows_one_live_line_which_begins_with_what_is_on_disk(copied, tmp_path):
-    code, lines = on_a_terminal(*SHORT, "--seeds", "0-1", "--out", str(tmp_path))
+    longer = [*SHORT, "--movements", "80"]  # of 40 that are there already
+    code, lines = on_a_terminal(*longer, "--seeds", "0-1", "--out", str(tmp_path))
     assert code == 0
-    assert any(re.search(r"sweep:  50%.* 40/80 \[00:00<\?, \? movements/s, . of 2 runs", line) for line in lines)
-    assert any(re.search(r"sweep: 100%.* 80/80 \[.* movements/s, 2 of 2 runs", line) for line in lines)
+    assert any(re.search(r"sweep:  25%.* 40/160 \[00:00<\?, \? movements/s, 0 of 2 runs", line) for line in lines)
+    assert any(re.search(r"sweep: 100%.* 160/160 \[.* movements/s, 2 of 2 runs", line) for line in lines)
 
 
 def test_the_live_line_does_not_wait_for_what_a_failed_run_will_never_make(tmp_path):

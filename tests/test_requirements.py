@@ -1,0 +1,114 @@
+"""Versions: what scripts/setup installs is pinned, nothing else is, and the lowest versions allowed work as well."""
+
+import importlib.metadata
+import os
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+ROOT = Path(__file__).parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
+EXTRAS = PROJECT["project"]["optional-dependencies"]
+PINNED = dict(
+    line.split("==") for line in (ROOT / "constraints.txt").read_text().splitlines() if not line.startswith("#")
+)
+
+
+def required(*names):
+    """Requirements of the project itself and of some of its extras; those that name the project are followed."""
+    lists = [PROJECT["project"]["dependencies"], *(EXTRAS[name] for name in names)]
+    requirements = [Requirement(text) for each in lists for text in each]
+    again = {extra for each in requirements if each.name == PROJECT["project"]["name"] for extra in each.extras}
+    if again - {*names}:
+        return required(*{*names, *again})
+    return [each for each in requirements if each.name != PROJECT["project"]["name"]]
+
+
+def closure(requirements):
+    """Names of everything that these and their requirements bring on this system, as installed."""
+    wanted = [(each, extra) for each in requirements for extra in (each.extras or {""}) | {""}]
+    done = set()
+    while wanted:
+        each, extra = wanted.pop()
+        name = canonicalize_name(each.name)
+        if (name, extra) in done:
+            continue
+        done.add((name, extra))
+        for text in importlib.metadata.requires(name) or []:
+            further = Requirement(text)
+            if further.marker is None or further.marker.evaluate({"extra": extra}):
+                wanted += [(further, more) for more in further.extras | {""}]
+    return {name for name, _ in done}
+
+
+def test_everything_that_setup_installs_is_pinned_and_nothing_else():
+    build = [Requirement(text) for text in PROJECT["build-system"]["requires"]]
+    names = closure([*required("all", "dev"), *build])
+    assert names == {canonicalize_name(name) for name in PINNED}
+
+
+def test_what_is_installed_has_the_pinned_versions():
+    installed = {name: importlib.metadata.version(name).partition("+")[0] for name in PINNED}  # "+cpu" is no version
+    assert installed == PINNED
+
+
+def test_every_requirement_says_its_lowest_version():
+    for each in [*required("all", "dev"), *(Requirement(text) for text in PROJECT["build-system"]["requires"])]:
+        assert len([part for part in each.specifier if part.operator == ">="]) == 1, each
+
+
+def lowest(requirement):
+    """``name==version`` of the lowest version that it allows."""
+    ((version,),) = [[part.version for part in requirement.specifier if part.operator == ">="]]
+    return f"{requirement.name}=={version}"
+
+
+@pytest.mark.slow
+def test_the_lowest_versions_allowed_install_together_and_pass(tmp_path):
+    # Some 3 GB to download: the lowest torch comes with its libraries for GPUs. Tools of style are not among them.
+    wanted = [*required("all", "dev"), *(Requirement(text) for text in PROJECT["build-system"]["requires"])]
+    pins = [lowest(each) for each in wanted if each.name not in ("mypy", "ruff", "pytest-xdist")]
+    python = str(tmp_path / "venv/bin/python")
+    subprocess.run([sys.executable, "-m", "venv", str(tmp_path / "venv")], check=True)
+    install = [python, "-m", "pip", "install", "-q", "--disable-pip-version-check", "--no-cache-dir", *pins]
+    done = subprocess.run(install, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    tests = [f"tests/{name}" for name in SMOKE]
+    # Old releases warn of what newer Pythons and numpys will no longer do.
+    words = [
+        "-m",
+        "pytest",
+        "-q",
+        "-p",
+        "no:cacheprovider",
+        "-m",
+        "not slow",
+        "-W",
+        "ignore::DeprecationWarning",
+        *tests,
+    ]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run([python, *words], cwd=ROOT, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout[-5000:] + done.stderr[-2000:]
+    assert re.search(r"\d{3,} passed", done.stdout)
+
+
+SMOKE = (
+    *("test_memory.py", "test_strategies.py", "test_session.py", "test_evaluation.py", "test_loaders.py"),
+    *(
+        "environments/test_fishing_rod.py",
+        "goals",
+        "inverses",
+        "searches",
+        "rivals",
+        "forward_model",
+        "board/test_board.py",
+    ),
+    *("figures", "runs/test_run.py", "runs/test_resume.py", "views/test_report.py", "views/test_film.py"),
+)
