@@ -191,7 +191,7 @@ class Config:
         on_resume=True,
     )
     repeats: int = option(
-        10,
+        3,
         EVALUATION,
         "How often each chosen movement is executed again to measure the noise, at least 2; 0 does not measure it.",
         least=0,
