@@ -2,8 +2,8 @@
 
 Section 6 of Nguyen & Oudeyer (2014). Each row compares groups of movements: one-way analyses of variance, one for each
 dimension of theta, their p values adjusted by Holm's method for their number. A demonstrator's movements are the thetas
-that reproduce their recordings closest, eq. (6); as many random ones are drawn from Pi. Movements of one run repeat and
-refine each other, so a run counts as one: the mean theta that it executed.
+that reproduce their recordings best, eq. (6); the same number of random ones is drawn
+from Pi. Movements of one run repeat and refine each other, so a run counts as one: the mean theta that it executed.
 
 The rows are kept in results/anova.csv, since run directories are not shipped:
     update_anova(Path("results/anova.csv"), Path("runs")); anova_cells(Path("results/anova.csv"))
@@ -29,7 +29,7 @@ from variants import shipped
 
 HEADER: Final = ("compared", "of", "differ", "dimensions", "smallest_p", "largest_p")
 KEY: Final = ("compared",)
-TAUGHT: Final = {1: "sgim-d-teacher-1", 2: "sgim-d-teacher-2", 3: "sgim-d"}  # SGIM-D by who teaches it
+TAUGHT: Final = {1: "sgim-d-teacher-1", 2: "sgim-d-teacher-2", 3: "sgim-d"}  # SGIM-D, by its demonstrator
 
 
 Gather = Callable[[Path], Sequence[Array]]  # the groups of one comparison, from the folder of run directories
@@ -44,7 +44,7 @@ class Compared(NamedTuple):
 
 
 def compare(runs: Path) -> tuple[list[Compared], dict[str, str]]:
-    """What could be compared; and of the other groups what they lack. ``runs`` is the folder of run directories.
+    """The comparisons, and what is missing for the others. ``runs`` is the folder of run directories.
 
     Raises:
         ValueError: a file is damaged.
@@ -61,7 +61,7 @@ def compare(runs: Path) -> tuple[list[Compared], dict[str, str]]:
 
 
 def update_anova(path: Path, runs: Path) -> None:
-    """Compare anew; what cannot be compared keeps the row that is there, and a line says what it lacks.
+    """Compare again. A comparison that is not possible keeps its row, and a message says what is missing.
 
     Raises:
         ValueError: a file is damaged.
@@ -78,11 +78,11 @@ def update_anova(path: Path, runs: Path) -> None:
     )
     kept = table.rows()
     for groups, what in missing.items():
-        say(f"{groups}: not run: {what}; " + ("its row stays as it was" if (groups,) in kept else "it gets no row"))
+        say(f"{groups}: not run: {what}; " + ("its row stays the same" if (groups,) in kept else "it gets no row"))
 
 
 def anova_cells(path: Path) -> list[list[str]]:
-    """The rows for people, a line that says so for what was not compared.
+    """The rows of the page; comparisons that were not made say so.
 
     Raises:
         ValueError: the table is damaged.
@@ -98,10 +98,10 @@ def _cells(row: dict[str, str], where: str) -> list[str]:
 
 
 def shown_by(teacher: int) -> Array:
-    """``(n, theta_dim)``, the thetas that reproduce the shipped recordings of a demonstrator closest, eq. (6).
+    """``(n, theta_dim)``, the thetas that reproduce the shipped recordings of a demonstrator best, eq. (6).
 
     Raises:
-        NotRun: that file is not there.
+        NotRun: the file does not exist.
         ValueError: it is damaged, or of another robot.
     """
     path = shipped(teacher)
@@ -114,13 +114,13 @@ def shown_by(teacher: int) -> Array:
 
 
 def random_thetas(n: int, name: str) -> Array:
-    """``(n, theta_dim)``, uniform in Pi; each name has its own."""
+    """``(n, theta_dim)``, uniform in Pi; each name has its own stream."""
     policies, rng = FishingRod().policies, stream(SEED, f"random thetas for {name}")
     return np.stack([policies.sample(rng) for _ in range(n)])
 
 
 def mean_thetas(folder: Path, variant: str) -> Array:
-    """``(n_runs, theta_dim)``, the mean theta that each finished run executed, movements at rest left out.
+    """``(n_runs, theta_dim)``, the mean theta that each finished run executed, without movements at rest.
 
     Raises:
         NotRun: fewer than 2 runs are finished.
@@ -147,7 +147,7 @@ def _mean_thetas(*variants: str) -> Gather:
     return gather
 
 
-COMPARISONS: Final[dict[str, tuple[str, Gather]]] = {  # groups in words: what their rows are, and what gathers them
+COMPARISONS: Final[dict[str, tuple[str, Gather]]] = {  # groups in words: what a row is, what gathers them
     **{f"demonstrator {each}, random movements": ("movements", _against_random(each)) for each in TAUGHT},
     **{
         f"SGIM-D taught by demonstrator {each}, Random": ("runs", _mean_thetas(variant, "random"))

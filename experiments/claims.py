@@ -1,17 +1,17 @@
-"""The pages results/RESULTS.md and results/FORWARD_MODEL.md: what was claimed, our numbers, and whether it holds.
+"""The pages results/RESULTS.md and results/FORWARD_MODEL.md: the claims, our numbers, and whether they hold.
 
-Each page is a template in experiments/pages/ that holds the prose, with the tables put in by name. Change the template,
-not the page. The tables come from the rows in --results, which compare.py leaves there:
+Each page is a template in experiments/pages/, which has the text; the tables are put in by name. Change the template,
+not the page. The tables come from the rows in --results, which compare.py writes:
 
-  RESULTS         paper.csv, and where they are there goals.csv and anova.csv
-  FORWARD_MODEL   forward_model.csv, and where it is there the table of model_figures.py (--table)
+  RESULTS         paper.csv, and goals.csv and anova.csv if they exist
+  FORWARD_MODEL   forward_model.csv, and the table of model_figures.py (--table) if it exists
 
-Intervals are bootstrapped with a fixed seed, so that the same rows give the same page. The analyses of variance need
-run directories: --runs makes them anew and keeps their rows in anova.csv.
+Intervals are bootstrapped with a fixed seed, so the same rows give the same page. The analyses of variance need
+run directories: --runs makes them again and keeps their rows in anova.csv.
 
 Examples:
   python experiments/claims.py                                  both pages, from the rows in results/
-  python experiments/claims.py --runs runs --only RESULTS       and the analyses of variance anew
+  python experiments/claims.py --runs runs --only RESULTS       and the analyses of variance again
 """
 
 from __future__ import annotations
@@ -41,23 +41,23 @@ PAGES: Final = ("RESULTS", "FORWARD_MODEL")
 MADE: Final = "<!-- Made by experiments/claims.py"
 ANOVA: Final = ("means compared", "of", "dimensions of theta in which they differ", "smallest p", "largest p")
 ON_ARMS: Final = (250, 500, 1000, 2000)
-# Of the forward model's page: how the names of variants end, and at which movements they are evaluated.
+# For the forward model's page: how names of variants end, and at which movements they are evaluated.
 MODEL_TABLES: Final = {
     "forward-model": ("", (500, 1000, 2000, LAST)),
     "planar-arm-7": ("-arm-7", ON_ARMS),
     "planar-arm-50": ("-arm-50", ON_ARMS),
 }
 Page = tuple[list[Verdict], dict[str, str]]  # its verdicts, and its tables by name
-Cell = Callable[[str], str]  # what a column of a table says of a variant; raises NotRun where that is nothing
+Cell = Callable[[str], str]  # the text of a variant in a column of a table; raises NotRun if there is none
 
 
 def paper_page(folder: Path) -> Page:
-    """Of results/RESULTS.md; learners from the worst to the best, other variants in the order of their rows."""
+    """The page results/RESULTS.md; learners from the worst to the best, other variants in the order of their rows."""
     results = Results(read_results(folder / "paper.csv"), read_goals(folder / "goals.csv"))
     verdicts, variants = judge(PAPER_CLAIMS, results), results.variants
     learners = sorted((v for v in variants.values() if v.experiment == "learners"), key=lambda v: -_last_error(v))
     others = [variant for variant in variants.values() if variant.experiment != "learners"]
-    better, difference = _beside(results, lambda _: "sgim-d", LAST)
+    better, difference = _against(results, lambda _: "sgim-d", LAST)
     columns = {
         "experiment": lambda name: variants[name].experiment,
         **_errors(results, (1000, LAST), ".3f"),
@@ -75,12 +75,12 @@ def paper_page(folder: Path) -> Page:
 
 
 def model_page(folder: Path, table: Path) -> Page:
-    """Of results/FORWARD_MODEL.md; variants in the order of ``EXPERIMENTS``."""
+    """The page results/FORWARD_MODEL.md; variants in the order of ``EXPERIMENTS``."""
     results = Results(read_results(folder / "forward_model.csv"), coverages=read_coverages(table))
     verdicts = judge(MODEL_CLAIMS, results)
     tables = {"bars": verdicts_table("what", verdicts)}
     for experiment, (ending, times) in MODEL_TABLES.items():
-        better, difference = _beside(results, partial(_plain_learner, ending), times[-1])
+        better, difference = _against(results, partial(_plain_learner, ending), times[-1])
         columns = {
             **_errors(results, times, ".4f"),
             f"difference to the plain learner at {times[-1]} (m)": difference,
@@ -92,7 +92,7 @@ def model_page(folder: Path, table: Path) -> Page:
 
 
 def _errors(results: Results, times: Sequence[int], form: str) -> dict[str, Cell]:
-    """A variant's name, how many of its seeds came to the last of these ``times``, its errors at each of them."""
+    """A variant's name, how many of its seeds reached the last of these ``times``, its errors at each of them."""
 
     def error(when: int) -> Cell:
         return lambda name: show(results.iqm(name, when), form)
@@ -104,9 +104,9 @@ def _errors(results: Results, times: Sequence[int], form: str) -> dict[str, Cell
     }
 
 
-def _beside(results: Results, plain: Callable[[str], str], movements: int) -> tuple[Cell, Cell]:
-    """How likely the ``plain`` learner of a variant is better; and by how much, above 0 where it errs less, on the
-    seeds that both have. Nothing for the plain learner itself."""
+def _against(results: Results, plain: Callable[[str], str], movements: int) -> tuple[Cell, Cell]:
+    """Two columns that compare a variant with its ``plain`` learner: how likely that one is better; the difference on
+    common seeds, above 0 if its error is smaller. Empty for the plain learner itself."""
 
     def better(name: str) -> str:
         return "" if name == plain(name) else show(results.improvement(plain(name), name, movements))
@@ -127,12 +127,12 @@ def _plain_learner(ending: str, name: str) -> str:
 
 
 def _last_error(variant: Evaluated) -> float:
-    """Mean over seeds at the end; inf where it was never evaluated there."""
+    """Mean over seeds at the end; inf if it was never evaluated there."""
     return float(np.mean(list(variant.at(LAST).values()) or [np.inf]))
 
 
 def variants_table(names: Sequence[str], columns: Mapping[str, Cell]) -> str:
-    """One row for each variant, with a dash where something was not run."""
+    """One row for each variant, with a dash for what was not run."""
 
     def shown(cell: Cell, name: str) -> str:
         try:
@@ -150,7 +150,7 @@ def verdicts_table(what: str, verdicts: Sequence[Verdict]) -> str:
 
 
 def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table; one without rows says so."""
+    """A table; "Not run." without rows."""
     if not rows:
         return "Not run."
     lines = [head, ["---"] * len(head), *([cell.replace("|", "\\|") for cell in row] for row in rows)]
@@ -167,7 +167,7 @@ def render(name: str, tables: Mapping[str, str]) -> str:
 
 
 def _check_place(path: Path) -> None:
-    """Raises ResultsError where a page of another kind would be lost."""
+    """Raises ResultsError if a file that is not one of our pages would be overwritten."""
     if path.is_file() and not path.read_bytes().startswith(MADE.encode()):
         raise ResultsError(
             f"{path} was not made by claims.py and is left as it is; move it away, or name another --out"
@@ -175,14 +175,14 @@ def _check_place(path: Path) -> None:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Make the pages; the exit code is 2, and no page is changed, where the rows make no sense."""
+    """Make the pages; the exit code is 2, and no page is changed, if the rows make no sense."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     results = Path("results")
     parser.add_argument("--results", type=Path, default=results, help="folder of the rows (default: %(default)s)")
     parser.add_argument("--table", type=Path, help="of model_figures.py (default: model/table.csv in --results)")
-    parser.add_argument("--runs", type=Path, help="run directories, to make the analyses of variance anew")
+    parser.add_argument("--runs", type=Path, help="run directories, to make the analyses of variance again")
     parser.add_argument("--out", type=Path, default=results, help="folder of the pages (default: %(default)s)")
-    parser.add_argument("--only", choices=PAGES, help="this page alone")
+    parser.add_argument("--only", choices=PAGES, help="only this page")
     options = parser.parse_args(argv)
     folder, table = options.results, options.table or options.results / "model" / "table.csv"
     makers = {"RESULTS": lambda: paper_page(folder), "FORWARD_MODEL": lambda: model_page(folder, table)}

@@ -1,8 +1,8 @@
-"""Run the paper's experiments, every variant for several seeds, and collect what they come to in tables.
+"""Run the paper's experiments, every variant with several seeds, and collect the results in tables.
 
 variants.py says which variants there are. A run goes to OUT/VARIANT/seed-003. When it ends, each of its evaluations
 becomes a line of RESULTS/paper.csv, or of RESULTS/forward_model.csv for forward-model and planar-arm-*; the goals that
-it chose in the large task space are counted in RESULTS/goals.csv. A variant of two experiments is run once.
+it chose in the large task space are counted in RESULTS/goals.csv. A variant in two experiments is run once.
 
 Start the same command again after Ctrl-C or a power cut, or with more seeds: what is in the tables is not run again,
 and a run that was stopped goes on. If a run fails, the others go on.
@@ -41,14 +41,14 @@ examples:
 
 Exit code: 0 all runs are in the tables, 1 some failed, 2 the request is wrong, 130 or 143 stopped by a signal.
 """
-# These measure the noise floor: as much work as all the rest.
+# These measure the noise floor, which takes as long as everything else.
 FLOORS: Final = ("learners", "teachers", "long", "letter", "forward-model")
 FLOOR_AT: Final = (5000, 10_000)
-ROUNDING: Final = 1e-5  # relative; another processor rounds otherwise, and thousands of movements build on it
+ROUNDING: Final = 1e-5  # relative; another processor rounds differently, and errors grow over thousands of movements
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Find what is missing in the tables, run it, collect it.
+    """Run what is missing in the tables, and collect the results.
 
     Returns:
         The exit code, 1 where runs failed.
@@ -67,7 +67,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 0
     make_folder(options.results)
     make_subsets(options.out / "demonstrations")
-    runs: dict[Config, list[str]] = {}  # with the experiments that want it
+    runs: dict[Config, list[str]] = {}  # with the experiments that it belongs to
     for name, config in left:
         runs.setdefault(config, []).append(name)
 
@@ -83,10 +83,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 def verify(wanted: Sequence[tuple[str, Config]], options: argparse.Namespace) -> int:
     """Draw rows of the tables by lot, make each again by a run of its own, and compare.
 
-    Such a run lives as long as its row says and is evaluated then alone, which changes nothing in it.
+    Such a run has as many movements as its row says and is evaluated only at the end, which does not change it.
 
     Returns:
-        0 if all are equal, but for rounding, else 1.
+        0 if all are equal, except for rounding, else 1.
     """
     shipped = {table: table_in(options.results, table).rows() for name, _ in wanted for table in tables_of(name)[:1]}
     found = [
@@ -119,13 +119,13 @@ def verify(wanted: Sequence[tuple[str, Config]], options: argparse.Namespace) ->
 
 
 def row_now(experiment: str, config: Config) -> list[str]:
-    """The last row that a run comes to; [] if it did not come to its end."""
+    """The last row of a run; [] if the run is not finished."""
     made = result_rows(experiment, config, read_run(config.directory)) if finished(config) else []
     return [as_text(value) for value in made[-1]] if made else []
 
 
 def compared(shipped: Sequence[str], now: Sequence[str]) -> str:
-    """Two rows: "equal", equal but for "rounding", which grows while a learner learns, or "DIFFERS"."""
+    """Compare two rows: "equal", "rounding" if only that differs (it grows while a learner learns), or "DIFFERS"."""
     if list(shipped) == list(now):
         return "equal"
     if len(shipped) != len(now) or shipped[:6] != now[:6] or [bool(field) for field in shipped] != list(map(bool, now)):
@@ -137,13 +137,13 @@ def compared(shipped: Sequence[str], now: Sequence[str]) -> str:
 def runs_of(
     experiments: Sequence[str], only: Sequence[str], seeds: Sequence[int], out: Path
 ) -> list[tuple[str, Config]]:
-    """All runs, each with its experiment, seed by seed, so that every variant has its first ones early.
+    """All runs, each with its experiment, seed by seed, so that every variant gets its first seeds early.
 
     Args:
         experiments: names in ``EXPERIMENTS``.
-        only: of their variants only these; empty for all.
+        only: only these of their variants; empty for all.
         seeds: of each.
-        out: where runs go; the subsets of ``make_subsets`` lie in ``out/demonstrations``.
+        out: where runs go; the subsets of ``make_subsets`` are in ``out/demonstrations``.
     """
     found = []
     for seed in seeds:
@@ -161,7 +161,7 @@ def runs_of(
 
 
 def last_row(config: Config) -> Key:
-    """Key of a run's last row; if that is in a table, all its rows are."""
+    """Key of a run's last row; if it is in a table, so are the others."""
     return config.variant, str(config.seed), str(config.movements)
 
 
@@ -183,7 +183,7 @@ def collect(experiment: str, config: Config, results: Path) -> None:
     evaluations, *others = tables_of(experiment)
     for name in others:
         table_in(results, name).merge([goal_row(config, run)])
-    table_in(results, evaluations).merge(result_rows(experiment, config, run))  # last: it is what counts as done
+    table_in(results, evaluations).merge(result_rows(experiment, config, run))  # last: now the run counts as done
 
 
 def _options(argv: Sequence[str] | None) -> argparse.Namespace:
@@ -193,8 +193,8 @@ def _options(argv: Sequence[str] | None) -> argparse.Namespace:
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("experiments", nargs="*", metavar="EXPERIMENT", help="which; none stands for all of them")
-    parser.add_argument("--only", nargs="+", default=[], metavar="VARIANT", help="of their variants only these")
+    parser.add_argument("experiments", nargs="*", metavar="EXPERIMENT", help="which; all if none is named")
+    parser.add_argument("--only", nargs="+", default=[], metavar="VARIANT", help="only these of their variants")
     add_options(parser, seeds="0-9")
     parser.add_argument("--out", type=Path, default=Path("runs"), help="where the runs go (default: %(default)s)")
     parser.add_argument(
@@ -203,7 +203,7 @@ def _options(argv: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "--verify", type=int, default=0, metavar="N", help="make N rows of the tables again, in a folder of their own"
     )
-    parser.add_argument("--lot", type=int, default=0, help="seed of the lot that draws them (default: %(default)s)")
+    parser.add_argument("--lot", type=int, default=0, help="seed for drawing them (default: %(default)s)")
     options = parser.parse_args(argv)
     options.experiments = list(dict.fromkeys(options.experiments)) or list(EXPERIMENTS)
     _check_names(options.experiments, options.only)
@@ -226,7 +226,7 @@ def _check_names(experiments: Sequence[str], only: Sequence[str]) -> None:
             raise ValueError(f"{name} is an experiment, no variant; experiments go before --only")
         if name in homes and name not in known:
             where = " and ".join(homes[name])
-            raise ValueError(f"{name} is a variant of {where}, asked for were {', '.join(experiments)}")
+            raise ValueError(f"{name} is a variant of {where}, you named {', '.join(experiments)}")
         _check_known("variant", name, known)
 
 

@@ -1,6 +1,6 @@
-"""The figures of the paper's results, from results/paper.csv and, where movements are shown, from run directories.
+"""The figures of the paper's results, from results/paper.csv and, for figures of movements, from run directories.
 
-Each is written as png and svg. A figure without its data is left out, and a line says what it lacks.
+Each is written as png and svg. A figure without its data is left out, and a message says what is missing.
 
   errors         error against movements, five learners           (fig. a of the paper's results)
   demonstrators  the same with each of three demonstrators         (b)
@@ -55,19 +55,19 @@ PANELS = {
     "teaching": "Taught otherwise",
     "letter": "The paper to the letter",
 }
-MOVING = (("random", "sagg-riac"), ("imitation", "sgim-d"))  # the learners of the paper that execute movements
+MOVING = (("random", "sagg-riac"), ("imitation", "sgim-d"))  # the paper's learners that execute movements
 REACH = 1.5  # m; the float hardly ever lands farther from the base
 
 
 @dataclass(frozen=True, eq=False)
 class Data:
-    """What figures are made of: the results, and where run directories lie."""
+    """The data of figures: the results, and the folder of run directories."""
 
     results: Results
     folder: Path
 
     def curves(self, variant: str, algorithm: str, label: str, *, dashed: bool = False) -> SeedCurves:
-        """Error curves up to the paper's 5000 movements; raises ``NotRun`` where no seed has a whole one."""
+        """Error curves up to the paper's 5000 movements; raises ``NotRun`` if no seed has a whole one."""
         if variant not in self.results.variants:
             raise NotRun(variant)
         movements, errors = self.results.variants[variant].curves()
@@ -77,12 +77,12 @@ class Data:
         return SeedCurves(algorithm, label, movements, errors, centre, low, high, dashed)
 
     def last(self, variant: str, values: str) -> Array:
-        """``(n_seeds,)`` "floors" or "tiles" after the paper's 5000 movements; none of a variant that was not run."""
+        """``(n_seeds,)`` "floors" or "tiles" after the paper's 5000 movements; empty for a variant that was not run."""
         found = self.results.variants[variant].at(LAST, values) if variant in self.results.variants else {}
         return np.array(list(found.values()))
 
     def runs(self, variant: str) -> list[Run]:
-        """All seeds; raises ``NotRun`` where there is none, ``RunError`` where one is damaged."""
+        """All seeds; raises ``NotRun`` if there is none, ``RunError`` if one is damaged."""
         if runs := read_seeds(self.folder, variant):
             return runs
         raise NotRun(f"run directories {self.folder}/{variant}/seed-*")
@@ -104,7 +104,7 @@ def errors(data: Data) -> Figure:
 
 
 def demonstrators(data: Data) -> Figure:
-    """(b): one panel for each demonstrator, with SAGG-RIAC, which has none, in all of them."""
+    """(b): one panel for each demonstrator, and SAGG-RIAC, which has none, in all of them."""
     panels = {}
     for teacher in DEMONSTRATORS:
         suffix = "" if teacher == 3 else f"-teacher-{teacher}"
@@ -144,7 +144,7 @@ def landing(data: Data) -> Figure:
 
 
 def trajectories(data: Data) -> Figure:
-    """(d): what the demonstrators show, joint by joint; a row for each of those whose recordings are there."""
+    """(d): what the demonstrators show, joint by joint; a row for each whose recordings exist."""
     shown = {each: load_demonstrations(path) for each in DEMONSTRATORS if (path := shipped(each)).exists()}
     if not shown:
         raise NotRun("recordings of any demonstrator")
@@ -165,7 +165,7 @@ def trajectories(data: Data) -> Figure:
 
 
 def large_space(data: Data) -> Figure:
-    """(e): the learners where T is 100 times wider, beside those of the usual T."""
+    """(e): the learners in a T 100 times wider, and in the usual T."""
     figure = _figure(8, 5.6)
     ax = figure.subplots()
     small, large = "T = [−1, 1]²", "T = [−100, 100]²"
@@ -184,7 +184,7 @@ def large_space(data: Data) -> Figure:
 
 
 def goals(data: Data) -> Figure:
-    """(f): goals that learners set themselves in the large task space, and how far from the base they lie."""
+    """(f): goals that learners chose themselves in the large task space, and their distance from the base."""
     runs = {name: data.runs(f"{name}-large") for name in ("sagg-riac", "sgim-d")}
     chosen = {name: [run.chosen_goals() for run in found] for name, found in runs.items()}
     half_side = max(float(run.config["task_space"]) for found in runs.values() for run in found)
@@ -204,7 +204,7 @@ def goals(data: Data) -> Figure:
 
 
 def variants(data: Data) -> Figure:
-    """What becomes of the error when SGIM-D is changed, taught otherwise or replaced; one panel for each experiment."""
+    """The error when SGIM-D is changed, taught differently or replaced; one panel for each experiment."""
     panels: dict[str, list[Difference]] = {}
     for name, variant in data.results.variants.items():
         if variant.experiment not in ("learners", "teachers", "large-space", "long"):
@@ -238,7 +238,7 @@ def _figure(width: float, height: float) -> Figure:
 
 
 def _interval(values: Array) -> Interval:
-    """Of a single seed: that seed."""
+    """For a single seed: that seed."""
     return iqm_interval(values, rng=rng()) if len(values) > 1 else Interval(values[0], values[0], values[0])
 
 
@@ -265,12 +265,12 @@ def _demonstrated(runs: Sequence[Run]) -> Array:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Draw what can be drawn; the exit code is 2 when the results make no sense."""
+    """Draw what can be drawn; the exit code is 2 if the results make no sense."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--results", type=Path, default=Path("results"), help="folder of tables (default: %(default)s)")
     parser.add_argument("--runs", type=Path, default=Path("runs"), help="run directories (default: %(default)s)")
     parser.add_argument("--out", type=Path, default=Path("results/figures"), help="default: %(default)s")
-    parser.add_argument("--only", choices=FIGURES, help="this figure alone")
+    parser.add_argument("--only", choices=FIGURES, help="only this figure")
     options = parser.parse_args(argv)
     data = Data(Results(read_results(options.results / "paper.csv")), options.runs)
     make_folder(options.out)

@@ -1,7 +1,7 @@
-"""How a claim is judged: what it is judged on, the bar it has to clear, and one loop for all of them.
+"""How a claim is judged: the results, the bar that it has to clear, and one loop for all claims.
 
 A bar counts as cleared only if the whole 95 % interval clears it. If the interval straddles the bar, or runs are
-missing, nothing can be said.
+missing, the verdict is "cannot say".
     results = Results(read_results("results/paper.csv"))
     judge([Claim("half of Random's error", "ratio ≤ 0.50", ratio_at_most("sgim-d", "random", 0.5))], results)
 """
@@ -43,10 +43,10 @@ class NotRun(LookupError):
 
 @dataclass(frozen=True, eq=False)
 class Results:
-    """What is claimed is judged on this: ``variants`` as of ``read_results``, and for some claims ``goals`` as of
-    ``read_goals`` and ``coverages`` as of ``read_coverages``.
+    """The data that claims are judged on: ``variants`` from ``read_results``, and for some claims ``goals`` from
+    ``read_goals`` and ``coverages`` from ``read_coverages``.
 
-    Errors are in metres, intervals hold 95 % of a bootstrap over seeds. All methods raise ``NotRun`` where fewer than 2
+    Errors are in metres, intervals hold 95 % of a bootstrap over seeds. All methods raise ``NotRun`` if fewer than 2
     seeds have what they need.
     """
 
@@ -63,7 +63,7 @@ class Results:
         return found
 
     def errors(self, variant: str, movements: int = LAST) -> Array:
-        """``(n_seeds,)``."""
+        """``(n_seeds,)`` m."""
         return _array(self.at(variant, movements))
 
     def curves(self, variant: str) -> tuple[Array, Array]:
@@ -83,7 +83,7 @@ class Results:
         return iqm_interval(_array(self.at(variant, movements, values)), rng=rng())
 
     def pairs(self, ours: str, theirs: str, movements: int = LAST) -> tuple[dict[int, float], dict[int, float]]:
-        """Errors of both by seed, of the seeds that both have."""
+        """Errors of both by seed, for common seeds."""
         return shared(self.at(ours, movements), self.at(theirs, movements))
 
     def difference(self, ours: str, theirs: str, movements: int = LAST) -> Interval:
@@ -95,7 +95,7 @@ class Results:
         return ratio_interval(self.errors(ours, movements), self.errors(theirs, movements), rng=rng())
 
     def improvement(self, ours: str, theirs: str, movements: int = LAST) -> Interval:
-        """The probability that a run of ours errs less than one of theirs."""
+        """The probability that a run of ours has a smaller error than one of theirs."""
         return improvement_interval(self.errors(ours, movements), self.errors(theirs, movements), rng=rng())
 
     def floor_ratio(self, ours: str, theirs: str) -> Interval:
@@ -104,7 +104,7 @@ class Results:
         return ratio_interval(_array(errors), _array(floors), rng=rng(), paired=True)
 
     def time_to_reach(self, ours: str, theirs: str, *, unit: float = 1.0, at_most: float) -> Interval:
-        """When our mean curve comes down to where theirs ends, in movements / ``unit``; ``at_most`` if later."""
+        """When our mean curve falls to the end of theirs, in movements / ``unit``; ``at_most`` if later."""
         movements, curves = self.curves(ours)
 
         def time(curves: Array, errors: Array) -> Array:
@@ -115,7 +115,7 @@ class Results:
 
 
 def shared(ours: dict[int, float], theirs: dict[int, float]) -> tuple[dict[int, float], dict[int, float]]:
-    """Both, cut down to the seeds that both have.
+    """Both, restricted to common seeds.
 
     Raises:
         NotRun: fewer than 2.
@@ -127,7 +127,7 @@ def shared(ours: dict[int, float], theirs: dict[int, float]) -> tuple[dict[int, 
 
 
 class Claim(NamedTuple):
-    """What is claimed, the bar in words, and what judges it: gives our number in words and the verdict."""
+    """The claim and its bar in words, and the function that judges it: returns our number in words and the verdict."""
 
     text: str
     bar: str
@@ -144,10 +144,10 @@ class Verdict(NamedTuple):
 
 
 def judge(claims: Iterable[Claim], results: Results) -> list[Verdict]:
-    """All claims in order; "cannot say" where something was not run.
+    """All claims in order; "cannot say" if something was not run.
 
     Raises:
-        ValueError: errors that no ratio can be made of, such as 0.
+        ValueError: errors that have no ratio, such as 0.
     """
     return [Verdict(claim.text, claim.bar, *_judged(claim, results)) for claim in claims]
 
@@ -172,21 +172,21 @@ def at_least(found: Interval, bar: float) -> str:
 
 
 def below_zero(found: Interval) -> str:
-    """Do ours err less, for certain?"""
+    """Is the error of ours smaller, for certain?"""
     if found.high < 0:
         return HOLDS
     return FAILS if found.low > 0 else OPEN
 
 
 def all_of(*verdicts: str) -> str:
-    """One that fails fails all; else one that is open leaves all open."""
+    """Fails if any fails; else open if any is open."""
     return next((verdict for verdict in (FAILS, OPEN) if verdict in verdicts), HOLDS)
 
 
 def ratio_at_most(
     ours: str, theirs: str, bar: float, *, upper: float | None = None, movements: int = LAST
 ) -> Callable[[Results], Judged]:
-    """Judges our error over theirs; ``upper`` as of ``at_most``."""
+    """Judges our error over theirs; ``upper`` as in ``at_most``."""
 
     def judged(results: Results) -> Judged:
         ratio = results.ratio(ours, theirs, movements)
@@ -196,7 +196,7 @@ def ratio_at_most(
 
 
 def errs_less(ours: str, theirs: str) -> Callable[[Results], Judged]:
-    """Judges our error less theirs, paired by seed, at the end."""
+    """Judges our error minus theirs, paired by seed, at the end."""
 
     def judged(results: Results) -> Judged:
         difference = results.difference(ours, theirs)

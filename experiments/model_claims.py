@@ -1,6 +1,6 @@
-"""What the forward model had to show: bars for each of the variants judged by them, in results/FORWARD_MODEL.md.
+"""The claims about the forward model in results/FORWARD_MODEL.md, for each of the judged variants.
 
-How honest the predicted spread is comes from the table that model_figures.py makes. What a model costs is in no table:
+How honest the predicted spread is comes from the table that model_figures.py makes. The cost of a model is in no table:
 scripts/bench_forward_model.py measures it.    for verdict in judge(MODEL_CLAIMS, results): print(verdict.verdict)
 """
 

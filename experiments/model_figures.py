@@ -1,6 +1,6 @@
 """Was the forward model right, and did it know where it was wrong? A figure for each variant, one table.
 
-Only predictions count that were made before the model learnt from what they predict. The figure, of a variant's first
+Only predictions made before the model learnt from their exemplars count. The figure, of a variant's first
 run, shows where the last predictions were wrong, whether the spread was honest, and how both changed with time. The
 table has a row for each run; table.csv has its numbers unrounded.
 
@@ -45,7 +45,7 @@ from sgimd_torch.runs.tables import WHOLE, small_table
 from sgimd_torch.spaces import Array, Box
 
 NEWEST: Final = 1000  # predictions
-LATE: Final = 2000  # movements, from which on the spread is to be honest
+LATE: Final = 2000  # movements, from which on the spread must be honest
 HEAD: Final = (
     *("run", "predicted", "error (m)", "inside 50 / 80 / 95 %", f"from {LATE} on", "improved (%)"),
     *("refreshes", "ms each"),
@@ -73,7 +73,7 @@ class ModelRun:
         return "/".join(self.run.path.resolve().parts[-2:])
 
     def inside(self, chosen: slice | NDArray[np.bool_], levels: ArrayLike = LEVELS) -> Array:
-        """Coverage ``(n_levels,)`` of the ``chosen`` predictions, NaN without any."""
+        """Coverage ``(n_levels,)`` of the ``chosen`` predictions; NaN if there are none."""
         observed, mean, spread = (values[chosen] for values in (self.observed, self.mean, self.spread))
         return coverage(observed, mean, spread, levels) if len(observed) else np.full(np.shape(levels), np.nan)
 
@@ -110,7 +110,7 @@ def read_model_run(path: Path) -> ModelRun:
 
 
 def row(model_run: ModelRun) -> dict[str, Any]:
-    """Its row of the table, by column; NaN where there is nothing to measure."""
+    """Its row of the table, by column; NaN if there is nothing to measure."""
     errors = np.linalg.norm(model_run.observed - model_run.mean, axis=1)
     run, refreshes = model_run.run, len(model_run.refreshes["diverged"])
     seconds = run.summary.get("seconds_model")
@@ -129,7 +129,7 @@ def row(model_run: ModelRun) -> dict[str, Any]:
 
 
 def figure_of(model_run: ModelRun) -> Figure:
-    """Where predictions went wrong, whether the spread was honest, and both over time; maps only of the plane."""
+    """Where predictions went wrong, whether the spread was honest, and both over time; maps only in the plane."""
     observed, mean, refreshes = model_run.observed, model_run.mean, model_run.refreshes
     is_plane, last = observed.shape[1] == 2, slice(-NEWEST, None)
     over_time = ["error", "coverage", "held out"]
@@ -163,7 +163,7 @@ def _checked(run: Run, name: str, table: dict[str, np.ndarray]) -> dict[str, np.
     """The ``table`` of a model as it is.
 
     Raises:
-        RunError: it is damaged, or of other outcomes.
+        RunError: it is damaged, or has other outcomes.
     """
     path, bad = run.path / name, run.damage.get(name, 1)
     names = small_table(path, run.outcomes.shape[1]).names
@@ -191,14 +191,14 @@ def _printed(cells: dict[str, Any]) -> list[str]:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Draw the figures, write and print the table; the exit code is 2 when a run makes no sense."""
+    """Draw the figures, write and print the table; the exit code is 2 if a run makes no sense."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("runs", type=Path, nargs="+", metavar="RUN", help="a run directory: runs/sgim-d/seed-003")
     parser.add_argument("--out", type=Path, default=Path("results/model"), help="default: %(default)s")
     options = parser.parse_args(argv)
     found = {run.name: run for run in map(read_model_run, tqdm(options.runs, "reading", disable=None))}
     if len(found) < len(options.runs):
-        raise RunError("two of these runs have the same name; draw them apart, each with its own --out")
+        raise RunError("two of these runs have the same name; draw them one by one, each with its own --out")
     make_folder(options.out)
     first = {name.split("/")[0]: name for name in reversed(found)}
     for name in tqdm(first.values(), "drawing", disable=None):

@@ -1,4 +1,4 @@
-"""What the experiments left, read back: the tables in results/, and the runs of a variant.
+"""Reading results: the tables in results/, and the runs of a variant.
 
 results = read_results("results/paper.csv"); results["sgim-d"].at(5000)    # {seed: mean error (m)}
 runs = read_seeds(Path("runs"), "sgim-d")
@@ -39,7 +39,7 @@ class ResultsError(ValueError):
 
 
 class Values(NamedTuple):
-    """Of one evaluation of one run: m, m, and how many tiles; ``floors`` is NaN where the noise was not measured."""
+    """One evaluation of one run: m, m, and how many tiles; ``floors`` is NaN if the noise was not measured."""
 
     errors: float
     floors: float
@@ -55,12 +55,12 @@ class Evaluated:
     rows: dict[tuple[int, int], Values]
 
     def at(self, movements: int, values: str = "errors") -> dict[int, float]:
-        """Seed -> value of "errors", "floors" or "tiles" after so many movements, of the seeds that have one."""
+        """Seed -> value of "errors", "floors" or "tiles" after these ``movements``, for seeds that have one."""
         found = {seed: getattr(row, values) for (seed, when), row in sorted(self.rows.items()) if when == movements}
         return {seed: value for seed, value in found.items() if math.isfinite(value)}
 
     def curves(self, last: int = LAST) -> tuple[Array, Array]:
-        """Movements ``(n,)`` and errors ``(n_seeds, n)`` m up to ``last``, of the seeds that have all evaluations."""
+        """Movements ``(n,)`` and errors ``(n_seeds, n)`` m up to ``last``, for seeds that have all evaluations."""
         times, seeds = sorted({when for _, when in self.rows if when <= last}), sorted({seed for seed, _ in self.rows})
         whole = [seed for seed in seeds if all((seed, when) in self.rows for when in times)]
         errors = [[self.rows[seed, when].errors for when in times] for seed in whole]
@@ -122,7 +122,7 @@ def read_coverages(path: str | os.PathLike[str]) -> dict[str, Array]:
 def read_rows(
     path: str | os.PathLike[str], header: tuple[str, ...], *, optional: bool = False
 ) -> Iterator[tuple[str, dict[str, str]]]:
-    """Where each line stands, for messages, and its fields by name; nothing of an ``optional`` table without file.
+    """The place of each line, for messages, and its fields by name; nothing if an ``optional`` table has no file.
 
     Raises:
         ResultsError: it is missing, cannot be read, or is another table.
@@ -166,7 +166,7 @@ def number(row: dict[str, str], name: str, where: str) -> float:
     """A finite number of 0 or more.
 
     Raises:
-        ResultsError: it is none; the message says where.
+        ResultsError: it is not; the message says where.
     """
     try:
         value = float(row[name])

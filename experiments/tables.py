@@ -1,4 +1,4 @@
-"""The tables of results: what each finished run comes to, collected from its directory and merged with what is there.
+"""The tables of results: the results of each finished run, collected from its directory and merged with earlier rows.
 
 table = Table(Path("results/paper.csv"), *RESULTS); table.merge(result_rows("learners", config, run)); table.rows()
 A row made again from a run is the row that was there, byte for byte.
@@ -32,10 +32,10 @@ from sgimd_torch.spaces import Array
 from variants import teacher_of
 
 Key = tuple[str, ...]
-# Columns, and which of them tell one row from another.
+# Columns, and which of them identify a row.
 RESULTS: Final = (HEADER, ("variant", "seed", "movements"))
 GOALS: Final = (GOALS_HEADER, ("variant", "seed"))
-CORNER = -1.0  # m, where the tiles of a benchmark begin in x and y: T's, be it the paper's or an arm's
+CORNER = -1.0  # m, where the tiles of a benchmark begin in x and y: the corner of T, of rod and arms
 NEAR = 1.5  # m from the base: goals farther away cannot be reached
 
 
@@ -44,9 +44,9 @@ class Table:
     """A csv file that several processes may add rows to; it is replaced whole.
 
     Args:
-        path: of the file, in a folder that is there.
+        path: of the file, in a folder that exists.
         columns: their names, the first line of the file.
-        key: names of the columns that tell one row from another.
+        key: names of the columns that identify a row.
     """
 
     path: Path
@@ -54,7 +54,7 @@ class Table:
     key: Sequence[str]
 
     def rows(self) -> dict[Key, list[str]]:
-        """Every row by its key, none where there is no file. A torn last line counts as missing.
+        """Every row by its key, none without a file. An incomplete last line counts as missing.
 
         Raises:
             RunError: the file is another table, or damaged.
@@ -77,11 +77,11 @@ class Table:
         return rows
 
     def merge(self, rows: Sequence[Sequence[object]]) -> None:
-        """Add rows, or put them in the place of those with their key; the others stay as they are and where they are.
+        """Add rows, or replace those with the same key; the others stay as they are, in their order.
 
         Raises:
             RunError: see ``rows``.
-            OSError: it cannot be written; then it is as it was.
+            OSError: it cannot be written; then it is unchanged.
         """
         new = [[as_text(value) for value in row] for row in rows]
         with _alone(self.path.parent):
@@ -107,17 +107,17 @@ def result_rows(experiment: str, config: Config, run: Run) -> list[list[object]]
 
 
 def goal_row(config: Config, run: Run) -> list[object]:
-    """A row of ``GOALS``: how many goals a learner chose for itself, and how many of them near enough to be reached."""
+    """A row of ``GOALS``: how many goals a learner chose for itself, and how many of them can be reached."""
     goals = run.chosen_goals()
     return [config.variant, config.seed, len(goals), int((np.linalg.norm(goals, axis=1) <= NEAR).sum())]
 
 
 def tiles_reached(outcomes: Array, benchmark: Benchmark) -> int:
-    """How many of the benchmark's tiles, one for each of its goals, hold one of the ``outcomes`` or more.
+    """How many of the benchmark's tiles, one for each of its goals, hold one or more of the ``outcomes``.
 
     Args:
         outcomes: ``(n, 2)`` m, NaN where the robot was at rest.
-        benchmark: its tiles were laid out from ``CORNER``, whatever T these goals came from.
+        benchmark: its tiles were laid out from ``CORNER``, whatever the T of these goals.
     """
     landed = outcomes[np.isfinite(outcomes).all(axis=1)]
     reached, wanted = (
@@ -134,13 +134,13 @@ def _benchmark(environment: str, path: Path | None) -> Benchmark:
 
 @contextmanager
 def _alone(folder: Path) -> Iterator[None]:
-    """Within, no other process changes a table of this folder."""
+    """In this block, no other process changes a table of this folder."""
     while True:
         try:
             held = lock(folder / ".lock")
             break
         except BlockingIOError:
-            time.sleep(0.05)  # the other one takes no longer than it takes to write a file
+            time.sleep(0.05)  # the other process only writes a file
     try:
         yield
     finally:

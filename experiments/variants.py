@@ -1,8 +1,8 @@
-"""Every experiment as data: which variants it compares, each a line of what differs from ``run.py``'s defaults.
+"""Every experiment as data: its variants, each a line with the differences from the defaults of ``sgimd run``.
 
-Section 6 of Nguyen & Oudeyer (2014) first, then what the paper lacks. A variant of SGIM-D is one changed word.
+Section 6 of Nguyen & Oudeyer (2014) first, then what the paper lacks. A variant of SGIM-D changes one option.
     EXPERIMENTS["ablations"]["uniform-goals"]        # {"algorithm": "sgim-d", "goals": "uniform"}
-A variant that stands in two experiments is one run, with its rows in the table of each: its line is the same in both.
+A variant in two experiments has the same line in both; it is run once, and has its rows in both tables.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ Variant = dict[str, Any]
 ARMS: Final = ("planar-arm-7", "planar-arm-50")
 SGIM_D: Final[Variant] = {"algorithm": "sgim-d"}
 SAGG_RIAC: Final[Variant] = {"algorithm": "sagg-riac"}
-# The parts that the paper names, where measurements spoke for others; for who has no goals of his own only the inverse.
+# The paper's parts, where our defaults differ after measurements; learners without goals use only the inverse.
 LETTER: Final[Variant] = {"inverse": "paper", "search": "nelder-mead-exact", "progress": "absolute"}
 LARGE: Final[Variant] = {"task_space": 100.0}
 FEW, HALF = "few.npz", "half.npz"  # made from the shipped demonstrations by ``make_subsets``
-# How to get from a first guess to a goal, and from what was learnt to an answer. Each line is a variant on the rod and,
-# by a longer name, on every arm.
+# Ways to refine a movement for a goal, and to answer in evaluations. Each line is a variant on the rod and, with a
+# longer name, on every arm.
 MODEL: Final[Variant] = {**SGIM_D, "inverse": "model"}
 GRADIENT: Final[Variant] = {**MODEL, "search": "gradient"}
 ALONE: Final[Variant] = {**SAGG_RIAC, "inverse": "model"}
@@ -52,7 +52,7 @@ REFINING: Final[dict[str, Variant]] = {
     "model-1": {**MODEL, "members": 1},
     "model-5": {**MODEL, "members": 5},
 }
-# Where movements cost nothing, training may cost more.
+# Movements of an arm take no time, so training may take more.
 ON_ARMS: Final[Variant] = {"movements": 2000, "evaluate_at": (250, 500, 1000, 1500)}  # and at the end
 LONGER: Final[Variant] = {"training": 2.0}
 
@@ -125,28 +125,28 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
 
 
 def tables_of(experiment: str) -> list[str]:
-    """The tables of results that its runs leave rows in; the first has their evaluations."""
+    """The tables of results that its runs write rows to; the first has their evaluations."""
     if experiment in ("forward-model", *ARMS):
         return ["forward_model.csv"]
     return ["paper.csv", *(["goals.csv"] if experiment == "large-space" else [])]
 
 
 def make_subsets(folder: Path) -> None:
-    """Write what the demonstrator of a few, 13 of 127, and the one of the right half of the plane have to show.
+    """Write two subsets of the demonstrations: a few, 13 of 127, and those in the right half of the plane.
 
     Raises:
         RunError, OSError: it cannot be written.
     """
     everything = load_demonstrations()
     make_folder(folder)
-    save_demonstrations(folder / FEW, everything[:13])  # in their order the first ones are spread already
+    save_demonstrations(folder / FEW, everything[:13])  # they are ordered so that the first ones are spread
     right = [demonstration for demonstration in everything if demonstration.outcome[0] > 0]
     save_demonstrations(folder / HALF, right)
 
 
 def teacher_of(config: Config) -> str:
     """Who demonstrates: the number of the demonstrator, the file's name, or "structured" for the postures that an arm
-    is shown; "" for who learns alone."""
+    is shown; "" for a learner without a teacher."""
     if "teacher" not in config.used:
         return ""
     if config.environment in ARMS and config.demonstrations is None:

@@ -1,7 +1,7 @@
 """What a board costs: its share of a run's processor time, how many tags it has, how large its file gets.
 
 Examples:
-  python scripts/bench_board.py                            SGIM-D fishes for 1000 movements
+  python scripts/bench_board.py                            SGIM-D on the rod, 1000 movements
   python scripts/bench_board.py --movements 5000
   python scripts/bench_board.py --movements 50000 --arm    on the planar arm, without physics or pictures: a long run
 """
@@ -30,7 +30,7 @@ CALLS = ("__init__", "episode", "evaluation", "begin", "flush", "finish", "__exi
 
 
 class Clock:
-    """Processor time (s) within the calls that it stands around; other processes do not count."""
+    """Processor time (s) within the calls that it wraps; other processes do not count."""
 
     def __init__(self) -> None:
         self.seconds, self._running = 0.0, False
@@ -56,7 +56,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--movements", type=int, default=1000, help="of the run (1000)")
     parser.add_argument("--seed", type=int, default=1000, help="of the run (1000)")
-    parser.add_argument("--arm", action="store_true", help="the planar arm in the place of the fishing rod")
+    parser.add_argument("--arm", action="store_true", help="the planar arm instead of the fishing rod")
     options = parser.parse_args()
     if options.movements < 1 or options.seed < 0:
         parser.error("--movements must be at least 1, --seed at least 0")

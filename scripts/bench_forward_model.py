@@ -1,7 +1,7 @@
-"""What a forward model costs: processor time for training it and for searching through it, over that of the physics.
+"""What a forward model costs: processor time for training it and for searching through it, relative to the physics.
 
-Each search lives the same number of movements of SGIM-D with the fishing rod, one after the other in one process, so
-that all figures are of one machine in one state. Refining is what a search takes beyond the simplex of the first line;
+Each search runs SGIM-D on the fishing rod for the same number of movements, one after the other in one process, so
+all numbers are from one machine in one state. Refining is the time of a search beyond the simplex of the first line;
 answering is the time for one goal of an evaluation, all goals in one batch.
 
 Examples:
@@ -35,7 +35,7 @@ HEAD = f"{'search':22}{'physics (s)':>12}{'training':>10}{'refining':>10}{'toget
 
 
 class Clock:
-    """Processor time (s) within what it stands around; other processes do not count."""
+    """Processor time (s) within what it wraps; other processes do not count."""
 
     def __init__(self) -> None:
         self.seconds = 0.0
@@ -53,7 +53,7 @@ class Clock:
         return timed
 
     def through(self, search: Callable[..., Generator[Array, Array, None]]) -> Callable[..., Any]:
-        """A search whose own work is timed, and what others do between its movements is not."""
+        """A search whose own work is timed, without what happens between its movements."""
 
         def timed(start: Estimate, goal: Array) -> Generator[Array, Array, None]:
             movements = search(start, goal)
@@ -95,7 +95,7 @@ def main() -> int:
     parser.add_argument("--seed", type=at_least(0), default=1000, help="of the runs (1000)")
     parser.add_argument("--training", type=float, default=Config.training, help="steps for each movement (%(default)s)")
     through_model = [word for word, entry in CATALOGUE["search"].items() if "model" in entry.uses.values()]
-    parser.add_argument("--search", choices=through_model, help="only this one, beside the simplex")
+    parser.add_argument("--search", choices=through_model, help="only this one and the simplex")
     options = parser.parse_args()
     torch.set_num_threads(1)
     searches = [options.search] if options.search else through_model

@@ -1,6 +1,6 @@
 """Measure the fishing rod: is it stable, fast, smooth and noisy enough, and where does its float fall?
 
-Prints one line for each property and what is wanted, and ends with exit code 1 if one is not met.
+Prints one line for each property and what is wanted; the exit code is 1 if one is not met.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def landings(rod: FishingRod, thetas: Array, name: str) -> tuple[int, Array]:
 
 
 def cost(rod: FishingRod, movements: int = 300) -> tuple[float, float]:
-    """Median time (ms) of executing one movement, and median ratio to C stepping alone over as many steps.
+    """Median time (ms) of executing one movement, and median ratio to C stepping alone over the same number of steps.
 
     C stepping also moves the arm, from one random posture to the next, in one call.
     """
@@ -83,7 +83,7 @@ def main() -> int:
     deviations = repeated.std(axis=1, ddof=1)
     ordered = np.sort(deviations.mean(axis=1))
     spread = float(ordered[-20:].mean() / ordered[:20].mean())
-    # If all movements scattered by the same Gaussian about their means, the kurtosis would be 3.
+    # If all movements scattered around their means by the same Gaussian, the kurtosis would be 3.
     pooled = ((repeated - repeated.mean(axis=1, keepdims=True)) / deviations.mean()).ravel()
     kurtosis = float((pooled**4).mean() / (pooled**2).mean() ** 2)
 

@@ -2,8 +2,8 @@
 
 Section 5.3 of the paper. Several SAGG-RIAC learners are run on the fishing rod, and their memories are put together.
 Demonstrator 1 is naive: its demonstrations are exemplars drawn at random. Demonstrator 2 is careful: its demonstrations
-are spread evenly over what was reached, and each is, of some exemplars that landed on the same tile, the one that lands
-most reliably when it is executed again. The recordings are joint trajectories, as for demonstrator 3, so the learner
+are spread evenly over what was reached; each is the exemplar, of some that landed on the same tile, that lands most
+reliably when it is executed again. The recordings are joint trajectories, as for demonstrator 3, so the learner
 has to find theta_d by itself.
 """
 
@@ -40,19 +40,19 @@ def memory_of(seed: int, movements: int) -> tuple[Array, Array]:
 
 
 def demonstrate(rod: FishingRod, theta: Array, outcome: Array) -> Demonstration:
-    """The commanded trajectory of ``theta``, recorded at 50 Hz, and where the float had landed."""
+    """The commanded trajectory of ``theta``, recorded at 50 Hz, and the remembered landing point."""
     return Demonstration(np.zeros(0), *rod.primitive.trajectory(theta), outcome)
 
 
 def on_tiles(outcomes: Array, n: int) -> list[np.ndarray]:
-    """Rows of the ``outcomes`` ``(m, 2)`` m, tile by tile; of tiles so large that about 1.1 n of them have any."""
+    """Rows of the ``outcomes`` ``(m, 2)`` m, tile by tile; tiles are so large that about 1.1 n are not empty."""
     side = min(np.linspace(0.05, 0.4, 141), key=lambda side: abs(len(np.unique(outcomes // side, axis=0)) - 1.1 * n))
     _, tile_of = np.unique(outcomes // side, axis=0, return_inverse=True)
     return [np.flatnonzero(tile_of == tile) for tile in range(tile_of.max() + 1)]
 
 
 def execute_again(rod: FishingRod, thetas: Array, rng: np.random.Generator) -> Array:
-    """``(EXECUTIONS, n, 2)`` m, where each of ``(n, theta_dim)`` lands, every time with other motor noise."""
+    """``(EXECUTIONS, n, 2)`` m, where each of ``(n, theta_dim)`` lands, each time with different motor noise."""
     copies = np.tile(thetas, (EXECUTIONS, 1))
     rngs = [stream(int(rng.integers(2**32)), "re-execution", k) for k in range(len(copies))]
     return execute_many(rod, np.zeros((len(copies), 0)), copies, rngs).reshape(EXECUTIONS, len(thetas), 2)

@@ -9,19 +9,17 @@ from sgimd_torch import __version__
 from sgimd_torch.runs.process import Command, dispatch
 
 COMMANDS: Final = {
-    "run": Command(
-        "sgimd_torch.runs.command_line", "let one learner live, evaluate it, write everything to a directory"
-    ),
+    "run": Command("sgimd_torch.runs.command_line", "run one learner, evaluate it, write everything to a directory"),
     "sweep": Command(
         "sgimd_torch.runs.sweep", "many runs: options crossed with each other and with seeds, in parallel"
     ),
-    "table": Command("sgimd_torch.views.table", "what runs came to, over their seeds"),
+    "table": Command("sgimd_torch.views.table", "results of runs, over their seeds"),
     "report": Command(
         "sgimd_torch.views.report.command", "one page about one run, or about many side by side", "report"
     ),
-    "watch": Command("sgimd_torch.views.watch", "TensorBoard on the boards of runs, also while they are under way"),
+    "watch": Command("sgimd_torch.views.watch", "TensorBoard on the boards of runs, also while they are still running"),
     "film": Command("sgimd_torch.views.film.command", "a film of what a run has learnt", "film"),
-    "demo": Command("sgimd_torch.views.demo", "SGIM-D beside random exploration: one figure, one table", "plot"),
+    "demo": Command("sgimd_torch.views.demo", "SGIM-D and random exploration: one figure, one table", "plot"),
 }
 HELP: Final = f"""usage: sgimd COMMAND [OPTIONS]
 
@@ -32,14 +30,14 @@ commands:
 {"".join(f"  {name:8}{each.about}{chr(10)}" for name, each in COMMANDS.items())}
 examples:
   sgimd demo                                         see it learn, in a minute or two
-  sgimd run --algorithm sgim-d --seed 3              one life of 5000 movements, into runs/sgim-d/seed-003
+  sgimd run --algorithm sgim-d --seed 3              one run of 5000 movements, into runs/sgim-d/seed-003
   sgimd run --algorithm sgim-d --seed 3 --resume     after Ctrl-C or a power cut
   sgimd run --environment mypackage.toss:make        on a robot of your own
   sgimd sweep --vary goals=interest-map,uniform --seeds 0-9 --out study
   sgimd table study                                  error of each variant, over its seeds
   sgimd report study                                 curves, maps and tables on one page
 
-sgimd COMMAND --help explains a command; sgimd --version tells the version."""
+sgimd COMMAND --help explains a command; sgimd --version prints the version."""
 
 
 def main() -> int:

@@ -2,7 +2,7 @@
 
     find("goals", "grid").load()                    # ProgressGrid; imported now
     find("goals", "mypackage.goals:Curious")        # of your own
-A record says which options of a run go to which parameter. From that follows how a run is put together, which options
+A record says which options of a run go to which parameter. This decides how a run is put together, which options
 have no effect in it, what ``--help`` says and what figures call it. There is no other list of names.
 """
 
@@ -28,9 +28,9 @@ class Entry:
         uses: its parameter -> the option of a run that it takes, or the part that a run shares with it: "model",
             "trust", "policies", "correspondence". An option that is None leaves the parameter at its own default.
         fixed: its parameter -> value; a text with a colon is an attribute, loaded like ``at``.
-        also: options that matter with it, though they go elsewhere.
+        also: options that matter with it, but are used by another part.
         ignores: options that have no effect with it, though others use them.
-        learns_with: of an inverse: the one that answers while it learns, if that is another one.
+        learns_with: of an inverse: the one to use while learning, if it is another one.
         label, colour: what figures call it, and how they draw it.
     """
 
@@ -76,7 +76,7 @@ _TAUGHT: Final = ("teacher", "demonstrations")
 _SHOWN: Final = {"correspondence": "correspondence"}
 _PROGRESS: Final = {"window": "window", "progress": "progress"}
 _MODEL: Final = {"model": "model", "trust": "trust"}
-_AIM: Final = ("focus",)  # is on the goal pursued: without goals there is none
+_AIM: Final = ("focus",)  # it is the share near the goal pursued: no effect without goals
 _IN_THE_PACKAGE: Final = "sgimd_torch"
 
 
@@ -84,8 +84,8 @@ def _at(place: str, about: str, **more: Any) -> Entry:
     return Entry(f"{_IN_THE_PACKAGE}.{place}", about, **more)
 
 
-ROD: Final = "fishing-rod"  # where runs lived before there was a choice
-# Colours after Okabe & Ito: told apart with any colour vision, and in grey.
+ROD: Final = "fishing-rod"  # the environment of all runs before there was a choice
+# Colours after Okabe & Ito: distinct with any colour vision, and in grey.
 CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
     "algorithm": {
         "random": _at(
@@ -162,7 +162,7 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
         "nelder-mead-exact": _at("searches.simplex:nelder_mead", "without the noise", fixed={"noise": 0.0}),
         "nelder-mead-complete": _at(
             "searches.simplex:nelder_mead",
-            "which first fills up the paper's simplex of 26, too",
+            "without the noise, from the paper's complete simplex of 26",
             fixed={"noise": 0.0, "complete": True},
         ),
         "perturb": _at("searches.perturb:perturb", "the best so far plus noise"),
@@ -174,7 +174,7 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
         ),
         "gauss-newton": _at(
             "searches.through_model:gradient_search",
-            "each movement planned anew",
+            "a new plan for each movement",
             uses={**_MODEL, "residual": "residual"},
             fixed={"propose": "sgimd_torch.searches.through_model:gauss_newton"},
         ),
@@ -194,7 +194,7 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
         "nearest": _at("inverses.local:NearestNeighbour", "the movement that came nearest"),
         "model": _at(
             "inverses.through_model:ModelInverse",
-            "linear when learning, through a forward model in evaluations (extra forward); it pays for learners that "
+            "linear when learning, through a forward model in evaluations (extra forward); it helps learners that "
             "explore and misleads the imitation learner",
             uses={**_MODEL, "policies": "policies"},
             learns_with="linear",
@@ -220,7 +220,7 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
         "random": _at("teachers:at_random", "any"),
     },
 }
-# Parts that others share: built once a run, and only if one of those uses them.
+# Shared parts: built once for a run, and only if something uses them.
 SHARED: Final = {
     "model": _at(
         "forward_model.model:ForwardModel",
@@ -229,7 +229,7 @@ SHARED: Final = {
     ),
     "trust": _at("forward_model.anchored:Trust", "how far to trust it", uses={"anchors": "anchored"}),
 }
-# What a thing of your own must offer: its call, and the members of what the call gives.
+# What a thing of your own must have: how it is called, and the members of what it returns.
 _WANTED: Final[dict[str, tuple[str, tuple[str, ...]]]] = {
     "algorithm": ("(environment, seed, ...) -> a Learner", ("ask", "tell", "watch", "memory")),
     "environment": (
@@ -273,7 +273,7 @@ def find(kind: str, word: str) -> Entry:
 
 
 def check(kind: str, word: str, made: object) -> None:
-    """Refuse what lacks members that one of its kind has.
+    """Refuse a thing that lacks members of its kind.
 
     Raises:
         ValueError: with the names of what is missing.
@@ -290,7 +290,7 @@ def check(kind: str, word: str, made: object) -> None:
 def check_call(
     kind: str, word: str, make: Callable[..., Any], arguments: Sequence[Any], options: Mapping[str, Any]
 ) -> None:
-    """Refuse what cannot be called as one of its kind is.
+    """Refuse a thing that cannot be called like others of its kind.
 
     Raises:
         ValueError: with the call that was wanted.
@@ -299,7 +299,7 @@ def check_call(
         inspect.signature(make).bind(*arguments, **options)
     except TypeError as error:
         raise ValueError(f"{kind} {word} cannot be called as {_WANTED[kind][0]}: {error}") from error
-    except ValueError:  # a builtin says nothing of its parameters
+    except ValueError:  # a builtin may not name its parameters
         pass
 
 
@@ -353,6 +353,6 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 def _keywords(made: Callable[..., Any]) -> set[str]:
     try:
         parameters = inspect.signature(made).parameters.values()
-    except (TypeError, ValueError):  # a builtin says nothing of its parameters
+    except (TypeError, ValueError):  # a builtin may not name its parameters
         return set()
     return {parameter.name for parameter in parameters if parameter.kind is not parameter.POSITIONAL_ONLY}

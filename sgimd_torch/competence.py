@@ -55,11 +55,22 @@ class Competence:
     def __init__(self, memory: Memory, performance: Performance) -> None:
         self.memory = memory
         self.performance = performance
+        self._asked: tuple[bytes, bytes] | None = None
+        self._row: int | None = None
 
     def __call__(self, context: Array, goal: Array, outcomes: Array | None = None) -> float:
-        """In [-1, 0], -1 for an empty memory. ``outcomes`` of the attempt are not needed: they are in memory."""
-        nearest = self.memory.near_outcomes(context, goal, k=1)
-        return _best(self.performance, goal, self.memory.outcomes[nearest])
+        """In [-1, 0], -1 for an empty memory. ``outcomes`` of the attempt are not needed: they are in memory.
+
+        Asked again for the same goal, as after each movement of an attempt, it looks at the newest exemplars only.
+        """
+        asked = np.asarray(context).tobytes(), np.asarray(goal).tobytes()
+        if asked != self._asked:
+            self._nearest = self.memory.nearest(context, goal)
+            self._asked, self._row, self._best = asked, None, _best(self.performance, goal, self.memory.outcomes[:0])
+        if (row := self._nearest.row) != self._row:
+            assert row is not None
+            self._row, self._best = row, _best(self.performance, goal, self.memory.outcomes[row : row + 1])
+        return self._best
 
 
 class AttemptCompetence:

@@ -56,7 +56,7 @@ class Benchmark:
 class Evaluation:
     """What ``evaluate`` found. ``errors`` ``(n,)`` m, one for each goal; ``thetas`` ``(n, theta_dim)`` that were
     executed; ``outcomes`` ``(n, outcome_dim)`` where they landed; ``scatter`` ``(n,)`` m, the mean distance of the
-    repeated landing points of each theta to their own mean, NaN without repeats."""
+    repeated landing points of each theta to their true mean (estimated, see ``evaluate``), NaN without repeats."""
 
     errors: Array
     thetas: Array
@@ -82,7 +82,7 @@ def evaluate(
     movements: int,
     *,
     context: Array | None = None,
-    repeats: int = 10,
+    repeats: int = 3,
 ) -> Evaluation:
     """Invert every goal, execute the result once, and ``repeats`` times more to measure the noise.
 
@@ -93,7 +93,9 @@ def evaluate(
         goals: ``(n, outcome_dim)`` m.
         seed, movements: name the random streams, so that each evaluation of a run has its own.
         context: ``(context_dim,)`` in which to execute; None for the middle of C.
-        repeats: 0 does not measure the noise; otherwise 2 or more, as one landing point does not scatter.
+        repeats: k; 0 does not measure the noise; otherwise 2 or more, as one landing point does not scatter. Landing
+            points lie nearer to their own mean than to the true one, so the scatter is multiplied by sqrt(k / (k - 1)):
+            for Gaussian noise its mean is then the same for every k.
 
     Raises:
         ValueError: no goals, of another dimension, or not finite; repeats or movements out of range.
@@ -117,7 +119,8 @@ def evaluate(
     outcomes, again = landed[0], landed[1:]
     scatter = np.full(len(goals), np.nan)
     if repeats:
-        scatter = np.linalg.norm(again - again.mean(axis=0), axis=2).mean(axis=0)
+        bessel = np.sqrt(repeats / (repeats - 1))
+        scatter = bessel * np.linalg.norm(again - again.mean(axis=0), axis=2).mean(axis=0)
     return Evaluation(np.linalg.norm(outcomes - goals, axis=1), thetas, outcomes, scatter)
 
 

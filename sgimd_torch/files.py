@@ -41,7 +41,7 @@ _NPY: Final = re.compile(
 
 @contextmanager
 def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """A file beside ``path``, to be written in the block, which takes the place of ``path`` when the block ends.
+    """A file next to ``path``, to be written in the block; it replaces ``path`` when the block ends.
 
     ``path`` holds the old file or the whole new one, also after a power cut; after an error nothing else is left.
 
@@ -88,8 +88,8 @@ def write_npz(path: str | os.PathLike[str], arrays: dict[str, Any], *, compresse
 def read_npz(path: str | os.PathLike[str], kind: str, writer: str, version: int, names: Sequence[str]) -> list[Stored]:
     """The arrays called ``names``, read-only, of a file that also holds its ``version``; nothing in it is executed.
 
-    It may unpack to 64 MiB, or to eight times its own size where that is more. What it says of sizes is checked before
-    memory is taken, and every checksum before a number is used.
+    It may unpack to 64 MiB, or to eight times its own size where that is more. The sizes that it states are checked
+    before memory is taken, and every checksum before a number is used.
 
     Args:
         path: of the file.
@@ -123,7 +123,7 @@ def read_npz(path: str | os.PathLike[str], kind: str, writer: str, version: int,
 
 
 def _members(file: BinaryIO, names: Sequence[str]) -> dict[str, Stored]:
-    """Those of the arrays called ``names`` that an npz file holds."""
+    """The arrays called ``names``, as far as an npz file holds them."""
     size = os.fstat(file.fileno()).st_size
     with zipfile.ZipFile(file) as archive:
         inside = archive.namelist()
@@ -147,7 +147,7 @@ def _content(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> bytes:
 
 
 def _array(content: bytes) -> Stored:
-    """The array of an npy file: its header as numpy writes it, then just as many bytes as that says."""
+    """The array of an npy file: its header as numpy writes it, then exactly as many bytes as the header says."""
     header = _NPY.match(content)
     if header is None:
         raise ValueError("an array holds neither numbers nor text")
@@ -162,7 +162,7 @@ def _array(content: bytes) -> Stored:
 
 
 def make_folder(path: Path) -> None:
-    """With its parents, where they are missing.
+    """Make a folder, and its parents if they are missing.
 
     Raises:
         OSError: something is in the way, or it may not be made.
@@ -181,7 +181,7 @@ def lock(path: str | os.PathLike[str], flags: int = 0) -> int:
 
     Args:
         path: of the file.
-        flags: of ``os.open``, beside those for reading, writing and making it.
+        flags: of ``os.open``, in addition to those for reading, writing and making it.
 
     Returns:
         The descriptor; the lock is held until it is closed, or the process ends.
@@ -204,15 +204,15 @@ def lock(path: str | os.PathLike[str], flags: int = 0) -> int:
 
 
 def locked(path: str | os.PathLike[str]) -> bool:
-    """Whether a process holds the ``lock`` of ``path``; it cannot where there is no such file."""
+    """Whether a process holds the ``lock`` of ``path``; False if there is no such file."""
     try:
-        import fcntl  # Windows has none, so that nobody holds it
+        import fcntl  # Windows has none, so nobody holds it
 
         file = os.open(path, os.O_RDONLY)
     except (FileNotFoundError, NotADirectoryError, ImportError):
         return False
     try:
-        fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)  # shared, so that two who ask do not hinder each other
+        fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)  # shared, so that two callers do not block each other
     except BlockingIOError:
         return True
     finally:

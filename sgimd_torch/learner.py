@@ -84,7 +84,7 @@ class Learner:
             self._begin(self.autonomous.attempt(context), context)
             if self._attempt is None:
                 raise RuntimeError(f"{type(self.autonomous).__name__}.attempt() has to yield at least once")
-        elif not np.array_equal(context, self._context):
+        elif context is not self._context and not np.array_equal(context, self._context):
             raise RuntimeError(f"the attempt under way began in context {self._context}, got {context}; see idle")
         if self._move is None:
             self.interrupt()

@@ -59,15 +59,16 @@ def test_without_repeats_there_is_no_noise_floor_and_without_noise_it_is_zero() 
     assert evaluate(perfect(arm), arm, goals, 0, 0, repeats=10).noise_floor == pytest.approx(0, abs=1e-15)
 
 
-def test_the_noise_floor_is_the_mean_distance_to_the_mean_landing_point() -> None:
+@pytest.mark.parametrize("repeats", [2, 3, 10])
+def test_the_noise_floor_is_the_mean_distance_to_the_true_mean_however_many_repeats(repeats: int) -> None:
     # Stretched out along y, joint noise s moves the end along x by s times the distances of the joints to the end,
-    # 1, .8, .6, .4, .2: sd s sqrt(2.2). Mean distance of a Gaussian sd sqrt(2 / pi), less of 10 samples to their mean.
+    # 1, .8, .6, .4, .2: sd s sqrt(2.2). Mean distance of a Gaussian: sd sqrt(2 / pi).
     arm = PlanarArm(5, noise=0.001)
-    evaluation = evaluate(perfect(arm), arm, np.tile([0.0, 1.0], (400, 1)), 0, 0, repeats=10)
-    expected = 0.001 * np.sqrt(2.2) * np.sqrt(2 / np.pi) * np.sqrt(9 / 10)
-    # Its standard error is about .76 / sqrt(4000) of it, so five of them are 6 %.
-    assert evaluation.noise_floor == pytest.approx(expected, rel=0.06)
-    assert evaluation.mean_error == pytest.approx(0.001 * np.sqrt(2.2) * np.sqrt(2 / np.pi), rel=5 * 0.76 / 20)
+    evaluation = evaluate(perfect(arm), arm, np.tile([0.0, 1.0], (1200, 1)), 0, 0, repeats=repeats)
+    expected = 0.001 * np.sqrt(2.2) * np.sqrt(2 / np.pi)
+    # Its standard error is at most .76 / sqrt(1200 (repeats - 1)) of it, so five of them are 11, 8 and 4 %.
+    assert evaluation.noise_floor == pytest.approx(expected, rel={2: 0.11, 3: 0.08, 10: 0.04}[repeats])
+    assert evaluation.mean_error == pytest.approx(expected, rel=5 * 0.76 / np.sqrt(1200))
 
 
 def test_the_movement_that_is_judged_is_not_one_of_its_own_repeats() -> None:
@@ -75,7 +76,9 @@ def test_the_movement_that_is_judged_is_not_one_of_its_own_repeats() -> None:
     seen = evaluate(perfect(arm), arm, np.array([[0.0, 0.5]]), 0, 0, repeats=2)
     judged, *again = (arm.execute(NO_CONTEXT, seen.thetas[0], stream(0, "evaluation 0", row)) for row in range(3))
     assert np.array_equal(seen.outcomes[0], judged)
-    assert seen.scatter[0] == pytest.approx(np.linalg.norm(again[0] - again[1]) / 2)  # two points and their middle
+    assert seen.scatter[0] == pytest.approx(
+        np.sqrt(2) * np.linalg.norm(again[0] - again[1]) / 2
+    )  # from two points to their middle
 
 
 @pytest.mark.parametrize("counts", [{"repeats": -1}, {"repeats": 1}, {"repeats": 2.5}, {"movements": -1}])

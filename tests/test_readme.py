@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+import sgimd_torch
+
 ROOT = Path(__file__).parent.parent
 BLOCK = re.compile(r"^```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
@@ -49,3 +51,8 @@ def test_files_that_a_page_names_exist(name):
     missing = [link for link in links if not (page.parent / link).exists()]
     missing += [path for path in paths if not (ROOT / path).exists()]
     assert not missing
+
+
+def test_the_version_to_cite_is_that_of_the_package():
+    cited = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"\nversion: {sgimd_torch.__version__}\n" in cited

@@ -5,6 +5,7 @@ import sys
 import numpy as np
 import pytest
 
+import bench
 import check_physics
 import make_benchmark
 import make_demonstrations
@@ -37,11 +38,16 @@ from sgimd_torch.spaces import stream
         (make_teachers, "--out nowhere"),
         (make_teachers, "--runs 1 --processes 1 --movements 5 --n 6"),  # too few movements
         (check_physics, "--movements 9"),
+        (bench, "--rounds 0"),
+        (bench, "--rows 100"),
+        (bench, "--rows 5000 1000"),
+        (bench, "--only nothing"),
+        (bench, "--against nowhere"),
     ],
 )
 def test_what_makes_no_sense_is_refused_and_nothing_is_written(tmp_path, monkeypatch, capsys, script, options):
     monkeypatch.chdir(tmp_path)
-    out = {check_physics: [], make_teachers: ["--out", "."]}.get(script, ["--out", "out.npz"])
+    out = {bench: [], check_physics: [], make_teachers: ["--out", "."]}.get(script, ["--out", "out.npz"])
     monkeypatch.setattr(sys, "argv", ["script", *out, *options.split()])
     with pytest.raises(SystemExit) as end:
         script.main()
@@ -116,3 +122,14 @@ def test_a_pool_on_too_few_tiles_is_refused(pool):
     thetas, outcomes = pool
     with pytest.raises(ValueError, match="only 1 tiles have a movement to show, too few for --n 3"):
         make_teachers.careful(FishingRod(), thetas[[0, 0, 0]], outcomes[[0, 0, 0]], 3, stream(0, "test"))
+
+
+def test_the_bench_compares_two_copies_of_the_library(capsys, monkeypatch):
+    monkeypatch.setattr(
+        sys, "argv", ["bench", "--only", "growth", "--rounds", "1", "--rows", "400", "--against", str(bench.HERE)]
+    )
+    assert bench.main() == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == 4 * 4  # overhead, memory, longest addition and percentile, for four learners
+    for line in lines:
+        assert len([float(word) for word in line.split()[-3:]]) == 3  # here, there, ratio

@@ -115,3 +115,26 @@ def test_a_record_keeps_what_it_was_made_of_and_is_read_only():
             field[0] = 9.0
     assert Move(THETA, None, "babble").goal is None
     assert Episode(0, THETA, None, None, None).outcome is None
+
+
+@pytest.mark.parametrize("seed", [0, 7, 2**32 - 1, 2**32, 2**96 + 3, 2**200])
+@pytest.mark.parametrize("index", [None, 0, 7, 2**32 - 1, 2**32, 2**70])
+def test_a_stream_is_that_of_the_spawned_seed_sequence(seed: int, index: int | None) -> None:
+    for name in ("", "environment", "Käse"):
+        key = tuple(name.encode()) + (() if index is None else (256, index))
+        expected = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=key))
+        found = stream(seed, name, index)
+        assert np.array_equal(found.random(3), expected.random(3))
+        assert np.array_equal(found.spawn(2)[1].random(3), expected.spawn(2)[1].random(3))
+
+
+@pytest.mark.parametrize("shape", [(5,), (3, 5)])
+@pytest.mark.parametrize("wrong", [np.nan, np.inf, -np.inf, 1e300, -1e300, np.nextafter(1e100, np.inf)])
+def test_one_number_too_large_or_none_at_all_is_found_wherever_it_stands(shape: tuple[int, ...], wrong: float) -> None:
+    right = np.full(shape, 1e100)
+    assert np.array_equal(check_vector("point", right, 5), right)
+    for entry in np.ndindex(shape):
+        array = np.zeros(shape)
+        array[entry] = wrong
+        with pytest.raises(ValueError, match="finite"):
+            check_vector("point", array, 5)

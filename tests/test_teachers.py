@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from sgimd_torch.memory import Memory
-from sgimd_torch.spaces import Demonstration, stream
+from sgimd_torch.spaces import Array, Demonstration, stream
 from sgimd_torch.teachers import AskedTeacher, InitialTeacher, PeriodicTeacher, Teacher, at_random, least_explored
 
 NO_CONTEXT = np.zeros(0)
@@ -217,3 +217,21 @@ def test_demonstrations_of_another_robot_are_refused_by_name(other: Demonstratio
 def test_a_demonstration_with_more_or_less_than_one_outcome_is_refused(shape: tuple[int, ...]) -> None:
     with pytest.raises(ValueError, match="demonstrations must have contexts"):
         InitialTeacher([replace(LESSONS[0], outcome=np.zeros(shape))], stream(0, "teacher"))
+
+
+def test_tiles_are_counted_as_if_all_outcomes_were_looked_at_each_time() -> None:
+    rng, memory, asked = stream(0, "test"), Memory(0, 1, 2), stream(1, "teacher")
+    shown = [Demonstration(np.zeros(0), np.arange(2.0), np.zeros((2, 1)), outcome) for outcome in rng.random((40, 2))]
+    demonstrated = np.array([demonstration.outcome for demonstration in shown])
+    low, high = demonstrated.min(axis=0), demonstrated.max(axis=0)
+    for n in (0, 1, 30, 2500, 3):
+        for outcome in rng.normal(0.5, 0.4, (n, 2)):
+            memory.add(np.zeros(0), np.zeros(1), outcome)
+        for tiles in (10, 3):
+
+            def cells(outcomes: Array, tiles: int = tiles) -> Array:
+                return np.where(outcomes == high, tiles - 1, np.floor((outcomes - low) / ((high - low) / tiles)))
+
+            reached = (cells(memory.outcomes) == cells(demonstrated)[:, None]).all(axis=2).sum(axis=1)
+            chosen = least_explored(shown, memory, asked, tiles=tiles)
+            assert reached[[demonstration is chosen for demonstration in shown]] == reached.min()

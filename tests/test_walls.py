@@ -29,7 +29,7 @@ LIBRARIES = {  # library: the only rooms that may import it; of a folder, where 
     "numpy": ROW.keys(),
     "scipy": ROW.keys() - {"spaces"},
     "lazy_loader": {"__init__"},
-    "faiss": {"memory"},
+    "faiss": {"memory/neighbours"},
     "mujoco": {"environments/rod_physics", "views/film"},
     "torch": {"forward_model", "inverses/through_model", "searches/through_model"},
     "lightning": {"forward_model"},

@@ -9,9 +9,11 @@ import venv
 
 import pytest
 
+import sgimd_torch
 from runs import ROOT
 
 pytestmark = pytest.mark.slow
+WITHOUT_CHECKOUT = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
 SHORT = [
     *("--environment", "planar-arm-7", "--algorithm", "sgim-d", "--movements", "3000"),
     *("--evaluate-at", "1000", "--repeats", "2", "--out", "runs"),
@@ -23,12 +25,12 @@ def installed(tmp_path_factory):
     """The folder of commands of an environment in which only the wheel is installed, with its extra for reports."""
     place = tmp_path_factory.mktemp("wheel")
     pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "-q"]
-    subprocess.run([*pip, "wheel", "--no-deps", "-w", str(place), str(ROOT)], check=True)
+    subprocess.run([*pip, "wheel", "--no-deps", "-w", str(place), str(ROOT)], check=True, env=WITHOUT_CHECKOUT)
     (wheel,) = place.glob("sgimd_torch-*.whl")
     venv.create(place / "env", with_pip=True)
     commands = place / "env" / "bin"
     pip = [str(commands / "python"), "-m", "pip", "--disable-pip-version-check", "-q", "install"]
-    subprocess.run([*pip, f"{wheel}[report]", "-c", str(ROOT / "constraints.txt")], check=True)
+    subprocess.run([*pip, f"{wheel}[report]", "-c", str(ROOT / "constraints.txt")], check=True, env=WITHOUT_CHECKOUT)
     return commands
 
 
@@ -36,7 +38,6 @@ def installed(tmp_path_factory):
 def sgimd(installed, tmp_path_factory):
     """Runs the installed command in a folder of its own; returns exit code, stdout and stderr."""
     away = tmp_path_factory.mktemp("away")
-    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
 
     def sgimd(*words, stop_after=None):
         process = subprocess.Popen(
@@ -45,7 +46,7 @@ def sgimd(installed, tmp_path_factory):
             stderr=subprocess.PIPE,
             text=True,
             cwd=away,
-            env=environment,
+            env=WITHOUT_CHECKOUT,
         )
         while stop_after is not None and process.poll() is None:
             if stop_after.exists() and stop_after.read_bytes().count(b"\n") > 200:
@@ -100,6 +101,11 @@ def test_what_lies_beside_the_code_is_in_the_wheel(installed):
         "import sgimd_torch as s; s.load_benchmark(); s.load_demonstrations(); s.FishingRod(); print(s.__version__)"
     )
     done = subprocess.run(
-        [str(installed / "python"), "-c", program], capture_output=True, text=True, cwd="/", check=True
+        [str(installed / "python"), "-c", program],
+        capture_output=True,
+        text=True,
+        cwd="/",
+        env=WITHOUT_CHECKOUT,
+        check=True,
     )
-    assert done.stdout.strip() == "0.1.0"
+    assert done.stdout.strip() == sgimd_torch.__version__

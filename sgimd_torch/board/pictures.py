@@ -22,8 +22,8 @@ from sgimd_torch.figures.learning import interest_map, landing_points
 from sgimd_torch.goals.regions import Region
 from sgimd_torch.spaces import Array, Box
 
-LEVEL = 2  # of the tree: those regions are named in the pictures, as on the board's page of curves
-# The scales stay, so that pictures of different times and runs can be compared; what lies beyond looks like the end.
+LEVEL = 2  # of the tree: regions named in the pictures, as on the board's page of curves
+# Fixed scales, so that pictures of different times and runs can be compared; values beyond look like the end.
 WORST = -0.25
 FARTHEST = 0.3  # m
 STYLE: Any = {"font.size": 8, "axes.titlesize": 8}
@@ -42,9 +42,9 @@ def draw(
     """The pictures, as png.
 
     Args:
-        regions: of the goal model; they get no pictures where there are none, or contexts are part of them.
+        regions: of the goal model; no pictures of them if there are none, or if they include contexts.
         space: T, of the plane.
-        outcomes, goals, demonstrated: ``(n, 2)`` m, where the float landed; the last own goals; what was demonstrated.
+        outcomes, goals, demonstrated: ``(n, 2)`` m, where the float landed; the learner's last goals; demonstrated.
         benchmark, errors: ``(n, 2)`` and ``(n,)`` m, its goals and how far from each the float landed.
     """
     side = float(space.sides[0]) / 40
@@ -60,7 +60,7 @@ def draw(
 
 
 def where(regions: Sequence[Region]) -> str:
-    """A table, in Markdown, of the regions that have curves of their own: where they lie, and how they are."""
+    """A table, in Markdown, of the regions that have curves of their own: corners, competence, interest."""
     lines = ["| region | corner below | corner above | goals | competence | interest |", "|---|---|---|---|---|---|"]
     for path, below in branches(regions, 3).items():
         low, high = _corners(below)
@@ -129,7 +129,7 @@ def _corners(regions: Sequence[Region]) -> tuple[Array, Array]:
 
 
 def _png(picture: Callable[[Axes], object]) -> bytes:
-    """As large as TensorBoard shows it."""
+    """A png, as large as TensorBoard shows it."""
     with rc_context(STYLE):
         figure = Figure(figsize=(4.0, 3.5), dpi=90)
         ax = figure.subplots()

@@ -1,6 +1,6 @@
 """From episodes, regions and evaluations to named numbers: the curves that a board shows, and what each of them means.
 
-Interest and competence by region are those of section 3.2.1 of Nguyen & Oudeyer (2014). Reads only what is public.
+Interest and competence by region are those of section 3.2.1 of Nguyen & Oudeyer (2014). Reads public attributes only.
     curves = Curves(environment.outcomes); curves.episode(episode); curves.of_regions(interest_map.regions)
 """
 
@@ -15,29 +15,29 @@ import numpy as np
 from sgimd_torch.goals.regions import Region
 from sgimd_torch.spaces import Array, Box, Episode, check_vector
 
-# By tag, or by what stands before its slash.
+# By tag, or by the part of it before the slash.
 LEGEND: Final = {
     "error/mean": "Distance (m) from a benchmark goal to where its movement landed, mean over the goals, eq. (10).",
     "error/median": "Median of these distances (m).",
     "error/p90": "Nine in ten of these distances are shorter (m).",
-    "error/noise_floor": "The part of error/mean that motor noise alone makes (m).",
+    "error/noise_floor": "The part of error/mean that motor noise alone causes (m).",
     "competence": "How well goals in this region went, from 0, reached, to -1, no better than resting: mean of those "
     "it remembers. R is all of C x T, R0 and R1 its two parts, R01 a part of R0; images show where. A name keeps its "
-    "meaning for the whole run, another run has other regions. One that was cut goes on as the mean over its parts.",
-    "interest": "How fast competence changes in this region, eq. (3); goals are drawn where it is high. A region that "
-    "was cut goes on as the mean over the goals of its parts.",
+    "meaning for the whole run; another run has other regions. After a cut, the curve is the mean over the parts.",
+    "interest": "How fast competence changes in this region, eq. (3); goals are drawn where it is high. After a "
+    "cut, the curve is the mean over the goals of the parts.",
     "region_goals": "Goals met in this region, demonstrated ones too, since its parts were cut.",
     "region_reached": "Share of the goals remembered in this region that a movement came within the tolerance of.",
     "region_size": "This region's share of C x T, once.",
     "grid_competence": "Mean competence of the remembered goals in one cell of a grid that is the same in all "
     "runs on one benchmark.",
     "grid_error": "Mean error (m) over the benchmark goals in one cell of this grid.",
-    "regions/count": "How many regions the goal model has by now.",
+    "regions/count": "How many regions the goal model has.",
     "regions": "Over all regions, also those too small for curves of their own: 10 %, half or 90 % lie below this.",
     "regime": "Share of the last movements that came from global exploration, local optimisation, imitation, babbling "
     "or rest.",
-    "goals/attempted": "Goals that the learner has pursued so far, imitation apart.",
-    "goals/reached": "Those of them that a movement came within the tolerance of.",
+    "goals/attempted": "Goals that the learner has pursued so far, without imitation.",
+    "goals/reached": "Those goals that a movement came within the tolerance of.",
     "goals/reached_share": "Of the last 50 goals, the share that a movement came within the tolerance of.",
     "goals/missed_by": "Distance (m) from a goal to where its best movement landed, median over the last 50 goals.",
     "teacher/demonstrations": "Demonstrations that the teacher has given so far.",
@@ -64,7 +64,7 @@ LAYOUT: Final = {
         "imitations miss what was shown by (m)": "teacher/missed_by",
     },
 }
-METRICS: Final = ("error/mean", "error/noise_floor", "competence/R", "goals/reached_share")  # that sum up a run
+METRICS: Final = ("error/mean", "error/noise_floor", "competence/R", "goals/reached_share")  # that summarise a run
 _RECENT: Final = 50  # goals
 _MOST_CELLS: Final = 16
 
@@ -103,7 +103,7 @@ class Grid:
         return counts.astype(np.float64), totals.astype(np.float64)
 
     def means(self, counts: Array, sums: Array) -> dict[str, float]:
-        """By the name of each cell that is not empty."""
+        """The mean of each cell that is not empty, by its name."""
         return {self.names[k]: float(sums[k] / counts[k]) for k in np.flatnonzero(counts)}
 
 
@@ -165,7 +165,7 @@ class Curves:
 
     def of_regions(self, regions: Sequence[Region]) -> dict[str, float]:
         """Competence, interest, attempts, goals reached and size by region, from the leaves of the tree."""
-        # A Region never changes, so that most are known from the last call.
+        # A Region never changes, so most are known from the last call.
         self._leaves = {region: self._leaves.get(region) or self._leaf(region) for region in regions}
         space = sum(leaf.volume for leaf in self._leaves.values())
         values: dict[str, float] = {}
@@ -230,7 +230,7 @@ class _Leaf(NamedTuple):
 def branches(regions: Sequence[Region], depth: int) -> dict[str, list[Region]]:
     """The leaves below each node of the tree down to ``depth``, by the node's path, sorted.
 
-    The cells of a `ProgressGrid`, "R.3.7" say, all lie below "R" and nothing else.
+    The cells of a `ProgressGrid`, such as "R.3.7", all lie below "R" and nothing else.
     """
     found: dict[str, list[Region]] = {}
     for region in regions:

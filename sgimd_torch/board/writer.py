@@ -1,6 +1,6 @@
 """A TensorBoard board: where is the robot competent, where does it make progress, what did its teacher do?
 
-Fed from the caller's loop, of which it changes nothing; the steps are movements. ``scalars.py`` says what is shown.
+Called from the caller's loop, which it does not change; steps are movements. ``scalars.py`` says what is shown.
     with Board("runs/mine", environment.outcomes) as board:
         for episode in run(...):
             board.episode(episode)
@@ -43,12 +43,12 @@ class Board:
     """What one run shows, in one event file in its directory.
 
     Args:
-        directory: of the run, made when missing.
+        directory: of the run, made if missing.
         grid: the part of T that is cut into cells, the same for runs to be compared.
         tolerance: distance (m) at which a goal counts as reached.
         every: movements from one point of a curve to the next.
         depth: regions have curves of their own down to this level of the tree, 15 at most with 3.
-        legend: a sentence for each tag that you add, or for what stands before its slash.
+        legend: a sentence for each tag that you add, or for the part of it before the slash.
         layout: charts of them for the tab Custom Scalars, category -> chart -> tag, after those of ``LAYOUT``.
         replace: the run is replayed, and its event files are to be replaced by the first ``publish``.
 
@@ -92,7 +92,7 @@ class Board:
 
     @property
     def due(self) -> bool:
-        """Whether this movement gives the curves a point."""
+        """Whether the curves get a point at this movement."""
         return self.movements > 0 and self.movements % self.every == 0
 
     def episode(self, episode: Episode) -> None:
@@ -130,9 +130,9 @@ class Board:
         self._write({tag: _strings(markdown.encode())})
 
     def settings(self, settings: Mapping[str, bool | float | str], first: Collection[str] = ()) -> None:
-        """What makes this run, for the tabs Text and HParams, with the legend and the charts of the layout.
+        """Show the options of this run in the tabs Text and HParams, with the legend and the charts of the layout.
 
-        HParams shows the columns ``first`` before the others. A setting should be of one type in all runs.
+        HParams shows the columns ``first`` before the others. A setting should have the same type in all runs.
         """
         rows = "\n".join(f"| {name} | {value} |" for name, value in settings.items())
         self.text("about/settings", f"| option | value |\n|---|---|\n{rows}")
@@ -141,20 +141,20 @@ class Board:
         self._file.write(self.movements, [_layout(self.layout), *_hparams(settings, first)])
 
     def finish(self) -> None:
-        """Say in the tab HParams that the run has come to its end."""
+        """Show in the tab HParams that the run has ended."""
         ended = plugin_data_pb2.SessionEndInfo(status=api_pb2.STATUS_SUCCESS, end_time_secs=time.time())
         value = _hparams_value(hparams_metadata.SESSION_END_INFO_TAG, session_end_info=ended)
         self._file.write(self.movements, [value])
 
     def recall(self, *families: str, needs: Collection[str] = ()) -> bool:
-        """Take over, for this movement, what a replay does not make again; ``families`` stand before a tag's slash.
+        """Copy from earlier event files, for this movement, what a replay does not make again.
 
         Args:
-            families: of the tags to take over.
-            needs: tags without which nothing is taken over.
+            families: of the tags to copy: the parts before the slash.
+            needs: tags without which nothing is copied.
 
         Returns:
-            Whether the event file that is to be replaced held any of it.
+            Whether the earlier event file had any of it.
         """
         events = [
             (event.wall_time, {v.tag: v.tensor for v in event.summary.value if v.tag.partition("/")[0] in families})
@@ -168,7 +168,7 @@ class Board:
         return bool(tags)
 
     def publish(self) -> None:
-        """Appear under the name that TensorBoard looks for, in the place of earlier event files."""
+        """Appear under the name that TensorBoard looks for, and replace earlier event files."""
         self._file.publish()
 
     def flush(self) -> None:
@@ -176,7 +176,7 @@ class Board:
         self._file.flush()
 
     def close(self) -> None:
-        """Flush, and let go; what was not published is dropped."""
+        """Flush and close; what was not published is dropped."""
         self._file.close()
 
     def _write(self, tensors: Mapping[str, TensorProto], wall_time: float | None = None) -> None:
@@ -200,17 +200,17 @@ class Board:
 
 
 class _EventFile:
-    """Written beside those of the directory, until ``publish`` replaces them; ``before`` holds their events by step."""
+    """A new event file; ``publish`` replaces those of the directory. ``before`` holds their events by step."""
 
     def __init__(self, directory: Path) -> None:
         directory.mkdir(parents=True, exist_ok=True)
         self._earlier = sorted(directory.glob(f"{_NAME}[0-9][0-9][0-9]"))
         self.before: dict[int, list[Event]] = {}
-        for path in self._earlier[-1:]:  # it took over all that the others held, before it was published
+        for path in self._earlier[-1:]:  # it has all that the others had
             for event in read_events(path):
                 self.before.setdefault(event.step, []).append(event)
         number = int(self._earlier[-1].name[-3:]) + 1 if self._earlier else 0
-        self._path = directory / f"{_NAME}{number:03d}"  # a new name, or a running TensorBoard would not look at it
+        self._path = directory / f"{_NAME}{number:03d}"  # a new name, else a running TensorBoard would ignore it
         self._partial: Path | None = directory / "board.part"
         self._writer = RecordWriter(self._partial.open("wb"))
         self._add(Event(wall_time=time.time(), file_version="brain.Event:2"))

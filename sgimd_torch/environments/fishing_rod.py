@@ -127,8 +127,13 @@ class FishingRod:
         if not thetas.ndim == contexts.ndim == 2 or not 0 < len(thetas) == len(contexts) == len(rngs):
             rows = f"{contexts.shape}, {thetas.shape} and {len(rngs)} rngs"
             raise ValueError(f"needs n > 0 contexts, thetas and rngs, got {rows}; is it one movement, for execute()?")
-        blocks = [slice(start, start + _BLOCK) for start in range(0, len(thetas), _BLOCK)]
-        return np.concatenate([self._execute(contexts[block], thetas[block], rngs[block]) for block in blocks])
+        # A block takes as many steps as its longest movement, so movements of about the same length run together.
+        order = thetas[:, -1].argsort(kind="stable")
+        outcomes = np.empty((len(thetas), self.outcomes.dim))
+        for start in range(0, len(order), _BLOCK):
+            block = order[start : start + _BLOCK]
+            outcomes[block] = self._execute(contexts[block], thetas[block], [rngs[row] for row in block])
+        return outcomes
 
     def record(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Recording:
         """As ``execute``, but it keeps every step, for films and for a closer look; takes twice as long."""
@@ -190,8 +195,8 @@ class FishingRod:
 
     def _times(self, end: float) -> Array:
         """Times (s) of the commands up to ``end``, and one more, as sensors show the state *before* each step."""
-        step = self.model.opt.timestep
-        return step * np.arange(int(np.ceil(end / step)) + 1)
+        step = self._caster.timestep
+        return step * np.arange(math.ceil(end / step) + 1, dtype=np.float64)
 
     def _commands(self, theta: Array, rng: np.random.Generator) -> Array:
         """``(n_steps, 6)`` rad: the trajectory of theta, with motor noise proportional to its speed."""
@@ -204,6 +209,6 @@ class FishingRod:
         draws = rng.standard_normal((self._draws, len(JOINTS)))[: len(times)]
         draws[1:] *= math.sqrt(1 - CORRELATION**2)
         noise = lfilter([1.0], [1.0, -CORRELATION], draws, axis=0)  # AR(1) of unit variance
-        speed = np.abs(trajectory[1:] - trajectory[:-1]) / self.model.opt.timestep
+        speed = np.abs(trajectory[1:] - trajectory[:-1]) / self._caster.timestep
         trajectory[:-1] += self.noise * speed * noise[:-1]
         return trajectory

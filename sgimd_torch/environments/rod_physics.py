@@ -83,6 +83,7 @@ class Caster:
         self._float_mass = float(model.body("float").mass[0])
         self._threads = os.cpu_count() or 1 if threads is None else threads
         self._pools: dict[int, tuple[rollout.Rollout, list[mujoco.MjData]]] = {}
+        self._rooms: dict[str, Array] = {}
         self.home, self.hanging = self._settle(posture)
         """The start configuration, a full physics state; and ``(6,)``, position (m) and velocity (m/s) of its float."""
 
@@ -106,7 +107,8 @@ class Caster:
         flying = np.arange(n)
         for start in range(0, int(steps.max()), _CHUNK):
             stop = min(start + _CHUNK, int(steps[flying].max()))
-            run, seen = self._rollout(states[flying], controls[flying, start:stop])
+            whole = slice(None) if n == 1 else flying  # one movement needs no copies
+            run, seen = self._rollout(states[whole], controls[whole, start:stop])
             for k, row in enumerate(flying):
                 last = min(stop, int(steps[row])) - start
                 speed, track = run[k, :last, speeds], seen[k, :last]
@@ -129,7 +131,11 @@ class Caster:
         """The movement that, by ``cast``, lands at ``outcome``, step by step."""
         states, controls = self._begin([commands], yaw_wind)
         run, seen = self._rollout(states, controls)
-        states, floats, push = np.concatenate([states, run[0]]), seen[0], float(controls[0, 0, 6]) / self._float_mass
+        states, floats, push = (
+            np.concatenate([states, run[0]]),
+            seen[0].copy(),
+            float(controls[0, 0, 6]) / self._float_mass,
+        )
         let_out = None
         wet = np.flatnonzero(floats[:, 2] <= 0)
         if wet.size:
@@ -188,7 +194,10 @@ class Caster:
         return (dz + math.sqrt(dz * dz + 2 * self._gravity * max(z, 0.0))) / self._gravity
 
     def _rollout(self, states: Array, controls: Array) -> tuple[Array, Array]:
-        """States after each step, and the float's position and velocity *before* it, as MuJoCo's sensors have them."""
+        """States after each step, and the float's position and velocity *before* it, as MuJoCo's sensors have them.
+
+        Both are overwritten by the next call: new memory for each would take longer than everything around it.
+        """
         threads = self._threads if len(states) > 1 else 1
         if threads not in self._pools:
             data = [mujoco.MjData(self.model) for _ in range(threads)]
@@ -196,13 +205,19 @@ class Caster:
         pool, data = self._pools[threads]
         n, n_steps = controls.shape[:2]
         self.steps += n * n_steps
-        run = np.empty((n, n_steps, states.shape[1]))
-        seen = np.empty((n, n_steps, self.model.nsensordata))
+        run = self._room("run", n, n_steps, states.shape[1])
+        seen = self._room("seen", n, n_steps, self.model.nsensordata)
         # MuJoCo's own checks and copies would take as long as four steps; the shapes are right by construction.
         pool.rollout(
             [self.model] * n, data, states, controls, state=run, sensordata=seen, nstep=n_steps, skip_checks=True
         )
         return run, seen
+
+    def _room(self, name: str, *shape: int) -> Array:
+        size = math.prod(shape)
+        if name not in self._rooms or len(self._rooms[name]) < size:
+            self._rooms[name] = np.empty(size)
+        return self._rooms[name][:size].reshape(shape)
 
 
 def _crossing(above: Array, below: Array) -> Array:

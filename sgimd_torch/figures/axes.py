@@ -21,7 +21,7 @@ GREY: Final = "0.45"
 
 
 def plane(ax: Axes, box: Box) -> None:
-    """Axes in metres, equal aspect, all of ``box`` in sight."""
+    """Axes in metres, equal aspect, showing all of ``box``."""
     ax.set(
         xlim=(box.low[0], box.high[0]), ylim=(box.low[1], box.high[1]), aspect="equal", xlabel="x (m)", ylabel="y (m)"
     )
@@ -47,12 +47,12 @@ def coloured_regions(
         One rectangle for each region, in their order; their array holds the values.
 
     Raises:
-        ValueError: regions that are not of the plane, as when contexts are part of them, or numbers that do not match.
+        ValueError: regions not in the plane, such as those that include contexts, or numbers that do not match.
     """
     if lows.shape != highs.shape or lows.shape != (len(values), 2):
         raise ValueError(
             f"regions must be (n, 2), (n, 2) and (n,), got {lows.shape}, {highs.shape}, {values.shape}; "
-            "a map over contexts too has to be cut at one context first"
+            "a map that includes contexts must be cut at one context first"
         )
     patches = [Rectangle((low[0], low[1]), *(high - low)) for low, high in zip(lows, highs, strict=True)]
     drawn = PatchCollection(patches, cmap=colours, edgecolor="0.35", linewidth=0.8)
@@ -63,7 +63,7 @@ def coloured_regions(
 
 
 def over_movements(ax: Axes, label: str) -> None:
-    """Movements along the x axis, ``label`` along the other."""
+    """Movements along the x axis, ``label`` on the y axis."""
     ax.set(xlabel="movements executed", ylabel=label)
     ax.set_xlim(left=0)
     ax.grid(alpha=0.3)
@@ -77,7 +77,7 @@ def colour_bar(axes: Sequence[Axes], drawn: ScalarMappable, label: str, *, exten
 
 
 def note(ax: Axes, text: str, *, top: bool = False) -> None:
-    """Words at the lower or upper edge."""
+    """Text at the lower or upper edge."""
     white = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 2}
     height, side = (0.985, "top") if top else (0.015, "bottom")
     ax.text(0.5, height, text, transform=ax.transAxes, ha="center", va=side, fontsize="small", bbox=white)

@@ -48,7 +48,7 @@ def error_curves(ax: Axes, runs: Mapping[str, Sequence[Curve]]) -> dict[str, Dra
 
     Args:
         ax: drawn on.
-        runs: algorithm -> one curve for each seed. Drawn where all seeds of an algorithm were evaluated.
+        runs: algorithm -> one curve for each seed. Drawn at movements where all seeds of an algorithm were evaluated.
 
     Returns:
         What was drawn for each algorithm.
@@ -92,7 +92,7 @@ def landing_points(
     most: float | None = None,
     colour_bar: bool = True,
 ) -> QuadMesh:
-    """How often the float landed where: a histogram on a logarithmic scale, empty tiles white.
+    """Where the float landed, and how often: a histogram on a logarithmic scale, empty tiles white.
 
     Args:
         ax: drawn on, and given a colour bar unless ``colour_bar`` is False.
@@ -106,7 +106,7 @@ def landing_points(
         The tiles; their array holds the counts, ``(n_y, n_x)``, masked where 0.
 
     Raises:
-        ValueError: ``box`` is not of the plane.
+        ValueError: ``box`` is not in the plane.
     """
     mesh = histogram(ax, outcomes, box, side=side, most=most)
     if colour_bar:
@@ -127,7 +127,7 @@ def histogram(ax: Axes, points: Array, box: Box, *, side: float, most: float | N
     tiles = np.ma.masked_equal(tile_counts(points, box, side), 0)
     x, y = _edges(box, side)
     norm = LogNorm(1, max(2, float(tiles.filled(0).max()) if most is None else most))
-    blues = ListedColormap(colormaps["Blues"](np.linspace(0.25, 1.0, 256)))  # a single point is seen against white
+    blues = ListedColormap(colormaps["Blues"](np.linspace(0.25, 1.0, 256)))  # a single point is visible on white
     return ax.pcolormesh(x, y, tiles, norm=norm, cmap=blues)
 
 
@@ -144,7 +144,7 @@ def tile_counts(outcomes: Array, box: Box, side: float = 0.05) -> Array:
     """``(n_y, n_x)`` how many of the ``outcomes`` ``(n, 2)`` lie on each tile of the plane.
 
     Raises:
-        ValueError: ``box`` is not of the plane.
+        ValueError: ``box`` is not in the plane.
     """
     x, y = _edges(box, side)
     return np.histogram2d(outcomes[:, 0], outcomes[:, 1], bins=(x, y))[0].T
@@ -165,7 +165,7 @@ def interest_map(
         One rectangle for each region, in their order; their array holds the interests.
 
     Raises:
-        ValueError: regions that are not of the plane, as when contexts are part of them, or numbers that do not match.
+        ValueError: regions not in the plane, such as those that include contexts, or numbers that do not match.
     """
     drawn = coloured_regions(ax, lows, highs, interests, "Oranges", (0, max(float(interests.max()), 1e-6)))
     colour_bar([ax], drawn, "interest: recent change of competence")

@@ -42,7 +42,7 @@ def trajectories(
 
     Args:
         axes: one for each joint.
-        demonstrations: drawn thin and grey, one over the other.
+        demonstrations: drawn thin and grey, on top of each other.
         fitted: for each demonstration ``(n_times,)`` s and ``(n_times, n_joints)`` rad, as
             ``primitive.trajectory(primitive.correspondence(times, trajectory))`` gives them; drawn dashed.
         names: of the joints; None numbers them.
@@ -137,7 +137,7 @@ def competence_map(ax: Axes, lows: Array, highs: Array, competences: Array) -> P
         One rectangle for each region, in their order; their array holds the competences.
 
     Raises:
-        ValueError: regions that are not of the plane, or numbers that do not match.
+        ValueError: regions that are not in the plane, or numbers that do not match.
     """
     drawn = coloured_regions(ax, lows, highs, np.ma.masked_invalid(competences), "viridis", (-1.0, 0.0))
     colour_bar([ax], drawn, "mean competence: 0 met, -1 not at all")
@@ -156,7 +156,7 @@ def interest_over_time(axes: Iterable[Axes], regions: Mapping[str, np.ndarray]) 
         The rectangles of each map.
 
     Raises:
-        ValueError: there is no map, or its regions are not of the plane.
+        ValueError: there is no map, or its regions are not in the plane.
     """
     axes, moments = list(axes), np.unique(regions["movements"])
     if not len(moments) or "low_2" in regions:
@@ -178,19 +178,19 @@ def interest_over_time(axes: Iterable[Axes], regions: Mapping[str, np.ndarray]) 
 
 
 def chosen_goals(ax: Axes, goals: Array, times: Array, box: Box | None = None) -> PathCollection:
-    """The goals that a learner set itself, coloured by when.
+    """The goals that a learner chose itself, coloured by time.
 
     Args:
         ax: drawn on, and given a colour bar.
         goals: ``(n, 2)`` m.
         times: ``(n,)`` movements executed before.
-        box: T; None shows what the goals need.
+        box: T; None for a box around the goals.
 
     Returns:
         The points; their array holds the times.
 
     Raises:
-        ValueError: goals that are not of the plane, none, or as many times.
+        ValueError: no goals, goals that are not in the plane, or another number of times.
     """
     if goals.ndim != 2 or goals.shape[1] != 2 or not 0 < len(goals) == len(times):
         raise ValueError(f"needs (n, 2) goals and (n,) times, n > 0, got {goals.shape} and {np.shape(times)}")

@@ -23,11 +23,11 @@ from sgimd_torch.forward_model.diagnostics import LEVELS, CellErrors
 from sgimd_torch.spaces import Array, Box
 
 _LINES = (COLOURS["sgim-d"], COLOURS["sagg-riac"], COLOURS["imitation"], COLOURS["observation"])
-_ERRORS = ListedColormap(colormaps["YlOrRd"](np.linspace(0.15, 1.0, 256)))  # the smallest is seen against white
+_ERRORS = ListedColormap(colormaps["YlOrRd"](np.linspace(0.15, 1.0, 256)))  # the smallest is visible on white
 
 
 def predictions(ax: Axes, observed: Array, mean: Array, box: Box, *, most: float | None = None) -> LineCollection:
-    """A line from where the float was to land to where it did, a dot at that end; coloured by the distance.
+    """A line from the predicted to the observed landing point, which has a dot; coloured by the distance.
 
     Args:
         ax: drawn on, and given a colour bar.
@@ -39,7 +39,7 @@ def predictions(ax: Axes, observed: Array, mean: Array, box: Box, *, most: float
         The lines; their array holds the distances (m).
 
     Raises:
-        ValueError: outcomes that are not of the plane, or as many predictions.
+        ValueError: outcomes that are not in the plane, or another number of predictions.
     """
     if observed.ndim != 2 or observed.shape[1] != 2 or observed.shape != mean.shape or not len(observed):
         raise ValueError(f"needs (n, 2) outcomes and as many predictions, n > 0, got {observed.shape}, {mean.shape}")
@@ -71,7 +71,7 @@ def error_map(ax: Axes, cells: CellErrors, box: Box, *, most: float | None = Non
         The cells; their array holds the errors (m), ``(n_y, n_x)``, masked where a cell is empty.
 
     Raises:
-        ValueError: a grid that is not of the plane.
+        ValueError: a grid that is not in the plane.
     """
     errors, counts = np.ma.masked_invalid(cells.errors.T), cells.counts.T
     if errors.ndim != 2 or box.dim != 2:
@@ -91,7 +91,7 @@ def error_map(ax: Axes, cells: CellErrors, box: Box, *, most: float | None = Non
 
 
 def calibration(ax: Axes, levels: Array, coverages: Mapping[str, Array]) -> dict[str, Line2D]:
-    """Share of the outcomes inside the regions that should hold a share of ``levels``, beside the ideal diagonal.
+    """Share of the outcomes inside the regions that should hold a share of ``levels``, with the ideal diagonal.
 
     Args:
         ax: drawn on.
@@ -112,9 +112,9 @@ def calibration(ax: Axes, levels: Array, coverages: Mapping[str, Array]) -> dict
         ax.axvline(level, color="0.85", linewidth=1, zorder=0)
     drawn = {}
     for colour, (label, shares) in zip(_LINES, coverages.items(), strict=False):
-        told = " / ".join(f"{100 * shares[k]:.0f}" for k in marked)
+        in_words = " / ".join(f"{100 * shares[k]:.0f}" for k in marked)
         (drawn[label],) = ax.plot(levels, shares, "o-", color=colour, markersize=6, markevery=marked)
-        drawn[label].set_label(f"{label}: {told} %" if told else label)
+        drawn[label].set_label(f"{label}: {in_words} %" if in_words else label)
     words: dict[str, Any] = {"color": GREY, "fontsize": "small", "transform": ax.transAxes}
     ax.text(0.04, 0.62, "too cautious", **words)
     ax.text(0.96, 0.38, "overconfident", ha="right", **words)
@@ -137,7 +137,7 @@ def error_over_time(ax: Axes, movements: Array, errors: Array) -> Line2D:
 def coverage_over_time(
     ax: Axes, movements: Array, coverages: Array, *, level: float = 0.8, band: tuple[float, float] = (0.7, 0.9)
 ) -> Line2D:
-    """Share of the outcomes inside the region of one ``level`` in each window, ``(n,)``; ``band`` is what will do."""
+    """Share of the outcomes inside the region of one ``level`` in each window, ``(n,)``; ``band`` is acceptable."""
     ax.axhspan(*band, color="0.9", zorder=0, label=f"{100 * band[0]:.0f} to {100 * band[1]:.0f} %")
     ax.axhline(level, linestyle="--", color=GREY, linewidth=1.2, label="ideal")
     (line,) = ax.plot(movements, coverages, "o-", color=COLOURS["sgim-d"], markersize=4)
@@ -149,9 +149,9 @@ def coverage_over_time(
 
 
 def held_out_over_time(ax: Axes, movements: Array, held_out: Array, diverged: NDArray[np.bool_]) -> Line2D:
-    """Negative log likelihood of what is held out, after each refresh ``(n,)``; those that diverged as crosses.
+    """Negative log likelihood of held-out exemplars, after each refresh ``(n,)``; those that diverged as crosses.
 
-    Values far above all others, as of the first refresh, are cut off, and a note says so.
+    Values far above all others, such as at the first refresh, are cut off; a note says so.
     """
     (line,) = ax.plot(movements, held_out, "o-", color=COLOURS["sgim-d"], markersize=3, linewidth=1.2)
     if diverged.any():

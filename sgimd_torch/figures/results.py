@@ -67,10 +67,10 @@ def seed_curves(ax: Axes, runs: Sequence[SeedCurves]) -> list[Line2D]:
 
 
 def goal_histogram(ax: Axes, goals: Array, box: Box, *, side: float, most: float | None = None) -> QuadMesh:
-    """Where a learner's goals ``(n, 2)`` m lie in the task space; like ``landing_points``, but for whole task spaces.
+    """Where a learner's goals ``(n, 2)`` m lie in the task space; like ``landing_points``, but for a whole task space.
 
     Raises:
-        ValueError: ``box`` is not of the plane.
+        ValueError: ``box`` is not in the plane.
     """
     mesh = histogram(ax, goals, box, side=side, most=most)
     plane(ax, box)
@@ -78,12 +78,12 @@ def goal_histogram(ax: Axes, goals: Array, box: Box, *, side: float, most: float
 
 
 def goal_distances(ax: Axes, runs: Mapping[str, Sequence[Array]], *, reach: float) -> list[Line2D]:
-    """Which share of a learner's goals lies within a distance of the arm's base: all seeds thick, each seed thin.
+    """The share of a learner's goals within a distance of the arm's base: all seeds thick, each seed thin.
 
     Args:
         ax: drawn on, with logarithmic axes.
         runs: algorithm -> goals ``(n, 2)`` m of each seed.
-        reach: m, marked: what lies within can be reached.
+        reach: m, marked: goals within it can be reached.
 
     Returns:
         The thick lines, in the order of ``runs``.
@@ -110,9 +110,9 @@ def goal_distances(ax: Axes, runs: Mapping[str, Sequence[Array]], *, reach: floa
 
 
 def forest(ax: Axes, differences: Sequence[Difference], *, reference: str) -> list[Line2D]:
-    """One row for each variant, the best on top: how much larger its error (m) is than the reference's, with interval.
+    """One row for each variant, the best on top: error (m) minus the reference's, with interval.
 
-    A full mark: the interval excludes 0. Small points are seeds, shown behind; their number stands by the name.
+    A filled mark: the interval excludes 0. Small points behind are seeds; their number is next to the name.
 
     Returns:
         The marks of the centres, from the top.

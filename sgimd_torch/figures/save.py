@@ -23,12 +23,12 @@ STYLE: Final[Any] = {
     "axes.spines.right": False,
     "lines.linewidth": 2,
     "legend.fontsize": 10.5,
-    "svg.hashsalt": "sgimd_torch",  # names inside an svg are else drawn by lot
+    "svg.hashsalt": "sgimd_torch",  # else names inside an svg are random
 }
 
 
 def save_figure(draw: Callable[[], Figure], stem: Path, *kinds: str) -> list[Path]:
-    """Draw a figure in our style and write it as ``stem`` with each of the ``kinds`` of file behind, such as "png".
+    """Draw a figure in our style and write it as ``stem`` for each of the ``kinds`` of file, such as "png".
 
     Returns:
         The files.

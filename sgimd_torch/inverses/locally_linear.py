@@ -68,4 +68,4 @@ class LocallyLinear:
         cross = (weights * deviations.T) @ (thetas - mean_theta)
         slope = np.linalg.solve(covariance + self.ridge * variance * np.eye(len(goal)), cross)
         theta = mean_theta + (goal - mean_outcome) @ slope
-        return estimate._replace(theta=np.clip(theta, self.memory.thetas.min(axis=0), self.memory.thetas.max(axis=0)))
+        return estimate._replace(theta=np.clip(theta, *self.memory.theta_range))

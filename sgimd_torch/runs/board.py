@@ -1,4 +1,4 @@
-"""The board of a run: what ``run.py`` shows in TensorBoard while it goes on, and after a resume as if it never stopped.
+"""The board of a run: what TensorBoard shows of it, after a resume as if the run had never stopped.
 
 with RunBoard(directory, config, parts, seconds, regions) as board: board.episode(episode); board.evaluation(found)
 ``scripts/watch RUNS`` opens TensorBoard on it.
@@ -38,13 +38,13 @@ LEGEND: Final = {
 
 
 class RunBoard:
-    """Shows what a run does; nothing unless ``config.board`` is true. A context manager.
+    """Shows what a run does, if ``config.board`` is true. A context manager.
 
     Args:
         directory: of the run; its event files stay as they are until ``begin``.
         config, parts: of the run.
         seconds: its clock.
-        regions: gives those of the goal model as they are, none for one that has none.
+        regions: gives the current regions of the goal model; an empty sequence if it has none.
     """
 
     def __init__(
@@ -61,10 +61,10 @@ class RunBoard:
         self._goals: deque[Array] = deque(maxlen=GOALS)
         self._demonstrated: list[Array] = []
         self._drawn_at = 0
-        self._timed = False  # earlier event files say when the movements were
+        self._timed = False  # earlier event files hold times
         if not config.board:
             return
-        from sgimd_torch.board.writer import Board  # loaded only for those who watch
+        from sgimd_torch.board.writer import Board  # loaded only when there is a board
 
         tolerance = getattr(parts.learner.autonomous, "tolerance", 0.02)
         cells = cells_of(parts.environment.outcomes, parts.benchmark.goals)
@@ -85,7 +85,7 @@ class RunBoard:
             self._board.close()
 
     def episode(self, episode: Episode) -> None:
-        """Count a movement, be it lived or replayed."""
+        """Count a movement, new or replayed."""
         board = self._board
         if board is None:
             return
@@ -101,7 +101,7 @@ class RunBoard:
             board.regions(self._regions())
             recalled = replayed and board.recall("time")
             self._timed |= recalled
-            if not replayed or (self._timed and not recalled):  # the clock is near what a killed run did not write
+            if not replayed or (self._timed and not recalled):  # not written by a killed run: now is close
                 spent = self._seconds.summary().items()
                 board.scalars({f"time/{name.removeprefix('seconds_')}": value for name, value in spent})
 
@@ -111,7 +111,7 @@ class RunBoard:
             self._board.scalars(curves)
 
     def evaluation(self, found: Evaluation) -> None:
-        """Show an evaluation that was made just now, and pictures, at times; on disk when it returns."""
+        """Show a new evaluation, sometimes with pictures. It is on disk when this returns."""
         board = self._board
         if board is None:
             return
@@ -125,7 +125,7 @@ class RunBoard:
         """Take over from earlier event files what they hold of an evaluation after this movement.
 
         Returns:
-            Whether that is all; else it has to be evaluated again.
+            Whether they hold all of it; if not, it has to be evaluated again.
         """
         board = self._board
         if board is None:
@@ -139,7 +139,7 @@ class RunBoard:
         return whole
 
     def begin(self) -> None:
-        """The replay is over: take the place of earlier event files."""
+        """The replay is over: replace earlier event files."""
         if self._board is not None:
             self._board.publish()
 
@@ -149,14 +149,14 @@ class RunBoard:
             self._board.flush()
 
     def finish(self) -> None:
-        """The run has come to its end."""
+        """The run has ended."""
         if self._board is not None:
             self._board.finish()
 
     @property
     def _draws(self) -> bool:
-        """Whether this evaluation gets pictures: when movements have doubled, as they take as long as a hundred, and at
-        the end."""
+        """Whether this evaluation gets pictures, which take as long as 100 movements: when the number of movements has
+        doubled, and at the end."""
         assert self._board is not None
         return self._board.movements >= 2 * self._drawn_at or self._board.movements == self._config.movements
 
@@ -165,7 +165,7 @@ class RunBoard:
         return self._parts.environment.outcomes.dim == 2
 
     def _draw(self, board: Board, found: Evaluation) -> None:
-        from sgimd_torch.board.pictures import draw, where  # loaded only for those who watch
+        from sgimd_torch.board.pictures import draw, where  # loaded only when there is a board
 
         space, regions = self._parts.environment.outcomes, self._regions()
         self._drawn_at = board.movements
@@ -188,7 +188,7 @@ class RunBoard:
 def cells_of(space: Box, goals: Array) -> Box:
     """The part of T that is cut into cells: where the benchmark's ``goals`` ``(n, outcome_dim)`` lie, rounded outwards.
 
-    So the cells of runs on one benchmark are the same, however much larger than what can be reached their T is.
+    So runs on one benchmark have the same cells, however large their T is.
     """
     sides = np.ptp(goals, axis=0)
     step = 10 ** np.floor(np.log10(np.where(sides > 0, sides, space.sides))) / 2
@@ -198,5 +198,5 @@ def cells_of(space: Box, goals: Array) -> Box:
 
 
 def _plain(field: Field[Any], value: object) -> bool | float | str:
-    """Of one type in all runs: what may be null is text."""
+    """A value of the same type in all runs: an option that may be null is text."""
     return value if isinstance(value, bool | int | float) and "None" not in str(field.type) else str(value)

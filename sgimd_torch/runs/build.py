@@ -1,4 +1,4 @@
-"""The composition root: from a ``Config`` to the parts of a run, by what the catalogue says of each choice.
+"""The composition root: makes the parts of a run from a ``Config``, as the catalogue describes each choice.
 
 parts = build(Config(seed=3)); for episode in run(parts.learner, parts.environment, 3, teacher=parts.teacher, ...): ...
 """
@@ -24,17 +24,17 @@ if TYPE_CHECKING:
     from sgimd_torch.forward_model.anchored import Trust
     from sgimd_torch.forward_model.model import ForwardModel
 
-LEAST_NOISE: Final = 0.01  # m; where outcomes have none, predictions are still not better than this
+LEAST_NOISE: Final = 0.01  # m; predictions are not better than this, even if outcomes have no noise
 _OF_THE_ROBOT: Final = {"policies", "correspondence"}
 
 
 @dataclass(frozen=True, eq=False)
 class RunParts:
     """What a run needs. ``correspondence`` translates a demonstrated trajectory to theta. ``inverse`` reads the
-    learner's memory for evaluations; ``model``, to be refreshed after each movement, and how far to ``trust`` it, are
-    None for a run without; ``teacher`` is None, and ``demonstrations`` are empty, for a learner that learns alone.
-    ``residuals`` (rad) say how far each is from what the robot can play. ``data`` holds checksums of the files that
-    were read, ``notes`` what a person should know."""
+    learner's memory for evaluations; ``model`` is refreshed after each movement; it and its ``trust`` are None for a
+    run without a model. ``teacher`` is None, and ``demonstrations`` are empty, for a learner that learns alone.
+    ``residuals`` (rad) say how far each demonstration is from what the robot can play. ``data`` holds checksums of the
+    files that were read, ``notes`` messages for the user."""
 
     environment: Environment
     correspondence: Correspondence | None
@@ -85,10 +85,10 @@ def build(config: Config) -> RunParts:
 
 
 def task_of(config: Config) -> Task:
-    """The environment that a run lives in, with what belongs to it.
+    """The environment of a run, with what belongs to it.
 
     Raises:
-        ValueError: it cannot be made, or what was made is no environment.
+        ValueError: it cannot be made, or is not an environment.
     """
     entry = config.entry("environment")
     options = {name: getattr(config, option) for name, option in entry.uses.items()}
@@ -101,7 +101,7 @@ def task_of(config: Config) -> Task:
 
 
 class _Parts:
-    """Makes the parts of one run by name; those that others share are made once."""
+    """Makes the parts of one run by name; shared parts are made once."""
 
     def __init__(self, config: Config, task: Task) -> None:
         self.config, self.used = config, config.used
@@ -119,7 +119,7 @@ class _Parts:
         return self._made[name]
 
     def maker(self, kind: str, *, learning: bool = True) -> Callable[..., Any]:
-        """What is chosen of a kind, with its options; ``learning``: an inverse may answer otherwise in evaluations."""
+        """The choice of a kind, with its options. ``learning`` False: for evaluations, where the inverse may differ."""
         word = getattr(self.config, kind)
         entry = self.config.entry(kind)
         if learning and entry.learns_with is not None:
@@ -144,7 +144,7 @@ class _Parts:
 
 
 def _checked(kind: str, word: str, make: Callable[..., Any]) -> Callable[..., Any]:
-    """``make``, and a look at what it gives: a part of the user's may lack what is asked of it."""
+    """``make``, with a check of what it gives: a part of the user's own may lack members."""
 
     @wraps(make)
     def made(*arguments: Any, **options: Any) -> Any:
@@ -161,6 +161,6 @@ def _goals_note(task: Task, config: Config, benchmark: Benchmark) -> list[str]:
         return []
     name, n = type(task.environment).__name__, len(benchmark.goals)
     return [
-        f"{name} brings no goals to be judged by: evaluations take {n} points all over T, also where it cannot reach; "
-        "a file of goals (--benchmark) or a Task with a benchmark says more"
+        f"{name} has no benchmark goals: evaluations use {n} points all over T, also where it cannot reach; "
+        "a file of goals (--benchmark) or a Task with a benchmark is more informative"
     ]

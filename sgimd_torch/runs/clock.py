@@ -12,7 +12,7 @@ from sgimd_torch.spaces import Array, Episode
 
 
 class Seconds:
-    """Where the time goes, counted on from the ``before`` of a resumed run."""
+    """Seconds spent so far; those of a resumed run are added to ``before``, its last summary."""
 
     def __init__(self, before: dict[str, Any]) -> None:
         self.physics: float = before.get("seconds_physics", 0.0)
@@ -20,7 +20,7 @@ class Seconds:
         self.learner = 0.0
 
     def of_physics(self, execute: Execute) -> Execute:
-        """``execute``, timed; what it takes is not the learner's."""
+        """``execute``, timed; its time does not count as the learner's."""
 
         def timed(index: int, context: Array, theta: Array) -> Array:
             begun = time.perf_counter()
@@ -51,6 +51,6 @@ class Seconds:
             self.evaluation += time.perf_counter() - begun
 
     def summary(self) -> dict[str, float]:
-        """As summary.json has them."""
+        """As they go to summary.json."""
         named = {"physics": self.physics, "learner": self.learner, "evaluation": self.evaluation}
         return {f"seconds_{name}": round(seconds, 3) for name, seconds in named.items()}

@@ -1,4 +1,4 @@
-"""Let one learner live, evaluate it now and then, and write everything to one run directory, OUT/NAME/seed-003.
+"""Run one learner, evaluate it now and then, and write everything to one run directory, OUT/NAME/seed-003.
 
 Examples:
   sgimd run --algorithm sgim-d --seed 3
@@ -28,7 +28,7 @@ from sgimd_torch.runs.process import loading
 
 FLAGS: Final = {
     "resume": "Go on with a stopped or killed run, or lengthen a finished one.",
-    "accept_loss": "With --resume: go on though movements that were made are missing from the log; a copy is kept.",
+    "accept_loss": "With --resume: go on even if the log has lost movements; a copy of it is kept.",
 }
 _WANTED: Final = {
     "int": "a whole number",
@@ -63,7 +63,7 @@ def parse(
         prog=prog,
         usage="%(prog)s [--OPTION VALUE ...] [--resume]",
         description=description,
-        epilog="null stands for nothing. Underscores in the place of dashes are understood, too.",
+        epilog="null means no value. Options may be typed with underscores instead of dashes.",
         formatter_class=_Help,
     )
     hints, groups = get_type_hints(Config), dict[str, Any]()
@@ -71,7 +71,7 @@ def parse(
         about = options()[each.name]
         group = groups.get(about.group) or groups.setdefault(about.group, parser.add_argument_group(about.group))
         wanted = _WANTED.get(str(each.type), "")
-        text = f"{about.about} ({wanted}{wanted and '; '}default: {_told(each.default)}){_choices(each.name)}"
+        text = f"{about.about} ({wanted}{wanted and '; '}default: {_typed(each.default)}){_choices(each.name)}"
         metavar = f"{{{','.join(_BOOL)}}}" if each.type == "bool" else each.name.upper()
         group.add_argument(
             f"--{dashed(each.name)}", type=hints[each.name], default=each.default, metavar=metavar, help=text
@@ -86,20 +86,20 @@ def parse(
         parser.error(str(error))
 
 
-def _told(value: Any) -> str:
-    """A default, as the command line has it."""
+def _typed(value: Any) -> str:
+    """A default, as one types it."""
     return str(value) if isinstance(value, str | Path) else json.dumps(value)
 
 
 def _choices(name: str) -> str:
-    """What the catalogue has for an option, a line each."""
+    """The choices that the catalogue has for an option, one per line."""
     entries = CATALOGUE.get(name, {})
     lines = [f"\n  {word}: {entry.about}" for word, entry in entries.items()]
     return "".join([*lines, "\n  or package.module:attribute, one of your own"]) if lines else ""
 
 
 class _Help(argparse.RawTextHelpFormatter):
-    """Keeps lines, each wrapped by itself."""
+    """Keeps the lines of a text and wraps each by itself."""
 
     def _split_lines(self, text: str, width: int) -> list[str]:
         lines: list[str] = []
@@ -115,7 +115,7 @@ class _Parser(jsonargparse.ArgumentParser):
         self.typed: dict[str, tuple[str, str]] = {}  # by field: the option as it was typed, and its value
 
     def joined(self, argv: Sequence[str]) -> list[str]:
-        """Each option and its value as one word, spelt with dashes; what belongs to no option is refused."""
+        """Each option and its value as one word, spelt with dashes; a word that belongs to no option is refused."""
         names = {f"--{dashed(each.name)}": each.name for each in fields(Config)}
         flags = {*(f"--{dashed(flag)}" for flag in FLAGS), "--help"}
         words: list[str] = []

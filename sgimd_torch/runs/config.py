@@ -1,6 +1,6 @@
-"""What a run is made of: one field for each option, which says of itself all that there is to know about it.
+"""What a run is made of: one field for each option, with all that is known about it.
 
-Each default is the library's own, each option an ablation of one changed word.
+Each default is the library's own; a run with one changed option is an ablation.
     config = Config(algorithm="sagg-riac", goals="uniform", name="uniform-goals"); config.directory
 An option is added here, by one field, and nowhere else.
 """
@@ -20,13 +20,12 @@ from sgimd_torch.catalogue import CATALOGUE, ROD, SHARED, Entry, find
 
 
 class Option(NamedTuple):
-    """What a field of ``Config`` says of itself.
+    """What is known about a field of ``Config``.
 
-    ``about`` is its line in ``--help``, under the heading ``group``. ``least`` and ``most`` bound its numbers,
-    ``above`` leaves the bound itself out; ``slip`` ends the error. ``on_resume``: it may change when a run is resumed,
-    since it says how long the run lasts, where it lies or how it is looked at. ``place``: it makes no learner differ
-    from another. ``evaluates``: all evaluations of a run share it. ``leads``: one of the few that a comparison shows
-    first.
+    ``about`` is its line in ``--help``, under the heading ``group``. Its numbers are from ``least`` to ``most`` and
+    greater than ``above``; ``slip`` ends the error. ``on_resume``: it may change when a run is resumed, because it only
+    says how long the run lasts, where it is or how it is shown. ``place``: it does not change the learner.
+    ``evaluates``: all evaluations of a run share it. ``leads``: one of the few that a comparison shows first.
     """
 
     about: str
@@ -41,7 +40,7 @@ class Option(NamedTuple):
     leads: bool = False
 
     def check(self, name: str, value: Any) -> None:
-        """Refuse a number out of bounds; of several the first.
+        """Refuse the first number that is out of bounds.
 
         Raises:
             ValueError: with the bounds.
@@ -64,7 +63,7 @@ class Option(NamedTuple):
 
 
 def option(default: Any, group: str, about: str, *, before: Any = ..., **more: Any) -> Any:
-    """A field of ``Config``, see ``Option``; ``before`` is what runs had that were made before there was a choice."""
+    """A field of ``Config``, see ``Option``; ``before`` is the value in runs that are older than the option."""
     return field(default=default, metadata={"option": Option(about, group, **more), "before": before})
 
 
@@ -83,10 +82,10 @@ _MOST_THREADS: Final = max(64, os.cpu_count() or 1)
 class Config:
     """One run. ``options()`` explains each field; wrong values raise ValueError."""
 
-    algorithm: str = option("sgim-d", RUN, "Who learns.", leads=True)
-    seed: int = option(0, RUN, "Of all random streams; the same seed gives the same files.", least=0, place=True)
+    algorithm: str = option("sgim-d", RUN, "Which algorithm learns.", leads=True)
+    seed: int = option(0, RUN, "Seed of all random streams; the same seed gives the same files.", least=0, place=True)
     movements: int = option(
-        5000, RUN, "Length of the learner's life, movements at rest counted.", least=1, on_resume=True, leads=True
+        5000, RUN, "Number of movements, those at rest included.", least=1, on_resume=True, leads=True
     )
     out: Path = option(
         Path("runs"), RUN, "Directory for runs; this one goes to OUT/NAME/seed-003.", on_resume=True, place=True
@@ -101,11 +100,11 @@ class Config:
     board: bool = option(
         False,
         RUN,
-        "Show the run in TensorBoard; sgimd watch OUT opens it. Showing changes nothing in it.",
+        "Show the run in TensorBoard; sgimd watch OUT opens it. This does not change the run.",
         on_resume=True,
         place=True,
     )
-    environment: str = option(ROD, ROBOT, "Where it lives.", before=ROD)
+    environment: str = option(ROD, ROBOT, "Which robot in which world.", before=ROD)
     noise: float = option(
         0.032, ROBOT, "Motor noise (s): deviation (rad) of a command for each rad/s of commanded speed.", least=0
     )
@@ -137,7 +136,7 @@ class Config:
     inverse: str = option(
         "linear", LEARNER, "Which movement is inferred for a goal, when learning and in evaluations.", leads=True
     )
-    members: int = option(3, MODEL, "Networks in it.", least=1, most=100, slip="5 are many", before=3)
+    members: int = option(3, MODEL, "Number of networks.", least=1, most=100, slip="5 are many", before=3)
     noise_heads: bool = option(True, MODEL, "Whether its noise depends on the movement.", before=True)
     training: float = option(
         0.3,
@@ -145,7 +144,7 @@ class Config:
         "Steps of training for each movement; 0.3 takes about a fifth of the rod's physics.",
         above=0,
         most=100,
-        slip="it counts steps a movement",
+        slip="it is a number of steps per movement",
         before=0.3,
     )
     focus: float = option(
@@ -154,12 +153,12 @@ class Config:
         "Share of training drawn from what landed near the goal pursued.",
         least=0,
         most=0.75,
-        slip="the rest is of what is new and old",
+        slip="the rest is for new and old movements",
         before=0.0,
     )
-    anchored: bool = option(True, MODEL, "Whether predictions are corrected by what it missed nearby.", before=True)
+    anchored: bool = option(True, MODEL, "Whether predictions are corrected by its errors nearby.", before=True)
     residual: bool = option(
-        True, MODEL, "Whether, besides, by the outcomes of the search under way (gradient searches).", before=True
+        True, MODEL, "Whether also by the outcomes of the current search (gradient searches).", before=True
     )
     social: str = option("imitate", TEACHER, "How sgim-d answers a demonstration.")
     imitations: int = option(10, TEACHER, "Movements that sgim-d spends on imitating a demonstration.", least=1)
@@ -176,7 +175,7 @@ class Config:
         None,
         TEACHER,
         "Movements from one demonstration to the next, or from one look at the learner to the next (asked); null is "
-        "that teacher's own number.",
+        "the default of that teacher.",
         least=1,
     )
     choice: str = option("least-explored", TEACHER, "Which demonstration comes (periodic, asked).")
@@ -192,9 +191,9 @@ class Config:
         on_resume=True,
     )
     repeats: int = option(
-        10,
+        3,
         EVALUATION,
-        "How often each chosen movement is executed again to measure the noise, at least 2; 0 leaves the noise out.",
+        "How often each chosen movement is executed again to measure the noise, at least 2; 0 does not measure it.",
         least=0,
         on_resume=True,
         evaluates=True,
@@ -226,7 +225,7 @@ class Config:
 
     @property
     def variant(self) -> str:
-        """What the run's directory and its curve are called."""
+        """The name of the run's directory and of its curve."""
         return self.algorithm.replace("/", "-") if self.name is None else self.name
 
     @property
@@ -244,7 +243,7 @@ class Config:
         return sorted({movements for movements in chosen if movements < self.movements} | {self.movements})
 
     def entry(self, kind: str) -> Entry:
-        """The record of what is chosen of a kind, or of a part that others share."""
+        """The record of the choice of a kind, or of a shared part."""
         return SHARED[kind] if kind in SHARED else find(kind, getattr(self, kind))
 
     @property
@@ -274,7 +273,7 @@ class Config:
         return [f"--{dashed(name)} has no effect {self._why_not(name, used)}" for name in changed if name not in used]
 
     def _why_not(self, name: str, used: set[str]) -> str:
-        """The choice that leaves an option without a use."""
+        """The choice because of which an option has no effect."""
         if name in SHARED:
             return "without a forward model, see --search and --inverse"
         if name in self.entry("algorithm").ignores:
@@ -307,7 +306,7 @@ def words(settings: Mapping[str, Any]) -> list[str]:
 
 
 def from_settings(settings: Mapping[str, Any]) -> Config:
-    """The choices that made a run, of its config.json; what it does not name was not there to choose.
+    """The choices of a run, from its config.json; options that it lacks did not exist yet.
 
     Raises:
         ValueError: they make no sense.
@@ -325,7 +324,7 @@ def from_settings(settings: Mapping[str, Any]) -> Config:
 
 
 def options() -> dict[str, Option]:
-    """What each field says of itself, by name."""
+    """What is known about each field, by name."""
     return {each.name: each.metadata["option"] for each in fields(Config)}
 
 
@@ -335,7 +334,7 @@ def having(quality: str) -> tuple[str, ...]:
 
 
 def before_there_was_a_choice() -> dict[str, Any]:
-    """Options that older runs do not name, with what they had."""
+    """Options that older runs lack, with their value in them."""
     return {each.name: each.metadata["before"] for each in fields(Config) if each.metadata["before"] is not ...}
 
 

@@ -1,4 +1,4 @@
-"""The run directory as its one writer sees it: refuse what is not this run, take over what is whole, go on from there.
+"""Writing a run directory: refuse what is not this run, keep what is undamaged, go on from there.
 
 with RunDirectory(path, settings, ...) as directory: directory.begin(); directory.log.append(line); ...
 ``log.py`` explains the files.
@@ -30,10 +30,10 @@ class RunDirectory:
         free: names of settings that may differ when a run is resumed.
         columns: of the log.
         region_dims: dimensions of C x T, where the goal model has regions; None where it has none.
-        versions: what runs it.
+        versions: of Python, the libraries and this repository.
         movements: how long the run is to be; the log must not be longer.
         resume: go on with what is there; False refuses a directory that is in use already.
-        accept_loss: go on, too, where the log lacks movements that summary.json knows of: they are lived again.
+        accept_loss: go on even if the log lacks movements that summary.json counts: they are made again.
 
     Attributes:
         log: its table.
@@ -41,7 +41,7 @@ class RunDirectory:
         before: the settings it was started or last resumed with; None for a new run.
         summary: the last one, {} if there is none.
         evaluations: those found, and where new ones go.
-        notes: what a person should know: what was dropped from damaged files, say.
+        notes: messages for the user, such as what was dropped from damaged files.
 
     Raises:
         RunError: it holds a run and ``resume`` is False, or a run with other settings, or something else; or its log
@@ -80,7 +80,7 @@ class RunDirectory:
                 self.notes.append(f"{path} holds no run yet: it starts from the beginning")
             self._copy = self._read_log(accept_loss)
             if len(self.lines) > movements:
-                raise RunError(f"{path} has {len(self.lines)} movements already, asked for were {movements}")
+                raise RunError(f"{path} has {len(self.lines)} movements already, {movements} were asked for")
             self._settings, self._versions = dict(settings), versions
             self.evaluations = Evaluations(path, region_dims, self.notes)
             for partial in (*path.glob("*.json*.part"), *path.glob("*.csv*.part")):  # of a process that was killed
@@ -95,7 +95,7 @@ class RunDirectory:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        """Flush and let go; a disk that is full is not reported twice."""
+        """Flush and release the lock; a full disk is not reported twice."""
         try:
             self.log.flush()
         except OSError:
@@ -117,7 +117,7 @@ class RunDirectory:
         self.evaluations.begin()
 
     def summarise(self, **summary: Any) -> None:
-        """Replace summary.json, once the log is on the disk: it must not know of movements that the log lacks."""
+        """Replace summary.json, once the log is on the disk: it must not count movements that the log lacks."""
         self.log.flush(sync=True)
         self.summary = summary
         write_json(self.path / "summary.json", summary)
@@ -162,7 +162,7 @@ class RunDirectory:
         return {} if wrong else summary
 
     def _read_or_note(self, name: str) -> dict[str, Any]:
-        """A file that only says how things went: damaged, it is as good as missing."""
+        """A file that a run can go on without: if it is damaged, it counts as missing."""
         try:
             found: dict[str, Any] = read_json(self.path / name, missing={})
         except RunError as error:
@@ -171,7 +171,7 @@ class RunDirectory:
         return found
 
     def _read_log(self, accept_loss: bool) -> Path | None:
-        """Take over the whole lines; returns where the file is to be kept as it was found, if it was not whole."""
+        """Take over the undamaged lines; returns where to keep a copy of the log, None if nothing was lost."""
         log, found = self.log.path, self.log.read()
         begins_otherwise = found.bad == 1 and not self.log.header.startswith(found.tail) and found.tail.strip(b"\0")
         if begins_otherwise or not found.checked:
@@ -183,12 +183,12 @@ class RunDirectory:
         if self._lost and not accept_loss:
             raise RunError(
                 f"{log} holds {n} movements{f', line {found.bad} is damaged' if damaged else ''}, but summary.json "
-                f"knows of {n + self._lost}; was it cut, emptied or deleted? Restore it, or live the {self._lost} "
+                f"counts {n + self._lost}; was it cut, emptied or deleted? Restore it, or make the {self._lost} "
                 "missing ones again with --accept-loss, which keeps a copy of what is there"
             )
         self.notes += self.log.notes(found, f"{n} movements are kept")
         if self._lost:
-            self.notes.append(f"{log} lacks {self._lost} movements: {n} are kept, the others will be lived again")
+            self.notes.append(f"{log} lacks {self._lost} movements: {n} are kept, the others will be made again")
         if not damaged and not (self._lost and os.path.lexists(log)):
             return None
         copies = (log.with_name(f"{log.name}.lost-{k}") for k in count())

@@ -1,4 +1,4 @@
-"""What evaluations leave on disk: evaluation.csv, and regions.csv, the regions of the goal model at each of them."""
+"""The files that evaluations write: evaluation.csv, and regions.csv, the regions of the goal model at each of them."""
 
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ class Evaluations:
 
     @property
     def last(self) -> dict[str, float]:
-        """Its columns, {} before the first."""
+        """The last evaluation by column, {} before the first."""
         errors, *_ = self._rows.values()
         return dict(zip(EVALUATION, map(float, errors[max(errors)][0]), strict=True)) if errors else {}
 
     def keep(self, movements: Iterable[int]) -> None:
-        """Drop all but those after these numbers of ``movements``."""
+        """Keep only those after these numbers of ``movements``."""
         wanted = {number for number in movements if number in self}
         for table, rows in self._rows.items():
             self._rows[table] = {number: rows[number] for number in wanted}

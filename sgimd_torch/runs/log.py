@@ -14,8 +14,8 @@
     *.lost-0         a log as it was found, where movements of it were missing or damaged
 
 The csv files have a last column, crc32, the checksum of the fields before it. Numbers read back exactly, and no time of
-day is written: equal seeds make the same csv files, byte for byte. What does not grow is replaced whole, so that nobody
-ever reads half of it.
+day is written: equal seeds make the same csv files, byte for byte. A file that does not grow is replaced whole, so
+nobody reads half of it.
 
 ``tables.py`` writes and reads such lines, ``directory.py`` writes a run directory, ``read.py`` reads it.
 """
@@ -39,12 +39,12 @@ _LARGEST_JSON: Final = 16 * 2**20  # bytes
 
 
 class RunError(ValueError):
-    """A directory is not what is wanted: of another run, in use, damaged, or of no run at all."""
+    """A run directory cannot be used: it belongs to another run, is in use, is damaged, or holds no run."""
 
 
 @dataclass(frozen=True)
 class Columns:
-    """Of the log: how many of each there are."""
+    """The columns of the log: how many there are of each kind."""
 
     context_dim: int
     theta_dim: int
@@ -52,7 +52,7 @@ class Columns:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """In order, that of the checksum left out."""
+        """In order, without the checksum."""
         return (
             *("index", "origin", "demonstration"),
             *(f"context_{k}" for k in range(self.context_dim)),
@@ -68,7 +68,7 @@ class Columns:
 
     @classmethod
     def of(cls, directory: Path) -> Columns:
-        """Those that the first line of a run's log names; none where there is none yet.
+        """The columns that the first line of a run's log names; none if there is no log yet.
 
         Raises:
             RunError: it is not the first line of a log.
@@ -102,7 +102,7 @@ class Columns:
         return sealed(fields)
 
     def split(self, rows: Rows) -> tuple[Array, Array, Array, Array]:
-        """Contexts, thetas, goals and outcomes ``(n, dim)`` of so many rows of fields, NaN where they are empty."""
+        """Contexts, thetas, goals and outcomes ``(n, dim)`` from n rows of fields; empty fields are NaN."""
         ends = np.cumsum([self.context_dim, self.theta_dim, self.outcome_dim, self.outcome_dim])
         fields = [[field or "nan" for field in row[3:]] for row in rows]
         values = np.array(fields, dtype=np.float64).reshape(len(rows), ends[-1])
@@ -110,7 +110,7 @@ class Columns:
         return contexts, thetas, goals, outcomes
 
     def recorded(self, lines: Sequence[bytes]) -> list[Recorded]:
-        """What ``session.replay`` needs of them."""
+        """What ``session.replay`` needs of these lines."""
         _, thetas, _, outcomes = self.split([line.decode().split(",")[:-1] for line in lines])
         rest = Recorded(None, None)
         return [rest if np.isnan(o).any() else Recorded(t, o) for t, o in zip(thetas, outcomes, strict=True)]
@@ -137,5 +137,5 @@ def read_json(path: Path, *, missing: Any) -> Any:
 
 
 def _in_order(rows: Rows) -> int:
-    """How many lines of a log follow each other."""
+    """How many rows, from the first on, are numbered in order."""
     return next((k for k, row in enumerate(rows) if row[0] != str(k)), len(rows))

@@ -1,4 +1,4 @@
-"""The forward model of a run: trained while it goes on, watched for how well it foresees, never unheard silently.
+"""The forward model of a run: it is trained, its predictions are recorded, and a message says when it is not asked.
 
 predictions.csv and refreshes.csv are made again by a replay, so a resumed run has them as if it had never stopped.
     model = RunModel(directory, parts.model, trust); model.episode(episode, memory); model.flush()
@@ -22,23 +22,21 @@ if TYPE_CHECKING:
     from sgimd_torch.forward_model.model import ForwardModel, Prediction
 
 LEVEL: Final = 0.8  # of the regions whose coverage the board shows
-LATELY: Final = 500  # movements, over which the board says how often refining a guess helped
-NOT_ASKED: Final = (
-    "the forward model is not asked, the local inverse model answers and the simplex searches in its place"
-)
+LATELY: Final = 500  # movements, over which the board shows how often refining a guess helped
+NOT_ASKED: Final = "the forward model is not asked, the local inverse model answers and the simplex searches instead"
 LEGEND: Final = {
     "model/relative_error": "Error for exemplars never trained on, over that of always predicting their mean.",
     "model/held_out": "Negative log likelihood of exemplars never trained on; lower is better.",
     "model/steps": "Of the optimiser, at the last refresh.",
     "model/error": "Distance (m) from where the newest movements landed to where the model, before learning them, "
-    "said that they would.",
+    "predicted that they would.",
     "model/coverage": f"Share of the newest movements that landed in the model's {LEVEL:.0%} region.",
     "model/improved": f"Share of the goals of the last {LATELY} movements for which refining came nearer than the "
     "first guess.",
     "model/ms": "Milliseconds of a refresh, the mean so far.",
 }
 LAYOUT: Final = {
-    "Does the forward model foresee where movements land?": {
+    "Does the forward model predict where movements land?": {
         "distance to where they landed (m)": "model/error",
         f"share in its {LEVEL:.0%} region": "model/coverage",
         "relative error on what it never learns from; 1 is no better than their mean": "model/relative_error",
@@ -53,7 +51,7 @@ class RunModel:
     Args:
         directory: of the run; its files stay as they are until ``begin``.
         model: None for a run without.
-        trust: relative error above which nobody asks the model.
+        trust: relative error above which the model is not asked.
 
     ``curves`` are for the board, by tag, as the last refresh left them.
     """
@@ -72,13 +70,13 @@ class RunModel:
         self.curves: dict[str, float] = {}
 
     def begin(self) -> None:
-        """The replay is over: take the place of earlier files."""
+        """The replay is over: replace earlier files."""
         for table in self._tables:
             table.begin()
             table.flush()
 
     def episode(self, episode: Episode, memory: Memory) -> bool:
-        """Refresh after a movement, lived or replayed; whether the model has learnt, so that ``curves`` are new."""
+        """Refresh after a movement, new or replayed. Returns whether the model has learnt and ``curves`` are new."""
         if self._model is None:
             return False
         movements, move = episode.index + 1, episode.move
@@ -101,7 +99,7 @@ class RunModel:
             "model/improved": self._improved(),
         }
         if refresh.predicted is not None:
-            self._foreseen(refresh.first, memory.outcomes[refresh.first :], refresh.predicted)
+            self._record(refresh.first, memory.outcomes[refresh.first :], refresh.predicted)
         if refresh.diverged:
             self._news.append(f"movement {movements}: training diverged; the forward model keeps its last good weights")
         self._say_whether_asked(movements, error)
@@ -113,7 +111,7 @@ class RunModel:
             table.flush()
 
     def news(self, *, ended: bool = False) -> list[str]:
-        """What is to be told about the model and was not yet; at the end of a run, too, that it is not asked."""
+        """Messages about the model that were not returned yet; at the end of a run also that it is not asked."""
         news, self._news = self._news, []
         if ended and self._model is not None and not self._asked:
             trained = self._model.trained
@@ -122,16 +120,16 @@ class RunModel:
         return news
 
     def summary(self) -> dict[str, float]:
-        """For summary.json: seconds spent on refreshes, from movement 0 on, as a replay does them again."""
+        """For summary.json: seconds spent on refreshes since movement 0, because a replay repeats them."""
         return {} if self._model is None else {"seconds_model": round(self._seconds, 3)}
 
-    def _foreseen(self, first: int, outcomes: Array, foreseen: Prediction) -> None:
-        parts = (outcomes, *foreseen)
+    def _record(self, first: int, outcomes: Array, predicted: Prediction) -> None:
+        parts = (outcomes, *predicted)
         for row, values in enumerate(np.hstack(parts), first):
             self._predictions.append(sealed([str(row), *numbers(values, len(values))]))
-        spread = np.hypot(foreseen.epistemic, foreseen.aleatoric)
-        self.curves["model/error"] = float(np.linalg.norm(outcomes - foreseen.mean, axis=1).mean())
-        self.curves["model/coverage"] = float(coverage(outcomes, foreseen.mean, spread, (LEVEL,))[0])
+        spread = np.hypot(predicted.epistemic, predicted.aleatoric)
+        self.curves["model/error"] = float(np.linalg.norm(outcomes - predicted.mean, axis=1).mean())
+        self.curves["model/coverage"] = float(coverage(outcomes, predicted.mean, spread, (LEVEL,))[0])
 
     def _improved(self) -> float:
         if not self._lately:
@@ -148,4 +146,4 @@ class RunModel:
         self._asked = asked
 
     def _how_wrong(self, error: float) -> str:
-        return f"its relative error is {error:.3f}, to be trusted it needs {self._trust:g}"
+        return f"its relative error is {error:.3f}, it is trusted up to {self._trust:g}"

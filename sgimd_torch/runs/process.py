@@ -2,7 +2,7 @@
 
     sys.exit(command(main))    # main(argv) returns the exit code; what it raises becomes one line and an exit code
 
-Exit codes: 0 done, 1 it failed under way, 2 the request is wrong, 130 stopped by Ctrl-C, 143 stopped by SIGTERM.
+Exit codes: 0 done, 1 it failed while running, 2 the request is wrong, 130 stopped by Ctrl-C, 143 stopped by SIGTERM.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Stopped(KeyboardInterrupt):
 
 
 class Failed(RuntimeError):
-    """The request was right, and it failed under way: exit code 1."""
+    """The request was right, but it failed while running: exit code 1."""
 
 
 class Command(NamedTuple):
@@ -74,7 +74,7 @@ def dispatch(prog: str, commands: Mapping[str, Command], help_text: str, argv: S
         except ModuleNotFoundError as error:
             if not chosen.extra:
                 raise
-            slip = f"pip install 'sgimd-torch[{chosen.extra}]' brings it"
+            slip = f"pip install 'sgimd-torch[{chosen.extra}]' installs it"
             raise ImportError(f"{prog} {name} needs {error.name}, which is not installed; {slip}") from error
         return int(module.main(words[1:]))
 
@@ -82,7 +82,7 @@ def dispatch(prog: str, commands: Mapping[str, Command], help_text: str, argv: S
 
 
 def command(main: Callable[[Sequence[str]], int], argv: Sequence[str] | None = None) -> int:
-    """Run ``main`` on the words of the command line, whatever happens to signals, standard streams and files.
+    """Run ``main`` on the words of the command line, and handle signals, errors and closed standard streams.
 
     Returns:
         The exit code. A ``ValueError``, an error of a file and a missing package are the request's fault.
@@ -109,7 +109,7 @@ def command(main: Callable[[Sequence[str]], int], argv: Sequence[str] | None = N
     except OSError as error:
         if error.filename is not None:
             say(f"error: {error.filename} cannot be read or written: {error.strerror}")
-        elif error.errno is None:  # raised by us, with all that there is to say
+        elif error.errno is None:  # raised by us, with a complete message
             say(f"error: {error}")
         else:  # of stdout, or the disk
             lost = error
@@ -132,7 +132,7 @@ def command(main: Callable[[Sequence[str]], int], argv: Sequence[str] | None = N
 
 @contextmanager
 def loading() -> Iterator[None]:
-    """Within, libraries are imported: half of one cannot be interrupted cleanly, so a signal ends the process."""
+    """A block that imports libraries. An import cannot be interrupted cleanly, so a signal ends the process."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -155,7 +155,7 @@ def _stop(signum: int, frame: FrameType | None) -> None:
 
 
 class Stopping:
-    """Within, SIGINT and SIGTERM wait for the next ``check()``, or for ``at_once()``; a context manager."""
+    """In this block, SIGINT and SIGTERM wait for the next ``check()``, or for ``at_once()``; a context manager."""
 
     def __init__(self) -> None:
         self._signum = 0
@@ -184,7 +184,7 @@ class Stopping:
 
     @contextmanager
     def at_once(self) -> Iterator[None]:
-        """Within, a signal raises ``Stopped`` where it strikes."""
+        """In this block, a signal raises ``Stopped`` at once."""
         self._at_once = True
         try:
             self.check()
@@ -232,7 +232,7 @@ class Progress:
         self._begun = self._reported = time.monotonic()
 
     def show(self, done: int, note: str = "") -> None:
-        """So much is done, earlier parts counted."""
+        """Show how much is ``done``, including what was done before."""
         if self._bar is not None:
             self._bar.total = self.total
             self._bar.set_postfix_str(note, refresh=False)
@@ -258,7 +258,7 @@ def clock(seconds: float) -> str:
 
 
 def say(*messages: str) -> None:
-    """On stderr, at once, above a bar of progress if there is one; a stderr that takes nothing stops nobody."""
+    """Print on stderr, above a progress bar if there is one; a stderr that cannot be written is no error."""
     bars = sys.modules.get("tqdm")
     write: Any = print if bars is None else bars.tqdm.write
     with suppress(OSError):

@@ -34,7 +34,7 @@ class Run:
 
     ``damage``: file name -> number of its first bad line, where reading ended, such as ``{"evaluation.csv": 3}``; the
     names of the columns are line 1. ``unchecked``: names of the files without checksums, which an earlier version
-    wrote: in them, a changed number is noticed only if it cannot be.
+    wrote: in them, a changed number is noticed only if it is impossible.
     """
 
     path: Path
@@ -56,17 +56,17 @@ class Run:
     unchecked: tuple[str, ...] = ()
 
     def chosen_goals(self) -> Array:
-        """``(n, outcome_dim)``, the goals that the learner set itself, in order, each once though it takes several
-        movements; those of imitation are the teacher's."""
+        """``(n, outcome_dim)``, the goals that the learner chose itself, in order, each once even if it took several
+        movements. The goals of imitation are the teacher's, so they are left out."""
         own = self.goals[np.isfinite(self.goals).all(axis=1) & (self.origin != "imitate")]
         new = (np.diff(own, axis=0, prepend=np.nan) != 0).any(axis=1)
         return own[new]
 
 
 def read_run(path: str | os.PathLike[str]) -> Run:
-    """What a run has written so far, be it finished, stopped or under way; a torn last line is left out.
+    """What a run has written so far: finished, stopped or still running. An incomplete last line is left out.
 
-    A file that is damaged is read up to there, and ``damage`` says where.
+    A damaged file is read up to its first bad line, see ``damage``.
 
     Raises:
         RunError: there is no run at ``path``, or one of its files cannot be read at all.
@@ -74,7 +74,7 @@ def read_run(path: str | os.PathLike[str]) -> Run:
     path = Path(path)
     config = read_json(path / "config.json", missing=None)
     if config is None:
-        raise RunError(f"{path} is no run directory, it has no config.json; runs lie in OUT/NAME/seed-000")
+        raise RunError(f"{path} is no run directory, it has no config.json; runs are in OUT/NAME/seed-000")
     try:
         columns = Columns.of(path)
         log = columns.table(path)
@@ -88,7 +88,7 @@ def read_run(path: str | os.PathLike[str]) -> Run:
         raise RunError(f"{error.filename} cannot be read: {error.strerror}") from error
     except RunError:
         raise
-    except (ValueError, OverflowError) as error:  # a line whose checksum somebody has made anew
+    except (ValueError, OverflowError) as error:  # an edited line with a new checksum
         raise RunError(
             f"{path} has a table that holds what no run writes ({str(error)[:100]}); was it edited?"
         ) from error
@@ -123,7 +123,7 @@ def find_runs(out: str | os.PathLike[str]) -> dict[str, list[Path]]:
     for config in sorted(Path(out).glob("*/seed-*/config.json")):
         found.setdefault(config.parent.parent.name, []).append(config.parent)
     if not found:
-        raise RunError(f"{out} holds no runs; they lie in OUT/NAME/seed-000")
+        raise RunError(f"{out} holds no runs; they are in OUT/NAME/seed-000")
     return found
 
 
@@ -144,7 +144,7 @@ def finished(config: Config) -> bool:
             file is None or settings.get(f"{name}_crc32") in (None, f"{zlib.crc32(file.read_bytes()):08x}")
             for name, file in files
         )
-    except (ValueError, OSError):  # of another version, or beyond reading: the run itself says so when it goes on
+    except (ValueError, OSError):  # of another version, or unreadable: the run says so when it is resumed
         return False
 
 

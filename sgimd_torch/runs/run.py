@@ -30,6 +30,7 @@ from sgimd_torch.runs.log import Columns, RunError
 from sgimd_torch.runs.model_record import RunModel
 from sgimd_torch.runs.process import Failed, Progress, Stopped, Stopping, say
 from sgimd_torch.session import ReplayError, live, replay, run
+from sgimd_torch.spaces import Episode
 
 # Files count by their content, of which a checksum is recorded; a benchmark may be another one when a run is resumed.
 MAY_CHANGE: Final = (*having("on_resume"), "benchmark_crc32")
@@ -76,93 +77,119 @@ def run_in(directory: RunDirectory, config: Config, parts: RunParts, stopping: S
     Seconds: physics and evaluations of a resumed run add to those of its summary, which is at most ``FLUSH_EVERY`` old
     if it was killed; the learner's are counted from movement 0 on, since a replay lets it do all its work again.
     """
-    rows = {id(demonstration): row for row, demonstration in enumerate(parts.demonstrations)}
-    recorded = directory.columns.recorded(directory.lines)
     seconds = Seconds(directory.summary)
-    execute = replay(recorded, seconds.of_physics(live(parts.environment, config.seed)))
-    wanted = set(config.evaluations)
-    model = RunModel(directory, parts.model, 0.0 if parts.trust is None else parts.trust.error)
-    movements, flushed, title = 0, time.monotonic(), f"{config.variant} seed {config.seed}"
-
-    def begin() -> None:
-        directory.begin()
-        model.begin()
-        board.begin()
-
-    def flush() -> None:
-        board.flush()  # first: of a movement that the log holds, a replay does not know again when it was
-        directory.log.flush()
-
-    def summarise(*, finished: bool = False) -> None:
-        flush()
-        model.flush()
-        last = directory.evaluations.last
-        directory.summarise(
-            movements=movements,
-            mean_error_m=last.get("mean_error_m"),
-            noise_floor_m=last.get("noise_floor_m"),
-            **seconds.summary(),
-            **model.summary(),
-            finished=finished,
-        )
-
-    episodes = run(
-        parts.learner,
-        parts.environment,
-        config.seed,
-        movements=config.movements,
-        teacher=parts.teacher,
-        execute=execute,
-    )
-    finished = False
-    with (
-        RunBoard(directory, config, parts, seconds, partial(regions_of, parts)) as board,
-        Progress("replaying" if recorded else title, len(recorded) or config.movements) as progress,
-    ):
+    with RunBoard(directory, config, parts, seconds, partial(regions_of, parts)) as board:
+        life = _Life(directory, config, parts, seconds, board)
+        finished = False
         try:
-            if not recorded:
-                begin()
-            for episode in seconds.of_learner(episodes):
-                demonstration = episode.demonstration
-                line = directory.columns.line(episode, None if demonstration is None else rows[id(demonstration)])
-                if episode.index >= len(recorded):
-                    directory.log.append(line)
-                elif line != directory.lines[episode.index]:
-                    raise ReplayError(_differs(directory.columns, directory.lines[episode.index], line))
-                movements = episode.index + 1
-                board.episode(episode)
-                if model.episode(episode, parts.learner.memory):
-                    board.model(model.curves)
-                if movements in wanted and not (movements in directory.evaluations and board.recall_evaluation()):
-                    flush()
-                    with seconds.of_evaluation():
-                        evaluated = evaluate_in(config, parts, movements, stopping)
-                    if evaluated is not None:
-                        board.evaluation(evaluated)
-                        with seconds.of_evaluation():
-                            directory.evaluations.add(movements, evaluated, regions_of(parts))
-                if movements == len(recorded):
-                    begin()
-                    say(*model.news())
-                if movements > len(recorded) and time.monotonic() - flushed >= FLUSH_EVERY:
-                    summarise()
-                    flushed = time.monotonic()
-                if movements > len(recorded):
-                    say(*model.news())
-                progress.show(movements, _error_so_far(directory))
-                if movements == len(recorded) < config.movements:
-                    progress.begin(title, config.movements, movements)
-                stopping.check()
+            life.go_on(stopping)
             finished = True
-            say(*model.news(ended=True))
-            board.finish()
         finally:
-            if movements >= len(recorded):  # else the summary that was found counts for more
-                summarise(finished=finished)
+            if not life.replaying:  # else the summary that was found counts for more
+                life.summarise(finished=finished)
     error, floor = (directory.summary[name] for name in ("mean_error_m", "noise_floor_m"))
     measured = "not measured" if floor is None or math.isnan(floor) else f"{floor:.4f} m"
     found = "not evaluated" if error is None else f"mean error {error:.4f} m, noise floor {measured}"
-    return f"{directory.path}: {movements} movements, {found}"
+    return f"{directory.path}: {life.movements} movements, {found}"
+
+
+class _Life:
+    """A run under way: after each movement it is written, shown, learnt from and evaluated, in this order."""
+
+    def __init__(
+        self, directory: RunDirectory, config: Config, parts: RunParts, seconds: Seconds, board: RunBoard
+    ) -> None:
+        self.directory, self.config, self.parts, self.seconds, self.board = directory, config, parts, seconds, board
+        self.model = RunModel(directory, parts.model, 0.0 if parts.trust is None else parts.trust.error)
+        self.movements, self.recorded = 0, len(directory.lines)
+        self._wanted = set(config.evaluations)
+        self._rows = {id(demonstration): row for row, demonstration in enumerate(parts.demonstrations)}
+        self._flushed = time.monotonic()
+
+    @property
+    def replaying(self) -> bool:
+        """Whether what was recorded is not lived through again yet."""
+        return self.movements < self.recorded
+
+    def go_on(self, stopping: Stopping) -> None:
+        """From the first movement to the last."""
+        recorded = self.directory.columns.recorded(self.directory.lines)
+        execute = replay(recorded, self.seconds.of_physics(live(self.parts.environment, self.config.seed)))
+        learner, robot, total = self.parts.learner, self.parts.environment, self.config.movements
+        episodes = run(learner, robot, self.config.seed, movements=total, teacher=self.parts.teacher, execute=execute)
+        title = f"{self.config.variant} seed {self.config.seed}"
+        with Progress("replaying" if recorded else title, self.recorded or total) as progress:
+            if not recorded:
+                self._begin()
+            for episode in self.seconds.of_learner(episodes):
+                self._after(episode, stopping)
+                progress.show(self.movements, _error_so_far(self.directory))
+                if self.movements == self.recorded < total:
+                    progress.begin(title, total, self.movements)
+                stopping.check()
+        say(*self.model.news(ended=True))
+        self.board.finish()
+
+    def summarise(self, *, finished: bool = False) -> None:
+        """Hand everything to the operating system, and say how far it is."""
+        self._flush()
+        self.model.flush()
+        last = self.directory.evaluations.last
+        self.directory.summarise(
+            movements=self.movements,
+            mean_error_m=last.get("mean_error_m"),
+            noise_floor_m=last.get("noise_floor_m"),
+            **self.seconds.summary(),
+            **self.model.summary(),
+            finished=finished,
+        )
+
+    def _after(self, episode: Episode, stopping: Stopping) -> None:
+        self._write(episode)
+        self.movements = episode.index + 1
+        self.board.episode(episode)
+        if self.model.episode(episode, self.parts.learner.memory):
+            self.board.model(self.model.curves)
+        if self.movements in self._wanted:
+            self._evaluate(stopping)
+        if self.movements == self.recorded:
+            self._begin()
+        if self.movements > self.recorded and time.monotonic() - self._flushed >= FLUSH_EVERY:
+            self.summarise()
+            self._flushed = time.monotonic()
+        if not self.replaying:
+            say(*self.model.news())
+
+    def _write(self, episode: Episode) -> None:
+        """A line for the log; one that is there already must be the same."""
+        shown, columns = episode.demonstration, self.directory.columns
+        line = columns.line(episode, None if shown is None else self._rows[id(shown)])
+        if episode.index >= self.recorded:
+            self.directory.log.append(line)
+        elif line != self.directory.lines[episode.index]:
+            raise ReplayError(_differs(columns, self.directory.lines[episode.index], line))
+
+    def _evaluate(self, stopping: Stopping) -> None:
+        """Unless it was done, and shown, before."""
+        if self.movements in self.directory.evaluations and self.board.recall_evaluation():
+            return
+        self._flush()
+        with self.seconds.of_evaluation():
+            found = evaluate_in(self.config, self.parts, self.movements, stopping)
+        if found is not None:
+            self.board.evaluation(found)
+            with self.seconds.of_evaluation():
+                self.directory.evaluations.add(self.movements, found, regions_of(self.parts))
+
+    def _begin(self) -> None:
+        """The replay is over: from now on files change."""
+        self.directory.begin()
+        self.model.begin()
+        self.board.begin()
+
+    def _flush(self) -> None:
+        self.board.flush()  # first: of a movement that the log holds, a replay does not know again when it was
+        self.directory.log.flush()
 
 
 def _error_so_far(directory: RunDirectory) -> str:

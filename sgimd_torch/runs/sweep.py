@@ -1,16 +1,16 @@
 """Run many runs: options of sgimd run, crossed with each other and with seeds, some at a time.
 
-Each --vary is one option with its values. The runs of a variant go to OUT/NAME/seed-003 and so on; NAME tells what is
-varied, such as sgim-d,goals=uniform where algorithm and goals are. All other options of sgimd run hold for every run.
+Each --vary is one option with its values. The runs of a variant go to OUT/NAME/seed-003 and so on; NAME says what is
+varied: sgim-d,goals=uniform if algorithm and goals are. All other options of sgimd run apply to every run.
 
   sgimd sweep --seeds 0-9                                                  ten runs with the defaults
   sgimd sweep --vary goals=interest-map,uniform --seeds 0-19 --out study   is the interest map worth it?
   sgimd sweep --vary algorithm=sagg-riac,sgim-d --vary budget=5,15 --seeds 0-4 --movements 2000 --out study
   sgimd sweep --vary noise=0,0.03 --seeds 0,3,7-9 --out study --dry-run    what is still to be done
-  sgimd table study                                                        what they came to
+  sgimd table study                                                        their results
 
 Start the same command again after Ctrl-C or a power cut, or with more seeds: finished runs stay as they are, the
-others go on. If a run fails, the others go on, too; it is named at the end, and OUT/NAME/seed-003.log has what it said.
+others go on. If a run fails, the others go on, too; it is named at the end, and its output is in OUT/NAME/seed-003.log.
 
 Exit code: 0 all runs are finished, 1 some failed, 2 the request is wrong, 130 or 143 stopped by Ctrl-C or SIGTERM.
 """
@@ -48,7 +48,7 @@ NOT_VARIED: Final = {
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Find out what is still to be done, and do it.
+    """Carry out all runs that are not finished.
 
     Returns:
         The exit code, 1 where runs failed.
@@ -82,7 +82,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     with loading():
         from sgimd_torch.runs.build import build  # after --help
     for variant in variants if left else []:
-        build(variant)  # what cannot be put together is refused before anything starts
+        build(variant)  # a wrong option is refused before anything starts
     make_folder(out)
     failures = sweep(left, options.processes, flags=flags)
     say(f"{len(left) - len(failures)} runs ended well, {len(failures)} failed: {out}", *failures)
@@ -94,18 +94,18 @@ def add_options(parser: argparse.ArgumentParser, *, seeds: str) -> None:
     cores = os.cpu_count() or 1
     parser.add_argument("--seeds", type=_seeds, default=seeds, help="5, 0-19 or 0,3,7-9 (default: %(default)s)")
     parser.add_argument("--processes", type=_count, default=cores, help="runs at a time (default: cores, %(default)s)")
-    parser.add_argument("--dry-run", action="store_true", help="only tell what is still to be done")
+    parser.add_argument("--dry-run", action="store_true", help="only list what is still to be done")
 
 
 def variants_of(varied: Sequence[str], options: Sequence[str]) -> tuple[list[Config], list[str]]:
-    """Every combination of the values, as a run whose name tells it, and the flags among the ``options``.
+    """Every combination of the values, as a run that is named after it, and the flags among the ``options``.
 
     Args:
         varied: such as ``["goals=interest-map,uniform", "budget=5,15"]``.
         options: of ``sgimd run``, for all of them.
 
     Raises:
-        ValueError: an option cannot be varied, or is there twice.
+        ValueError: an option cannot be varied, or is given twice.
         SystemExit: ``sgimd run`` would refuse an option; it has said why.
     """
     given = [dashed(word.partition("=")[0].removeprefix("--")) for word in options if word.startswith("--")]
@@ -117,11 +117,11 @@ def variants_of(varied: Sequence[str], options: Sequence[str]) -> tuple[list[Con
         if not all([option, *choices]):
             raise ValueError(f"--vary must be like goals=interest-map,uniform, got {word!r}")
         if option in [*values, *given]:
-            raise ValueError(f"--{option} is there twice; one --vary has all its values")
+            raise ValueError(f"--{option} is there twice; put all its values in one --vary")
         values[option] = list(dict.fromkeys(choices))
     for option, instead in NOT_VARIED.items():
         if option in values or (option in given and option != "out"):
-            raise ValueError(f"--{option} is not free here: {instead}")
+            raise ValueError(f"--{option} cannot be given here: {instead}")
     found = []
     for combination in itertools.product(*values.values()):
         chosen = dict(zip(values, combination, strict=True))
@@ -141,7 +141,7 @@ def sweep(
 ) -> list[str]:
     """Run them, in this order, and show how far they are; those that are finished already are not started.
 
-    A run that another process writes, one that a killed sweep left behind, say, is waited for and then taken up.
+    If another process writes a run, such as one left by a killed sweep, it is waited for and then taken over.
         failures = sweep([Config(seed=seed) for seed in range(20)], processes=4)
 
     Args:
@@ -157,7 +157,7 @@ def sweep(
     Raises:
         ValueError: two runs have one directory; without ``keep_going`` also: a run refused its request.
         Failed: without ``keep_going``: a run failed under way.
-        KeyboardInterrupt: of a signal. All runs were stopped before, and nothing is lost.
+        KeyboardInterrupt: a signal came. All runs were stopped first, and nothing is lost.
     """
     twice = [path for path, n in Counter(config.directory for config in configs).items() if n > 1]
     if twice:
@@ -181,7 +181,7 @@ def sweep(
                         run.state = "done"
                     except (Failed, ValueError, OSError) as error:
                         run.state = "failed"
-                        progress.total -= run.config.movements - run.done  # nobody waits for the rest
+                        progress.total -= run.config.movements - run.done  # the rest will not be run
                         failures.append(f"{title(run.config)} failed: {error}")
                         if not keep_going:
                             raise (Failed if isinstance(error, Failed) else ValueError)(failures[0]) from error
@@ -204,15 +204,15 @@ class _Run:
     state: str = "waiting"
 
     def __post_init__(self) -> None:
-        self.log = self.config.directory.with_suffix(".log")  # what it says, beside its directory
+        self.log = self.config.directory.with_suffix(".log")  # its output, next to its directory
         self.look()
 
     def look(self) -> None:
-        """Count the movements that are ``done``."""
+        """Update ``done``, its number of movements on disk."""
         self.done = min(movements_on_disk(self.config.directory), self.config.movements)
 
     def carry_out(self, stop: threading.Event) -> None:
-        """From where it stands to its end; returns early after ``stop``.
+        """Run it, or resume it, to its end; returns early after ``stop``.
 
         Raises:
             ValueError: it refused its request (exit code 2), or there is no place for its directory.
@@ -224,7 +224,7 @@ class _Run:
         while not stop.is_set():
             if locked(directory / "lock"):
                 if self.state != "held":
-                    say(f"{title(self.config)}: waiting for another process, which has this run in hand")
+                    say(f"{title(self.config)}: waiting for another process, which writes this run")
                 self.state = "held"
                 stop.wait(LOOK_EVERY)
                 continue
@@ -234,7 +234,7 @@ class _Run:
             code = self._process(stop)
             if code == 0:
                 return
-            if not stop.is_set() and not locked(directory / "lock"):  # else another process was quicker to take it up
+            if not stop.is_set() and not locked(directory / "lock"):  # else another process took it over first
                 raise (ValueError if code == 2 else Failed)(self._last_words(code))
 
     def _process(self, stop: threading.Event) -> int:
@@ -248,7 +248,7 @@ class _Run:
                 stdout=log,
                 stderr=log,
                 env={**os.environ, **one_thread},
-                process_group=0,  # Ctrl-C comes to us alone, and we pass it on
+                process_group=0,  # only we get Ctrl-C, and pass it on
             )
         while not stop.is_set():
             try:
@@ -272,7 +272,7 @@ class _Run:
 
 
 def title(config: Config) -> str:
-    """What a run is called where people read it."""
+    """The name of a run in messages."""
     return f"{config.variant} seed {config.seed}"
 
 
@@ -285,16 +285,16 @@ def _done(runs: Sequence[_Run]) -> int:
 
 
 def _note(runs: Sequence[_Run]) -> str:
-    """How many runs are where, and how far those are that are under way."""
+    """How many runs are in each state, and how far the running ones are."""
     states = Counter(run.state for run in runs)
     parts = [f"{states['done']} of {len(runs)} runs"]
     parts += [f"{states['failed']} failed"] if states["failed"] else []
-    parts += [f"waiting for {states['held']} in the hands of another process"] if states["held"] else []
+    parts += [f"waiting for {states['held']} held by another process"] if states["held"] else []
     return ", ".join([*parts, *(f"{title(run.config)} at {run.done}" for run in runs if run.state == "running")])
 
 
 def _in_name(option: str, value: str) -> str:
-    """A choice in the name of a variant; of a path the name of the file."""
+    """A choice in the name of a variant; a path is shortened to the name of its file."""
     return value if option == "algorithm" else f"{option}={Path(value).name if os.sep in value else value}"
 
 

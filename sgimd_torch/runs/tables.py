@@ -1,6 +1,6 @@
-"""The tables of a run: csv files whose lines end in a checksum, each read up to its first line that is not as written.
+"""The tables of a run: csv files whose lines end in a checksum, each read up to its first damaged line.
 
-One line codec for all: the log, which grows, and the small tables, of which those of evaluations are replaced whole.
+One line codec for all: the log, which grows, and the small tables; those of evaluations are replaced whole.
     table = Table(folder / "evaluation.csv", EVALUATION); table.replace(rows); table.read().rows
 ``log.py`` says what is in each.
 """
@@ -36,8 +36,8 @@ _MAY_BE_NAN: Final = ("noise_floor_m", "competence")  # not measured; no goals
 class Found:
     """What the file of a table held, up to its first bad line.
 
-    ``lines``, without the header, as they stand there; ``size`` (bytes) of header and lines; ``tail``, what comes after
-    them; ``checked``: the lines have checksums, which those written by earlier versions lack; ``grows``: it is written
+    ``lines``, without the header, as they are in the file; ``size`` (bytes) of header and lines; ``tail``, what comes
+    after them; ``checked``: the lines have checksums, those of earlier versions have none; ``grows``: it is written
     line by line.
     """
 
@@ -59,8 +59,8 @@ class Found:
 
     @property
     def damage(self) -> int | None:
-        """The same, unless only the end of the last line of a file that grows is missing: its writer was killed there,
-        or is still writing. A file that is replaced whole is never empty."""
+        """The same, but None if only the end of the last line of a file that grows is missing: its writer was killed
+        there, or is still writing. A file that is replaced whole is never empty."""
         if not self.size and not self.grows:
             return 1
         cut = self.grows and b"\n" not in self.tail and (self.size > 0 or _PART_OF_A_HEADER.fullmatch(self.tail))
@@ -77,7 +77,7 @@ class Table:
 
     Args:
         path: of the file; nothing is written before ``begin`` or ``replace``.
-        names: of the columns, crc32 left out.
+        names: of the columns, without crc32.
         grows: it is written line by line, rather than replaced whole.
         standing: (rows) -> how many of them, from the first on, make sense together.
     """
@@ -99,7 +99,7 @@ class Table:
         return self.parse(self.path.read_bytes() if os.path.lexists(self.path) else b"")
 
     def parse(self, content: bytes) -> Found:
-        """The same of the content of a file."""
+        """The same, from the content of a file."""
         header, *lines = content.splitlines(keepends=True) or [b""]
         checked = header != ",".join(self.names).encode() + b"\n"
         if checked and header != self.header:
@@ -110,17 +110,17 @@ class Table:
         return found.first(self._standing(found.rows))
 
     def notes(self, found: Found, outlook: str) -> list[str]:
-        """For people: what of it was bad, with the ``outlook`` on that, and whether there were no checksums."""
+        """Messages: what was bad, with the ``outlook``: what happens now; and whether checksums were missing."""
         notes = []
         if found.tail:
             dropped = f"{len(found.tail)} bytes in {len(found.tail.splitlines())} line(s)"
             notes.append(f"{self.path}: dropped {dropped} from line {found.bad} on, torn or damaged; {outlook}")
         if not found.checked:
-            notes.append(f"{self.path} was made without checksums: its numbers are taken as they are, and get them now")
+            notes.append(f"{self.path} was made without checksums: its numbers are not checked, and get checksums now")
         return notes
 
     def arrays(self, found: Found) -> dict[str, np.ndarray]:
-        """By column of a table beside the log: integers, the paths of regions, or numbers."""
+        """The columns of a small table: integers, the paths of regions, or numbers."""
         rows = np.array(found.rows, dtype=np.str_).reshape(len(found.lines), len(self.names))
         kinds = {"path": np.str_, **dict.fromkeys(WHOLE, np.int64)}
         return {name: rows[:, k].astype(kinds.get(name, np.float64)) for k, name in enumerate(self.names)}
@@ -151,7 +151,7 @@ class Table:
             os.close(file)
 
     def replace(self, rows: Iterable[Sequence[str]]) -> None:
-        """Write the whole table anew."""
+        """Replace the whole table."""
         write_bytes(self.path, self.header + b"".join(map(sealed, rows)))
 
     def _is_possible(self, line: bytes) -> bool:
@@ -177,7 +177,7 @@ def numbers(values: Array | None, dim: int) -> list[str]:
 
 
 def small_table(path: Path, dims: int | None = None) -> Table:
-    """One of the tables beside the log, by the name of its file.
+    """One of the small tables, by the name of its file.
 
     Args:
         path: of evaluation.csv, regions.csv, predictions.csv or refreshes.csv.
@@ -215,7 +215,7 @@ def _whole_maps(rows: Rows) -> int:
 def _tile(paths: list[str]) -> bool:
     """Whether nothing was cut off: these are all leaves of a tree, or all cells of a grid. Other names say nothing."""
     if all(re.fullmatch("R[01]*", path) for path in paths):
-        return sum(0.5 ** (len(path) - 1) for path in paths) == 1  # each cut halves what its leaves count for
+        return sum(0.5 ** (len(path) - 1) for path in paths) == 1  # each cut halves the weight of its leaves
     if all(re.fullmatch(_CELL, path) for path in paths):
         cells = np.array([path.split(".")[1:] for path in paths], dtype=np.int64)
         return len(cells) == np.prod(cells.max(axis=0) + 1)
@@ -228,7 +228,7 @@ def _is_sealed(line: bytes) -> bool:
 
 
 def _can_be(name: str, field: str) -> bool:
-    """Whether a column can hold this, as far as its name tells: for lines that have no checksum."""
+    """Whether a column can hold this, judged by its name: for lines that have no checksum."""
     if name == "path":
         return re.fullmatch(f"R[01]*|{_CELL}", field) is not None
     if name in WHOLE:

@@ -1,4 +1,4 @@
-"""Tasks: an environment with what a study of it needs - goals to be judged by, demonstrations, their correspondence.
+"""Tasks: an environment with what a study of it needs: benchmark goals, demonstrations, their correspondence.
 
 Benchmark and demonstrations of the fishing rod are shipped files. Those of a planar arm, whose geometry is known
 exactly, are made here, the same for every seed. An environment of your own may come alone, or as a ``Task``:
@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 SIDE: Final = 0.1  # m, of a benchmark tile; it leaves 311 goals in the disc of radius 1 m that these arms reach
 SHOWN: Final = 127  # demonstrations, as many as each shipped demonstrator recorded
 SAMPLES: Final = 5  # of each of them
-MOST_GOALS: Final = 500  # of a task that brings none
-STRETCH: Final = 3.0  # times longer or shorter than the robot can move: its speed is not the reason
+MOST_GOALS: Final = 500  # of a task that has none
+STRETCH: Final = 3.0  # a demonstration this many times slower or faster than the robot can move has wrong times
 MISFIT: Final = 0.5  # rad; a larger misfit means that this robot cannot make the movement
 
 
@@ -42,11 +42,11 @@ class Task:
     """What can be learnt, and how it is judged.
 
     Args:
-        environment: where the learner lives.
-        benchmark: goals to be judged by: a file, or a function that makes them; None for goals all over T.
+        environment: the robot and its world.
+        benchmark: goals of evaluation: a file, or a function that makes them; None for goals all over T.
         demonstrations: what a teacher has to show: a file, or a function that makes it; None for no teacher.
         correspondence: (times, trajectory) -> theta_d, eq. (6); None for the environment's own, if it has one.
-        misfit: demonstration -> how far (rad) it is from what the robot can play; raises ValueError where it cannot be
+        misfit: demonstration -> how far (rad) it is from what the robot can play; raises ValueError if it cannot be
             translated. None for the correspondence alone.
         n_joints: columns of a demonstrated trajectory; None for any.
     """
@@ -61,7 +61,7 @@ class Task:
 
 def fishing_rod(*, noise: float, task_space: float, threads: int) -> Task:
     """The paper's task; goals come from a square of half side ``task_space`` m."""
-    from sgimd_torch.environments.fishing_rod import JOINTS, FishingRod  # MuJoCo is loaded only for those who fish
+    from sgimd_torch.environments.fishing_rod import JOINTS, FishingRod  # MuJoCo is loaded only when it is needed
 
     rod = FishingRod(noise=noise, outcomes=Box.cube(-task_space, task_space, 2), threads=threads)
     return Task(
@@ -75,7 +75,7 @@ def fishing_rod(*, noise: float, task_space: float, threads: int) -> Task:
 
 
 def planar_arm(*, n_joints: int) -> Task:
-    """An arm without noise whose outcome is where it ends."""
+    """An arm without noise; its outcome is the position of its end."""
     arm = PlanarArm(n_joints)
     return Task(arm, partial(arm_benchmark, arm), partial(arm_demonstrations, arm), arm.correspondence, None, n_joints)
 
@@ -88,7 +88,7 @@ def arm_benchmark(arm: PlanarArm) -> Benchmark:
 
 
 def arm_demonstrations(arm: PlanarArm) -> list[Demonstration]:
-    """An arm without context, led from its rest to structured postures, all bends equal, whose ends spread evenly."""
+    """Movements from rest to postures with all bends equal; their end positions are spread evenly within reach."""
     shares = (np.arange(SHOWN) + 0.5) / SHOWN  # of the area within reach: a sunflower's spiral
     radii = np.sqrt(arm.min_radius**2 + shares * (arm.length**2 - arm.min_radius**2))
     turns = np.pi * (3 - np.sqrt(5)) * np.arange(SHOWN)
@@ -97,7 +97,7 @@ def arm_demonstrations(arm: PlanarArm) -> list[Demonstration]:
 
 
 def goals_all_over(environment: Environment) -> Benchmark:
-    """At most 500 goals over T, for a task that brings none: a grid in one or two dimensions, Sobol points above."""
+    """At most 500 goals over T, for a task that has none: a grid in one or two dimensions, Sobol points above."""
     box = environment.outcomes
     per_side = int(MOST_GOALS ** (1 / box.dim))
     if box.dim <= 2:
@@ -112,8 +112,8 @@ def benchmark_of(task: Task, file: Path | None) -> tuple[Benchmark, str | None]:
     """The goals of a run and the checksum of their file, None of goals that are made.
 
     Args:
-        task: brings the goals where there is no file.
-        file: takes their place.
+        task: has the goals if there is no file.
+        file: replaces them.
 
     Raises:
         ValueError: they do not fit the environment, or the file is damaged.
@@ -130,11 +130,11 @@ def benchmark_of(task: Task, file: Path | None) -> tuple[Benchmark, str | None]:
 
 
 def demonstrations_of(task: Task, file: Path | None) -> tuple[Sequence[Demonstration], list[float], str | None]:
-    """What a teacher can show, what the correspondence leaves of each (rad), and the checksum of the file.
+    """What a teacher can show, the misfit of each (rad), and the checksum of the file.
 
     Args:
-        task: brings the demonstrations where there is no file.
-        file: takes their place.
+        task: has the demonstrations if there is no file.
+        file: replaces them.
 
     Raises:
         ValueError: there are none, or one cannot be translated, or the file is damaged.

@@ -72,8 +72,7 @@ def nelder_mead(
         flat = _Flat(theta, xatol)
         distances = np.linalg.norm(start.outcomes - goal, axis=1)
         for k in distances.argsort(kind="stable"):
-            if flat.lacks(start.thetas[k]):
-                flat.widen(start.thetas[k])
+            if flat.widen_if_lacking(start.thetas[k]):
                 vertices.append(policies.check("a theta of the estimate", start.thetas[k]))
                 values.append(float(distances[k]))
         n_vertices = 1 + (policies.dim if complete else min(policies.dim, len(goal)))
@@ -177,26 +176,47 @@ class _Flat:
     def __init__(self, origin: Array, shortest: float) -> None:
         self._origin = origin
         self._shortest = shortest
-        self._basis = np.empty((0, len(origin)))  # orthonormal rows
+        self._room = np.empty((len(origin), len(origin)))
+        self._basis = self._room[:0]  # orthonormal rows
 
     def lacks(self, point: Array) -> bool:
         """Whether ``point`` is far enough outside to become a vertex."""
         edge = point - self._origin
-        outside, length = np.linalg.norm(self._across(edge)), np.linalg.norm(edge)
-        return bool(outside > self._shortest and outside > self._SINE * length)
+        return self._is_outside(edge, _length(self._across(edge)))
 
     def widen(self, point: Array) -> None:
         """Add ``point`` as a vertex."""
         across = self._across(point - self._origin)
-        self._basis = np.vstack((self._basis, across / np.linalg.norm(across)))
+        self._add(across, _length(across))
+
+    def widen_if_lacking(self, point: Array) -> bool:
+        """Add ``point`` as a vertex if it is far enough outside; whether it was."""
+        edge = point - self._origin
+        across = self._across(edge)
+        outside = _length(across)
+        if lacking := self._is_outside(edge, outside):
+            self._add(across, outside)
+        return lacking
 
     def direction_out(self, rng: np.random.Generator) -> Array:
         """A random unit vector at right angles to the flat."""
         across = self._across(rng.standard_normal(len(self._origin)))
         return across / np.linalg.norm(across)
 
+    def _is_outside(self, edge: Array, outside: float) -> bool:
+        return outside > self._shortest and outside > self._SINE * _length(edge)
+
+    def _add(self, across: Array, length: float) -> None:
+        n = len(self._basis)
+        self._room[n] = across / length
+        self._basis = self._room[: n + 1]
+
     def _across(self, edges: Array) -> Array:
         return edges - edges @ self._basis.T @ self._basis
+
+
+def _length(vector: Array) -> float:
+    return math.sqrt(vector.dot(vector))  # np.linalg.norm, bit for bit, without its options
 
 
 def _step_out(policies: Box, theta: Array, flat: _Flat, rng: np.random.Generator, step: float) -> Array:

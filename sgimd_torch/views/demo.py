@@ -1,7 +1,7 @@
-"""SGIM-D beside random exploration: both learn to fish, then one figure and one table say what came of it.
+"""SGIM-D and random exploration: both learn to fish, then one figure and one table show the results.
 
 Two runs with the same seed, side by side. Both move the same simulated arm with the same motor noise. One has curiosity
-and a teacher, the other moves at random. Under --out they leave:
+and a teacher, the other moves at random. They write to --out:
 
   sgim-d/seed-000/, random/seed-000/   everything that happened (docs/runs.md explains the files)
   demo.png                             how the error falls; where the float landed; where competence is changing
@@ -10,7 +10,7 @@ Start it again after Ctrl-C or a power cut, and it goes on where it stopped; fin
 
   sgimd demo                                       the paper's 5000 movements, seed 0
   sgimd demo --movements 1000                      a first look, in less than a minute
-  sgimd demo --seed 1                              another life
+  sgimd demo --seed 1                              another seed
   sgimd demo --out runs/quiet -- --noise 0         options after -- go to both runs; sgimd run --help lists them
 """
 
@@ -37,15 +37,15 @@ ALGORITHMS: Final = ("sgim-d", "random")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Learn, draw, tell; the exit code."""
+    """Run both learners, draw the figure, print the table; returns the exit code."""
     options = _options(argv)
     base, _ = parse(
         [f"--seed={options.seed}", f"--movements={options.movements}", f"--out={options.out}", *options.more]
     )
     if base.environment != ROD:
-        raise ValueError("--environment is not free here: the demo shows the fishing rod")
+        raise ValueError("--environment cannot be given here: the demo shows the fishing rod")
     if not base.evaluations:
-        raise ValueError("--evaluate-at [] leaves nothing to draw; choose some movements, or leave it out")
+        raise ValueError("--evaluate-at [] leaves nothing to draw; choose some movements, or omit it")
     with loading():
         from sgimd_torch.views.demo_figure import draw, table  # after --help
     began, figure = time.monotonic(), options.out / "demo.png"
@@ -82,7 +82,7 @@ def _options(argv: Sequence[str] | None) -> argparse.Namespace:
         if name in ("--seed", "--movements", "--out"):
             raise ValueError(f"{name} is the demo's own; it goes before --")
         if name in ("--algorithm", "--name"):
-            raise ValueError(f"{name} is not free here: the demo compares sgim-d and random by their own names")
+            raise ValueError(f"{name} cannot be given here: the demo compares sgim-d and random by their own names")
     return options
 
 
@@ -92,9 +92,9 @@ def _next_steps(options: argparse.Namespace) -> str:
     longer = [*sgimd, "demo", *place, "--movements", str(2 * options.movements), *(["--", *more] if more else [])]
     run = [*sgimd, "run", *place, "--movements", str(options.movements), *more]
     steps = {
-        "both live on": longer,
+        "both learn on": longer,
         "without a teacher": [*run, "--algorithm", "sagg-riac"],
         "without curiosity": [*run, "--goals", "uniform", "--name", "uniform-goals"],
-        "what they came to": [*sgimd, "table", str(options.out)],
+        "their results": [*sgimd, "table", str(options.out)],
     }
     return "\n".join(f"  {shlex.join(words)}    # {why}" for why, words in steps.items())

@@ -1,4 +1,4 @@
-"""What two runs came to, beside each other: the demo's figure and its table, made from their directories alone."""
+"""The demo's figure and table: the results of two runs next to each other, made from their directories alone."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def _demonstrated(run: Run) -> Array | None:
 
 
 def _draw_interest(ax: Axes, run: Run) -> None:
-    """The map as it was at the last evaluation, and the goals aimed at before it."""
+    """The map at the last evaluation, and the last goals chosen before it."""
     ax.set_title(f"Where the competence of {NAMES['sgim-d']} is changing", pad=32)
     if run.regions is None or not len(run.regions["movements"]):
         ax.text(0.5, 0.5, "uniform goals: no interest map", transform=ax.transAxes, ha="center")

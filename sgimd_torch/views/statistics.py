@@ -1,4 +1,4 @@
-"""What several seeds allow to say: interquartile means, bootstrap intervals, improvement, and the paper's two ANOVAs.
+"""Statistics over seeds: interquartile means, bootstrap intervals, improvement, and the paper's two ANOVAs.
 
 After Agarwal et al. (2021), "Deep reinforcement learning at the edge of the statistical precipice": few seeds, so every
 number comes with an interval. ``errors`` are mean benchmark errors (m), one for each seed; smaller is better.
@@ -17,7 +17,7 @@ from sgimd_torch.spaces import Array
 
 LEVEL = 0.95
 RESAMPLES = 9999
-SEED: Final = 2014  # of the bootstrap: each number draws from its own default_rng(SEED), whatever else is computed
+SEED: Final = 2014  # of the bootstrap: each number draws from its own default_rng(SEED)
 
 
 class Interval(NamedTuple):
@@ -29,14 +29,14 @@ class Interval(NamedTuple):
 
 
 class Anova(NamedTuple):
-    """One test for each dimension: ``p`` ``(dim,)``, and ``adjusted`` ``(dim,)`` for their number after Holm (1979)."""
+    """One test for each dimension: ``p`` ``(dim,)``, and ``adjusted`` ``(dim,)`` for their number (Holm, 1979)."""
 
     p: Array
     adjusted: Array
 
     @property
     def rejected(self) -> int:
-        """In how many dimensions the means differ, with at most 5 % odds of a single false one among them."""
+        """In how many dimensions the means differ; the chance that any of them is wrong is at most 5 %."""
         return int((self.adjusted <= 1 - LEVEL).sum())
 
     @property
@@ -51,7 +51,7 @@ def rng() -> np.random.Generator:
 
 
 def show(found: Interval, form: str = ".2f", unit: str = "") -> str:
-    """``0.48 [0.45, 0.52]``, a unit behind."""
+    """``0.48 [0.45, 0.52]``, followed by a unit."""
     return f"{found.value:{form}} [{found.low:{form}}, {found.high:{form}}]" + (f" {unit}" if unit else "")
 
 
@@ -74,8 +74,8 @@ def interval(
 ) -> Interval:
     """Percentile bootstrap: the statistic of seeds drawn again with replacement, 9999 times; its middle 95 %.
 
-    Stratified: each sample keeps its size and is drawn from by itself. Of normal errors such an interval holds the true
-    interquartile mean 94 % of the time with 10 or 20 seeds, but 90 % with 5: there it is too narrow.
+    Stratified: seeds are drawn from each sample by itself, as many as it has. If errors are normal, the interval holds
+    the true interquartile mean 94 % of the time with 10 or 20 seeds, but 90 % with 5: there it is too narrow.
 
     Args:
         statistic: of arrays ``(..., n_seeds, *rest)``, one for each sample; returns ``(...)``.
@@ -128,12 +128,12 @@ def ratio_interval(ours: Array, theirs: Array, *, rng: np.random.Generator, pair
         ValueError: ``theirs`` are not all above 0; see ``interval``.
     """
     if (np.asarray(theirs) <= 0).any():
-        raise ValueError(f"a ratio needs values above 0 below the line, got {np.min(theirs)}")
+        raise ValueError(f"the values to divide by must be above 0, got {np.min(theirs)}")
     return interval(lambda x, y: interquartile_mean(x) / interquartile_mean(y), ours, theirs, rng=rng, paired=paired)
 
 
 def improvement(ours: Array, theirs: Array) -> Array:
-    """P(X < Y): how often a run of ours ``(..., n)`` errs less than one of theirs ``(..., m)``; a tie counts half.
+    """P(X < Y): how often ours ``(..., n)`` have a smaller error than theirs ``(..., m)``; a tie counts half.
 
     The Mann-Whitney statistic over n m; Agarwal et al. (2021) call it the probability of improvement.
     """
@@ -143,9 +143,9 @@ def improvement(ours: Array, theirs: Array) -> Array:
 
 
 def improvement_interval(ours: Array, theirs: Array, *, rng: np.random.Generator) -> Interval:
-    """``improvement`` of ``(n,)`` over ``(m,)``; the seeds of each are drawn by themselves.
+    """``improvement`` of ``(n,)`` over ``(m,)``; the seeds of each are drawn separately.
 
-    Where each of ours errs less than each of theirs the interval is [1, 1], however few they are: no draw shows a tie.
+    If all of ours are below all of theirs, the interval is [1, 1] however few seeds there are: every draw gives 1.
 
     Raises:
         ValueError: see ``interval``.
@@ -154,7 +154,7 @@ def improvement_interval(ours: Array, theirs: Array, *, rng: np.random.Generator
 
 
 def paired_differences(ours: Mapping[int, float], theirs: Mapping[int, float]) -> Array:
-    """``(n_seeds,)`` ours - theirs, seed by seed: runs of one seed meet the same motor noise, so it cancels.
+    """``(n_seeds,)`` ours - theirs, seed by seed: runs of one seed have the same motor noise, which cancels.
 
     Args:
         ours, theirs: seed -> error (m).
@@ -171,7 +171,7 @@ def paired_differences(ours: Mapping[int, float], theirs: Mapping[int, float]) -
 def difference_interval(
     ours: Mapping[int, float], theirs: Mapping[int, float], *, rng: np.random.Generator
 ) -> Interval:
-    """Interquartile mean of the paired differences (m); wholly below 0 where ours err less.
+    """Interquartile mean of the paired differences (m); wholly below 0 if our errors are smaller.
 
     Raises:
         ValueError: see ``paired_differences`` and ``interval``.
@@ -180,7 +180,7 @@ def difference_interval(
 
 
 def mean_over_life(movements: Array, errors: Array) -> Array:
-    """Area under the error curve, divided by its width: the error (m) at the mean moment of the learner's life.
+    """Area under the error curve, divided by its width: the mean error (m) over the learner's life.
 
     Trapezoids over movements, on a linear scale: each movement counts the same.
 
@@ -197,7 +197,7 @@ def mean_over_life(movements: Array, errors: Array) -> Array:
 
 
 def movements_to_reach(movements: Array, errors: Array, level: Array | float) -> Array:
-    """After how many movements the error first comes down to a level; straight lines between evaluations.
+    """After how many movements the error first falls to a level; straight lines between evaluations.
 
     Args:
         movements: ``(n,)``, increasing, 2 or more.
@@ -205,7 +205,7 @@ def movements_to_reach(movements: Array, errors: Array, level: Array | float) ->
         level: ``(...)`` m.
 
     Returns:
-        ``(...)``, the first evaluation at the earliest, inf where the level is never reached.
+        ``(...)``, the first evaluation at the earliest, inf if the level is never reached.
 
     Raises:
         ValueError: see ``mean_over_life``.
@@ -225,8 +225,8 @@ def anova(*groups: Array) -> Anova:
     """Do these sets of movements have different means? One-way analysis of variance in each dimension of theta.
 
     Section 6 of Nguyen & Oudeyer (2014): demonstrations against random movements, and the movements that learners
-    executed against each other. Rows must be independent of each other. Movements of one run are not, they repeat and
-    refine each other: there a row is the mean theta of a run, or p comes out far too small.
+    executed against each other. Rows must be independent of each other. The movements of one run are not, because they
+    repeat and refine each other: there a row must be the mean theta of a run, else p is far too small.
 
     Args:
         groups: ``(n, theta_dim)`` each, two or more groups.

@@ -1,14 +1,14 @@
-"""One table of what runs came to: error, noise floor and costs of each variant, over its seeds.
+"""One table with the results of runs: error, noise floor and costs of each variant, over its seeds.
 
 It takes any folder with run directories, OUT/NAME/seed-000. Variants are compared after the last number of movements at
-which all finished runs were evaluated, or after --at; the worst comes first. Errors and noise floors are means over
+which all finished runs were evaluated, or after --at. The worst comes first. Errors and noise floors are means over
 seeds in metres, ± the standard deviation; costs are milliseconds for each movement. Runs that are damaged, not finished
 or not evaluated there are left out, and named below the table.
 
   sgimd table runs
-  sgimd table study --at 2000       also with runs that are still under way, if they have come that far
+  sgimd table study --at 2000       also with unfinished runs that were evaluated there
 
-Exit code: 0 there was something to show, 2 there was not.
+Exit code: 0 a table was printed, 2 there is nothing to show.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("runs", type=Path, metavar="OUT", help="folder of runs: the --out of sgimd run or sgimd sweep")
-    parser.add_argument("--at", type=int, metavar="MOVEMENTS", help="compare after so many movements")
+    parser.add_argument("--at", type=int, metavar="MOVEMENTS", help="compare after this number of movements")
     options = parser.parse_args(argv)
     runs, left_out = _readable(options.runs)
     at = options.at
@@ -102,18 +102,18 @@ def _metres(lengths: Array) -> str:
 
 
 def _evaluated(run: Run) -> set[int]:
-    """After which numbers of movements."""
+    """The numbers of movements after which it was evaluated."""
     return set(run.evaluation["movements"].astype(int).tolist())
 
 
 def _at(runs: Sequence[Run], movements: int, column: str) -> Array:
-    """``(n_runs,)``, NaN where a run was not evaluated after so many movements."""
+    """``(n_runs,)``, NaN if a run was not evaluated after these ``movements``."""
     values = [run.evaluation[column][run.evaluation["movements"] == movements] for run in runs]
     return np.array([value[0] if value.size else np.nan for value in values])
 
 
 def _milliseconds(run: Run, part: str) -> float:
-    """Of one movement, on the mean.
+    """Mean milliseconds for one movement.
 
     Raises:
         RunError: the run's summary is missing or damaged.

@@ -1,9 +1,9 @@
-"""Open TensorBoard on the boards that runs have made, also while they are still under way. For this machine alone.
+"""Open TensorBoard on the boards of runs, also while they are still running. Only this machine can see it.
 
 Examples:
   sgimd run --algorithm sgim-d --board true &
   sgimd watch                                         all boards below runs
-  sgimd watch runs/sgim-d --port 7007                 those of one learner, elsewhere
+  sgimd watch runs/sgim-d --port 7007                 one learner, on another port
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ from pathlib import Path
 from sgimd_torch.runs.process import Failed, say
 
 PORTS = 50  # how many are tried
-POINTS = 100_000  # that TensorBoard keeps of each curve, which is all; 0, documented as all, shows none
+POINTS = 100_000  # that TensorBoard keeps of each curve, enough for all; 0 should mean all, but shows none
 PATIENCE = 60.0  # s, for TensorBoard to answer
 WHERE = """
 TensorBoard shows {boards} of {runs} at  {url}   (Ctrl-C ends it)
 
   {url}/#custom_scalars&_smoothingWeight=0
-      Begin here, on one page: does it learn, where is it competent, where does it make progress, what did its teacher?
+      Begin here: does it learn, where is it competent, where does it make progress, what did its teacher do?
   {url}/#images
-      Where the regions lie that the curves are named after; where the float landed; the error by goal.
+      The regions that curves are named after; where the float landed; the error at each goal.
   {url}/#scalars&_smoothingWeight=0
-      Every curve by itself; the steps are movements. A click on (i) says what a curve shows, as does the tab Text.
+      Every curve by itself; steps are movements. A click on (i) explains a curve; so does the tab Text.
   {url}/#hparams
-      Runs beside each other: their options, and what they came to.
+      Runs next to each other: their options and results.
 """
 
 
@@ -80,7 +80,7 @@ def boards_below(runs: Path) -> int:
 
 
 def free_port(first: int) -> int:
-    """The first port of this machine from ``first`` on that nobody uses.
+    """The first free port of this machine from ``first`` on.
 
     Raises:
         ValueError: no such number, or all are taken.
@@ -89,10 +89,10 @@ def free_port(first: int) -> int:
         raise ValueError(f"--port must be from 1 to 65535, got {first}")
     for port in range(first, min(first + PORTS, 65536)):
         with socket.socket() as attempt:
-            attempt.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # else a server that just ended counts
+            attempt.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # a server that just ended does not count
             try:
                 attempt.bind(("127.0.0.1", port))
-            except OSError:  # taken, or not for everybody
+            except OSError:  # taken, or not allowed for this user
                 continue
             return port
     raise ValueError(f"no port from {first} on is free; give another --port")
@@ -122,7 +122,7 @@ def serve(runs: Path, port: int, where: str) -> None:
 
 
 def wait_for(address: str, process: subprocess.Popen[bytes]) -> None:
-    """Until something answers there, the process has ended, or patience has."""
+    """Wait until something answers there, the process ends or ``PATIENCE`` is over."""
     direct = urllib.request.build_opener(urllib.request.ProxyHandler({}))
     give_up = time.monotonic() + PATIENCE
     while process.poll() is None and time.monotonic() < give_up:

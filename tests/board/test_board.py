@@ -229,7 +229,7 @@ def test_every_tag_is_explained_once_in_the_file_and_once_in_the_legend(board):
     assert all(f"**{tag}" in legend.decode() for tag in LEGEND)
 
 
-def test_a_tag_that_nobody_explained_is_refused(tmp_path):
+def test_a_tag_without_an_explanation_is_refused(tmp_path):
     with Board(tmp_path, PLANE) as board, pytest.raises(ValueError, match="legend"):
         board.scalars({"mine": 1.0})
 
@@ -337,7 +337,7 @@ def test_the_curves_of_a_run_are_those_of_its_files(watched):
 
 
 def assert_same_board(resumed, whole, apart=()):
-    """Every point of the one is in the other, with the same value where it is none of the clock."""
+    """Every point of the one is in the other, with the same value unless it is a time."""
     resumed, whole = curves_of(resumed), curves_of(whole)
     assert resumed.keys() - whole.keys() == set()
     for tag in whole:
@@ -443,7 +443,7 @@ def test_an_evaluation_that_is_taken_back_leaves_the_board_too(tmp_path, go):
 
 
 class Slider:
-    """A robot of ``dim`` sliders, whose outcome is where they are; a context, where there is one, shifts them."""
+    """A robot of ``dim`` sliders, whose outcome is their position; a context, if there is one, shifts them."""
 
     outcome_noise = 0.0
 
@@ -459,7 +459,7 @@ class Slider:
 
 
 def live_as(out, robot, make, **options):
-    """A watched run of a robot and learner of one's own; returns its directory."""
+    """A watched run of a user's robot and learner; returns its directory."""
     config = Config(environment="planar-arm-7", movements=120, evaluate_at=(60,), repeats=0, board=True, out=out)
     goals = np.linspace(0.2, 0.9, 5)[:, None].repeat(robot.outcomes.dim, axis=1)
     learner = make(robot, 0, **options)
@@ -495,7 +495,7 @@ def test_outcomes_of_any_dimension_have_curves_and_cells_and_those_of_the_plane_
 
 
 class Halves:
-    """A goal model of one's own, whose two regions are all that a run knows of it."""
+    """A user's goal model; a run knows only its two regions."""
 
     def __init__(self, contexts, outcomes, rng):
         whole = InterestMap(contexts, outcomes, rng)

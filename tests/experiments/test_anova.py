@@ -78,7 +78,7 @@ def test_a_run_counts_as_one_movement_its_mean(runs):
     np.testing.assert_array_equal(means[1], read_run(runs / "sgim-d/seed-001").thetas.mean(axis=0))
 
 
-def test_runs_that_are_missing_or_not_finished_are_told(demonstrators, runs):
+def test_runs_that_are_missing_or_not_finished_are_reported(demonstrators, runs):
     compared, missing = compare(runs)
     assert found(compared, "SGIM-D taught by demonstrator 3, Random").rows == "2, 2 runs"
     told = f"sgim-d-teacher-2, 1 finished in {runs}, at least 2 are needed"
@@ -118,7 +118,7 @@ def test_without_run_directories_the_rows_of_earlier_ones_are_kept(demonstrators
     assert (tmp_path / "RESULTS.md").read_text() == page
     assert (tmp_path / "anova.csv").read_text() == table
     assert "Random: not run: sgim-d, 0 finished" in (said := capsys.readouterr().err)
-    assert "its row stays as it was" in said
+    assert "its row stays the same" in said
 
 
 def test_what_was_never_compared_says_so(tmp_path):

@@ -254,12 +254,12 @@ def test_a_malformed_table_is_refused_in_one_line(results, tmp_path, capsys, spo
 def test_a_table_that_is_not_there_is_refused_with_where_it_comes_from(tmp_path, capsys):
     assert make_page(tmp_path / "none" / "paper.csv", tmp_path) == 2
     assert "none/paper.csv does not exist; experiments/compare.py writes" in capsys.readouterr().err
-    (tmp_path / "paper.csv").write_text("")  # the table in the place of its folder
+    (tmp_path / "paper.csv").write_text("")  # the table outside its folder
     assert make_page(tmp_path / "paper.csv" / "paper.csv", tmp_path) == 2
     assert "paper.csv/paper.csv does not exist; experiments/compare.py writes" in capsys.readouterr().err
 
 
-def test_goals_that_are_more_than_there_are_are_refused(results):
+def test_more_near_goals_than_goals_are_refused(results):
     results.with_name("goals.csv").write_text("variant,seed,n_goals,n_near\nsgim-d-large,0,3,4\n")
     with pytest.raises(ResultsError, match="line 2: n_near must be at most n_goals"):
         read_goals(results.with_name("goals.csv"))

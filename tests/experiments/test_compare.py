@@ -1,4 +1,4 @@
-"""The comparison with tiny variants, in real processes: what is run, what is harvested, what a bad end does to it."""
+"""The comparison with tiny variants, in real processes: what is run, what is collected, what happens when runs fail."""
 
 import csv
 import re
@@ -220,9 +220,12 @@ def test_looking_at_what_is_to_be_done_writes_nothing(tmp_path, monkeypatch, cap
         (["learnres"], "unknown experiment 'learnres', known are learners, .*did you mean learners?"),
         (["grid"], "grid is a variant, of ablations; write ablations --only grid"),
         (["ablations", "--only", "gird"], "unknown variant 'gird', known are uniform-goals, .*did you mean grid?"),
-        (["learners", "--only", "grid"], "grid is a variant of ablations, asked for were learners"),
+        (["learners", "--only", "grid"], "grid is a variant of ablations, you named learners"),
         (["sgim-d"], "sgim-d is a variant, of learners and forward-model; write learners --only sgim-d"),
-        (["long", "--only", "sgim-d"], "sgim-d is a variant of learners and forward-model, asked for were long"),
+        (
+            ["long", "--only", "sgim-d"],
+            "sgim-d is a variant of learners and forward-model, you named long",
+        ),
         (["--only", "grid", "ablations"], "ablations is an experiment, no variant; experiments go before --only"),
         (["--seeds", ""], "--seeds: must be like 5, 0-19 or 0,3,7-9, got ''"),
         (["--seeds=-1"], "--seeds: must be like 5, 0-19 or 0,3,7-9, got '-1'"),
@@ -232,7 +235,7 @@ def test_looking_at_what_is_to_be_done_writes_nothing(tmp_path, monkeypatch, cap
         (["--results", "foreign"], "foreign/paper.csv must begin with experiment,variant"),
     ],
 )
-def test_what_cannot_be_is_refused_with_its_reason(tmp_path, monkeypatch, capsys, options, message):
+def test_impossible_requests_are_refused_with_their_reason(tmp_path, monkeypatch, capsys, options, message):
     monkeypatch.chdir(tmp_path)
     Path("file").write_text("")
     Path("foreign").mkdir()
@@ -255,7 +258,7 @@ def test_a_run_that_cannot_start_fails_alone(compare, tmp_path):
     assert keys_of(tmp_path, "forward_model.csv") == [("sgim-d-arm-7", 20), ("sgim-d-arm-7", 40)]
 
 
-def test_every_variant_is_a_run_that_can_be_and_in_its_table_has_a_name_of_its_own(tmp_path):
+def test_every_variant_is_a_valid_run_with_its_own_name_in_its_table(tmp_path):
     wanted = runs_of(list(EXPERIMENTS), [], range(1), tmp_path)
     assert len({(tables_of(name)[0], last_row(config)) for name, config in wanted}) == len(wanted)
     assert not [note for _, config in wanted for note in config.without_effect if "--budget" in note]

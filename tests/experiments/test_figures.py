@@ -1,4 +1,4 @@
-"""The figures of the results: what they show, read back from their axes, and what they do without their data."""
+"""The figures of the results: what they show, read back from their axes, and what happens without their data."""
 
 import numpy as np
 import pytest
@@ -140,7 +140,7 @@ def test_landing_points_of_all_seeds_are_pooled_on_one_scale(data):
 
 
 @pytest.mark.parametrize("name", ["errors", "demonstrators", "landing"])
-def test_an_algorithm_more_leaves_the_figures_of_the_paper_as_they_are(data, monkeypatch, name):
+def test_an_additional_algorithm_leaves_the_figures_of_the_paper_as_they_are(data, monkeypatch, name):
     before = [(ax.get_title(), [*lines_of(ax)], len(ax.get_yticklabels())) for ax in FIGURES[name](data).axes]
     monkeypatch.setitem(NAMES, "toddler", "Toddler")
     monkeypatch.setitem(COLOURS, "toddler", "#000000")

@@ -24,7 +24,7 @@ CLAIMS = [claim for claim, _, _ in BARS]
 
 
 def write(path, *, without=(), **spoilt):
-    """``spoilt``: variant, with _ for -, to errors in the place of the true ones."""
+    """``spoilt``: variant, with _ for -, to errors that replace the true ones."""
     lines = []
     for name, (experiment, errors) in TRUE.items():
         for seed in range(SEEDS) if name not in without else ():

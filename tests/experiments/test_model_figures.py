@@ -103,7 +103,7 @@ def test_only_predictions_from_2000_movements_on_count_as_late(honest):
     assert run.inside(late, [0.8]) == expected.mean()
 
 
-def test_an_overconfident_model_is_told_from_an_honest_and_a_cautious_one(tmp_path):
+def test_an_overconfident_model_differs_from_an_honest_and_a_cautious_one(tmp_path):
     runs = [write_run(tmp_path / str(doubt), movements=600, doubt=doubt) for doubt in (0.3, 3)]
     small, large = (row(read_model_run(run)) for run in runs)
     assert small["inside_95_last"] < 0.4  # 1 - .05^.09 = .24

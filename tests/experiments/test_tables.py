@@ -1,4 +1,4 @@
-"""Tables of results: no row twice, none lost, whoever else writes, and nobody else's file harmed."""
+"""Tables of results: no row twice, none lost while others write, no foreign file changed."""
 
 import math
 import os
@@ -97,7 +97,7 @@ def writing(path, variant, n):
     return subprocess.Popen([sys.executable, "-c", program], env={**os.environ, "PYTHONPATH": paths})
 
 
-def test_of_what_two_processes_write_at_once_nothing_is_lost_and_anyone_may_look(table, path):
+def test_two_processes_that_write_at_once_lose_nothing_and_anyone_may_read(table, path):
     writers = [writing(path, variant, 60) for variant in ("grid", "random")]
     while any(writer.poll() is None for writer in writers):
         seen = set(table.rows())  # never half of a file

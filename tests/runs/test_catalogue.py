@@ -1,4 +1,4 @@
-"""The catalogue: what it says of each thing is true, and a thing of one's own is as good as one of ours."""
+"""The catalogue: what it says of each thing is true, and a user's own parts work like ours."""
 
 import inspect
 import re
@@ -145,11 +145,11 @@ def test_what_cannot_be_named_is_refused_with_its_reason(toss, capsys, options, 
     assert not (toss / "runs").exists()
 
 
-def test_an_environment_of_ones_own_lives_is_evaluated_and_resumed(toss, capsys):
+def test_a_users_environment_is_run_evaluated_and_resumed(toss, capsys):
     own = ("--environment", "toss:Toss", "--algorithm", "sagg-riac", "--out", "runs", *SHORT)
     assert command(main, own) == 0
     said = capsys.readouterr().err
-    assert "Toss brings no goals to be judged by" in said
+    assert "Toss has no benchmark goals" in said
     run = read_run(toss / "runs/sagg-riac/seed-000")
     assert run.outcomes.shape == (40, 1)
     assert run.evaluation["movements"].tolist() == [20, 40]
@@ -159,7 +159,7 @@ def test_an_environment_of_ones_own_lives_is_evaluated_and_resumed(toss, capsys)
     assert (toss / "runs/two/seed-000/episodes.csv").read_bytes() == whole
 
 
-def test_a_task_of_ones_own_brings_its_teacher(toss, capsys):
+def test_a_users_task_comes_with_its_teacher(toss, capsys):
     taught = ("--environment", "toss:taught", "--out", "runs", *SHORT)
     assert command(main, taught) == 0
     run = read_run(toss / "runs/sgim-d/seed-000")
@@ -167,7 +167,7 @@ def test_a_task_of_ones_own_brings_its_teacher(toss, capsys):
     assert "3 demonstrations" in capsys.readouterr().err
 
 
-def test_a_goal_model_of_ones_own_gets_the_options_that_it_names(toss):
+def test_a_users_goal_model_gets_the_options_that_it_names(toss):
     own = Config(environment="toss:Toss", algorithm="sagg-riac", goals="toss:Worst", window=4)
     goals = build(own).learner.autonomous.goals
     assert type(goals).__name__ == "Worst"
@@ -176,7 +176,7 @@ def test_a_goal_model_of_ones_own_gets_the_options_that_it_names(toss):
     assert Config(environment="toss:Toss", algorithm="sagg-riac", goals="toss:Worst", progress="signed").without_effect
 
 
-def test_the_installed_command_finds_what_lies_in_the_working_directory(toss):
+def test_the_installed_command_finds_modules_in_the_working_directory(toss):
     words_ = [sys.executable, "-c", "import sys; from sgimd_torch.__main__ import main; sys.exit(main())"]
     sys_path = {"PYTHONPATH": str(ROOT), "PATH": "/usr/bin:/bin", "PYTHONSAFEPATH": "1"}
     own = ["run", "--environment", "toss:Toss", "--algorithm", "random", "--out", "runs", *SHORT]
@@ -229,3 +229,14 @@ def test_an_entry_that_is_not_installed_names_its_extra(monkeypatch):
 def test_the_environment_of_a_config_is_the_task_it_names():
     assert len(task_of(Config(environment="planar-arm-50")).environment.policies.low) == 50
     assert isinstance(find("environment", "planar-arm-7"), Entry)
+
+
+@pytest.mark.parametrize("kind", CATALOGUE)
+def test_the_order_of_the_catalogue_means_nothing(kind, monkeypatch):
+    given = {"algorithm": "sagg-riac", "search": "gradient", "residual": False, "epsilon": 0.2, "every": 7}
+    before = Config(**given).without_effect, Config(**{**given, "search": "perturb"}).without_effect
+    monkeypatch.setitem(CATALOGUE, kind, dict(reversed(CATALOGUE[kind].items())))
+    after = Config(**given).without_effect, Config(**{**given, "search": "perturb"}).without_effect
+    assert after == before
+    assert not any("residual" in note for note in after[0])
+    assert any("--residual has no effect with --search perturb" in note for note in after[1])

@@ -83,7 +83,7 @@ def test_the_tiles_of_rod_and_arm_begin_at_one_corner():
 
 
 @pytest.mark.parametrize("n_joints", ARMS.values())
-def test_an_arm_is_shown_how_to_come_from_rest_to_postures_of_equal_bends_all_over_its_reach(n_joints):
+def test_demonstrations_for_an_arm_lead_from_rest_to_equal_bends_all_over_its_reach(n_joints):
     arm = PlanarArm(n_joints)
     shown = arm_demonstrations(arm)
     assert len(shown) == 127
@@ -110,7 +110,7 @@ def test_an_imitating_arm_varies_the_posture_that_it_was_shown(tmp_path):
     assert (np.abs(run.thetas[30:60] - arm.correspondence(shown.times, shown.trajectory)) <= 0.03 + 1e-12).all()
 
 
-def test_own_demonstrations_and_goals_take_the_place_of_the_arms(tmp_path, capsys):
+def test_own_demonstrations_and_goals_replace_those_of_the_arm(tmp_path, capsys):
     arm = PlanarArm()
     save_demonstrations(tmp_path / "own.npz", arm_demonstrations(arm)[:2])
     save_benchmark(tmp_path / "goals.npz", Benchmark("PlanarArm", np.array([[0.1, 0.2]]), 0.1))
@@ -162,7 +162,7 @@ def test_a_run_on_an_arm_made_longer_equals_a_long_run(tmp_path, reference):
     assert csv_of(tmp_path / "sgim-d" / "seed-003") == csv_of(reference)
 
 
-def test_a_run_made_before_there_was_a_choice_lived_on_the_rod(tmp_path, go, capsys):
+def test_a_run_older_than_the_option_is_on_the_rod(tmp_path, go, capsys):
     assert go(tmp_path, "--movements", 5) == 0
     path = tmp_path / "sgim-d" / "seed-003" / "config.json"
     config = json.loads(path.read_text())
@@ -213,7 +213,7 @@ def test_a_report_shows_an_arm_beside_the_rod_with_what_each_was_shown(tmp_path,
     assert report.main([str(tmp_path), "--out", str(tmp_path / "page.html")]) == 0
     page = (tmp_path / "page.html").read_text()
     assert "planar-arm-7" in page
-    assert "judged by different benchmarks" in page
+    assert "evaluated on different benchmarks" in page
     assert "left out" not in page.lower()
     assert f"sgimd film {tmp_path / 'rod' / 'seed-003'}" in page
     assert f"sgimd film {tmp_path / 'arm' / 'seed-003'}" not in page

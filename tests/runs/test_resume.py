@@ -133,7 +133,7 @@ def files_of(directory):
         (lambda content: b"".join(content.splitlines(keepends=True)[:31]), 30),  # cut at the end of a line
     ],
 )
-def test_a_log_that_lacks_movements_is_gone_on_with_only_when_the_loss_is_accepted(
+def test_a_log_that_lacks_movements_is_continued_only_if_the_loss_is_accepted(
     tmp_path, go, benchmark, reference, capsys, damage, kept
 ):
     directory = tmp_path / "sgim-d" / "seed-003"
@@ -147,7 +147,7 @@ def test_a_log_that_lacks_movements_is_gone_on_with_only_when_the_loss_is_accept
     assert go(tmp_path, "--resume") == 2
     message = capsys.readouterr().err
     assert f"episodes.csv holds {kept} movements" in message
-    assert "summary.json knows of 90; was it cut, emptied or deleted?" in message
+    assert "summary.json counts 90; was it cut, emptied or deleted?" in message
     assert ("line 42 is damaged" in message) == (damage is flip)
     assert f"the {90 - kept} missing ones again with --accept-loss" in message
     assert files_of(directory) == before
@@ -194,10 +194,10 @@ def test_a_replay_that_fails_leaves_a_lossy_directory_as_it_was(tmp_path, go, be
 @pytest.mark.parametrize(
     ("damage", "kept", "copied"), [(append_garbage, 90, False), (repeat_last_line, 90, True), (flip, 40, True)]
 )
-def test_of_a_damaged_log_what_is_whole_is_kept_and_the_rest_lived_again(
+def test_whole_lines_of_a_damaged_log_are_kept_and_the_rest_is_made_again(
     tmp_path, go, reference, capsys, damage, kept, copied
 ):
-    """Without asking where nothing says that movements are missing; a last line that has no end is no damage."""
+    """Without asking if nothing shows that movements are missing; an incomplete last line is no damage."""
     directory = tmp_path / "sgim-d" / "seed-003"
     assert go(tmp_path) == 0
     log = directory / "episodes.csv"
@@ -244,8 +244,8 @@ def test_a_process_killed_between_log_and_summary_loses_nothing_and_asks_nothing
 @pytest.mark.parametrize(
     ("name", "column", "line"), [("evaluation.csv", "mean_error_m", 3), ("regions.csv", "competence", 4)]
 )
-def test_an_edited_row_is_told_of_and_made_again(tmp_path, go, reference, capsys, name, column, line, checked):
-    """Also in the tables of earlier versions, which had no checksums, if the number cannot be."""
+def test_an_edited_row_is_reported_and_made_again(tmp_path, go, reference, capsys, name, column, line, checked):
+    """Also in the tables of earlier versions, which had no checksums, if the number is impossible."""
     directory = tmp_path / "sgim-d" / "seed-003"
     assert go(tmp_path) == 0
     lines = [row.split(",") for row in reference[name].decode().splitlines()]

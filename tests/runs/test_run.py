@@ -217,7 +217,7 @@ def test_help_names_every_choice_and_every_field_has_a_sentence(capsys):
 @pytest.mark.parametrize(
     ("option", "table"), [item for item in CATALOGUE.items() if item[0] not in ("algorithm", "environment")]
 )
-def test_every_choice_lives_and_none_is_another_by_a_new_name(tmp_path, go, option, table):
+def test_every_choice_runs_and_differs_from_the_others(tmp_path, go, option, table):
     logs = set()
     # Short attempts and a short window, so that the map is split, and has its say, before the run is over.
     common = ("--every", 20, "--budget", 3, "--imitations", 3, "--window", 4, "--movements", 240, "--evaluate_at", "[]")
@@ -244,7 +244,7 @@ ON_THE_ARM = (
 )
 
 
-def test_every_search_through_the_model_lives_and_none_is_another_by_a_new_name(tmp_path, go):
+def test_every_search_through_the_model_runs_and_differs_from_the_others(tmp_path, go):
     searches = ("nelder-mead", *MODEL_SEARCHES)
     for search in searches:
         assert go(tmp_path, "--name", search, "--search", search, *ON_THE_ARM) == 0
@@ -296,7 +296,7 @@ def test_options_that_change_nothing_are_named_and_change_nothing(tmp_path, go, 
     assert logs[0] == logs[1]
 
 
-def test_of_options_that_change_nothing_only_those_that_were_changed_are_named(tmp_path, go, capsys):
+def test_of_options_without_effect_only_the_changed_ones_are_named(tmp_path, go, capsys):
     budget = str(Config().budget)
     assert go(tmp_path, "--algorithm", "random", "--budget", budget, "--inverse", "nearest", "--movements", 5) == 0
     assert "no effect" not in capsys.readouterr().err
@@ -363,7 +363,7 @@ def test_a_link_to_nowhere_is_named(tmp_path, go, capsys):
     assert f"{tmp_path / 'link'} is no folder" in capsys.readouterr().err
 
 
-def test_an_error_under_way_is_one_line(tmp_path, go, capsys, monkeypatch):
+def test_an_error_while_running_is_one_line(tmp_path, go, capsys, monkeypatch):
     def fail(*_, **__):
         raise ValueError("this cannot be evaluated")
 
@@ -398,7 +398,7 @@ def test_ctrl_c_while_python_imports_shows_no_traceback(script, tmp_path):
 @pytest.mark.parametrize(
     ("redirection", "code"), [("| true", 0), (">/dev/full", 1), ("2>/dev/full", 0), ("2>&-", 0), (">&-", 0), ("", 0)]
 )
-def test_a_run_ends_well_whatever_becomes_of_its_output(tmp_path, benchmark, redirection, code):
+def test_a_run_finishes_whatever_happens_to_its_output(tmp_path, benchmark, redirection, code):
     script = [sys.executable, "-m", "sgimd_torch", "run", *arguments(tmp_path, benchmark)]
     command = shlex.join([*script, "--movements", "5", "--name", "Å"])
     done = subprocess.run(

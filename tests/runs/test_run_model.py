@@ -1,4 +1,4 @@
-"""Runs with a forward model: what they record and say of it, what they refuse, and that a stop leaves no trace."""
+"""Runs with a forward model: what they record and report, what they refuse, and that a stop leaves no trace."""
 
 import json
 import re
@@ -80,7 +80,7 @@ def curves_of(directory):
     return found
 
 
-def test_every_movement_after_the_first_refresh_was_foreseen_and_is_recorded_with_its_outcome(reference):
+def test_every_movement_after_the_first_refresh_was_predicted_and_is_recorded_with_its_outcome(reference):
     columns, predictions = table(reference / "predictions.csv")
     parts = [[f"{part}_{k}" for k in (0, 1)] for part in ("outcome", "predicted", "epistemic", "aleatoric")]
     assert columns == ["exemplar", *np.ravel(parts)]
@@ -91,15 +91,15 @@ def test_every_movement_after_the_first_refresh_was_foreseen_and_is_recorded_wit
     assert (aleatoric > 0).all()
 
 
-def test_what_is_recorded_as_foreseen_is_what_a_model_of_all_before_says(reference):
+def test_recorded_predictions_are_those_of_a_model_of_all_earlier_movements(reference):
     run, memory, model = read_run(reference), Memory(0, 7, 2), ForwardModel(0, 7, 2, seed=3, rate=2.0)
     _, predictions = table(reference / "predictions.csv")
     for n in (50, 100):
         for k in range(len(memory), n):
             memory.add(NO_CONTEXT, run.thetas[k], run.outcomes[k])
         model.refresh(memory)
-        foreseen = np.hstack(model.predict(NO_CONTEXT, run.thetas[n : n + 50]))
-        np.testing.assert_array_equal(predictions[n - 50 : n, 3:], foreseen)
+        predicted = np.hstack(model.predict(NO_CONTEXT, run.thetas[n : n + 50]))
+        np.testing.assert_array_equal(predictions[n - 50 : n, 3:], predicted)
 
 
 def test_every_refresh_is_recorded(reference):
@@ -183,13 +183,13 @@ def test_a_model_that_is_asked_is_announced_once(tmp_path, live, capsys):
     ("options", "why", "rows"),
     [
         (("--movements", 40), "there were too few exemplars to train it", 0),
-        (("--movements", 60, "--training", 0.02), r"its relative error is \d\.\d+, to be trusted it needs 0\.25", 1),
+        (("--movements", 60, "--training", 0.02), r"its relative error is \d\.\d+, it is trusted up to 0\.25", 1),
     ],
 )
-def test_a_model_that_nobody_ever_asked_is_no_secret(tmp_path, live, capsys, options, why, rows):
+def test_a_model_that_was_never_asked_is_reported(tmp_path, live, capsys, options, why, rows):
     assert live(tmp_path, *MODEL, *options) == 0
     said = capsys.readouterr().err
-    instead = "the local inverse model answers and the simplex searches in its place"
+    instead = "the local inverse model answers and the simplex searches instead"
     assert re.search(f"the forward model is not asked, {instead}: {why}\n", said)
     directory = tmp_path / "sgim-d" / "seed-003"
     assert len((directory / "refreshes.csv").read_text().splitlines()) == 1 + rows
@@ -205,7 +205,7 @@ def run_model(tmp_path, model, trust):
 
 
 def remember(memory, n):
-    """What an episode makes of each of ``n`` random movements of an arm, which are remembered."""
+    """What ``episode`` returns for each of ``n`` random movements of an arm, which are remembered."""
     arm, rng = PlanarArm(7), stream(0, "exemplars")
     for index in range(n):
         theta, goal = rng.random(7), np.full(2, index // 2)  # two movements for each goal
@@ -282,7 +282,7 @@ def test_options_of_a_model_that_is_not_there_are_named():
         ("--members 0", "members must be from 1 to 100, got 0"),
         ("--members 101", "members must be from 1 to 100, got 101"),
         ("--members 1.5", "--members must be a whole number, got 1.5"),
-        ("--training 0", "training must be above 0 and at most 100, got 0.0; it counts steps a movement"),
+        ("--training 0", "training must be above 0 and at most 100, got 0.0; it is a number of steps per movement"),
         ("--training 101", "training must be above 0 and at most 100"),
         ("--training .nan", "training must be above 0"),
         ("--focus 0.8", "focus must be from 0 to 0.75, got 0.8"),

@@ -1,4 +1,4 @@
-"""The run directory's files: exact numbers, lines that tell whether they are as they were written, clear refusals."""
+"""The run directory's files: exact numbers, lines that show whether they were changed, clear refusals."""
 
 import zlib
 from pathlib import Path
@@ -84,7 +84,7 @@ ROWS = {  # of each table, two that can be: dimensions, and rows
 
 
 def content_of(name, rows, *, checked=True):
-    """The file of a table, as it is written today, or by versions that knew no checksums."""
+    """The file of a table, as it is written today, or by versions without checksums."""
     table = small_table(Path(name), ROWS[name][0])
     if checked:
         return table.header + b"".join(sealed(row.split(",")) for row in rows)
@@ -149,7 +149,7 @@ def test_an_error_edited_to_below_zero_is_noticed(tmp_path, checked):
         ("refreshes.csv", "0.75", "nan"),
     ],
 )
-def test_without_checksums_what_cannot_be_is_refused_with_its_line(tmp_path, name, was, edited):
+def test_without_checksums_impossible_values_are_refused_with_their_line(tmp_path, name, was, edited):
     first, second = ROWS[name][1]
     assert was in second
     run = run_with(tmp_path, name, content_of(name, [first, second.replace(was, edited)], checked=False))

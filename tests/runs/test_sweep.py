@@ -1,4 +1,4 @@
-"""Many runs at once, in real processes: which runs a command line means, what is left to do, how it can end badly."""
+"""Many runs at once, in real processes: which runs a command line means, what is left to do, how runs can fail."""
 
 import os
 import pty
@@ -83,11 +83,11 @@ def test_values_and_further_options_become_those_of_the_runs():
         ("--vary goals=", "--vary must be like"),
         ("--vary =uniform", "--vary must be like"),
         ("--vary goals=grid,,uniform", "--vary must be like"),
-        ("--vary seed=0,1", "--seed is not free here: --seeds takes them"),
-        ("--vary name=a,b", "--name is not free here"),
-        ("--vary out=a,b", "--out is not free here: all runs of a sweep go to one --out"),
-        ("--seed 3", "--seed is not free here: --seeds takes them, such as 5, 0-19 or 0,3,7-9"),
-        ("--name=mine", "--name is not free here"),
+        ("--vary seed=0,1", "--seed cannot be given here: --seeds takes them"),
+        ("--vary name=a,b", "--name cannot be given here"),
+        ("--vary out=a,b", "--out cannot be given here: all runs of a sweep go to one --out"),
+        ("--seed 3", "--seed cannot be given here: --seeds takes them, such as 5, 0-19 or 0,3,7-9"),
+        ("--name=mine", "--name cannot be given here"),
         ("--vary goals=grid --vary goals=uniform", "--goals is there twice"),
         ("--vary task_space=1,2 --task-space 3", "--task-space is there twice"),
         ("--gaols uniform", "unknown option --gaols; did you mean --goals?"),
@@ -104,7 +104,7 @@ def test_values_and_further_options_become_those_of_the_runs():
         ("--out file", "file cannot be made: file is no folder"),
     ],
 )
-def test_what_cannot_be_is_refused_before_anything_starts(tmp_path, monkeypatch, capsys, options, message):
+def test_impossible_requests_are_refused_before_anything_starts(tmp_path, monkeypatch, capsys, options, message):
     monkeypatch.chdir(tmp_path)
     Path("file").write_text("")
     assert swept(*options.split()) == 2
@@ -272,10 +272,10 @@ def test_a_run_that_a_killed_sweep_left_behind_is_waited_for_and_taken_up(tmp_pa
     pid = child_of(first, config)
     first.kill()
     first.communicate()
-    os.kill(pid, signal.SIGSTOP)  # it keeps the run in hand and gets no further
+    os.kill(pid, signal.SIGSTOP)  # it still holds the run, but makes no progress
     assert locked(config.directory / "lock")
     second = start(SWEEP, *options)
-    while "random seed 0: waiting for another process, which has this run in hand" not in second.stderr.readline():
+    while "random seed 0: waiting for another process, which writes this run" not in second.stderr.readline():
         assert second.poll() is None
     for signum in (signal.SIGINT, signal.SIGCONT):  # it ends in the middle, and the second sweep goes on with it
         os.kill(pid, signum)
@@ -284,7 +284,7 @@ def test_a_run_that_a_killed_sweep_left_behind_is_waited_for_and_taken_up(tmp_pa
     assert finished(config)
 
 
-def test_what_ended_well_is_told_once_each_and_an_error_there_is_a_failure(whole, tmp_path):
+def test_on_end_is_called_once_for_each_finished_run_and_its_error_is_a_failure(whole, tmp_path):
     configs, ended = [whole, short(tmp_path, seed=1)], []
 
     def on_end(config):

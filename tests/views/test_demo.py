@@ -1,4 +1,4 @@
-"""The demo as a newcomer meets it, with lives of a few movements and a benchmark of a few goals."""
+"""The demo as a new user starts it, with runs of a few movements and a benchmark of a few goals."""
 
 import os
 import shutil
@@ -130,16 +130,16 @@ def test_stopped_it_says_how_to_go_on_and_leaves_no_process(benchmark_file, tmp_
         (("--movements", "0"), (), "movements must be at least 1"),
         ((), ("--noise", "-1"), "noise must be finite and at least 0"),
         ((), ("--evaluate_at", "[]"), "leaves nothing to draw"),
-        ((), ("--environment", "planar-arm-7"), "--environment is not free here"),
+        ((), ("--environment", "planar-arm-7"), "--environment cannot be given here"),
         ((), ("--seed", "3"), "--seed is the demo's own"),
         ((), ("--movements=3",), "--movements is the demo's own"),
         ((), ("--out", "x"), "--out is the demo's own"),
-        ((), ("--algorithm", "x"), "--algorithm is not free here"),
-        ((), ("--name", "x"), "--name is not free here"),
+        ((), ("--algorithm", "x"), "--algorithm cannot be given here"),
+        ((), ("--name", "x"), "--name cannot be given here"),
         ((), ("stray",), "'stray' belongs to no option"),
     ],
 )
-def test_what_cannot_be_ends_with_its_reason_and_no_traceback(benchmark_file, tmp_path, more, extra, message):
+def test_impossible_requests_end_with_a_reason_and_no_traceback(benchmark_file, tmp_path, more, extra, message):
     code, said, errors = ended(start(tmp_path, benchmark_file, 20, *more, extra=extra))
     assert code == 2
     assert message in errors
@@ -148,7 +148,7 @@ def test_what_cannot_be_ends_with_its_reason_and_no_traceback(benchmark_file, tm
     assert not list(tmp_path.iterdir())
 
 
-def test_a_wish_for_fewer_movements_is_no_reason_to_delete_the_run(finished, benchmark_file):
+def test_asking_for_fewer_movements_does_not_delete_the_run(finished, benchmark_file):
     code, _, errors = ended(start(finished[0], benchmark_file, 40))
     assert code == 2
     assert "60 movements already" in errors

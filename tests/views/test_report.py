@@ -1,4 +1,4 @@
-"""The report: one file that tells what the runs' own files tell, of one run or of many, whatever became of them."""
+"""The report: one file that shows what the files of runs hold, for one run or many, finished or not."""
 
 import html
 import json
@@ -19,6 +19,7 @@ from sgimd_torch.runs.command_line import parse
 from sgimd_torch.runs.log import Columns
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
+from sgimd_torch.runs.tables import sealed
 from sgimd_torch.spaces import Episode, Move
 from sgimd_torch.views.report import command as report
 from sgimd_torch.views.report import figures
@@ -57,7 +58,7 @@ def copy(runs, tmp_path):
 
 
 class Page(HTMLParser):
-    """The elements with their attributes, and the text of headings, cells and code; refuses what is not closed."""
+    """The elements with their attributes, and the text of headings, cells and code; refuses unclosed ones."""
 
     def __init__(self, text):
         super().__init__()
@@ -151,7 +152,7 @@ def test_the_numbers_of_a_run_are_those_of_its_evaluations(pages, runs):
     assert errors["times the floor"] == f"{mean / floor:.2f}"
     area = (run.evaluation["mean_error_m"][0] + mean) / 2  # of one trapezoid
     assert errors["error over life (m)"] == f"{area:.3f}"
-    lived = dict(zip(*rows_of(pages["one"], "How it lived"), strict=True))
+    lived = dict(zip(*rows_of(pages["one"], "Where movements came from"), strict=True))
     assert lived["movements"] == "60"
     assert lived["local (%)"] == f"{100 * np.mean(run.origin == 'local'):.1f}"
     assert lived["demonstrations shown"] == str((run.demonstration >= 0).sum())
@@ -245,7 +246,7 @@ def test_a_run_whose_log_is_damaged_in_the_middle_is_called_so_and_its_errors_ar
     row = next(row for row in rows_of(text, "Errors") if row[0] == "SGIM-D")
     assert row[1].split() == ["1", "of", "2"]
     assert row[4] == f"{good.evaluation['mean_error_m'][-1]:.3f}"  # of one seed, so without an interval
-    lived = next(row for row in rows_of(text, "How they lived") if row[0] == "SGIM-D")
+    lived = next(row for row in rows_of(text, "Where movements came from") if row[0] == "SGIM-D")
     assert lived[1] == "60"
     states = [row[2] for row in rows_of(text, "Every run of SGIM-D")[1:]]
     assert states == ["finished", "episodes.csv is damaged at line 27"]
@@ -263,7 +264,7 @@ def test_a_damaged_run_alone_has_no_last_error(copy):
 
 
 @pytest.mark.parametrize("dim", [1, 3])
-def test_of_outcomes_that_are_not_of_the_plane_all_but_the_maps_is_shown(copy, dim):
+def test_outcomes_that_are_not_in_the_plane_have_everything_but_maps(copy, dim):
     path = copy / "sgim-d" / "seed-003"
     run, rng = read_run(path), np.random.default_rng(0)
     columns = Columns(0, 2, dim)
@@ -279,7 +280,7 @@ def test_of_outcomes_that_are_not_of_the_plane_all_but_the_maps_is_shown(copy, d
     (path / "regions.csv").write_text(f"{head}\n60,R,{corners},3,3,-0.5,0.1\n")
     life = read_life(path)
     assert len(life.index) == len(life.regions["movements"]) * 60 == 60
-    assert report.main([str(copy)]) == 0  # beside a seed of the plane
+    assert report.main([str(copy)]) == 0  # next to a seed in the plane
     shutil.rmtree(copy / "sgim-d" / "seed-004")
     for place in (path, copy):
         assert report.main([str(place)]) == 0
@@ -291,7 +292,7 @@ def test_of_outcomes_that_are_not_of_the_plane_all_but_the_maps_is_shown(copy, d
 
 
 def test_names_may_be_more_and_in_any_order(copy, monkeypatch):
-    """Of an algorithm that is new in the tables; it has no colour of its own yet."""
+    """Such as a new algorithm in the tables, which has no colour of its own yet."""
     (copy / "sgim-d").rename(copy / "sixth")
     assert report.main([str(copy)]) == 0
     before = (copy / "report.html").read_text(encoding="utf-8")
@@ -326,16 +327,16 @@ def test_algorithms_without_a_colour_of_their_own_can_be_told_apart(copy):
 
 def test_without_motor_noise_nothing_is_divided_by_the_floor(copy):
     run = copy / "observation" / "seed-003"
-    lines = (run / "evaluation.csv").read_text().splitlines()
-    lines[1:] = [f"{line.rpartition(',')[0]},1e-16" for line in lines[1:]]
-    (run / "evaluation.csv").write_text("\n".join([*lines, ""]))
+    header, *lines = (run / "evaluation.csv").read_bytes().splitlines(keepends=True)
+    fields = [line.decode().split(",")[:4] for line in lines]  # without noise floor and checksum
+    (run / "evaluation.csv").write_bytes(b"".join([header, *(sealed([*each, "1e-16"]) for each in fields)]))
     assert report.main([str(run)]) == 0
     errors = dict(zip(*rows_of((run / "report.html").read_text(), "Errors"), strict=True))
     assert errors["noise floor (m)"] == "0.000"
     assert errors["times the floor"] == "–"
 
 
-def test_a_run_that_has_hardly_begun_is_told_of(copy):
+def test_a_run_that_has_hardly_begun_is_reported(copy):
     run = copy / "observation" / "seed-003"
     (run / "episodes.csv").write_text("")
     for name in ("summary.json", "versions.json", "evaluation.csv"):
@@ -355,7 +356,7 @@ def test_a_run_that_has_hardly_begun_is_told_of(copy):
         (["a" * 40] * 2, ""),
     ],
 )
-def test_doubtful_versions_are_told(copy, commits, warning):
+def test_doubtful_versions_are_reported(copy, commits, warning):
     lives = []
     for seed, commit in zip((3, 4), commits, strict=True):
         path = copy / "sgim-d" / f"seed-00{seed}"

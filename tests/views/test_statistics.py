@@ -152,7 +152,7 @@ def test_anova_of_two_groups_is_the_t_test(rng):
 
 
 def test_random_groups_are_seldom_told_apart_however_many_dimensions_there_are(rng):
-    """In 25 dimensions uncorrected tests would cry wolf in 72 % of cases."""
+    """In 25 dimensions uncorrected tests would find a difference that is none in 72 % of cases."""
     wrong = [anova(rng.random((30, 25)), rng.random((30, 25))).rejected > 0 for _ in range(200)]
     assert np.mean(wrong) < 0.11  # .05 expected, standard error .015
 

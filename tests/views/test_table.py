@@ -1,4 +1,4 @@
-"""The table of what runs came to."""
+"""The table of the results of runs."""
 
 import json
 import shutil
@@ -72,7 +72,7 @@ def test_a_run_that_is_not_finished_is_named_and_left_out_unless_at_says_where_t
     assert not said.err
 
 
-def test_runs_that_share_no_evaluation_want_at(runs, copied, capsys):
+def test_runs_without_a_common_evaluation_need_at(runs, copied, capsys):
     options = "--algorithm random --name other --movements 50 --repeats 0 --evaluate_at 30"
     assert live([*options.split(), "--benchmark", str(runs / "tiny.npz"), "--out", str(copied)]) == 0
     assert table(copied) == 2

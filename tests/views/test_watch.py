@@ -1,4 +1,4 @@
-"""scripts/watch: a real TensorBoard over a real run says what the files of the run say; bad requests are answered."""
+"""sgimd watch: a real TensorBoard shows what the files of a real run hold; bad requests are refused."""
 
 import json
 import os
@@ -59,7 +59,7 @@ def server(runs):
             timer.cancel()
 
 
-def test_whoever_terminates_it_ends_tensorboard_too(runs):
+def test_terminating_it_ends_tensorboard_too(runs):
     port = free_port(8000)
     with watching(runs, port) as process:
         while "http" not in process.stdout.readline():
@@ -142,7 +142,7 @@ def test_a_port_that_is_taken_is_passed_over():
 
 
 @pytest.mark.parametrize(("options", "says"), [(["--port", "0"], "1 to 65535"), (["--prot", "1"], "--prot")])
-def test_an_option_that_cannot_be_is_refused(runs, capsys, options, says):
+def test_an_impossible_option_is_refused(runs, capsys, options, says):
     assert command(main, [str(runs), *options]) == 2
     assert says in capsys.readouterr().err
 

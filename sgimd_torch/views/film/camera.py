@@ -1,7 +1,7 @@
-"""Films of the fishing rod: the arm casts, the line swings, the float lands, some way off its goal.
+"""Films of the fishing rod: the arm casts, the line swings, the float lands near its goal.
 
-Section 4 of Nguyen & Oudeyer (2014), to look at. What is shown is what ``FishingRod.record`` has simulated, in real
-time. Line and float are drawn thicker than they are, or nobody would see them.
+Section 4 of Nguyen & Oudeyer (2014). A film shows what ``FishingRod.record`` has simulated, in real time. Line and
+float are drawn thicker than they are, so that they can be seen.
     with Camera(rod.model) as camera: write_film("film.mp4", shoot(camera, [[Shot(recording, goal)]]))
 
 Needs the extra ``film``, and OpenGL: without a display, set MUJOCO_GL=egl before anything imports mujoco.
@@ -37,7 +37,7 @@ Frame = NDArray[np.uint8]  # (height, width, 3)
 
 RATE: Final = 25  # frames a second
 PAUSE: Final = 1.6  # s, the landing is shown
-MOST_PAST: Final = 300  # landings that are drawn: they cost as much time as all the rest
+MOST_PAST: Final = 300  # landings that are drawn: this many take as much time as all the rest
 
 _Colour = tuple[float, float, float, float]
 _INK, _FLOAT, _GOAL, _PATH = (0.06, 0.06, 0.08, 1), (0.92, 0.18, 0.06, 1), (1, 0.88, 0.1, 1), (1, 0.6, 0.4, 1)
@@ -60,7 +60,7 @@ class Shot:
         return float(np.linalg.norm(self.recording.outcome - self.goal))
 
     def caption(self, time: float) -> str:
-        """What is said below the picture at ``time`` (s)."""
+        """The text below the picture at ``time`` (s)."""
         recording = self.recording
         if time >= recording.landed:
             return f"goal {_place(self.goal)}, landed {_place(recording.outcome)}: missed by {100 * self.missed:.0f} cm"
@@ -80,8 +80,8 @@ class Camera:
         width, height: of an image, pixels, even; at most 1280 and 960.
 
     Raises:
-        NoGraphics: there is no OpenGL here, or not of the kind that MUJOCO_GL asks for.
-        ValueError: more pixels than that.
+        NoGraphics: there is no OpenGL, or not the kind that MUJOCO_GL names.
+        ValueError: the image is larger.
     """
 
     def __init__(self, model: mujoco.MjModel, *, width: int = 640, height: int = 480) -> None:
@@ -99,7 +99,7 @@ class Camera:
             AttributeError,
             RuntimeError,
             ImportError,
-        ) as error:  # each kind of OpenGL has its own
+        ) as error:  # each kind of OpenGL fails in its own way
             raise NoGraphics(no_graphics(error)) from error
 
     def __enter__(self) -> Self:
@@ -168,7 +168,7 @@ def count_frames(scenes: Iterable[Sequence[Shot]]) -> int:
 
 
 def tiled(frames: Sequence[Frame], columns: int) -> Frame:
-    """One image of several of one size, row by row; places left over are black."""
+    """One image made of several of equal size, row by row; empty places are black."""
     columns = min(columns, len(frames))
     rows = math.ceil(len(frames) / columns)
     height, width, _ = frames[0].shape
@@ -183,7 +183,7 @@ def write_film(path: str | os.PathLike[str], frames: Iterable[Frame]) -> None:
     """An mp4 file that every player opens (H.264, yuv420p); it appears whole or not at all.
 
     Args:
-        path: ends on .mp4.
+        path: ends in .mp4.
         frames: one or more, all of one size, even in height and width.
 
     Raises:
@@ -191,7 +191,7 @@ def write_film(path: str | os.PathLike[str], frames: Iterable[Frame]) -> None:
     """
     frames = iter(frames)
     with replacing(path) as partial:
-        partial.touch()  # a folder that takes no files is known before the first frame is drawn
+        partial.touch()  # fails before the first frame is drawn if the folder is not writable
         first = next(frames)
         size = f"{first.shape[1]}x{first.shape[0]}"
         given = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", size, "-r", str(RATE), "-i", "-"]
@@ -200,11 +200,11 @@ def write_film(path: str | os.PathLike[str], frames: Iterable[Frame]) -> None:
 
 
 def _encode(command: Sequence[str], frames: Iterable[Frame]) -> None:
-    # In a session of its own Ctrl-C does not reach the encoder: it is for whoever draws the frames.
+    # In a session of its own, so that Ctrl-C reaches only the process that draws the frames.
     with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True) as encoder:
         assert encoder.stdin is not None
         try:
-            with suppress(BrokenPipeError):  # it gave up, and says why
+            with suppress(BrokenPipeError):  # it failed, and its error output says why
                 for frame in frames:
                     encoder.stdin.write(frame.tobytes())
             _, said = encoder.communicate()
@@ -216,7 +216,7 @@ def _encode(command: Sequence[str], frames: Iterable[Frame]) -> None:
 
 
 def write_sheet(path: str | os.PathLike[str], frames: Sequence[Frame], *, columns: int = 3, width: int = 420) -> None:
-    """A png file of several frames, each made ``width`` pixels wide; whole or not at all.
+    """A png file of several frames, each made ``width`` pixels wide. It appears whole or not at all.
 
     Raises:
         OSError: ``path`` cannot be written.
@@ -262,7 +262,7 @@ def _draw_chain(scene: mujoco.MjvScene, points: Sequence[Array] | Array, radius:
 def _draw(
     scene: mujoco.MjvScene, kind: int, size: Sequence[float], place: Array, colour: _Colour, label: str = ""
 ) -> Any:
-    """One more body in the scene; its size in m, as MuJoCo counts it for this ``kind``."""
+    """Add a body to the scene; ``size`` in m, as MuJoCo defines it for this ``kind``."""
     geom = scene.geoms[scene.ngeom]
     mujoco.mjv_initGeom(geom, kind, np.array(size), place, np.eye(3).ravel(), np.array(colour, np.float32))
     geom.label = label

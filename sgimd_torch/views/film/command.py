@@ -1,8 +1,8 @@
 """Film what a run has learnt: the arm casts for chosen goals, with the movements that the run's own memory infers.
 
 Each goal is answered by the run's inverse model, its memory rebuilt from the log, and executed once with motor noise.
-A yellow ring is the goal, white dots are past landings, circles lie half a metre and a metre around the base. Where the
-float has not met the water after the movement, the line is let out and the float falls: the film says so.
+A yellow ring is the goal, white dots are past landings, circles are half a metre and a metre around the base. If the
+float has not met the water after the movement, the line is let out and the float falls; the film says so.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ try:
     import mujoco
 except (ImportError, AttributeError, RuntimeError) as error:  # each kind of OpenGL fails in its own way
     asked = os.environ.get("MUJOCO_GL")
-    raise ImportError(f"MUJOCO_GL={asked} cannot be had here ({error}); set MUJOCO_GL=egl, or unset it") from error
+    raise ImportError(f"MUJOCO_GL={asked} does not work here ({error}); set MUJOCO_GL=egl, or unset it") from error
 
 import numpy as np
 from tqdm import tqdm
@@ -57,7 +57,7 @@ class Filmed(Protocol):
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Infer, cast, film; 0 when the film is there.
+    """Make the film; returns 0.
 
     Raises:
         ValueError, OSError, ImportError: the request is wrong, or there is nothing to draw with.
@@ -87,7 +87,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def config_of(run: Run) -> Config:
-    """The choices that made a run.
+    """The configuration of a run.
 
     Raises:
         RunError: they make no sense.
@@ -99,10 +99,10 @@ def config_of(run: Run) -> Config:
 
 
 def remember(run: Run, parts: RunParts, start: int, stop: int) -> None:
-    """Add to the memory of ``parts`` what the learner remembered in movements ``start`` to ``stop``, in its order, and
-    let a forward model learn from it as it did then."""
+    """Add to the memory of ``parts`` what the learner remembered in movements ``start`` to ``stop``, in the same order,
+    and train a forward model on it as in the run."""
     memory, correspondence = parts.learner.memory, parts.correspondence
-    by_observation = isinstance(parts.learner.social, Remember)  # the others remember only what they did themselves
+    by_observation = isinstance(parts.learner.social, Remember)  # other learners remember only their own movements
     for row in range(start, min(stop, len(run.index))):
         if by_observation and correspondence is not None and run.demonstration[row] >= 0:
             shown = parts.demonstrations[run.demonstration[row]]
@@ -117,16 +117,14 @@ def remember(run: Run, parts: RunParts, start: int, stop: int) -> None:
 def _cast(
     run: Run, parts: RunParts, robot: Filmed, goals: Array, stages: Sequence[int], *, say_movements: bool
 ) -> list[list[Shot]]:
-    """For each stage, the run's answer to each goal; a goal meets the same motor noise at every stage."""
+    """For each stage, the run's answer to each goal; a goal has the same motor noise at every stage."""
     shots = []
     context = (robot.contexts.low + robot.contexts.high) / 2
     title = f"{run.config['name'] or run.config['algorithm']}, seed {run.config['seed']}"
     for before, movements in zip((0, *stages), stages, strict=False):
         remember(run, parts, before, movements)
         if not len(parts.learner.memory):
-            raise RunError(
-                f"{run.path} remembers nothing after {movements} movements, so there is nothing to infer from"
-            )
+            raise RunError(f"{run.path} remembers nothing after {movements} movements, so no movement can be inferred")
         landed = run.outcomes[:movements]
         landed = landed[np.isfinite(landed[:, 0])]
         stage = []
@@ -144,7 +142,7 @@ def _film(options: argparse.Namespace, camera: Camera, scenes: list[list[Shot]])
     ends = np.cumsum([count_frames([scene]) for scene in scenes]) - 1
 
     def frames() -> Iterator[Frame]:
-        # tqdm knows how long it will take; where there is no terminal it says so now and then
+        # tqdm shows the time left; without a terminal it prints a line now and then
         interval = 0.2 if sys.stderr.isatty() else 10.0
         bar = tqdm(shoot(camera, scenes), "filming", int(ends[-1]) + 1, unit=" frames", mininterval=interval)
         for k, frame in enumerate(bar):
@@ -158,10 +156,10 @@ def _film(options: argparse.Namespace, camera: Camera, scenes: list[list[Shot]])
 
 
 def _stages(run: Run, options: argparse.Namespace) -> list[int]:
-    """After how many movements to look."""
+    """After how many movements to film."""
     lived = len(run.index)
     if not lived:
-        raise RunError(f"{run.path} has no movements yet; let it run on with --resume")
+        raise RunError(f"{run.path} has no movements yet; --resume goes on with it")
     if not options.time_lapse:
         return [lived]
     if options.after is None:
@@ -190,7 +188,7 @@ def _options(argv: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "--goals", type=_goal, nargs="+", metavar="X,Y", help="in m; without it, six of the benchmark's, all around"
     )
-    parser.add_argument("--time-lapse", action="store_true", help="what it did for each goal early and late, tiled")
+    parser.add_argument("--time-lapse", action="store_true", help="movements for each goal, early and late, tiled")
     parser.add_argument(
         "--after",
         type=_counts,
@@ -198,9 +196,9 @@ def _options(argv: Sequence[str] | None) -> argparse.Namespace:
         help=f"movements, of a time lapse (default: {','.join(map(str, AFTER))})",
     )
     parser.add_argument("--width", type=_width, help="of a picture, pixels (default: 640; in a time lapse 480)")
-    parser.add_argument("--out", type=Path, help="the film, .mp4 (default: beside the run's directory)")
+    parser.add_argument("--out", type=Path, help="the film, .mp4 (default: next to the run's directory)")
     parser.add_argument("--sheet", type=Path, help="also an image of how each scene ends, .png")
-    # A word that begins with a minus is no option when a number follows it.
+    # A minus with a number after it begins a goal, not an option.
     given = sys.argv[1:] if argv is None else argv
     words = [f" {word}" if re.match(r"-[.\d]", word) else word for word in given]
     options = parser.parse_args(words)

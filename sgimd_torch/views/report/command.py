@@ -1,8 +1,8 @@
-"""One page about one run, or about many beside each other: a single file that opens from disk, without network.
+"""One page about one run, or comparing many: a single file that opens from disk, without network.
 
-It tells what was run, shows error curves with intervals over seeds, where movements landed, how the interest map split,
-and a film where sgimd film has made one; it has tables of results, configurations and versions, and the commands that
-repeat each run. Runs that are not finished are counted as such; one that cannot be read is named and left out.
+It shows error curves with intervals over seeds, where movements landed, how the interest map split, and a film if
+sgimd film has made one. It has tables of results, configurations and versions, and the commands that repeat each run.
+Runs that are not finished are marked; a run that cannot be read is named and left out.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ EXAMPLES = """examples:
   sgimd report runs/sgim-d/seed-003               one run, into runs/sgim-d/seed-003/report.html
   sgimd report runs/sgim-d                        all seeds of a variant
   sgimd report runs --out paper.html              every variant in runs, compared
-  sgimd report runs/sgim-d/seed-003 --film        the same with a film, made first where there is none
+  sgimd report runs/sgim-d/seed-003 --film        the same with a film, made first if there is none
 """
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Read, draw, write; print where; 0 when the page is there.
+    """Write the page and print its path; returns 0.
 
     Raises:
         ValueError: there is nothing to report, or no place to write.
@@ -52,11 +52,11 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _check_writable(out: Path) -> None:
-    """Before any work."""
+    """Called before any work."""
     if out.is_dir():
         raise RunError(f"--out must be a file, {out} is a folder; was {out / 'report.html'} meant?")
     if not out.parent.is_dir():
-        raise RunError(f"--out must lie in a folder that exists, got {out}")
+        raise RunError(f"--out must be in a folder that exists, got {out}")
     if not os.access(out.parent, os.W_OK):
         raise RunError(f"{out.parent} cannot be written to; name another place with --out")
 
@@ -70,5 +70,5 @@ def _options(argv: Sequence[str] | None) -> argparse.Namespace:
     )
     parser.add_argument("runs", type=Path, help="a run's directory, a variant's folder, or the --out of sgimd run")
     parser.add_argument("--out", type=Path, metavar="FILE", help="the page (default: RUNS/report.html)")
-    parser.add_argument("--film", action="store_true", help="film the runs that are shown, where there is no film yet")
+    parser.add_argument("--film", action="store_true", help="film the runs that are shown, if there is no film yet")
     return parser.parse_args(argv)

@@ -1,4 +1,4 @@
-"""What a report tells of runs: each run is read once; statistics are over the seeds of a variant.
+"""The data of a report: each run is read once; statistics are over the seeds of a variant.
 
 variants, unread = read(find(Path("runs"))); variants[0].last_error    # interquartile mean and interval (m)
 """
@@ -27,7 +27,7 @@ from sgimd_torch.runs.tasks import demonstrations_of
 from sgimd_torch.spaces import Array
 from sgimd_torch.views.statistics import Interval, iqm_interval, mean_over_life, ratio_interval, rng
 
-NOISELESS: Final = 1e-9  # m; a lower noise floor is rounding, and nothing is divided by it
+NOISELESS: Final = 1e-9  # m; a lower noise floor is rounding, so errors are not divided by it
 _NEEDED: Final = {"algorithm": str, "seed": int, "movements": int}
 
 Item = TypeVar("Item")
@@ -35,21 +35,21 @@ Item = TypeVar("Item")
 
 @dataclass(frozen=True, eq=False)
 class Life(Run):
-    """A run, with what a report asks of it; contexts and thetas, most of the log, are left out."""
+    """A run, with what a report needs; contexts and thetas, most of the log, are left out."""
 
     @property
     def seed(self) -> int:
-        """Of its random streams."""
+        """The seed of its random streams."""
         return int(self.config["seed"])
 
     @property
     def environment(self) -> str:
-        """Where it lived; runs that do not name it lived on the rod."""
+        """Its environment; runs that do not name one used the rod."""
         return str(self.config.get("environment", ROD))
 
     @property
     def state(self) -> str:
-        """Finished, not finished, or where it is damaged."""
+        """``finished``, ``not finished``, or where it is damaged."""
         if self.damage:
             return "; ".join(f"{name} is damaged at line {line}" for name, line in self.damage.items())
         ended = self.summary.get("finished") is True and len(self.index) >= self.config["movements"]
@@ -62,7 +62,7 @@ class Life(Run):
 
     @property
     def landed(self) -> Array:
-        """``(n, 2)`` m where movements ended; none where outcomes are not of the plane."""
+        """``(n, 2)`` m where movements ended; none if outcomes are not in the plane."""
         return (
             self.outcomes[np.isfinite(self.outcomes).all(axis=1)] if self.outcomes.shape[1] == 2 else np.empty((0, 2))
         )
@@ -80,12 +80,12 @@ class Life(Run):
         return self.outcomes.shape[1] == 2 and "low_2" not in self.regions
 
     def at(self, movements: int, column: str = "mean_error_m") -> float:
-        """An entry of evaluation.csv, NaN where there is none."""
+        """An entry of evaluation.csv, NaN if there is none."""
         found = self.evaluation[column][self.evaluation["movements"] == movements]
         return float(found[0]) if len(found) else float("nan")
 
     def seconds(self, part: str) -> float:
-        """Spent on "physics", "learner" or "evaluation"; NaN where the summary does not say."""
+        """Spent on "physics", "learner" or "evaluation"; NaN if the summary does not have it."""
         value = self.summary.get(f"seconds_{part}")
         return float(value) if isinstance(value, int | float) else float("nan")
 
@@ -94,7 +94,7 @@ def read_life(path: Path) -> Life:
     """A run, whatever its state.
 
     Raises:
-        RunError: nothing can be read of it, or it is of another kind of run.
+        RunError: it cannot be read, or is not a run of this library.
     """
     try:
         run = read_run(path)
@@ -105,7 +105,7 @@ def read_life(path: Path) -> Life:
     for name, kind in _NEEDED.items():
         if type(run.config.get(name)) is not kind:
             raise RunError(f"{path}/config.json must name {name}, got {run.config.get(name)!r}; was it edited?")
-    whole, nothing = vars(run), np.empty((0, 0))  # the arrays are views of one; copies let it go
+    whole, nothing = vars(run), np.empty((0, 0))  # the arrays are views of one large array; copies free it
     plane = {name: whole[name].copy() for name in ("goals", "outcomes")}
     return Life(**{**whole, "contexts": nothing, "thetas": nothing, **plane})
 
@@ -113,7 +113,7 @@ def read_life(path: Path) -> Life:
 def find(place: Path) -> dict[str, list[Path]]:
     """The runs of a run directory, of a variant's folder, or of a folder of variants, by variant, seeds in order.
 
-    Beside a run, a folder called seed-* counts as a run whatever is in it: what is damaged is to be named.
+    Next to a run, every folder called seed-* counts as a run, so that damaged ones are named.
 
     Raises:
         RunError: there is none, or no such folder.
@@ -123,7 +123,7 @@ def find(place: Path) -> dict[str, list[Path]]:
         raise RunError(f"{place} {why}; wanted a run's directory, or the --out of sgimd run")
     runs = [path.parent for pattern in ("", "seed-*/", "*/seed-*/") for path in place.glob(f"{pattern}config.json")]
     if not runs:
-        raise RunError(f"{place} holds no runs; they lie in OUT/NAME/seed-000")
+        raise RunError(f"{place} holds no runs; they are in OUT/NAME/seed-000")
     if place in runs:
         return {Path(os.path.abspath(place)).parent.name: [place]}
     folders = {Path(os.path.abspath(run)).parent.name: run.parent for run in sorted(runs)}
@@ -151,7 +151,7 @@ def read(found: Mapping[str, Sequence[Path]]) -> tuple[list[Variant], list[str]]
 
 
 def counted(what: str, items: Sequence[Item]) -> Iterable[Item]:
-    """``items``; how far they are is shown if it takes long."""
+    """``items``, with a progress bar if it takes long."""
     interval = 0.2 if sys.stderr.isatty() else 10.0
     return tqdm(items, what, unit="", delay=1.0, mininterval=interval, disable=len(items) < 2)
 
@@ -159,8 +159,8 @@ def counted(what: str, items: Sequence[Item]) -> Iterable[Item]:
 class Variant:
     """The runs of one variant, one for each seed.
 
-    Errors are of the finished runs, at the evaluations that all of them have; where none is finished yet, of all that
-    were evaluated. Those of damaged runs are left out.
+    Errors are of the finished runs, at the evaluations that all of them have; if none is finished yet, of all that
+    were evaluated. Damaged runs are left out.
 
     Args:
         name: of its folder.
@@ -223,21 +223,21 @@ class Variant:
 
     @property
     def typical(self) -> Life:
-        """The run whose last error is the middle one, of an even number the better; it stands for all in maps."""
+        """The run with the median last error (the better of two); maps show this one."""
         if not self.last:
             return max(self.lives, key=lambda life: len(life.index))
         return sorted(self.used, key=lambda life: life.at(self.last))[(len(self.used) - 1) // 2]
 
 
 def over_seeds(values: Array) -> Interval | None:
-    """Interquartile mean and its 95 % interval; of one seed its value; None where any is missing."""
+    """Interquartile mean and its 95 % interval; for one seed its value; None if any is missing."""
     if not len(values) or not np.isfinite(values).all():
         return None
     return iqm_interval(values, rng=rng()) if len(values) > 1 else Interval(*map(float, (*values,) * 3))
 
 
 def demonstrated(lives: Sequence[Life]) -> tuple[Array, str]:
-    """``(n, 2)`` m what the runs were shown, each demonstration once, and what is to be said if that is not known."""
+    """``(n, 2)`` m what the runs were shown, each demonstration once; and a message if that is not known."""
     rows = {
         (life.environment, *(str(life.config.get(f"demonstrations{which}")) for which in ("", "_crc32")), row)
         for life in lives
@@ -253,7 +253,7 @@ def demonstrated(lives: Sequence[Life]) -> tuple[Array, str]:
 
 @cache
 def _recorded(environment: str, file: str, checksum: str) -> list[Array]:
-    """Outcomes of the demonstrations in a ``file``, "None" for those that an environment comes with."""
+    """Outcomes of the demonstrations in a ``file``, "None" for the environment's own."""
     if environment not in CATALOGUE["environment"]:  # what a config.json names is not executed
         raise ValueError(f"they are not known without running {environment}")
     path = None if file == "None" else Path(file)

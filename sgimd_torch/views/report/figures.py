@@ -1,4 +1,4 @@
-"""The figures of a report, as small images that can still be read in a column of 400 pixels.
+"""The figures of a report, as small images that are readable 400 pixels wide.
 
 source = curves(variants)    # each function gives the address of a png, for the src of an img
 """
@@ -52,7 +52,7 @@ def data_uri(kind: str, content: bytes) -> str:
 def png(draw: Callable[Concatenate[Figure, P], None]) -> Callable[P, str]:
     """A function that gives what ``draw`` draws as the address of a png; the same figure has the same address.
 
-    It has enough pixels for dense screens, and with few colours it is smaller than an svg of the same figure.
+    It has enough pixels for dense screens; having few colours, it is smaller than an svg.
     """
 
     @wraps(draw)
@@ -74,7 +74,7 @@ def png(draw: Callable[Concatenate[Figure, P], None]) -> Callable[P, str]:
 def curves(figure: Figure, variants: Sequence[Variant], behind: Sequence[Variant] = ()) -> None:
     """Error against movements: interquartile means over seeds with their intervals, other variants in grey ``behind``.
 
-    One variant alone is shown with its seeds, thin, and its noise floor.
+    A single variant is shown with its seeds, thin, and its noise floor.
     """
     if len(variants) > 1:
         figure.set_size_inches(6.8, 4.5)
@@ -116,7 +116,7 @@ def one_curve(figure: Figure, life: Life) -> None:
 
 
 def differences(variants: Sequence[Variant], reference: Variant) -> str:
-    """How much larger last errors are than the reference's, seed by seed; "" without 2 seeds that both have."""
+    """How much larger last errors are than the reference's, seed by seed; "" without 2 common seeds."""
     theirs = {life.seed: life.at(reference.last) for life in reference.used}
     rows = []
     for variant in variants:
@@ -137,7 +137,7 @@ def _forest(figure: Figure, rows: Sequence[Difference], reference: str) -> None:
 
 @png
 def landing(figure: Figure, landed: Array, shown: Array) -> None:
-    """Where movements landed, and the demonstrated outcomes; the plane is as large as they need."""
+    """Where movements landed, and the demonstrated outcomes; the plane is large enough for them."""
     far = float(np.quantile(np.abs(landed).max(axis=1), 0.99))
     reach = far if far > REACH or 0 < far < REACH / 10 else REACH
     box, side = Box.cube(-reach, reach, 2), reach / 30
@@ -155,7 +155,7 @@ def interest(figure: Figure, life: Life) -> None:
 
 @png
 def splitting(figure: Figure, life: Life) -> None:
-    """Up to four interest maps of one life."""
+    """Up to four interest maps of one run."""
     assert life.regions is not None
     n = min(4, len(np.unique(life.regions["movements"])))
     axes = figure.subplots(1 + (n > 2), min(2, n), squeeze=False)
@@ -185,6 +185,6 @@ def _colour(algorithm: str) -> str:
 
 
 def _plain(name: str) -> str:
-    """A name as a label: no formula, not hidden, not endless."""
+    """A name as a label: not a formula, not hidden, not too long."""
     short = name if len(name) <= 32 else f"{name[:30]}…"
     return f"{' ' * short.startswith('_')}{short}".replace("$", r"\$")

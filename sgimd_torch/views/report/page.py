@@ -1,6 +1,6 @@
 """The page of a report: figures, films and numbers of each variant go into template.html.j2, as one file.
 
-html = page(Path("runs"), variants, unread)    # of data.read; strings from runs are text there, never markup
+html = page(Path("runs"), variants, unread)    # from data.read; strings from runs are escaped
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from sgimd_torch.views.report.data import Variant, counted, demonstrated
 from sgimd_torch.views.report.figures import data_uri
 from sgimd_torch.views.statistics import Interval, show
 
-EARLY: Final = 1000  # movements, of the column beside the last error
+EARLY: Final = 1000  # movements, for the column next to the last error
 ORIGINS: Final = {"global": "global", "local": "local", "imitate": "imitation", "babble": "random", "": "at rest"}
 PARTS: Final = {"physics": "physics (s)", "learner": "learning (s)", "evaluation": "evaluation (s)"}
 MOST: Final = 3 * 2**20  # bytes of one film
@@ -67,7 +67,7 @@ def page(place: Path, variants: Sequence[Variant], unread: Sequence[str]) -> str
         counted=counted,
         demonstrated=demonstrated,
     )
-    return html.encode(errors="backslashreplace").decode()  # a name may be no text at all
+    return html.encode(errors="backslashreplace").decode()  # a name may not be valid text
 
 
 def lived(variants: Sequence[Variant]) -> record.Table:
@@ -90,17 +90,17 @@ def lived(variants: Sequence[Variant]) -> record.Table:
 
 
 def find_films(run: Path) -> list[Path]:
-    """Of a run directory: what lies in it, and beside it under its name, as ``sgimd film`` writes it."""
+    """The films in a run directory, and those next to it with its name, as ``sgimd film`` writes them."""
     run = run.resolve()
-    beside = [run.parent / f"{run.name}{kind}.mp4" for kind in ("", "-time-lapse")]
-    return [path for path in (*beside, *sorted(run.glob("*.mp4"))) if path.is_file()]
+    next_to = [run.parent / f"{run.name}{kind}.mp4" for kind in ("", "-time-lapse")]
+    return [path for path in (*next_to, *sorted(run.glob("*.mp4"))) if path.is_file()]
 
 
 def make_films(variants: Sequence[Variant]) -> None:
-    """Film the runs of the rod that the page shows, as ``sgimd film`` does, where there is no film yet.
+    """Film the runs of the rod that the page shows, as ``sgimd film`` does, if there is no film yet.
 
     Raises:
-        RunError: that failed; why is on stderr.
+        RunError: filming failed; the reason is on stderr.
     """
     for run in [variant.typical.path for variant in variants if variant.typical.environment == ROD]:
         if find_films(run):
@@ -110,7 +110,7 @@ def make_films(variants: Sequence[Variant]) -> None:
             try:
                 code = filming.wait()
             except BaseException:
-                filming.terminate()  # it takes its unfinished film away; leaving the block waits for that
+                filming.terminate()  # it removes its unfinished film; leaving the block waits for that
                 raise
         if code == 130:
             raise KeyboardInterrupt
@@ -119,14 +119,14 @@ def make_films(variants: Sequence[Variant]) -> None:
 
 
 def read_films(variants: Sequence[Variant]) -> tuple[dict[str, list[dict[str, str]]], list[str]]:
-    """By variant the films of the run that stands for it, and notes about those that do not fit into a page."""
+    """By variant the films of its typical run, and notes about films that are too large for a page."""
     films: dict[str, list[dict[str, str]]] = {variant.name: [] for variant in variants}
     notes, room = [], ROOM
     for variant in variants:
         for path in find_films(variant.typical.path):
             size = path.stat().st_size
             if size > min(MOST, room):
-                notes.append(f"The film {path} is too large for this page ({size / 2**20:.1f} MB) and lies beside it.")
+                notes.append(f"The film {path} is too large for this page ({size / 2**20:.1f} MB).")
                 continue
             room -= size
             source = data_uri("video/mp4", path.read_bytes())
@@ -146,7 +146,7 @@ def _still(path: Path) -> str:
 
 
 def _interval(found: Interval | None, form: str = ".3f") -> str:
-    """``0.060 [0.058, 0.062]``; without brackets where there is one seed, a dash where there is nothing."""
+    """``0.060 [0.058, 0.062]``; without brackets for one seed, a dash for nothing."""
     if found is None:
         return "–"
     return f"{found.value:{form}}" if found.low == found.value == found.high else show(found, form)

@@ -1,4 +1,4 @@
-"""For the record, in a report: doubts, what differs between configurations, versions, and how to repeat the runs.
+"""The record in a report: doubts, what differs between configurations, versions, and how to repeat the runs.
 
 doubts(variants)    # ["1 run not finished: ..."];   commands(variant.lives)    # ["sgimd run --algorithm=sgim-d ..."]
 """
@@ -33,26 +33,26 @@ def doubts(variants: Sequence[Variant]) -> Iterator[str]:
         if len(values) > 1:
             yield f"The runs were made with different versions of {name}: {', '.join(values)}."
     if dirty := sum(str(each.get("commit")).endswith("-dirty") for each in versions):
-        yield f"{count(dirty, 'run')} came from a checkout with uncommitted changes; the commit does not tell them."
+        yield f"{count(dirty, 'run')} came from a checkout with uncommitted changes; the commit does not show them."
     if nowhere := sum(each.get("commit") is None for each in versions):
         yield f"The commit of {count(nowhere, 'run')} is not known: made outside a git checkout."
     if resumed := sum(bool(each.get("before")) for each in versions):
-        yield f"{count(resumed, 'run')} went on with other versions than they began with."
+        yield f"{count(resumed, 'run')} went on with other versions than at the start."
     for variant in variants:
         own = differing([variant])
         if own.pop("movements", None):
             lengths = ", ".join(map(str, sorted({life.config["movements"] for life in variant.lives})))
             yield f"The runs of {variant.label} are not equally long: {lengths} movements."
         if own:
-            yield f"The seeds of {variant.label} are not of one configuration: they differ in {', '.join(own)}."
+            yield f"The seeds of {variant.label} have different configurations: they differ in {', '.join(own)}."
     lasts = sorted({variant.last for variant in variants if variant.last})
     if len(lasts) > 1:
-        yield f"Last errors are of different ages: after {', '.join(map(str, lasts))} movements."
+        yield f"Last errors are of different numbers of movements: after {', '.join(map(str, lasts))} movements."
     if len({life.config.get("benchmark_crc32") for _, life in lives}) > 1:
-        yield "The runs were judged by different benchmarks, so their errors cannot be compared."
+        yield "The runs were evaluated on different benchmarks, so their errors cannot be compared."
     for label, life in lives:
         if life.damage:
-            yield f"{label}, seed {life.seed}: {life.state}; its errors are left out, maps show what comes before."
+            yield f"{label}, seed {life.seed}: {life.state}; its errors are left out, maps show what precedes it."
     cut = [
         f"{of}, seed {life.seed}: {len(life.index)} of {life.config['movements']} movements"
         for of, life in lives
@@ -60,12 +60,12 @@ def doubts(variants: Sequence[Variant]) -> Iterator[str]:
     ]
     if cut:
         some = any(variant.used and variant.used[0].state == "finished" for variant in variants)
-        rest = "; the maps show them, the errors over seeds do not count them" if some else ""
-        yield f"{count(len(cut), 'run')} not finished, stopped or still under way{rest}: {'; '.join(cut)}."
+        rest = "; maps show them, errors over seeds leave them out" if some else ""
+        yield f"{count(len(cut), 'run')} not finished, stopped or still running{rest}: {'; '.join(cut)}."
 
 
 def versions(variants: Sequence[Variant]) -> Table:
-    """A column for each set of versions, with whose runs it made; a row for each library, the commit first."""
+    """A column for each set of versions, headed by its variants; a row for each library, the commit first."""
     made: dict[str, Counter[str]] = {}
     for variant in variants:
         for life in variant.lives:
@@ -78,24 +78,24 @@ def versions(variants: Sequence[Variant]) -> Table:
         heads.append(
             f"all {len(counts)} variants ({counts.total()} runs)" if len(counts) == len(variants) > 3 else each
         )
-    return Table(heads, [(name, [_told(each.get(name)) for each in every]) for name in names])
+    return Table(heads, [(name, [_shown(each.get(name)) for each in every]) for name in names])
 
 
 def checkout(variants: Sequence[Variant]) -> str:
-    """What goes back to the commit that made all runs; "" if there is no such one, or it had uncommitted changes."""
+    """The command that checks out the commit of all runs; "" if they differ, or it had uncommitted changes."""
     commits = {str(life.versions.get("commit")) for variant in variants for life in variant.lives}
     name = commits.pop() if len(commits) == 1 else "None"
     return "" if name == "None" or name.endswith("-dirty") else shlex.join(["git", "checkout", name])
 
 
 def commands(lives: Sequence[Life]) -> list[str]:
-    """A line of shell for each way in which these runs were configured, nearly always one; defaults are not named."""
+    """A line of shell for each configuration of these runs, nearly always one; defaults are left out."""
     groups: dict[str, list[int]] = {}
     for life in lives:
         config = {**before_there_was_a_choice(), **life.config}
         algorithm = config.pop("algorithm")
         if config.get("name") == algorithm:
-            del config["name"]  # a run is called like its algorithm anyway
+            del config["name"]  # a run is named after its algorithm anyway
         own = {name: value for name, value in config.items() if name == "name" or name not in having("place")}
         groups.setdefault(shlex.join([f"--algorithm={algorithm}", *words(own)]), []).append(life.seed)
     lines = []
@@ -106,16 +106,16 @@ def commands(lives: Sequence[Life]) -> list[str]:
 
 
 def unknown(lives: Sequence[Life]) -> list[str]:
-    """Options of the runs that ``sgimd run`` does not have here: a command cannot name them."""
+    """Options of the runs that this version of ``sgimd run`` does not have."""
     return sorted({name for life in lives for name in life.config if not name.endswith("_crc32")} - options().keys())
 
 
 def differing(variants: Sequence[Variant]) -> dict[str, list[str]]:
-    """Option -> for each variant its values as text, of the options in which not all runs agree; not seed and place."""
+    """Option -> for each variant its values as text, for options in which runs differ, without seed and place."""
     every = [life.config for variant in variants for life in variant.lives]
     found = {}
     for name in dict.fromkeys(name for config in every for name in config if name not in having("place")):
-        values = [dict.fromkeys(_told(life.config.get(name)) for life in variant.lives) for variant in variants]
+        values = [dict.fromkeys(_shown(life.config.get(name)) for life in variant.lives) for variant in variants]
         if len(set().union(*values)) > 1:
             found[name] = [" or ".join(each) for each in values]
     return found
@@ -126,5 +126,5 @@ def count(n: int, what: str) -> str:
     return f"{n} {what}{'s' * (n != 1)}"
 
 
-def _told(value: Any) -> str:
+def _shown(value: Any) -> str:
     return "–" if value is None else value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)

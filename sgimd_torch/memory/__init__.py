@@ -1,4 +1,4 @@
-"""Memory: all exemplars (c, theta, tau) of a learner, and the exact nearest neighbours among them.
+"""Memory: all exemplars (c, theta, tau) of a learner, and the nearest neighbours among them.
 
 Sections 3.2 and 4.4 of Nguyen & Oudeyer (2014): the set M. The outcome side answers "which movements landed near
 there?" (H of eq. 8), the policy side "which movements are like this one?" (K_h of eq. 8).
@@ -10,23 +10,18 @@ from __future__ import annotations
 import os
 from typing import Final
 
-import faiss
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sgimd_torch.files import read_npz, write_npz
+from sgimd_torch.memory.neighbours import PolicyNeighbours, Rows, Table, TreeNeighbours, squared_distances
 from sgimd_torch.spaces import Array, check_point, check_vector
 
-Rows = NDArray[np.int64]
+__all__ = ["Memory", "Nearest", "Rows"]
 
 _VERSION: Final = 1
 _MOST_DIMS: Final = 100_000  # of a table in a file
 _NO_CONTEXT: Final = "an environment without contexts gives np.zeros(0)"
-_EPSILON32: Final = float(np.finfo(np.float32).eps)
-_LARGEST32: Final = float(np.finfo(np.float32).max)  # what faiss reports where float32 overflowed
-
-faiss.omp_set_num_threads(1)  # queries last microseconds: to wake other threads costs more than they save
-faiss.cvar.distance_compute_blas_threshold = 2**20  # above it |a|^2 + |b|^2 - 2ab cancels, and _Neighbours' bound fails
 
 
 class Memory:
@@ -51,12 +46,14 @@ class Memory:
             raise ValueError(f"context_weight must be finite and >= 0, got {context_weight}")
         self.context_dim, self.theta_dim, self.outcome_dim = context_dim, theta_dim, outcome_dim
         self.context_weight = context_weight
-        self._contexts, self._thetas, self._outcomes = _Table(context_dim), _Table(theta_dim), _Table(outcome_dim)
-        self._outcome_side = _Neighbours(context_dim + outcome_dim)
-        self._policy_side = _Neighbours(context_dim + theta_dim)
+        self._contexts, self._thetas, self._outcomes = Table(context_dim), Table(theta_dim), Table(outcome_dim)
+        # A key is the weighted context and an outcome or a theta; without contexts nothing is kept twice.
+        self._outcome_side = TreeNeighbours(Table(context_dim + outcome_dim) if context_dim else self._outcomes)
+        self._policy_side = PolicyNeighbours(Table(context_dim + theta_dim) if context_dim else self._thetas)
+        self._range, self._ranged = (np.full(theta_dim, np.inf), np.full(theta_dim, -np.inf)), 0
 
     def __len__(self) -> int:
-        return len(self._thetas.rows)
+        return len(self._thetas)
 
     @property
     def contexts(self) -> Array:
@@ -72,6 +69,15 @@ class Memory:
     def outcomes(self) -> Array:
         """``(n, outcome_dim)`` read-only."""
         return self._outcomes.rows
+
+    @property
+    def theta_range(self) -> tuple[Array, Array]:
+        """``(theta_dim,)`` the least and the greatest value of each parameter so far; infinite for an empty memory."""
+        new, self._ranged = self.thetas[self._ranged :], len(self)
+        if len(new):
+            lowest, highest = self._range
+            self._range = np.minimum(lowest, new.min(axis=0)), np.maximum(highest, new.max(axis=0))
+        return self._range
 
     def add(self, context: ArrayLike, theta: ArrayLike, outcome: ArrayLike) -> None:
         """Remember one exemplar: ``(context_dim,)``, ``(theta_dim,)``, ``(outcome_dim,)``.
@@ -91,10 +97,18 @@ class Memory:
         """``(min(k, n),)`` rows whose outcomes lie nearest to ``goal`` ``(outcome_dim,)``, nearest first; of equally
         near ones the oldest first."""
         goal = check_point("goal", goal, self.outcome_dim, "was a theta passed instead?")
-        return self._outcome_side.nearest(self._key(context, goal)[None], k)[0]
+        return self._outcome_side.nearest(self._key(context, goal), k)
+
+    def nearest(self, context: ArrayLike, goal: ArrayLike) -> Nearest:
+        """The first of :meth:`near_outcomes`, as something to ask again after each movement."""
+        goal = check_point("goal", goal, self.outcome_dim, "was a theta passed instead?")
+        return Nearest(self._outcome_side, self._key(context, goal))
 
     def near_policies(self, context: ArrayLike, theta: ArrayLike, k: int, within: float = np.inf) -> Rows:
-        """At most ``k`` rows whose thetas lie nearest to ``theta`` ``(theta_dim,)``, not farther than ``within``."""
+        """At most ``k`` rows whose thetas lie nearest to ``theta`` ``(theta_dim,)``, not farther than ``within``.
+
+        Exact among up to ``EXACT_UP_TO`` exemplars; among more nearly all of them are found, see `PolicyNeighbours`.
+        """
         theta = check_point("theta", theta, self.theta_dim, "was a goal passed instead?")
         return self._policy_side.nearest(self._key(context, theta)[None], k, within)[0]
 
@@ -121,88 +135,37 @@ class Memory:
         return memory
 
     def _append(self, contexts: Array, thetas: Array, outcomes: Array) -> None:
-        weighted = self.context_weight * contexts
-        self._contexts.append(contexts)
-        self._thetas.append(thetas)
-        self._outcomes.append(outcomes)
-        self._outcome_side.append(np.concatenate((weighted, outcomes), axis=1))
-        self._policy_side.append(np.concatenate((weighted, thetas), axis=1))
+        for table, rows in ((self._contexts, contexts), (self._thetas, thetas), (self._outcomes, outcomes)):
+            table.append(rows)
+        if self.context_dim:
+            weighted = self.context_weight * contexts
+            self._outcome_side.keys.append(np.concatenate((weighted, outcomes), axis=1))
+            self._policy_side.keys.append(np.concatenate((weighted, thetas), axis=1))
 
     def _key(self, context: ArrayLike, point: Array) -> Array:
         context = check_point("context", context, self.context_dim, _NO_CONTEXT)
-        return np.concatenate((self.context_weight * context, point))
+        return np.concatenate((self.context_weight * context, point)) if self.context_dim else point.copy()
 
 
-class _Table:
-    """Rows in an array that doubles when full."""
+class Nearest:
+    """The row whose outcome lies nearest to one goal in one context; asked again, it looks at newer exemplars only."""
 
-    def __init__(self, dim: int) -> None:
-        self._room = np.empty((64, dim))
-        self.rows: Array = _read_only_view(self._room[:0])
+    def __init__(self, side: TreeNeighbours, key: Array) -> None:
+        self._side, self._key = side, key
+        self._row: int | None = None
+        self._squared, self._seen = np.inf, 0
 
-    def append(self, rows: Array) -> None:
-        n_old, n_new = len(self.rows), len(self.rows) + len(rows)
-        if n_new > len(self._room):
-            room = np.empty((max(n_new, 2 * len(self._room)), self._room.shape[1]))
-            room[:n_old] = self.rows
-            self._room = room
-        self._room[n_old:n_new] = rows
-        self.rows = _read_only_view(self._room[:n_new])
-
-
-class _Neighbours:
-    """Exact float64 neighbours: faiss proposes in float32, float64 decides."""
-
-    _SPARE: Final = 8  # proposals beyond k, so that the last one nearly always lies clearly beyond the k-th
-
-    def __init__(self, dim: int) -> None:
-        self.keys = _Table(dim)
-        self._index = faiss.IndexFlatL2(dim)
-
-    def append(self, keys: Array) -> None:
-        self.keys.append(keys)
-        with np.errstate(over="ignore"):  # faiss then finds nothing near, and ``nearest`` compares all rows
-            self._index.add(keys.astype(np.float32))
-
-    def nearest(self, queries: Array, k: int, within: float = np.inf) -> list[Rows]:
-        """For each of ``queries`` ``(m, dim)`` at most ``k`` rows not farther than ``within``, nearest first; ties stay
-        in the order of row numbers."""
-        if k < 1:
-            raise ValueError(f"k must be at least 1, got {k}")
-        keys = self.keys.rows
-        if len(keys) <= k + self._SPARE:
-            return [_rank(keys, query, k, within) for query in queries]
-        with np.errstate(over="ignore"):
-            squared32, proposed = self._index.search(queries.astype(np.float32), k + self._SPARE)
-        proposed.sort(axis=1)  # the stable sort below then leaves ties in order of row number
-        squared = _squared_distances(keys[proposed], queries[:, None])
-        order = squared.argsort(axis=1, kind="stable")[:, :k]
-        squared = np.take_along_axis(squared, order, axis=1)
-        rows = np.take_along_axis(proposed, order, axis=1)
-        # A row that was not proposed has squared32 >= the last one's. If it were as near as `reach`, rounding its key,
-        # the query, their difference and the sum to float32 could not have put it beyond `reach + error`.
-        reach = np.minimum(np.sqrt(squared[:, -1]), within)
-        error = _EPSILON32 * (queries.shape[1] + 5) * (reach + np.sqrt((queries * queries).sum(axis=1)))
-        last = squared32[:, -1]
-        certain = ((reach + error) ** 2 < last) & (last < _LARGEST32)
-        inside = (squared <= within * within).sum(axis=1)
-        return [rows[i, : inside[i]] if certain[i] else _rank(keys, queries[i], k, within) for i in range(len(queries))]
-
-
-def _rank(keys: Array, query: Array, k: int, within: float) -> Rows:
-    squared = _squared_distances(keys, query)
-    rows = squared.argsort(kind="stable")[:k]
-    return rows[squared[rows] <= within * within]
-
-
-def _squared_distances(points: Array, query: Array) -> Array:
-    difference = points - query
-    return (difference * difference).sum(axis=-1)
-
-
-def _read_only_view(array: Array) -> Array:
-    array.flags.writeable = False
-    return array
+    @property
+    def row(self) -> int | None:
+        """Of equally near rows the oldest; None for an empty memory."""
+        seen, self._seen = self._seen, len(self._side.keys)
+        if seen < self._seen:
+            rows = self._side.keys.rows
+            first = seen if seen else int(self._side.nearest(self._key, 1)[0])
+            squared = squared_distances(rows[first : None if seen else first + 1], self._key)
+            if (nearest := squared.min()) < self._squared:
+                self._row, self._squared = first + int(squared.argmin()), nearest
+        return self._row
 
 
 def _read(path: str | os.PathLike[str]) -> tuple[float, Array, Array, Array]:
