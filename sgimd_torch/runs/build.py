@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from functools import partial, wraps
 from typing import TYPE_CHECKING, Any, Final
 
-from sgimd_torch.algorithms import Correspondence
 from sgimd_torch.catalogue import CATALOGUE, SHARED, check, check_call
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.evaluation import Benchmark
+from sgimd_torch.goals.regions import Region
 from sgimd_torch.learner import Learner
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.tasks import Task, benchmark_of, correspondence_of, demonstrations_of
@@ -30,24 +30,27 @@ _OF_THE_ROBOT: Final = {"policies", "correspondence"}
 
 @dataclass(frozen=True, eq=False)
 class RunParts:
-    """What a run needs. ``correspondence`` translates a demonstrated trajectory to theta. ``inverse`` reads the
-    learner's memory for evaluations; ``model`` is refreshed after each movement; it and its ``trust`` are None for a
-    run without a model. ``teacher`` is None, and ``demonstrations`` are empty, for a learner that learns alone.
-    ``residuals`` (rad) say how far each demonstration is from what the robot can play. ``data`` holds checksums of the
-    files that were read, ``notes`` messages for the user."""
+    """What a run needs. ``config`` is what it was made from. ``inverse`` reads the learner's memory for evaluations;
+    ``model`` is refreshed after each movement; it and its ``trust`` are None for a run without a model. ``teacher`` is
+    None, and ``demonstrations`` are empty, for a learner that learns alone. ``data`` holds checksums of the files that
+    were read, ``notes`` messages for the user."""
 
+    config: Config
     environment: Environment
-    correspondence: Correspondence | None
     learner: Learner
     teacher: Teacher | None
     demonstrations: Sequence[Demonstration]
-    residuals: Sequence[float]
     inverse: Callable[[Array, Array], Estimate]
     benchmark: Benchmark
     data: dict[str, str | None]
     model: ForwardModel | None
     trust: Trust | None
     notes: Sequence[str] = ()
+
+    @property
+    def regions(self) -> Sequence[Region]:
+        """Of the learner's goal model as they are now, whichever it is; none if it has no regions."""
+        return list(getattr(getattr(self.learner.autonomous, "goals", None), "regions", ()))
 
 
 def build(config: Config) -> RunParts:
@@ -61,26 +64,25 @@ def build(config: Config) -> RunParts:
     parts = _Parts(config, task)
     benchmark, benchmark_crc32 = benchmark_of(task, config.benchmark)
     demonstrations: Sequence[Demonstration] = []
-    residuals: list[float] = []
-    teacher, demonstrations_crc32 = None, None
+    teacher, demonstrations_crc32, notes = None, None, [*config.without_effect, *_goals_note(task, config, benchmark)]
     if "teacher" in parts.used:
-        demonstrations, residuals, demonstrations_crc32 = demonstrations_of(task, config.demonstrations)
+        demonstrations, about_them, demonstrations_crc32 = demonstrations_of(task, config.demonstrations)
+        notes += about_them
         teacher = parts.maker("teacher")(demonstrations, stream(config.seed, "teacher"))
     learner = parts.maker("algorithm")(task.environment, config.seed)
     inverse = parts.maker("inverse", learning=False)(learner.memory)
     return RunParts(
+        config=config,
         environment=task.environment,
-        correspondence=parts["correspondence"] if "correspondence" in parts.used else None,
         learner=learner,
         teacher=teacher,
         demonstrations=demonstrations,
-        residuals=residuals,
         inverse=inverse,
         benchmark=benchmark,
         data={"demonstrations_crc32": demonstrations_crc32, "benchmark_crc32": benchmark_crc32},
         model=parts["model"] if "model" in parts.used else None,
         trust=parts["trust"] if "model" in parts.used else None,
-        notes=[*_goals_note(task, config, benchmark)],
+        notes=notes,
     )
 
 

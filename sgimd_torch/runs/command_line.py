@@ -24,7 +24,7 @@ import jsonargparse
 
 from sgimd_torch.catalogue import CATALOGUE, did_you_mean
 from sgimd_torch.runs.config import Config, dashed, options
-from sgimd_torch.runs.process import loading
+from sgimd_torch.runs.process import Stopping, loading
 
 FLAGS: Final = {
     "resume": "Go on with a stopped or killed run, or lengthen a finished one.",
@@ -46,8 +46,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     config, flags = parse(argv, __doc__)
     again = [sys.executable, "-m", "sgimd_torch", "run", *argv, *([] if flags["resume"] else ["--resume"])]
     with loading():
-        from sgimd_torch.runs.run import carry_out  # after --help
-    print(carry_out(config, **flags, again=shlex.join(again)))
+        from sgimd_torch.runs.build import build  # after --help
+        from sgimd_torch.runs.run import carry_out
+    with Stopping() as stopping:
+        with stopping.at_once():
+            parts = build(config)
+        print(carry_out(parts, stopping, **flags, again=shlex.join(again)))
     return 0
 
 

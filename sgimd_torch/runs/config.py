@@ -234,6 +234,11 @@ class Config:
         return self.out / self.variant / f"seed-{self.seed:03d}"
 
     @property
+    def title(self) -> str:
+        """The name of the run in messages."""
+        return f"{self.variant} seed {self.seed}"
+
+    @property
     def evaluations(self) -> list[int]:
         """The numbers of movements after which to evaluate, in order."""
         if self.evaluate_at == ():
@@ -298,8 +303,8 @@ def words(settings: Mapping[str, Any]) -> list[str]:
     """``--dashed-name=value`` for every option of a ``Config``, or of a config.json, that is not at its default."""
     found = []
     for each in fields(Config):
-        value = _plain(settings.get(each.name, each.default))
-        if value != _plain(each.default):
+        value = plain(settings.get(each.name, each.default))
+        if value != plain(each.default):
             text = value if isinstance(value, str) else json.dumps(value, separators=(",", ":"))
             found.append(f"--{dashed(each.name)}={text}")
     return found
@@ -343,7 +348,7 @@ def dashed(name: str) -> str:
     return name.replace("_", "-")
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """As json has it."""
     return json.loads(json.dumps(value, default=str))
 

@@ -77,7 +77,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     say(f"{len(configs)} runs ({counts}), {len(configs) - len(left)} of them finished: {out}")
     if options.dry_run:
         for config in left:
-            print(f"{title(config)}: {movements_on_disk(config.directory)} of {config.movements} movements")
+            print(f"{config.title}: {movements_on_disk(config.directory)} of {config.movements} movements")
         return 0
     with loading():
         from sgimd_torch.runs.build import build  # after --help
@@ -182,7 +182,7 @@ def sweep(
                     except (Failed, ValueError, OSError) as error:
                         run.state = "failed"
                         progress.total -= run.config.movements - run.done  # the rest will not be run
-                        failures.append(f"{title(run.config)} failed: {error}")
+                        failures.append(f"{run.config.title} failed: {error}")
                         if not keep_going:
                             raise (Failed if isinstance(error, Failed) else ValueError)(failures[0]) from error
                 progress.show(_done(runs), _note(runs))
@@ -224,7 +224,7 @@ class _Run:
         while not stop.is_set():
             if locked(directory / "lock"):
                 if self.state != "held":
-                    say(f"{title(self.config)}: waiting for another process, which writes this run")
+                    say(f"{self.config.title}: waiting for another process, which writes this run")
                 self.state = "held"
                 stop.wait(LOOK_EVERY)
                 continue
@@ -271,11 +271,6 @@ class _Run:
         return f"{words}\nIts whole log: {self.log}"
 
 
-def title(config: Config) -> str:
-    """The name of a run in messages."""
-    return f"{config.variant} seed {config.seed}"
-
-
 def _done(runs: Sequence[_Run]) -> int:
     """Movements on disk of all of them."""
     for run in runs:
@@ -290,7 +285,7 @@ def _note(runs: Sequence[_Run]) -> str:
     parts = [f"{states['done']} of {len(runs)} runs"]
     parts += [f"{states['failed']} failed"] if states["failed"] else []
     parts += [f"waiting for {states['held']} held by another process"] if states["held"] else []
-    return ", ".join([*parts, *(f"{title(run.config)} at {run.done}" for run in runs if run.state == "running")])
+    return ", ".join([*parts, *(f"{run.config.title} at {run.done}" for run in runs if run.state == "running")])
 
 
 def _in_name(option: str, value: str) -> str:

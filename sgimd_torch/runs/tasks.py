@@ -129,8 +129,8 @@ def benchmark_of(task: Task, file: Path | None) -> tuple[Benchmark, str | None]:
     return benchmark, checksum
 
 
-def demonstrations_of(task: Task, file: Path | None) -> tuple[Sequence[Demonstration], list[float], str | None]:
-    """What a teacher can show, the misfit of each (rad), and the checksum of the file.
+def demonstrations_of(task: Task, file: Path | None) -> tuple[Sequence[Demonstration], list[str], str | None]:
+    """What a teacher can show, messages on how well it fits the robot, and the checksum of the file.
 
     Args:
         task: has the demonstrations if there is no file.
@@ -146,10 +146,11 @@ def demonstrations_of(task: Task, file: Path | None) -> tuple[Sequence[Demonstra
             f"{type(task.environment).__name__} comes without demonstrations, and this algorithm needs a teacher; "
             "give --demonstrations FILE, or choose one that learns alone: --algorithm sagg-riac"
         )
+    robot = task.environment
     if not isinstance(source, Path):
         made = source()
-        return made, [0.0] * len(made), None
-    path, robot = _existing("demonstrations", source), task.environment
+        return made, _fit(robot, made, [0.0] * len(made)), None
+    path = _existing("demonstrations", source)
     found = load_demonstrations(
         path, n_joints=task.n_joints, outcome_dim=robot.outcomes.dim, context_dim=robot.contexts.dim
     )
@@ -163,7 +164,21 @@ def demonstrations_of(task: Task, file: Path | None) -> tuple[Sequence[Demonstra
                 misfits.append(0.0)
         except ValueError as error:
             raise ValueError(f"{path}: recording {row} cannot be translated: {error}") from error
-    return found, misfits, _checksum(path)
+    return found, _fit(robot, found, misfits), _checksum(path)
+
+
+def _fit(robot: Environment, shown: Sequence[Demonstration], misfits: Sequence[float]) -> list[str]:
+    """How well the robot can play what it will be shown, and what lands outside T."""
+    if not shown:
+        return []
+    size = f"{np.median(misfits):.4f} rad (median), {max(misfits):.4f} rad at most"
+    notes = [f"{len(shown)} demonstrations; correspondence misses them by {size}"]
+    outside = [row for row, each in enumerate(shown) if not robot.outcomes.contains(each.outcome)]
+    if outside:
+        place = ", ".join(f"{x:g}" for x in shown[outside[0]].outcome)
+        more = f", as do {len(outside) - 1} more" if len(outside) > 1 else ""
+        notes.append(f"recording {outside[0]} lands at ({place}) m, outside T{more}; were they recorded in cm?")
+    return notes
 
 
 def correspondence_of(task: Task) -> Correspondence:

@@ -101,7 +101,7 @@ def config_of(run: Run) -> Config:
 def remember(run: Run, parts: RunParts, start: int, stop: int) -> None:
     """Add to the memory of ``parts`` what the learner remembered in movements ``start`` to ``stop``, in the same order,
     and train a forward model on it as in the run."""
-    memory, correspondence = parts.learner.memory, parts.correspondence
+    memory, correspondence = parts.learner.memory, parts.learner.correspondence
     by_observation = isinstance(parts.learner.social, Remember)  # other learners remember only their own movements
     for row in range(start, min(stop, len(run.index))):
         if by_observation and correspondence is not None and run.demonstration[row] >= 0:
