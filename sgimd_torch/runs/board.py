@@ -67,8 +67,8 @@ class RunBoard:
     def __exit__(self, *_: object) -> None:
         self._board.close()
 
-    def episode(self, episode: Episode) -> None:
-        """Count a movement, new or replayed."""
+    def episode(self, episode: Episode, curves: Mapping[str, float]) -> None:
+        """Count a movement, new or replayed; ``curves`` are those of a forward model that learnt from it."""
         board = self._board
         board.episode(episode)
         if episode.demonstration is not None:
@@ -85,10 +85,7 @@ class RunBoard:
             if not replayed or (self._timed and not recalled):  # not written by a killed run: now is close
                 spent = self._seconds.summary().items()
                 board.scalars({f"time/{name.removeprefix('seconds_')}": value for name, value in spent})
-
-    def model(self, curves: Mapping[str, float]) -> None:
-        """A point for the curves of the forward model, which has just learnt."""
-        self._board.scalars(curves)
+        board.scalars(curves)
 
     def evaluation(self, found: Evaluation) -> None:
         """Show a new evaluation, sometimes with pictures. It is on disk when this returns."""

@@ -11,7 +11,7 @@ import importlib.util
 import json
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -262,7 +262,8 @@ class Config:
                 entry = self.entry(name)
                 ignored |= {*entry.ignores}
                 waiting += [each for each in entry.options if each not in used]
-        named = {each for entry in _entries() for each in entry.options}
+        entries = [*SHARED.values(), *(entry for entries in CATALOGUE.values() for entry in entries.values())]
+        named = {each for entry in entries for each in entry.options}
         return (used | {each.name for each in fields(self)} - named) - ignored
 
     @property
@@ -294,13 +295,12 @@ class Config:
             return f"with --{dashed(chosen[0])} {getattr(self, chosen[0])}"
         return self._why_not(users[0], used)
 
-    def words(self) -> list[str]:
-        """The command line of ``sgimd run`` that makes this run: every option that is not at its default."""
-        return words(vars(self))
-
 
 def words(settings: Mapping[str, Any]) -> list[str]:
-    """``--dashed-name=value`` for every option of a ``Config``, or of a config.json, that is not at its default."""
+    """The command line of ``sgimd run`` for these settings, of ``vars(config)`` or of a config.json.
+
+    ``--dashed-name=value`` for every option that is not at its default.
+    """
     found = []
     for each in fields(Config):
         value = plain(settings.get(each.name, each.default))
@@ -351,7 +351,3 @@ def dashed(name: str) -> str:
 def plain(value: Any) -> Any:
     """As json has it."""
     return json.loads(json.dumps(value, default=str))
-
-
-def _entries() -> Sequence[Entry]:
-    return [*SHARED.values(), *(entry for entries in CATALOGUE.values() for entry in entries.values())]

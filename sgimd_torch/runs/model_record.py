@@ -74,8 +74,8 @@ class RunModel:
             table.begin()
             table.flush()
 
-    def episode(self, episode: Episode, memory: Memory) -> bool:
-        """Refresh after a movement, new or replayed. Returns whether the model has learnt and ``curves`` are new."""
+    def episode(self, episode: Episode, memory: Memory) -> dict[str, float]:
+        """Refresh after a movement, new or replayed; returns new ``curves``, none if the model has not learnt."""
         movements, move = episode.index + 1, episode.move
         if move is not None and move.goal is not None and episode.outcome is not None:
             self._lately.append((move.goal, episode.outcome, move.origin))
@@ -83,7 +83,7 @@ class RunModel:
         refresh = self._model.refresh(memory, None if move is None else move.goal)
         self._seconds += time.perf_counter() - begun
         if refresh is None:
-            return False
+            return {}
         self._learnt += 1
         error = self._model.relative_error
         fields = [movements, len(memory), refresh.steps, repr(refresh.held_out), repr(error), int(refresh.diverged)]
@@ -100,7 +100,7 @@ class RunModel:
         if refresh.diverged:
             self._news.append(f"movement {movements}: training diverged; the forward model keeps its last good weights")
         self._say_whether_asked(movements, error)
-        return True
+        return self.curves
 
     def flush(self) -> None:
         """Hand everything to the operating system."""

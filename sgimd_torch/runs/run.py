@@ -99,7 +99,7 @@ class _Life:
         """From the first movement to the last."""
         parts, total, seed = self.parts, self.parts.config.movements, self.parts.config.seed
         recorded = self.directory.columns.recorded(self.directory.lines)
-        execute = replay(recorded, self.seconds.of_physics(live(parts.environment, seed)))
+        execute = replay(recorded, self.seconds.of("physics")(live(parts.environment, seed)))
         episodes = run(parts.learner, parts.environment, seed, movements=total, teacher=parts.teacher, execute=execute)
         with Progress("replaying" if recorded else parts.config.title, self.recorded or total) as progress:
             if not recorded:
@@ -132,10 +132,9 @@ class _Life:
     def _after(self, episode: Episode) -> None:
         self._write(episode)
         self.movements = episode.index + 1
+        curves = {} if self.model is None else self.model.episode(episode, self.parts.learner.memory)
         if self.board is not None:
-            self.board.episode(episode)
-        if self.model is not None and self.model.episode(episode, self.parts.learner.memory) and self.board is not None:
-            self.board.model(self.model.curves)
+            self.board.episode(episode, curves)
         if self.movements in self._wanted:
             self._evaluate()
         if self.movements == self.recorded:
@@ -167,11 +166,11 @@ class _Life:
             return
         repeats = config.repeats if config.floor_at is None or self.movements in config.floor_at else 0
         goals, when = parts.benchmark.goals, (config.seed, self.movements)
-        with self.seconds.of_evaluation(), self.stopping.at_once():
+        with self.seconds.of("evaluation"), self.stopping.at_once():
             found = evaluate(parts.inverse, parts.environment, goals, *when, repeats=repeats)
         if self.board is not None:
             self.board.evaluation(found)
-        with self.seconds.of_evaluation():
+        with self.seconds.of("evaluation"):
             evaluations.add(self.movements, found, parts.regions)
 
     def _begin(self) -> None:

@@ -34,7 +34,7 @@ from typing import Final
 
 from sgimd_torch.files import locked, make_folder
 from sgimd_torch.runs.command_line import parse
-from sgimd_torch.runs.config import Config, dashed
+from sgimd_torch.runs.config import Config, dashed, words
 from sgimd_torch.runs.process import Failed, Progress, loading, say
 from sgimd_torch.runs.read import finished, movements_on_disk
 
@@ -239,7 +239,7 @@ class _Run:
 
     def _process(self, stop: threading.Event) -> int:
         """Start its process, wait for it, stop it after ``stop``; its exit code."""
-        command = [sys.executable, "-m", "sgimd_torch", "run", "--resume", *self.flags, *self.config.words()]
+        command = [sys.executable, "-m", "sgimd_torch", "run", "--resume", *self.flags, *words(vars(self.config))]
         one_thread = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL")}
         with self.log.open("wb") as log:
             process = subprocess.Popen(
@@ -263,12 +263,12 @@ class _Run:
             return process.wait()
 
     def _last_words(self, code: int) -> str:
-        _, mark, words = ("\n" + self.log.read_text(errors="replace").rstrip()).rpartition("\nerror: ")
+        _, mark, said = ("\n" + self.log.read_text(errors="replace").rstrip()).rpartition("\nerror: ")
         if not mark:
-            words = words.rpartition("\n")[2] or "it said nothing"
+            said = said.rpartition("\n")[2] or "it said nothing"
         if code < 0:
-            words = f"stopped by {signal.Signals(-code).name}; the same command goes on with it"
-        return f"{words}\nIts whole log: {self.log}"
+            said = f"stopped by {signal.Signals(-code).name}; the same command goes on with it"
+        return f"{said}\nIts whole log: {self.log}"
 
 
 def _done(runs: Sequence[_Run]) -> int:
