@@ -55,16 +55,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     return 0
 
 
-def parse(
-    argv: Sequence[str], description: str | None = None, prog: str = "sgimd run"
-) -> tuple[Config, dict[str, bool]]:
+def parse(argv: Sequence[str], description: str | None = None) -> tuple[Config, dict[str, bool]]:
     """The run that a command line asks for, and its flags.
 
     Raises:
         SystemExit: with code 2 and a message on stderr when it makes no sense, 0 after ``--help``.
     """
     parser = _Parser(
-        prog=prog,
+        prog="sgimd run",
         usage="%(prog)s [--OPTION VALUE ...] [--resume]",
         description=description,
         epilog="null means no value. Options may be typed with underscores instead of dashes.",
