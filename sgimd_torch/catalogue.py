@@ -282,7 +282,7 @@ def find(kind: str, word: str) -> Entry:
 
 
 def checked(kind: str, word: str, make: Callable[..., Any]) -> Callable[..., Any]:
-    """``make``, which refuses how it is called or what it gives if that is not as for others of its kind.
+    """``make``, with a check of how it is called and of what it gives: one of your own may differ from its kind.
 
     Raises (when called):
         ValueError: with the call that was wanted, or the names of the members that are missing.

@@ -22,7 +22,7 @@ class Seconds:
 
     @contextmanager
     def of(self, part: str) -> Iterator[None]:
-        """Times a block, or a function that it decorates. Physics do not count as the learner's time."""
+        """Times a block, or a function that it decorates. Physics does not count as the learner's time."""
         begun = time.perf_counter()
         try:
             yield
