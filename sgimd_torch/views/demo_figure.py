@@ -14,7 +14,8 @@ except ImportError as error:
     raise ImportError(f"the figure needs matplotlib: pip install 'sgimd-torch[plot]' ({error})") from error
 
 from sgimd_torch.demonstrations import SHIPPED, load_demonstrations
-from sgimd_torch.figures.learning import NAMES, Curve, error_curves, interest_map, landing_points, tile_counts
+from sgimd_torch.figures.learning import NAMES, interest_map, landing_points, map_after, tile_counts
+from sgimd_torch.figures.results import SeedCurves, seed_curves
 from sgimd_torch.runs.log import RunError
 from sgimd_torch.runs.read import Run
 from sgimd_torch.spaces import Array, Box
@@ -49,7 +50,7 @@ def draw(runs: dict[str, Run]) -> Figure:
     with rc_context(STYLE):
         figure = Figure(figsize=(14, 12.6), layout="constrained")
         (curves, interest), landed_axes = figure.subplots(2, 2)
-        error_curves(curves, {algorithm: [_curve(run)] for algorithm, run in runs.items()})
+        seed_curves(curves, [_curve(algorithm, run) for algorithm, run in runs.items()])
         curves.set_title("How far from its goals the float lands")
         _draw_interest(interest, sgim_d)
         for ax, (algorithm, landed) in zip(landed_axes, outcomes.items(), strict=True):
@@ -82,8 +83,9 @@ def table(runs: dict[str, Run]) -> str:
     return "\n".join(lines)
 
 
-def _curve(run: Run) -> Curve:
-    return Curve(*(run.evaluation[name] for name in ("movements", "mean_error_m", "noise_floor_m")))
+def _curve(algorithm: str, run: Run) -> SeedCurves:
+    when, errors, floors = (run.evaluation[name] for name in ("movements", "mean_error_m", "noise_floor_m"))
+    return SeedCurves(algorithm, NAMES[algorithm], when, errors[None], errors, errors, errors, floors=floors)
 
 
 def _demonstrated(run: Run) -> Array | None:
@@ -101,11 +103,8 @@ def _draw_interest(ax: Axes, run: Run) -> None:
     if run.regions is None or not len(run.regions["movements"]):
         ax.text(0.5, 0.5, "uniform goals: no interest map", transform=ax.transAxes, ha="center")
         return
-    last = run.regions["movements"] == run.regions["movements"].max()
-    lows, highs = (
-        np.stack([run.regions[f"{corner}_{k}"][last] for k in range(2)], axis=1) for corner in ("low", "high")
-    )
-    interest_map(ax, lows, highs, run.regions["interest"][last], goals=run.chosen_goals()[-GOALS:])
+    last = map_after(run.regions, run.regions["movements"].max())
+    interest_map(ax, *last, goals=run.chosen_goals()[-GOALS:])
 
 
 def _metres(value: float | None) -> str:
