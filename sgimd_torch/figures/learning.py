@@ -1,7 +1,7 @@
 """Figures: where the float landed, where competence changes.
 
 Sections 5.2 and 6 of Nguyen & Oudeyer (2014). Each function draws on the axis it is given and returns what it drew; the
-caller owns the figure, its size and its file.   landing_points(ax, outcomes, box); interest_map(ax, lows, highs, values)
+caller owns the figure, its size and its file.   landing_points(ax, outcomes, box); interest_map(ax, lows, highs, each)
 """
 
 from __future__ import annotations

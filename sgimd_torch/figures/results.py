@@ -21,8 +21,8 @@ from sgimd_torch.spaces import Array, Box
 
 class SeedCurves(NamedTuple):
     """The runs of one learner: ``errors`` ``(n_seeds, n)`` m after ``movements`` ``(n,)``; over seeds their ``centre``
-    and the interval from ``low`` to ``high``, each ``(n,)`` m. ``algorithm`` gives the colour, noise ``floors`` ``(n,)`` m
-    are drawn dashed."""
+    and the interval from ``low`` to ``high``, each ``(n,)`` m. ``algorithm`` gives the colour; noise ``floors`` are
+    ``(n,)`` m."""
 
     algorithm: str
     label: str
