@@ -1,10 +1,10 @@
 """What a board and a forward model cost: processor time within a run; other processes do not count.
 
-``board`` gives the board's share of an SGIM-D run, how many tags it has and how large its file gets. ``model`` gives the
-cost of training and of searching, relative to the physics. Each search runs SGIM-D on the fishing rod for the same
+``board`` gives the board's share of an SGIM-D run, how many tags it has and how large its file gets. ``model`` gives
+the cost of training and of searching, relative to the physics. Each search runs SGIM-D on the fishing rod for the same
 number of movements, one after the other in one process, so all numbers are from one machine in one state. Refining is
-the time of a search beyond the simplex of the first line; answering is the time for one goal of an evaluation, all goals
-in one batch.
+the time of a search beyond the simplex of the first line; answering is the time for one goal of an evaluation, all
+goals in one batch.
 
 Examples:
   python scripts/bench_run.py board --movements 1000
@@ -152,7 +152,7 @@ def main() -> int:
             command.add_argument("--environment", default=ROD, help="of the run (%(default)s)")
         else:
             command.add_argument(
-                "--training", type=float, default=Config.training, help="steps a movement (%(default)s)"
+                "--training", type=float, default=Config.training, help="steps a movement (%(default)g)"
             )
             command.add_argument("--search", choices=searches(), help="only this one and the simplex")
     options = parser.parse_args()
