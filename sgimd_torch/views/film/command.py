@@ -13,12 +13,12 @@ import re
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 if "mujoco" not in sys.modules and sys.platform == "linux":
     os.environ.setdefault("MUJOCO_GL", "egl")  # draws without a display
 try:
-    import mujoco
+    import mujoco  # noqa: F401
 except (ImportError, AttributeError, RuntimeError) as error:  # each kind of OpenGL fails in its own way
     asked = os.environ.get("MUJOCO_GL")
     raise ImportError(f"MUJOCO_GL={asked} does not work here ({error}); set MUJOCO_GL=egl, or unset it") from error
@@ -26,12 +26,11 @@ except (ImportError, AttributeError, RuntimeError) as error:  # each kind of Ope
 import numpy as np
 from tqdm import tqdm
 
-from sgimd_torch.environments.rod_physics import Recording
 from sgimd_torch.runs.build import RunParts, build
 from sgimd_torch.runs.config import Config, from_settings
 from sgimd_torch.runs.log import RunError
 from sgimd_torch.runs.read import Run, read_run
-from sgimd_torch.spaces import Array, Box, stream
+from sgimd_torch.spaces import Array, stream
 from sgimd_torch.strategies import Remember
 from sgimd_torch.views.film.camera import Camera, Frame, Shot, count_frames, shoot, write_film, write_sheet
 
@@ -42,18 +41,6 @@ EXAMPLES = """examples:
   sgimd film runs/sgim-d/seed-003 --time-lapse                  each goal after 100, 500, 1000 and 5000 movements
   sgimd film runs/sgim-d/seed-003 --time-lapse --after 50,200   after 50 and 200
 """
-
-
-class Filmed(Protocol):
-    """An environment that can be filmed: ``model`` is MuJoCo's, ``record`` executes and keeps what happened."""
-
-    model: mujoco.MjModel
-    outcomes: Box
-    contexts: Box
-
-    def record(self, context: Array, theta: Array, rng: np.random.Generator) -> Recording:
-        """One movement, with the noise of ``rng``."""
-        ...
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -115,7 +102,7 @@ def remember(run: Run, parts: RunParts, start: int, stop: int) -> None:
 
 
 def _cast(
-    run: Run, parts: RunParts, robot: Filmed, goals: Array, stages: Sequence[int], *, say_movements: bool
+    run: Run, parts: RunParts, robot: Any, goals: Array, stages: Sequence[int], *, say_movements: bool
 ) -> list[list[Shot]]:
     """For each stage, the run's answer to each goal; a goal has the same motor noise at every stage."""
     shots = []
