@@ -11,7 +11,7 @@ import argparse
 import os
 import re
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +32,7 @@ from sgimd_torch.runs.log import RunError
 from sgimd_torch.runs.read import Run, read_run
 from sgimd_torch.spaces import Array, stream
 from sgimd_torch.strategies import Remember
-from sgimd_torch.views.film.camera import Camera, Frame, Shot, count_frames, shoot, write_film, write_sheet
+from sgimd_torch.views.film.camera import Camera, Shot, count_frames, landed, shoot, write_film, write_sheet
 
 AFTER = (100, 500, 1000, 5000)
 EXAMPLES = """examples:
@@ -112,34 +112,25 @@ def _cast(
         remember(run, parts, before, movements)
         if not len(parts.learner.memory):
             raise RunError(f"{run.path} remembers nothing after {movements} movements, so no movement can be inferred")
-        landed = run.outcomes[:movements]
-        landed = landed[np.isfinite(landed[:, 0])]
+        past = run.outcomes[:movements]
+        past = past[np.isfinite(past[:, 0])]
         stage = []
         for k, goal in enumerate(goals):
             theta = parts.inverse(context, goal).theta
             recording = robot.record(context, theta, stream(run.config["seed"], "film", k))
             shown = f"after {movements} movements" if say_movements else f"{title}, after {movements} movements"
-            stage.append(Shot(recording, goal, shown, landed))
+            stage.append(Shot(recording, goal, shown, past))
         shots.append(stage)
     return shots
 
 
 def _film(options: argparse.Namespace, camera: Camera, scenes: list[list[Shot]]) -> None:
-    lasts: list[Frame] = []  # of each scene
-    ends = np.cumsum([count_frames([scene]) for scene in scenes]) - 1
-
-    def frames() -> Iterator[Frame]:
-        # tqdm shows the time left; without a terminal it prints a line now and then
-        interval = 0.2 if sys.stderr.isatty() else 10.0
-        bar = tqdm(shoot(camera, scenes), "filming", int(ends[-1]) + 1, unit=" frames", mininterval=interval)
-        for k, frame in enumerate(bar):
-            if k in ends:
-                lasts.append(frame)
-            yield frame
-
-    write_film(options.out, frames())
+    # tqdm shows the time left; without a terminal it prints a line now and then
+    interval = 0.2 if sys.stderr.isatty() else 10.0
+    frames = shoot(camera, scenes)
+    write_film(options.out, tqdm(frames, "filming", count_frames(scenes), unit=" frames", mininterval=interval))
     if options.sheet is not None:
-        write_sheet(options.sheet, lasts)
+        write_sheet(options.sheet, [landed(camera, shots) for shots in scenes])
 
 
 def _stages(run: Run, options: argparse.Namespace) -> list[int]:
