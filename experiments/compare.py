@@ -17,17 +17,19 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
-import numpy as np
+from sgimd_torch.runs.process import command, loading, say
 
-from sgimd_torch.catalogue import did_you_mean
-from sgimd_torch.files import make_folder
-from sgimd_torch.runs.config import Config
-from sgimd_torch.runs.log import RunError
-from sgimd_torch.runs.process import command, say
-from sgimd_torch.runs.read import finished, read_run
-from sgimd_torch.runs.sweep import add_options, sweep
-from tables import GOALS, RESULTS, Key, Table, as_text, goal_row, result_rows
-from variants import EXPERIMENTS, FEW, HALF, make_subsets, tables_of
+with loading():  # Ctrl-C shows no traceback
+    import numpy as np
+
+    from sgimd_torch.catalogue import did_you_mean
+    from sgimd_torch.files import make_folder
+    from sgimd_torch.runs.config import Config
+    from sgimd_torch.runs.log import RunError
+    from sgimd_torch.runs.read import finished, read_run
+    from sgimd_torch.runs.sweep import add_options, sweep
+    from tables import GOALS, RESULTS, Key, Table, as_text, goal_row, result_rows
+    from variants import EXPERIMENTS, FEW, HALF, make_subsets, tables_of
 
 EXAMPLES: Final = f"""experiments: {", ".join(EXPERIMENTS)}
 
