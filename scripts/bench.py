@@ -1,11 +1,11 @@
-"""What the library costs: the learner's work a movement, how it grows, evaluations, what execute adds to physics, and two
-runs side by side.
+"""What the library costs: the learner's work a movement, how it grows, evaluations, what execute adds to physics, what
+a replay costs, and two runs side by side.
 
 The learner's overhead is all that a run does besides executing movements and evaluating: choosing the teacher's
 demonstration, asking, telling, watching. It learns on a planar arm, whose own time does not count, with 25 joints for
-the dimensions of the fishing rod, and with 50. Times are processor time. Other programs still lengthen it, as they empty
-the caches; what runs briefly between physics feels that most. With --against the library in another folder does the
-same work in turns (here, there, here, there ...), each time in a new process. Figures are medians over the rounds.
+the dimensions of the fishing rod, and with 50. Times are processor time. Other programs still lengthen it, as they
+empty the caches; what runs briefly between physics feels that most. With --against the library in another folder does
+the same work in turns (here, there, here, there ...), each time in a new process. Figures are medians over the rounds.
 
 Examples:
   python scripts/bench.py                                       every part, some minutes
@@ -22,6 +22,7 @@ import os
 import resource
 import subprocess
 import sys
+import tempfile
 import time
 import zlib
 from collections.abc import Callable
@@ -203,6 +204,19 @@ def movement(n: int = 60) -> Figures:
     return {"execute (ms)": 1000 * ours / n, "execute over C stepping": ours / alone}
 
 
+def resume(inverse: str, movements: int) -> Figures:
+    """A run on the fishing rod without evaluations, and its replay once it has ended: processor time of each."""
+    words = f"-m sgimd_torch run --inverse {inverse} --movements {movements} --evaluate-at [] --out runs".split()
+    used = [0.0]
+    with tempfile.TemporaryDirectory() as folder:
+        for more in ([], ["--resume"]):
+            subprocess.run([sys.executable, *words, *more], cwd=folder, capture_output=True, check=True)
+            used.append(sum(resource.getrusage(resource.RUSAGE_CHILDREN)[:2]))
+    fresh, replayed = np.diff(used)
+    what = f"--inverse {inverse}, {movements} movements"
+    return {f"run, {what} (s)": fresh, f"replay over run, {what}": replayed / fresh}
+
+
 def fishing(movements: int) -> tuple[float, float]:
     """Seconds that SGIM-D on the fishing rod takes for so many movements, by the clock and of processor time."""
     from sgimd_torch import FishingRod, PeriodicTeacher, load_demonstrations, run, sgim_d, stream
@@ -228,7 +242,7 @@ def pair(movements: int = 1000) -> Figures:
 
 PARTS: dict[str, Callable[..., Figures]] = {
     "overhead": overhead, "growth": growth, "recall": recall, "evaluation": evaluation, "movement": movement,
-    "pair": pair,
+    "resume": resume, "pair": pair,
 }  # fmt: skip
 
 
@@ -292,6 +306,8 @@ def arguments_of(part: str, rows: list[int]) -> list[list[Any]]:
         return [[*who, rows] for who in (("sagg-riac", 25), ("sagg-riac", 50), ("sgim-d", 7), ("sgim-d", 25))]
     if part == "recall":
         return [[*who, rows[:2]] for who in (("sgim-d", 25), ("sagg-riac", 50))]
+    if part == "resume":
+        return [["linear", 5000], ["model", 5000]]
     return [[]]
 
 
