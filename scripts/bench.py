@@ -169,8 +169,8 @@ def evaluation() -> Figures:
     return {"evaluation (s)": time.process_time() - begun, "noise floor of it (m)": found.noise_floor}
 
 
-def movement(n: int = 200) -> Figures:
-    """``execute`` of the fishing rod against the same steps in C alone, in turns, the best of three readings each."""
+def movement(n: int = 60) -> Figures:
+    """``execute`` of the fishing rod against the same steps in C alone, in turns, the best of 15 readings each."""
     from mujoco import rollout
 
     from sgimd_torch import FishingRod, stream
@@ -189,7 +189,7 @@ def movement(n: int = 200) -> Figures:
         rod.execute(np.zeros(0), theta, stream(1, "bench", i))
         rollout.Rollout.rollout = step
         readings = []
-        for _ in range(3):
+        for _ in range(15):
             rng = stream(1, "bench", i)
             begun = time.process_time()
             rod.execute(np.zeros(0), theta, rng)
