@@ -11,11 +11,12 @@ from functools import partial, wraps
 from typing import TYPE_CHECKING, Any, Final
 
 from sgimd_torch.algorithms import Correspondence
-from sgimd_torch.catalogue import CATALOGUE, SHARED, check, check_call
+from sgimd_torch.catalogue import CATALOGUE, SHARED, check, check_call, find
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.learner import Learner
 from sgimd_torch.runs.config import Config
+from sgimd_torch.runs.tables import OWN
 from sgimd_torch.runs.tasks import Task, benchmark_of, correspondence_of, demonstrations_of
 from sgimd_torch.spaces import Array, Demonstration, Estimate, stream
 from sgimd_torch.teachers import Teacher
@@ -31,10 +32,11 @@ _OF_THE_ROBOT: Final = {"policies", "correspondence"}
 @dataclass(frozen=True, eq=False)
 class RunParts:
     """What a run needs. ``correspondence`` translates a demonstrated trajectory to theta. ``inverse`` reads the
-    learner's memory for evaluations; ``model`` is refreshed after each movement; it and its ``trust`` are None for a
-    run without a model. ``teacher`` is None, and ``demonstrations`` are empty, for a learner that learns alone.
-    ``residuals`` (rad) say how far each demonstration is from what the robot can play. ``data`` holds checksums of the
-    files that were read, ``notes`` messages for the user."""
+    learner's memory for evaluations; ``answers`` are all inverses to evaluate by, this one first. ``model`` is
+    refreshed after each movement; it and its ``trust`` are None for a run without a model. ``teacher`` is None, and
+    ``demonstrations`` are empty, for a learner that learns alone. ``residuals`` (rad) say how far each demonstration is
+    from what the robot can play. ``data`` holds checksums of the files that were read, ``notes`` messages for the user.
+    """
 
     environment: Environment
     correspondence: Correspondence | None
@@ -43,6 +45,7 @@ class RunParts:
     demonstrations: Sequence[Demonstration]
     residuals: Sequence[float]
     inverse: Callable[[Array, Array], Estimate]
+    answers: dict[str, Callable[[Array, Array], Estimate]]
     benchmark: Benchmark
     data: dict[str, str | None]
     model: ForwardModel | None
@@ -68,6 +71,10 @@ def build(config: Config) -> RunParts:
         teacher = parts.maker("teacher")(demonstrations, stream(config.seed, "teacher"))
     learner = parts.maker("algorithm")(task.environment, config.seed)
     inverse = parts.maker("inverse", learning=False)(learner.memory)
+
+    def answer(word: str) -> Any:
+        return parts.maker("inverse", word, learning=False)(learner.memory)
+
     return RunParts(
         environment=task.environment,
         correspondence=parts["correspondence"] if "correspondence" in parts.used else None,
@@ -76,6 +83,12 @@ def build(config: Config) -> RunParts:
         demonstrations=demonstrations,
         residuals=residuals,
         inverse=inverse,
+        answers={
+            word: inverse
+            if word in (OWN, config.inverse)
+            else parts.maker("inverse", word, learning=False)(learner.memory)
+            for word in config.answered
+        },
         benchmark=benchmark,
         data={"demonstrations_crc32": demonstrations_crc32, "benchmark_crc32": benchmark_crc32},
         model=parts["model"] if "model" in parts.used else None,
@@ -118,10 +131,11 @@ class _Parts:
             self._made[name] = self._shared(name)
         return self._made[name]
 
-    def maker(self, kind: str, *, learning: bool = True) -> Callable[..., Any]:
-        """The choice of a kind, with its options. ``learning`` False: for evaluations, where the inverse may differ."""
-        word = getattr(self.config, kind)
-        entry = self.config.entry(kind)
+    def maker(self, kind: str, word: str | None = None, *, learning: bool = True) -> Callable[..., Any]:
+        """The choice of a kind, or another ``word`` of it, with its options. ``learning`` False: for evaluations, where
+        the inverse may differ."""
+        word = getattr(self.config, kind) if word is None else word
+        entry = find(kind, word)
         if learning and entry.learns_with is not None:
             word, entry = entry.learns_with, CATALOGUE[kind][entry.learns_with]
         given = {name: self[option] for name, option in entry.uses.items()}

@@ -36,6 +36,7 @@ _WANTED: Final = {
     "bool": "true or false",
     "int | None": "a whole number, or null",
     "tuple[int, ...] | None": "whole numbers such as 250,500, or [], or null",
+    "tuple[str, ...]": "words such as own,nearest",
 }
 _BOOL: Final = ("true", "false")
 
@@ -148,7 +149,7 @@ class _Parser(jsonargparse.ArgumentParser):
         kind = str(Config.__dataclass_fields__[name].type)
         if not value and "Path" in kind:
             self.error(f"{typed} must be a path, got an empty one")
-        if "tuple" in kind and re.fullmatch(r"\d+(,\d+)*", value):
+        if "tuple" in kind and re.fullmatch(r"\d+(,\d+)*" if "int" in kind else r"[^\[\],]+(,[^\[\],]+)*", value):
             value = f"[{value}]"
         return f"{option}={value}"
 

@@ -29,6 +29,7 @@ from sgimd_torch.runs.directory import RunDirectory
 from sgimd_torch.runs.log import Columns, RunError
 from sgimd_torch.runs.model_record import RunModel
 from sgimd_torch.runs.process import Failed, Progress, Stopped, Stopping, say
+from sgimd_torch.runs.tables import OWN
 from sgimd_torch.session import ReplayError, live, replay, run
 from sgimd_torch.spaces import Episode
 
@@ -179,7 +180,8 @@ class _Life:
         if found is not None:
             self.board.evaluation(found)
             with self.seconds.of_evaluation():
-                self.directory.evaluations.add(self.movements, found, regions_of(self.parts))
+                near = self.parts.benchmark.side / 2
+                self.directory.evaluations.add(self.movements, found, near, regions_of(self.parts))
 
     def _begin(self) -> None:
         """The replay is over: from now on files change."""
@@ -198,9 +200,10 @@ def _error_so_far(directory: RunDirectory) -> str:
     return "" if error is None else f"error {error:.4f} m"
 
 
-def evaluate_in(config: Config, parts: RunParts, movements: int, stopping: Stopping) -> Evaluation | None:
-    """Evaluate the learner as it is now, with streams that the run does not use.
+def evaluate_in(config: Config, parts: RunParts, movements: int, stopping: Stopping) -> dict[str, Evaluation] | None:
+    """Evaluate the learner as it is now by each of its answers, with streams that the run does not use.
 
+    All answers are executed with the same noise, goal by goal; only of the run's own the noise is measured.
     Before its first exemplar there is nothing to infer a movement from, as for the learner by observation before its
     first demonstration: such an evaluation is left out.
     """
@@ -208,8 +211,13 @@ def evaluate_in(config: Config, parts: RunParts, movements: int, stopping: Stopp
         return None
     goals = parts.benchmark.goals
     repeats = config.repeats if config.floor_at is None or movements in config.floor_at else 0
+    found: dict[str, Evaluation] = {}
     with stopping.at_once():
-        return evaluate(parts.inverse, parts.environment, goals, config.seed, movements, repeats=repeats)
+        judged = partial(evaluate, environment=parts.environment, goals=goals, seed=config.seed, movements=movements)
+        for answer, inverse in parts.answers.items():
+            again = answer != OWN and inverse is parts.inverse
+            found[answer] = found[OWN] if again else judged(inverse, repeats=repeats if answer == OWN else 0)
+    return found
 
 
 def correspondence_of(parts: RunParts) -> list[str]:
@@ -262,7 +270,8 @@ def open_directory(config: Config, parts: RunParts, resume: bool, *, accept_loss
     same = directory.before is not None and all(
         directory.before.get(key) == settings[key] for key in EVALUATION_SETTINGS
     )
-    directory.evaluations.keep(m for m in config.evaluations if same and m <= len(directory.lines))
+    kept = [m for m in config.evaluations if same and m <= len(directory.lines)]
+    directory.evaluations.keep(kept, config.answered)
     return directory
 
 
