@@ -34,7 +34,7 @@ from read_results import LAST, Evaluated, ResultsError, read_coverages, read_goa
 from sgimd_torch.files import make_folder, write_text
 from sgimd_torch.runs.process import command
 from sgimd_torch.views.statistics import iqm_interval, metres, rng, show
-from variants import EXPERIMENTS
+from variants import EXPERIMENTS, ladder
 
 TEMPLATES: Final = Path(__file__).with_name("pages")
 PAGES: Final = ("RESULTS", "FORWARD_MODEL")
@@ -53,21 +53,27 @@ Cell = Callable[[str], str]  # the text of a variant in a column of a table; rai
 
 def paper_page(folder: Path) -> Page:
     """The page results/RESULTS.md; learners from the worst to the best, other variants in the order of their rows."""
-    results = Results(read_results(folder / "paper.csv"), read_goals(folder / "goals.csv"))
-    verdicts, variants = judge(PAPER_CLAIMS, results), results.variants
+    path = folder / "paper.csv"
+    own = Results(read_results(path), read_goals(folder / "goals.csv"), linear=read_results(path, "linear"))
+    verdicts, results, variants = judge(PAPER_CLAIMS, own), own.alike, own.linear
     learners = sorted((v for v in variants.values() if v.experiment == "learners"), key=lambda v: -_last_error(v))
     others = [variant for variant in variants.values() if variant.experiment != "learners"]
     better, difference = _against(results, lambda _: "sgim-d", LAST)
     columns = {
         "experiment": lambda name: variants[name].experiment,
         **_errors(results, (1000, LAST), ".3f"),
+        f"by its own inverse at {LAST} (m)": lambda name: show(own.iqm(name), ".3f"),
         "mean over life (m)": lambda name: show(iqm_interval(results.lives(name), rng=rng()), ".3f"),
         "SGIM-D better, probability": better,
         "difference to SGIM-D (m)": difference,
-        "tiles reached": lambda name: show(results.iqm(name, values="tiles"), ".0f"),
+        "tiles reached": lambda name: show(own.iqm(name, values="tiles"), ".0f"),
+        "goals claimed": lambda name: show(own.iqm(name, values="claimed"), ".0f"),
+        "goals met": lambda name: show(results.iqm(name, values="met"), ".0f"),
     }
     return verdicts, {
-        "claims": verdicts_table("claim of the paper", verdicts),
+        "ladder": _ladder_table(own, ""),
+        "ladder_large": _ladder_table(own, "-large"),
+        "claims": verdicts_table("claim", verdicts),
         "learners": variants_table([variant.variant for variant in learners], columns),
         "ablations": variants_table([variant.variant for variant in others], columns),
         "anova": markdown(ANOVA, anova_cells(folder / "anova.csv")),
@@ -91,6 +97,26 @@ def model_page(folder: Path, table: Path) -> Page:
     return verdicts, tables
 
 
+def _ladder_table(own: Results, ending: str) -> str:
+    """The steps from the letter to our defaults: the error of each, and the difference that it makes."""
+    names = ladder(ending)
+    before = dict(zip(names[1:], names, strict=False))
+
+    def step(results: Results) -> Cell:
+        def cell(name: str) -> str:
+            return metres(results.difference(name, before[name])).removesuffix(" m") if name in before else ""
+
+        return cell
+
+    columns = {
+        **_errors(own, (1000, LAST), ".3f"),
+        "difference to the step before (m)": step(own),
+        f"by `LocallyLinear` at {LAST} (m)": lambda name: show(own.alike.iqm(name), ".3f"),
+        "difference, by `LocallyLinear` (m)": step(own.alike),
+    }
+    return variants_table(names, columns)
+
+
 def _errors(results: Results, times: Sequence[int], form: str) -> dict[str, Cell]:
     """A variant's name, how many of its seeds reached the last of these ``times``, its errors at each of them."""
 
@@ -99,7 +125,7 @@ def _errors(results: Results, times: Sequence[int], form: str) -> dict[str, Cell
 
     return {
         "variant": str,
-        "seeds": lambda name: str(len(results.variants[name].at(times[-1]))),
+        "seeds": lambda name: str(len(results.variants[name].at(times[-1])) if name in results.variants else 0),
         **{f"error at {when} (m)": error(when) for when in times},
     }
 
@@ -145,8 +171,12 @@ def variants_table(names: Sequence[str], columns: Mapping[str, Cell]) -> str:
 
 def verdicts_table(what: str, verdicts: Sequence[Verdict]) -> str:
     """One row for each claim; ``what`` heads the first column."""
-    cells = [(row.claim, row.bar, row.number, f"**{row.verdict}**") for row in verdicts]
-    return markdown((what, "bar", "our number [95 % interval]", "verdict"), cells)
+    cells = [(row.claim, row.bar, row.number, row.effect, _in_words(row)) for row in verdicts]
+    return markdown((what, "bar", "our number [95 % interval]", "difference [95 % interval]", "verdict"), cells)
+
+
+def _in_words(row: Verdict) -> str:
+    return f"**{row.verdict}**" + (f" (alone: {row.alone})" if row.alone != row.verdict else "")
 
 
 def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
