@@ -92,7 +92,7 @@ def test_improvement_is_the_mann_whitney_statistic_and_its_opposite_makes_one(rn
     assert opposite == pytest.approx((1 - found.value, 1 - found.high, 1 - found.low))
 
 
-@pytest.mark.parametrize(("n", "low"), [(2, 0.386), (10, 0.80), (20, 0.88)])
+@pytest.mark.parametrize(("n", "low"), [(2, 0.386), (10, 0.80), (20, 0.90)])
 def test_few_seeds_never_make_an_improvement_certain(n, low):
     ours, theirs = np.zeros(n), np.ones(n)
     assert improvement_interval(ours, theirs) == pytest.approx((1, low, 1), abs=0.005)
