@@ -31,11 +31,11 @@ _OF_THE_ROBOT: Final = {"policies", "correspondence"}
 
 @dataclass(frozen=True, eq=False)
 class RunParts:
-    """What a run needs. ``correspondence`` translates a demonstrated trajectory to theta. ``inverse`` reads the
-    learner's memory for evaluations; ``answers`` are all inverses to evaluate by, this one first. ``model`` is
-    refreshed after each movement; it and its ``trust`` are None for a run without a model. ``teacher`` is None, and
-    ``demonstrations`` are empty, for a learner that learns alone. ``residuals`` (rad) say how far each demonstration is
-    from what the robot can play. ``data`` holds checksums of the files that were read, ``notes`` messages for the user.
+    """What a run needs. ``correspondence`` translates a demonstrated trajectory to theta. ``answers`` are the
+    inverses to evaluate by, the run's own first; they read the learner's memory. ``model`` is refreshed after each
+    movement; it and its ``trust`` are None for a run without a model. ``teacher`` is None, and ``demonstrations`` are
+    empty, for a learner that learns alone. ``residuals`` (rad) say how far each demonstration is from what the robot
+    can play. ``data`` holds checksums of the files that were read, ``notes`` messages for the user.
     """
 
     environment: Environment
@@ -44,13 +44,17 @@ class RunParts:
     teacher: Teacher | None
     demonstrations: Sequence[Demonstration]
     residuals: Sequence[float]
-    inverse: Callable[[Array, Array], Estimate]
     answers: dict[str, Callable[[Array, Array], Estimate]]
     benchmark: Benchmark
     data: dict[str, str | None]
     model: ForwardModel | None
     trust: Trust | None
     notes: Sequence[str] = ()
+
+    @property
+    def inverse(self) -> Callable[[Array, Array], Estimate]:
+        """The run's own inverse for evaluations."""
+        return self.answers[OWN]
 
 
 def build(config: Config) -> RunParts:
@@ -82,7 +86,6 @@ def build(config: Config) -> RunParts:
         teacher=teacher,
         demonstrations=demonstrations,
         residuals=residuals,
-        inverse=inverse,
         answers={
             word: inverse
             if word in (OWN, config.inverse)

@@ -19,6 +19,7 @@ from sgimd_torch.runs.log import Columns, RunError, read_json
 from sgimd_torch.runs.tables import EVALUATION, OWN, SMALL, small_table
 from sgimd_torch.spaces import Array
 
+NO_EVALUATION: Final = {name: np.empty(0) for name in EVALUATION}
 LONGEST_LINE: Final = 1 << 16  # bytes, of a log
 
 
@@ -110,7 +111,7 @@ def read_run(path: str | os.PathLike[str]) -> Run:
         thetas=thetas,
         goals=goals,
         outcomes=outcomes,
-        answers=_by_answer(arrays.get("evaluation.csv", {name: np.empty(0) for name in EVALUATION})),
+        answers=_by_answer(arrays.get("evaluation.csv", NO_EVALUATION)),
         regions=arrays.get("regions.csv"),
         predictions=arrays.get("predictions.csv"),
         refreshes=arrays.get("refreshes.csv"),
@@ -157,9 +158,9 @@ def finished(config: Config) -> bool:
 
 def _by_answer(columns: dict[str, Any]) -> dict[str, dict[str, Array]]:
     """The rows of evaluation.csv, apart for each answer; the run's own answers are always there."""
-    words = columns.pop("answer")
+    words = columns["answer"]
     return {
-        word: {name: values[words == word] for name, values in columns.items()}
+        word: {name: values[words == word] for name, values in columns.items() if name != "answer"}
         for word in dict.fromkeys((OWN, *words.tolist()))
     }
 

@@ -466,7 +466,7 @@ def live_as(out, robot, make, **options):
     alone = {"teacher": None, "demonstrations": [], "residuals": [], "model": None, "trust": None}
     parts = dataclasses.replace(
         build(config),
-        **{**alone, "environment": robot, "learner": learner, "inverse": LocalInverse(learner.memory)},
+        **{**alone, "environment": robot, "learner": learner, "answers": {"own": LocalInverse(learner.memory)}},
         benchmark=Benchmark("Slider", goals, 0.1),
     )
     with Stopping() as stopping, open_directory(config, parts, False) as directory:

@@ -104,10 +104,10 @@ def answers_of(out, go, *options):
 
 
 def test_an_inverse_answers_alike_whether_it_is_the_runs_own_or_another(tmp_path, go):
-    """Observers with different inverses remember the same, so nearest and linear land at the same places."""
+    """Imitators with different inverses remember the same, so nearest and linear land at the same places."""
     found, logs = zip(
         *(
-            answers_of(tmp_path / own, go, "--algorithm", "observation", "--inverse", own, "--answers", f"own,{other}")
+            answers_of(tmp_path / own, go, "--algorithm", "imitation", "--inverse", own, "--answers", f"own,{other}")
             for own, other in (("nearest", "linear"), ("linear", "nearest"))
         ),
         strict=True,
