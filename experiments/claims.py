@@ -23,18 +23,20 @@ from functools import partial
 from pathlib import Path
 from typing import Final
 
-import numpy as np
+from sgimd_torch.runs.process import command, loading
 
-from anova import anova_cells, update_anova
-from judging import NotRun, Results, Verdict, judge
-from model_claims import MODEL_CLAIMS, SIMPLEX
-from paper_claims import PAPER_CLAIMS
-from quoted import MADE, Page, into_readme, render
-from read_results import LAST, Evaluated, ResultsError, read_coverages, read_goals, read_results
-from sgimd_torch.files import make_folder, write_text
-from sgimd_torch.runs.process import command
-from sgimd_torch.views.statistics import iqm_interval, metres, rng, show
-from variants import EXPERIMENTS, ladder
+with loading():  # Ctrl-C shows no traceback
+    import numpy as np
+
+    from anova import anova_cells, update_anova
+    from judging import NotRun, Results, Verdict, judge
+    from model_claims import MODEL_CLAIMS, SIMPLEX
+    from paper_claims import PAPER_CLAIMS
+    from quoted import MADE, Page, into_readme, render
+    from read_results import LAST, Evaluated, ResultsError, read_coverages, read_goals, read_results
+    from sgimd_torch.files import make_folder, write_text
+    from sgimd_torch.views.statistics import iqm_interval, metres, rng, show
+    from variants import EXPERIMENTS, ladder
 
 PAGES: Final = ("RESULTS", "FORWARD_MODEL")
 ANOVA: Final = ("means compared", "of", "dimensions of theta in which they differ", "smallest p", "largest p")

@@ -21,18 +21,29 @@ from itertools import product
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-import numpy as np
+from sgimd_torch.runs.process import command, loading, say
 
-from sgimd_torch import FishingRod, LocallyLinear, PeriodicTeacher, evaluate, load_demonstrations, run, sgim_d, stream
-from sgimd_torch.evaluation import Benchmark, load_benchmark
-from sgimd_torch.goals.uniform import UniformGoals
-from sgimd_torch.inverses.local import NearestNeighbour
-from sgimd_torch.learner import Learner
-from sgimd_torch.rivals.quality_diversity import cma_mae, cma_me, isoline, map_elites
-from sgimd_torch.runs.process import command, say
-from sgimd_torch.runs.sweep import add_options
-from sgimd_torch.searches.perturb import perturb
-from tables import Key, Table
+with loading():  # Ctrl-C shows no traceback
+    import numpy as np
+
+    from sgimd_torch import (
+        FishingRod,
+        LocallyLinear,
+        PeriodicTeacher,
+        evaluate,
+        load_demonstrations,
+        run,
+        sgim_d,
+        stream,
+    )
+    from sgimd_torch.evaluation import Benchmark, load_benchmark
+    from sgimd_torch.goals.uniform import UniformGoals
+    from sgimd_torch.inverses.local import NearestNeighbour
+    from sgimd_torch.learner import Learner
+    from sgimd_torch.rivals.quality_diversity import cma_mae, cma_me, isoline, map_elites
+    from sgimd_torch.runs.sweep import add_options
+    from sgimd_torch.searches.perturb import perturb
+    from tables import Key, Table
 
 COLUMNS: Final = ("rival", "setting", "seed", "movements", "linear_error_m")
 KEY: Final = ("rival", "setting", "seed", "movements")
