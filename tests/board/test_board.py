@@ -467,7 +467,7 @@ def live_as(out, robot, make, **options):
     alone = {"teacher": None, "demonstrations": [], "model": None, "trust": None}
     parts = dataclasses.replace(
         build(config),
-        **{**alone, "environment": robot, "learner": learner, "inverse": LocalInverse(learner.memory)},
+        **{**alone, "environment": robot, "learner": learner, "answers": {"own": LocalInverse(learner.memory)}},
         benchmark=Benchmark("Slider", goals, 0.1),
     )
     with Stopping() as stopping, RunDirectory(parts, resume=False) as directory:
