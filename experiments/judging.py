@@ -86,7 +86,7 @@ class Results:
         return movements, errors
 
     def lives(self, variant: str) -> Array:
-        """``(n_seeds,)``, the mean of each error curve over its movements; curves that begin late are not comparable."""
+        """``(n_seeds,)``, the mean of each error curve over its movements; none of curves that begin late."""
         movements, errors = self.curves(variant)
         if movements[0] > FIRST:
             raise NotRun(f"{variant}: no evaluation at {FIRST}")
