@@ -13,7 +13,6 @@ from typing import Any, TypedDict, Unpack
 
 import numpy as np
 
-from sgimd_torch.algorithms import Correspondence
 from sgimd_torch.environments.protocol import Environment, check_rest
 from sgimd_torch.learner import Learner
 from sgimd_torch.memory import Memory
@@ -44,7 +43,7 @@ class Options(TypedDict, total=False):
 
     cells: int | None
     again: float
-    correspondence: Correspondence | None
+    correspondence: Callable[[Array, Array], Array] | None
     imitations: int
     epsilon: float
 
@@ -305,7 +304,7 @@ def _learner(
     *,
     cells: int | None = None,
     again: float = 0.0,
-    correspondence: Correspondence | None = None,
+    correspondence: Callable[[Array, Array], Array] | None = None,
     imitations: int = 10,
     epsilon: float = 0.05,
 ) -> Learner:
