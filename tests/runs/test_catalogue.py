@@ -4,6 +4,7 @@ import inspect
 import re
 import subprocess
 import sys
+import typing
 from dataclasses import fields
 
 import numpy as np
@@ -73,11 +74,14 @@ def toss(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize(("kind", "word", "entry"), ENTRIES, ids=lambda each: each if isinstance(each, str) else "")
 def test_what_an_entry_takes_its_parameters_are(kind, word, entry):
-    parameters = inspect.signature(entry.load()).parameters
-    names = {each.name for each in parameters.values()}
-    builders = {"sagg_riac", "sgim_d"}  # these hand their parts on
-    if entry.at.rpartition(":")[2] not in builders:
-        assert {*entry.uses, *entry.fixed} <= names
+    made = entry.load()
+    names = {*inspect.signature(made).parameters}
+    parameters = inspect.signature(made).parameters.values()
+    handed_on = next((each for each in parameters if each.kind == each.VAR_KEYWORD), None)
+    if handed_on is not None:  # **parts: Unpack[Parts]
+        (parts,) = typing.get_args(typing.get_type_hints(made)[handed_on.name])
+        names |= {*parts.__annotations__}
+    assert {*entry.uses, *entry.fixed} <= names
     known = {each.name for each in fields(Config)} | SHARED.keys() | {"policies", "correspondence"}
     assert {*entry.options, *entry.ignores} <= known
     assert entry.learns_with is None or entry.learns_with in CATALOGUE[kind]
