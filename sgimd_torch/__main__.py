@@ -13,6 +13,7 @@ COMMANDS: Final = {
     "sweep": Command(
         "sgimd_torch.runs.sweep", "many runs: options crossed with each other and with seeds, in parallel"
     ),
+    "check": Command("sgimd_torch.views.check", "does an environment keep every promise? each slip by name"),
     "table": Command("sgimd_torch.views.table", "results of runs, over their seeds"),
     "report": Command(
         "sgimd_torch.views.report.command", "one page about one run, or about many side by side", "report"
@@ -33,6 +34,7 @@ examples:
   sgimd run --algorithm sgim-d --seed 3              one run of 5000 movements, into runs/sgim-d/seed-003
   sgimd run --algorithm sgim-d --seed 3 --resume     after Ctrl-C or a power cut
   sgimd run --environment mypackage.toss:make        on a robot of your own
+  sgimd check mypackage.toss:make                    what is wrong with it, if anything
   sgimd sweep --vary goals=interest-map,uniform --seeds 0-9 --out study
   sgimd table study                                  error of each variant, over its seeds
   sgimd report study                                 curves, maps and tables on one page
