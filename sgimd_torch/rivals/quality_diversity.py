@@ -12,7 +12,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sgimd_torch.environments.protocol import Environment, check_rest
+from sgimd_torch.algorithms import start_memory
+from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.learner import Learner
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, Attempt, Box, Move, check_count, stream
@@ -35,6 +36,7 @@ def map_elites(
     sd: float = 0.05,
     batch: int = 10,
     cells: int | None = None,
+    memory: Memory | None = None,
 ) -> Learner:
     """MAP-Elites: Gaussian variations of elites, which are drawn evenly from the cells of T that were reached.
 
@@ -45,6 +47,7 @@ def map_elites(
         sd: standard deviation of the variations, in sides of Pi, as in `perturb`; what leaves Pi is clipped.
         batch: movements between two looks at the archive.
         cells: for each dimension of T; None for about 400 in all.
+        memory: to start from; its exemplars enter the archive, and take the place of the ``first`` movements.
 
     Raises:
         ValueError: a number out of its range, or an environment with contexts, which an archive over T does not know.
@@ -53,7 +56,8 @@ def map_elites(
         raise ValueError(f"sd must be positive and finite, got {sd}; without noise nothing new is tried")
     first, batch = check_count("first", first, 1), check_count("batch", batch, 1)
     rng = stream(seed, "map-elites")
-    archive = _archive(environment, rng, cells)
+    memory = start_memory(environment, memory)
+    archive = _archive(environment, rng, cells, memory)
     emitter = GaussianEmitter(
         archive,
         sigma=sd,
@@ -61,7 +65,7 @@ def map_elites(
         batch_size=batch,
         seed=_seed(rng),
     )
-    return _learner(environment, archive, [emitter], "map-elites")
+    return Learner(memory, QualityDiversity(environment.policies, archive, [emitter], "map-elites"))
 
 
 def cma_me(
@@ -72,11 +76,12 @@ def cma_me(
     sd: float = 0.1,
     batch: int | None = None,
     cells: int | None = None,
+    memory: Memory | None = None,
 ) -> Learner:
     """CMA-ME: CMA-ES that climbs towards new cells of the archive, and restarts from an elite when it finds none.
 
     Args:
-        environment, seed, cells: as in `map_elites`.
+        environment, seed, cells, memory: as in `map_elites`.
         emitters: number of emitters of the improvement type, which take turns; all start at the centre of Pi.
             Deviation: Fontaine et al. have 15, of which each would get some 25 generations in a run on the rod.
         sd: standard deviation of the first generation and after a restart, in sides of Pi; what leaves Pi is clipped.
@@ -92,13 +97,14 @@ def cma_me(
     if batch is not None:
         check_count("batch", batch, 2)
     rng = stream(seed, "cma-me")
-    archive = _archive(environment, rng, cells)
+    memory = start_memory(environment, memory)
+    archive = _archive(environment, rng, cells, memory)
     centre = np.full(environment.policies.dim, 0.5)
     team = [
         EvolutionStrategyEmitter(archive, x0=centre, sigma0=sd, ranker="2imp", batch_size=batch, seed=_seed(rng))
         for _ in range(check_count("emitters", emitters, 1))
     ]
-    return _learner(environment, archive, team, "cma-me")
+    return Learner(memory, QualityDiversity(environment.policies, archive, team, "cma-me"))
 
 
 class QualityDiversity:
@@ -140,12 +146,17 @@ class QualityDiversity:
         self._outcomes: list[Array] = []
 
     def _tell(self) -> None:
-        objectives, outcomes = -np.square(self._batch - 0.5).mean(axis=1), np.stack(self._outcomes)
+        objectives, outcomes = _objectives(self._batch), np.stack(self._outcomes)
         added = self.archive.add(self._batch, objectives, outcomes)
         self._emitter.tell(self._batch, objectives, outcomes, added)
 
 
-def _archive(environment: Environment, rng: np.random.Generator, cells: int | None) -> GridArchive:
+def _objectives(thetas: Array) -> Array:
+    """``(n,)`` of thetas in sides of Pi."""
+    return -np.square(thetas - 0.5).mean(axis=1)
+
+
+def _archive(environment: Environment, rng: np.random.Generator, cells: int | None, memory: Memory) -> GridArchive:
     if environment.contexts.dim:
         raise ValueError(f"quality diversity knows one context only, got contexts of dim {environment.contexts.dim}")
     outcomes = environment.outcomes
@@ -153,15 +164,13 @@ def _archive(environment: Environment, rng: np.random.Generator, cells: int | No
     if cells**outcomes.dim > _MAX_CELLS:
         raise ValueError(f"cells must be {_MAX_CELLS} in all at most, got {cells} in {outcomes.dim} dimensions")
     ranges = list(zip(outcomes.low, outcomes.high, strict=True))
-    return GridArchive(
+    archive = GridArchive(
         solution_dim=environment.policies.dim, dims=[cells] * outcomes.dim, ranges=ranges, seed=_seed(rng)
     )
-
-
-def _learner(environment: Environment, archive: GridArchive, emitters: Sequence[EmitterBase], origin: str) -> Learner:
-    check_rest(environment)
-    memory = Memory(environment.contexts.dim, environment.policies.dim, environment.outcomes.dim)
-    return Learner(memory, QualityDiversity(environment.policies, archive, emitters, origin))
+    if len(memory):
+        thetas = (memory.thetas - environment.policies.low) / environment.policies.sides
+        archive.add(thetas, _objectives(thetas), memory.outcomes)
+    return archive
 
 
 def _seed(rng: np.random.Generator) -> int:
