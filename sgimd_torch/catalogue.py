@@ -140,6 +140,7 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
         ),
         "planar-arm-7": _at("runs.tasks:planar_arm", "7 joints, no noise", fixed={"n_joints": 7}),
         "planar-arm-50": _at("runs.tasks:planar_arm", "50 joints, no noise", fixed={"n_joints": 50}),
+        "swimmer": _at("runs.tasks:swimmer", "gymnasium's Swimmer-v5: three links, two motors (extra gym)"),
     },
     "goals": {
         "interest-map": _at("goals.interest_map:InterestMap", "where competence changes, in regions", uses=_PROGRESS),

@@ -45,6 +45,7 @@ LIBRARIES = {  # library: the only rooms that may import it; of a folder, where 
     "cma": {"searches/cma_es"},
     "sklearn": {"goals/alp_gmm"},
     "ribs": {"rivals/quality_diversity"},
+    "gymnasium": {"environments/from_gymnasium", "environments/to_gymnasium"},
 }
 WORLDS = {"environments"}
 PROTOCOL = "environments.protocol"  # what works with every environment
@@ -215,7 +216,18 @@ def loaded_by(program: str) -> set[str]:
     return set(subprocess.run(words, capture_output=True, text=True, check=True).stdout.split())
 
 
-HEAVY = {"torch", "lightning", "pytorch_lightning", "matplotlib", "tensorboard", "sklearn", "cma", "ribs", "jinja2"}
+HEAVY = {
+    "torch",
+    "lightning",
+    "pytorch_lightning",
+    "matplotlib",
+    "tensorboard",
+    "sklearn",
+    "cma",
+    "ribs",
+    "jinja2",
+    "gymnasium",
+}
 
 
 def test_importing_the_package_loads_no_heavy_library():

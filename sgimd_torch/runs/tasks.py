@@ -29,6 +29,7 @@ from sgimd_torch.spaces import Array, Box, Demonstration, stream
 if TYPE_CHECKING:
     from sgimd_torch.environments.fishing_rod import FishingRod
 
+DATA: Final = SHIPPED_BENCHMARK.parent
 SIDE: Final = 0.1  # m, of a benchmark tile; it leaves 311 goals in the disc of radius 1 m that these arms reach
 SHOWN: Final = 127  # demonstrations, as many as each shipped demonstrator recorded
 SAMPLES: Final = 5  # of each of them
@@ -78,6 +79,14 @@ def planar_arm(*, n_joints: int) -> Task:
     """An arm without noise; its outcome is the position of its end."""
     arm = PlanarArm(n_joints)
     return Task(arm, partial(arm_benchmark, arm), partial(arm_demonstrations, arm), arm.correspondence, None, n_joints)
+
+
+def swimmer() -> Task:
+    """gymnasium's Swimmer-v5; its demonstrations are torques."""
+    from sgimd_torch.environments.swimmer import Swimmer  # gymnasium is loaded only when it is needed
+
+    robot, goals, shown = Swimmer(), DATA / "swimmer_benchmark.npz", DATA / "swimmer_demonstrations.npz"
+    return Task(robot, goals, shown, misfit=robot.misfit, n_joints=2)
 
 
 def arm_benchmark(arm: PlanarArm) -> Benchmark:
