@@ -71,16 +71,16 @@ def _sizes(task: Task) -> list[str]:
     execute_many(robot, contexts, thetas, rngs)
     milliseconds = 1e3 * (time.perf_counter() - begun) / TIMED
     dims = f"context {robot.contexts.dim}, theta {robot.policies.dim}, outcome {robot.outcomes.dim}"
-    goals, _ = benchmark_of(task, None)
-    own = "of its own" if task.benchmark is not None else "all over T, as it has none"
+    goals, notes, _ = benchmark_of(task, None)
     return [
         f"  dimensions: {dims}; {milliseconds:.3g} ms a movement, {TIMED} together",
-        f"  goals of evaluation: {len(goals.goals)} {own}",
+        f"  goals of evaluation: {len(goals.goals)}",
+        *(f"  {note}" for note in notes),
     ]
 
 
 def _lessons(task: Task) -> list[str]:
     if task.demonstrations is None:
         return ["  demonstrations: none"]
-    shown, misfits, _ = demonstrations_of(task, None)
-    return [f"  demonstrations: {len(shown)}, misfit {max(misfits):.3g} rad at most"]
+    shown, notes, _ = demonstrations_of(task, None)
+    return [f"  demonstrations: {len(shown)}", *(f"  {note}" for note in notes)]

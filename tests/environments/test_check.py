@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import sgimd_torch
-from sgimd_torch.__main__ import COMMANDS, HELP
+from sgimd_torch.__main__ import _call
 from sgimd_torch.environments.check import check_environment
 from sgimd_torch.environments.protocol import check_movement
-from sgimd_torch.runs.process import dispatch
+from sgimd_torch.runs.process import command
 from sgimd_torch.spaces import Box
 
 
@@ -281,11 +281,11 @@ def arms(tmp_path, monkeypatch):
 
 
 def test_the_command_says_what_it_found(capsys):
-    assert dispatch("sgimd", COMMANDS, HELP, ["check", "planar-arm-7", "--movements", "2"]) == 0
+    assert command(_call, ["check", "planar-arm-7", "--movements", "2"]) == 0
     said = capsys.readouterr().out
     assert re.search(
         r"PlanarArm keeps every promise\n.*context 0, theta 7, outcome 2; .* ms a movement.*\n"
-        r".*311 of its own\n.*127, misfit 0",
+        r".*goals of evaluation: 311\n.*demonstrations: 127",
         said,
     )
 
@@ -305,14 +305,14 @@ def test_the_command_says_what_it_found(capsys):
     ],
 )
 def test_the_command_refuses_with_exit_code_2_and_no_traceback(arms, capsys, words, told):
-    assert dispatch("sgimd", COMMANDS, HELP, ["check", *words]) == 2
+    assert command(_call, ["check", *words]) == 2
     said = capsys.readouterr().err
     assert told in said
     assert "Traceback" not in said
 
 
 def test_its_help_says_every_promise(capsys):
-    assert dispatch("sgimd", COMMANDS, HELP, ["check", "--help"]) == 0
+    assert command(_call, ["check", "--help"]) == 0
     said = capsys.readouterr().out
     for word in ("rest", "outcome_noise", "execute_many", "carries over", "mypackage.toss:make", "Exit code"):
         assert word in said
