@@ -45,6 +45,7 @@ LIBRARIES = {  # library: the only rooms that may import it; of a folder, where 
     "cma": {"searches/cma_es"},
     "sklearn": {"goals/alp_gmm"},
     "ribs": {"rivals/quality_diversity"},
+    "pyarrow": {"demonstrations/lerobot"},
     "gymnasium": {"environments/from_gymnasium", "environments/to_gymnasium"},
 }
 WORLDS = {"environments"}
