@@ -16,7 +16,7 @@ from sgimd_torch.inverses.locally_linear import LocallyLinear
 from sgimd_torch.learner import Learner, ReplayError
 from sgimd_torch.learner.life import Kind, read_life
 from sgimd_torch.memory import Memory
-from sgimd_torch.rivals.quality_diversity import cma_me, map_elites
+from sgimd_torch.rivals.quality_diversity import cma_mae, cma_me, isoline, map_elites
 from sgimd_torch.searches.cma_es import cma_es
 from sgimd_torch.searches.through_model import gradient_search
 from sgimd_torch.session import run
@@ -31,6 +31,7 @@ LEARNERS = {
     **{name: (partial(build, ARM), name in TAUGHT, ARM) for name, build in ALGORITHMS.items()},
     "map-elites": (partial(map_elites, ARM, first=20), False, ARM),
     "cma-me": (partial(cma_me, ARM), False, ARM),
+    "isoline": (partial(isoline, ARM, first=20, again=0.2, correspondence=last_posture), True, ARM),
     "alp-gmm and cma-es": (partial(sagg_riac, ARM, goals=AlpGmm, search=cma_es), False, ARM),
     "contexts": (partial(sgim_d, TURNED, correspondence=last_posture), True, TURNED),
 }
@@ -290,7 +291,7 @@ def test_lessons_that_differ_in_shape_cannot_be_saved_and_leave_the_old_file(tmp
     assert len(list(tmp_path.iterdir())) == 1
 
 
-@pytest.mark.parametrize("build", [random_exploration, sagg_riac, map_elites, cma_me])
+@pytest.mark.parametrize("build", [random_exploration, sagg_riac, map_elites, cma_me, cma_mae, isoline])
 def test_a_learner_starts_from_a_memory_and_leaves_it_as_it_was(build):
     start = exemplars(30)
     learner = build(ARM, 0, memory=start)
