@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from sgimd_torch.forward_model.model import ForwardModel
 
 LEAST_NOISE: Final = 0.01  # m; predictions are not better than this, even if outcomes have no noise
-_OF_THE_ROBOT: Final = {"policies", "correspondence"}
+_OF_THE_ROBOT: Final = {"policies", "outcome_noise", "correspondence"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,8 +131,8 @@ class _Parts:
 
     def _shared(self, name: str) -> Any:
         robot = self._task.environment
-        if name == "policies":
-            return robot.policies
+        if name in ("policies", "outcome_noise"):
+            return getattr(robot, name)
         if name == "correspondence":
             return correspondence_of(self._task)
         entry = SHARED[name]
