@@ -78,7 +78,8 @@ def toss(*, noise: float = 0.03) -> Toy:
         return np.stack([distance * np.sin(direction) + blown, distance * np.cos(direction)], axis=-1)
 
     weak = np.array([0.5, 0.5, 0.0, 0.0])
-    return Toy(Box.cube(-1, 1, 1), Box.cube(0, 1, 4), Box(np.array([-5.0, 0.0]), np.array([5.0, 5.0])), landing, weak, noise)
+    floor = Box(np.array([-5.0, 0.0]), np.array([5.0, 5.0]))
+    return Toy(Box.cube(-1, 1, 1), Box.cube(0, 1, 4), floor, landing, weak, noise)
 
 
 def crawler(*, noise: float = 0.02) -> Toy:
