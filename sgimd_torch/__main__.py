@@ -13,6 +13,7 @@ COMMANDS: Final = {
     "sweep": Command(
         "sgimd_torch.runs.sweep", "many runs: options crossed with each other and with seeds, in parallel"
     ),
+    "suite": Command("sgimd_torch.views.suite", "one learner on many robots, against random movements", "plot"),
     "table": Command("sgimd_torch.views.table", "results of runs, over their seeds"),
     "report": Command(
         "sgimd_torch.views.report.command", "one page about one run, or about many side by side", "report"
