@@ -98,6 +98,12 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
             "algorithms:random_exploration", "uniform movements", ignores=_AIM, label="Random", colour="#7f7f7f"
         ),
         "sagg-riac": _at("algorithms:sagg_riac", "goal babbling", uses=_PURSUES, label="SAGG-RIAC", colour="#0072b2"),
+        "practice": _at(
+            "algorithms:practice",
+            "one movement a goal, as a local process answers; evaluate it with --inverse process",
+            label="Practice",
+            colour="#332288",
+        ),
         "observation": _at(
             "algorithms:observation",
             "watches and remembers, never moves",
@@ -177,6 +183,7 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
             fixed={"noise": 0.0, "complete": True},
         ),
         "perturb": _at("searches.perturb:perturb", "the best so far plus noise"),
+        "practice": _at("searches.perturb:practise", "what the inverse model infers plus a little noise"),
         "cma-es": _at("searches.cma_es:cma_es", "an evolution strategy (extra rivals)"),
         "gradient": _at(
             "searches.through_model:gradient_search",

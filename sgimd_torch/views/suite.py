@@ -94,8 +94,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         build(config)  # a wrong option is refused before anything starts
     failures = sweep(left, options.processes, flags=flags)
     errors = errors_of([config for config in configs if finished(config)])
-    print(table(errors))
-    say(*(f"figure: {path}" for path in draw(errors, out / "suite")))
+    if errors:
+        print(table(errors))
+        say(*(f"figure: {path}" for path in draw(errors, out / "suite")))
     say(f"{len(left) - len(failures)} runs ended well, {len(failures)} failed: {out}", *failures)
     return 1 if failures else 0
 
@@ -135,13 +136,18 @@ def errors_of(configs: Sequence[Config]) -> dict[str, dict[str, dict[int, Array]
     found: dict[str, dict[str, dict[int, list[float]]]] = {}
     for config in configs:
         run = read_run(config.directory).evaluation
-        curve = found.setdefault(config.out.name, {}).setdefault(config.variant, {})
+        curve = found.setdefault(titled(config.out.name), {}).setdefault(config.variant, {})
         for movements, error in zip(run["movements"], run["mean_error_m"], strict=True):
             curve.setdefault(int(movements), []).append(float(error))
     return {
         task: {name: {at: np.array(values) for at, values in curve.items()} for name, curve in learners.items()}
         for task, learners in found.items()
     }
+
+
+def titled(task: str) -> str:
+    """The name of a task, marked if it is new."""
+    return task + " (new)" * TASKS[task].new
 
 
 def where(config: Config) -> str:
@@ -154,7 +160,7 @@ def _options(argv: Sequence[str] | None) -> tuple[argparse.Namespace, list[str]]
         prog="sgimd suite",
         usage="%(prog)s [--tasks TASK ...] [--vary OPTION=VALUE,VALUE ...] [--seeds SEEDS] [--OPTION VALUE ...]",
         description=__doc__,
-        epilog="tasks: " + ", ".join(name + " (new)" * task.new for name, task in TASKS.items()),
+        epilog="tasks: " + ", ".join(map(titled, TASKS)),
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )

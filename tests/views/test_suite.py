@@ -97,16 +97,16 @@ def test_a_suite_is_run_shown_and_gone_on_with(tmp_path, capsys):
 
 
 def test_seeds_give_the_ratio_of_means_and_an_interval_around_it():
-    found = relative(errors(random_nearest=[0.2, 0.4], mine=[0.1, 0.14])["toss"], "mine", 100)
+    found = relative({100: np.array([0.1, 0.14])}, {100: np.array([0.2, 0.4])}, 100)
     assert found.value == pytest.approx(0.4)
     assert 0.1 / 0.4 <= found.low < 0.4 < found.high <= 0.14 / 0.2
-    alone = relative(errors(random_nearest=[0.2], mine=[0.1])["toss"], "mine", 100)
+    alone = relative({100: np.array([0.1])}, {100: np.array([0.2])}, 100)
     assert alone.low == alone.value == alone.high == pytest.approx(0.5)
 
 
 def test_what_was_not_evaluated_is_a_dash_and_no_mean():
     found = errors(random_nearest=[0.2], mine=[0.1])
-    found["crawler"] = {"random-nearest": {100: np.array([0.5])}}
+    found["crawler (new)"] = {"random-nearest": {100: np.array([0.5])}}
     lines = table(found).splitlines()
     assert lines[1].split() == ["100", "toss", "0.2", "0.50"]
     assert lines[2].split() == ["100", "crawler", "(new)", "0.5", "-"]
@@ -115,7 +115,7 @@ def test_what_was_not_evaluated_is_a_dash_and_no_mean():
 
 def test_the_figure_has_a_panel_for_each_task_with_a_curve_for_each_learner():
     found = errors(random_nearest=[0.2], mine=[0.1], other=[0.3])
-    found["crawler"] = found["toss"]
+    found["crawler (new)"] = found["toss"]
     panels = [ax for ax in figure(found).axes if ax.axison]
     assert [ax.get_title() for ax in panels] == ["toss", "crawler (new)"]
     assert [line.get_label() for line in panels[0].lines] == [RANDOM, "mine", "other"]
