@@ -23,18 +23,20 @@ from functools import partial
 from pathlib import Path
 from typing import Final
 
-import jinja2
-import numpy as np
+from sgimd_torch.runs.process import command, loading
 
-from anova import anova_cells, update_anova
-from judging import NotRun, Results, Verdict, judge
-from model_claims import MODEL_CLAIMS, SIMPLEX
-from paper_claims import PAPER_CLAIMS
-from read_results import LAST, Evaluated, ResultsError, read_coverages, read_goals, read_results
-from sgimd_torch.files import make_folder, write_text
-from sgimd_torch.runs.process import command
-from sgimd_torch.views.statistics import iqm_interval, metres, rng, show
-from variants import EXPERIMENTS
+with loading():  # Ctrl-C shows no traceback
+    import jinja2
+    import numpy as np
+
+    from anova import anova_cells, update_anova
+    from judging import NotRun, Results, Verdict, judge
+    from model_claims import MODEL_CLAIMS, SIMPLEX
+    from paper_claims import PAPER_CLAIMS
+    from read_results import LAST, Evaluated, ResultsError, read_coverages, read_goals, read_results
+    from sgimd_torch.files import make_folder, write_text
+    from sgimd_torch.views.statistics import iqm_interval, metres, rng, show
+    from variants import EXPERIMENTS
 
 TEMPLATES: Final = Path(__file__).with_name("pages")
 PAGES: Final = ("RESULTS", "FORWARD_MODEL")

@@ -17,17 +17,19 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
-import numpy as np
+from sgimd_torch.runs.process import command, loading, say
 
-from sgimd_torch.catalogue import did_you_mean
-from sgimd_torch.files import make_folder
-from sgimd_torch.runs.config import Config
-from sgimd_torch.runs.log import RunError
-from sgimd_torch.runs.process import command, say
-from sgimd_torch.runs.read import finished, read_run
-from sgimd_torch.runs.sweep import add_options, sweep, title
-from tables import GOALS, RESULTS, Key, Table, as_text, goal_row, result_rows
-from variants import EXPERIMENTS, FEW, HALF, make_subsets, tables_of
+with loading():  # Ctrl-C shows no traceback
+    import numpy as np
+
+    from sgimd_torch.catalogue import did_you_mean
+    from sgimd_torch.files import make_folder
+    from sgimd_torch.runs.config import Config
+    from sgimd_torch.runs.log import RunError
+    from sgimd_torch.runs.read import finished, read_run
+    from sgimd_torch.runs.sweep import add_options, sweep
+    from tables import GOALS, RESULTS, Key, Table, as_text, goal_row, result_rows
+    from variants import EXPERIMENTS, FEW, HALF, make_subsets, tables_of
 
 EXAMPLES: Final = f"""experiments: {", ".join(EXPERIMENTS)}
 
@@ -63,7 +65,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     where = " and ".join(str(options.results / table) for table in names)
     say(f"{len(wanted)} runs, {len(wanted) - len(left)} of them in {where} already")
     if options.dry_run:
-        print("".join(f"{name}: {title(config)}\n" for name, config in left), end="")
+        print("".join(f"{name}: {config.title}\n" for name, config in left), end="")
         return 0
     make_folder(options.results)
     make_subsets(options.out / "demonstrations")
@@ -104,7 +106,7 @@ def verify(wanted: Sequence[tuple[str, Config]], options: argparse.Namespace) ->
         again[number] = replace(config, movements=movements, evaluate_at=(movements,), out=out)
     say(f"{len(again)} rows of {len(found)}, made again in {options.out}/verify-{options.lot}")
     if options.dry_run:
-        print("".join(f"{title(config)} at {config.movements}\n" for config in again.values()), end="")
+        print("".join(f"{config.title} at {config.movements}\n" for config in again.values()), end="")
         return 0
     make_subsets(options.out / "demonstrations")
     failures = sweep(list(again.values()), options.processes)

@@ -23,25 +23,27 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
+from sgimd_torch.runs.process import command, loading
 
-from judging import NotRun, Results
-from read_results import LAST, LEARNERS, read_results, read_seeds
-from sgimd_torch.demonstrations import SHIPPED, load_demonstrations
-from sgimd_torch.environments.fishing_rod import JOINTS
-from sgimd_torch.figures import movements as plots_of_movements
-from sgimd_torch.figures.learning import COLOURS, NAMES, count_bar, landing_points, tile_counts
-from sgimd_torch.figures.results import Difference, SeedCurves, forest, goal_distances, goal_histogram, seed_curves
-from sgimd_torch.figures.save import save_figure
-from sgimd_torch.files import make_folder
-from sgimd_torch.runs.process import command
-from sgimd_torch.runs.read import Run
-from sgimd_torch.spaces import Array, Box
-from sgimd_torch.views.statistics import Interval, iqm_interval, paired_differences, rng
-from variants import shipped
+with loading():  # Ctrl-C shows no traceback
+    import numpy as np
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+
+    from judging import NotRun, Results
+    from read_results import LAST, LEARNERS, read_results, read_seeds
+    from sgimd_torch.demonstrations import SHIPPED, load_demonstrations
+    from sgimd_torch.environments.fishing_rod import JOINTS
+    from sgimd_torch.figures import movements as plots_of_movements
+    from sgimd_torch.figures.learning import COLOURS, NAMES, count_bar, landing_points, tile_counts
+    from sgimd_torch.figures.results import Difference, SeedCurves, forest, goal_distances, goal_histogram, seed_curves
+    from sgimd_torch.figures.save import save_figure
+    from sgimd_torch.files import make_folder
+    from sgimd_torch.runs.read import Run
+    from sgimd_torch.spaces import Array, Box
+    from sgimd_torch.views.statistics import Interval, iqm_interval, paired_differences, rng
+    from variants import shipped
 
 BAND = "thick: interquartile mean, band: its 95 % interval, thin: seeds"
 DEMONSTRATORS = {

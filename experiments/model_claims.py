@@ -1,7 +1,7 @@
 """The claims about the forward model in results/FORWARD_MODEL.md, for each of the judged variants.
 
 How honest the predicted spread is comes from the table that model_figures.py makes. The cost of a model is in no table:
-scripts/bench_forward_model.py measures it.    for verdict in judge(MODEL_CLAIMS, results): print(verdict.verdict)
+scripts/bench_run.py measures it.    for verdict in judge(MODEL_CLAIMS, results): print(verdict.verdict)
 """
 
 from __future__ import annotations

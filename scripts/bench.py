@@ -1,4 +1,5 @@
-"""What the library costs: the learner's work a movement, how it grows, evaluations, and what execute adds to physics.
+"""What the library costs: the learner's work a movement, how it grows, evaluations, what execute adds to physics, and
+what a replay costs.
 
 The learner's overhead is all that a run does besides executing movements and evaluating: choosing the teacher's
 demonstration, asking, telling, watching. It learns on a planar arm, whose own time does not count, with 25 joints for
@@ -21,6 +22,7 @@ import os
 import resource
 import subprocess
 import sys
+import tempfile
 import time
 import zlib
 from collections.abc import Callable
@@ -167,8 +169,8 @@ def evaluation() -> Figures:
     return {"evaluation (s)": time.process_time() - begun, "noise floor of it (m)": found.noise_floor}
 
 
-def movement(n: int = 200) -> Figures:
-    """``execute`` of the fishing rod against the same steps in C alone, in turns, the best of three readings each."""
+def movement(n: int = 60) -> Figures:
+    """``execute`` of the fishing rod against the same steps in C alone, in turns, the best of 15 readings each."""
     from mujoco import rollout
 
     from sgimd_torch import FishingRod, stream
@@ -187,7 +189,7 @@ def movement(n: int = 200) -> Figures:
         rod.execute(np.zeros(0), theta, stream(1, "bench", i))
         rollout.Rollout.rollout = step
         readings = []
-        for _ in range(3):
+        for _ in range(15):
             rng = stream(1, "bench", i)
             begun = time.process_time()
             rod.execute(np.zeros(0), theta, rng)
@@ -201,8 +203,22 @@ def movement(n: int = 200) -> Figures:
     return {"execute (ms)": 1000 * ours / n, "execute over C stepping": ours / alone}
 
 
+def resume(inverse: str, movements: int) -> Figures:
+    """A run on the fishing rod without evaluations, and its replay once it has ended: processor time of each."""
+    words = f"-m sgimd_torch run --inverse {inverse} --movements {movements} --evaluate-at [] --out runs".split()
+    used = [0.0]
+    with tempfile.TemporaryDirectory() as folder:
+        for more in ([], ["--resume"]):
+            subprocess.run([sys.executable, *words, *more], cwd=folder, capture_output=True, check=True)
+            used.append(sum(resource.getrusage(resource.RUSAGE_CHILDREN)[:2]))
+    fresh, replayed = np.diff(used)
+    what = f"--inverse {inverse}, {movements} movements"
+    return {f"run, {what} (s)": fresh, f"replay over run, {what}": replayed / fresh}
+
+
 PARTS: dict[str, Callable[..., Figures]] = {
-    "overhead": overhead, "growth": growth, "recall": recall, "evaluation": evaluation, "movement": movement
+    "overhead": overhead, "growth": growth, "recall": recall, "evaluation": evaluation, "movement": movement,
+    "resume": resume,
 }  # fmt: skip
 
 
@@ -266,6 +282,8 @@ def arguments_of(part: str, rows: list[int]) -> list[list[Any]]:
         return [[*who, rows] for who in (("sagg-riac", 25), ("sagg-riac", 50), ("sgim-d", 7), ("sgim-d", 25))]
     if part == "recall":
         return [[*who, rows[:2]] for who in (("sgim-d", 25), ("sagg-riac", 50))]
+    if part == "resume":
+        return [["linear", 5000], ["model", 5000]]
     return [[]]
 
 

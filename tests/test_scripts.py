@@ -59,7 +59,7 @@ def test_what_makes_no_sense_is_refused_and_nothing_is_written(tmp_path, monkeyp
 @pytest.fixture(scope="module")
 def pool():
     """What two SAGG-RIAC learners remember after 30 movements each, as far as it lies in T."""
-    memories = [make_teachers.memory_of(seed, 30) for seed in (4000, 4001)]
+    memories = [make_benchmark.memory_of("sagg-riac", seed, 30) for seed in (4000, 4001)]
     thetas, outcomes = (np.concatenate(parts) for parts in zip(*memories, strict=True))
     inside = FishingRod().outcomes.contains(outcomes)
     return thetas[inside], outcomes[inside]

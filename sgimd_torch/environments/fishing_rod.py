@@ -30,7 +30,7 @@ HOLD = 0.15  # s, how long the last posture is held before the line is let out
 CORRELATION = 0.96  # of the motor noise from one step to the next
 LONGEST = 60.0  # s, the longest recording that can be replayed
 
-_BLOCK = 128  # movements side by side: little memory, and Ctrl-C works between two blocks
+_BLOCK = 32  # movements side by side: of about the same length, little memory, and Ctrl-C works between two blocks
 
 
 class FishingRod:

@@ -11,7 +11,7 @@ import importlib.util
 import json
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -234,6 +234,11 @@ class Config:
         return self.out / self.variant / f"seed-{self.seed:03d}"
 
     @property
+    def title(self) -> str:
+        """The name of the run in messages."""
+        return f"{self.variant} seed {self.seed}"
+
+    @property
     def evaluations(self) -> list[int]:
         """The numbers of movements after which to evaluate, in order."""
         if self.evaluate_at == ():
@@ -257,7 +262,8 @@ class Config:
                 entry = self.entry(name)
                 ignored |= {*entry.ignores}
                 waiting += [each for each in entry.options if each not in used]
-        named = {each for entry in _entries() for each in entry.options}
+        entries = [*SHARED.values(), *(entry for entries in CATALOGUE.values() for entry in entries.values())]
+        named = {each for entry in entries for each in entry.options}
         return (used | {each.name for each in fields(self)} - named) - ignored
 
     @property
@@ -289,17 +295,16 @@ class Config:
             return f"with --{dashed(chosen[0])} {getattr(self, chosen[0])}"
         return self._why_not(users[0], used)
 
-    def words(self) -> list[str]:
-        """The command line of ``sgimd run`` that makes this run: every option that is not at its default."""
-        return words(vars(self))
-
 
 def words(settings: Mapping[str, Any]) -> list[str]:
-    """``--dashed-name=value`` for every option of a ``Config``, or of a config.json, that is not at its default."""
+    """The command line of ``sgimd run`` for these settings, of ``vars(config)`` or of a config.json.
+
+    ``--dashed-name=value`` for every option that is not at its default.
+    """
     found = []
     for each in fields(Config):
-        value = _plain(settings.get(each.name, each.default))
-        if value != _plain(each.default):
+        value = plain(settings.get(each.name, each.default))
+        if value != plain(each.default):
             text = value if isinstance(value, str) else json.dumps(value, separators=(",", ":"))
             found.append(f"--{dashed(each.name)}={text}")
     return found
@@ -343,10 +348,6 @@ def dashed(name: str) -> str:
     return name.replace("_", "-")
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """As json has it."""
     return json.loads(json.dumps(value, default=str))
-
-
-def _entries() -> Sequence[Entry]:
-    return [*SHARED.values(), *(entry for entries in CATALOGUE.values() for entry in entries.values())]

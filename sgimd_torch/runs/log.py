@@ -109,6 +109,20 @@ class Columns:
         contexts, thetas, goals, outcomes = np.split(values, ends[:-1], axis=1)
         return contexts, thetas, goals, outcomes
 
+    def difference(self, recorded: bytes, now: bytes) -> str:
+        """Of two lines that should be the same: which columns differ, the first three in full."""
+        were, are = (line.decode().split(",")[:-1] for line in (recorded, now))
+        differences = [
+            f"{name} was {old or 'empty'}, now {new or 'empty'}"
+            for name, old, new in zip(self.names, were, are, strict=True)
+            if old != new
+        ]
+        more = f"; and {len(differences) - 3} more" if len(differences) > 3 else ""
+        return (
+            f"movement {were[0]} is replayed otherwise than recorded: {'; '.join(differences[:3])}{more}. "
+            "Was it recorded by another version, or on another processor?"
+        )
+
     def recorded(self, lines: Sequence[bytes]) -> list[Recorded]:
         """What ``session.replay`` needs of these lines."""
         _, thetas, _, outcomes = self.split([line.decode().split(",")[:-1] for line in lines])

@@ -30,7 +30,7 @@ from sgimd_torch.catalogue import ROD
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.process import loading, say
 from sgimd_torch.runs.read import finished, movements_on_disk, read_run
-from sgimd_torch.runs.sweep import add_options, sweep, title, variants_of
+from sgimd_torch.runs.sweep import add_options, sweep, variants_of
 
 if TYPE_CHECKING:
     from sgimd_torch.spaces import Array
@@ -85,7 +85,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     say(f"{len(configs)} runs, {len(configs) - len(left)} of them finished: {out}")
     if options.dry_run:
         for config in left:
-            print(f"{where(config)}: {movements_on_disk(config.directory)} of {config.movements} movements")
+            done = movements_on_disk(config.directory)
+            print(f"{config.out.name}: {config.title}: {done} of {config.movements} movements")
         return 0
     with loading():
         from sgimd_torch.runs.build import build  # after --help
@@ -148,11 +149,6 @@ def errors_of(configs: Sequence[Config]) -> dict[str, dict[str, dict[int, Array]
 def titled(task: str) -> str:
     """The name of a task, marked if it is new."""
     return task + " (new)" * TASKS[task].new
-
-
-def where(config: Config) -> str:
-    """A run in messages."""
-    return f"{config.out.name}: {title(config)}"
 
 
 def _options(argv: Sequence[str] | None) -> tuple[argparse.Namespace, list[str]]:

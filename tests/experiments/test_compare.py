@@ -17,7 +17,7 @@ from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.files import locked
 from sgimd_torch.runs.command_line import parse
-from sgimd_torch.runs.config import Config
+from sgimd_torch.runs.config import Config, words
 from sgimd_torch.runs.log import RunError
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import Run, read_run
@@ -266,7 +266,7 @@ def test_every_variant_is_a_valid_run_with_its_own_name_in_its_table(tmp_path):
     assert all(config == configs[config.directory] for _, config in wanted)  # one directory, one run
     assert {name for name, _ in wanted if tables_of(name)[0] == "forward_model.csv"} == {"forward-model", *ARMS}
     for _, config in wanted:
-        assert parse(config.words())[0] == config
+        assert parse(words(vars(config)))[0] == config
 
 
 def test_teachers_have_the_number_of_the_demonstrator_or_the_name_of_the_file(tmp_path):

@@ -368,15 +368,17 @@ def test_a_run_that_another_process_writes_is_left_alone(tmp_path, go, capsys):
     assert go(tmp_path, "--resume") == 0
 
 
-def test_a_full_disk_is_reported_and_the_run_can_go_on(tmp_path, go, benchmark, reference):
+@pytest.mark.parametrize("watched", ["false", "true"])
+def test_a_full_disk_is_reported_and_the_run_can_go_on(tmp_path, go, benchmark, reference, watched):
     directory = tmp_path / "sgim-d" / "seed-003"
-    process = start(EAGER, *arguments(tmp_path, benchmark), limit="-f 24")  # KiB a file may have
+    process = start(EAGER, *arguments(tmp_path, benchmark), "--board", watched, limit="-f 24")  # KiB a file may have
     _, errors = process.communicate()
     assert process.returncode == 1
     assert "cannot be written" in errors
     assert "Traceback" not in errors
-    assert (directory / "episodes.csv").stat().st_size == 24 * 1024
-    assert go(tmp_path, "--resume") == 0
+    sizes = {path.name.partition(".")[0]: path.stat().st_size for path in directory.iterdir()}
+    assert sizes["events" if watched == "true" else "episodes"] == 24 * 1024
+    assert go(tmp_path, "--board", watched, "--resume") == 0
     assert csv_of(directory) == reference
 
 
