@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from scipy.stats import qmc
 
 from sgimd_torch.algorithms import Correspondence
 from sgimd_torch.demonstrations import SHIPPED as SHIPPED_DEMONSTRATIONS
@@ -127,6 +126,8 @@ def goals_all_over(environment: Environment) -> Benchmark:
         steps = (np.arange(per_side) + 0.5) / per_side
         points = np.stack(np.meshgrid(*[steps] * box.dim), axis=-1).reshape(-1, box.dim)
     else:
+        from scipy.stats import qmc  # takes longer to import than this whole library
+
         points = qmc.Sobol(box.dim, scramble=False).random_base2(int(np.log2(MOST_GOALS)))[1:]
     return Benchmark(type(environment).__name__, box.low + points * box.sides, float(box.sides.max()) / per_side)
 
