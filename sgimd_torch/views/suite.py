@@ -72,7 +72,7 @@ REFERENCES: Final[dict[str, dict[str, Any]]] = {
         "budget": 1,
     },
 }
-DEFAULTS: Final = {"algorithm": "sagg-riac", "movements": "1000", "repeats": "0", "out": "runs/suite"}
+DEFAULTS: Final = {"algorithm": "sagg-riac", "movements": "1000", "repeats": "0", "answers": "own", "out": "runs/suite"}
 OWN: Final = ("environment", "task-space", "benchmark", "demonstrations", "name")
 
 
@@ -119,7 +119,9 @@ def runs_of(options: argparse.Namespace, rest: Sequence[str]) -> tuple[list[Conf
     words = [*(f"--{name}={value}" for name, value in DEFAULTS.items() if name not in given), *rest]
     learners, flags = variants_of(options.vary, words)
     first = learners[0]
-    shared = {name: getattr(first, name) for name in ("movements", "evaluate_at", "repeats", "floor_at", "out")}
+    shared = {
+        name: getattr(first, name) for name in ("movements", "evaluate_at", "answers", "repeats", "floor_at", "out")
+    }
     others = [Config(name=name, **line, **shared) for name, line in REFERENCES.items()]
     configs = [
         replace(each, seed=seed, name=each.variant, out=each.out / task, **TASKS[task].options)
