@@ -9,7 +9,7 @@ tasks only; the others are marked "new".
   sgimd suite                                             the default learner on the tasks that need no physics
   sgimd suite --seeds 0-9 --movements 2000 --out study    runs go to study/TASK/NAME/seed-000
   sgimd suite --vary inverse=linear,process --seeds 0-4   which inverse model?
-  sgimd suite --tasks all                                 with the fishing rod, which takes minutes a run
+  sgimd suite --tasks all                                 with fishing rod and swimmer (extra gym): minutes a run
   sgimd suite --tasks toss crawler --algorithm sagg-riac --budget 4
   sgimd table study/toss                                  one task in its own unit
 
@@ -57,6 +57,7 @@ TASKS: Final[dict[str, Suited]] = {
     "two-elbows": _robot("two-elbows"),
     "half-reached": _robot("half-reached"),
     "rod-large": Suited({"environment": ROD, "task_space": 100.0}, new=True, quick=False),
+    "swimmer": Suited({"environment": "swimmer"}, new=True, quick=False),
     "planar-arm-7": _robot("planar-arm-7", new=True),
     "crawler": _robot("crawler", new=True),
     "spatial-arm": _robot("spatial-arm", new=True),
