@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from contracts import check_environment
 
 from sgimd_torch.catalogue import CATALOGUE
+from sgimd_torch.environments.check import check_environment
 from sgimd_torch.environments.toys import GRAVITY, Toy, crawler, spatial_arm, toss, two_elbows
 from sgimd_torch.runs.build import task_of
 from sgimd_torch.runs.config import Config
