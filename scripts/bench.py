@@ -204,16 +204,16 @@ def movement(n: int = 60) -> Figures:
     return {"execute (ms)": 1000 * ours / n, "execute over C stepping": ours / alone}
 
 
-def resume(inverse: str, movements: int) -> Figures:
-    """A run on the fishing rod without evaluations, and its replay once it has ended: processor time of each."""
-    words = f"-m sgimd_torch run --inverse {inverse} --movements {movements} --evaluate-at [] --out runs".split()
+def resume(inverse: str, evaluate_at: str) -> Figures:
+    """A run on the fishing rod, and its replay once it has ended: processor time of each, that of starting included."""
+    words = f"-m sgimd_torch run --inverse {inverse} --evaluate-at {evaluate_at} --out runs".split()
     used = [0.0]
     with tempfile.TemporaryDirectory() as folder:
         for more in ([], ["--resume"]):
             subprocess.run([sys.executable, *words, *more], cwd=folder, capture_output=True, check=True)
             used.append(sum(resource.getrusage(resource.RUSAGE_CHILDREN)[:2]))
     fresh, replayed = np.diff(used)
-    what = f"--inverse {inverse}, {movements} movements"
+    what = f"--inverse {inverse}, {'no' if evaluate_at == '[]' else 'all'} evaluations"
     return {f"run, {what} (s)": fresh, f"replay over run, {what}": replayed / fresh}
 
 
@@ -307,7 +307,7 @@ def arguments_of(part: str, rows: list[int]) -> list[list[Any]]:
     if part == "recall":
         return [[*who, rows[:2]] for who in (("sgim-d", 25), ("sagg-riac", 50))]
     if part == "resume":
-        return [["linear", 5000], ["model", 5000]]
+        return [[inverse, evaluate_at] for inverse in ("linear", "model") for evaluate_at in ("null", "[]")]
     return [[]]
 
 

@@ -58,7 +58,6 @@ class Part(NamedTuple):
 def child(descriptor: int, words: Sequence[str]) -> int:
     """Be ``sgimd run``, and write to ``descriptor`` when a part of the run begins. Returns the exit code."""
     from sgimd_torch.runs import command_line, process, run
-    from sgimd_torch.runs.board import RunBoard
 
     now = ""
 
@@ -80,10 +79,10 @@ def child(descriptor: int, words: Sequence[str]) -> int:
 
         setattr(owner, name, call)
 
-    telling(run, "open_directory", "replay" if "--resume" in words else "start")
+    telling(run, "RunDirectory", "replay" if "--resume" in words else "start")
     telling(run._Life, "_begin", "", "movements")
     telling(run._Life, "_evaluate", "evaluation", "movements")
-    telling(RunBoard, "finish", "end")
+    telling(process.Progress, "__exit__", "end")
     if "model" in words:
         from sgimd_torch.forward_model.training import OnlineTrainer
 

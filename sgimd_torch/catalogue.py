@@ -75,14 +75,26 @@ _PURSUES: Final = {
     "search": "search",
     "judge": "competence",
     "budget": "budget",
+    "give_up": "give_up",
 }
 _TAUGHT: Final = ("teacher", "demonstrations")
 _SHOWN: Final = {"correspondence": "correspondence"}
 _PROGRESS: Final = {"window": "window", "progress": "progress"}
+_REGIONS: Final = {**_PROGRESS, "g_max": "g_max", "max_aspect": "max_aspect"}
 _MODEL: Final = {"model": "model", "trust": "trust"}
 _REFINED: Final = {**_MODEL, "residual": "residual"}
 _AIM: Final = ("focus",)  # it is the share near the goal pursued: no effect without goals
 _IN_THE_PACKAGE: Final = "sgimd_torch"
+
+
+_IMITATED: Final = {**_SHOWN, "imitations": "imitations", "epsilon": "epsilon"}
+_SCHOOL: Final[tuple[tuple[str, str, dict[str, object], str], ...]] = (  # of quality diversity
+    ("map-elites", "map_elites", {}, "fills an archive of outcomes"),
+    ("isoline", "isoline", {}, "the same along lines between elites"),
+    ("isoline-again", "isoline", {"again": 0.2}, "the same, and repeats elites because outcomes are noisy"),
+    ("cma-me", "cma_me", {}, "the same with evolution strategies"),
+    ("cma-mae", "cma_mae", {}, "the same with thresholds that rise slowly"),
+)
 
 
 def _at(place: str, about: str, **more: Any) -> Entry:
@@ -136,6 +148,19 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
             label="CMA-ME",
             colour="#e69f00",
         ),
+        **{
+            f"{name}{ending}": _at(
+                f"rivals.quality_diversity:{place}",
+                f"{about}{shown} (extra rivals)",
+                uses=_IMITATED if shown else {},
+                fixed=fixed,
+                also=_TAUGHT if shown else (),
+                ignores=_AIM,
+            )
+            for ending, shown in (("", ""), ("-taught", ", and imitates what it is shown"))
+            for name, place, fixed, about in _SCHOOL
+            if ending or name not in ("map-elites", "cma-me")
+        },
     },
     "environment": {
         ROD: _at(
@@ -145,9 +170,10 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
         ),
         "planar-arm-7": _at("runs.tasks:planar_arm", "7 joints, no noise", fixed={"n_joints": 7}),
         "planar-arm-50": _at("runs.tasks:planar_arm", "50 joints, no noise", fixed={"n_joints": 50}),
+        "swimmer": _at("runs.tasks:swimmer", "gymnasium's Swimmer-v5: three links, two motors (extra gym)"),
     },
     "goals": {
-        "interest-map": _at("goals.interest_map:InterestMap", "where competence changes, in regions", uses=_PROGRESS),
+        "interest-map": _at("goals.interest_map:InterestMap", "where competence changes, in regions", uses=_REGIONS),
         "grid": _at("goals.progress_grid:ProgressGrid", "the same in cells that never split", uses=_PROGRESS),
         "alp-gmm": _at("goals.alp_gmm:AlpGmm", "Gaussians of high progress (extra rivals)"),
         "uniform": _at("goals.uniform:UniformGoals", "the same everywhere", ignores=("competence",)),
@@ -167,8 +193,8 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
         "nelder-mead-exact": _at("searches.simplex:nelder_mead", "without the noise", fixed={"noise": 0.0}),
         "nelder-mead-complete": _at(
             "searches.simplex:nelder_mead",
-            "without the noise, from the paper's complete simplex of 26",
-            fixed={"noise": 0.0, "complete": True},
+            "without the noise, from the paper's complete simplex of 26, ended by the budget alone",
+            fixed={"noise": 0.0, "complete": True, "xatol": 1e-4, "fatol": 1e-4},
         ),
         "perturb": _at("searches.perturb:perturb", "the best so far plus noise"),
         "cma-es": _at("searches.cma_es:cma_es", "an evolution strategy (extra rivals)"),

@@ -15,7 +15,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.signal import lfilter
 
 from sgimd_torch.environments.motor_primitives import GaussianPrimitive
 from sgimd_torch.environments.protocol import SimulationError, check_movement, check_rng
@@ -205,6 +204,8 @@ class FishingRod:
         trajectory = self.primitive.at(theta, times)
         if not self.noise:
             return trajectory
+        from scipy.signal import lfilter  # takes longer to import than this whole library
+
         # A short movement draws as often as a long one, so that the stream goes on in the same way after both.
         draws = rng.standard_normal((self._draws, len(JOINTS)))[: len(times)]
         draws[1:] *= math.sqrt(1 - CORRELATION**2)

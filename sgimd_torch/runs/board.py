@@ -19,6 +19,7 @@ from sgimd_torch.runs.build import RunParts
 from sgimd_torch.runs.clock import Seconds
 from sgimd_torch.runs.config import having
 from sgimd_torch.runs.directory import RunDirectory
+from sgimd_torch.runs.tables import OWN
 from sgimd_torch.spaces import Array, Box, Episode
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 GOALS: Final = 100  # the last ones are drawn
 LEGEND: Final = {
     "time": "Seconds spent so far: on physics, by the learner and on evaluations.",
+    "answers": "error/mean (m) if another inverse model answers, such as linear in all runs: compare learners by it.",
     "map/competence": "The regions, named like the curves, coloured by the mean competence of the goals they remember.",
     "map/interest": "The regions, coloured by interest, and the last goals that the learner chose.",
     "map/landed": "Where movements have landed so far, and what was demonstrated.",
@@ -87,9 +89,11 @@ class RunBoard:
                 board.scalars({f"time/{name.removeprefix('seconds_')}": value for name, value in spent})
         board.scalars(curves)
 
-    def evaluation(self, found: Evaluation) -> None:
-        """Show a new evaluation, sometimes with pictures. It is on disk when this returns."""
-        board = self._board
+    def evaluation(self, answers: Mapping[str, Evaluation]) -> None:
+        """Show a new evaluation, sometimes with pictures; of answers that are not the run's own only the mean error.
+        It is on disk when this returns."""
+        board, found = self._board, answers[OWN]
+        board.scalars({f"answers/{answer}": each.mean_error for answer, each in answers.items() if answer != OWN})
         # The error comes last: where an event file holds it, it holds all of this evaluation, see recall_evaluation.
         if self._draws:
             self._draw(found)
@@ -104,9 +108,9 @@ class RunBoard:
         """
         board = self._board
         if not self._draws:
-            return board.recall("error", "grid_error", needs=("error/mean",))
+            return board.recall("error", "answers", "grid_error", needs=("error/mean",))
         picture = "about/regions" if self._parts.regions else "map/error" if self._in_the_plane else "error/mean"
-        whole = board.recall("error", "grid_error", "map", "about", needs=("error/mean", picture))
+        whole = board.recall("error", "answers", "grid_error", "map", "about", needs=("error/mean", picture))
         if whole:
             self._drawn_at = board.movements
         return whole

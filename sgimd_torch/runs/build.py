@@ -10,12 +10,13 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
-from sgimd_torch.catalogue import CATALOGUE, SHARED, checked
+from sgimd_torch.catalogue import CATALOGUE, SHARED, checked, find
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.goals.regions import Region
 from sgimd_torch.learner import Learner
 from sgimd_torch.runs.config import Config
+from sgimd_torch.runs.tables import OWN
 from sgimd_torch.runs.tasks import Task, benchmark_of, correspondence_of, demonstrations_of
 from sgimd_torch.spaces import Array, Demonstration, Estimate, stream
 from sgimd_torch.teachers import Teacher
@@ -29,22 +30,27 @@ LEAST_NOISE: Final = 0.01  # m; predictions are not better than this, even if ou
 
 @dataclass(frozen=True, eq=False)
 class RunParts:
-    """What a run needs. ``config`` is what it was made from. ``inverse`` reads the learner's memory for evaluations;
-    ``model`` is refreshed after each movement; it and its ``trust`` are None for a run without a model. ``teacher`` is
-    None, and ``demonstrations`` are empty, for a learner that learns alone. ``data`` holds checksums of the files that
-    were read, ``notes`` messages for the user."""
+    """What a run needs. ``config`` is what it was made from. ``answers`` are the inverses to evaluate by, the run's own
+    first; they read the learner's memory. ``model`` is refreshed after each movement; it and its ``trust`` are None for
+    a run without a model. ``teacher`` is None, and ``demonstrations`` are empty, for a learner that learns alone.
+    ``data`` holds checksums of the files that were read, ``notes`` messages for the user."""
 
     config: Config
     environment: Environment
     learner: Learner
     teacher: Teacher | None
     demonstrations: Sequence[Demonstration]
-    inverse: Callable[[Array, Array], Estimate]
+    answers: dict[str, Callable[[Array, Array], Estimate]]
     benchmark: Benchmark
     data: dict[str, str | None]
     model: ForwardModel | None
     trust: Trust | None
     notes: Sequence[str] = ()
+
+    @property
+    def inverse(self) -> Callable[[Array, Array], Estimate]:
+        """The run's own inverse for evaluations."""
+        return self.answers[OWN]
 
     @property
     def regions(self) -> Sequence[Region]:
@@ -69,14 +75,17 @@ def build(config: Config) -> RunParts:
         notes += about_them
         teacher = parts["teacher"](demonstrations, stream(config.seed, "teacher"))
     learner = parts["algorithm"](task.environment, config.seed)
-    inverse = parts.maker("inverse", learning=False)(learner.memory)
+    words = {answer: config.inverse if answer == OWN else answer for answer in config.answered}
+    inverses = {
+        word: parts.maker("inverse", word, learning=False)(learner.memory) for word in dict.fromkeys(words.values())
+    }
     return RunParts(
         config=config,
         environment=task.environment,
         learner=learner,
         teacher=teacher,
         demonstrations=demonstrations,
-        inverse=inverse,
+        answers={answer: inverses[word] for answer, word in words.items()},
         benchmark=benchmark,
         data={"demonstrations_crc32": demonstrations_crc32, "benchmark_crc32": benchmark_crc32},
         model=parts["model"] if "model" in parts.used else None,
@@ -110,9 +119,11 @@ class _Parts:
             self._made[name] = self._make(name)
         return self._made[name]
 
-    def maker(self, kind: str, *, learning: bool = True) -> Callable[..., Any]:
-        """The choice of a kind, with its options. ``learning`` False: for evaluations, where the inverse may differ."""
-        word, entry = getattr(self._config, kind), self._config.entry(kind)
+    def maker(self, kind: str, word: str | None = None, *, learning: bool = True) -> Callable[..., Any]:
+        """The choice of a kind, or another ``word`` of it, with its options. ``learning`` False: for evaluations, where
+        the inverse may differ."""
+        word = getattr(self._config, kind) if word is None else word
+        entry = find(kind, word)
         if learning and entry.learns_with is not None:
             word, entry = entry.learns_with, CATALOGUE[kind][entry.learns_with]
         made = entry.bind(self.__getitem__)

@@ -36,6 +36,7 @@ _WANTED: Final = {
     "bool": "true or false",
     "int | None": "a whole number, or null",
     "tuple[int, ...] | None": "whole numbers such as 250,500, or [], or null",
+    "tuple[str, ...]": "words such as own,nearest",
 }
 _BOOL: Final = ("true", "false")
 
@@ -135,7 +136,8 @@ class _Parser(jsonargparse.ArgumentParser):
             self.typed[names[option].name] = typed, value, kind
             if equals and not value and "Path" in kind:
                 self.error(f"{typed} must be a path, got an empty one")
-            if "tuple" in kind and re.fullmatch(r"\d+(,\d+)*", value):
+            item = r"\d+" if "int" in kind else r"[^\[\],]+"
+            if "tuple" in kind and re.fullmatch(f"{item}(,{item})*", value):
                 value = f"[{value}]"
             return f"{option}={value}" if equals else option
         if word != "-h" and not typed.startswith("--"):

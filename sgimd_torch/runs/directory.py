@@ -77,7 +77,8 @@ class RunDirectory:
                 raise RunError(f"{path} has {len(self.lines)} movements already, {config.movements} were asked for")
             self.evaluations = Evaluations(path, len(parts.regions[0].low) if parts.regions else None, self.notes)
             alike = before is not None and all(before.get(name) == self._settings[name] for name in EVALUATION_SETTINGS)
-            self.evaluations.keep(n for n in config.evaluations if alike and n <= len(self.lines))
+            kept = [n for n in config.evaluations if alike and n <= len(self.lines)]
+            self.evaluations.keep(kept, config.answered)
             for partial in (*path.glob("*.json*.part"), *path.glob("*.csv*.part")):  # of a process that was killed
                 partial.unlink()
         except BaseException:

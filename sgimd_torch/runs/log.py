@@ -5,7 +5,8 @@
     episodes.csv     the log, append-only:
                          index, origin ("" at rest), demonstration (its row in the file, when one came just before),
                          context_*, theta_*, goal_*, outcome_*
-    evaluation.csv   movements, mean_error_m, median_error_m, p90_error_m, noise_floor_m
+    evaluation.csv   movements, answer, mean_error_m, median_error_m, p90_error_m, noise_floor_m, goals_met: a line for
+                         each inverse model that answered
     regions.csv      the regions of the goal model at each evaluation, a line for each, corners in C x T
     predictions.csv  with a forward model: what it predicted of each exemplar before learning it, and what happened
     refreshes.csv    with a forward model: a line each time that it has learnt

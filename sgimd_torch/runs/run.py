@@ -18,6 +18,7 @@ from sgimd_torch.runs.directory import RunDirectory
 from sgimd_torch.runs.log import RunError
 from sgimd_torch.runs.model_record import RunModel
 from sgimd_torch.runs.process import Failed, Progress, Stopped, Stopping, say
+from sgimd_torch.runs.tables import OWN
 from sgimd_torch.session import ReplayError, live, replay, run
 from sgimd_torch.spaces import Episode
 
@@ -155,8 +156,9 @@ class _Life:
             raise ReplayError(columns.difference(self.directory.lines[episode.index], line))
 
     def _evaluate(self) -> None:
-        """Evaluate the learner as it is now, with streams that the run does not use; unless it was done, and shown,
-        before. Without an exemplar there is nothing to infer a movement from, so there is no evaluation: the learner
+        """Evaluate the learner as it is now by each of its answers, with streams that the run does not use; unless it
+        was done, and shown, before. All answers get the same noise, goal by goal; of the run's own it is measured, too.
+        Without an exemplar there is nothing to infer a movement from, so there is no evaluation: the learner
         by observation has none before its first demonstration."""
         parts, config, evaluations = self.parts, self.parts.config, self.directory.evaluations
         if self.movements in evaluations and (self.board is None or self.board.recall_evaluation()):
@@ -165,13 +167,17 @@ class _Life:
         if len(parts.learner.memory) == 0:
             return
         repeats = config.repeats if config.floor_at is None or self.movements in config.floor_at else 0
-        goals, when = parts.benchmark.goals, (config.seed, self.movements)
+        judged = (parts.environment, parts.benchmark.goals, config.seed, self.movements)
         with self.seconds.of("evaluation"), self.stopping.at_once():
-            found = evaluate(parts.inverse, parts.environment, goals, *when, repeats=repeats)
+            found = {OWN: evaluate(parts.inverse, *judged, repeats=repeats)}
+            for answer, inverse in parts.answers.items():
+                if answer != OWN:
+                    same = inverse is parts.inverse
+                    found[answer] = found[OWN] if same else evaluate(inverse, *judged, repeats=0)
         if self.board is not None:
             self.board.evaluation(found)
         with self.seconds.of("evaluation"):
-            evaluations.add(self.movements, found, parts.regions)
+            evaluations.add(self.movements, found, parts.benchmark.side / 2, parts.regions)
 
     def _begin(self) -> None:
         """The replay is over: from now on files change."""

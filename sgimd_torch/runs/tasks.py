@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from scipy.stats import qmc
 
 from sgimd_torch.algorithms import Correspondence
 from sgimd_torch.demonstrations import SHIPPED as SHIPPED_DEMONSTRATIONS
@@ -29,6 +28,7 @@ from sgimd_torch.spaces import Array, Box, Demonstration, stream
 if TYPE_CHECKING:
     from sgimd_torch.environments.fishing_rod import FishingRod
 
+DATA: Final = SHIPPED_BENCHMARK.parent
 SIDE: Final = 0.1  # m, of a benchmark tile; it leaves 311 goals in the disc of radius 1 m that these arms reach
 SHOWN: Final = 127  # demonstrations, as many as each shipped demonstrator recorded
 SAMPLES: Final = 5  # of each of them
@@ -80,6 +80,14 @@ def planar_arm(*, n_joints: int) -> Task:
     return Task(arm, partial(arm_benchmark, arm), partial(arm_demonstrations, arm), arm.correspondence, None, n_joints)
 
 
+def swimmer() -> Task:
+    """gymnasium's Swimmer-v5; its demonstrations are torques."""
+    from sgimd_torch.environments.swimmer import Swimmer  # gymnasium is loaded only when it is needed
+
+    robot, goals, shown = Swimmer(), DATA / "swimmer_benchmark.npz", DATA / "swimmer_demonstrations.npz"
+    return Task(robot, goals, shown, misfit=robot.misfit, n_joints=2)
+
+
 def arm_benchmark(arm: PlanarArm) -> Benchmark:
     """One random goal in each tile of T, without those that the arm cannot reach; always the same ones."""
     box = arm.outcomes
@@ -104,6 +112,8 @@ def goals_all_over(environment: Environment) -> Benchmark:
         steps = (np.arange(per_side) + 0.5) / per_side
         points = np.stack(np.meshgrid(*[steps] * box.dim), axis=-1).reshape(-1, box.dim)
     else:
+        from scipy.stats import qmc  # takes longer to import than this whole library
+
         points = qmc.Sobol(box.dim, scramble=False).random_base2(int(np.log2(MOST_GOALS)))[1:]
     return Benchmark(type(environment).__name__, box.low + points * box.sides, float(box.sides.max()) / per_side)
 

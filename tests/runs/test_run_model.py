@@ -365,3 +365,12 @@ def test_a_run_is_not_resumed_with_another_model(tmp_path, live, capsys):
     message = capsys.readouterr().err
     assert "training was 2.0, now 3.0" in message
     assert "anchored was True, now False" in message
+
+
+def test_a_run_that_learns_a_model_but_answers_without_it_is_evaluated_by_both(tmp_path, live):
+    options = ("--search", "gradient", "--inverse", "linear", "--answers", "own,nearest,linear,model")
+    assert live(tmp_path, *options) == 0
+    answers = read_run(tmp_path / "sgim-d" / "seed-003").answers
+    assert list(answers) == ["own", "nearest", "linear", "model"]
+    errors = {answer: each["mean_error_m"].tolist() for answer, each in answers.items()}
+    assert errors["own"] == errors["linear"] != errors["model"]
