@@ -13,8 +13,8 @@ from typing import Any, TypedDict, Unpack
 
 import numpy as np
 
-from sgimd_torch.algorithms import Correspondence
-from sgimd_torch.environments.protocol import Environment, check_rest
+from sgimd_torch.algorithms import Correspondence, start_memory
+from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.learner import Learner
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, Attempt, Box, Demonstration, Move, check_count, stream
@@ -39,7 +39,8 @@ class Options(TypedDict, total=False):
     ``cells`` for each dimension of T, None for about 400 in all. ``again``: share of the movements that repeat elites,
     whose cell is then that of their mean outcome; 0 believes the first outcome, however lucky. ``correspondence``, eq.
     (6): what is demonstrated is imitated as by SGIM-D, ``imitations`` times with variations up to ``epsilon``, and
-    enters the archive; None learns alone.
+    enters the archive; None learns alone. ``memory`` to start from: its exemplars enter the archive, and take the place
+    of first movements.
     """
 
     cells: int | None
@@ -47,6 +48,7 @@ class Options(TypedDict, total=False):
     correspondence: Correspondence | None
     imitations: int
     epsilon: float
+    memory: Memory | None
 
 
 def map_elites(
@@ -178,9 +180,12 @@ class QualityDiversity:
             once its mean lies in a corner of many dimensions.
         origin: of the movements, for the log.
         again: share of the movements that repeat elites.
+        start: its exemplars are in the archive from the start; None for an empty one.
     """
 
-    def __init__(self, policies: Box, scheduler: Scheduler, origin: str, again: float = 0.0) -> None:
+    def __init__(
+        self, policies: Box, scheduler: Scheduler, origin: str, again: float = 0.0, start: Memory | None = None
+    ) -> None:
         if not 0 <= again < 1:
             raise ValueError(f"again must lie in [0, 1), got {again}; it is a share of the movements")
         self.policies = policies
@@ -189,6 +194,8 @@ class QualityDiversity:
         self._origin = origin
         self._again = again
         self._landed: dict[bytes, list[Array]] = {}  # outcomes of each movement, where elites are repeated
+        if start is not None and len(start):
+            self.add(start.thetas, start.outcomes)
         self._ask()
 
     def attempt(self, context: Array) -> Attempt:
@@ -308,10 +315,11 @@ def _learner(
     correspondence: Correspondence | None = None,
     imitations: int = 10,
     epsilon: float = 0.05,
+    memory: Memory | None = None,
 ) -> Learner:
     if environment.contexts.dim:
         raise ValueError(f"quality diversity knows one context only, got contexts of dim {environment.contexts.dim}")
-    check_rest(environment)
+    memory = start_memory(environment, memory)
     outcomes, rng = environment.outcomes, stream(seed, origin)
     cells = max(2, round(_DEFAULT_CELLS ** (1 / outcomes.dim))) if cells is None else check_count("cells", cells, 1)
     if cells**outcomes.dim > _MAX_CELLS:
@@ -323,12 +331,18 @@ def _learner(
         seed=_seed(rng),
         **(annealed or {}),
     )
-    explorer = QualityDiversity(environment.policies, Scheduler(archive, emitters(archive, rng)), origin, again)
-    memory = Memory(environment.contexts.dim, environment.policies.dim, environment.outcomes.dim)
+    scheduler = Scheduler(archive, emitters(archive, rng))
+    explorer = QualityDiversity(environment.policies, scheduler, origin, again, memory)
     if correspondence is None:
         return Learner(memory, explorer)
     imitate = Imitate(environment.policies, stream(seed, "imitate"), repeats=imitations, epsilon=epsilon)
-    return Learner(memory, explorer, social=Shown(explorer, imitate), correspondence=correspondence)
+    return Learner(
+        memory,
+        explorer,
+        social=Shown(explorer, imitate),
+        correspondence=correspondence,
+        policies=environment.policies,
+    )
 
 
 def _seed(rng: np.random.Generator) -> int:
