@@ -16,9 +16,9 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from sgimd_torch.runs.config import OWN
 from sgimd_torch.runs.process import say
 from sgimd_torch.runs.read import Run, read_run
-from sgimd_torch.runs.tables import OWN
 from sgimd_torch.spaces import Array
 
 HEADER = (

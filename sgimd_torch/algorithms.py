@@ -20,9 +20,12 @@ from sgimd_torch.competence import AttemptCompetence, Competence, Performance, p
 from sgimd_torch.environments.protocol import Environment, check_rest
 from sgimd_torch.goals.interest_map import InterestMap
 from sgimd_torch.goals.protocol import Goals
+from sgimd_torch.goals.uniform import UniformGoals
+from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.inverses.locally_linear import LocallyLinear
 from sgimd_torch.learner import Learner
 from sgimd_torch.memory import Memory
+from sgimd_torch.searches.perturb import practise
 from sgimd_torch.searches.simplex import nelder_mead
 from sgimd_torch.spaces import Array, Box, Estimate, Search, stream
 from sgimd_torch.strategies import Babble, Emulate, GoalBabbling, Imitate, Judge, Remember, Rest, SocialStrategy
@@ -62,6 +65,17 @@ def sagg_riac(environment: Environment, seed: int, *, memory: Memory | None = No
     memory = start_memory(environment, memory)
     babbling = goal_babbling(environment, seed, memory, **parts)
     return Learner(memory, babbling, inverse=babbling.inverse)
+
+
+def practice(environment: Environment, seed: int, *, memory: Memory | None = None, **parts: Unpack[Parts]) -> Learner:
+    """Practice, which is ours: goals anywhere in T, and at each one movement, the answer of a local process plus noise.
+
+    It has no teacher, and nothing in it knows a unit or a robot. What the answer gets wrong is what it learns next.
+    """
+    answer = partial(LocalProcess, noise=environment.outcome_noise)
+    chosen: Parts = {"goals": UniformGoals, "inverse": answer, "search": practise, "budget": 1}
+    chosen.update(parts)
+    return sagg_riac(environment, seed, memory=memory, **chosen)
 
 
 def observation(

@@ -78,7 +78,7 @@ def test_what_an_entry_takes_its_parameters_are(kind, word, entry):
     builders = {"sagg_riac", "sgim_d"}  # these hand their parts on
     if entry.at.rpartition(":")[2] not in builders:
         assert {*entry.uses, *entry.fixed} <= names
-    known = {each.name for each in fields(Config)} | SHARED.keys() | {"policies", "correspondence"}
+    known = {each.name for each in fields(Config)} | SHARED.keys() | {"policies", "outcome_noise", "correspondence"}
     assert {*entry.options, *entry.ignores} <= known
     assert entry.learns_with is None or entry.learns_with in CATALOGUE[kind]
 
