@@ -331,7 +331,7 @@ def test_the_misfit_of_the_demonstrations_is_reported(tmp_path, go, capsys):
     )
 
 
-@pytest.mark.parametrize("slip", ["three samples", "degrees", "milliseconds"])
+@pytest.mark.parametrize("slip", ["three samples", "degrees", "milliseconds", "a few milliseconds"])
 def test_recordings_that_the_robot_cannot_play_are_refused_before_anything_is_written(tmp_path, go, capsys, slip):
     shown = load_demonstrations()[5]
     times, trajectory = shown.times, shown.trajectory
@@ -340,7 +340,7 @@ def test_recordings_that_the_robot_cannot_play_are_refused_before_anything_is_wr
     elif slip == "degrees":
         trajectory = np.degrees(trajectory)
     else:
-        times = 1000 * times
+        times = 1000 * times if slip == "milliseconds" else times / 1000
     save_demonstrations(tmp_path / "own.npz", [shown, Demonstration(shown.context, times, trajectory, shown.outcome)])
     assert go(tmp_path / "runs", "--demonstrations", tmp_path / "own.npz") == 2
     said = capsys.readouterr().err
