@@ -10,7 +10,7 @@ Intervals are bootstrapped with a fixed seed, so the same rows give the same pag
 run directories: --runs makes them again and keeps their rows in anova.csv.
 
 Examples:
-  python experiments/claims.py                                  both pages, from the rows in results/
+  python experiments/claims.py --readme README.md               both pages, and the numbers of the README
   python experiments/claims.py --runs runs --only RESULTS       and the analyses of variance again
 """
 
@@ -23,22 +23,22 @@ from functools import partial
 from pathlib import Path
 from typing import Final
 
-import jinja2
-import numpy as np
+from sgimd_torch.runs.process import command, loading
 
-from anova import anova_cells, update_anova
-from judging import NotRun, Results, Verdict, judge
-from model_claims import MODEL_CLAIMS, SIMPLEX
-from paper_claims import PAPER_CLAIMS
-from read_results import LAST, Evaluated, ResultsError, read_coverages, read_goals, read_results
-from sgimd_torch.files import make_folder, write_text
-from sgimd_torch.runs.process import command
-from sgimd_torch.views.statistics import iqm_interval, metres, rng, show
-from variants import EXPERIMENTS
+with loading():  # Ctrl-C shows no traceback
+    import numpy as np
 
-TEMPLATES: Final = Path(__file__).with_name("pages")
+    from anova import anova_cells, update_anova
+    from judging import NotRun, Results, Verdict, judge
+    from model_claims import MODEL_CLAIMS, SIMPLEX
+    from paper_claims import PAPER_CLAIMS
+    from quoted import MADE, Page, into_readme, render
+    from read_results import LAST, Evaluated, ResultsError, read_coverages, read_goals, read_results
+    from sgimd_torch.files import make_folder, write_text
+    from sgimd_torch.views.statistics import iqm_interval, metres, rng, show
+    from variants import EXPERIMENTS, ladder
+
 PAGES: Final = ("RESULTS", "FORWARD_MODEL")
-MADE: Final = "<!-- Made by experiments/claims.py"
 ANOVA: Final = ("means compared", "of", "dimensions of theta in which they differ", "smallest p", "largest p")
 ON_ARMS: Final = (250, 500, 1000, 2000)
 # For the forward model's page: how names of variants end, and at which movements they are evaluated.
@@ -47,31 +47,48 @@ MODEL_TABLES: Final = {
     "planar-arm-7": ("-arm-7", ON_ARMS),
     "planar-arm-50": ("-arm-50", ON_ARMS),
 }
-Page = tuple[list[Verdict], dict[str, str]]  # its verdicts, and its tables by name
+IN_README: Final = {
+    "observation": "Observation",
+    "random": "Random",
+    "sagg-riac": "SAGG-RIAC",
+    "imitation": "Imitation",
+    "sgim-d-letter": "SGIM-D, the paper to the letter",
+    "sgim-d": "**SGIM-D, our defaults**",
+    "random-goals-demonstrations": "uniform goals, demonstrations, noise around the nearest movement",
+    "cma-mae": "CMA-MAE that saves effort, no teacher",
+}
 Cell = Callable[[str], str]  # the text of a variant in a column of a table; raises NotRun if there is none
 
 
 def paper_page(folder: Path) -> Page:
     """The page results/RESULTS.md; learners from the worst to the best, other variants in the order of their rows."""
-    results = Results(read_results(folder / "paper.csv"), read_goals(folder / "goals.csv"))
-    verdicts, variants = judge(PAPER_CLAIMS, results), results.variants
+    path = folder / "paper.csv"
+    own = Results(read_results(path), read_goals(folder / "goals.csv"), linear=read_results(path, "linear"))
+    verdicts, results, variants = judge(PAPER_CLAIMS, own), own.alike, own.linear
     learners = sorted((v for v in variants.values() if v.experiment == "learners"), key=lambda v: -_last_error(v))
     others = [variant for variant in variants.values() if variant.experiment != "learners"]
     better, difference = _against(results, lambda _: "sgim-d", LAST)
     columns = {
         "experiment": lambda name: variants[name].experiment,
         **_errors(results, (1000, LAST), ".3f"),
+        f"by its own inverse at {LAST} (m)": lambda name: show(own.iqm(name), ".3f"),
         "mean over life (m)": lambda name: show(iqm_interval(results.lives(name), rng=rng()), ".3f"),
         "SGIM-D better, probability": better,
         "difference to SGIM-D (m)": difference,
-        "tiles reached": lambda name: show(results.iqm(name, values="tiles"), ".0f"),
+        "tiles reached": lambda name: show(own.iqm(name, values="tiles"), ".0f"),
+        "goals claimed": lambda name: show(own.iqm(name, values="claimed"), ".0f"),
+        "goals met": lambda name: show(results.iqm(name, values="met"), ".0f"),
     }
-    return verdicts, {
-        "claims": verdicts_table("claim of the paper", verdicts),
+    tables = {
+        "ladder": _ladder_table(own, ""),
+        "ladder_large": _ladder_table(own, "-large"),
+        "claims": verdicts_table("claim", verdicts),
         "learners": variants_table([variant.variant for variant in learners], columns),
         "ablations": variants_table([variant.variant for variant in others], columns),
         "anova": markdown(ANOVA, anova_cells(folder / "anova.csv")),
+        "readme": _readme_table(own),
     }
+    return Page(verdicts, tables, own)
 
 
 def model_page(folder: Path, table: Path) -> Page:
@@ -88,7 +105,39 @@ def model_page(folder: Path, table: Path) -> Page:
         }
         names = [name for name in EXPERIMENTS[experiment] if name in results.variants]
         tables[experiment] = variants_table(names, columns)
-    return verdicts, tables
+    return Page(verdicts, tables, results)
+
+
+def _readme_table(own: Results) -> str:
+    """The learners and their peers in short."""
+    columns: dict[str, Cell] = {
+        "learner": lambda name: IN_README[name],
+        "error after 1000 (m)": lambda name: show(own.alike.iqm(name, 1000), ".3f"),
+        f"after {LAST} (m)": lambda name: show(own.alike.iqm(name), ".3f"),
+        f"after {LAST}, by its own inverse (m)": lambda name: show(own.iqm(name), ".3f"),
+        "seeds": lambda name: str(len(own.alike.at(name))),
+    }
+    return variants_table([*IN_README], columns)
+
+
+def _ladder_table(own: Results, ending: str) -> str:
+    """The steps from the letter to our defaults: the error of each, and the difference that it makes."""
+    names = ladder(ending)
+    before = dict(zip(names[1:], names, strict=False))
+
+    def step(results: Results) -> Cell:
+        def cell(name: str) -> str:
+            return metres(results.difference(name, before[name])).removesuffix(" m") if name in before else ""
+
+        return cell
+
+    columns = {
+        **_errors(own, (1000, LAST), ".3f"),
+        "difference to the step before (m)": step(own),
+        f"by `LocallyLinear` at {LAST} (m)": lambda name: show(own.alike.iqm(name), ".3f"),
+        "difference, by `LocallyLinear` (m)": step(own.alike),
+    }
+    return variants_table(names, columns)
 
 
 def _errors(results: Results, times: Sequence[int], form: str) -> dict[str, Cell]:
@@ -99,7 +148,7 @@ def _errors(results: Results, times: Sequence[int], form: str) -> dict[str, Cell
 
     return {
         "variant": str,
-        "seeds": lambda name: str(len(results.variants[name].at(times[-1]))),
+        "seeds": lambda name: str(len(results.variants[name].at(times[-1])) if name in results.variants else 0),
         **{f"error at {when} (m)": error(when) for when in times},
     }
 
@@ -145,8 +194,12 @@ def variants_table(names: Sequence[str], columns: Mapping[str, Cell]) -> str:
 
 def verdicts_table(what: str, verdicts: Sequence[Verdict]) -> str:
     """One row for each claim; ``what`` heads the first column."""
-    cells = [(row.claim, row.bar, row.number, f"**{row.verdict}**") for row in verdicts]
-    return markdown((what, "bar", "our number [95 % interval]", "verdict"), cells)
+    cells = [(row.claim, row.bar, row.number, row.effect, _in_words(row)) for row in verdicts]
+    return markdown((what, "bar", "our number [95 % interval]", "difference [95 % interval]", "verdict"), cells)
+
+
+def _in_words(row: Verdict) -> str:
+    return f"**{row.verdict}**" + (f" (alone: {row.alone})" if row.alone != row.verdict else "")
 
 
 def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -155,15 +208,6 @@ def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
         return "Not run."
     lines = [head, ["---"] * len(head), *([cell.replace("|", "\\|") for cell in row] for row in rows)]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
-
-
-def render(name: str, tables: Mapping[str, str]) -> str:
-    """The text of a page: its template with the ``tables`` put in."""
-    loader = jinja2.FileSystemLoader(TEMPLATES)
-    environment = jinja2.Environment(loader=loader, undefined=jinja2.StrictUndefined, keep_trailing_newline=True)
-    template = f"{name}.md.j2"
-    text = environment.get_template(template).render(tables=tables)
-    return f"{MADE} from experiments/pages/{template}; change that file, not this one. -->\n\n{text}"
 
 
 def _check_place(path: Path) -> None:
@@ -183,6 +227,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--runs", type=Path, help="run directories, to make the analyses of variance again")
     parser.add_argument("--out", type=Path, default=results, help="folder of the pages (default: %(default)s)")
     parser.add_argument("--only", choices=PAGES, help="only this page")
+    parser.add_argument("--readme", type=Path, help="a README whose section of results is made again, too")
     options = parser.parse_args(argv)
     folder, table = options.results, options.table or options.results / "model" / "table.csv"
     makers = {"RESULTS": lambda: paper_page(folder), "FORWARD_MODEL": lambda: model_page(folder, table)}
@@ -192,11 +237,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     if options.runs is not None:
         update_anova(folder / "anova.csv", options.runs)
     pages = {name: makers[name]() for name in paths}
-    texts = {name: render(name, tables) for name, (_, tables) in pages.items()}
+    texts = {name: render(name, page) for name, page in pages.items()}
+    if options.readme is not None:
+        paper, model = (pages.get(name) or makers[name]() for name in PAGES)
+        write_text(options.readme, into_readme(options.readme.read_text(encoding="utf-8"), paper, model))
     make_folder(options.out)
     for name, path in paths.items():
         write_text(path, texts[name])
-        found = [row.verdict for row in pages[name][0]]
+        found = [row.verdict for row in pages[name].verdicts]
         counts = ", ".join(f"{found.count(verdict)} {verdict}" for verdict in dict.fromkeys(found))
         print(f"{path}: {len(found)} claims: {counts}")
     return 0

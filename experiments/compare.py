@@ -1,8 +1,9 @@
 """Run the paper's experiments, every variant with several seeds, and collect the results in tables.
 
 variants.py says which variants there are. A run goes to OUT/VARIANT/seed-003. When it ends, each of its evaluations
-becomes a line of RESULTS/paper.csv, or of RESULTS/forward_model.csv for forward-model and planar-arm-*; the goals that
-it chose in the large task space are counted in RESULTS/goals.csv. A variant in two experiments is run once.
+becomes lines of RESULTS/paper.csv, one for each inverse model that answers, or of RESULTS/forward_model.csv for
+forward-model and planar-arm-*; the goals that it chose in the large task space are counted in RESULTS/goals.csv. A
+variant in two experiments is run once.
 
 Start the same command again after Ctrl-C or a power cut, or with more seeds: what is in the tables is not run again,
 and a run that was stopped goes on. If a run fails, the others go on.
@@ -17,17 +18,20 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
-import numpy as np
+from sgimd_torch.runs.process import command, loading, say
 
-from sgimd_torch.catalogue import did_you_mean
-from sgimd_torch.files import make_folder
-from sgimd_torch.runs.config import Config
-from sgimd_torch.runs.log import RunError
-from sgimd_torch.runs.process import command, say
-from sgimd_torch.runs.read import finished, read_run
-from sgimd_torch.runs.sweep import add_options, sweep, title
-from tables import GOALS, RESULTS, Key, Table, as_text, goal_row, result_rows
-from variants import EXPERIMENTS, FEW, HALF, make_subsets, tables_of
+with loading():  # Ctrl-C shows no traceback
+    import numpy as np
+
+    from read_results import HEADER
+    from sgimd_torch.catalogue import did_you_mean
+    from sgimd_torch.files import make_folder
+    from sgimd_torch.runs.config import Config
+    from sgimd_torch.runs.log import RunError
+    from sgimd_torch.runs.read import finished, read_run
+    from sgimd_torch.runs.sweep import add_options, sweep
+    from tables import GOALS, RESULTS, Key, Table, as_text, goal_rows, result_rows
+    from variants import EXPERIMENTS, FEW, HALF, make_subsets, tables_of
 
 EXAMPLES: Final = f"""experiments: {", ".join(EXPERIMENTS)}
 
@@ -42,8 +46,10 @@ examples:
 Exit code: 0 all runs are in the tables, 1 some failed, 2 the request is wrong, 130 or 143 stopped by a signal.
 """
 # These measure the noise floor, which takes as long as everything else.
-FLOORS: Final = ("learners", "teachers", "long", "letter", "forward-model")
+FLOORS: Final = ("learners", "teachers", "long", "letter", "ladder", "forward-model")
 FLOOR_AT: Final = (5000, 10_000)
+ANSWERS: Final = ("own", "nearest", "linear", "model")  # every run is evaluated by each of them
+ANSWER: Final = HEADER.index("answer")
 ROUNDING: Final = 1e-5  # relative; another processor rounds differently, and errors grow over thousands of movements
 
 
@@ -59,11 +65,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         return verify(wanted, options)
     names = dict.fromkeys(table for name, _ in wanted for table in tables_of(name))
     rows = {table: table_in(options.results, table).rows() for table in names}
-    left = [(name, config) for name, config in wanted if last_row(config) not in rows[tables_of(name)[0]]]
+    left = [(name, config) for name, config in wanted if not last_rows(config) <= rows[tables_of(name)[0]].keys()]
     where = " and ".join(str(options.results / table) for table in names)
     say(f"{len(wanted)} runs, {len(wanted) - len(left)} of them in {where} already")
     if options.dry_run:
-        print("".join(f"{name}: {title(config)}\n" for name, config in left), end="")
+        print("".join(f"{name}: {config.title}\n" for name, config in left), end="")
         return 0
     make_folder(options.results)
     make_subsets(options.out / "demonstrations")
@@ -93,7 +99,7 @@ def verify(wanted: Sequence[tuple[str, Config]], options: argparse.Namespace) ->
         (name, config, row)
         for name, config in wanted
         for row in shipped[tables_of(name)[0]].values()
-        if row[:2] == [name, config.variant] and row[4] == str(config.seed)
+        if row[:2] == [name, config.variant] and row[4] == str(config.seed) and row[ANSWER] in config.answered
     ]
     drawn = sorted(np.random.default_rng(options.lot).permutation(len(found))[: options.verify].tolist())
     again = {}
@@ -104,11 +110,13 @@ def verify(wanted: Sequence[tuple[str, Config]], options: argparse.Namespace) ->
         again[number] = replace(config, movements=movements, evaluate_at=(movements,), out=out)
     say(f"{len(again)} rows of {len(found)}, made again in {options.out}/verify-{options.lot}")
     if options.dry_run:
-        print("".join(f"{title(config)} at {config.movements}\n" for config in again.values()), end="")
+        print("".join(f"{config.title} at {config.movements}\n" for config in again.values()), end="")
         return 0
     make_subsets(options.out / "demonstrations")
-    failures = sweep(list(again.values()), options.processes)
-    found_now = {number: row_now(found[number][0], config) for number, config in again.items()}
+    failures = sweep(list(dict.fromkeys(again.values())), options.processes)
+    found_now = {
+        number: row_now(found[number][0], config, found[number][2][ANSWER]) for number, config in again.items()
+    }
     verdicts = {number: compared(found[number][2], now) for number, now in found_now.items()}
     for number, verdict in verdicts.items():
         now = "" if verdict == "equal" else f"  now {','.join(found_now[number])}"
@@ -118,19 +126,20 @@ def verify(wanted: Sequence[tuple[str, Config]], options: argparse.Namespace) ->
     return 1 if counts[-1] else 0
 
 
-def row_now(experiment: str, config: Config) -> list[str]:
-    """The last row of a run; [] if the run is not finished."""
+def row_now(experiment: str, config: Config, answer: str) -> list[str]:
+    """The last row of a run with this ``answer``; [] if the run is not finished."""
     made = result_rows(experiment, config, read_run(config.directory)) if finished(config) else []
-    return [as_text(value) for value in made[-1]] if made else []
+    return next(([as_text(value) for value in row] for row in reversed(made) if row[ANSWER] == answer), [])
 
 
 def compared(shipped: Sequence[str], now: Sequence[str]) -> str:
     """Compare two rows: "equal", "rounding" if only that differs (it grows while a learner learns), or "DIFFERS"."""
     if list(shipped) == list(now):
         return "equal"
-    if len(shipped) != len(now) or shipped[:6] != now[:6] or [bool(field) for field in shipped] != list(map(bool, now)):
+    n = ANSWER + 1
+    if len(shipped) != len(now) or shipped[:n] != now[:n] or [bool(field) for field in shipped] != list(map(bool, now)):
         return "DIFFERS"
-    pairs = [(float(then), float(field)) for then, field in zip(shipped[6:], now[6:], strict=True) if then]
+    pairs = [(float(then), float(field)) for then, field in zip(shipped[n:], now[n:], strict=True) if then]
     return "rounding" if all(abs(then - field) <= ROUNDING * abs(then) for then, field in pairs) else "DIFFERS"
 
 
@@ -155,14 +164,15 @@ def runs_of(
                 if changes.get("demonstrations") in (Path(FEW), Path(HALF)):
                     changes["demonstrations"] = out / "demonstrations" / changes["demonstrations"]
                 floor_at = FLOOR_AT if experiment in FLOORS else ()
-                whole = {"seed": seed, "out": out, "name": variant, "floor_at": floor_at, **changes}
+                fixed = {"answers": ANSWERS, "floor_at": floor_at}
+                whole = {"seed": seed, "out": out, "name": variant, **fixed, **changes}
                 found.append((experiment, Config(**whole)))
     return found
 
 
-def last_row(config: Config) -> Key:
-    """Key of a run's last row; if it is in a table, so are the others."""
-    return config.variant, str(config.seed), str(config.movements)
+def last_rows(config: Config) -> set[Key]:
+    """Keys of the rows of a run's last evaluation; if they are in a table, so are the others."""
+    return {(config.variant, str(config.seed), str(config.movements), answer) for answer in config.answered}
 
 
 def table_in(results: Path, name: str) -> Table:
@@ -182,7 +192,7 @@ def collect(experiment: str, config: Config, results: Path) -> None:
         raise RunError(f"{run.path} has no evaluation after {config.movements} movements, though it ended")
     evaluations, *others = tables_of(experiment)
     for name in others:
-        table_in(results, name).merge([goal_row(config, run)])
+        table_in(results, name).merge(goal_rows(config, run))
     table_in(results, evaluations).merge(result_rows(experiment, config, run))  # last: now the run counts as done
 
 

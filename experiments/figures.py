@@ -1,5 +1,7 @@
 """The figures of the paper's results, from results/paper.csv and, for figures of movements, from run directories.
 
+All errors are those of ``LocallyLinear``'s answers, so that learners are compared by what they have explored.
+
 Each is written as png and svg. A figure without its data is left out, and a message says what is missing.
 
   errors         error against movements, five learners           (fig. a of the paper's results)
@@ -23,25 +25,27 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
+from sgimd_torch.runs.process import command, loading
 
-from judging import NotRun, Results
-from read_results import LAST, LEARNERS, read_results, read_seeds
-from sgimd_torch.demonstrations import SHIPPED, load_demonstrations
-from sgimd_torch.environments.fishing_rod import JOINTS
-from sgimd_torch.figures import movements as plots_of_movements
-from sgimd_torch.figures.learning import COLOURS, NAMES, count_bar, landing_points, tile_counts
-from sgimd_torch.figures.results import Difference, SeedCurves, forest, goal_distances, goal_histogram, seed_curves
-from sgimd_torch.figures.save import save_figure
-from sgimd_torch.files import make_folder
-from sgimd_torch.runs.process import command
-from sgimd_torch.runs.read import Run
-from sgimd_torch.spaces import Array, Box
-from sgimd_torch.views.statistics import Interval, iqm_interval, paired_differences, rng
-from variants import shipped
+with loading():  # Ctrl-C shows no traceback
+    import numpy as np
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+
+    from judging import NotRun, Results
+    from read_results import LAST, LEARNERS, read_results, read_seeds
+    from sgimd_torch.demonstrations import SHIPPED, load_demonstrations
+    from sgimd_torch.environments.fishing_rod import JOINTS
+    from sgimd_torch.figures import movements as plots_of_movements
+    from sgimd_torch.figures.learning import COLOURS, NAMES, count_bar, landing_points, tile_counts
+    from sgimd_torch.figures.results import Difference, SeedCurves, forest, goal_distances, goal_histogram, seed_curves
+    from sgimd_torch.figures.save import save_figure
+    from sgimd_torch.files import make_folder
+    from sgimd_torch.runs.read import Run
+    from sgimd_torch.spaces import Array, Box
+    from sgimd_torch.views.statistics import Interval, iqm_interval, paired_differences, rng
+    from variants import shipped
 
 BAND = "thick: interquartile mean, band: its 95 % interval, thin: seeds"
 DEMONSTRATORS = {
@@ -54,7 +58,9 @@ PANELS = {
     "baselines": "Other learners",
     "teaching": "Taught otherwise",
     "letter": "The paper to the letter",
+    "ladder": "From there to our defaults, step by step",
 }
+APART = ("learners", "teachers", "large-space", "ladder-large", "long")  # experiments without a panel of their own
 MOVING = (("random", "sagg-riac"), ("imitation", "sgim-d"))  # the paper's learners that execute movements
 REACH = 1.5  # m; the float hardly ever lands farther from the base
 
@@ -207,7 +213,7 @@ def variants(data: Data) -> Figure:
     """The error when SGIM-D is changed, taught differently or replaced; one panel for each experiment."""
     panels: dict[str, list[Difference]] = {}
     for name, variant in data.results.variants.items():
-        if variant.experiment not in ("learners", "teachers", "large-space", "long"):
+        if variant.experiment not in APART and len(variant.at(LAST)) > 1:
             seeds = paired_differences(*data.results.pairs(name, "sgim-d"))
             row = Difference(name, seeds, *data.results.difference(name, "sgim-d"))
             panels.setdefault(variant.experiment, []).append(row)
@@ -272,7 +278,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, default=Path("results/figures"), help="default: %(default)s")
     parser.add_argument("--only", choices=FIGURES, help="only this figure")
     options = parser.parse_args(argv)
-    data = Data(Results(read_results(options.results / "paper.csv")), options.runs)
+    data = Data(Results(read_results(options.results / "paper.csv", "linear")), options.runs)
     make_folder(options.out)
     for name in FIGURES if options.only is None else [options.only]:
         try:

@@ -1,15 +1,15 @@
 """How a claim is judged: the results, the bar that it has to clear, and one loop for all claims.
 
-A bar counts as cleared only if the whole 95 % interval clears it. If the interval straddles the bar, or runs are
-missing, the verdict is "cannot say".
+A bar counts as cleared only if the whole interval clears it, at the confidence that Holm's method asks for so many
+claims. If the interval straddles the bar, or runs are missing, the verdict is "cannot say".
     results = Results(read_results("results/paper.csv"))
     judge([Claim("half of Random's error", "ratio ≤ 0.50", ratio_at_most("sgim-d", "random", 0.5))], results)
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -17,8 +17,10 @@ import numpy as np
 from read_results import LAST, Evaluated
 from sgimd_torch.spaces import Array
 from sgimd_torch.views.statistics import (
+    LEVEL,
     Interval,
     difference_interval,
+    holm,
     improvement_interval,
     interquartile_mean,
     interval,
@@ -43,19 +45,28 @@ class NotRun(LookupError):
 
 @dataclass(frozen=True, eq=False)
 class Results:
-    """The data that claims are judged on: ``variants`` from ``read_results``, and for some claims ``goals`` from
-    ``read_goals`` and ``coverages`` from ``read_coverages``.
+    """The data that claims are judged on.
 
-    Errors are in metres, intervals hold 95 % of a bootstrap over seeds. All methods raise ``NotRun`` if fewer than 2
-    seeds have what they need.
+    ``variants`` from ``read_results``, with their own answers, and ``linear``, with those of ``LocallyLinear``; for
+    some claims ``goals`` from ``read_goals`` and ``coverages`` from ``read_coverages``.
+
+    Errors are in metres; intervals are over seeds, of confidence ``level``. All methods raise ``NotRun`` if fewer than
+    2 seeds have what they need.
     """
 
     variants: Mapping[str, Evaluated]
     goals: Mapping[str, Array] = field(default_factory=dict)
-    coverages: Mapping[str, Array] = field(default_factory=dict)
+    coverages: Mapping[str, Mapping[int, Array]] = field(default_factory=dict)
+    linear: Mapping[str, Evaluated] = field(default_factory=dict)
+    level: float = LEVEL
+
+    @property
+    def alike(self) -> Results:
+        """The same with all variants answered by ``LocallyLinear``, for a comparison of what they have explored."""
+        return replace(self, variants=self.linear)
 
     def at(self, variant: str, movements: int = LAST, values: str = "errors") -> dict[int, float]:
-        """Seed -> value of "errors", "floors" or "tiles"."""
+        """Seed -> value of "errors", "floors", "tiles", "claimed" or "met"."""
         found = self.variants[variant].at(movements, values) if variant in self.variants else {}
         if len(found) < 2:
             what = f": {len(found)} with {values} at {movements}" if variant in self.variants else ""
@@ -80,7 +91,7 @@ class Results:
 
     def iqm(self, variant: str, movements: int = LAST, values: str = "errors") -> Interval:
         """The interquartile mean over seeds."""
-        return iqm_interval(_array(self.at(variant, movements, values)), rng=rng())
+        return iqm_interval(_array(self.at(variant, movements, values)), rng=rng(), level=self.level)
 
     def pairs(self, ours: str, theirs: str, movements: int = LAST) -> tuple[dict[int, float], dict[int, float]]:
         """Errors of both by seed, for common seeds."""
@@ -88,20 +99,21 @@ class Results:
 
     def difference(self, ours: str, theirs: str, movements: int = LAST) -> Interval:
         """Ours - theirs, paired by seed."""
-        return difference_interval(*self.pairs(ours, theirs, movements), rng=rng())
+        return difference_interval(*self.pairs(ours, theirs, movements), rng=rng(), level=self.level)
 
     def ratio(self, ours: str, theirs: str, movements: int = LAST) -> Interval:
         """Ours / theirs."""
-        return ratio_interval(self.errors(ours, movements), self.errors(theirs, movements), rng=rng())
+        errors = self.errors(ours, movements), self.errors(theirs, movements)
+        return ratio_interval(*errors, rng=rng(), level=self.level)
 
     def improvement(self, ours: str, theirs: str, movements: int = LAST) -> Interval:
         """The probability that a run of ours has a smaller error than one of theirs."""
-        return improvement_interval(self.errors(ours, movements), self.errors(theirs, movements), rng=rng())
+        return improvement_interval(self.errors(ours, movements), self.errors(theirs, movements), level=self.level)
 
     def floor_ratio(self, ours: str, theirs: str) -> Interval:
         """Our errors / their noise floors, paired by seed."""
         errors, floors = shared(self.at(ours), self.at(theirs, values="floors"))
-        return ratio_interval(_array(errors), _array(floors), rng=rng(), paired=True)
+        return ratio_interval(_array(errors), _array(floors), rng=rng(), paired=True, level=self.level)
 
     def time_to_reach(self, ours: str, theirs: str, *, unit: float = 1.0, at_most: float) -> Interval:
         """When our mean curve falls to the end of theirs, in movements / ``unit``; ``at_most`` if later."""
@@ -111,7 +123,7 @@ class Results:
             means = interquartile_mean(np.swapaxes(curves, -1, -2))
             return np.minimum(movements_to_reach(movements, means, interquartile_mean(errors)) / unit, at_most)
 
-        return interval(time, curves, self.errors(theirs), rng=rng())
+        return interval(time, curves, self.errors(theirs), rng=rng(), level=self.level)
 
 
 def shared(ours: dict[int, float], theirs: dict[int, float]) -> tuple[dict[int, float], dict[int, float]]:
@@ -127,36 +139,77 @@ def shared(ours: dict[int, float], theirs: dict[int, float]) -> tuple[dict[int, 
 
 
 class Claim(NamedTuple):
-    """The claim and its bar in words, and the function that judges it: returns our number in words and the verdict."""
+    """A claim.
+
+    ``text`` and its ``bar`` in words; ``judged`` returns our number in words and the verdict; ``pairs`` of variants
+    whose difference at ``movements`` is its effect in metres; ``own``: each variant answers by its own inverse model,
+    otherwise all by ``LocallyLinear``.
+    """
 
     text: str
     bar: str
     judged: Callable[[Results], Judged]
+    pairs: Sequence[tuple[str, str]] = ()
+    movements: int = LAST
+    own: bool = False
 
 
 class Verdict(NamedTuple):
-    """One line of a table of verdicts."""
+    """One line of a table of verdicts; ``effect`` in metres, with its interval; ``alone``: were it the only claim."""
 
     claim: str
     bar: str
     number: str
+    effect: str
     verdict: str
+    alone: str
 
 
 def judge(claims: Iterable[Claim], results: Results) -> list[Verdict]:
-    """All claims in order; "cannot say" if something was not run.
+    """All claims in order, together: by Holm's method the chance that any verdict is wrong is at most 5 %. "Cannot say"
+    if something was not run, or if only a single claim could be so sure.
 
     Raises:
         ValueError: errors that have no ratio, such as 0.
     """
-    return [Verdict(claim.text, claim.bar, *_judged(claim, results)) for claim in claims]
+    claims = list(claims)
+    seen = {claim.text: claim for claim in claims}
+
+    def decides(text: str, level: float) -> bool:
+        return _judged(seen[text], replace(results, level=level))[1] != OPEN
+
+    alone = {text: _judged(claim, results) for text, claim in seen.items()}
+    standing = holm(seen, lambda text, level: alone[text][1] != OPEN and decides(text, level))
+    return [
+        Verdict(
+            claim.text,
+            claim.bar,
+            alone[claim.text][0],
+            _effect(claim, results),
+            alone[claim.text][1] if claim.text in standing else OPEN,
+            alone[claim.text][1],
+        )
+        for claim in claims
+    ]
 
 
 def _judged(claim: Claim, results: Results) -> Judged:
     try:
-        return claim.judged(results)
+        return claim.judged(results if claim.own else results.alike)
     except NotRun as missing:
         return f"not run: {missing}", OPEN
+
+
+def _effect(claim: Claim, results: Results) -> str:
+    """Differences of errors in metres, ours minus theirs."""
+    found = {}
+    for ours, theirs in claim.pairs:
+        try:
+            difference = (results if claim.own else results.alike).difference(ours, theirs, claim.movements)
+        except NotRun:
+            continue
+        found[f"{ours} − {theirs}"] = metres(difference, "+.3f")
+    return "; ".join(f"{names}: {each}" for names, each in found.items())
 
 
 def at_most(found: Interval, bar: float, upper: float | None = None) -> str:
@@ -166,9 +219,10 @@ def at_most(found: Interval, bar: float, upper: float | None = None) -> str:
     return FAILS if found.low > bar else OPEN
 
 
-def at_least(found: Interval, bar: float) -> str:
-    """Is it ``bar`` or more?"""
-    return at_most(Interval(-found.value, -found.high, -found.low), -bar)
+def at_least(found: Interval, bar: float, lower: float | None = None) -> str:
+    """Is it ``bar`` or more? ``lower``: how far down the interval may reach, the bar itself unless given."""
+    upper = None if lower is None else -lower
+    return at_most(Interval(-found.value, -found.high, -found.low), -bar, upper)
 
 
 def below_zero(found: Interval) -> str:
@@ -199,8 +253,8 @@ def errs_less(ours: str, theirs: str) -> Callable[[Results], Judged]:
     """Judges our error minus theirs, paired by seed, at the end."""
 
     def judged(results: Results) -> Judged:
-        difference = results.difference(ours, theirs)
-        return metres(difference), below_zero(difference)
+        difference, better = results.difference(ours, theirs), results.improvement(ours, theirs)
+        return f"P(improvement) {show(better)}", below_zero(difference)
 
     return judged
 

@@ -27,22 +27,24 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
-import numpy as np
-from matplotlib.figure import Figure
-from numpy.typing import ArrayLike, NDArray
-from tqdm import tqdm
+from sgimd_torch.runs.process import command, loading
 
-from figures import REACH
-from read_results import MODEL_HEADER
-from sgimd_torch.figures import predictions as plots
-from sgimd_torch.figures.save import save_figure
-from sgimd_torch.files import make_folder, write_text
-from sgimd_torch.forward_model.diagnostics import LEVELS, coverage, error_by_cell, improvements, running
-from sgimd_torch.runs.log import RunError
-from sgimd_torch.runs.process import command
-from sgimd_torch.runs.read import Run, read_run
-from sgimd_torch.runs.tables import WHOLE, small_table
-from sgimd_torch.spaces import Array, Box
+with loading():  # Ctrl-C shows no traceback
+    import numpy as np
+    from matplotlib.figure import Figure
+    from numpy.typing import ArrayLike, NDArray
+    from tqdm import tqdm
+
+    from figures import REACH
+    from read_results import MODEL_HEADER
+    from sgimd_torch.figures import predictions as plots
+    from sgimd_torch.figures.save import save_figure
+    from sgimd_torch.files import make_folder, write_text
+    from sgimd_torch.forward_model.diagnostics import LEVELS, coverage, error_by_cell, improvements, running
+    from sgimd_torch.runs.log import RunError
+    from sgimd_torch.runs.read import Run, read_run
+    from sgimd_torch.runs.tables import WHOLE, small_table
+    from sgimd_torch.spaces import Array, Box
 
 NEWEST: Final = 1000  # predictions
 LATE: Final = 2000  # movements, from which on the spread must be honest

@@ -40,24 +40,25 @@ from sgimd_torch.views.statistics import (
 )
 
 OTHERS: Final = tuple(learner for learner in LEARNERS if learner != "sgim-d")
+DAMAGE: Final = 0.005  # m; what later movements may cost, a tenth of the error
 ROBUST: Final = "SGIM-D − SAGG-RIAC, and SGIM-D − Imitation taught alike, at 5000 < 0"
 
 
 def _sagg_riac_beats_random(results: Results) -> Judged:
     difference, ratio = results.difference("sagg-riac", "random"), results.ratio("sagg-riac", "random")
-    return f"{metres(difference)}; ratio {show(ratio)}", all_of(below_zero(difference), at_most(ratio, 0.85))
+    return f"ratio {show(ratio)}", all_of(below_zero(difference), at_most(ratio, 0.85))
 
 
 def _imitation_beats_random(results: Results) -> Judged:
     difference, ratio = results.difference("imitation", "random"), results.ratio("imitation", "sagg-riac")
-    return f"{metres(difference)}; {show(ratio)} times sagg-riac", below_zero(difference)
+    return f"{show(ratio)} times sagg-riac", below_zero(difference)
 
 
 def _beats_the_others(errors: Callable[[Results, str], Array]) -> Callable[[Results], Judged]:
     def judged(results: Results) -> Judged:
         ours, theirs = errors(results, "sgim-d"), {other: errors(results, other) for other in OTHERS}
-        found = {other: improvement_interval(ours, each, rng=rng()) for other, each in theirs.items()}
-        return _listed(found), all_of(*(at_least(each, 0.95) for each in found.values()))
+        found = {other: improvement_interval(ours, each, level=results.level) for other, each in theirs.items()}
+        return _listed(found), all_of(*(at_least(each, 0.95, lower=0.75) for each in found.values()))
 
     return judged
 
@@ -72,15 +73,17 @@ def _fast(results: Results) -> Judged:
     return f"{show(found, '.0f')} movements", at_most(found, np.nextafter(1000, 0))
 
 
-def _robust_to(teacher: int) -> Callable[[Results], Judged]:
+def _robust_to(teacher: int) -> tuple[Callable[[Results], Judged], list[tuple[str, str]]]:
+    """How it is judged, and the pairs that are compared."""
     taught = "" if teacher == 3 else f"-teacher-{teacher}"
+    pairs = [(f"sgim-d{taught}", other) for other in ("sagg-riac", f"imitation{taught}")]
 
     def judged(results: Results) -> Judged:
-        found = {other: results.difference(f"sgim-d{taught}", other) for other in ("sagg-riac", f"imitation{taught}")}
-        numbers = "; ".join(f"{other} {metres(each)}" for other, each in found.items())
-        return numbers, all_of(*map(below_zero, found.values()))
+        found = {theirs: results.improvement(ours, theirs) for ours, theirs in pairs}
+        differences = [results.difference(*pair) for pair in pairs]
+        return f"P(improvement) {_listed(found)}", all_of(*map(below_zero, differences))
 
-    return judged
+    return judged, pairs
 
 
 def _large_space_costs_sagg_riac_more(results: Results) -> Judged:
@@ -90,7 +93,7 @@ def _large_space_costs_sagg_riac_more(results: Results) -> Judged:
         large, small, our_large, our_small = map(interquartile_mean, errors)
         return (large / small) / (our_large / our_small)
 
-    found = interval(times, *map(results.errors, names), rng=rng())
+    found = interval(times, *map(results.errors, names), rng=rng(), level=results.level)
     own = results.ratio("sagg-riac-large", "sagg-riac")
     above_one = below_zero(Interval(1 - found.value, 1 - found.high, 1 - found.low))
     return f"SAGG-RIAC's ratio {show(own)}, {show(found)} times SGIM-D's", above_one
@@ -107,7 +110,7 @@ def _goals_are_near(results: Results) -> Judged:
         return (our_near / our_goals) / ((near + 0.5) / (goals + 1))
 
     ours, theirs = results.goals["sgim-d-large"], results.goals["sagg-riac-large"]
-    found = interval(times, ours, theirs, rng=rng())
+    found = interval(times, ours, theirs, rng=rng(), level=results.level)
     shares = [100 * counts[:, 1].sum() / counts[:, 0].sum() for counts in (ours, theirs)]
     return f"{shares[0]:.1f} % against {shares[1]:.2f} %: {show(found, '.0f')} times", at_least(found, 10)
 
@@ -120,8 +123,8 @@ def _range(results: Results) -> Judged:
 
 def _no_late_damage(results: Results) -> Judged:
     late, early = shared(results.at("sgim-d-long", 2 * LAST), results.at("sgim-d-long"))
-    found = difference_interval(late, early, rng=rng())
-    return metres(found), FAILS if found.low > 0 else HOLDS
+    found = difference_interval(late, early, rng=rng(), level=results.level)
+    return metres(found), at_most(found, DAMAGE)
 
 
 def _apart(lower: Interval, upper: Interval) -> str:
@@ -134,42 +137,65 @@ def _listed(found: Mapping[str, Interval], form: str = ".2f") -> str:
     return "; ".join(f"{variant} {show(each, form)}" for variant, each in found.items())
 
 
+def _less(text: str, ours: str, theirs: str) -> Claim:
+    return Claim(text, f"{ours} − {theirs} at 5000 < 0", errs_less(ours, theirs), [(ours, theirs)])
+
+
 PAPER_CLAIMS: Final = (
     Claim(
         "SGIM-D halves Random's error",
         "ratio at 5000 ≤ 0.50, interval up to 0.55",
         ratio_at_most("sgim-d", "random", 0.5, upper=0.55),
+        [("sgim-d", "random")],
     ),
-    Claim("SAGG-RIAC clearly beats Random", "SAGG-RIAC − Random at 5000 < 0, ratio ≤ 0.85", _sagg_riac_beats_random),
-    Claim("Imitation beats Random", "Imitation − Random at 5000 < 0", _imitation_beats_random),
+    Claim(
+        "SAGG-RIAC clearly beats Random",
+        "SAGG-RIAC − Random at 5000 < 0, ratio ≤ 0.85",
+        _sagg_riac_beats_random,
+        [("sagg-riac", "random")],
+    ),
+    Claim(
+        "Imitation beats Random",
+        "Imitation − Random at 5000 < 0",
+        _imitation_beats_random,
+        [("imitation", "random"), ("imitation", "sagg-riac")],
+    ),
     Claim(
         "SGIM-D beats every other learner",
-        "P(improvement) at 5000 ≥ 0.95 against each",
+        "P(improvement) at 5000 ≥ 0.95 against each, intervals above 0.75",
         _beats_the_others(Results.errors),
+        [("sgim-d", other) for other in OTHERS],
     ),
     Claim("... and all along", "the same of the error's mean over life", _beats_the_others(Results.lives)),
-    Claim("SGIM-D approaches the noise level", "error at 5000 ≤ 1.25 times its noise floor", _near_the_noise),
+    Claim("SGIM-D approaches the noise level", "error at 5000 ≤ 1.25 times its noise floor", _near_the_noise, own=True),
     Claim("SGIM-D is fast from the start", "below Random's error at 5000 in < 1000 movements", _fast),
-    Claim("SGIM-D is robust: demonstrator 1, naive", ROBUST, _robust_to(1)),
-    Claim("SGIM-D is robust: demonstrator 2, careful", ROBUST, _robust_to(2)),
-    Claim("SGIM-D is robust: demonstrator 3", ROBUST, _robust_to(3)),
+    Claim("SGIM-D is robust: demonstrator 1, naive", ROBUST, *_robust_to(1)),
+    Claim("SGIM-D is robust: demonstrator 2, careful", ROBUST, *_robust_to(2)),
+    Claim("SGIM-D is robust: demonstrator 3", ROBUST, *_robust_to(3)),
     Claim(
         "SGIM-D works in a 10⁴ times larger task space",
         "ratio large to small ≤ 1.20",
         ratio_at_most("sgim-d-large", "sgim-d", 1.2),
+        [("sgim-d-large", "sgim-d")],
     ),
-    Claim("... where SAGG-RIAC loses clearly more", "its ratio > SGIM-D's", _large_space_costs_sagg_riac_more),
+    Claim(
+        "... where SAGG-RIAC loses clearly more",
+        "its ratio > SGIM-D's",
+        _large_space_costs_sagg_riac_more,
+        [("sagg-riac-large", "sagg-riac"), ("sgim-d-large", "sagg-riac-large")],
+    ),
     Claim(
         "... because SGIM-D aims where it can reach",
         "goals within 1.5 m: share ≥ 10 times SAGG-RIAC's",
         _goals_are_near,
     ),
     Claim("Range: Random < SAGG-RIAC < SGIM-D", "tiles reached at 5000, intervals apart", _range),
-    Claim("No late damage", "error at 10,000 − at 5000: interval not wholly above 0", _no_late_damage),
-    Claim("The tree earns its place", "SGIM-D − uniform goals at 5000 < 0", errs_less("sgim-d", "uniform-goals")),
-    Claim(
-        "... in the large space",
-        "SGIM-D − uniform goals at 5000 < 0",
-        errs_less("sgim-d-large", "sgim-d-uniform-large"),
-    ),
+    Claim("No late damage", "error at 10,000 − at 5000 ≤ 0.005 m", _no_late_damage),
+    _less("The tree earns its place", "sgim-d", "uniform-goals"),
+    _less("... in the large space", "sgim-d-large", "sgim-d-uniform-large"),
+    _less("SGIM-D beats the field's standard baseline", "sgim-d", "random-goals-demonstrations"),
+    _less("... in the large space, too", "sgim-d-large", "random-goals-demonstrations-large"),
+    _less("SGIM-D beats quality diversity that saves effort", "sgim-d", "cma-mae"),
+    _less("... also when it is shown the same", "sgim-d", "cma-mae-demonstrations"),
+    _less("Our defaults beat the paper's letter", "sgim-d", "sgim-d-letter"),
 )

@@ -18,18 +18,21 @@ import numpy as np
 
 from sgimd_torch.runs.process import say
 from sgimd_torch.runs.read import Run, read_run
+from sgimd_torch.runs.tables import OWN
 from sgimd_torch.spaces import Array
 
 HEADER = (
-    *("experiment", "variant", "teacher", "task_space", "seed", "movements"),
-    *("mean_error_m", "noise_floor_m", "tiles_reached"),
+    *("experiment", "variant", "teacher", "task_space", "seed", "movements", "answer"),
+    *("mean_error_m", "noise_floor_m", "tiles_reached", "goals_claimed", "goals_met"),
 )
 GOALS_HEADER = ("variant", "seed", "n_goals", "n_near")
 MODEL_HEADER = (
     *("run", "predicted", "error_m", "inside_50_last", "inside_80_last", "inside_95_last"),
     *("inside_50_late", "inside_80_late", "inside_95_late", "improved", "refreshes", "diverged", "ms_per_refresh"),
 )
+REGIONS: Final = (50, 80, 95)  # percent of the outcomes that a region of the model should hold
 UNKNOWN: Final = ("", "nan")
+MAY_BE_UNKNOWN: Final = ("noise_floor_m", "goals_claimed", "goals_met")
 LEARNERS: Final = ("random", "sagg-riac", "observation", "imitation", "sgim-d")  # the paper's five
 LAST: Final = 5000  # movements in the life of a learner of the paper
 
@@ -39,23 +42,29 @@ class ResultsError(ValueError):
 
 
 class Values(NamedTuple):
-    """One evaluation of one run: m, m, and how many tiles; ``floors`` is NaN if the noise was not measured."""
+    """One evaluation of one run: m, m, then numbers of tiles and goals; NaN for what was not measured.
+
+    ``claimed`` goals are near an outcome in the log, which luck may have brought there; ``met`` ones were reached
+    when the answer for them was executed.
+    """
 
     errors: float
     floors: float
     tiles: float
+    claimed: float
+    met: float
 
 
 @dataclass(frozen=True, eq=False)
 class Evaluated:
-    """All evaluations of one variant of an experiment, by seed and movements."""
+    """All evaluations of one variant of an experiment by one answer, by seed and movements."""
 
     variant: str
     experiment: str
     rows: dict[tuple[int, int], Values]
 
     def at(self, movements: int, values: str = "errors") -> dict[int, float]:
-        """Seed -> value of "errors", "floors" or "tiles" after these ``movements``, for seeds that have one."""
+        """Seed -> value of a field of ``Values`` after these ``movements``, for seeds that have one."""
         found = {seed: getattr(row, values) for (seed, when), row in sorted(self.rows.items()) if when == movements}
         return {seed: value for seed, value in found.items() if math.isfinite(value)}
 
@@ -67,8 +76,8 @@ class Evaluated:
         return np.array(times, dtype=np.float64), np.array(errors).reshape(len(whole), len(times))
 
 
-def read_results(path: str | os.PathLike[str]) -> dict[str, Evaluated]:
-    """All variants of the table, in the order of the file.
+def read_results(path: str | os.PathLike[str], answer: str = OWN) -> dict[str, Evaluated]:
+    """All variants of the table, in the order of the file, with their evaluations by one ``answer``.
 
     Raises:
         ResultsError: there is no such table, or a line of it makes no sense; the message names the line.
@@ -81,10 +90,14 @@ def read_results(path: str | os.PathLike[str]) -> dict[str, Evaluated]:
         if runs.setdefault(variant, run) != run:
             raise ResultsError(f"{where}: {variant} is {run}, on an earlier line {runs[variant]}; rename one")
         rows = found.setdefault(variant, Evaluated(variant, row["experiment"], {})).rows
+        known = {name: number(row, name, where) if row[name] not in UNKNOWN else math.nan for name in MAY_BE_UNKNOWN}
+        floor, claimed, met = known.values()
+        values = Values(number(row, "mean_error_m", where), floor, _count(row, "tiles_reached", where), claimed, met)
+        if row["answer"] != answer:
+            continue
         if (seed, movements) in rows:
             raise ResultsError(f"{where}: seed {seed} of {variant} is there twice at {movements} movements")
-        floor = number(row, "noise_floor_m", where) if row["noise_floor_m"] not in UNKNOWN else math.nan
-        rows[seed, movements] = Values(number(row, "mean_error_m", where), floor, _count(row, "tiles_reached", where))
+        rows[seed, movements] = values
     if not found:
         raise ResultsError(f"{path} has no line below its header; is the comparison still to be run?")
     return found
@@ -105,18 +118,19 @@ def read_goals(path: str | os.PathLike[str]) -> dict[str, Array]:
     return {variant: np.array(counts, dtype=np.float64) for variant, counts in found.items()}
 
 
-def read_coverages(path: str | os.PathLike[str]) -> dict[str, Array]:
-    """Variant -> ``(n_seeds,)``, the share of outcomes in the model's 80 % regions from 2000 movements on; {} without
-    file.
+def read_coverages(path: str | os.PathLike[str]) -> dict[str, dict[int, Array]]:
+    """Variant -> 50, 80 or 95 -> ``(n_seeds,)``, the share of outcomes in the model's regions of so many percent, from
+    2000 movements on; {} without file.
 
     Raises:
         ResultsError: a line makes no sense.
     """
-    found: dict[str, list[float]] = {}
+    found: dict[str, list[list[float]]] = {}
     for where, row in read_rows(path, MODEL_HEADER, optional=True):
-        if row["inside_80_late"] not in UNKNOWN:
-            found.setdefault(row["run"].split("/")[0], []).append(number(row, "inside_80_late", where))
-    return {variant: np.array(shares) for variant, shares in found.items()}
+        names = [f"inside_{region}_late" for region in REGIONS]
+        if not any(row[name] in UNKNOWN for name in names):
+            found.setdefault(row["run"].split("/")[0], []).append([number(row, name, where) for name in names])
+    return {variant: dict(zip(REGIONS, np.array(shares).T, strict=True)) for variant, shares in found.items()}
 
 
 def read_rows(

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from read_results import GOALS_HEADER, HEADER
 from sgimd_torch.evaluation import Benchmark
@@ -33,7 +34,7 @@ from variants import teacher_of
 
 Key = tuple[str, ...]
 # Columns, and which of them identify a row.
-RESULTS: Final = (HEADER, ("variant", "seed", "movements"))
+RESULTS: Final = (HEADER, ("variant", "seed", "movements", "answer"))
 GOALS: Final = (GOALS_HEADER, ("variant", "seed"))
 CORNER = -1.0  # m, where the tiles of a benchmark begin in x and y: the corner of T, of rod and arms
 NEAR = 1.5  # m from the base: goals farther away cannot be reached
@@ -93,23 +94,31 @@ class Table:
 
 
 def result_rows(experiment: str, config: Config, run: Run) -> list[list[object]]:
-    """A row of ``RESULTS`` for each evaluation of a finished run."""
+    """A row of ``RESULTS`` for each evaluation of a finished run and each of its answers."""
     benchmark = _benchmark(config.environment, config.benchmark)
-    evaluations = zip(*(run.evaluation[name] for name in ("movements", "mean_error_m", "noise_floor_m")), strict=True)
-    return [
-        [
-            *(experiment, config.variant, teacher_of(config), config.task_space, config.seed),
-            *(int(movements), float(error), float(floor)),
-            tiles_reached(run.outcomes[: int(movements)], benchmark),
-        ]
-        for movements, error, floor in evaluations
-    ]
+    columns = ("movements", "mean_error_m", "noise_floor_m", "goals_met")
+    found = {
+        (int(movements), answer): (float(error), float(floor), float(met))
+        for answer, each in run.answers.items()
+        for movements, error, floor, met in zip(*(each[name] for name in columns), strict=True)
+    }
+    first = (experiment, config.variant, teacher_of(config), config.task_space, config.seed)
+    rows: list[list[object]] = []
+    for movements in run.evaluation["movements"].tolist():
+        landed = run.outcomes[:movements]
+        reached = tiles_reached(landed, benchmark), goals_claimed(landed, benchmark)
+        for answer in run.answers:
+            error, floor, met = found[movements, answer]
+            rows.append([*first, movements, answer, error, floor, *reached, met if math.isnan(met) else int(met)])
+    return rows
 
 
-def goal_row(config: Config, run: Run) -> list[object]:
-    """A row of ``GOALS``: how many goals a learner chose for itself, and how many of them can be reached."""
+def goal_rows(config: Config, run: Run) -> list[list[object]]:
+    """The row of ``GOALS``: how many goals a learner chose for itself, and how many of them can be reached. None for a
+    learner without goals."""
     goals = run.chosen_goals()
-    return [config.variant, config.seed, len(goals), int((np.linalg.norm(goals, axis=1) <= NEAR).sum())]
+    near = int((np.linalg.norm(goals, axis=1) <= NEAR).sum())
+    return [[config.variant, config.seed, len(goals), near]] if len(goals) else []
 
 
 def tiles_reached(outcomes: Array, benchmark: Benchmark) -> int:
@@ -125,6 +134,23 @@ def tiles_reached(outcomes: Array, benchmark: Benchmark) -> int:
         for points in (landed, benchmark.goals)
     )
     return len(reached & wanted)
+
+
+def goals_claimed(outcomes: Array, benchmark: Benchmark) -> int:
+    """How many of the benchmark's goals have one or more of the ``outcomes`` within half a tile's side.
+
+    These are claims: noise may have carried a movement there once. Whether the learner can do it again, the goals that
+    are met in evaluations say.
+
+    Args:
+        outcomes: ``(n, 2)`` m, NaN where the robot was at rest.
+        benchmark: its goals.
+    """
+    landed = outcomes[np.isfinite(outcomes).all(axis=1)]
+    if not len(landed):
+        return 0
+    distances, _ = KDTree(landed).query(benchmark.goals)
+    return int((distances <= benchmark.side / 2).sum())
 
 
 @cache

@@ -18,9 +18,21 @@ Variant = dict[str, Any]
 ARMS: Final = ("planar-arm-7", "planar-arm-50")
 SGIM_D: Final[Variant] = {"algorithm": "sgim-d"}
 SAGG_RIAC: Final[Variant] = {"algorithm": "sagg-riac"}
-# The paper's parts, where our defaults differ after measurements; learners without goals use only the inverse.
-LETTER: Final[Variant] = {"inverse": "paper", "search": "nelder-mead-exact", "progress": "absolute"}
+# From the paper to our defaults, one change at a time: what each step is called, what it was and what it becomes. The
+# paper gives no number for the budget and for g_max: 60 movements are more than come between two demonstrations.
+STEPS: Final[tuple[tuple[str, Variant, Variant], ...]] = (
+    ("inverse", {"inverse": "paper"}, {"inverse": "linear"}),
+    ("simplex", {"search": "nelder-mead-complete", "budget": 60}, {"search": "nelder-mead-exact", "budget": 15}),
+    ("noise", {}, {"search": "nelder-mead"}),
+    ("progress", {"progress": "absolute"}, {"progress": "gained"}),
+    ("giving-up", {"give_up": -1.0}, {"give_up": -0.5}),
+    ("regions", {"g_max": 50, "max_aspect": 1e9}, {"g_max": 30, "max_aspect": 5.0}),  # the last one: our defaults
+)
+LETTER: Final[Variant] = {option: value for _, was, _ in STEPS for option, value in was.items()}
+INVERSE: Final[Variant] = {"inverse": "paper"}  # all that the letter changes in a learner without goals
 LARGE: Final[Variant] = {"task_space": 100.0}
+BASELINE: Final[Variant] = {"goals": "uniform", "inverse": "nearest", "search": "perturb"}  # the field's standard one
+SCHOOL: Final = ("map-elites", "isoline", "isoline-again", "cma-me", "cma-mae")  # quality diversity
 FEW, HALF = "few.npz", "half.npz"  # made from the shipped demonstrations by ``make_subsets``
 # Ways to refine a movement for a goal, and to answer in evaluations. Each line is a variant on the rod and, with a
 # longer name, on every arm.
@@ -78,6 +90,19 @@ def _on_arm(arm: str) -> dict[str, Variant]:
     }
 
 
+def _ladder(ending: str, where: Variant) -> dict[str, Variant]:
+    """SGIM-D between the letter, ``sgim-d-letter``, and our defaults, ``sgim-d``, which the last step leads to."""
+    found, line = {}, {**SGIM_D, **LETTER, **where}
+    for number, (step, _, becomes) in enumerate(STEPS[:-1], 1):
+        found[f"ladder-{number}-{step}{ending}"] = line = {**line, **becomes}
+    return found
+
+
+def ladder(ending: str = "") -> list[str]:
+    """The names of its variants, from the letter to our defaults; ``ending`` "-large" for those in the large space."""
+    return [f"sgim-d-letter{ending}", *EXPERIMENTS[f"ladder{ending}"], f"sgim-d{ending}"]
+
+
 EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
     "learners": {name: {"algorithm": name} for name in ("random", "sagg-riac", "observation", "imitation", "sgim-d")},
     "teachers": {**_of_teacher(1), **_of_teacher(2)},
@@ -85,12 +110,18 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
         "sagg-riac-large": {**SAGG_RIAC, **LARGE},
         "sgim-d-large": {**SGIM_D, **LARGE},
         "sgim-d-uniform-large": {**SGIM_D, **LARGE, "goals": "uniform"},
+        "random-goals-demonstrations-large": {**SGIM_D, **BASELINE, **LARGE},
+        "cma-mae-large": {"algorithm": "cma-mae", **LARGE},
+        "sagg-riac-letter-large": {**SAGG_RIAC, **LETTER, **LARGE},
+        "sgim-d-letter-large": {**SGIM_D, **LETTER, **LARGE},
     },
     "long": {"sgim-d-long": {**SGIM_D, "movements": 10_000}},
     "letter": {
-        f"{algorithm}-letter": {"algorithm": algorithm, **LETTER}
+        f"{algorithm}-letter": {"algorithm": algorithm, **(LETTER if algorithm in ("sagg-riac", "sgim-d") else INVERSE)}
         for algorithm in ("sagg-riac", "observation", "imitation", "sgim-d")
     },
+    "ladder": _ladder("", {}),
+    "ladder-large": _ladder("-large", LARGE),
     "ablations": {
         "uniform-goals": {**SGIM_D, "goals": "uniform"},
         "grid": {**SGIM_D, "goals": "grid"},
@@ -105,11 +136,11 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
         "search-cma-es": {**SGIM_D, "search": "cma-es"},
     },
     "baselines": {
-        "random-goals": {**SAGG_RIAC, "goals": "uniform", "inverse": "nearest", "search": "perturb"},
-        "random-goals-demonstrations": {**SGIM_D, "goals": "uniform", "inverse": "nearest", "search": "perturb"},
+        "random-goals": {**SAGG_RIAC, **BASELINE},
+        "random-goals-demonstrations": {**SGIM_D, **BASELINE},
         "demonstrations-noise": {"algorithm": "imitation", "choice": "random"},
-        "map-elites": {"algorithm": "map-elites"},
-        "cma-me": {"algorithm": "cma-me"},
+        **{name: {"algorithm": name} for name in SCHOOL},
+        **{f"{name}-demonstrations": {"algorithm": f"{name}-taught"} for name in SCHOOL},
     },
     "teaching": {
         "every-10": {**SGIM_D, "every": 10},
@@ -128,7 +159,7 @@ def tables_of(experiment: str) -> list[str]:
     """The tables of results that its runs write rows to; the first has their evaluations."""
     if experiment in ("forward-model", *ARMS):
         return ["forward_model.csv"]
-    return ["paper.csv", *(["goals.csv"] if experiment == "large-space" else [])]
+    return ["paper.csv", *(["goals.csv"] if experiment in ("large-space", "ladder-large") else [])]
 
 
 def make_subsets(folder: Path) -> None:

@@ -1,10 +1,11 @@
-"""What the library costs: the learner's work a movement, how it grows, evaluations, and what execute adds to physics.
+"""What the library costs: the learner's work a movement, how it grows, evaluations, what execute adds to physics, what
+a replay costs, and two runs side by side.
 
 The learner's overhead is all that a run does besides executing movements and evaluating: choosing the teacher's
 demonstration, asking, telling, watching. It learns on a planar arm, whose own time does not count, with 25 joints for
-the dimensions of the fishing rod, and with 50. All times are processor time, so other programs hardly matter. With
---against the library in another folder does the same work in turns (here, there, here, there ...), each time in a new
-process. Figures are medians over the rounds.
+the dimensions of the fishing rod, and with 50. Times are processor time. Other programs still lengthen it, as they
+empty the caches; what runs briefly between physics feels that most. With --against the library in another folder does
+the same work in turns (here, there, here, there ...), each time in a new process. Figures are medians over the rounds.
 
 Examples:
   python scripts/bench.py                                       every part, some minutes
@@ -21,9 +22,11 @@ import os
 import resource
 import subprocess
 import sys
+import tempfile
 import time
 import zlib
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -125,7 +128,7 @@ def growth(algorithm: str, joints: int, rows: list[int]) -> Figures:
         slowest, percentile = life.fill(n)
         longest = max(longest, slowest)
         life.overhead(WINDOW // 2)
-        ms = life.overhead(3 * WINDOW)
+        ms = life.overhead(5 * WINDOW)
         first = first or ms
         found[f"overhead, {what}, with {n} (ms)"] = ms
         if n != rows[0]:
@@ -167,8 +170,8 @@ def evaluation() -> Figures:
     return {"evaluation (s)": time.process_time() - begun, "noise floor of it (m)": found.noise_floor}
 
 
-def movement(n: int = 200) -> Figures:
-    """``execute`` of the fishing rod against the same steps in C alone, in turns, the best of three readings each."""
+def movement(n: int = 60) -> Figures:
+    """``execute`` of the fishing rod against the same steps in C alone, in turns, the best of 15 readings each."""
     from mujoco import rollout
 
     from sgimd_torch import FishingRod, stream
@@ -187,7 +190,7 @@ def movement(n: int = 200) -> Figures:
         rod.execute(np.zeros(0), theta, stream(1, "bench", i))
         rollout.Rollout.rollout = step
         readings = []
-        for _ in range(3):
+        for _ in range(15):
             rng = stream(1, "bench", i)
             begun = time.process_time()
             rod.execute(np.zeros(0), theta, rng)
@@ -201,8 +204,45 @@ def movement(n: int = 200) -> Figures:
     return {"execute (ms)": 1000 * ours / n, "execute over C stepping": ours / alone}
 
 
+def resume(inverse: str, evaluate_at: str) -> Figures:
+    """A run on the fishing rod, and its replay once it has ended: processor time of each, that of starting included."""
+    words = f"-m sgimd_torch run --inverse {inverse} --evaluate-at {evaluate_at} --out runs".split()
+    used = [0.0]
+    with tempfile.TemporaryDirectory() as folder:
+        for more in ([], ["--resume"]):
+            subprocess.run([sys.executable, *words, *more], cwd=folder, capture_output=True, check=True)
+            used.append(sum(resource.getrusage(resource.RUSAGE_CHILDREN)[:2]))
+    fresh, replayed = np.diff(used)
+    what = f"--inverse {inverse}, {'no' if evaluate_at == '[]' else 'all'} evaluations"
+    return {f"run, {what} (s)": fresh, f"replay over run, {what}": replayed / fresh}
+
+
+def fishing(movements: int) -> tuple[float, float]:
+    """Seconds that SGIM-D on the fishing rod takes for so many movements, by the clock and of processor time."""
+    from sgimd_torch import FishingRod, PeriodicTeacher, load_demonstrations, run, sgim_d, stream
+
+    rod = FishingRod()
+    learner = sgim_d(rod, 0, correspondence=rod.primitive.correspondence)
+    teacher = PeriodicTeacher(load_demonstrations(), stream(0, "teacher"))
+    clock, processor = time.perf_counter(), time.process_time()
+    for _ in run(learner, rod, 0, movements=movements, teacher=teacher):
+        pass
+    return time.perf_counter() - clock, time.process_time() - processor
+
+
+def pair(movements: int = 1000) -> Figures:
+    """Movements a second of two runs side by side over those of one; 2 if they do not disturb each other."""
+    with ProcessPoolExecutor(2) as pool:
+        list(pool.map(fishing, (50, 50)))  # both processes have imported what they need
+        alone = pool.submit(fishing, movements).result()
+        both = list(pool.map(fishing, (movements, movements)))
+    clock, processor = np.sum(np.array(alone) / both, axis=0).tolist()
+    return {"two runs over one, by the clock": clock, "two runs over one, by processor time": processor}
+
+
 PARTS: dict[str, Callable[..., Figures]] = {
-    "overhead": overhead, "growth": growth, "recall": recall, "evaluation": evaluation, "movement": movement
+    "overhead": overhead, "growth": growth, "recall": recall, "evaluation": evaluation, "movement": movement,
+    "resume": resume, "pair": pair,
 }  # fmt: skip
 
 
@@ -266,6 +306,8 @@ def arguments_of(part: str, rows: list[int]) -> list[list[Any]]:
         return [[*who, rows] for who in (("sagg-riac", 25), ("sagg-riac", 50), ("sgim-d", 7), ("sgim-d", 25))]
     if part == "recall":
         return [[*who, rows[:2]] for who in (("sgim-d", 25), ("sagg-riac", 50))]
+    if part == "resume":
+        return [[inverse, evaluate_at] for inverse in ("linear", "model") for evaluate_at in ("null", "[]")]
     return [[]]
 
 

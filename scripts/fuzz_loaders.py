@@ -14,11 +14,11 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import multiprocessing
 import os
 import resource
 import shutil
 import signal
-import subprocess
 import sys
 import tempfile
 import time
@@ -28,6 +28,7 @@ import zlib
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, Final
 
@@ -35,8 +36,14 @@ import numpy as np
 
 from damage import Change, damaged, pick, rewritten_model, rewritten_npz, rewritten_text
 from options import at_least
+from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
+from sgimd_torch.evaluation import Benchmark, load_benchmark, save_benchmark
+from sgimd_torch.forward_model.model import ForwardModel
+from sgimd_torch.memory import Memory
+from sgimd_torch.runs import command_line, process
+from sgimd_torch.runs.read import read_run
+from sgimd_torch.spaces import Demonstration
 
-ROOT = Path(__file__).resolve().parent.parent
 SECONDS: Final = 5  # a file
 MEBIBYTES: Final = 512  # of address space, above what the process has before
 GOOD: Final = ("refused", "the same", "told", "as earlier", "json", "another valid file")
@@ -55,22 +62,10 @@ class Loader:
 
 
 def _save_benchmark(path: Path) -> None:
-    from sgimd_torch.evaluation import Benchmark, save_benchmark
-
     save_benchmark(path, Benchmark("FishingRod", np.random.default_rng(0).uniform(-1, 1, (20, 2)), 0.1))
 
 
-def _load_benchmark(path: Path) -> dict[str, Any]:
-    from sgimd_torch.evaluation import load_benchmark
-
-    benchmark = load_benchmark(path)
-    return {"environment": benchmark.environment, "goals": benchmark.goals, "side": benchmark.side}
-
-
 def _save_demonstrations(path: Path) -> None:
-    from sgimd_torch.demonstrations import save_demonstrations
-    from sgimd_torch.spaces import Demonstration
-
     rng = np.random.default_rng(0)
     recordings = [
         Demonstration(rng.normal(size=1), np.arange(n) / 50, rng.normal(size=(n, 3)), rng.normal(size=2))
@@ -80,18 +75,11 @@ def _save_demonstrations(path: Path) -> None:
 
 
 def _load_demonstrations(path: Path) -> dict[str, Any]:
-    from sgimd_torch.demonstrations import load_demonstrations
-
-    return {
-        f"{part} of {k}": getattr(recording, part)
-        for k, recording in enumerate(load_demonstrations(path))
-        for part in ("context", "times", "trajectory", "outcome")
-    }
+    recordings = enumerate(load_demonstrations(path))
+    return {f"{part} of {k}": values for k, recording in recordings for part, values in vars(recording).items()}
 
 
 def _save_memory(path: Path) -> None:
-    from sgimd_torch.memory import Memory
-
     rng, memory = np.random.default_rng(0), Memory(1, 4, 2, context_weight=0.5)
     for _ in range(30):
         memory.add(rng.normal(size=1), rng.random(4), rng.normal(size=2))
@@ -99,17 +87,11 @@ def _save_memory(path: Path) -> None:
 
 
 def _load_memory(path: Path) -> dict[str, Any]:
-    from sgimd_torch.memory import Memory
-
     memory = Memory.load(path)
-    names = ("contexts", "thetas", "outcomes", "context_weight")
-    return {name: getattr(memory, name) for name in names}
+    return {name: getattr(memory, name) for name in ("contexts", "thetas", "outcomes", "context_weight")}
 
 
 def _save_model(path: Path) -> None:
-    from sgimd_torch.forward_model.model import ForwardModel
-    from sgimd_torch.memory import Memory
-
     rng, memory = np.random.default_rng(0), Memory(0, 3, 2)
     for theta in rng.random((60, 3)):
         memory.add(np.zeros(0), theta, theta[:2])
@@ -119,16 +101,12 @@ def _save_model(path: Path) -> None:
 
 
 def _load_model(path: Path) -> dict[str, Any]:
-    from sgimd_torch.forward_model.model import ForwardModel
-
     model = ForwardModel.load(path)
     state = {name: values.numpy() for name, values in model.state_dict().items()}
     return {**state, "about": str({**model.sizes, **model.shape})}
 
 
 def _save_run(path: Path) -> None:
-    from sgimd_torch.runs import command_line, process
-
     words = (
         "--environment planar-arm-7 --inverse model --movements 120 --evaluate_at 60,120 --repeats 0 --name run --out"
     )
@@ -139,8 +117,6 @@ def _save_run(path: Path) -> None:
 
 
 def _load_run(path: Path) -> dict[str, Any]:
-    from sgimd_torch.runs.read import read_run
-
     run = read_run(path)
     log = ("index", "origin", "demonstration", "contexts", "thetas", "goals", "outcomes")
     tables = {name: getattr(run, name) or {} for name in ("evaluation", "regions", "predictions", "refreshes")}
@@ -154,7 +130,7 @@ def _load_run(path: Path) -> dict[str, Any]:
 
 
 LOADERS: Final = {
-    "benchmark": Loader(_save_benchmark, _load_benchmark, rewritten_npz),
+    "benchmark": Loader(_save_benchmark, lambda path: vars(load_benchmark(path)), rewritten_npz),
     "demonstrations": Loader(_save_demonstrations, _load_demonstrations, rewritten_npz),
     "memory": Loader(_save_memory, _load_memory, rewritten_npz),
     "model": Loader(_save_model, _load_model, rewritten_model),
@@ -216,8 +192,8 @@ def _earlier(shorter: Any, longer: Any) -> bool:
     return min(one.ndim, other.ndim) > 0 and one.dtype.kind == "U" and one.tolist() == other[: len(one)].tolist()
 
 
-def child(name: str, path: Path) -> None:
-    """Make a good file, then load what is there at each line of the standard input, and print what came of it."""
+def child(name: str, path: Path, parent: Connection) -> None:
+    """Make a good file, then load what is there whenever the parent asks, and send what came of it."""
     loader = LOADERS[name]
     loader.save(path)
     good = loader.load(path)
@@ -225,14 +201,16 @@ def child(name: str, path: Path) -> None:
     held = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (held + MEBIBYTES * 2**20,) * 2)
     before = _peak()
-    print("ready", flush=True)
-    for line in sys.stdin:
-        signal.setitimer(signal.ITIMER_REAL, SECONDS)  # nobody handles this signal: it ends the process
-        begun = time.perf_counter()
-        verdict = judge(loader, path, good, line == "damaged\n")
-        seconds = time.perf_counter() - begun
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        print(f"{verdict}\t{seconds}\t{_peak() - before}", flush=True)
+    parent.send("ready")
+    with contextlib.suppress(EOFError):  # the parent has closed its end
+        while True:
+            is_damaged = parent.recv()
+            signal.setitimer(signal.ITIMER_REAL, SECONDS)  # nobody handles this signal: it ends the process
+            begun = time.perf_counter()
+            verdict = judge(loader, path, good, is_damaged)
+            seconds = time.perf_counter() - begun
+            signal.setitimer(signal.ITIMER_REAL, 0)
+            parent.send((verdict, seconds, _peak() - before))
 
 
 def _peak() -> int:
@@ -245,38 +223,41 @@ def verdicts(name: str, files: int, seed: int, keep: Path | None) -> Iterator[tu
     """What came of each file, the seconds it took, and the memory (KiB) that the process needed so far to load."""
     done = 0
     while done < files:
-        with tempfile.TemporaryDirectory() as folder, _started(name, Path(folder) / "saved") as process:
-            assert process.stdin is not None
-            assert process.stdout is not None
-            process.stdout.readline()
+        with tempfile.TemporaryDirectory() as folder, _started(name, Path(folder) / "saved") as (loading, pipe):
+            pipe.recv()
             whole = files_of(Path(folder) / "saved")
-            for index in range(done, files):
-                path, content, is_damaged = changed(name, whole, seed, index)
+            while done < files and loading.is_alive():
+                path, content, is_damaged = changed(name, whole, seed, done)
                 path.write_bytes(content)
-                print("damaged" if is_damaged else "other", file=process.stdin, flush=True)
-                verdict, *numbers = process.stdout.readline().split("\t")
-                if not verdict and process.wait() != -signal.SIGALRM:
-                    sys.exit(f"{name}: the process that loads ended with {process.returncode} at file {index}")
-                done += 1
-                seconds, memory = numbers or (SECONDS, 0)
-                yield verdict or "out of time", float(seconds), int(memory)
-                if keep is not None and verdict not in GOOD:
+                pipe.send(is_damaged)
+                try:
+                    verdict, seconds, memory = pipe.recv()
+                except EOFError:
+                    loading.join()
+                    if loading.exitcode != -signal.SIGALRM:
+                        sys.exit(f"{name}: the process that loads ended with {loading.exitcode} at file {done}")
+                    verdict, seconds, memory = "out of time", SECONDS, 0
+                yield verdict, seconds, memory
+                if keep is not None and verdict in FAULTS:
                     keep.mkdir(parents=True, exist_ok=True)
-                    (keep / f"{name}-{index}-{path.name}").write_bytes(content)
+                    (keep / f"{name}-{done}-{path.name}").write_bytes(content)
                 path.write_bytes(whole[path])
-                if not verdict:
-                    break
+                done += 1
 
 
 @contextlib.contextmanager
-def _started(name: str, path: Path) -> Iterator[subprocess.Popen[str]]:
-    words = [sys.executable, __file__, "--child", str(path), "--loaders", name]
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
-    with subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment) as process:
-        try:
-            yield process
-        finally:
-            process.kill()
+def _started(name: str, path: Path) -> Iterator[tuple[multiprocessing.process.BaseProcess, Connection]]:
+    os.environ["OMP_NUM_THREADS"] = "1"
+    context = multiprocessing.get_context("spawn")
+    ours, theirs = context.Pipe()
+    loading = context.Process(target=child, args=(name, path, theirs))
+    loading.start()
+    theirs.close()  # so that its end is noticed
+    try:
+        yield loading, ours
+    finally:
+        ours.close()
+        loading.join()
 
 
 def main() -> None:
@@ -286,11 +267,7 @@ def main() -> None:
     parser.add_argument("--seed", type=at_least(0), default=0, help="of all changes (default: %(default)s)")
     parser.add_argument("--loaders", nargs="+", choices=LOADERS, default=list(LOADERS), help="(default: all)")
     parser.add_argument("--keep", type=Path, help="a folder for the files that show a fault")
-    parser.add_argument("--child", type=Path, help=argparse.SUPPRESS)
     options = parser.parse_args()
-    if options.child is not None:
-        child(options.loaders[0], options.child)
-        return
     print("| loader | files | " + " | ".join((*GOOD, *FAULTS)) + " | slowest (ms) | memory (MiB) |")
     print("|---" * (len(GOOD) + len(FAULTS) + 4) + "|")
     faults = 0

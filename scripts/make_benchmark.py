@@ -7,6 +7,7 @@ tiles is chosen so that about 358 of them, the paper's number, were reached. One
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterable
 from concurrent.futures import ProcessPoolExecutor
 from itertools import product
 
@@ -23,8 +24,8 @@ from sgimd_torch.spaces import Array, stream
 from sgimd_torch.teachers import PeriodicTeacher
 
 
-def outcomes_of(algorithm: str, seed: int, movements: int) -> Array:
-    """``(movements, 2)`` m, where the float landed in one run."""
+def memory_of(algorithm: str, seed: int, movements: int) -> tuple[Array, Array]:
+    """What one learner remembers: thetas ``(movements, theta_dim)``, outcomes ``(movements, 2)`` m."""
     rod = FishingRod(threads=1)
     teacher = None
     if algorithm == "random":
@@ -36,7 +37,16 @@ def outcomes_of(algorithm: str, seed: int, movements: int) -> Array:
         teacher = PeriodicTeacher(load_demonstrations(), stream(seed, "teacher"))
     for _ in run(learner, rod, seed, movements=movements, teacher=teacher):
         pass
-    return learner.memory.outcomes
+    return learner.memory.thetas, learner.memory.outcomes
+
+
+def pooled(learners: Iterable[tuple[str, int]], movements: int, processes: int) -> tuple[Array, Array]:
+    """The memories of all ``learners``, each an algorithm with a seed, put together."""
+    with ProcessPoolExecutor(processes) as pool:
+        pending = [pool.submit(memory_of, *each, movements) for each in learners]
+        memories = [future.result() for future in tqdm(pending, desc="learning")]
+    thetas, outcomes = (np.concatenate(parts) for parts in zip(*memories, strict=True))
+    return thetas, outcomes
 
 
 def main() -> None:
@@ -51,18 +61,16 @@ def main() -> None:
     parser.add_argument("--tiles", type=at_least(1), default=358, help="about how many (default: %(default)s)")
     parser.add_argument("--processes", type=at_least(1), default=2, help="(default: %(default)s)")
     options = parser.parse_args()
-    runs = list(product(("random", "sagg-riac", "sgim-d"), range(options.seed, options.seed + options.runs)))
-    with ProcessPoolExecutor(options.processes) as pool:
-        pending = [pool.submit(outcomes_of, *each, options.movements) for each in runs]
-        pooled = np.concatenate([future.result() for future in tqdm(pending, desc="learning")])
+    learners = product(("random", "sagg-riac", "sgim-d"), range(options.seed, options.seed + options.runs))
+    _, outcomes = pooled(learners, options.movements, options.processes)
     box = FishingRod().outcomes
 
     def goals(side: float) -> Array:
-        return tile_goals(pooled, box, side, stream(options.seed, "benchmark"))
+        return tile_goals(outcomes, box, side, stream(options.seed, "benchmark"))
 
     side = min(np.linspace(0.05, 0.2, 301), key=lambda side: abs(len(goals(side)) - options.tiles))
     save_benchmark(options.out, Benchmark("FishingRod", goals(side), float(side)))
-    print(f"{len(goals(side))} tiles of {side:.4f} m reached by {len(pooled)} movements: {options.out}")
+    print(f"{len(goals(side))} tiles of {side:.4f} m reached by {len(outcomes)} movements: {options.out}")
 
 
 if __name__ == "__main__":

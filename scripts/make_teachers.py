@@ -11,32 +11,20 @@ from __future__ import annotations
 
 import argparse
 import os
-from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import numpy as np
-from tqdm import tqdm
 
+from make_benchmark import pooled
 from make_demonstrations import farthest_points
 from options import at_least
-from sgimd_torch.algorithms import sagg_riac
 from sgimd_torch.demonstrations import SHIPPED, save_demonstrations
 from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.environments.protocol import execute_many
-from sgimd_torch.session import run
 from sgimd_torch.spaces import Array, Demonstration, stream
 
 CANDIDATES = 10  # the most exemplars that demonstrator 2 compares on a tile
 EXECUTIONS = 10  # of each of them
-
-
-def memory_of(seed: int, movements: int) -> tuple[Array, Array]:
-    """What one SAGG-RIAC learner remembers: thetas ``(movements, theta_dim)``, outcomes ``(movements, 2)`` m."""
-    rod = FishingRod(threads=1)
-    learner = sagg_riac(rod, seed)
-    for _ in run(learner, rod, seed, movements=movements):
-        pass
-    return learner.memory.thetas, learner.memory.outcomes
 
 
 def demonstrate(rod: FishingRod, theta: Array, outcome: Array) -> Demonstration:
@@ -101,12 +89,9 @@ def main() -> None:
     options = parser.parse_args()
     if not options.out.is_dir() or not os.access(options.out, os.W_OK):
         parser.error(f"--out must be a folder that exists and may be written, got {options.out}")
-    with ProcessPoolExecutor(options.processes) as pool:
-        seeds = range(options.seed, options.seed + options.runs)
-        pending = [pool.submit(memory_of, seed, options.movements) for seed in seeds]
-        memories = [future.result() for future in tqdm(pending, desc="learning")]
+    learners = [("sagg-riac", options.seed + k) for k in range(options.runs)]
+    thetas, outcomes = pooled(learners, options.movements, options.processes)
     rod = FishingRod()
-    thetas, outcomes = (np.concatenate(parts) for parts in zip(*memories, strict=True))
     inside = rod.outcomes.contains(outcomes)
     thetas, outcomes = thetas[inside], outcomes[inside]
     if len(thetas) < options.n:

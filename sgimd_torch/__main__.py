@@ -2,24 +2,32 @@
 
 from __future__ import annotations
 
+import importlib
 import sys
-from typing import Final
+from collections.abc import Sequence
+from typing import Final, NamedTuple
 
 from sgimd_torch import __version__
-from sgimd_torch.runs.process import Command, dispatch
+from sgimd_torch.catalogue import did_you_mean
+from sgimd_torch.runs.process import command, loading
+
+
+class Command(NamedTuple):
+    """A command: the ``module`` whose ``main(argv)`` it is, one line ``about`` it, and the ``extra`` that it needs."""
+
+    module: str
+    about: str
+    extra: str = ""
+
 
 COMMANDS: Final = {
-    "run": Command("sgimd_torch.runs.command_line", "run one learner, evaluate it, write everything to a directory"),
-    "sweep": Command(
-        "sgimd_torch.runs.sweep", "many runs: options crossed with each other and with seeds, in parallel"
-    ),
-    "table": Command("sgimd_torch.views.table", "results of runs, over their seeds"),
-    "report": Command(
-        "sgimd_torch.views.report.command", "one page about one run, or about many side by side", "report"
-    ),
-    "watch": Command("sgimd_torch.views.watch", "TensorBoard on the boards of runs, also while they are still running"),
-    "film": Command("sgimd_torch.views.film.command", "a film of what a run has learnt", "film"),
-    "demo": Command("sgimd_torch.views.demo", "SGIM-D and random exploration: one figure, one table", "plot"),
+    "run": Command("runs.command_line", "run one learner, evaluate it, write everything to a directory"),
+    "sweep": Command("runs.sweep", "many runs: options crossed with each other and with seeds, in parallel"),
+    "table": Command("views.table", "results of runs, over their seeds"),
+    "report": Command("views.report.command", "one page about one run, or about many side by side", "report"),
+    "watch": Command("views.watch", "TensorBoard on the boards of runs, also while they are still running"),
+    "film": Command("views.film.command", "a film of what a run has learnt", "film"),
+    "demo": Command("views.demo", "SGIM-D and random exploration: one figure, one table", "plot"),
 }
 HELP: Final = f"""usage: sgimd COMMAND [OPTIONS]
 
@@ -41,12 +49,31 @@ sgimd COMMAND --help explains a command; sgimd --version prints the version."""
 
 
 def main() -> int:
-    """The exit code."""
-    words = sys.argv[1:]
+    """Run the command that the first word names; the exit code."""
+    return command(_call)
+
+
+def _call(words: Sequence[str]) -> int:
+    name = words[0] if words else "--help"
+    if name in ("-h", "--help"):
+        print(HELP)
+        return 0 if words else 2
     if words == ["--version"]:
         print(f"sgimd_torch {__version__}")
         return 0
-    return dispatch("sgimd", COMMANDS, HELP, words)
+    if name not in COMMANDS:
+        known = f"known are {', '.join(COMMANDS)}{did_you_mean(name, COMMANDS)}"
+        raise ValueError(f"unknown command {name!r}, {known}; sgimd --help explains them")
+    chosen = COMMANDS[name]
+    try:
+        with loading():
+            module = importlib.import_module(f"sgimd_torch.{chosen.module}")
+    except ModuleNotFoundError as error:
+        if not chosen.extra:
+            raise
+        slip = f"pip install 'sgimd-torch[{chosen.extra}]' installs it"
+        raise ImportError(f"sgimd {name} needs {error.name}, which is not installed; {slip}") from error
+    return int(module.main(words[1:]))
 
 
 if __name__ == "__main__":

@@ -12,9 +12,10 @@ import importlib
 import inspect
 import os
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
+from functools import partial, wraps
 from typing import Any, Final
 
 
@@ -57,12 +58,15 @@ class Entry:
         """
         return load(self.at)
 
-    def arguments(self) -> dict[str, Any]:
-        """``fixed``, loaded."""
-        return {
-            name: load(value) if isinstance(value, str) and ":" in value else value
-            for name, value in self.fixed.items()
+    def bind(self, value: Callable[[str], Any]) -> Callable[..., Any]:
+        """The thing with its parameters: ``value`` gives that of an option, or a shared part, by name."""
+        fixed = {
+            name: load(given) if isinstance(given, str) and ":" in given else given
+            for name, given in self.fixed.items()
         }
+        given = {name: value(option) for name, option in self.uses.items()}
+        options = fixed | {name: each for name, each in given.items() if each is not None}
+        return partial(self.load(), **options) if options else self.load()
 
 
 _PURSUES: Final = {
@@ -71,13 +75,26 @@ _PURSUES: Final = {
     "search": "search",
     "judge": "competence",
     "budget": "budget",
+    "give_up": "give_up",
 }
 _TAUGHT: Final = ("teacher", "demonstrations")
 _SHOWN: Final = {"correspondence": "correspondence"}
 _PROGRESS: Final = {"window": "window", "progress": "progress"}
+_REGIONS: Final = {**_PROGRESS, "g_max": "g_max", "max_aspect": "max_aspect"}
 _MODEL: Final = {"model": "model", "trust": "trust"}
+_REFINED: Final = {**_MODEL, "residual": "residual"}
 _AIM: Final = ("focus",)  # it is the share near the goal pursued: no effect without goals
 _IN_THE_PACKAGE: Final = "sgimd_torch"
+
+
+_IMITATED: Final = {**_SHOWN, "imitations": "imitations", "epsilon": "epsilon"}
+_SCHOOL: Final[tuple[tuple[str, str, dict[str, object], str], ...]] = (  # of quality diversity
+    ("map-elites", "map_elites", {}, "fills an archive of outcomes"),
+    ("isoline", "isoline", {}, "the same along lines between elites"),
+    ("isoline-again", "isoline", {"again": 0.2}, "the same, and repeats elites because outcomes are noisy"),
+    ("cma-me", "cma_me", {}, "the same with evolution strategies"),
+    ("cma-mae", "cma_mae", {}, "the same with thresholds that rise slowly"),
+)
 
 
 def _at(place: str, about: str, **more: Any) -> Entry:
@@ -131,6 +148,19 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
             label="CMA-ME",
             colour="#e69f00",
         ),
+        **{
+            f"{name}{ending}": _at(
+                f"rivals.quality_diversity:{place}",
+                f"{about}{shown} (extra rivals)",
+                uses=_IMITATED if shown else {},
+                fixed=fixed,
+                also=_TAUGHT if shown else (),
+                ignores=_AIM,
+            )
+            for ending, shown in (("", ""), ("-taught", ", and imitates what it is shown"))
+            for name, place, fixed, about in _SCHOOL
+            if ending or name not in ("map-elites", "cma-me")
+        },
     },
     "environment": {
         ROD: _at(
@@ -142,7 +172,7 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
         "planar-arm-50": _at("runs.tasks:planar_arm", "50 joints, no noise", fixed={"n_joints": 50}),
     },
     "goals": {
-        "interest-map": _at("goals.interest_map:InterestMap", "where competence changes, in regions", uses=_PROGRESS),
+        "interest-map": _at("goals.interest_map:InterestMap", "where competence changes, in regions", uses=_REGIONS),
         "grid": _at("goals.progress_grid:ProgressGrid", "the same in cells that never split", uses=_PROGRESS),
         "alp-gmm": _at("goals.alp_gmm:AlpGmm", "Gaussians of high progress (extra rivals)"),
         "uniform": _at("goals.uniform:UniformGoals", "the same everywhere", ignores=("competence",)),
@@ -162,26 +192,26 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
         "nelder-mead-exact": _at("searches.simplex:nelder_mead", "without the noise", fixed={"noise": 0.0}),
         "nelder-mead-complete": _at(
             "searches.simplex:nelder_mead",
-            "without the noise, from the paper's complete simplex of 26",
-            fixed={"noise": 0.0, "complete": True},
+            "without the noise, from the paper's complete simplex of 26, ended by the budget alone",
+            fixed={"noise": 0.0, "complete": True, "xatol": 1e-4, "fatol": 1e-4},
         ),
         "perturb": _at("searches.perturb:perturb", "the best so far plus noise"),
         "cma-es": _at("searches.cma_es:cma_es", "an evolution strategy (extra rivals)"),
         "gradient": _at(
             "searches.through_model:gradient_search",
             "down the gradient of a forward model (extra forward, like those below)",
-            uses={**_MODEL, "residual": "residual"},
+            uses=_REFINED,
         ),
         "gauss-newton": _at(
             "searches.through_model:gradient_search",
             "a new plan for each movement",
-            uses={**_MODEL, "residual": "residual"},
+            uses=_REFINED,
             fixed={"propose": "sgimd_torch.searches.through_model:gauss_newton"},
         ),
         "screened": _at(
             "searches.through_model:gradient_search",
             "the best of 64 variations",
-            uses={**_MODEL, "residual": "residual"},
+            uses=_REFINED,
             fixed={"propose": "sgimd_torch.searches.through_model:screen", "noise": 0.0},
         ),
         "nelder-mead-polished": _at(
@@ -265,42 +295,44 @@ def find(kind: str, word: str) -> Entry:
     call, _ = _WANTED[kind]
     if not callable(made):
         raise ValueError(f"{kind} {word} must be called as {call}, but it is a {type(made).__name__}")
-    parameters = _keywords(made)
+    try:
+        parameters = list(inspect.signature(made).parameters.values())
+    except (TypeError, ValueError):  # a builtin may not name its parameters
+        parameters = []
+    named = {each.name for each in parameters if each.kind is not each.POSITIONAL_ONLY}
     possible = {name: option for entry in known.values() for name, option in entry.uses.items()}
-    uses = {name: option for name, option in possible.items() if name in parameters}
+    uses = {name: option for name, option in possible.items() if name in named}
     also = _TAUGHT if kind == "algorithm" and "correspondence" in uses else ()
     return Entry(word, "of your own", uses=uses, also=also)
 
 
-def check(kind: str, word: str, made: object) -> None:
-    """Refuse a thing that lacks members of its kind.
+def checked(kind: str, word: str, make: Callable[..., Any]) -> Callable[..., Any]:
+    """``make``, with a check of how it is called and of what it gives: one of your own may differ from its kind.
 
-    Raises:
-        ValueError: with the names of what is missing.
+    Raises (when called):
+        ValueError: with the call that was wanted, or the names of the members that are missing.
     """
-    call, members = _WANTED[kind]
-    missing = [name for name in members if not hasattr(made, name)]
-    if missing:
-        raise ValueError(
-            f"{kind} {word} gave a {type(made).__name__} without {', '.join(missing)}; wanted {call}, "
-            f"which has {', '.join(members)}"
-        )
+    wanted, members = _WANTED[kind]
 
+    @wraps(make)
+    def made(*arguments: Any, **options: Any) -> Any:
+        try:
+            inspect.signature(make).bind(*arguments, **options)
+        except TypeError as error:
+            raise ValueError(f"{kind} {word} cannot be called as {wanted}: {error}") from error
+        except ValueError:  # a builtin may not name its parameters
+            pass
+        part = make(*arguments, **options)
+        robot = getattr(part, "environment", part) if kind == "environment" else part  # of a Task
+        missing = [name for name in members if not hasattr(robot, name)]
+        if missing:
+            raise ValueError(
+                f"{kind} {word} gave a {type(robot).__name__} without {', '.join(missing)}; wanted {wanted}, "
+                f"which has {', '.join(members)}"
+            )
+        return part
 
-def check_call(
-    kind: str, word: str, make: Callable[..., Any], arguments: Sequence[Any], options: Mapping[str, Any]
-) -> None:
-    """Refuse a thing that cannot be called like others of its kind.
-
-    Raises:
-        ValueError: with the call that was wanted.
-    """
-    try:
-        inspect.signature(make).bind(*arguments, **options)
-    except TypeError as error:
-        raise ValueError(f"{kind} {word} cannot be called as {_WANTED[kind][0]}: {error}") from error
-    except ValueError:  # a builtin may not name its parameters
-        pass
+    return made
 
 
 def load(place: str, what: str = "") -> Any:
@@ -325,9 +357,8 @@ def load(place: str, what: str = "") -> Any:
         ) from error
     for name in attribute.split("."):
         if not hasattr(found, name):
-            near = get_close_matches(name, [each for each in dir(found) if not each.startswith("_")], 3, 0.5)
-            slip = f"; did you mean {' or '.join(near)}?" if near else ""
-            raise ValueError(f"{what}: {module} has no {attribute}{slip}")
+            public = [each for each in dir(found) if not each.startswith("_")]
+            raise ValueError(f"{what}: {module} has no {attribute}{did_you_mean(name, public, 3)}")
         found = getattr(found, name)
     return found
 
@@ -344,15 +375,8 @@ def colour(algorithm: str) -> str:
     return entry.colour if entry else "black"
 
 
-def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """``; did you mean grid?``, or nothing where no known name is near."""
-    near = get_close_matches(name.lower().replace("_", "-"), list(known), 1, 0.5)
-    return f"; did you mean {near[0]}?" if near else ""
-
-
-def _keywords(made: Callable[..., Any]) -> set[str]:
-    try:
-        parameters = inspect.signature(made).parameters.values()
-    except (TypeError, ValueError):  # a builtin may not name its parameters
-        return set()
-    return {parameter.name for parameter in parameters if parameter.kind is not parameter.POSITIONAL_ONLY}
+def did_you_mean(name: str, known: Iterable[str], most: int = 1) -> str:
+    """``; did you mean grid?``, with the ``most`` names that are near; nothing where no known name is."""
+    spelt = {each.lower().replace("_", "-"): each for each in known}
+    near = get_close_matches(name.lower().replace("_", "-"), spelt, most, 0.5)
+    return f"; did you mean {' or '.join(spelt[each] for each in near)}?" if near else ""

@@ -176,12 +176,8 @@ def make_folder(path: Path) -> None:
         raise OSError(f"{path} cannot be made: {why}; choose another --out") from error
 
 
-def lock(path: str | os.PathLike[str], flags: int = 0) -> int:
+def lock(path: str | os.PathLike[str]) -> int:
     """Open ``path``, which is made where it is missing, and lock it without waiting.
-
-    Args:
-        path: of the file.
-        flags: of ``os.open``, in addition to those for reading, writing and making it.
 
     Returns:
         The descriptor; the lock is held until it is closed, or the process ends.
@@ -194,7 +190,7 @@ def lock(path: str | os.PathLike[str], flags: int = 0) -> int:
         import fcntl  # Windows has none
     except ImportError as error:
         raise OSError(f"{path} cannot be locked: this system has no flock; runs need Linux or macOS") from error
-    file = os.open(path, os.O_RDWR | os.O_CREAT | flags, 0o666)
+    file = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BaseException:

@@ -2,9 +2,11 @@
 
 import numpy as np
 
-HEADER = "experiment,variant,teacher,task_space,seed,movements,mean_error_m,noise_floor_m,tiles_reached"
+from read_results import HEADER as COLUMNS
+
+HEADER = ",".join(COLUMNS)
 MOVEMENTS = (250, 500, 1000, 2000, 3000, 4000, 5000)
-SEEDS = 6
+SEEDS = 20
 TRUE = {  # variant: experiment, teacher, task space, error at 5000 (m), tiles reached
     "random": ("learners", "", 1, 0.20, 100),
     "sagg-riac": ("learners", "", 1, 0.15, 200),
@@ -18,6 +20,10 @@ TRUE = {  # variant: experiment, teacher, task space, error at 5000 (m), tiles r
     "sgim-d-large": ("large-space", 3, 100, 0.09, 290),
     "sgim-d-uniform-large": ("large-space", 3, 100, 0.12, 200),
     "sgim-d-long": ("long", 3, 1, 0.08, 300),
+    "random-goals-demonstrations-large": ("large-space", 3, 100, 0.11, 250),
+    "sgim-d-letter": ("letter", 3, 1, 0.11, 250),
+    **{f"{name}-demonstrations": ("baselines", 3, 1, 0.095, 300) for name in ("random-goals", "cma-mae")},
+    "cma-mae": ("baselines", "", 1, 0.1, 300),
     "uniform-goals": ("ablations", 3, 1, 0.085, 290),
     "grid": ("ablations", 3, 1, 0.079, 300),
 }
@@ -43,7 +49,9 @@ def rows(variant, *, last=None, tiles=None, seeds=range(SEEDS), **changes):
         for movements in (*MOVEMENTS, 10_000) if experiment == "long" else MOVEMENTS:
             value = error(final, seed, movements)
             floor = 0.9 * final * spread(seed) if movements == 5000 else ""
-            yield f"{experiment},{variant},{teacher},{task_space},{seed},{movements},{value},{floor},{reached}"
+            run = f"{experiment},{variant},{teacher},{task_space},{seed},{movements}"
+            for answer in ("own", "linear"):
+                yield f"{run},{answer},{value},{floor},{reached},{reached},{reached // 2}"
 
 
 def write_paper(path, *, without=(), **spoilt):

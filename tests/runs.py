@@ -10,8 +10,9 @@ from pathlib import Path
 import sgimd_torch
 from sgimd_torch.runs.build import build
 from sgimd_torch.runs.command_line import parse
+from sgimd_torch.runs.directory import RunDirectory
 from sgimd_torch.runs.process import Stopping
-from sgimd_torch.runs.run import open_directory, run_in
+from sgimd_torch.runs.run import live_in
 
 ROOT = Path(sgimd_torch.__file__).parents[1]
 MOVEMENTS = 90
@@ -35,8 +36,8 @@ def accept_loss(out, benchmark, *options):
     """Go on with a run whose log lacks movements; returns the notes on it."""
     config, _ = parse([*arguments(out, benchmark), *map(str, options)], "")
     parts = build(config)
-    with Stopping() as stopping, open_directory(config, parts, True, accept_loss=True) as directory:
-        run_in(directory, config, parts, stopping)
+    with Stopping() as stopping, RunDirectory(parts, resume=True, accept_loss=True) as directory:
+        live_in(directory, parts, stopping)
     return directory.notes
 
 

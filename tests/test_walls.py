@@ -34,7 +34,7 @@ LIBRARIES = {  # library: the only rooms that may import it; of a folder, where 
     "torch": {"forward_model", "inverses/through_model", "searches/through_model"},
     "lightning": {"forward_model"},
     "safetensors": {"forward_model"},
-    "tensorboard": {"board/writer"},
+    "tensorboard": {"board/writer", "views/watch"},
     "matplotlib": {"figures", "board/pictures", "views"},
     "PIL": {"views/film", "views/report"},
     "imageio_ffmpeg": {"views/film", "views/report"},

@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
-from matplotlib.collections import PatchCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
 from sgimd_torch.board.scalars import branches
-from sgimd_torch.figures.learning import interest_map, landing_points
+from sgimd_torch.figures.axes import colour_bar
+from sgimd_torch.figures.learning import competence_map, interest_map, landing_points
 from sgimd_torch.goals.regions import Region
 from sgimd_torch.spaces import Array, Box
 
@@ -73,17 +73,13 @@ def where(regions: Sequence[Region]) -> str:
 
 
 def _interest(ax: Axes, regions: Sequence[Region], goals: Array) -> None:
-    drawn = interest_map(ax, *_boxes(regions), np.array([region.interest() for region in regions]), goals=goals)
-    _label(drawn, "interest of a region: change of competence")
+    interest_map(ax, *_boxes(regions), np.array([region.interest() for region in regions]), goals=goals)
     _name(ax, regions)
 
 
 def _competence(ax: Axes, regions: Sequence[Region]) -> None:
     means = [region.competences.mean() if len(region.goals) else np.nan for region in regions]
-    drawn = interest_map(ax, *_boxes(regions), np.ma.masked_invalid(means))
-    drawn.set_cmap("viridis")
-    drawn.set_clim(WORST, 0)
-    _label(drawn, "mean competence of a region; 0: reached")
+    competence_map(ax, *_boxes(regions), np.array(means), worst=WORST)
     _name(ax, regions)
 
 
@@ -91,19 +87,12 @@ def _errors(ax: Axes, benchmark: Array, errors: Array) -> None:
     drawn = ax.scatter(
         benchmark[:, 0], benchmark[:, 1], c=errors, s=14, cmap="viridis_r", vmin=0, vmax=FARTHEST, edgecolors="none"
     )
-    figure = ax.get_figure()
-    assert figure is not None
-    figure.colorbar(drawn, ax=ax, label="distance from goal to landing point (m)", extend="max")
+    colour_bar([ax], drawn, "distance from goal to landing point (m)", extend="max")
     ax.plot(0, 0, "^", color="black", markeredgecolor="white", markersize=9)
     ax.set(xlabel="x (m)", ylabel="y (m)", aspect="equal")
     ax.xaxis.set_major_locator(MaxNLocator(4))
     ax.yaxis.set_major_locator(MaxNLocator(4))
     ax.set_title(f"{len(errors)} benchmark goals, mean error {errors.mean():.3f} m")
-
-
-def _label(drawn: PatchCollection, label: str) -> None:
-    assert drawn.colorbar is not None
-    drawn.colorbar.set_label(label)
 
 
 def _name(ax: Axes, regions: Sequence[Region]) -> None:

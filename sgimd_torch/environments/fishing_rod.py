@@ -15,7 +15,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.signal import lfilter
 
 from sgimd_torch.environments.motor_primitives import GaussianPrimitive
 from sgimd_torch.environments.protocol import SimulationError, check_movement, check_rng
@@ -30,7 +29,7 @@ HOLD = 0.15  # s, how long the last posture is held before the line is let out
 CORRELATION = 0.96  # of the motor noise from one step to the next
 LONGEST = 60.0  # s, the longest recording that can be replayed
 
-_BLOCK = 128  # movements side by side: little memory, and Ctrl-C works between two blocks
+_BLOCK = 32  # movements side by side: of about the same length, little memory, and Ctrl-C works between two blocks
 
 
 class FishingRod:
@@ -205,6 +204,8 @@ class FishingRod:
         trajectory = self.primitive.at(theta, times)
         if not self.noise:
             return trajectory
+        from scipy.signal import lfilter  # takes longer to import than this whole library
+
         # A short movement draws as often as a long one, so that the stream goes on in the same way after both.
         draws = rng.standard_normal((self._draws, len(JOINTS)))[: len(times)]
         draws[1:] *= math.sqrt(1 - CORRELATION**2)

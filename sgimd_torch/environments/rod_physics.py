@@ -25,7 +25,6 @@ from sgimd_torch.spaces import Array
 TOP_SPEED = 500.0  # rad/s; 100,000 random movements stay far below, a diverging simulation exceeds it
 
 _STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
-_CHUNK = 90  # steps in C between two checks whether the float has landed
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,33 +97,21 @@ class Caster:
         Returns:
             ``(n, 2)`` m, where the floats landed, and ``(n,)``, whether the simulation diverged.
         """
-        n = len(commands)
-        steps = np.array([len(c) for c in commands])
         states, controls = self._begin(commands, yaw_wind)
-        floats = np.repeat(self.hanging[None], n, axis=0)
-        landings, diverged = np.full((n, 2), np.nan), np.zeros(n, dtype=bool)
+        run, seen = self._rollout(states, controls)
+        landings, diverged = np.full((len(commands), 2), np.nan), np.zeros(len(commands), dtype=bool)
         speeds = slice(1 + self.model.nq, 1 + self.model.nq + self.model.nv)
-        flying = np.arange(n)
-        for start in range(0, int(steps.max()), _CHUNK):
-            stop = min(start + _CHUNK, int(steps[flying].max()))
-            whole = slice(None) if n == 1 else flying  # one movement needs no copies
-            run, seen = self._rollout(states[whole], controls[whole, start:stop])
-            for k, row in enumerate(flying):
-                last = min(stop, int(steps[row])) - start
-                speed, track = run[k, :last, speeds], seen[k, :last]
-                if not (speed.max() < TOP_SPEED and speed.min() > -TOP_SPEED):  # NaN too
-                    diverged[row] = True
-                elif track[:, 2].min() <= 0:
-                    wet = int((track[:, 2] <= 0).argmax())
-                    landings[row] = _crossing(track[wet - 1] if wet else floats[row], track[wet])
-                elif start + last == steps[row]:
-                    before = track[-2] if last > 1 else floats[row]
-                    after = steps[row] - 1 - ends[row] / self.timestep  # share of a step
-                    landings[row] = self._let_out(track[-1] + after * (before - track[-1]), float(controls[row, 0, 6]))
-            states[flying], floats[flying] = run[:, -1], seen[:, -1]
-            flying = flying[np.isnan(landings[flying, 0]) & ~diverged[flying]]
-            if not flying.size:
-                break
+        for row, end in enumerate(ends):
+            n_steps = len(commands[row])
+            speed, track = run[row, :n_steps, speeds], seen[row, :n_steps]
+            wet = int((track[:, 2] <= 0).argmax())  # 0 if no step is, as the float begins above the water
+            if not (speed.max() < TOP_SPEED and speed.min() > -TOP_SPEED):  # NaN too
+                diverged[row] = True
+            elif wet:
+                landings[row] = _crossing(track[wet - 1], track[wet])
+            else:
+                after = n_steps - 1 - end / self.timestep  # share of a step
+                landings[row] = self._let_out(track[-1] + after * (track[-2] - track[-1]), float(controls[row, 0, 6]))
         return landings, diverged
 
     def record(self, outcome: Array, commands: Array, end: float, yaw_wind: Array | None = None) -> Recording:

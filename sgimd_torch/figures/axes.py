@@ -29,13 +29,14 @@ def plane(ax: Axes, box: Box) -> None:
     ax.yaxis.set_major_locator(MaxNLocator(4))
 
 
-def water_plane(ax: Axes, box: Box) -> None:
+def water_plane(ax: Axes, box: Box, *, legend: bool = True) -> None:
     """The ``plane`` with the robot's base marked, and a legend above."""
     ax.plot(0, 0, "^", color="black", markeredgecolor="white", markersize=10, label="base of the arm")
     plane(ax, box)
-    ax.legend(
-        loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, frameon=False, borderaxespad=0.2, handletextpad=0.2
-    )
+    if legend:
+        ax.legend(
+            loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, frameon=False, borderaxespad=0.2, handletextpad=0.2
+        )
 
 
 def coloured_regions(

@@ -1,85 +1,27 @@
-"""Figures: how the error falls, where the float landed, where competence changes.
+"""Figures: where the float landed, where competence changes.
 
 Sections 5.2 and 6 of Nguyen & Oudeyer (2014). Each function draws on the axis it is given and returns what it drew; the
-caller owns the figure, its size and its file.   error_curves(ax, {"sgim-d": curves}); landing_points(ax, outcomes, box)
+caller owns the figure, its size and its file.   landing_points(ax, outcomes, box); interest_map(ax, lows, highs, each)
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import reduce
-from typing import NamedTuple
 
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
-from matplotlib.collections import PatchCollection, PolyCollection, QuadMesh
+from matplotlib.collections import PatchCollection, QuadMesh
 from matplotlib.colorbar import Colorbar
 from matplotlib.colors import ListedColormap, LogNorm
-from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullLocator
 
 from sgimd_torch.catalogue import CATALOGUE
-from sgimd_torch.figures.axes import colour_bar, coloured_regions, note, over_movements, water_plane
+from sgimd_torch.figures.axes import colour_bar, coloured_regions, note, water_plane
 from sgimd_torch.spaces import Array, Box
 
 COLOURS = {word: entry.colour for word, entry in CATALOGUE["algorithm"].items()}
 NAMES = {word: entry.label for word, entry in CATALOGUE["algorithm"].items()}
-
-
-class Curve(NamedTuple):
-    """The evaluations of one run: ``movements`` ``(n,)`` when, ``mean_errors`` and ``noise_floors`` ``(n,)`` m."""
-
-    movements: Array
-    mean_errors: Array
-    noise_floors: Array
-
-
-class DrawnCurve(NamedTuple):
-    """The mean over seeds, its noise floor, and the band of one standard deviation if there are several seeds."""
-
-    mean: Line2D
-    noise_floor: Line2D
-    band: PolyCollection | None
-
-
-def error_curves(ax: Axes, runs: Mapping[str, Sequence[Curve]]) -> dict[str, DrawnCurve]:
-    """Mean benchmark error (m) against movements, +- one standard deviation over seeds; noise floors dashed.
-
-    Args:
-        ax: drawn on.
-        runs: algorithm -> one curve for each seed. Drawn at movements where all seeds of an algorithm were evaluated.
-
-    Returns:
-        What was drawn for each algorithm.
-
-    Raises:
-        ValueError: an algorithm that has no colour, or whose seeds were never evaluated at the same movement.
-    """
-    drawn = {}
-    for algorithm, curves in runs.items():
-        if algorithm not in COLOURS:
-            raise ValueError(f"algorithm must be one of {sorted(COLOURS)}, got {algorithm!r}")
-        movements = reduce(np.intersect1d, [curve.movements for curve in curves])
-        if not len(movements):
-            raise ValueError(f"the {len(curves)} seeds of {algorithm} were never evaluated after the same movement")
-        shared = [np.searchsorted(curve.movements, movements) for curve in curves]
-        errors = np.stack([curve.mean_errors[rows] for curve, rows in zip(curves, shared, strict=True)])
-        floors = np.stack([curve.noise_floors[rows] for curve, rows in zip(curves, shared, strict=True)])
-        colour, seeds = COLOURS[algorithm], f"{len(curves)} seed{'s' * (len(curves) > 1)}"
-        mean = errors.mean(axis=0)
-        (line,) = ax.plot(movements, mean, "o-", color=colour, markersize=4, label=f"{NAMES[algorithm]} ({seeds})")
-        (floor,) = ax.plot(movements, floors.mean(axis=0), "--", color=colour, linewidth=1.2)
-        band = None
-        if len(curves) > 1:
-            deviation = errors.std(axis=0, ddof=1)
-            band = ax.fill_between(movements, mean - deviation, mean + deviation, color=colour, alpha=0.2, linewidth=0)
-        drawn[algorithm] = DrawnCurve(line, floor, band)
-    handles = [*(curve.mean for curve in drawn.values()), Line2D([], [], color="black", linestyle="--", linewidth=1.2)]
-    ax.legend(handles, [*(str(curve.mean.get_label()) for curve in drawn.values()), "noise floor of each"])
-    over_movements(ax, "mean distance to benchmark goals (m)")
-    ax.set_ylim(bottom=0)
-    return drawn
 
 
 def landing_points(
@@ -173,6 +115,27 @@ def interest_map(
         ax.plot(*goals.T, ".", color="#0072b2", markersize=4, label=f"last {len(goals)} goals")
     water_plane(ax, Box(lows.min(axis=0), highs.max(axis=0)))
     return drawn
+
+
+def competence_map(ax: Axes, lows: Array, highs: Array, competences: Array, *, worst: float = -1.0) -> PatchCollection:
+    """Like ``interest_map``, but coloured by mean competence, eqs. (2) and (7): 0 met, -1 no better than rest.
+
+    Args:
+        ax, lows, highs: as for ``interest_map``.
+        competences: ``(n_regions,)``; NaN, a region without goals, is left white.
+        worst: the competence at the end of the colour scale.
+    """
+    drawn = coloured_regions(ax, lows, highs, np.ma.masked_invalid(competences), "viridis", (worst, 0.0))
+    colour_bar([ax], drawn, "mean competence: 0 met, -1 not at all")
+    water_plane(ax, Box(lows.min(axis=0), highs.max(axis=0)))
+    return drawn
+
+
+def map_after(regions: Mapping[str, np.ndarray], movements: int) -> tuple[Array, Array, Array]:
+    """Corners ``(n_regions, 2)`` m, twice, and interest ``(n_regions,)``: one map of the columns of regions.csv."""
+    now = regions["movements"] == movements
+    lows, highs = (np.stack([regions[f"{side}_{k}"][now] for k in (0, 1)], axis=1) for side in ("low", "high"))
+    return lows, highs, regions["interest"][now]
 
 
 def _edges(box: Box, side: float) -> tuple[Array, Array]:

@@ -26,14 +26,13 @@ _LINES = (COLOURS["sgim-d"], COLOURS["sagg-riac"], COLOURS["imitation"], COLOURS
 _ERRORS = ListedColormap(colormaps["YlOrRd"](np.linspace(0.15, 1.0, 256)))  # the smallest is visible on white
 
 
-def predictions(ax: Axes, observed: Array, mean: Array, box: Box, *, most: float | None = None) -> LineCollection:
+def predictions(ax: Axes, observed: Array, mean: Array, box: Box) -> LineCollection:
     """A line from the predicted to the observed landing point, which has a dot; coloured by the distance.
 
     Args:
-        ax: drawn on, and given a colour bar.
+        ax: drawn on, and given a colour bar, which ends at what 95 % of the distances do not exceed.
         observed, mean: ``(n, 2)`` m, n >= 1.
         box: T, the part of the plane that is shown.
-        most: distance (m) at the end of the colour scale; None for what 95 % of the predictions do not exceed.
 
     Returns:
         The lines; their array holds the distances (m).
@@ -44,7 +43,7 @@ def predictions(ax: Axes, observed: Array, mean: Array, box: Box, *, most: float
     if observed.ndim != 2 or observed.shape[1] != 2 or observed.shape != mean.shape or not len(observed):
         raise ValueError(f"needs (n, 2) outcomes and as many predictions, n > 0, got {observed.shape}, {mean.shape}")
     distances = np.linalg.norm(observed - mean, axis=1)
-    most = max(float(np.quantile(distances, 0.95)), 1e-6) if most is None else most
+    most = _end(distances)
     lines = LineCollection(list(np.stack([mean, observed], axis=1)), cmap=_ERRORS, linewidths=0.8)
     lines.set_array(distances)
     lines.set_clim(0, most)
@@ -58,14 +57,13 @@ def predictions(ax: Axes, observed: Array, mean: Array, box: Box, *, most: float
     return lines
 
 
-def error_map(ax: Axes, cells: CellErrors, box: Box, *, most: float | None = None) -> QuadMesh:
+def error_map(ax: Axes, cells: CellErrors, box: Box) -> QuadMesh:
     """Mean distance of predictions from the outcomes in each cell, whose number is written in it; empty cells white.
 
     Args:
-        ax: drawn on, and given a colour bar.
+        ax: drawn on, and given a colour bar, which ends at what 95 % of the errors do not exceed.
         cells: of a grid over the plane.
         box: what that grid covers.
-        most: error (m) at the end of the colour scale; None for what 95 % of the cells do not exceed.
 
     Returns:
         The cells; their array holds the errors (m), ``(n_y, n_x)``, masked where a cell is empty.
@@ -76,9 +74,7 @@ def error_map(ax: Axes, cells: CellErrors, box: Box, *, most: float | None = Non
     errors, counts = np.ma.masked_invalid(cells.errors.T), cells.counts.T
     if errors.ndim != 2 or box.dim != 2:
         raise ValueError(f"needs a grid of the plane, got one of shape {errors.shape} over {box.dim} dimensions")
-    if most is None:
-        most = float(np.quantile(errors.compressed(), 0.95)) if counts.any() else 1.0
-        most = max(most, 1e-6)
+    most = _end(errors.compressed()) if counts.any() else 1.0
     x, y = (np.linspace(low, high, n + 1) for low, high, n in zip(box.low, box.high, cells.counts.shape, strict=True))
     mesh = ax.pcolormesh(x, y, errors, cmap=_ERRORS, vmin=0, vmax=most, edgecolors="white", linewidth=0.5)
     for row, column in np.argwhere(counts):
@@ -134,14 +130,12 @@ def error_over_time(ax: Axes, movements: Array, errors: Array) -> Line2D:
     return line
 
 
-def coverage_over_time(
-    ax: Axes, movements: Array, coverages: Array, *, level: float = 0.8, band: tuple[float, float] = (0.7, 0.9)
-) -> Line2D:
-    """Share of the outcomes inside the region of one ``level`` in each window, ``(n,)``; ``band`` is acceptable."""
-    ax.axhspan(*band, color="0.9", zorder=0, label=f"{100 * band[0]:.0f} to {100 * band[1]:.0f} %")
-    ax.axhline(level, linestyle="--", color=GREY, linewidth=1.2, label="ideal")
+def coverage_over_time(ax: Axes, movements: Array, coverages: Array) -> Line2D:
+    """Share of the outcomes inside the 80 % region in each window, ``(n,)``; 70 to 90 % are acceptable."""
+    ax.axhspan(0.7, 0.9, color="0.9", zorder=0, label="70 to 90 %")
+    ax.axhline(0.8, linestyle="--", color=GREY, linewidth=1.2, label="ideal")
     (line,) = ax.plot(movements, coverages, "o-", color=COLOURS["sgim-d"], markersize=4)
-    over_movements(ax, f"outcomes inside the {100 * level:.0f} % region")
+    over_movements(ax, "outcomes inside the 80 % region")
     ax.set_ylim(0, 1)
     ax.yaxis.set_major_formatter(lambda share, _: f"{100 * share:.0f} %")
     ax.legend(loc="lower right", ncols=2)
@@ -166,6 +160,11 @@ def held_out_over_time(ax: Axes, movements: Array, held_out: Array, diverged: ND
         ax.set_ylim(rest.min() - margin, rest.max() + margin)
         note(ax, f"{len(above)} of {len(held_out)} lie above, up to {above.max():.1f}", top=True)
     return line
+
+
+def _end(values: Array) -> float:
+    """Where the colour scale ends."""
+    return max(float(np.quantile(values, 0.95)), 1e-6)
 
 
 def _extend(values: Array, most: float) -> str:

@@ -21,7 +21,8 @@ from sgimd_torch.spaces import Array, Box
 
 class SeedCurves(NamedTuple):
     """The runs of one learner: ``errors`` ``(n_seeds, n)`` m after ``movements`` ``(n,)``; over seeds their ``centre``
-    and the interval from ``low`` to ``high``, each ``(n,)`` m. ``algorithm`` gives the colour."""
+    and the interval from ``low`` to ``high``, each ``(n,)`` m. ``algorithm`` gives the colour; noise ``floors`` are
+    ``(n,)`` m."""
 
     algorithm: str
     label: str
@@ -31,6 +32,7 @@ class SeedCurves(NamedTuple):
     low: Array
     high: Array
     dashed: bool = False
+    floors: Array | None = None
 
 
 class Difference(NamedTuple):
@@ -56,13 +58,19 @@ def seed_curves(ax: Axes, runs: Sequence[SeedCurves]) -> list[Line2D]:
     lines = []
     for run in runs:
         colour, style = _colour(run.algorithm), "--" if run.dashed else "-"
-        ax.plot(run.movements, run.errors.T, style, color=colour, linewidth=0.7, alpha=0.35)
-        ax.fill_between(run.movements, run.low, run.high, color=colour, alpha=0.22, linewidth=0)
+        if len(run.errors) > 1:
+            ax.plot(run.movements, run.errors.T, style, color=colour, linewidth=0.7, alpha=0.35)
+            ax.fill_between(run.movements, run.low, run.high, color=colour, alpha=0.22, linewidth=0)
         label = f"{run.label} ({_seeds(len(run.errors))})"
         lines += ax.plot(run.movements, run.centre, f"o{style}", color=colour, markersize=4, label=label)
+        if run.floors is not None:
+            ax.plot(run.movements, run.floors, "--", color=colour, linewidth=1.2)
     over_movements(ax, "mean distance to benchmark goals (m)")
     ax.set_ylim(bottom=0)
-    ax.legend(handles=lines)
+    handles = list(lines)
+    if any(run.floors is not None for run in runs):
+        handles.append(Line2D([], [], color="black", linestyle="--", linewidth=1.2, label="noise floor of each"))
+    ax.legend(handles=handles)
     return lines
 
 

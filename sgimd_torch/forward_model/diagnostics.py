@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import chi2
+from scipy.special import gammaincinv
 
 from sgimd_torch.spaces import Array, Box, check_count, check_vector, first_entry
 
@@ -168,4 +168,4 @@ def _inside(observed: Array, mean: Array, spread: Array, levels: ArrayLike) -> N
     if wanted.ndim != 1 or not ((wanted > 0) & (wanted < 1)).all():
         raise ValueError(f"levels must lie between 0 and 1, got {wanted}; were they in percent?")
     squared = (((observed - mean) / spread) ** 2).sum(axis=1)
-    return squared[:, None] <= chi2.ppf(wanted, observed.shape[1])
+    return squared[:, None] <= 2 * gammaincinv(observed.shape[1] / 2, wanted)

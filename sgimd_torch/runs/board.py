@@ -1,34 +1,34 @@
 """The board of a run: what TensorBoard shows of it, after a resume as if the run had never stopped.
 
-with RunBoard(directory, config, parts, seconds, regions) as board: board.episode(episode); board.evaluation(found)
-``scripts/watch RUNS`` opens TensorBoard on it.
+with RunBoard(directory, parts, seconds) as board: board.episode(episode); board.evaluation(found)
+``sgimd watch RUNS`` opens TensorBoard on it.
 """
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import Field, fields
-from types import TracebackType
 from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 
 from sgimd_torch.evaluation import Evaluation
-from sgimd_torch.goals.regions import Region
 from sgimd_torch.runs import model_record as run_model
 from sgimd_torch.runs.build import RunParts
 from sgimd_torch.runs.clock import Seconds
-from sgimd_torch.runs.config import Config, having
+from sgimd_torch.runs.config import having
 from sgimd_torch.runs.directory import RunDirectory
+from sgimd_torch.runs.tables import OWN
 from sgimd_torch.spaces import Array, Box, Episode
 
 if TYPE_CHECKING:
-    from sgimd_torch.board.writer import Board
+    pass
 
 GOALS: Final = 100  # the last ones are drawn
 LEGEND: Final = {
     "time": "Seconds spent so far: on physics, by the learner and on evaluations.",
+    "answers": "error/mean (m) if another inverse model answers, such as linear in all runs: compare learners by it.",
     "map/competence": "The regions, named like the curves, coloured by the mean competence of the goals they remember.",
     "map/interest": "The regions, coloured by interest, and the last goals that the learner chose.",
     "map/landed": "Where movements have landed so far, and what was demonstrated.",
@@ -38,57 +38,40 @@ LEGEND: Final = {
 
 
 class RunBoard:
-    """Shows what a run does, if ``config.board`` is true. A context manager.
+    """Shows what a run does. A context manager.
 
     Args:
         directory: of the run; its event files stay as they are until ``begin``.
-        config, parts: of the run.
+        parts: of the run.
         seconds: its clock.
-        regions: gives the current regions of the goal model; an empty sequence if it has none.
     """
 
-    def __init__(
-        self,
-        directory: RunDirectory,
-        config: Config,
-        parts: RunParts,
-        seconds: Seconds,
-        regions: Callable[[], Sequence[Region]],
-    ) -> None:
-        self._directory, self._config, self._parts = directory, config, parts
-        self._seconds, self._regions = seconds, regions
-        self._board: Board | None = None
+    def __init__(self, directory: RunDirectory, parts: RunParts, seconds: Seconds) -> None:
+        from sgimd_torch.board.writer import Board  # loaded only when there is a board
+
+        self._recorded, self._parts, self._seconds = len(directory.lines), parts, seconds
         self._goals: deque[Array] = deque(maxlen=GOALS)
         self._demonstrated: list[Array] = []
         self._drawn_at = 0
         self._timed = False  # earlier event files hold times
-        if not config.board:
-            return
-        from sgimd_torch.board.writer import Board  # loaded only when there is a board
-
         tolerance = getattr(parts.learner.autonomous, "tolerance", 0.02)
         cells = cells_of(parts.environment.outcomes, parts.benchmark.goals)
         legend, layout = LEGEND, None
         if parts.model is not None:
             legend, layout = {**LEGEND, **run_model.LEGEND}, run_model.LAYOUT
         self._board = Board(directory.path, cells, tolerance=tolerance, legend=legend, layout=layout, replace=True)
-        settings = {field.name: _plain(field, getattr(config, field.name)) for field in fields(config)}
+        settings = {field.name: _plain(field, getattr(parts.config, field.name)) for field in fields(parts.config)}
         self._board.settings(settings, first=having("leads"))
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        if self._board is not None:
-            self._board.close()
+    def __exit__(self, *_: object) -> None:
+        self._board.close()
 
-    def episode(self, episode: Episode) -> None:
-        """Count a movement, new or replayed."""
+    def episode(self, episode: Episode, curves: Mapping[str, float]) -> None:
+        """Count a movement, new or replayed; ``curves`` are those of a forward model that learnt from it."""
         board = self._board
-        if board is None:
-            return
         board.episode(episode)
         if episode.demonstration is not None:
             self._demonstrated.append(episode.demonstration.outcome)
@@ -96,28 +79,24 @@ class RunBoard:
         goal = None if move is None or move.origin == "imitate" else move.goal
         if goal is not None and not (self._goals and np.array_equal(goal, self._goals[-1])):
             self._goals.append(goal)
-        replayed = board.movements <= len(self._directory.lines)
+        replayed = board.movements <= self._recorded
         if board.due:
-            board.regions(self._regions())
+            board.regions(self._parts.regions)
             recalled = replayed and board.recall("time")
             self._timed |= recalled
             if not replayed or (self._timed and not recalled):  # not written by a killed run: now is close
                 spent = self._seconds.summary().items()
                 board.scalars({f"time/{name.removeprefix('seconds_')}": value for name, value in spent})
+        board.scalars(curves)
 
-    def model(self, curves: Mapping[str, float]) -> None:
-        """A point for the curves of the forward model, which has just learnt."""
-        if self._board is not None:
-            self._board.scalars(curves)
-
-    def evaluation(self, found: Evaluation) -> None:
-        """Show a new evaluation, sometimes with pictures. It is on disk when this returns."""
-        board = self._board
-        if board is None:
-            return
+    def evaluation(self, answers: Mapping[str, Evaluation]) -> None:
+        """Show a new evaluation, sometimes with pictures; of answers that are not the run's own only the mean error.
+        It is on disk when this returns."""
+        board, found = self._board, answers[OWN]
+        board.scalars({f"answers/{answer}": each.mean_error for answer, each in answers.items() if answer != OWN})
         # The error comes last: where an event file holds it, it holds all of this evaluation, see recall_evaluation.
         if self._draws:
-            self._draw(board, found)
+            self._draw(found)
         board.evaluation(self._parts.benchmark.goals, found.errors, found.noise_floor)
         board.flush()
 
@@ -128,46 +107,40 @@ class RunBoard:
             Whether they hold all of it; if not, it has to be evaluated again.
         """
         board = self._board
-        if board is None:
-            return True
         if not self._draws:
-            return board.recall("error", "grid_error", needs=("error/mean",))
-        picture = "about/regions" if self._regions() else "map/error" if self._in_the_plane else "error/mean"
-        whole = board.recall("error", "grid_error", "map", "about", needs=("error/mean", picture))
+            return board.recall("error", "answers", "grid_error", needs=("error/mean",))
+        picture = "about/regions" if self._parts.regions else "map/error" if self._in_the_plane else "error/mean"
+        whole = board.recall("error", "answers", "grid_error", "map", "about", needs=("error/mean", picture))
         if whole:
             self._drawn_at = board.movements
         return whole
 
     def begin(self) -> None:
         """The replay is over: replace earlier event files."""
-        if self._board is not None:
-            self._board.publish()
+        self._board.publish()
 
     def flush(self) -> None:
         """Hand everything to the operating system."""
-        if self._board is not None:
-            self._board.flush()
+        self._board.flush()
 
     def finish(self) -> None:
         """The run has ended."""
-        if self._board is not None:
-            self._board.finish()
+        self._board.finish()
 
     @property
     def _draws(self) -> bool:
         """Whether this evaluation gets pictures, which take as long as 100 movements: when the number of movements has
         doubled, and at the end."""
-        assert self._board is not None
-        return self._board.movements >= 2 * self._drawn_at or self._board.movements == self._config.movements
+        return self._board.movements >= 2 * self._drawn_at or self._board.movements == self._parts.config.movements
 
     @property
     def _in_the_plane(self) -> bool:
         return self._parts.environment.outcomes.dim == 2
 
-    def _draw(self, board: Board, found: Evaluation) -> None:
+    def _draw(self, found: Evaluation) -> None:
         from sgimd_torch.board.pictures import draw, where  # loaded only when there is a board
 
-        space, regions = self._parts.environment.outcomes, self._regions()
+        board, space, regions = self._board, self._parts.environment.outcomes, self._parts.regions
         self._drawn_at = board.movements
         if self._in_the_plane:
             pictures = draw(

@@ -15,8 +15,8 @@ import re
 import shlex
 import sys
 import textwrap
-from collections.abc import Sequence
-from dataclasses import fields
+from collections.abc import Mapping, Sequence
+from dataclasses import Field, fields
 from pathlib import Path
 from typing import Any, Final, NoReturn, get_type_hints
 
@@ -24,7 +24,7 @@ import jsonargparse
 
 from sgimd_torch.catalogue import CATALOGUE, did_you_mean
 from sgimd_torch.runs.config import Config, dashed, options
-from sgimd_torch.runs.process import loading
+from sgimd_torch.runs.process import Stopping, loading
 
 FLAGS: Final = {
     "resume": "Go on with a stopped or killed run, or lengthen a finished one.",
@@ -36,6 +36,7 @@ _WANTED: Final = {
     "bool": "true or false",
     "int | None": "a whole number, or null",
     "tuple[int, ...] | None": "whole numbers such as 250,500, or [], or null",
+    "tuple[str, ...]": "words such as own,nearest",
 }
 _BOOL: Final = ("true", "false")
 
@@ -46,21 +47,23 @@ def main(argv: Sequence[str] | None = None) -> int:
     config, flags = parse(argv, __doc__)
     again = [sys.executable, "-m", "sgimd_torch", "run", *argv, *([] if flags["resume"] else ["--resume"])]
     with loading():
-        from sgimd_torch.runs.run import carry_out  # after --help
-    print(carry_out(config, **flags, again=shlex.join(again)))
+        from sgimd_torch.runs.build import build  # after --help
+        from sgimd_torch.runs.run import carry_out
+    with Stopping() as stopping:
+        with stopping.at_once():
+            parts = build(config)
+        print(carry_out(parts, stopping, **flags, again=shlex.join(again)))
     return 0
 
 
-def parse(
-    argv: Sequence[str], description: str | None = None, prog: str = "sgimd run"
-) -> tuple[Config, dict[str, bool]]:
+def parse(argv: Sequence[str], description: str | None = None) -> tuple[Config, dict[str, bool]]:
     """The run that a command line asks for, and its flags.
 
     Raises:
         SystemExit: with code 2 and a message on stderr when it makes no sense, 0 after ``--help``.
     """
     parser = _Parser(
-        prog=prog,
+        prog="sgimd run",
         usage="%(prog)s [--OPTION VALUE ...] [--resume]",
         description=description,
         epilog="null means no value. Options may be typed with underscores instead of dashes.",
@@ -112,51 +115,43 @@ class _Help(argparse.RawTextHelpFormatter):
 class _Parser(jsonargparse.ArgumentParser):
     def __init__(self, **arguments: Any) -> None:
         super().__init__(**arguments)
-        self.typed: dict[str, tuple[str, str]] = {}  # by field: the option as it was typed, and its value
+        self.typed: dict[str, tuple[str, str, str]] = {}  # by field: the option as it was typed, its value, its type
 
     def joined(self, argv: Sequence[str]) -> list[str]:
         """Each option and its value as one word, spelt with dashes; a word that belongs to no option is refused."""
-        names = {f"--{dashed(each.name)}": each.name for each in fields(Config)}
-        flags = {*(f"--{dashed(flag)}" for flag in FLAGS), "--help"}
+        names = {f"--{dashed(each.name)}": each for each in fields(Config)}
         words: list[str] = []
-        waiting = ""  # the option before, if it takes a value
         for word in argv:
-            typed, equals, value = word.partition("=")
-            if waiting and not typed.startswith("--"):
-                words[-1] = self._with_value(waiting, names[waiting], self.typed[names[waiting]][0], word)
-                waiting = ""
-            elif typed.startswith("--"):
-                option = dashed(typed)
-                if option not in names and option not in flags:
-                    self.error(f"unknown option {word}{did_you_mean(option, {*names, *flags})}")
-                if option in flags and equals:
-                    self.error(f"{typed} takes no value, got {value!r}")
-                words.append(option)
-                waiting = option if option in names and not equals else ""
-                if option in names:
-                    self.typed[names[option]] = typed, value
-                    if equals:
-                        words[-1] = self._with_value(option, names[option], typed, value)
-            elif word == "-h":
-                words.append(word)
+            if words and dashed(words[-1]) in names and not word.startswith("--"):  # the value that it waits for
+                words[-1] += f"={word}"
             else:
-                self.error(f"{word!r} belongs to no option; an option begins with -- and takes one value")
-        return words
+                words.append(word)
+        return [self._spelt(word, names) for word in words]
 
-    def _with_value(self, option: str, name: str, typed: str, value: str) -> str:
-        self.typed[name] = typed, value
-        kind = str(Config.__dataclass_fields__[name].type)
-        if not value and "Path" in kind:
-            self.error(f"{typed} must be a path, got an empty one")
-        if "tuple" in kind and re.fullmatch(r"\d+(,\d+)*", value):
-            value = f"[{value}]"
-        return f"{option}={value}"
+    def _spelt(self, word: str, names: Mapping[str, Field[Any]]) -> str:
+        typed, equals, value = word.partition("=")
+        option, flags = dashed(typed), {*(f"--{dashed(flag)}" for flag in FLAGS), "--help"}
+        if option in names:
+            kind = str(names[option].type)
+            self.typed[names[option].name] = typed, value, kind
+            if equals and not value and "Path" in kind:
+                self.error(f"{typed} must be a path, got an empty one")
+            item = r"\d+" if "int" in kind else r"[^\[\],]+"
+            if "tuple" in kind and re.fullmatch(f"{item}(,{item})*", value):
+                value = f"[{value}]"
+            return f"{option}={value}" if equals else option
+        if word != "-h" and not typed.startswith("--"):
+            self.error(f"{word!r} belongs to no option; an option begins with -- and takes one value")
+        if word != "-h" and option not in flags:
+            self.error(f"unknown option {word}{did_you_mean(option, {*names, *flags})}")
+        if equals:
+            self.error(f"{typed} takes no value, got {value!r}")
+        return option
 
     def error(self, message: str, ex: Exception | None = None) -> NoReturn:
         key = re.search(r'[Kk]ey "(\w+)"', message)
         if key and key[1] in self.typed:
-            kinds = {each.name: str(each.type) for each in fields(Config)}
-            typed, value = self.typed[key[1]]
-            message = f"{typed} must be {_WANTED.get(kinds[key[1]], 'text')}, got {value}"
+            typed, value, kind = self.typed[key[1]]
+            message = f"{typed} must be {_WANTED.get(kind, 'text')}, got {value}"
         print(f"error: {message}\n--help lists all options", file=sys.stderr)
         raise SystemExit(2)

@@ -11,12 +11,13 @@ import importlib.util
 import json
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from sgimd_torch.catalogue import CATALOGUE, ROD, SHARED, Entry, find
+from sgimd_torch.runs.tables import OWN
 
 
 class Option(NamedTuple):
@@ -130,9 +131,25 @@ class Config:
         24, LEARNER, "Competences of a region that its interest is measured over, the paper's zeta; even."
     )
     progress: str = option("gained", LEARNER, "What makes a region interesting.")
+    g_max: int = option(30, LEARNER, "Goals above which a region is cut in two (interest-map).", least=4, before=30)
+    max_aspect: float = option(
+        5.0,
+        LEARNER,
+        "How many times longer than another side a region's side may become; 1e9 is no bound, as in the paper.",
+        least=1,
+        before=5.0,
+    )
     competence: str = option("memory", LEARNER, "What the competence at a goal is judged by.")
     search: str = option("nelder-mead", LEARNER, "How a movement is refined (sagg-riac, sgim-d).", leads=True)
     budget: int = option(15, LEARNER, "Movements for one goal, at most.", least=1)
+    give_up: float = option(
+        -0.5,
+        LEARNER,
+        "Competence below which a goal is given up at the first movement in vain; -1 never gives up, as in the paper.",
+        least=-1,
+        most=0,
+        before=-0.5,
+    )
     inverse: str = option(
         "linear", LEARNER, "Which movement is inferred for a goal, when learning and in evaluations.", leads=True
     )
@@ -190,6 +207,15 @@ class Config:
         least=1,
         on_resume=True,
     )
+    answers: tuple[str, ...] = option(
+        ("own", "linear"),
+        EVALUATION,
+        "Which inverse models answer in evaluations, each with the same noise: own is that of --inverse, others are "
+        "its choices, to compare learners by the same one; model answers only in runs that learn one.",
+        on_resume=True,
+        evaluates=True,
+        before=["own"],  # as json has it
+    )
     repeats: int = option(
         3,
         EVALUATION,
@@ -216,6 +242,11 @@ class Config:
             if each.name in CATALOGUE:
                 find(each.name, value)
             each.metadata["option"].check(each.name, value)
+        for answer in self.answers:
+            if answer != OWN:
+                find("inverse", answer)
+        if self.answers[:1] != (OWN,) or len({*self.answers}) < len(self.answers):
+            raise ValueError(f"answers must begin with {OWN} and name each once, got {','.join(self.answers)}")
         if self.repeats == 1:
             raise ValueError("repeats must be 0 or at least 2, got 1; one landing point does not scatter")
         if self.board and importlib.util.find_spec("tensorboard") is None:
@@ -234,6 +265,11 @@ class Config:
         return self.out / self.variant / f"seed-{self.seed:03d}"
 
     @property
+    def title(self) -> str:
+        """The name of the run in messages."""
+        return f"{self.variant} seed {self.seed}"
+
+    @property
     def evaluations(self) -> list[int]:
         """The numbers of movements after which to evaluate, in order."""
         if self.evaluate_at == ():
@@ -241,6 +277,13 @@ class Config:
         standard = (250, 500, *range(1000, self.movements, 1000))
         chosen = standard if self.evaluate_at is None else self.evaluate_at
         return sorted({movements for movements in chosen if movements < self.movements} | {self.movements})
+
+    @property
+    def answered(self) -> list[str]:
+        """The answers that its evaluations have: without a forward model, none by a model."""
+        needing = {"model"} - self.used
+        options = {answer: find("inverse", answer).options for answer in self.answers if answer != OWN}
+        return [answer for answer in self.answers if not needing.intersection(options.get(answer, ()))]
 
     def entry(self, kind: str) -> Entry:
         """The record of the choice of a kind, or of a shared part."""
@@ -257,7 +300,8 @@ class Config:
                 entry = self.entry(name)
                 ignored |= {*entry.ignores}
                 waiting += [each for each in entry.options if each not in used]
-        named = {each for entry in _entries() for each in entry.options}
+        entries = [*SHARED.values(), *(entry for entries in CATALOGUE.values() for entry in entries.values())]
+        named = {each for entry in entries for each in entry.options}
         return (used | {each.name for each in fields(self)} - named) - ignored
 
     @property
@@ -289,17 +333,16 @@ class Config:
             return f"with --{dashed(chosen[0])} {getattr(self, chosen[0])}"
         return self._why_not(users[0], used)
 
-    def words(self) -> list[str]:
-        """The command line of ``sgimd run`` that makes this run: every option that is not at its default."""
-        return words(vars(self))
-
 
 def words(settings: Mapping[str, Any]) -> list[str]:
-    """``--dashed-name=value`` for every option of a ``Config``, or of a config.json, that is not at its default."""
+    """The command line of ``sgimd run`` for these settings, of ``vars(config)`` or of a config.json.
+
+    ``--dashed-name=value`` for every option that is not at its default.
+    """
     found = []
     for each in fields(Config):
-        value = _plain(settings.get(each.name, each.default))
-        if value != _plain(each.default):
+        value = plain(settings.get(each.name, each.default))
+        if value != plain(each.default):
             text = value if isinstance(value, str) else json.dumps(value, separators=(",", ":"))
             found.append(f"--{dashed(each.name)}={text}")
     return found
@@ -343,10 +386,6 @@ def dashed(name: str) -> str:
     return name.replace("_", "-")
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """As json has it."""
     return json.loads(json.dumps(value, default=str))
-
-
-def _entries() -> Sequence[Entry]:
-    return [*SHARED.values(), *(entry for entries in CATALOGUE.values() for entry in entries.values())]

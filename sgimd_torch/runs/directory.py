@@ -1,70 +1,64 @@
 """Writing a run directory: refuse what is not this run, keep what is undamaged, go on from there.
 
-with RunDirectory(path, settings, ...) as directory: directory.begin(); directory.log.append(line); ...
+with RunDirectory(build(config), resume=False) as directory: directory.begin(); directory.log.append(line); ...
 ``log.py`` explains the files.
 """
 
 from __future__ import annotations
 
+import importlib.metadata
 import os
-from collections.abc import Mapping, Sequence
+import platform
+import subprocess
 from itertools import count
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any, Final, Self
 
+import sgimd_torch
 from sgimd_torch.files import lock, make_folder, write_bytes, write_json
-from sgimd_torch.runs.config import before_there_was_a_choice
+from sgimd_torch.runs.build import RunParts
+from sgimd_torch.runs.config import before_there_was_a_choice, having, plain
 from sgimd_torch.runs.evaluations import Evaluations
 from sgimd_torch.runs.log import Columns, RunError, read_json
 
 _UNFINISHED = ("lock", "versions.json")  # what a run killed before its config.json may have left, besides *.part
+# Files count by their content, of which a checksum is recorded; a benchmark may be another one when a run is resumed.
+MAY_CHANGE: Final = (*having("on_resume"), "benchmark_crc32")
+EVALUATION_SETTINGS: Final = (*having("evaluates"), "benchmark_crc32")  # all evaluations of a run share these
 
 
 class RunDirectory:
     """Where one run is written, from ``begin`` on, by one process at a time; a context manager.
 
+    Of the evaluations of an earlier part it keeps those that the whole run would have.
+
     Args:
-        path: made when missing.
-        settings: everything that makes the run, as it goes to config.json.
-        free: names of settings that may differ when a run is resumed.
-        columns: of the log.
-        region_dims: dimensions of C x T, where the goal model has regions; None where it has none.
-        versions: of Python, the libraries and this repository.
-        movements: how long the run is to be; the log must not be longer.
+        parts: of the run; its configuration says where the directory is.
         resume: go on with what is there; False refuses a directory that is in use already.
         accept_loss: go on even if the log lacks movements that summary.json counts: they are made again.
 
     Attributes:
-        log: its table.
+        columns, log: the columns of the log, and its table.
         lines: of the log, as they were found.
-        before: the settings it was started or last resumed with; None for a new run.
         summary: the last one, {} if there is none.
         evaluations: those found, and where new ones go.
         notes: messages for the user, such as what was dropped from damaged files.
 
     Raises:
         RunError: it holds a run and ``resume`` is False, or a run with other settings, or something else; or its log
-            lacks movements; or another process writes in it.
+            lacks movements, or has more than the run is to have; or another process writes in it.
         OSError: it cannot be written.
     """
 
-    def __init__(
-        self,
-        path: Path,
-        settings: Mapping[str, Any],
-        *,
-        free: Sequence[str],
-        columns: Columns,
-        region_dims: int | None,
-        versions: dict[str, Any],
-        resume: bool,
-        movements: int,
-        accept_loss: bool = False,
-    ) -> None:
-        self.path, self.columns, self.log = path, columns, columns.table(path)
+    def __init__(self, parts: RunParts, *, resume: bool, accept_loss: bool = False) -> None:
+        config, robot = parts.config, parts.environment
+        self.path = path = config.directory
+        self.columns = Columns(robot.contexts.dim, robot.policies.dim, robot.outcomes.dim)
+        self.log = self.columns.table(path)
         self.notes: list[str] = []
         self.summary: dict[str, Any] = {}
+        self._settings: dict[str, Any] = plain({**vars(config), **parts.data})
+        self._versions = versions()
         _refuse_foreign(path)
         make_folder(path)
         try:
@@ -72,17 +66,19 @@ class RunDirectory:
         except BlockingIOError:
             raise RunError(f"{path} is in use by another process; wait for it, or choose another --out") from None
         try:
-            self.before = self._settings_before(settings, free, resume)
-            if self.before is not None:
-                versions = self._with_versions_before(versions)
+            before = self._settings_before(resume)
+            if before is not None:
+                self._keep_versions_before()
                 self.summary = self._summary_before()
             elif resume:
                 self.notes.append(f"{path} holds no run yet: it starts from the beginning")
             self._copy = self._read_log(accept_loss)
-            if len(self.lines) > movements:
-                raise RunError(f"{path} has {len(self.lines)} movements already, {movements} were asked for")
-            self._settings, self._versions = dict(settings), versions
-            self.evaluations = Evaluations(path, region_dims, self.notes)
+            if len(self.lines) > config.movements:
+                raise RunError(f"{path} has {len(self.lines)} movements already, {config.movements} were asked for")
+            self.evaluations = Evaluations(path, len(parts.regions[0].low) if parts.regions else None, self.notes)
+            alike = before is not None and all(before.get(name) == self._settings[name] for name in EVALUATION_SETTINGS)
+            kept = [n for n in config.evaluations if alike and n <= len(self.lines)]
+            self.evaluations.keep(kept, config.answered)
             for partial in (*path.glob("*.json*.part"), *path.glob("*.csv*.part")):  # of a process that was killed
                 partial.unlink()
         except BaseException:
@@ -92,17 +88,8 @@ class RunDirectory:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        """Flush and release the lock; a full disk is not reported twice."""
-        try:
-            self.log.flush()
-        except OSError:
-            if error is None:
-                raise
-        finally:
-            os.close(self._lock)
+    def __exit__(self, *_: object) -> None:
+        os.close(self._lock)
 
     def begin(self) -> None:
         """Start to write. Until then what was found stays as it is, so that a replay that fails does no harm."""
@@ -122,7 +109,9 @@ class RunDirectory:
         self.summary = summary
         write_json(self.path / "summary.json", summary)
 
-    def _settings_before(self, settings: Mapping[str, Any], free: Sequence[str], resume: bool) -> dict[str, Any] | None:
+    def _settings_before(self, resume: bool) -> dict[str, Any] | None:
+        """Those that it was started or last resumed with; None for a new run."""
+        settings = self._settings
         before: dict[str, Any] | None = read_json(self.path / "config.json", missing=None)
         if before is None:
             return None
@@ -132,7 +121,7 @@ class RunDirectory:
         differ = [
             f"{name} was {before.get(name)}, now {settings.get(name)}"
             for name in dict.fromkeys((*settings, *before))
-            if name not in free and before.get(name) != settings.get(name)
+            if name not in MAY_CHANGE and before.get(name) != settings.get(name)
         ]
         if differ:
             raise RunError(
@@ -141,17 +130,19 @@ class RunDirectory:
             )
         return before
 
-    def _with_versions_before(self, versions: dict[str, Any]) -> dict[str, Any]:
+    def _keep_versions_before(self) -> None:
+        """Other versions that an earlier part ran with."""
         old = self._read_or_note("versions.json")
         earlier = old.pop("before", [])
         if not isinstance(earlier, list):
             earlier = []
-        differ = [name for name in versions if old.get(name) != versions[name]]
+        differ = [name for name, now in self._versions.items() if old.get(name) != now]
         if old and differ:
-            changes = ", ".join(f"{name} {old.get(name)} -> {versions[name]}" for name in differ)
+            changes = ", ".join(f"{name} {old.get(name)} -> {self._versions[name]}" for name in differ)
             self.notes.append(f"resumed with other versions: {changes}")
             earlier = [*earlier, old]
-        return {**versions, "before": earlier} if earlier else versions
+        if earlier:
+            self._versions["before"] = earlier
 
     def _summary_before(self) -> dict[str, Any]:
         summary = self._read_or_note("summary.json")
@@ -205,3 +196,21 @@ def _refuse_foreign(path: Path) -> None:
     foreign = [entry for entry in sorted(os.listdir(path)) if entry not in _UNFINISHED and not entry.endswith(".part")]
     if foreign:
         raise RunError(f"{path} holds {', '.join(foreign[:3])} but no run (no config.json); choose another --out")
+
+
+def versions() -> dict[str, Any]:
+    """What runs here; ``commit`` is None outside a git repository and ends in "-dirty" when files were changed."""
+    packages = {"numpy": "numpy", "scipy": "scipy", "faiss": "faiss-cpu", "mujoco": "mujoco"}
+    here = str(Path(__file__).parent)
+    describe = ["git", "-C", here, "describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"]
+    try:
+        commit = subprocess.run(describe, capture_output=True, text=True, check=True, timeout=10).stdout.strip()
+    except (OSError, subprocess.SubprocessError):
+        commit = None
+    return {
+        "python": platform.python_version(),
+        **{name: importlib.metadata.version(package) for name, package in packages.items()},
+        "sgimd_torch": sgimd_torch.__version__,
+        "platform": platform.platform(),
+        "commit": commit,
+    }

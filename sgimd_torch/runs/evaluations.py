@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -40,13 +40,18 @@ class Evaluations:
 
     @property
     def last(self) -> dict[str, float]:
-        """The last evaluation by column, {} before the first."""
-        errors, *_ = self._rows.values()
-        return dict(zip(EVALUATION, map(float, errors[max(errors)][0]), strict=True)) if errors else {}
+        """The last evaluation of the run's own answers by column, {} before the first."""
+        evaluated, *_ = self._rows.values()
+        if not evaluated:
+            return {}
+        row = dict(zip(EVALUATION, evaluated[max(evaluated)][0], strict=True))
+        return {name: float(field) for name, field in row.items() if name != "answer"}
 
-    def keep(self, movements: Iterable[int]) -> None:
-        """Keep only those after these numbers of ``movements``."""
-        wanted = {number for number in movements if number in self}
+    def keep(self, movements: Iterable[int], answers: Sequence[str]) -> None:
+        """Keep only those after these numbers of ``movements`` that have these ``answers``."""
+        evaluated, *_ = self._rows.values()
+        complete = {number for number, rows in evaluated.items() if [row[1] for row in rows] == [*answers]}
+        wanted = {number for number in movements if number in self and number in complete}
         for table, rows in self._rows.items():
             self._rows[table] = {number: rows[number] for number in wanted}
 
@@ -56,18 +61,30 @@ class Evaluations:
         for table in self._rows:
             self._write(table)
 
-    def add(self, movements: int, evaluation: Evaluation, regions: Sequence[Region]) -> None:
-        """Keep an evaluation, and the regions as they were then."""
-        values = [evaluation.mean_error, np.median(evaluation.errors), np.quantile(evaluation.errors, 0.9)]
-        errors = numbers(np.array([*values, evaluation.noise_floor]), len(EVALUATION) - 1)
-        for table, found in zip(self._rows, ([errors], map(_fields, regions)), strict=False):
-            self._rows[table][movements] = [[str(movements), *fields] for fields in found]
+    def add(self, movements: int, found: Mapping[str, Evaluation], near: float, regions: Sequence[Region]) -> None:
+        """Keep an evaluation, and the regions as they were then.
+
+        Args:
+            movements: before it.
+            found: by answer, the run's own first.
+            near: distance (m) at which a goal counts as met.
+            regions: of the goal model, none if it has none.
+        """
+        errors = [[answer, *_errors(each, near)] for answer, each in found.items()]
+        for table, found_there in zip(self._rows, (errors, map(_fields, regions)), strict=False):
+            self._rows[table][movements] = [[str(movements), *fields] for fields in found_there]
             if self._begun:
                 self._write(table)
 
     def _write(self, table: Table) -> None:
         rows = self._rows[table]
         table.replace(row for number in sorted(rows) for row in rows[number])
+
+
+def _errors(found: Evaluation, near: float) -> list[str]:
+    errors = found.errors
+    values = [found.mean_error, np.median(errors), np.quantile(errors, 0.9), found.noise_floor]
+    return [*numbers(np.array(values), len(values)), str(found.met(near))]
 
 
 def _fields(region: Region) -> list[str]:

@@ -5,7 +5,8 @@
     episodes.csv     the log, append-only:
                          index, origin ("" at rest), demonstration (its row in the file, when one came just before),
                          context_*, theta_*, goal_*, outcome_*
-    evaluation.csv   movements, mean_error_m, median_error_m, p90_error_m, noise_floor_m
+    evaluation.csv   movements, answer, mean_error_m, median_error_m, p90_error_m, noise_floor_m, goals_met: a line for
+                         each inverse model that answered
     regions.csv      the regions of the goal model at each evaluation, a line for each, corners in C x T
     predictions.csv  with a forward model: what it predicted of each exemplar before learning it, and what happened
     refreshes.csv    with a forward model: a line each time that it has learnt
@@ -108,6 +109,20 @@ class Columns:
         values = np.array(fields, dtype=np.float64).reshape(len(rows), ends[-1])
         contexts, thetas, goals, outcomes = np.split(values, ends[:-1], axis=1)
         return contexts, thetas, goals, outcomes
+
+    def difference(self, recorded: bytes, now: bytes) -> str:
+        """Of two lines that should be the same: which columns differ, the first three in full."""
+        were, are = (line.decode().split(",")[:-1] for line in (recorded, now))
+        differences = [
+            f"{name} was {old or 'empty'}, now {new or 'empty'}"
+            for name, old, new in zip(self.names, were, are, strict=True)
+            if old != new
+        ]
+        more = f"; and {len(differences) - 3} more" if len(differences) > 3 else ""
+        return (
+            f"movement {were[0]} is replayed otherwise than recorded: {'; '.join(differences[:3])}{more}. "
+            "Was it recorded by another version, or on another processor?"
+        )
 
     def recorded(self, lines: Sequence[bytes]) -> list[Recorded]:
         """What ``session.replay`` needs of these lines."""

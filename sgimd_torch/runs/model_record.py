@@ -1,20 +1,20 @@
 """The forward model of a run: it is trained, its predictions are recorded, and a message says when it is not asked.
 
 predictions.csv and refreshes.csv are made again by a replay, so a resumed run has them as if it had never stopped.
-    model = RunModel(directory, parts.model, trust); model.episode(episode, memory); model.flush()
+    model = RunModel(directory.path, parts.model, trust); model.episode(episode, memory); model.flush()
 """
 
 from __future__ import annotations
 
 import time
 from collections import deque
+from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from sgimd_torch.forward_model.diagnostics import coverage, improvements
 from sgimd_torch.memory import Memory
-from sgimd_torch.runs.directory import RunDirectory
 from sgimd_torch.runs.tables import numbers, sealed, small_table
 from sgimd_torch.spaces import Array, Episode
 
@@ -46,22 +46,21 @@ LAYOUT: Final = {
 
 
 class RunModel:
-    """Refreshes the model after every movement and keeps a record; does nothing in a run without one.
+    """Refreshes the model after every movement and keeps a record.
 
     Args:
         directory: of the run; its files stay as they are until ``begin``.
-        model: None for a run without.
+        model: of the run.
         trust: relative error above which the model is not asked.
 
     ``curves`` are for the board, by tag, as the last refresh left them.
     """
 
-    def __init__(self, directory: RunDirectory, model: ForwardModel | None, trust: float) -> None:
+    def __init__(self, directory: Path, model: ForwardModel, trust: float) -> None:
         self._model, self._trust = model, trust
-        dims = directory.columns.outcome_dim
-        self._predictions = small_table(directory.path / "predictions.csv", dims)
-        self._refreshes = small_table(directory.path / "refreshes.csv", dims)
-        self._tables = (self._predictions, self._refreshes) if model is not None else ()
+        self._predictions = small_table(directory / "predictions.csv", model.sizes["outcome_dim"])
+        self._refreshes = small_table(directory / "refreshes.csv", 0)
+        self._tables = self._predictions, self._refreshes
         self._asked = False
         self._learnt = 0  # refreshes so far
         self._lately: deque[tuple[Array, Array, str]] = deque(maxlen=LATELY)
@@ -75,10 +74,8 @@ class RunModel:
             table.begin()
             table.flush()
 
-    def episode(self, episode: Episode, memory: Memory) -> bool:
-        """Refresh after a movement, new or replayed. Returns whether the model has learnt and ``curves`` are new."""
-        if self._model is None:
-            return False
+    def episode(self, episode: Episode, memory: Memory) -> dict[str, float]:
+        """Refresh after a movement, new or replayed; returns new ``curves``, none if the model has not learnt."""
         movements, move = episode.index + 1, episode.move
         if move is not None and move.goal is not None and episode.outcome is not None:
             self._lately.append((move.goal, episode.outcome, move.origin))
@@ -86,7 +83,7 @@ class RunModel:
         refresh = self._model.refresh(memory, None if move is None else move.goal)
         self._seconds += time.perf_counter() - begun
         if refresh is None:
-            return False
+            return {}
         self._learnt += 1
         error = self._model.relative_error
         fields = [movements, len(memory), refresh.steps, repr(refresh.held_out), repr(error), int(refresh.diverged)]
@@ -103,7 +100,7 @@ class RunModel:
         if refresh.diverged:
             self._news.append(f"movement {movements}: training diverged; the forward model keeps its last good weights")
         self._say_whether_asked(movements, error)
-        return True
+        return self.curves
 
     def flush(self) -> None:
         """Hand everything to the operating system."""
@@ -113,7 +110,7 @@ class RunModel:
     def news(self, *, ended: bool = False) -> list[str]:
         """Messages about the model that were not returned yet; at the end of a run also that it is not asked."""
         news, self._news = self._news, []
-        if ended and self._model is not None and not self._asked:
+        if ended and not self._asked:
             trained = self._model.trained
             why = self._how_wrong(self._model.relative_error) if trained else "there were too few exemplars to train it"
             news.append(f"{NOT_ASKED}: {why}")
@@ -121,7 +118,7 @@ class RunModel:
 
     def summary(self) -> dict[str, float]:
         """For summary.json: seconds spent on refreshes since movement 0, because a replay repeats them."""
-        return {} if self._model is None else {"seconds_model": round(self._seconds, 3)}
+        return {"seconds_model": round(self._seconds, 3)}
 
     def _record(self, first: int, outcomes: Array, predicted: Prediction) -> None:
         parts = (outcomes, *predicted)

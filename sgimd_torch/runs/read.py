@@ -14,11 +14,12 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sgimd_torch.runs.config import Config, from_settings, having, options
+from sgimd_torch.runs.config import Config, before_there_was_a_choice, from_settings, having, options
 from sgimd_torch.runs.log import Columns, RunError, read_json
-from sgimd_torch.runs.tables import EVALUATION, SMALL, small_table
+from sgimd_torch.runs.tables import EVALUATION, OWN, SMALL, small_table
 from sgimd_torch.spaces import Array
 
+NO_EVALUATION: Final = {name: np.empty(0) for name in EVALUATION}
 LONGEST_LINE: Final = 1 << 16  # bytes, of a log
 
 
@@ -28,9 +29,10 @@ class Run:
 
     ``index`` ``(n,)``, ``origin`` ``(n,)`` names, "" at rest, ``demonstration`` ``(n,)`` row of the demonstration just
     before, -1 if there was none; ``contexts``, ``thetas``, ``goals`` and ``outcomes`` ``(n, dim)``, NaN where there was
-    none. ``evaluation`` has an array for each column, an entry for each evaluation; ``regions`` likewise, with an entry
-    for each region at each evaluation, None for a goal model without regions; ``predictions`` and ``refreshes``
-    likewise, None without a forward model. ``config``, ``versions``, ``summary``: as in their files.
+    none. ``answers`` has, for each answer, an array for each column of evaluation.csv, an entry for each evaluation;
+    ``regions`` likewise, with an entry for each region at each evaluation, None for a goal model without regions;
+    ``predictions`` and ``refreshes`` likewise, None without a forward model. ``config``, ``versions``,
+    ``summary``: as in their files.
 
     ``damage``: file name -> number of its first bad line, where reading ended, such as ``{"evaluation.csv": 3}``; the
     names of the columns are line 1. ``unchecked``: names of the files without checksums, which an earlier version
@@ -48,12 +50,17 @@ class Run:
     thetas: Array
     goals: Array
     outcomes: Array
-    evaluation: dict[str, Array]
+    answers: dict[str, dict[str, Array]]
     regions: dict[str, np.ndarray] | None
     predictions: dict[str, np.ndarray] | None = None
     refreshes: dict[str, np.ndarray] | None = None
     damage: dict[str, int] = field(default_factory=dict)
     unchecked: tuple[str, ...] = ()
+
+    @property
+    def evaluation(self) -> dict[str, Array]:
+        """The evaluations of the run's own answers."""
+        return self.answers[OWN]
 
     def chosen_goals(self) -> Array:
         """``(n, outcome_dim)``, the goals that the learner chose itself, in order, each once even if it took several
@@ -104,7 +111,7 @@ def read_run(path: str | os.PathLike[str]) -> Run:
         thetas=thetas,
         goals=goals,
         outcomes=outcomes,
-        evaluation=arrays.get("evaluation.csv", {name: np.empty(0) for name in EVALUATION}),
+        answers=_by_answer(arrays.get("evaluation.csv", NO_EVALUATION)),
         regions=arrays.get("regions.csv"),
         predictions=arrays.get("predictions.csv"),
         refreshes=arrays.get("refreshes.csv"),
@@ -136,8 +143,9 @@ def finished(config: Config) -> bool:
             return False
         run = read_run(path)
         whole = len(run.index) == config.movements and not run.damage
-        evaluated = not config.evaluations or config.movements in run.evaluation["movements"]
-        found, place = from_settings(settings), having("place")
+        last = [run.answers.get(answer, {}).get("movements", ()) for answer in config.answered]
+        evaluated = not config.evaluations or all(config.movements in movements for movements in last)
+        found, place = from_settings({**before_there_was_a_choice(), **settings}), having("place")
         same = all(getattr(found, name) == getattr(config, name) for name in options() if name not in place)
         files = [(name, getattr(config, name)) for name in ("benchmark", "demonstrations")]
         return (whole and evaluated and same) and all(
@@ -146,6 +154,15 @@ def finished(config: Config) -> bool:
         )
     except (ValueError, OSError):  # of another version, or unreadable: the run says so when it is resumed
         return False
+
+
+def _by_answer(columns: dict[str, Any]) -> dict[str, dict[str, Array]]:
+    """The rows of evaluation.csv, apart for each answer; the run's own answers are always there."""
+    words = columns["answer"]
+    return {
+        word: {name: values[words == word] for name, values in columns.items() if name != "answer"}
+        for word in dict.fromkeys((OWN, *words.tolist()))
+    }
 
 
 def movements_on_disk(path: Path) -> int:

@@ -34,7 +34,7 @@ from typing import Final
 
 from sgimd_torch.files import locked, make_folder
 from sgimd_torch.runs.command_line import parse
-from sgimd_torch.runs.config import Config, dashed
+from sgimd_torch.runs.config import Config, dashed, words
 from sgimd_torch.runs.process import Failed, Progress, loading, say
 from sgimd_torch.runs.read import finished, movements_on_disk
 
@@ -77,7 +77,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     say(f"{len(configs)} runs ({counts}), {len(configs) - len(left)} of them finished: {out}")
     if options.dry_run:
         for config in left:
-            print(f"{title(config)}: {movements_on_disk(config.directory)} of {config.movements} movements")
+            print(f"{config.title}: {movements_on_disk(config.directory)} of {config.movements} movements")
         return 0
     with loading():
         from sgimd_torch.runs.build import build  # after --help
@@ -182,7 +182,7 @@ def sweep(
                     except (Failed, ValueError, OSError) as error:
                         run.state = "failed"
                         progress.total -= run.config.movements - run.done  # the rest will not be run
-                        failures.append(f"{title(run.config)} failed: {error}")
+                        failures.append(f"{run.config.title} failed: {error}")
                         if not keep_going:
                             raise (Failed if isinstance(error, Failed) else ValueError)(failures[0]) from error
                 progress.show(_done(runs), _note(runs))
@@ -224,7 +224,7 @@ class _Run:
         while not stop.is_set():
             if locked(directory / "lock"):
                 if self.state != "held":
-                    say(f"{title(self.config)}: waiting for another process, which writes this run")
+                    say(f"{self.config.title}: waiting for another process, which writes this run")
                 self.state = "held"
                 stop.wait(LOOK_EVERY)
                 continue
@@ -239,7 +239,7 @@ class _Run:
 
     def _process(self, stop: threading.Event) -> int:
         """Start its process, wait for it, stop it after ``stop``; its exit code."""
-        command = [sys.executable, "-m", "sgimd_torch", "run", "--resume", *self.flags, *self.config.words()]
+        command = [sys.executable, "-m", "sgimd_torch", "run", "--resume", *self.flags, *words(vars(self.config))]
         one_thread = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL")}
         with self.log.open("wb") as log:
             process = subprocess.Popen(
@@ -263,17 +263,12 @@ class _Run:
             return process.wait()
 
     def _last_words(self, code: int) -> str:
-        _, mark, words = ("\n" + self.log.read_text(errors="replace").rstrip()).rpartition("\nerror: ")
+        _, mark, said = ("\n" + self.log.read_text(errors="replace").rstrip()).rpartition("\nerror: ")
         if not mark:
-            words = words.rpartition("\n")[2] or "it said nothing"
+            said = said.rpartition("\n")[2] or "it said nothing"
         if code < 0:
-            words = f"stopped by {signal.Signals(-code).name}; the same command goes on with it"
-        return f"{words}\nIts whole log: {self.log}"
-
-
-def title(config: Config) -> str:
-    """The name of a run in messages."""
-    return f"{config.variant} seed {config.seed}"
+            said = f"stopped by {signal.Signals(-code).name}; the same command goes on with it"
+        return f"{said}\nIts whole log: {self.log}"
 
 
 def _done(runs: Sequence[_Run]) -> int:
@@ -290,7 +285,7 @@ def _note(runs: Sequence[_Run]) -> str:
     parts = [f"{states['done']} of {len(runs)} runs"]
     parts += [f"{states['failed']} failed"] if states["failed"] else []
     parts += [f"waiting for {states['held']} held by another process"] if states["held"] else []
-    return ", ".join([*parts, *(f"{title(run.config)} at {run.done}" for run in runs if run.state == "running")])
+    return ", ".join([*parts, *(f"{run.config.title} at {run.done}" for run in runs if run.state == "running")])
 
 
 def _in_name(option: str, value: str) -> str:

@@ -12,7 +12,8 @@ import os
 import re
 import zlib
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import groupby
 from pathlib import Path
 from typing import Final
@@ -23,13 +24,17 @@ from sgimd_torch.files import write_bytes
 from sgimd_torch.spaces import Array
 
 SMALL: Final = ("evaluation.csv", "regions.csv", "predictions.csv", "refreshes.csv")
-EVALUATION: Final = ("movements", "mean_error_m", "median_error_m", "p90_error_m", "noise_floor_m")
+EVALUATION: Final = (
+    *("movements", "answer", "mean_error_m", "median_error_m", "p90_error_m", "noise_floor_m", "goals_met"),
+)
+OWN: Final = "own"  # the answer of the inverse model that a run chose
+_LATER: Final = {"answer": OWN, "goals_met": "nan"}  # columns that earlier versions lacked, and what they mean there
 REFRESHES: Final = ("movements", "exemplars", "steps", "held_out", "relative_error", "diverged")
 Rows = list[list[str]]
 WHOLE: Final = ("movements", "attempts", "goals", "exemplar", "exemplars", "steps", "diverged")
 _CELL: Final = r"R(\.[0-9]{1,6})+"  # the path of a cell of a grid
 _PART_OF_A_HEADER: Final = re.compile(rb"[a-z0-9_,]*")
-_MAY_BE_NAN: Final = ("noise_floor_m", "competence")  # not measured; no goals
+_MAY_BE_NAN: Final = ("noise_floor_m", "goals_met", "competence")  # not measured; no goals
 
 
 @dataclass(frozen=True)
@@ -38,7 +43,7 @@ class Found:
 
     ``lines``, without the header, as they are in the file; ``size`` (bytes) of header and lines; ``tail``, what comes
     after them; ``checked``: the lines have checksums, those of earlier versions have none; ``grows``: it is written
-    line by line.
+    line by line; ``later``: place -> value of each column that an earlier version lacked.
     """
 
     lines: list[bytes]
@@ -46,11 +51,16 @@ class Found:
     tail: bytes
     checked: bool
     grows: bool
+    later: dict[int, str] = field(default_factory=dict)
 
     @property
     def rows(self) -> Rows:
         """The fields of each line, its checksum left out."""
-        return [line.decode().rstrip("\n").split(",")[: -1 if self.checked else None] for line in self.lines]
+        rows = [line.decode().rstrip("\n").split(",")[: -1 if self.checked else None] for line in self.lines]
+        for row in rows:
+            for place, value in self.later.items():
+                row.insert(place, value)
+        return rows
 
     @property
     def bad(self) -> int | None:
@@ -86,7 +96,7 @@ class Table:
         self, path: Path, names: Sequence[str], *, grows: bool = False, standing: Callable[[Rows], int] = len
     ) -> None:
         self.path, self.names, self._grows, self._standing = path, tuple(names), grows, standing
-        self.header = ",".join((*names, "crc32")).encode() + b"\n"
+        self.header = _header(names)
         self._pending = bytearray()
         self._begun = False
 
@@ -101,12 +111,17 @@ class Table:
     def parse(self, content: bytes) -> Found:
         """The same, from the content of a file."""
         header, *lines = content.splitlines(keepends=True) or [b""]
-        checked = header != ",".join(self.names).encode() + b"\n"
-        if checked and header != self.header:
+        for later in ({}, _LATER):  # today's columns, then those of earlier versions
+            names = [name for name in self.names if name not in later]
+            checked = header != ",".join(names).encode() + b"\n"
+            if not checked or header == _header(names):
+                break
+        else:
             return Found([], 0, content, checked, self._grows)
-        is_good = _is_sealed if checked else self._is_possible
+        is_good = _is_sealed if checked else partial(_is_possible, names)
         n = next((k for k, line in enumerate(lines) if not is_good(line)), len(lines))
-        found = Found(lines, len(content), b"", checked, self._grows).first(n)
+        places = {place: later[name] for place, name in enumerate(self.names) if name in later}
+        found = Found(lines, len(content), b"", checked, self._grows, places).first(n)
         return found.first(self._standing(found.rows))
 
     def notes(self, found: Found, outlook: str) -> list[str]:
@@ -120,9 +135,9 @@ class Table:
         return notes
 
     def arrays(self, found: Found) -> dict[str, np.ndarray]:
-        """The columns of a small table: integers, the paths of regions, or numbers."""
+        """The columns of a small table: integers, words such as the paths of regions, or numbers."""
         rows = np.array(found.rows, dtype=np.str_).reshape(len(found.lines), len(self.names))
-        kinds = {"path": np.str_, **dict.fromkeys(WHOLE, np.int64)}
+        kinds = {**dict.fromkeys(("path", "answer"), np.str_), **dict.fromkeys(WHOLE, np.int64)}
         return {name: rows[:, k].astype(kinds.get(name, np.float64)) for k, name in enumerate(self.names)}
 
     def begin(self, size: int = 0) -> None:
@@ -153,10 +168,6 @@ class Table:
     def replace(self, rows: Iterable[Sequence[str]]) -> None:
         """Replace the whole table."""
         write_bytes(self.path, self.header + b"".join(map(sealed, rows)))
-
-    def _is_possible(self, line: bytes) -> bool:
-        fields = line.decode(errors="replace").removesuffix("\n").split(",")
-        return line.endswith(b"\n") and len(fields) == len(self.names) and all(map(_can_be, self.names, fields))
 
 
 def sealed(fields: Sequence[str]) -> bytes:
@@ -222,6 +233,15 @@ def _tile(paths: list[str]) -> bool:
     return True
 
 
+def _header(names: Sequence[str]) -> bytes:
+    return ",".join((*names, "crc32")).encode() + b"\n"
+
+
+def _is_possible(names: Sequence[str], line: bytes) -> bool:
+    fields = line.decode(errors="replace").removesuffix("\n").split(",")
+    return line.endswith(b"\n") and len(fields) == len(names) and all(map(_can_be, names, fields))
+
+
 def _is_sealed(line: bytes) -> bool:
     body, _, checksum = line.rpartition(b",")
     return checksum == b"%08x\n" % zlib.crc32(body)
@@ -231,6 +251,8 @@ def _can_be(name: str, field: str) -> bool:
     """Whether a column can hold this, judged by its name: for lines that have no checksum."""
     if name == "path":
         return re.fullmatch(f"R[01]*|{_CELL}", field) is not None
+    if name == "answer":
+        return field != ""
     if name in WHOLE:
         return re.fullmatch("0|[1-9][0-9]{0,17}", field) is not None
     try:

@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from scipy.stats import qmc
 
 from sgimd_torch.algorithms import Correspondence
 from sgimd_torch.demonstrations import SHIPPED as SHIPPED_DEMONSTRATIONS
@@ -104,12 +103,14 @@ def goals_all_over(environment: Environment) -> Benchmark:
         steps = (np.arange(per_side) + 0.5) / per_side
         points = np.stack(np.meshgrid(*[steps] * box.dim), axis=-1).reshape(-1, box.dim)
     else:
+        from scipy.stats import qmc  # takes longer to import than this whole library
+
         points = qmc.Sobol(box.dim, scramble=False).random_base2(int(np.log2(MOST_GOALS)))[1:]
     return Benchmark(type(environment).__name__, box.low + points * box.sides, float(box.sides.max()) / per_side)
 
 
-def benchmark_of(task: Task, file: Path | None) -> tuple[Benchmark, str | None]:
-    """The goals of a run and the checksum of their file, None of goals that are made.
+def benchmark_of(task: Task, file: Path | None) -> tuple[Benchmark, list[str], str | None]:
+    """The goals of a run, messages on them, and the checksum of their file, None of goals that are made.
 
     Args:
         task: has the goals if there is no file.
@@ -119,18 +120,24 @@ def benchmark_of(task: Task, file: Path | None) -> tuple[Benchmark, str | None]:
         ValueError: they do not fit the environment, or the file is damaged.
         OSError: there is no such file.
     """
-    source = task.benchmark if file is None else file
+    source, robot, notes, checksum = file or task.benchmark, task.environment, list[str](), None
     if isinstance(source, Path):
-        path = _existing("benchmark", source)
-        benchmark, checksum = load_benchmark(path), _checksum(path)
+        checksum = _checksum("benchmark", source)
+        benchmark = load_benchmark(source)
+    elif source is not None:
+        benchmark = source()
     else:
-        benchmark, checksum = goals_all_over(task.environment) if source is None else source(), None
-    benchmark.check(task.environment)
-    return benchmark, checksum
+        benchmark = goals_all_over(robot)
+        notes.append(
+            f"{type(robot).__name__} has no benchmark goals: evaluations use {len(benchmark.goals)} points all over T, "
+            "also where it cannot reach; a file of goals (--benchmark) or a Task with a benchmark is more informative"
+        )
+    benchmark.check(robot)
+    return benchmark, notes, checksum
 
 
-def demonstrations_of(task: Task, file: Path | None) -> tuple[Sequence[Demonstration], list[float], str | None]:
-    """What a teacher can show, the misfit of each (rad), and the checksum of the file.
+def demonstrations_of(task: Task, file: Path | None) -> tuple[Sequence[Demonstration], list[str], str | None]:
+    """What a teacher can show, messages on how well it fits the robot, and the checksum of the file.
 
     Args:
         task: has the demonstrations if there is no file.
@@ -140,30 +147,42 @@ def demonstrations_of(task: Task, file: Path | None) -> tuple[Sequence[Demonstra
         ValueError: there are none, or one cannot be translated, or the file is damaged.
         OSError: there is no such file.
     """
-    source = task.demonstrations if file is None else file
+    source, robot = file or task.demonstrations, task.environment
     if source is None:
         raise ValueError(
-            f"{type(task.environment).__name__} comes without demonstrations, and this algorithm needs a teacher; "
+            f"{type(robot).__name__} comes without demonstrations, and this algorithm needs a teacher; "
             "give --demonstrations FILE, or choose one that learns alone: --algorithm sagg-riac"
         )
     if not isinstance(source, Path):
         made = source()
-        return made, [0.0] * len(made), None
-    path, robot = _existing("demonstrations", source), task.environment
+        return made, _fit(robot, made, [0.0] * len(made)), None
+    checksum = _checksum("demonstrations", source)
     found = load_demonstrations(
-        path, n_joints=task.n_joints, outcome_dim=robot.outcomes.dim, context_dim=robot.contexts.dim
+        source, n_joints=task.n_joints, outcome_dim=robot.outcomes.dim, context_dim=robot.contexts.dim
     )
     misfits: list[float] = []
     for row, demonstration in enumerate(found):
         try:
-            if task.misfit is not None:
-                misfits.append(task.misfit(demonstration))
-            else:
+            if task.misfit is None:
                 correspondence_of(task)(demonstration.times, demonstration.trajectory)
-                misfits.append(0.0)
+            misfits.append(0.0 if task.misfit is None else task.misfit(demonstration))
         except ValueError as error:
-            raise ValueError(f"{path}: recording {row} cannot be translated: {error}") from error
-    return found, misfits, _checksum(path)
+            raise ValueError(f"{source}: recording {row} cannot be translated: {error}") from error
+    return found, _fit(robot, found, misfits), checksum
+
+
+def _fit(robot: Environment, shown: Sequence[Demonstration], misfits: Sequence[float]) -> list[str]:
+    """How well the robot can play what it will be shown, and what lands outside T."""
+    if not shown:
+        return []
+    size = f"{np.median(misfits):.4f} rad (median), {max(misfits):.4f} rad at most"
+    notes = [f"{len(shown)} demonstrations; correspondence misses them by {size}"]
+    outside = [row for row, each in enumerate(shown) if not robot.outcomes.contains(each.outcome)]
+    if outside:
+        place = ", ".join(f"{x:g}" for x in shown[outside[0]].outcome)
+        more = f", as do {len(outside) - 1} more" if len(outside) > 1 else ""
+        notes.append(f"recording {outside[0]} lands at ({place}) m, outside T{more}; were they recorded in cm?")
+    return notes
 
 
 def correspondence_of(task: Task) -> Correspondence:
@@ -212,13 +231,10 @@ def _led_to(arm: PlanarArm, end: Array) -> Demonstration:
     return Demonstration(context, times, np.outer(times, arm.angles(theta)), outcome)
 
 
-def _existing(what: str, path: Path) -> Path:
+def _checksum(what: str, path: Path) -> str:
+    """Of the content of a file that the user named."""
     if path.is_dir():
         raise IsADirectoryError(f"{what}: {path} is a directory, a file was wanted")
     if not path.is_file():
         raise FileNotFoundError(f"{what}: there is no file {path}")
-    return path
-
-
-def _checksum(path: Path) -> str:
     return f"{zlib.crc32(path.read_bytes()):08x}"

@@ -23,14 +23,13 @@ import sys
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Final
 
 from sgimd_torch.catalogue import ROD
-from sgimd_torch.files import replacing
 from sgimd_torch.runs.command_line import parse
 from sgimd_torch.runs.process import loading, say
-from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.sweep import sweep
 
 ALGORITHMS: Final = ("sgim-d", "random")
@@ -47,14 +46,15 @@ def main(argv: Sequence[str] | None = None) -> int:
     if not base.evaluations:
         raise ValueError("--evaluate-at [] leaves nothing to draw; choose some movements, or omit it")
     with loading():
-        from sgimd_torch.views.demo_figure import draw, table  # after --help
-    began, figure = time.monotonic(), options.out / "demo.png"
+        from sgimd_torch.figures.save import save_figure  # after --help
+        from sgimd_torch.views.demo_figure import draw, table
+        from sgimd_torch.views.report.data import read_life
+    began = time.monotonic()
     configs = {algorithm: replace(base, algorithm=algorithm) for algorithm in ALGORITHMS}
     say(f"SGIM-D and Random, {base.movements} movements each, seed {base.seed}: {base.out}")
     sweep(list(configs.values()), processes=2, keep_going=False)
-    runs = {algorithm: read_run(config.directory) for algorithm, config in configs.items()}
-    with replacing(figure) as partial:
-        draw(runs).savefig(partial, format="png", dpi=100)
+    runs = {algorithm: read_life(config.directory) for algorithm, config in configs.items()}
+    (figure,) = save_figure(partial(draw, runs), options.out / "demo", "png")
     print(f"\nMean distance to the benchmark goals (m) after so many movements, and seconds spent\n\n{table(runs)}\n")
     print(f"Figure    {figure}")
     for run in runs.values():

@@ -2,79 +2,63 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
 
 import numpy as np
 
 try:
-    from matplotlib import rc_context
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 except ImportError as error:
     raise ImportError(f"the figure needs matplotlib: pip install 'sgimd-torch[plot]' ({error})") from error
 
-from sgimd_torch.demonstrations import SHIPPED, load_demonstrations
-from sgimd_torch.figures.learning import NAMES, Curve, error_curves, interest_map, landing_points, tile_counts
+from sgimd_torch.figures.learning import NAMES, interest_map, landing_points, map_after, tile_counts
+from sgimd_torch.figures.results import SeedCurves, seed_curves
 from sgimd_torch.runs.log import RunError
-from sgimd_torch.runs.read import Run
-from sgimd_torch.spaces import Array, Box
+from sgimd_torch.spaces import Box
+from sgimd_torch.views.report.data import Life, demonstrated
 
-STYLE: Any = {
-    "font.size": 13,
-    "axes.titleweight": "bold",
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "lines.linewidth": 2,
-    "legend.fontsize": 12,
-    "figure.constrained_layout.w_pad": 0.12,
-    "figure.constrained_layout.h_pad": 0.12,
-}
 GOALS = 100  # the last ones are shown
 
 
-def draw(runs: dict[str, Run]) -> Figure:
+def draw(runs: Mapping[str, Life]) -> Figure:
     """The figure: error curves, the interest map, where the float landed in each run, on one scale.
 
     Raises:
         RunError: a run was never evaluated.
     """
     for run in runs.values():
-        if not len(run.evaluation["movements"]):
+        if not run.evaluated:
             raise RunError(f"{run.path} was never evaluated, so there is no curve to draw; was --evaluate_at [] given?")
     sgim_d, half_side = runs["sgim-d"], float(runs["sgim-d"].config["task_space"])
     task_space = Box.cube(-half_side, half_side, 2)
     tile = 0.05 * half_side
-    outcomes = {algorithm: run.outcomes[np.isfinite(run.outcomes[:, 0])] for algorithm, run in runs.items()}
-    most = max(float(tile_counts(landed, task_space, tile).max()) for landed in outcomes.values())
-    with rc_context(STYLE):
-        figure = Figure(figsize=(14, 12.6), layout="constrained")
-        (curves, interest), landed_axes = figure.subplots(2, 2)
-        error_curves(curves, {algorithm: [_curve(run)] for algorithm, run in runs.items()})
-        curves.set_title("How far from its goals the float lands")
-        _draw_interest(interest, sgim_d)
-        for ax, (algorithm, landed) in zip(landed_axes, outcomes.items(), strict=True):
-            shown = _demonstrated(runs[algorithm])
-            landing_points(ax, landed, task_space, demonstrated=shown, side=tile, most=most)
-            ax.set_title(f"Where the float landed: {NAMES[algorithm]}", pad=32)
-        n = " and ".join(dict.fromkeys(str(len(run.index)) for run in runs.values()))
-        seed = sgim_d.config["seed"]
-        figure.suptitle(
-            f"A simulated arm learns to place its float: SGIM-D and Random, {n} movements each, seed {seed}"
-        )
+    most = max(float(tile_counts(run.landed, task_space, tile).max()) for run in runs.values())
+    figure = Figure(figsize=(14, 12.6), layout="constrained")
+    (curves, interest), landed_axes = figure.subplots(2, 2)
+    seed_curves(curves, [_curve(algorithm, run) for algorithm, run in runs.items()])
+    curves.set_title("How far from its goals the float lands")
+    _draw_interest(interest, sgim_d)
+    for ax, (algorithm, run) in zip(landed_axes, runs.items(), strict=True):
+        shown, _ = demonstrated([run])
+        landing_points(ax, run.landed, task_space, demonstrated=shown if len(shown) else None, side=tile, most=most)
+        ax.set_title(f"Where the float landed: {NAMES[algorithm]}", pad=32)
+    n = " and ".join(dict.fromkeys(str(len(run.index)) for run in runs.values()))
+    seed = sgim_d.config["seed"]
+    figure.suptitle(f"A simulated arm learns to place its float: SGIM-D and Random, {n} movements each, seed {seed}")
     return figure
 
 
-def table(runs: dict[str, Run]) -> str:
+def table(runs: Mapping[str, Life]) -> str:
     """Errors and costs of the runs, and the ratio of the last errors."""
     evaluated = runs["sgim-d"].evaluation["movements"].astype(int).tolist()
     columns = [movements for movements in (1000, 2000, 5000) if movements in evaluated[:-1]] + evaluated[-1:]
     heads = [*(f"error {movements}" for movements in columns), "noise floor", "physics", "learning", "evaluation"]
     lines = [f"{'':10}" + "".join(f"{head:>13}" for head in heads)]
     for algorithm, run in runs.items():
-        errors = dict(zip(run.evaluation["movements"].astype(int), run.evaluation["mean_error_m"], strict=True))
-        cells = [_metres(errors.get(movements)) for movements in columns]
-        cells.append(_metres(run.evaluation["noise_floor_m"][-1]))
-        cells += [_seconds(run.summary.get(f"seconds_{part}")) for part in ("physics", "learner", "evaluation")]
+        cells = [_shown(run.at(movements), ".3f", "m") for movements in columns]
+        cells.append(_shown(run.evaluation["noise_floor_m"][-1], ".3f", "m"))
+        cells += [_shown(run.seconds(part), ".0f", "s") for part in ("physics", "learner", "evaluation")]
         lines.append(f"{NAMES[algorithm]:10}" + "".join(f"{cell:>13}" for cell in cells))
     last = {algorithm: run.evaluation["mean_error_m"][-1] for algorithm, run in runs.items()}
     ratio = last["sgim-d"] / last["random"]
@@ -82,35 +66,20 @@ def table(runs: dict[str, Run]) -> str:
     return "\n".join(lines)
 
 
-def _curve(run: Run) -> Curve:
-    return Curve(*(run.evaluation[name] for name in ("movements", "mean_error_m", "noise_floor_m")))
+def _curve(algorithm: str, run: Life) -> SeedCurves:
+    when, errors, floors = (run.evaluation[name] for name in ("movements", "mean_error_m", "noise_floor_m"))
+    return SeedCurves(algorithm, NAMES[algorithm], when, errors[None], errors, errors, errors, floors=floors)
 
 
-def _demonstrated(run: Run) -> Array | None:
-    """``(n, 2)`` m, the outcomes that the teacher showed in this run."""
-    rows = np.unique(run.demonstration[run.demonstration >= 0])
-    if not len(rows):
-        return None
-    demonstrations = load_demonstrations(run.config["demonstrations"] or SHIPPED)
-    return np.stack([demonstrations[row].outcome for row in rows])
-
-
-def _draw_interest(ax: Axes, run: Run) -> None:
+def _draw_interest(ax: Axes, run: Life) -> None:
     """The map at the last evaluation, and the last goals chosen before it."""
     ax.set_title(f"Where the competence of {NAMES['sgim-d']} is changing", pad=32)
-    if run.regions is None or not len(run.regions["movements"]):
+    if not run.regions or not len(run.regions["movements"]):
         ax.text(0.5, 0.5, "uniform goals: no interest map", transform=ax.transAxes, ha="center")
         return
-    last = run.regions["movements"] == run.regions["movements"].max()
-    lows, highs = (
-        np.stack([run.regions[f"{corner}_{k}"][last] for k in range(2)], axis=1) for corner in ("low", "high")
-    )
-    interest_map(ax, lows, highs, run.regions["interest"][last], goals=run.chosen_goals()[-GOALS:])
+    last = map_after(run.regions, run.regions["movements"].max())
+    interest_map(ax, *last, goals=run.chosen_goals()[-GOALS:])
 
 
-def _metres(value: float | None) -> str:
-    return f"{value:.3f} m" if value is not None and np.isfinite(value) else "-"
-
-
-def _seconds(value: float | None) -> str:
-    return f"{value:.0f} s" if value is not None else "-"
+def _shown(value: float, form: str, unit: str) -> str:
+    return f"{value:{form}} {unit}" if np.isfinite(value) else "-"

@@ -1,4 +1,4 @@
-"""Statistics over seeds: interquartile means, bootstrap intervals, improvement, and the paper's two ANOVAs.
+"""Statistics over seeds: interquartile means, bootstrap intervals, improvement, Holm, and the paper's two ANOVAs.
 
 After Agarwal et al. (2021), "Deep reinforcement learning at the edge of the statistical precipice": few seeds, so every
 number comes with an interval. ``errors`` are mean benchmark errors (m), one for each seed; smaller is better.
@@ -7,21 +7,22 @@ number comes with an interval. ``errors`` are mean benchmark errors (m), one for
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import Final, NamedTuple
+from collections.abc import Callable, Hashable, Iterable, Mapping
+from typing import Final, NamedTuple, TypeVar
 
 import numpy as np
-from scipy import stats
+from scipy import optimize, stats
 
 from sgimd_torch.spaces import Array
 
+Key = TypeVar("Key", bound=Hashable)
 LEVEL = 0.95
 RESAMPLES = 9999
 SEED: Final = 2014  # of the bootstrap: each number draws from its own default_rng(SEED)
 
 
 class Interval(NamedTuple):
-    """A statistic of the data, and its 95 % bootstrap interval from ``low`` to ``high``."""
+    """A statistic of the data, and its interval from ``low`` to ``high``, of 95 % unless said."""
 
     value: float
     low: float
@@ -70,7 +71,11 @@ def interquartile_mean(values: Array) -> Array:
 
 
 def interval(
-    statistic: Callable[..., Array], *samples: Array, rng: np.random.Generator, paired: bool = False
+    statistic: Callable[..., Array],
+    *samples: Array,
+    rng: np.random.Generator,
+    paired: bool = False,
+    level: float = LEVEL,
 ) -> Interval:
     """Percentile bootstrap: the statistic of seeds drawn again with replacement, 9999 times; its middle 95 %.
 
@@ -82,6 +87,7 @@ def interval(
         samples: ``(n_seeds, *rest)`` each.
         rng: draws the seeds.
         paired: all samples are of the same seeds in the same order, which are drawn together.
+        level: confidence, .95 or another one; see `holm`.
 
     Raises:
         ValueError: a sample of fewer than 2 seeds, one that is not finite, or paired ones of unequal length.
@@ -105,23 +111,25 @@ def interval(
         n_resamples=RESAMPLES,
         vectorized=True,
         paired=paired,
-        confidence_level=LEVEL,
+        confidence_level=level,
         method="percentile",
         rng=rng,
     )
     return Interval(float(statistic(*samples)), *map(float, found.confidence_interval))
 
 
-def iqm_interval(*strata: Array, rng: np.random.Generator) -> Interval:
+def iqm_interval(*strata: Array, rng: np.random.Generator, level: float = LEVEL) -> Interval:
     """Interquartile mean of all values together; seeds are drawn within each stratum ``(n_seeds,)``.
 
     Raises:
         ValueError: see ``interval``.
     """
-    return interval(lambda *drawn: interquartile_mean(np.concatenate(drawn, axis=-1)), *strata, rng=rng)
+    return interval(lambda *drawn: interquartile_mean(np.concatenate(drawn, axis=-1)), *strata, rng=rng, level=level)
 
 
-def ratio_interval(ours: Array, theirs: Array, *, rng: np.random.Generator, paired: bool = False) -> Interval:
+def ratio_interval(
+    ours: Array, theirs: Array, *, rng: np.random.Generator, paired: bool = False, level: float = LEVEL
+) -> Interval:
     """IQM(ours) / IQM(theirs), of ``(n_seeds,)`` each; ``paired`` when both were measured on the same runs.
 
     Raises:
@@ -129,7 +137,11 @@ def ratio_interval(ours: Array, theirs: Array, *, rng: np.random.Generator, pair
     """
     if (np.asarray(theirs) <= 0).any():
         raise ValueError(f"the values to divide by must be above 0, got {np.min(theirs)}")
-    return interval(lambda x, y: interquartile_mean(x) / interquartile_mean(y), ours, theirs, rng=rng, paired=paired)
+
+    def ratio(x: Array, y: Array) -> Array:
+        return interquartile_mean(x) / interquartile_mean(y)
+
+    return interval(ratio, ours, theirs, rng=rng, paired=paired, level=level)
 
 
 def improvement(ours: Array, theirs: Array) -> Array:
@@ -142,15 +154,54 @@ def improvement(ours: Array, theirs: Array) -> Array:
     return shares
 
 
-def improvement_interval(ours: Array, theirs: Array, *, rng: np.random.Generator) -> Interval:
-    """``improvement`` of ``(n,)`` over ``(m,)``; the seeds of each are drawn separately.
+def improvement_interval(ours: Array, theirs: Array, *, level: float = LEVEL) -> Interval:
+    """``improvement`` of ``(n,)`` over ``(m,)``, with a score interval, which few seeds keep wide.
 
-    If all of ours are below all of theirs, the interval is [1, 1] however few seeds there are: every draw gives 1.
+    Wilson's interval for this statistic: all probabilities that are not rejected by what was seen (Newcombe 2006,
+    Statistics in Medicine 25:559, method 5). A bootstrap would give [1, 1] whenever all of ours are below all of
+    theirs, even with two seeds; this gives [.80, 1] with ten and [.90, 1] with twenty. Of normal errors it holds the
+    truth in 95 to 98 % of cases, with 5, 10 or 20 seeds.
 
     Raises:
-        ValueError: see ``interval``.
+        ValueError: fewer than 2 seeds on a side, or errors that are not finite.
     """
-    return interval(improvement, ours, theirs, rng=rng)
+    for sample in (ours, theirs):
+        if len(sample) < 2 or not np.isfinite(sample).all():
+            raise ValueError(f"an interval needs 2 or more seeds with finite errors, got {np.asarray(sample).tolist()}")
+    n, m, found = len(ours), len(theirs), float(improvement(ours, theirs))
+    z = float(stats.norm.isf((1 - level) / 2))
+
+    def excess(p: float) -> float:
+        """Above 0 where p is rejected: squared distance to what was found, less z^2 times the variance under p."""
+        variance = p * (1 - p) * (1 + ((n + m) / 2 - 1) * ((1 - p) / (2 - p) + p / (1 + p))) / (n * m)
+        return (found - p) ** 2 - z * z * variance
+
+    inside = float(np.clip(found, 1e-9, 1 - 1e-9))
+    low = optimize.brentq(excess, 0.0, inside) if found > 0 else 0.0
+    high = optimize.brentq(excess, inside, 1.0) if found < 1 else 1.0
+    return Interval(found, low, high)
+
+
+def holm(claims: Iterable[Key], rejects: Callable[[Key, float], bool]) -> set[Key]:
+    """Which of several claims stand together: the chance that any of them is wrong is at most 5 %.
+
+    Holm's method (1979) by intervals: all are asked at the level that Bonferroni's method gives for their number; what
+    stands is set aside, and the others are asked again at the level for the number that is left.
+
+    Args:
+        claims: all of them, also those that stand no chance.
+        rejects: (claim, level) -> whether an interval of this confidence decides the claim.
+    """
+    left = list(dict.fromkeys(claims))
+    standing: set[Key] = set()
+    while left:
+        level = 1 - (1 - LEVEL) / len(left)
+        decided = {claim for claim in left if rejects(claim, level)}
+        if not decided:
+            break
+        standing |= decided
+        left = [claim for claim in left if claim not in decided]
+    return standing
 
 
 def paired_differences(ours: Mapping[int, float], theirs: Mapping[int, float]) -> Array:
@@ -169,14 +220,14 @@ def paired_differences(ours: Mapping[int, float], theirs: Mapping[int, float]) -
 
 
 def difference_interval(
-    ours: Mapping[int, float], theirs: Mapping[int, float], *, rng: np.random.Generator
+    ours: Mapping[int, float], theirs: Mapping[int, float], *, rng: np.random.Generator, level: float = LEVEL
 ) -> Interval:
     """Interquartile mean of the paired differences (m); wholly below 0 if our errors are smaller.
 
     Raises:
         ValueError: see ``paired_differences`` and ``interval``.
     """
-    return iqm_interval(paired_differences(ours, theirs), rng=rng)
+    return iqm_interval(paired_differences(ours, theirs), rng=rng, level=level)
 
 
 def mean_over_life(movements: Array, errors: Array) -> Array:

@@ -2,7 +2,8 @@
 
 It takes any folder with run directories, OUT/NAME/seed-000. Variants are compared after the last number of movements at
 which all finished runs were evaluated, or after --at. The worst comes first. Errors and noise floors are means over
-seeds in metres, ± the standard deviation; costs are milliseconds for each movement. Runs that are damaged, not finished
+seeds in metres, ± the standard deviation; "by linear" is the error if LocallyLinear answers, whatever inverse model
+the run has: compare learners by it. Costs are milliseconds for each movement. Runs that are damaged, not finished
 or not evaluated there are left out, and named below the table.
 
   sgimd table runs
@@ -23,7 +24,8 @@ import numpy as np
 
 from sgimd_torch.runs.log import RunError
 from sgimd_torch.runs.process import say
-from sgimd_torch.runs.read import Run, find_runs, read_run
+from sgimd_torch.runs.read import NO_EVALUATION, Run, find_runs, read_run
+from sgimd_torch.runs.tables import OWN
 from sgimd_torch.spaces import Array
 
 EARLY: Final = 1000  # movements, for a column of its own
@@ -59,7 +61,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             variants.setdefault(run.path.parent.name, []).append(run)
     if not variants:
         raise RunError("\n".join(["there is nothing to compare; is --at another number of movements?", *left_out]))
-    errors = (f"error at {EARLY}", f"at {at} (m)", "noise floor (m)")
+    errors = (f"error at {EARLY}", f"at {at} (m)", "by linear (m)", "noise floor (m)")
     heads = ("variant", "seeds", *errors, "physics (ms)", "learning (ms)")
     worst_first = sorted(variants.items(), key=lambda variant: -_at(variant[1], at, "mean_error_m").mean())
     table = [heads, *(_row(name, theirs, at) for name, theirs in worst_first)]
@@ -92,6 +94,7 @@ def _row(name: str, runs: Sequence[Run], at: int) -> tuple[str, ...]:
         str(len(runs)),
         _metres(_at(runs, EARLY, "mean_error_m")),
         f"{errors.mean():.3f}" + (f" ± {errors.std(ddof=1):.3f}" if len(runs) > 1 else ""),
+        _metres(_at(runs, at, "mean_error_m", "linear")),
         _metres(_at(runs, at, "noise_floor_m")),
         *(f"{np.mean([_milliseconds(run, part) for run in runs]):.2f}" for part in ("physics", "learner")),
     )
@@ -106,9 +109,10 @@ def _evaluated(run: Run) -> set[int]:
     return set(run.evaluation["movements"].astype(int).tolist())
 
 
-def _at(runs: Sequence[Run], movements: int, column: str) -> Array:
-    """``(n_runs,)``, NaN if a run was not evaluated after these ``movements``."""
-    values = [run.evaluation[column][run.evaluation["movements"] == movements] for run in runs]
+def _at(runs: Sequence[Run], movements: int, column: str, answer: str = OWN) -> Array:
+    """``(n_runs,)``, NaN if a run was not evaluated by this ``answer`` after these ``movements``."""
+    found = [run.answers.get(answer, NO_EVALUATION) for run in runs]
+    values = [each[column][each["movements"] == movements] for each in found]
     return np.array([value[0] if value.size else np.nan for value in values])
 
 

@@ -9,21 +9,17 @@ Examples:
 from __future__ import annotations
 
 import argparse
+import io
 import socket
-import subprocess
-import sys
-import tempfile
 import time
-import urllib.request
 from collections.abc import Sequence
-from importlib.util import find_spec
+from contextlib import redirect_stderr
 from pathlib import Path
 
 from sgimd_torch.runs.process import Failed, say
 
 PORTS = 50  # how many are tried
 POINTS = 100_000  # that TensorBoard keeps of each curve, enough for all; 0 should mean all, but shows none
-PATIENCE = 60.0  # s, for TensorBoard to answer
 WHERE = """
 TensorBoard shows {boards} of {runs} at  {url}   (Ctrl-C ends it)
 
@@ -43,7 +39,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     Raises:
         ValueError: the request is wrong, or tensorboard is not installed.
-        Failed: TensorBoard ended by itself.
+        Failed: TensorBoard cannot start.
     """
     parser = argparse.ArgumentParser(
         prog="sgimd watch",
@@ -54,15 +50,15 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("runs", nargs="?", type=Path, default=Path("runs"), help="where to look for boards (runs)")
     parser.add_argument("--port", type=int, default=6006, help="the first port to try (6006)")
     options = parser.parse_args(argv)
-    if find_spec("tensorboard") is None:
-        raise ValueError("watching needs tensorboard, which is not installed; pip install 'sgimd-torch[board]'")
     boards = boards_below(options.runs)
     port = free_port(options.port)
     if port != options.port:
         say(f"port {options.port} is taken, {port} is free")
     shown = "1 board" if boards == 1 else f"{boards} boards"
-    serve(options.runs, port, WHERE.format(boards=shown, runs=options.runs, url=f"http://127.0.0.1:{port}"))
-    return 0
+    serve(options.runs, port)
+    print(WHERE.format(boards=shown, runs=options.runs, url=f"http://127.0.0.1:{port}"), flush=True)
+    while True:
+        time.sleep(3600)
 
 
 def boards_below(runs: Path) -> int:
@@ -98,37 +94,25 @@ def free_port(first: int) -> int:
     raise ValueError(f"no port from {first} on is free; give another --port")
 
 
-def serve(runs: Path, port: int, where: str) -> None:
-    """Run TensorBoard, and say ``where`` to look once it answers.
+def serve(runs: Path, port: int) -> None:
+    """Start TensorBoard in a thread; returns once it answers.
 
     Raises:
-        Failed: it ended by itself.
+        ValueError: tensorboard is not installed.
+        Failed: it cannot start.
     """
-    command = [sys.executable, "-m", "tensorboard.main", "--logdir", str(runs), "--host", "127.0.0.1"]
-    command += ["--port", str(port), "--reload_interval", "5"]
-    command += ["--samples_per_plugin", ",".join(f"{plugin}={POINTS}" for plugin in ("scalars", "images", "text"))]
-    with tempfile.TemporaryFile() as log:
-        process = subprocess.Popen(command, stdout=log, stderr=log, stdin=subprocess.DEVNULL, start_new_session=True)
-        try:
-            wait_for(f"http://127.0.0.1:{port}/data/environment", process)
-            print(where, flush=True)
-            process.wait()
-        finally:
-            process.terminate()
-            process.wait()
-        log.seek(0)
-        lines = log.read().decode(errors="replace").strip().splitlines()
-        raise Failed("\n".join(["TensorBoard ended by itself; it said:", *lines[-12:]]))
-
-
-def wait_for(address: str, process: subprocess.Popen[bytes]) -> None:
-    """Wait until something answers there, the process ends or ``PATIENCE`` is over."""
-    direct = urllib.request.build_opener(urllib.request.ProxyHandler({}))
-    give_up = time.monotonic() + PATIENCE
-    while process.poll() is None and time.monotonic() < give_up:
-        try:
-            direct.open(address, timeout=5).close()
-        except OSError:  # not yet
-            time.sleep(0.1)
-        else:
-            return
+    try:
+        from tensorboard import program
+    except ImportError as error:
+        raise ValueError(
+            f"watching needs {error.name}, which is not installed; pip install 'sgimd-torch[board]'"
+        ) from error
+    words = ["", "--logdir", str(runs), "--host", "127.0.0.1", "--port", str(port), "--reload_interval", "5"]
+    kept = ",".join(f"{plugin}={POINTS}" for plugin in ("scalars", "images", "text"))
+    board, said = program.TensorBoard(), io.StringIO()
+    try:
+        with redirect_stderr(said):  # notes about its own development
+            board.configure([*words, "--samples_per_plugin", kept])
+            board.launch()
+    except (program.TensorBoardServerException, SystemExit) as error:
+        raise Failed(f"TensorBoard cannot start: {error} {said.getvalue()}") from error

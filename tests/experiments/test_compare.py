@@ -10,19 +10,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compare import collect, compared, last_row, main, runs_of, table_in
+from compare import collect, compared, last_rows, main, runs_of, table_in
 from read_results import GOALS_HEADER, HEADER, read_goals, read_results
 from runs import ROOT, signal_after, start
 from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.files import locked
 from sgimd_torch.runs.command_line import parse
-from sgimd_torch.runs.config import Config
+from sgimd_torch.runs.config import Config, words
 from sgimd_torch.runs.log import RunError
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import Run, read_run
 from sgimd_torch.runs.sweep import sweep
-from tables import RESULTS, Table, goal_row, result_rows, tiles_reached
+from tables import RESULTS, Table, goal_rows, goals_claimed, result_rows, tiles_reached
 from variants import ARMS, EXPERIMENTS, make_subsets, shipped, tables_of, teacher_of
 
 # Two variants that live for 40 movements, and one, of an experiment of its own, whose demonstrations are missing.
@@ -69,10 +69,15 @@ def table(path):
 
 
 def keys_of(path, name="paper.csv"):
-    """(variant, movements) of each row."""
-    return [(row[1], int(row[5])) for row in table(path / "results" / name)[1]]
+    """(variant, movements) of each run's own answers; the others have a row for each of them, too."""
+    rows = table(path / "results" / name)[1]
+    own, nearest, linear = ([(row[1], int(row[5])) for row in rows if row[6] == each] for each in ANSWERS)
+    assert own == nearest == linear
+    assert 3 * len(own) == len(rows)
+    return own
 
 
+ANSWERS = ("own", "nearest", "linear")  # of runs without a forward model
 WHOLE = [("random", 20), ("random", 40), ("sgim-d-large", 20), ("sgim-d-large", 40)]
 
 
@@ -90,10 +95,12 @@ def test_each_evaluation_is_a_row_the_failed_are_reported_and_a_second_start_doe
         ("sgim-d-large", "large-space", "3", "100.0"),
     ):
         run = read_run(tmp_path / "runs" / variant / "seed-000")
-        theirs = [row for row in rows if row[1] == variant]
-        assert [row[:5] for row in theirs] == 2 * [[experiment, variant, teacher, space, "0"]]
-        assert [float(row[6]) for row in theirs] == run.evaluation["mean_error_m"].tolist()
-        assert [row[7] for row in theirs] == ["", ""]  # the noise floor is measured at 5000 only
+        for answer in ANSWERS:
+            theirs = [row for row in rows if row[1] == variant and row[6] == answer]
+            assert [row[:5] for row in theirs] == 2 * [[experiment, variant, teacher, space, "0"]]
+            assert [float(row[7]) for row in theirs] == run.answers[answer]["mean_error_m"].tolist()
+            assert [row[8] for row in theirs] == ["", ""]  # the noise floor is measured at 5000 only
+            assert [int(row[11]) for row in theirs] == run.answers[answer]["goals_met"].tolist()
     run = read_run(tmp_path / "runs/sgim-d-large/seed-000")
     header, rows = table(tmp_path / "results/goals.csv")
     assert header == GOALS_HEADER
@@ -119,16 +126,18 @@ def test_a_variant_of_two_experiments_is_one_run_in_the_table_of_each(compare, t
     assert header == HEADER
     for experiment, teacher, theirs in (("forward-model", "", run), ("planar-arm-7", "structured", arm)):
         variant, errors_m = theirs.path.parent.name, theirs.evaluation["mean_error_m"].tolist()
-        wanted = [[experiment, variant, teacher, "1.0", "0", str(20 * k), str(errors_m[k - 1]), ""] for k in (1, 2)]
-        assert [row[:8] for row in rows if row[1] == variant] == wanted
-    tiles = [int(row[8]) for row in rows if row[1] == "sgim-d-arm-7"]
+        run_0 = [experiment, variant, teacher, "1.0", "0"]
+        wanted = [[*run_0, str(20 * k), "own", str(errors_m[k - 1]), ""] for k in (1, 2)]
+        assert [row[:9] for row in rows if row[1] == variant and row[6] == "own"] == wanted
+    tiles = [int(row[9]) for row in rows if row[1] == "sgim-d-arm-7"]
     assert 0 < tiles[0] <= tiles[1] <= 40  # at most one a movement
     again = table(tmp_path / "results/paper.csv")[1]
     assert again == [["learners", *row[1:]] for row in rows if row[1] == "random"]
 
 
 def test_what_is_in_one_table_is_still_to_be_done_for_the_other(tmp_path, monkeypatch, capsys):
-    Table(tmp_path / "paper.csv", *RESULTS).merge([["learners", "sgim-d", 3, 1.0, 0, 5000, 0.1, "", 7]])
+    rows = [["learners", "sgim-d", 3, 1.0, 0, 5000, answer, 0.1, "", 7, "", ""] for answer in ANSWERS]
+    Table(tmp_path / "paper.csv", *RESULTS).merge(rows)
     monkeypatch.chdir(tmp_path)
     assert (
         command(main, ["learners", "forward-model", "--only", "sgim-d", "--seeds", "0", "--dry-run", "--results", "."])
@@ -175,7 +184,7 @@ def test_a_run_that_lost_its_rows_is_collected_again_and_no_goal_is_counted_twic
     paths = [tmp_path / "paper.csv", tmp_path / "goals.csv"]
 
     def collected():
-        known = last_row(config) in Table(paths[0], *RESULTS).rows()
+        known = last_rows(config) <= Table(paths[0], *RESULTS).rows().keys()
         collect("large-space", config, tmp_path)
         return known
 
@@ -260,13 +269,13 @@ def test_a_run_that_cannot_start_fails_alone(compare, tmp_path):
 
 def test_every_variant_is_a_valid_run_with_its_own_name_in_its_table(tmp_path):
     wanted = runs_of(list(EXPERIMENTS), [], range(1), tmp_path)
-    assert len({(tables_of(name)[0], last_row(config)) for name, config in wanted}) == len(wanted)
+    assert len({(tables_of(name)[0], *sorted(last_rows(config))) for name, config in wanted}) == len(wanted)
     assert not [note for _, config in wanted for note in config.without_effect if "--budget" in note]
     configs = {config.directory: config for _, config in wanted}
     assert all(config == configs[config.directory] for _, config in wanted)  # one directory, one run
     assert {name for name, _ in wanted if tables_of(name)[0] == "forward_model.csv"} == {"forward-model", *ARMS}
     for _, config in wanted:
-        assert parse(config.words())[0] == config
+        assert parse(words(vars(config)))[0] == config
 
 
 def test_teachers_have_the_number_of_the_demonstrator_or_the_name_of_the_file(tmp_path):
@@ -300,11 +309,20 @@ def test_tiles_of_the_benchmark_that_were_reached_are_counted_once():
     assert tiles_reached(np.array([[0.49, 0.0], [-0.51, 0.49], [-0.51, 0.51]]), benchmark) == 2
 
 
+def test_a_goal_is_claimed_where_something_landed_within_half_a_tile():
+    benchmark = Benchmark("FishingRod", np.array([[0.1, 0.1], [-0.9, 0.4]]), 0.5)
+    at_rest = [np.nan, np.nan]
+    assert goals_claimed(np.array([at_rest, [0.1, 0.36]]), benchmark) == 0
+    assert goals_claimed(np.array([at_rest, [0.1, 0.34], [0.3, 0.1]]), benchmark) == 1
+    assert goals_claimed(np.array([[0.1, 0.34], [-0.9, 0.4]]), benchmark) == 2
+    assert goals_claimed(np.array([at_rest]), benchmark) == 0
+
+
 def run_with(origins, goals):
     nothing = np.empty((len(goals), 0))
     return Run(
         *(Path("nowhere"), {}, {}, {}, np.arange(len(goals)), np.array(origins), np.full(len(goals), -1)),
-        *(nothing, nothing, np.array(goals, dtype=np.float64), nothing, {}, None),
+        *(nothing, nothing, np.array(goals, dtype=np.float64), nothing, {"own": {}}, None),
     )
 
 
@@ -313,19 +331,20 @@ def test_a_goal_counts_once_imitation_and_rest_not_at_all_and_near_is_within_a_m
     origins = ["babble", "local", "global", "imitate", "imitate", "local", "local", "local", ""]
     run = run_with(origins, [none, near, near, shown, shown, edge, far, near, none])
     np.testing.assert_array_equal(run.chosen_goals(), [near, edge, far, near])
-    assert goal_row(Config(name="sgim-d-large", seed=7), run) == ["sgim-d-large", 7, 4, 3]
-    assert len(run_with(["babble"], [none]).chosen_goals()) == 0
+    assert goal_rows(Config(name="sgim-d-large", seed=7), run) == [["sgim-d-large", 7, 4, 3]]
+    assert goal_rows(Config(name="random", seed=7), run_with(["babble"], [none])) == []
 
 
 def test_rows_made_again_are_equal_but_for_rounding_or_differ():
-    row = ["learners", "sgim-d", "3", "1.0", "0", "5000", "0.0426", "", "342"]
+    row = ["learners", "sgim-d", "3", "1.0", "0", "5000", "own", "0.0426", "", "342"]
     assert compared(row, list(row)) == "equal"
-    assert compared(row, [*row[:6], "0.04260000000001", "", "342"]) == "rounding"
+    assert compared(row, [*row[:7], "0.04260000000001", "", "342"]) == "rounding"
     for other in (
-        [*row[:6], "0.0427", "", "342"],
-        [*row[:6], "0.0426", "0.03", "342"],
-        [*row[:6], "0.0426", "", "343"],
+        [*row[:7], "0.0427", "", "342"],
+        [*row[:7], "0.0426", "0.03", "342"],
+        [*row[:7], "0.0426", "", "343"],
         [*row[:5], "4000", *row[6:]],
+        [*row[:6], "linear", *row[7:]],
         [],
     ):
         assert compared(row, other) == "DIFFERS"
@@ -335,10 +354,10 @@ def test_rows_are_drawn_by_lot_and_made_again_in_a_folder_of_their_own(tmp_path,
     monkeypatch.chdir(tmp_path)
     results = table_in(tmp_path, "forward_model.csv")
     config = Config(algorithm="sgim-d", environment="planar-arm-7", name="sgim-d-arm-7", movements=20)
-    again = replace(config, evaluate_at=(20,), floor_at=(), out=tmp_path / "first")
+    again = replace(config, evaluate_at=(20,), floor_at=(), answers=("own", "nearest"), out=tmp_path / "first")
     assert sweep([again], 1) == []
-    (row,) = result_rows("planar-arm-7", again, read_run(again.directory))
-    results.merge([row, [*row[:4], 1, 20, 0.5, "", 7]])
+    _, row = result_rows("planar-arm-7", again, read_run(again.directory))
+    results.merge([row, [*row[:4], 1, 20, "nearest", 0.5, "", 7, 7, 7]])
     words = ["planar-arm-7", "--only", "sgim-d-arm-7", "--results", ".", "--verify", "2", "--processes", "1"]
     code = command(main, words)
     said = capsys.readouterr()

@@ -7,7 +7,7 @@ from claims import main
 from judging import Results, judge
 from model_claims import BARS, JUDGED, MODEL_CLAIMS
 from paper import HEADER, SEEDS, spread
-from read_results import MODEL_HEADER, ResultsError, read_coverages, read_results
+from read_results import MODEL_HEADER, REGIONS, ResultsError, read_coverages, read_results
 from sgimd_torch.runs.process import command
 
 TRUE = {  # variant: experiment, its errors (m) by movements
@@ -19,7 +19,7 @@ TRUE = {  # variant: experiment, its errors (m) by movements
     **{f"{name}-arm-50": ("planar-arm-50", {250: 0.2, 500: 0.1, 1000: 0.03, 2000: 0.01}) for name in JUDGED},
 }
 FLOOR = 0.033  # m
-HONEST = {name: np.full(3, 0.8) for name in JUDGED}
+HONEST = {name: {region: np.full(3, region / 100) for region in REGIONS} for name in JUDGED}
 CLAIMS = [claim for claim, _, _ in BARS]
 
 
@@ -30,7 +30,7 @@ def write(path, *, without=(), **spoilt):
         for seed in range(SEEDS) if name not in without else ():
             for movements, error in {**errors, **spoilt.get(name.replace("-", "_"), {})}.items():
                 floor = FLOOR if movements == 5000 else ""
-                lines.append(f"{experiment},{name},3,1,{seed},{movements},{error * spread(seed)},{floor},300")
+                lines.append(f"{experiment},{name},3,1,{seed},{movements},own,{error * spread(seed)},{floor},300,,")
     path.write_text("\n".join([HEADER, *lines]) + "\n")
     return path
 
@@ -80,18 +80,27 @@ def test_what_was_not_run_is_left_open(tmp_path):
     found = verdicts(write(tmp_path / "x.csv", without=("gradient", "model-arm-50")), {})
     open_ones = {claim for claim, verdict in found.items() if verdict == "cannot say"}
     wanted = {f"{claim}: `gradient`" for claim in CLAIMS[:3]} | {f"{CLAIMS[3]}: `model`"}
-    assert open_ones == wanted | {f"calibration: `{name}`" for name in JUDGED}
+    assert open_ones == wanted | {f"calibration, {region} %: `{name}`" for name in JUDGED for region in REGIONS}
 
 
-@pytest.mark.parametrize(("share", "verdict"), [(0.65, "does not hold"), (0.75, "holds"), (0.93, "does not hold")])
-def test_a_spread_may_be_neither_overconfident_nor_too_cautious(tmp_path, share, verdict):
-    found = verdicts(write(tmp_path / "x.csv"), {**HONEST, "model": np.full(3, share)})
-    assert found["calibration: `model`"] == verdict
+@pytest.mark.parametrize(
+    ("region", "share", "verdict"),
+    [
+        *((50, 0.35, "does not hold"), (50, 0.45, "holds"), (50, 0.62, "does not hold")),
+        *((80, 0.65, "does not hold"), (80, 0.75, "holds"), (80, 0.93, "does not hold")),
+        *((95, 0.9, "does not hold"), (95, 0.92, "holds"), (95, 1.0, "does not hold")),
+    ],
+)
+def test_a_spread_may_be_neither_overconfident_nor_too_cautious(tmp_path, region, share, verdict):
+    spoilt = {**HONEST["model"], region: np.full(3, share)}
+    found = verdicts(write(tmp_path / "x.csv"), {**HONEST, "model": spoilt})
+    for each in REGIONS:
+        assert found[f"calibration, {each} %: `model`"] == (verdict if each == region else "holds")
 
 
 def write_table(path, *lines):
-    """The table of model_figures.py: of each run its name and the share in its 80 % regions."""
-    rows = [{"run": run, "inside_80_late": share} for run, share in lines]
+    """The table of model_figures.py: of each run its name and the share in its regions, whatever they should hold."""
+    rows = [{"run": run, **{f"inside_{region}_late": share for region in REGIONS}} for run, share in lines]
     text = [",".join(MODEL_HEADER), *(",".join(str(row.get(name, 1)) for name in MODEL_HEADER) for row in rows)]
     path.write_text("\n".join(text) + "\n")
 
@@ -111,14 +120,14 @@ def test_the_page_has_its_prose_and_gets_its_tables(tmp_path, capsys):
     assert "0.81 [0.80, 0.82], single runs 0.80 to 0.82" in text
     (line,) = (line for line in text.splitlines() if line.startswith("| sagg-riac-model |"))
     assert "−0.01" in line  # compared with sagg-riac, not with SGIM-D
-    assert "9 holds, 1 cannot say" in capsys.readouterr().out
+    assert "9 holds, 2 does not hold, 3 cannot say" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
     ("spoil", "message"),
     [
         (lambda text: "variant,x\nmodel,1\n", "table.csv must begin with run,predicted"),
-        (lambda text: text.replace("0.8,", "much,"), "table.csv, line 2: inside_80_late must be a finite number"),
+        (lambda text: text.replace("0.8,", "much,"), "table.csv, line 2: inside_50_late must be a finite number"),
     ],
 )
 def test_a_table_of_something_else_is_refused_and_the_page_untouched(tmp_path, capsys, spoil, message):

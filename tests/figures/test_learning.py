@@ -7,9 +7,8 @@ from matplotlib.figure import Figure
 from sgimd_torch.figures.learning import (
     COLOURS,
     NAMES,
-    Curve,
+    competence_map,
     count_bar,
-    error_curves,
     histogram,
     interest_map,
     landing_points,
@@ -18,6 +17,7 @@ from sgimd_torch.goals.interest_map import InterestMap
 from sgimd_torch.spaces import Box, stream
 
 T = Box.cube(-1.0, 1.0, 2)
+LOWS, HIGHS = np.array([[-1.0, -1.0], [0.0, -1.0]]), np.array([[0.0, 1.0], [1.0, 1.0]])
 
 
 @pytest.fixture
@@ -25,45 +25,9 @@ def ax():
     return Figure().add_subplot()
 
 
-def curve(*errors, movements=(1000, 2000)):
-    return Curve(np.array(movements), np.array(errors), np.full(len(errors), 0.04))
-
-
 def test_every_algorithm_has_a_name_and_a_colour_of_its_own():
     assert set(COLOURS) == set(NAMES) >= {"random", "sagg-riac", "imitation", "observation", "sgim-d"}
     assert len(set(COLOURS.values())) == len(COLOURS)
-
-
-def test_an_error_curve_of_one_seed_shows_its_errors_and_noise_floor(ax):
-    drawn = error_curves(ax, {"sgim-d": [curve(0.3, 0.2)]})["sgim-d"]
-    np.testing.assert_array_equal(drawn.mean.get_xydata(), [[1000, 0.3], [2000, 0.2]])
-    np.testing.assert_array_equal(drawn.noise_floor.get_xydata(), [[1000, 0.04], [2000, 0.04]])
-    assert drawn.noise_floor.get_linestyle() == "--"
-    assert drawn.band is None
-    assert drawn.mean.get_color() == COLOURS["sgim-d"]
-
-
-def test_several_seeds_are_averaged_with_a_band_of_one_standard_deviation_and_counted(ax):
-    drawn = error_curves(ax, {"random": [curve(0.3, 0.1), curve(0.5, 0.3)]})["random"]
-    np.testing.assert_allclose(drawn.mean.get_ydata(), [0.4, 0.2])
-    heights = drawn.band.get_paths()[0].vertices[:, 1]
-    half = 0.1 * np.sqrt(2)  # sd of two values .2 apart, n - 1
-    assert heights.max() == pytest.approx(0.4 + half)
-    assert heights.min() == pytest.approx(0.2 - half)
-    assert drawn.mean.get_label() == "Random (2 seeds)"
-
-
-def test_seeds_of_different_length_are_compared_where_both_were_evaluated(ax):
-    long = curve(0.3, 0.2, 0.1, movements=(1000, 2000, 3000))
-    drawn = error_curves(ax, {"random": [long, curve(0.4, 0.2, movements=(500, 2000))]})["random"]
-    np.testing.assert_allclose(drawn.mean.get_xydata(), [[2000, 0.2]])
-    with pytest.raises(ValueError, match="never evaluated after the same movement"):
-        error_curves(ax, {"random": [long, curve(0.4, movements=(500,))]})
-
-
-def test_an_algorithm_without_a_colour_is_refused(ax):
-    with pytest.raises(ValueError, match="got 'sgimd'"):
-        error_curves(ax, {"sgimd": [curve(0.3, 0.2)]})
 
 
 def test_each_landing_point_inside_is_counted_on_its_tile_and_those_outside_are_told(ax):
@@ -125,6 +89,21 @@ def test_an_interest_map_over_contexts_is_refused(ax):
         interest_map(ax, np.zeros((1, 3)), np.ones((1, 3)), np.zeros(1))
 
 
+def test_competence_is_shown_from_minus_one_to_zero_and_unknown_regions_are_left_white(ax):
+    drawn = competence_map(ax, LOWS, HIGHS, np.array([-0.3, np.nan]))
+    assert drawn.get_clim() == (-1, 0)
+    np.testing.assert_array_equal(np.ma.getmaskarray(drawn.get_array()), [False, True])
+    corners = np.stack([path.vertices for path in drawn.get_paths()])
+    np.testing.assert_array_equal(corners.min(axis=1), LOWS)
+    np.testing.assert_array_equal(corners.max(axis=1), HIGHS)
+    assert (ax.get_xlabel(), ax.get_aspect(), ax.get_xlim()) == ("x (m)", 1.0, (-1, 1))
+
+
+def test_a_competence_map_over_contexts_is_refused(ax):
+    with pytest.raises(ValueError, match="regions must be"):
+        competence_map(ax, np.zeros((1, 3)), np.ones((1, 3)), np.zeros(1))
+
+
 def test_one_colour_bar_serves_histograms_that_share_a_scale():
     axes = list(Figure().subplots(1, 2))
     mesh, _ = (landing_points(ax, np.zeros((3, 2)), T, most=40, colour_bar=False) for ax in axes)
@@ -143,13 +122,8 @@ def test_a_histogram_is_nothing_but_tiles(ax):
     assert not ax.lines
 
 
-@pytest.mark.parametrize("draw", ["error_curves", "landing_points", "interest_map"])
+@pytest.mark.parametrize("draw", ["landing_points", "interest_map"])
 def test_axes_carry_names_with_units_and_the_water_plane_is_not_distorted(ax, draw):
-    if draw == "error_curves":
-        error_curves(ax, {"random": [curve(0.3, 0.2)]})
-        assert "(m)" in ax.get_ylabel()
-        assert "movements" in ax.get_xlabel()
-        return
     if draw == "landing_points":
         landing_points(ax, np.zeros((3, 2)), T)
     else:

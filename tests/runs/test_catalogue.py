@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from runs import ROOT
-from sgimd_torch.catalogue import CATALOGUE, SHARED, Entry, check, colour, find, label, load
-from sgimd_torch.runs.build import _OF_THE_ROBOT, build, task_of
+from sgimd_torch.catalogue import CATALOGUE, SHARED, Entry, checked, colour, find, label, load
+from sgimd_torch.runs.build import build, task_of
 from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.config import Config, dashed, from_settings, words
 from sgimd_torch.runs.process import command
@@ -78,7 +78,7 @@ def test_what_an_entry_takes_its_parameters_are(kind, word, entry):
     builders = {"sagg_riac", "sgim_d"}  # these hand their parts on
     if entry.at.rpartition(":")[2] not in builders:
         assert {*entry.uses, *entry.fixed} <= names
-    known = {each.name for each in fields(Config)} | SHARED.keys() | _OF_THE_ROBOT
+    known = {each.name for each in fields(Config)} | SHARED.keys() | {"policies", "correspondence"}
     assert {*entry.options, *entry.ignores} <= known
     assert entry.learns_with is None or entry.learns_with in CATALOGUE[kind]
 
@@ -204,16 +204,16 @@ def test_goals_all_over_a_space_are_at_most_500_and_inside():
 
 def test_a_part_without_its_members_is_refused_by_name():
     with pytest.raises(ValueError, match=r"gave a int without sample, add; wanted \(contexts, outcomes, rng\)"):
-        check("goals", "mine:Own", 7)
+        checked("goals", "mine:Own", lambda: 7)()
 
 
 def test_the_words_of_a_config_make_it_again():
     config = Config(algorithm="sagg-riac", goals="uniform", evaluate_at=(5, 6), every=7, board=False, task_space=2.5)
     from sgimd_torch.runs.command_line import parse
 
-    assert parse(config.words())[0] == config
-    assert all(word.startswith("--") and "_" not in word.partition("=")[0] for word in config.words())
-    assert Config().words() == []
+    assert parse(words(vars(config)))[0] == config
+    assert all(word.startswith("--") and "_" not in word.partition("=")[0] for word in words(vars(config)))
+    assert words(vars(Config())) == []
     assert words({"algorithm": "sgim-d", "no-such-option": 3}) == []
     assert from_settings({"goals": "grid", "evaluate_at": [5], "out": "x", "commit": "abc"}).goals == "grid"
     assert dashed("task_space") == "task-space"

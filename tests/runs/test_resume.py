@@ -1,9 +1,12 @@
 """Runs that are stopped, killed, damaged or made longer: in the end they are as if nothing had happened."""
 
+import json
 import os
 import signal
 import zlib
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from runs import EAGER, MOVEMENTS, accept_loss, arguments, csv_of, signal_after, start
@@ -11,7 +14,8 @@ from sgimd_torch.evaluation import evaluate
 from sgimd_torch.files import lock
 from sgimd_torch.runs import run as run_script
 from sgimd_torch.runs.config import Config
-from sgimd_torch.runs.read import read_run
+from sgimd_torch.runs.read import finished, read_run
+from sgimd_torch.runs.tables import sealed
 from sgimd_torch.spaces import stream
 
 
@@ -242,7 +246,7 @@ def test_a_process_killed_between_log_and_summary_loses_nothing_and_asks_nothing
 
 @pytest.mark.parametrize("checked", [True, False])
 @pytest.mark.parametrize(
-    ("name", "column", "line"), [("evaluation.csv", "mean_error_m", 3), ("regions.csv", "competence", 4)]
+    ("name", "column", "line"), [("evaluation.csv", "mean_error_m", 4), ("regions.csv", "competence", 4)]
 )
 def test_an_edited_row_is_reported_and_made_again(tmp_path, go, reference, capsys, name, column, line, checked):
     """Also in the tables of earlier versions, which had no checksums, if the number is impossible."""
@@ -282,6 +286,39 @@ def test_a_directory_of_an_earlier_version_is_read_resumed_and_gets_checksums(tm
     assert "evaluated again" not in messages
     assert csv_of(directory) == reference
     assert read_run(directory).unchecked == ()
+
+
+def test_an_evaluation_that_lost_an_answer_is_done_again(tmp_path, go, reference):
+    path = tmp_path / "sgim-d" / "seed-003" / "evaluation.csv"
+    assert go(tmp_path) == 0
+    lines = path.read_bytes().splitlines(keepends=True)
+    assert lines[4].startswith(b"60,linear")
+    path.write_bytes(b"".join(lines[:4]))
+    assert read_run(path.parent).evaluation["movements"].tolist() == [30, 60]
+    assert go(tmp_path, "--resume") == 0
+    assert csv_of(path.parent) == reference
+
+
+def test_evaluations_from_before_there_were_answers_are_the_runs_own(tmp_path, go, benchmark, reference):
+    path = tmp_path / "sgim-d" / "seed-003" / "evaluation.csv"
+    assert go(tmp_path, "--movements", 60, "--answers", "own") == 0
+    today = read_run(path.parent).evaluation
+    rows = [line.split(",") for line in path.read_text().splitlines()]
+    rows = [[row[0], *row[2:-2]] for row in rows]  # as they were, before answers, goals met and checksums
+    path.write_bytes(",".join([*rows[0], "crc32\n"]).encode() + b"".join(map(sealed, rows[1:])))
+    settings = json.loads((path.parent / "config.json").read_text())
+    del settings["answers"]
+    (path.parent / "config.json").write_text(json.dumps(settings))
+    before = read_run(path.parent)
+    assert list(before.answers) == ["own"]
+    assert before.damage == {}
+    assert before.evaluation["mean_error_m"].tolist() == today["mean_error_m"].tolist()
+    assert np.isnan(before.evaluation["goals_met"]).all()
+    config = Config(seed=3, movements=60, evaluate_at=(30, 60), repeats=2, benchmark=benchmark, out=tmp_path)
+    assert finished(replace(config, answers=("own",)))
+    assert not finished(config)  # linear did not answer yet
+    assert go(tmp_path, "--resume") == 0
+    assert csv_of(path.parent) == reference
 
 
 @pytest.mark.parametrize("name", ["evaluation.csv", "regions.csv"])
@@ -368,15 +405,17 @@ def test_a_run_that_another_process_writes_is_left_alone(tmp_path, go, capsys):
     assert go(tmp_path, "--resume") == 0
 
 
-def test_a_full_disk_is_reported_and_the_run_can_go_on(tmp_path, go, benchmark, reference):
+@pytest.mark.parametrize("watched", ["false", "true"])
+def test_a_full_disk_is_reported_and_the_run_can_go_on(tmp_path, go, benchmark, reference, watched):
     directory = tmp_path / "sgim-d" / "seed-003"
-    process = start(EAGER, *arguments(tmp_path, benchmark), limit="-f 24")  # KiB a file may have
+    process = start(EAGER, *arguments(tmp_path, benchmark), "--board", watched, limit="-f 24")  # KiB a file may have
     _, errors = process.communicate()
     assert process.returncode == 1
     assert "cannot be written" in errors
     assert "Traceback" not in errors
-    assert (directory / "episodes.csv").stat().st_size == 24 * 1024
-    assert go(tmp_path, "--resume") == 0
+    sizes = {path.name.partition(".")[0]: path.stat().st_size for path in directory.iterdir()}
+    assert sizes["events" if watched == "true" else "episodes"] == 24 * 1024
+    assert go(tmp_path, "--board", watched, "--resume") == 0
     assert csv_of(directory) == reference
 
 

@@ -38,7 +38,7 @@ def test_every_algorithm_writes_a_whole_run_directory(tmp_path, go, capsys, algo
     assert run.thetas.shape == (MOVEMENTS, 25)
     assert (run.regions is not None) == (algorithm in ("sagg-riac", "sgim-d"))
     header = (directory / "evaluation.csv").read_text().splitlines()[0]
-    assert header == "movements,mean_error_m,median_error_m,p90_error_m,noise_floor_m,crc32"
+    assert header == "movements,answer,mean_error_m,median_error_m,p90_error_m,noise_floor_m,goals_met,crc32"
     # Observation has seen nothing before movement 30, so it has nothing to be evaluated by after 30 movements.
     wanted = [60, 90] if algorithm in ("observation", "imitation") else [30, 60, 90]
     assert run.evaluation["movements"].tolist() == wanted
@@ -76,7 +76,7 @@ def test_evaluating_more_or_not_at_all_leaves_the_log_as_it_is(tmp_path, go, ref
     assert go(tmp_path, "--evaluate_at", evaluations) == 0
     written = csv_of(tmp_path / "sgim-d" / "seed-003")
     assert written["episodes.csv"] == reference["episodes.csv"]
-    assert written["evaluation.csv"].count(b"\n") == (1 if evaluations == "[]" else 8)
+    assert written["evaluation.csv"].count(b"\n") == (1 if evaluations == "[]" else 1 + 2 * 7)
 
 
 def test_floor_at_names_the_evaluations_that_measure_the_noise_and_changes_nothing_else(tmp_path, go, reference):
@@ -90,11 +90,54 @@ def test_floor_at_names_the_evaluations_that_measure_the_noise_and_changes_nothi
             assert written[name] == reference[name]
         lines = zip(written["evaluation.csv"].splitlines(), reference["evaluation.csv"].splitlines(), strict=True)
         for line, full in lines:
-            movements, *errors, _, _ = full.split(b",")
+            movements, *errors, _, met, _ = full.split(b",")
             if movements == b"movements" or int(movements) in measured:
                 assert line == full
             else:
-                assert line.split(b",")[:-1] == [movements, *errors, b"nan"]
+                assert line.split(b",")[:-1] == [movements, *errors, b"nan", met]
+
+
+def answers_of(out, go, *options):
+    assert go(out, *options) == 0
+    (path,) = out.glob("*/seed-003")
+    return read_run(path).answers, csv_of(path)["episodes.csv"]
+
+
+def test_an_inverse_answers_alike_whether_it_is_the_runs_own_or_another(tmp_path, go):
+    """Imitators with different inverses remember the same, so nearest and linear land at the same places."""
+    found, logs = zip(
+        *(
+            answers_of(tmp_path / own, go, "--algorithm", "imitation", "--inverse", own, "--answers", f"own,{other}")
+            for own, other in (("nearest", "linear"), ("linear", "nearest"))
+        ),
+        strict=True,
+    )
+    assert logs[0] == logs[1]
+    for mine, theirs in ((found[0]["own"], found[1]["nearest"]), (found[1]["own"], found[0]["linear"])):
+        assert mine["mean_error_m"].tolist() == theirs["mean_error_m"].tolist()
+        assert mine["goals_met"].tolist() == theirs["goals_met"].tolist()
+        assert np.isfinite(mine["noise_floor_m"]).all()
+        assert np.isnan(theirs["noise_floor_m"]).all()
+    assert found[0]["own"]["mean_error_m"].tolist() != found[0]["linear"]["mean_error_m"].tolist()
+
+
+def test_a_run_has_the_answers_that_were_asked_for_and_its_log_does_not_depend_on_them(tmp_path, go, reference):
+    found, log = answers_of(tmp_path, go, "--answers", "own,nearest,paper,model")
+    assert list(found) == ["own", "nearest", "paper"]  # there is no model
+    assert log == reference["episodes.csv"]
+
+
+@pytest.mark.parametrize(
+    ("answers", "message"),
+    [
+        ("linear", "answers must begin with own and name each once, got linear"),
+        ("own,own", "answers must begin with own and name each once, got own,own"),
+        ("own,liner", "unknown inverse 'liner', .*did you mean linear"),
+    ],
+)
+def test_answers_that_make_no_sense_are_refused(tmp_path, go, capsys, answers, message):
+    assert go(tmp_path, "--answers", answers) == 2
+    assert re.search(message, capsys.readouterr().err)
 
 
 def test_threads_change_no_byte(tmp_path, go, reference):
@@ -380,11 +423,17 @@ def test_evaluate_at_may_be_joined_by_an_equals_sign(tmp_path, go):
 SCRIPTS = {**os.environ, "PYTHONPATH": str(ROOT)}
 
 
-@pytest.mark.parametrize("script", ["run --out", "demo --out", "table", "report"])
+@pytest.mark.parametrize(
+    "script",
+    [
+        *(f"-m sgimd_torch {words}" for words in ("run --out", "demo --out", "table", "report")),
+        *(f"experiments/{name}.py" for name in ("compare", "claims", "figures", "model_figures")),
+    ],
+)
 def test_ctrl_c_while_python_imports_shows_no_traceback(script, tmp_path):
-    command = [sys.executable, "-X", "importtime", "-m", "sgimd_torch", *script.split(), str(tmp_path)]
+    command = [sys.executable, "-X", "importtime", *script.split(), str(tmp_path)]
     said = ""
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=SCRIPTS) as process:
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=SCRIPTS, cwd=ROOT) as process:
         for line in process.stderr:  # importtime tells what is loaded, as it goes
             said += line
             if " numpy." in line:

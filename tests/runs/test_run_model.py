@@ -20,8 +20,6 @@ from sgimd_torch.memory import Memory
 from sgimd_torch.runs.build import LEAST_NOISE, build
 from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.config import Config
-from sgimd_torch.runs.directory import RunDirectory
-from sgimd_torch.runs.log import Columns
 from sgimd_torch.runs.model_record import LEGEND, RunModel
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
@@ -196,14 +194,6 @@ def test_a_model_that_was_never_asked_is_reported(tmp_path, live, capsys, option
     assert len((directory / "predictions.csv").read_text().splitlines()) == 1
 
 
-def run_model(tmp_path, model, trust):
-    columns = Columns(0, 7, 2)
-    free = {"free": (), "columns": columns, "region_dims": None, "versions": {}, "resume": False, "movements": 999}
-    directory = RunDirectory(tmp_path / "run", {}, **free)
-    directory.begin()
-    return directory, RunModel(directory, model, trust)
-
-
 def remember(memory, n):
     """What ``episode`` returns for each of ``n`` random movements of an arm, which are remembered."""
     arm, rng = PlanarArm(7), stream(0, "exemplars")
@@ -216,40 +206,38 @@ def remember(memory, n):
 
 def test_a_divergence_is_told_and_recorded(tmp_path):
     model, memory = ForwardModel(0, 7, 2, rate=1.0), Memory(0, 7, 2)
-    directory, watched = run_model(tmp_path, model, 1.0)
-    with directory:
-        for episode in remember(memory, 150):
-            if episode.index == 99:
-                model.lr, model._online.optimizer = 1e30, None
-            if episode.index == 149:
-                model.lr = 1e-2
-            learnt = watched.episode(episode, memory)
-            assert learnt == ((episode.index + 1) % 50 == 0)
-        watched.begin()
-        assert "movement 100: training diverged; the forward model keeps its last good weights" in watched.news()
-        assert watched.news() == []
-    assert table(directory.path / "refreshes.csv")[1][:, 5].tolist() == [0, 1, 0]
+    watched = RunModel(tmp_path, model, 1.0)
+    for episode in remember(memory, 150):
+        if episode.index == 99:
+            model.lr, model._online.optimizer = 1e30, None
+        if episode.index == 149:
+            model.lr = 1e-2
+        learnt = watched.episode(episode, memory)
+        assert bool(learnt) == ((episode.index + 1) % 50 == 0)
+    watched.begin()
+    assert "movement 100: training diverged; the forward model keeps its last good weights" in watched.news()
+    assert watched.news() == []
+    assert table(tmp_path / "refreshes.csv")[1][:, 5].tolist() == [0, 1, 0]
 
 
 def test_the_curves_are_those_of_the_newest_refresh(tmp_path):
     model, memory = ForwardModel(0, 7, 2, rate=1.0), Memory(0, 7, 2)
-    directory, watched = run_model(tmp_path, model, 1.0)
-    with directory:
-        episodes = list(remember(Memory(0, 7, 2), 100))
-        nearer = []
-        for episode in episodes:
-            memory.add(NO_CONTEXT, episode.move.theta, episode.outcome)
-            watched.episode(episode, memory)
-            if episode.index == 49:
-                assert watched.curves.keys() == LEGEND.keys() - {"model/error", "model/coverage"}
-        watched.begin()
+    watched = RunModel(tmp_path, model, 1.0)
+    episodes = list(remember(Memory(0, 7, 2), 100))
+    nearer = []
+    for episode in episodes:
+        memory.add(NO_CONTEXT, episode.move.theta, episode.outcome)
+        watched.episode(episode, memory)
+        if episode.index == 49:
+            assert watched.curves.keys() == LEGEND.keys() - {"model/error", "model/coverage"}
+    watched.begin()
     for first, second in zip(episodes[::2], episodes[1::2], strict=True):
         distances = [np.linalg.norm(episode.outcome - episode.move.goal) for episode in (first, second)]
         nearer.append(distances[1] < distances[0])
     assert watched.curves.keys() == LEGEND.keys()
     assert watched.curves["model/improved"] == pytest.approx(np.mean(nearer))
     assert watched.curves["model/relative_error"] == model.relative_error
-    outcome, predicted, epistemic, aleatoric = np.split(table(directory.path / "predictions.csv")[1][:, 1:], 4, axis=1)
+    outcome, predicted, epistemic, aleatoric = np.split(table(tmp_path / "predictions.csv")[1][:, 1:], 4, axis=1)
     assert watched.curves["model/error"] == pytest.approx(np.linalg.norm(outcome - predicted, axis=1).mean())
     squared = ((outcome - predicted) ** 2 / (epistemic**2 + aleatoric**2)).sum(axis=1)
     assert watched.curves["model/coverage"] == (squared < -2 * np.log(0.2)).mean()  # chi-squared, two dimensions
@@ -377,3 +365,12 @@ def test_a_run_is_not_resumed_with_another_model(tmp_path, live, capsys):
     message = capsys.readouterr().err
     assert "training was 2.0, now 3.0" in message
     assert "anchored was True, now False" in message
+
+
+def test_a_run_that_learns_a_model_but_answers_without_it_is_evaluated_by_both(tmp_path, live):
+    options = ("--search", "gradient", "--inverse", "linear", "--answers", "own,nearest,linear,model")
+    assert live(tmp_path, *options) == 0
+    answers = read_run(tmp_path / "sgim-d" / "seed-003").answers
+    assert list(answers) == ["own", "nearest", "linear", "model"]
+    errors = {answer: each["mean_error_m"].tolist() for answer, each in answers.items()}
+    assert errors["own"] == errors["linear"] != errors["model"]

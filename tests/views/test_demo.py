@@ -12,8 +12,8 @@ import pytest
 
 from runs import ROOT
 from sgimd_torch.evaluation import Benchmark, save_benchmark
-from sgimd_torch.runs.read import read_run
 from sgimd_torch.views.demo_figure import draw, table
+from sgimd_torch.views.report.data import read_life
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +48,7 @@ def finished(tmp_path_factory, benchmark_file):
 
 @pytest.fixture(scope="module")
 def runs(finished):
-    return {algorithm: read_run(finished[0] / algorithm / "seed-000") for algorithm in ("sgim-d", "random")}
+    return {algorithm: read_life(finished[0] / algorithm / "seed-000") for algorithm in ("sgim-d", "random")}
 
 
 def is_whole_png(path):

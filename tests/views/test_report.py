@@ -145,7 +145,7 @@ def test_the_numbers_of_a_run_are_those_of_its_evaluations(pages, runs):
     rows = list(zip(*run.evaluation.values(), strict=True))
     assert len(rows) == 2
     evaluations = rows_of(pages["one"], "Every evaluation: distances to the benchmark's goals")
-    assert evaluations[1:] == [[f"{row[0]:.0f}", *(f"{value:.4f}" for value in row[1:])] for row in rows]
+    assert evaluations[1:] == [[f"{row[0]:.0f}", *(f"{value:.4f}" for value in row[1:-1])] for row in rows]
     mean, floor = run.evaluation["mean_error_m"][-1], run.evaluation["noise_floor_m"][-1]
     assert f"lands {mean:.3f} m from a goal" in pages["one"]
     errors = dict(zip(*rows_of(pages["one"], "Errors"), strict=True))
@@ -328,8 +328,9 @@ def test_algorithms_without_a_colour_of_their_own_can_be_told_apart(copy):
 def test_without_motor_noise_nothing_is_divided_by_the_floor(copy):
     run = copy / "observation" / "seed-003"
     header, *lines = (run / "evaluation.csv").read_bytes().splitlines(keepends=True)
-    fields = [line.decode().split(",")[:4] for line in lines]  # without noise floor and checksum
-    (run / "evaluation.csv").write_bytes(b"".join([header, *(sealed([*each, "1e-16"]) for each in fields)]))
+    fields = [line.decode().split(",") for line in lines]  # the last ones: noise floor, goals met, checksum
+    rows = [sealed([*errors, "1e-16", met]) for *errors, _, met, _ in fields]
+    (run / "evaluation.csv").write_bytes(b"".join([header, *rows]))
     assert report.main([str(run)]) == 0
     errors = dict(zip(*rows_of((run / "report.html").read_text(), "Errors"), strict=True))
     assert errors["noise floor (m)"] == "0.000"

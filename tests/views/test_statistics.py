@@ -11,6 +11,7 @@ from sgimd_torch.views import statistics
 from sgimd_torch.views.statistics import (
     anova,
     difference_interval,
+    holm,
     improvement,
     improvement_interval,
     interquartile_mean,
@@ -86,8 +87,36 @@ def test_improvement_is_the_mann_whitney_statistic_and_its_opposite_makes_one(rn
     u = stats.mannwhitneyu(ours, theirs).statistic / 63  # how often ours are larger
     assert improvement(ours, theirs) == pytest.approx(1 - u)
     assert improvement(ours, theirs) + improvement(theirs, ours) == pytest.approx(1)
-    found = improvement_interval(ours, theirs, rng=rng)
-    assert 0 <= found.low <= found.value <= found.high <= 1
+    found, opposite = improvement_interval(ours, theirs), improvement_interval(theirs, ours)
+    assert 0 < found.low < found.value < found.high < 1
+    assert opposite == pytest.approx((1 - found.value, 1 - found.high, 1 - found.low))
+
+
+@pytest.mark.parametrize(("n", "low"), [(2, 0.386), (10, 0.80), (20, 0.90)])
+def test_few_seeds_never_make_an_improvement_certain(n, low):
+    ours, theirs = np.zeros(n), np.ones(n)
+    assert improvement_interval(ours, theirs) == pytest.approx((1, low, 1), abs=0.005)
+    assert improvement_interval(theirs, ours) == pytest.approx((0, 0, 1 - low), abs=0.005)
+    assert improvement_interval(ours, theirs, level=0.99).low < low
+
+
+@pytest.mark.parametrize(("n", "shift"), [(5, 0.0), (5, 2.0), (10, 1.0), (20, 2.0)])
+@pytest.mark.parametrize("level", [0.5, 0.8, 0.95])
+def test_an_interval_of_an_improvement_holds_the_truth_at_least_about_as_often_as_it_says(rng, n, shift, level):
+    truth = stats.norm.cdf(shift / np.sqrt(2))
+    pairs = [(rng.normal(size=n), rng.normal(shift, 1, n)) for _ in range(400)]
+    found = [improvement_interval(*pair, level=level) for pair in pairs]
+    share = np.mean([each.low <= truth <= each.high for each in found])
+    assert share > level - 0.1  # four standard errors at .5; five and nine at the others
+
+
+def test_holm_by_intervals_is_holm_by_p_values(rng):
+    """An interval at a level rejects where p is at most 1 - level."""
+    for p in rng.random((200, 6)) ** 4:
+        order = np.argsort(p)
+        adjusted = np.maximum.accumulate(p[order] * np.arange(6, 0, -1))
+        expected = set(order[adjusted <= 0.05].tolist())
+        assert holm(range(6), lambda claim, level, p=p: p[claim] <= 1 - level) == expected
 
 
 def test_noise_that_both_sides_of_a_pair_share_cancels(rng):
@@ -121,6 +150,8 @@ def test_a_level_is_reached_where_the_line_between_evaluations_first_crosses_it(
         (lambda rng: ratio_interval(np.ones(3), np.ones(2), rng=rng, paired=True), r"got samples of \[3, 2\]"),
         (lambda rng: ratio_interval(np.ones(3), np.zeros(2), rng=rng), "above 0"),
         (lambda rng: interval(interquartile_mean, np.empty(0), rng=rng), "got 0"),
+        (lambda rng: improvement_interval(np.ones(1), np.ones(3)), r"2 or more seeds with finite errors, got \[1.0\]"),
+        (lambda rng: improvement_interval(np.ones(2), np.array([1, np.inf])), "finite errors"),
         (lambda rng: paired_differences({0: 1.0, 1: 2.0}, {0: 1.0, 4: 1.0}), r"\[1, 4\]"),
         (lambda rng: mean_over_life(np.array([1.0, 1.0]), np.ones(2)), "increasing"),
         (lambda rng: mean_over_life(np.array([1.0]), np.ones(1)), "2 or more"),

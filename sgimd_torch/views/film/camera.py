@@ -162,6 +162,11 @@ def shoot(camera: Camera, scenes: Iterable[Sequence[Shot]], *, columns: int = 2)
             yield tiled([camera.frame(shot, k / RATE) for shot in shots], columns)
 
 
+def landed(camera: Camera, shots: Sequence[Shot], *, columns: int = 2) -> Frame:
+    """The last frame of a scene: all its shots have landed."""
+    return tiled([camera.frame(shot, shot.recording.landed) for shot in shots], columns)
+
+
 def count_frames(scenes: Iterable[Sequence[Shot]]) -> int:
     """How many frames ``shoot`` yields."""
     return sum(map(_length, scenes))

@@ -11,14 +11,14 @@ import argparse
 import os
 import re
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 if "mujoco" not in sys.modules and sys.platform == "linux":
     os.environ.setdefault("MUJOCO_GL", "egl")  # draws without a display
 try:
-    import mujoco
+    import mujoco  # noqa: F401
 except (ImportError, AttributeError, RuntimeError) as error:  # each kind of OpenGL fails in its own way
     asked = os.environ.get("MUJOCO_GL")
     raise ImportError(f"MUJOCO_GL={asked} does not work here ({error}); set MUJOCO_GL=egl, or unset it") from error
@@ -26,14 +26,13 @@ except (ImportError, AttributeError, RuntimeError) as error:  # each kind of Ope
 import numpy as np
 from tqdm import tqdm
 
-from sgimd_torch.environments.rod_physics import Recording
 from sgimd_torch.runs.build import RunParts, build
 from sgimd_torch.runs.config import Config, from_settings
 from sgimd_torch.runs.log import RunError
 from sgimd_torch.runs.read import Run, read_run
-from sgimd_torch.spaces import Array, Box, stream
+from sgimd_torch.spaces import Array, stream
 from sgimd_torch.strategies import Remember
-from sgimd_torch.views.film.camera import Camera, Frame, Shot, count_frames, shoot, write_film, write_sheet
+from sgimd_torch.views.film.camera import Camera, Shot, count_frames, landed, shoot, write_film, write_sheet
 
 AFTER = (100, 500, 1000, 5000)
 EXAMPLES = """examples:
@@ -42,18 +41,6 @@ EXAMPLES = """examples:
   sgimd film runs/sgim-d/seed-003 --time-lapse                  each goal after 100, 500, 1000 and 5000 movements
   sgimd film runs/sgim-d/seed-003 --time-lapse --after 50,200   after 50 and 200
 """
-
-
-class Filmed(Protocol):
-    """An environment that can be filmed: ``model`` is MuJoCo's, ``record`` executes and keeps what happened."""
-
-    model: mujoco.MjModel
-    outcomes: Box
-    contexts: Box
-
-    def record(self, context: Array, theta: Array, rng: np.random.Generator) -> Recording:
-        """One movement, with the noise of ``rng``."""
-        ...
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -101,7 +88,7 @@ def config_of(run: Run) -> Config:
 def remember(run: Run, parts: RunParts, start: int, stop: int) -> None:
     """Add to the memory of ``parts`` what the learner remembered in movements ``start`` to ``stop``, in the same order,
     and train a forward model on it as in the run."""
-    memory, correspondence = parts.learner.memory, parts.correspondence
+    memory, correspondence = parts.learner.memory, parts.learner.correspondence
     by_observation = isinstance(parts.learner.social, Remember)  # other learners remember only their own movements
     for row in range(start, min(stop, len(run.index))):
         if by_observation and correspondence is not None and run.demonstration[row] >= 0:
@@ -115,7 +102,7 @@ def remember(run: Run, parts: RunParts, start: int, stop: int) -> None:
 
 
 def _cast(
-    run: Run, parts: RunParts, robot: Filmed, goals: Array, stages: Sequence[int], *, say_movements: bool
+    run: Run, parts: RunParts, robot: Any, goals: Array, stages: Sequence[int], *, say_movements: bool
 ) -> list[list[Shot]]:
     """For each stage, the run's answer to each goal; a goal has the same motor noise at every stage."""
     shots = []
@@ -125,34 +112,25 @@ def _cast(
         remember(run, parts, before, movements)
         if not len(parts.learner.memory):
             raise RunError(f"{run.path} remembers nothing after {movements} movements, so no movement can be inferred")
-        landed = run.outcomes[:movements]
-        landed = landed[np.isfinite(landed[:, 0])]
+        past = run.outcomes[:movements]
+        past = past[np.isfinite(past[:, 0])]
         stage = []
         for k, goal in enumerate(goals):
             theta = parts.inverse(context, goal).theta
             recording = robot.record(context, theta, stream(run.config["seed"], "film", k))
             shown = f"after {movements} movements" if say_movements else f"{title}, after {movements} movements"
-            stage.append(Shot(recording, goal, shown, landed))
+            stage.append(Shot(recording, goal, shown, past))
         shots.append(stage)
     return shots
 
 
 def _film(options: argparse.Namespace, camera: Camera, scenes: list[list[Shot]]) -> None:
-    lasts: list[Frame] = []  # of each scene
-    ends = np.cumsum([count_frames([scene]) for scene in scenes]) - 1
-
-    def frames() -> Iterator[Frame]:
-        # tqdm shows the time left; without a terminal it prints a line now and then
-        interval = 0.2 if sys.stderr.isatty() else 10.0
-        bar = tqdm(shoot(camera, scenes), "filming", int(ends[-1]) + 1, unit=" frames", mininterval=interval)
-        for k, frame in enumerate(bar):
-            if k in ends:
-                lasts.append(frame)
-            yield frame
-
-    write_film(options.out, frames())
+    # tqdm shows the time left; without a terminal it prints a line now and then
+    interval = 0.2 if sys.stderr.isatty() else 10.0
+    frames = shoot(camera, scenes)
+    write_film(options.out, tqdm(frames, "filming", count_frames(scenes), unit=" frames", mininterval=interval))
     if options.sheet is not None:
-        write_sheet(options.sheet, lasts)
+        write_sheet(options.sheet, [landed(camera, shots) for shots in scenes])
 
 
 def _stages(run: Run, options: argparse.Namespace) -> list[int]:

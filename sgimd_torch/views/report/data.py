@@ -22,7 +22,8 @@ from sgimd_torch.figures.learning import NAMES
 from sgimd_torch.runs.build import task_of
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.log import RunError
-from sgimd_torch.runs.read import Run, read_run
+from sgimd_torch.runs.read import NO_EVALUATION, Run, read_run
+from sgimd_torch.runs.tables import OWN
 from sgimd_torch.runs.tasks import demonstrations_of
 from sgimd_torch.spaces import Array
 from sgimd_torch.views.statistics import Interval, iqm_interval, mean_over_life, ratio_interval, rng
@@ -79,9 +80,10 @@ class Life(Run):
             return False
         return self.outcomes.shape[1] == 2 and "low_2" not in self.regions
 
-    def at(self, movements: int, column: str = "mean_error_m") -> float:
+    def at(self, movements: int, column: str = "mean_error_m", answer: str = OWN) -> float:
         """An entry of evaluation.csv, NaN if there is none."""
-        found = self.evaluation[column][self.evaluation["movements"] == movements]
+        evaluation = self.answers.get(answer, NO_EVALUATION)
+        found = evaluation[column][evaluation["movements"] == movements]
         return float(found[0]) if len(found) else float("nan")
 
     def seconds(self, part: str) -> float:
@@ -178,9 +180,9 @@ class Variant:
         self.evaluated: NDArray[np.int64] = reduce(np.intersect1d, moments or [np.empty(0)]).astype(np.int64)
         self.last = int(self.evaluated[-1]) if len(self.evaluated) else 0  # movements before the last one
 
-    def at(self, movements: int, column: str = "mean_error_m") -> Interval | None:
+    def at(self, movements: int, column: str = "mean_error_m", answer: str = OWN) -> Interval | None:
         """A column of evaluation.csv over its seeds; None where one of them has no value."""
-        return over_seeds(np.array([life.at(movements, column) for life in self.used]))
+        return over_seeds(np.array([life.at(movements, column, answer) for life in self.used]))
 
     @cached_property
     def errors(self) -> Array:

@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from sgimd_torch.figures.axes import over_movements
-from sgimd_torch.figures.learning import COLOURS, interest_map, landing_points
+from sgimd_torch.figures.learning import COLOURS, interest_map, landing_points, map_after
 from sgimd_torch.figures.movements import interest_over_time
 from sgimd_torch.figures.results import Difference, forest
 from sgimd_torch.spaces import Array, Box
@@ -148,9 +148,8 @@ def landing(figure: Figure, landed: Array, shown: Array) -> None:
 def interest(figure: Figure, life: Life) -> None:
     """The interest map at the last evaluation, with the goals chosen before it."""
     assert life.regions is not None
-    last = life.regions["movements"] == life.regions["movements"].max()
-    lows, highs = (np.stack([life.regions[f"{end}_{k}"][last] for k in (0, 1)], axis=1) for end in ("low", "high"))
-    interest_map(figure.subplots(), lows, highs, life.regions["interest"][last], goals=life.chosen_goals()[-GOALS:])
+    last = map_after(life.regions, life.regions["movements"].max())
+    interest_map(figure.subplots(), *last, goals=life.chosen_goals()[-GOALS:])
 
 
 @png

@@ -1,0 +1,163 @@
+"""Settings of the rivals, searched on tuning seeds: each line changes one keyword of a rival, or two, from its default.
+
+Rivals deserve the search that our own defaults had (results/TUNING.md). Each setting learns on the rod with each seed;
+its memory is answered by ``LocallyLinear``, on a benchmark of its own, never the shipped one. Rows go to
+results/rivals.csv; what is there is not run again.
+
+Examples:
+  python scripts/make_benchmark.py --seed 3000 --out tuning.npz
+  python experiments/tune_rivals.py --benchmark tuning.npz                    everything: some hours on two cores
+  python experiments/tune_rivals.py --benchmark tuning.npz --only cma-mae --seeds 1000-1002
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from functools import partial
+from itertools import product
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+from sgimd_torch.runs.process import command, loading, say
+
+with loading():  # Ctrl-C shows no traceback
+    import numpy as np
+
+    from sgimd_torch import (
+        FishingRod,
+        LocallyLinear,
+        PeriodicTeacher,
+        evaluate,
+        load_demonstrations,
+        run,
+        sgim_d,
+        stream,
+    )
+    from sgimd_torch.evaluation import Benchmark, load_benchmark
+    from sgimd_torch.goals.uniform import UniformGoals
+    from sgimd_torch.inverses.local import NearestNeighbour
+    from sgimd_torch.learner import Learner
+    from sgimd_torch.rivals.quality_diversity import cma_mae, cma_me, isoline, map_elites
+    from sgimd_torch.runs.sweep import add_options
+    from sgimd_torch.searches.perturb import perturb
+    from tables import Key, Table
+
+COLUMNS: Final = ("rival", "setting", "seed", "movements", "linear_error_m")
+KEY: Final = ("rival", "setting", "seed", "movements")
+FIRST_TUNING_SEED: Final = 1000
+SHOWN_EVERY: Final = 30  # movements between two demonstrations
+Setting = dict[str, Any]
+
+
+class Rival(NamedTuple):
+    """What makes it, whether it is taught, and the settings that are tried; {} is its default."""
+
+    make: Any
+    taught: bool
+    settings: Sequence[Setting]
+
+
+def baseline(rod: FishingRod, seed: int, *, correspondence: Any, sd: float = 0.05, budget: int = 15) -> Learner:
+    """The field's standard one: uniform goals, demonstrations, noise around the nearest movement."""
+    search = partial(perturb, sd=sd)
+    return sgim_d(
+        rod,
+        seed,
+        correspondence=correspondence,
+        goals=UniformGoals,
+        inverse=NearestNeighbour,
+        search=search,
+        budget=budget,
+    )
+
+
+def one_by_one(**values: Sequence[Any]) -> list[Setting]:
+    """The default, then each value of each keyword alone."""
+    return [{}, *({name: value} for name, found in values.items() for value in found)]
+
+
+_TEAM: Final = one_by_one(emitters=(1, 3, 10, 15), sd=(0.05, 0.2, 0.3), batch=(8, 30), cells=(10, 40))
+_ELITES: Final = one_by_one(first=(30, 300), batch=(5, 30), cells=(10, 40))
+RIVALS: Final = {
+    "cma-mae": Rival(cma_mae, False, [*_TEAM, *({"learning_rate": rate} for rate in (0.001, 0.1, 0.5))]),
+    "cma-mae-demonstrations": Rival(cma_mae, True, [*_TEAM, *one_by_one(imitations=(3, 20), epsilon=(0.02, 0.1))[1:]]),
+    "cma-me": Rival(cma_me, False, _TEAM),
+    "map-elites": Rival(map_elites, False, [*_ELITES, *({"sd": sd} for sd in (0.02, 0.1, 0.15))]),
+    "isoline": Rival(isoline, False, [*_ELITES, *one_by_one(sd=(0.01, 0.05), line=(0.1, 0.4))[1:]]),
+    "isoline-again": Rival(isoline, False, [{"again": share} for share in (0.1, 0.2, 0.4)]),
+    "isoline-demonstrations": Rival(isoline, True, one_by_one(sd=(0.01, 0.05), first=(10,), imitations=(3, 20))),
+    "random-goals-demonstrations": Rival(baseline, True, one_by_one(sd=(0.02, 0.1), budget=(1, 2, 4, 8, 30))),
+}
+
+
+def in_words(setting: Setting) -> str:
+    """A setting as a field of the table: ``sd=0.2``; ``default`` for none."""
+    return " ".join(f"{name}={value}" for name, value in setting.items()) or "default"
+
+
+def errors_of(name: str, setting: Setting, seed: int, benchmark: Benchmark, times: Sequence[int]) -> list[float]:
+    """The error (m) of a rival by ``LocallyLinear`` after each of ``times`` movements, which increase."""
+    rival, rod = RIVALS[name], FishingRod(threads=1)
+    teacher, taught = None, dict[str, Any]()
+    if rival.taught:
+        teacher = PeriodicTeacher(load_demonstrations(), stream(seed, "teacher"), every=SHOWN_EVERY)
+        taught = {"correspondence": rod.primitive.correspondence}
+    learner = rival.make(rod, seed, **taught, **setting)
+    found = []
+    for episode in run(learner, rod, seed, movements=max(times), teacher=teacher):
+        if episode.index + 1 in times:
+            inverse = LocallyLinear(learner.memory)
+            found.append(evaluate(inverse, rod, benchmark.goals, seed, episode.index + 1, repeats=0).mean_error)
+    return found
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run what is missing in the table, then print the mean of each setting over its seeds, the best first.
+
+    Raises:
+        ValueError: seeds below 1000, which are for development and final rows; a benchmark that does not fit.
+        OSError: a file cannot be read or written.
+    """
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--benchmark", type=Path, required=True, help="goals to tune on, of scripts/make_benchmark.py")
+    parser.add_argument("--only", nargs="+", choices=RIVALS, default=list(RIVALS), help="only these rivals")
+    add_options(parser, seeds="1000-1001")
+    parser.add_argument("--times", type=int, nargs="+", default=[1000, 5000], help="movements before evaluations")
+    parser.add_argument("--table", type=Path, default=Path("results/rivals.csv"), help="default: %(default)s")
+    options = parser.parse_args(argv)
+    if min(options.seeds) < FIRST_TUNING_SEED:
+        raise ValueError(
+            f"seeds must be {FIRST_TUNING_SEED} or more, got {min(options.seeds)}; the others are judged by"
+        )
+    table, benchmark = Table(options.table, COLUMNS, KEY), load_benchmark(options.benchmark)
+    benchmark.check(FishingRod())
+    known, times = table.rows().keys(), sorted(options.times)
+    with ProcessPoolExecutor(options.processes) as pool:
+        waiting: dict[Future[list[float]], list[Key]] = {}
+        for seed, name in product(options.seeds, options.only):
+            for setting in RIVALS[name].settings:
+                keys: list[Key] = [(name, in_words(setting), str(seed), str(when)) for when in times]
+                if not {*keys} <= known:
+                    waiting[pool.submit(errors_of, name, setting, seed, benchmark, times)] = keys
+        for made in as_completed(waiting):
+            rows = [[*key, error] for key, error in zip(waiting[made], made.result(), strict=True)]
+            table.merge(rows)
+            say(" ".join(map(str, rows[-1])))
+    _print_means(table, options.only, times[-1])
+    return 0
+
+
+def _print_means(table: Table, names: Sequence[str], last: int) -> None:
+    errors: dict[tuple[str, str], list[float]] = {}
+    for name, setting, _, movements, error in table.rows().values():
+        if name in names and movements == str(last):
+            errors.setdefault((name, setting), []).append(float(error))
+    for (name, setting), found in sorted(errors.items(), key=lambda item: (item[0][0], np.mean(item[1]))):
+        print(f"{name:28} {setting:20} {np.mean(found):.4f} m, {len(found)} seeds")
+
+
+if __name__ == "__main__":
+    sys.exit(command(main))

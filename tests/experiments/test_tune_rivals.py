@@ -1,0 +1,66 @@
+"""The search for settings of the rivals: rows that are resumed, on tuning seeds only."""
+
+import csv
+
+import numpy as np
+import pytest
+
+from sgimd_torch.demonstrations import load_demonstrations
+from sgimd_torch.environments.fishing_rod import FishingRod
+from sgimd_torch.runs.process import command
+from tune_rivals import COLUMNS, RIVALS, baseline, in_words, main
+
+
+@pytest.fixture
+def tune(benchmark, tmp_path):
+    def tune(*options):
+        fixed = ("--benchmark", benchmark, "--table", tmp_path / "rivals.csv", "--times", 40, 20, "--processes", 1)
+        return command(main, [*map(str, fixed), *map(str, options)])
+
+    return tune
+
+
+def rows(tmp_path):
+    with (tmp_path / "rivals.csv").open(newline="") as file:
+        header, *found = csv.reader(file)
+    assert tuple(header) == COLUMNS
+    return found
+
+
+def test_each_setting_gets_a_row_for_each_evaluation_and_none_is_run_twice(tune, tmp_path, capsys):
+    assert tune("--only", "isoline-again", "--seeds", 1000) == 0
+    found = rows(tmp_path)
+    wanted = {("isoline-again", f"again={share}", "1000", when) for share in (0.1, 0.2, 0.4) for when in ("20", "40")}
+    assert {tuple(row[:4]) for row in found} == wanted
+    assert all(0 < float(row[4]) < 2 for row in found)
+    assert capsys.readouterr().out.count(" m, 1 seeds") == 3
+    assert tune("--only", "isoline-again", "--seeds", 1000) == 0
+    assert rows(tmp_path) == found
+    assert capsys.readouterr().err == ""
+
+
+def test_seeds_that_learners_are_judged_by_are_refused(tune, tmp_path, capsys):
+    assert tune("--seeds", "0-1") == 2
+    assert "seeds must be 1000 or more, got 0" in capsys.readouterr().err
+    assert not (tmp_path / "rivals.csv").exists()
+
+
+@pytest.mark.parametrize("name", RIVALS)
+def test_every_setting_makes_a_learner_and_has_a_name_of_its_own(name):
+    rod, rival = FishingRod(threads=1), RIVALS[name]
+    taught = {"correspondence": rod.primitive.correspondence} if rival.taught else {}
+    for setting in rival.settings:
+        learner = rival.make(rod, 1000, **taught, **setting)
+        if rival.taught:
+            learner.watch(load_demonstrations()[0])
+        move = learner.ask(np.zeros(0))
+        assert rod.policies.contains(move.theta)
+        assert (move.origin == "imitate") == rival.taught
+    names = [in_words(setting) for setting in rival.settings]
+    assert len({*names}) == len(names) > 2
+
+
+def test_the_baseline_is_that_of_the_variants():
+    learner = baseline(FishingRod(threads=1), 0, correspondence=FishingRod(threads=1).primitive.correspondence)
+    parts = learner.autonomous
+    assert [type(part).__name__ for part in (parts.goals, parts.inverse)] == ["UniformGoals", "NearestNeighbour"]
