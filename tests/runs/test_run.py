@@ -21,7 +21,7 @@ from sgimd_torch.runs import run as run_script
 from sgimd_torch.runs.build import build
 from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.config import Config
-from sgimd_torch.runs.process import command
+from sgimd_torch.runs.process import Stopped, Stopping, command
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.spaces import Demonstration, stream
 
@@ -418,6 +418,17 @@ def test_an_error_while_running_is_one_line(tmp_path, go, capsys, monkeypatch):
 def test_evaluate_at_may_be_joined_by_an_equals_sign(tmp_path, go):
     assert go(tmp_path, "--evaluate-at=5,6", "--movements=8") == 0
     assert read_run(tmp_path / "sgim-d" / "seed-003").evaluation["movements"].tolist() == [5, 6, 8]
+
+
+def test_a_signal_waits_for_the_next_check_but_where_it_may_come_at_once():
+    with Stopping() as stopping:
+        with stopping.at_once():
+            pass
+        signal.raise_signal(signal.SIGTERM)  # before and after that block it waits
+        with pytest.raises(Stopped), stopping.at_once():
+            pass
+    with Stopping() as stopping, pytest.raises(Stopped), stopping.at_once():
+        signal.raise_signal(signal.SIGTERM)
 
 
 SCRIPTS = {**os.environ, "PYTHONPATH": str(ROOT)}
