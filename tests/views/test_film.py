@@ -207,9 +207,9 @@ def test_a_run_without_movements_is_refused(run_path, tmp_path, capsys):
 
 
 def filmed(run_path, out, gl, *options):
-    words = [sys.executable, "-m", "sgimd_torch", "film", str(run_path), "--goals", "0.2,0.5"]
+    words = [sys.executable, "-m", "sgimd_torch", "film", str(run_path), "--goals", "0.2,0.5", "--width", "320"]
     process = subprocess.run(
-        [*words, "--width", "320", "--out", str(out / "film.mp4"), *options],
+        [*words, "--out", str(out / "film.mp4"), *options],
         env={**os.environ, "PYTHONPATH": str(ROOT), "MUJOCO_GL": gl},
         cwd=out,
         capture_output=True,
@@ -268,6 +268,20 @@ def test_a_frame_shows_the_arm_as_it_was_and_rings_on_the_water_about_base_and_g
     assert on_ring.min() < on_float < on_ring.max()
     white = np.flatnonzero((seen["landed"][:420].min(axis=2) > 180).any(axis=0))  # above the caption
     assert np.ptp(white) > 640 / 2  # the ring one metre from the base; all else that is white stands near the middle
+
+
+def test_what_is_filmed_after_some_movements_does_not_know_what_came_later(run_path, go, tmp_path):
+    assert go(tmp_path, "--movements", 20, "--evaluate_at", "[]", "--repeats", 0) == 0
+    x, y = read_run(run_path).outcomes[-1]
+    sheets = []
+    for path in (tmp_path / "sgim-d" / "seed-003", run_path):
+        lapse = ("--goals", f"{x},{y}", "--time-lapse", "--after", "20", "--sheet", "sheet.png")
+        code, _, errors = filmed(path, tmp_path, "egl", *lapse)
+        if "MUJOCO_GL" in errors:  # a machine without EGL
+            return
+        assert code == 0, errors
+        sheets.append((tmp_path / "sheet.png").read_bytes())
+    assert sheets[0] == sheets[1]
 
 
 @pytest.mark.parametrize("gl", ["disable", "bogus"])
