@@ -99,6 +99,9 @@ def test_demonstrations_for_an_arm_lead_from_rest_to_equal_bends_all_over_its_re
     ends = np.array([demonstration.outcome for demonstration in shown])
     gaps = np.linalg.norm(ends[:, None] - ends, axis=2)[~np.eye(127, dtype=bool)].reshape(127, 126).min(axis=1)
     assert radius < gaps.min() <= gaps.max() < 2 * radius
+    far = np.linalg.norm(ends, axis=1)
+    assert far.min() < arm.min_radius + radius
+    assert arm.length - radius / 4 < far.max() <= arm.length
 
 
 def test_an_imitating_arm_varies_the_posture_that_it_was_shown(tmp_path):
