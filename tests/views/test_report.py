@@ -343,6 +343,18 @@ def test_variants_behind_a_curve_do_not_stretch_its_axis(runs):
     assert 60 <= figure.axes[0].get_xlim()[1] < 70  # movements; the other went on to 6000
 
 
+def test_of_options_that_differ_only_values_that_most_variants_share_are_pale(pages, copy):
+    def marked(text):
+        return re.findall(
+            '<td class="(.*?)">', text[text.index("Only options in which runs differ") :].partition("</tbody>")[0]
+        )
+
+    assert set(marked(pages["many"])) == {"usual", "other"}  # three variants
+    shutil.rmtree(copy / "observation")
+    assert report.main([str(copy)]) == 0
+    assert set(marked((copy / "report.html").read_text(encoding="utf-8"))) == {"other"}  # no two of two agree
+
+
 def test_options_that_this_version_lacks_are_named_beside_the_command(pages, copy):
     assert "does not have" not in pages["one"]
     path = copy / "sgim-d" / "seed-003" / "config.json"
