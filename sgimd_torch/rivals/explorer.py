@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, Attempt, Box, Demonstration, Move
 from sgimd_torch.strategies import Imitate
 
@@ -32,9 +33,12 @@ class QualityDiversity:
             once its mean lies in a corner of many dimensions.
         origin: of the movements, for the log.
         again: share of the movements that repeat elites.
+        start: its exemplars are in the archive from the start; None for an empty one.
     """
 
-    def __init__(self, policies: Box, scheduler: Scheduler, origin: str, again: float = 0.0) -> None:
+    def __init__(
+        self, policies: Box, scheduler: Scheduler, origin: str, again: float = 0.0, start: Memory | None = None
+    ) -> None:
         if not 0 <= again < 1:
             raise ValueError(f"again must lie in [0, 1), got {again}; it is a share of the movements")
         self.policies = policies
@@ -43,6 +47,8 @@ class QualityDiversity:
         self._origin = origin
         self._again = again
         self._landed: dict[bytes, list[Array]] = {}  # outcomes of each movement, where elites are repeated
+        if start is not None and len(start):
+            self.add(start.thetas, start.outcomes)
         self._ask()
 
     def attempt(self, context: Array) -> Attempt:

@@ -13,11 +13,12 @@ from typing import Any, TypedDict, Unpack
 
 import numpy as np
 
-from sgimd_torch.environments.protocol import Environment, check_rest
+from sgimd_torch.algorithms import Correspondence, start_memory
+from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.learner import Learner
 from sgimd_torch.memory import Memory
 from sgimd_torch.rivals.explorer import QualityDiversity, Shown
-from sgimd_torch.spaces import Array, check_count, stream
+from sgimd_torch.spaces import check_count, stream
 from sgimd_torch.strategies import Imitate
 
 try:
@@ -39,14 +40,16 @@ class Options(TypedDict, total=False):
     ``cells`` for each dimension of T, None for about 400 in all. ``again``: share of the movements that repeat elites,
     whose cell is then that of their mean outcome; 0 believes the first outcome, however lucky. ``correspondence``, eq.
     (6): what is demonstrated is imitated as by SGIM-D, ``imitations`` times with variations up to ``epsilon``, and
-    enters the archive; None learns alone.
+    enters the archive; None learns alone. ``memory`` to start from: its exemplars enter the archive, and take the place
+    of first movements.
     """
 
     cells: int | None
     again: float
-    correspondence: Callable[[Array, Array], Array] | None
+    correspondence: Correspondence | None
     imitations: int
     epsilon: float
+    memory: Memory | None
 
 
 def map_elites(
@@ -206,13 +209,14 @@ def _learner(
     *,
     cells: int | None = None,
     again: float = 0.0,
-    correspondence: Callable[[Array, Array], Array] | None = None,
+    correspondence: Correspondence | None = None,
     imitations: int = 10,
     epsilon: float = 0.05,
+    memory: Memory | None = None,
 ) -> Learner:
     if environment.contexts.dim:
         raise ValueError(f"quality diversity knows one context only, got contexts of dim {environment.contexts.dim}")
-    check_rest(environment)
+    memory = start_memory(environment, memory)
     outcomes, rng = environment.outcomes, stream(seed, origin)
     cells = max(2, round(_DEFAULT_CELLS ** (1 / outcomes.dim))) if cells is None else check_count("cells", cells, 1)
     if cells**outcomes.dim > _MAX_CELLS:
@@ -224,12 +228,18 @@ def _learner(
         seed=_seed(rng),
         **(annealed or {}),
     )
-    explorer = QualityDiversity(environment.policies, Scheduler(archive, emitters(archive, rng)), origin, again)
-    memory = Memory(environment.contexts.dim, environment.policies.dim, environment.outcomes.dim)
+    scheduler = Scheduler(archive, emitters(archive, rng))
+    explorer = QualityDiversity(environment.policies, scheduler, origin, again, memory)
     if correspondence is None:
         return Learner(memory, explorer)
     imitate = Imitate(environment.policies, stream(seed, "imitate"), repeats=imitations, epsilon=epsilon)
-    return Learner(memory, explorer, social=Shown(explorer, imitate), correspondence=correspondence)
+    return Learner(
+        memory,
+        explorer,
+        social=Shown(explorer, imitate),
+        correspondence=correspondence,
+        policies=environment.policies,
+    )
 
 
 def _seed(rng: np.random.Generator) -> int:

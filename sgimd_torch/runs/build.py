@@ -131,8 +131,8 @@ class _Parts:
     def _make(self, name: str) -> Any:
         robot = self._task.environment
         match name:
-            case "policies":
-                return robot.policies
+            case "policies" | "outcome_noise":
+                return getattr(robot, name)
             case "correspondence":
                 return correspondence_of(self._task)
             case "model":
