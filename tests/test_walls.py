@@ -44,7 +44,7 @@ LIBRARIES = {  # library: the only rooms that may import it; of a folder, where 
     "tqdm": {"runs/process", "views"},
     "cma": {"searches/cma_es"},
     "sklearn": {"goals/alp_gmm"},
-    "ribs": {"rivals/quality_diversity"},
+    "ribs": {"rivals"},
     "pyarrow": {"demonstrations/lerobot"},
     "gymnasium": {"environments/from_gymnasium", "environments/to_gymnasium"},
 }
