@@ -335,6 +335,7 @@ def test_the_curves_of_a_run_are_those_of_its_files(watched):
     shown = {step: (read.demonstration[:step] >= 0).sum() for step in (50, 100, 150)}
     assert curves["teacher/demonstrations"] == shown
     assert all(picture[2].startswith(b"\x89PNG") for picture in curves["map/error"].values())
+    assert curves["map/error"].keys() == {60, 120, 160}  # when the movements have doubled, and at the end
 
 
 def assert_same_board(resumed, whole, apart=()):

@@ -177,6 +177,20 @@ def test_without_noise_the_stream_does_not_matter_and_with_noise_it_does(rod: Fi
     assert noisy.outcome_noise > 0
 
 
+def test_motor_noise_has_the_stated_deviation_for_each_speed_from_the_first_step_on(rod: FishingRod) -> None:
+    noisy, step, n_steps = FishingRod(noise=0.03, threads=1), rod.model.opt.timestep, 25
+    taken = 1 - np.exp(-step / rod.model.actuator_dynprm[:6, 0])  # share of a command that a servo takes up in a step
+    noises = []
+    for row, theta in enumerate(movements(100)):
+        servos = noisy.record(NO_CONTEXT, theta, stream(row, "environment")).states[: n_steps + 1, -6:]
+        commands = servos[:-1] + np.diff(servos, axis=0) / taken
+        planned = rod.primitive.at(theta, step * np.arange(n_steps + 1))
+        noises.append((commands - planned[:-1]) * step / np.abs(np.diff(planned, axis=0)))
+    each = np.array(noises).swapaxes(0, 1).reshape(n_steps, -1)  # of 100 movements with 6 joints
+    assert each.std(axis=1) == pytest.approx(np.full(n_steps, 0.03), rel=0.15)  # five standard errors
+    assert np.corrcoef(each[10], each[11])[0, 1] == pytest.approx(0.96, abs=0.02)
+
+
 def test_an_arm_that_does_not_move_has_no_noise() -> None:
     still = np.full(25, 0.5)
     noisy = FishingRod(noise=0.1, threads=1)

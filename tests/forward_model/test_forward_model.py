@@ -166,6 +166,20 @@ def test_with_a_focus_a_small_network_learns_best_what_lands_near_the_goal(unsee
     np.testing.assert_array_equal(errors["no goal"], errors["all"])
 
 
+@pytest.mark.parametrize("options", [{"recent": 1.0}, {"recent": 0.0, "focus": 1.0}, {"recent": 0.3, "focus": 0.3}])
+def test_what_is_held_out_is_looked_at_but_never_learnt_from(options):
+    memory, other = remembered(200), Memory(0, 3, 2)
+    for row, (theta, outcome) in enumerate(zip(memory.thetas, memory.outcomes, strict=True)):
+        held_out = row >= 100 and row % 10 == 9
+        other.add(NO_CONTEXT, theta + 0.05 * held_out, outcome)
+    models = [ForwardModel(0, 3, 2, every=100, **options) for _ in range(2)]
+    for model, second in zip(models, (memory, other), strict=True):
+        model.refresh(remembered(100))  # the same hundred
+        model.refresh(second, memory.outcomes[0])
+    assert torch.equal(*map(weights, models))
+    assert models[0].relative_error != models[1].relative_error
+
+
 def test_adams_moments_survive_a_refresh():
     model = ForwardModel(0, 3, 2, rate=0.2)
     model.refresh(remembered(100))

@@ -66,7 +66,7 @@ def test_each_prediction_counts_with_its_own_spread():
         (np.zeros((3, 2)), np.zeros((2, 2)), np.ones((3, 2)), LEVELS, "mean must have the shape of observed"),
         (np.zeros((3, 2)), np.zeros((3, 2)), np.ones((3, 3)), LEVELS, "spread must have shape"),
         (np.zeros((3, 2)), np.full((3, 2), np.nan), np.ones((3, 2)), LEVELS, "mean must be finite"),
-        (np.zeros((1, 2)), np.zeros((1, 2)), [[1.0, 0.0]], LEVELS, r"above 0, but entry \[0, 1\] is 0.0"),
+        (np.zeros((1, 2)), np.full((1, 2), 3.0), [[1.0, 0.0]], LEVELS, r"above 0, but entry \[0, 1\] is 0.0"),
         (np.zeros((0, 2)), np.zeros((0, 2)), np.ones((0, 2)), LEVELS, "at least one outcome"),
         (np.zeros(2), np.zeros(2), np.ones(2), LEVELS, r"\(n, outcome_dim\)"),
         (np.zeros((1, 2)), np.zeros((1, 2)), np.ones((1, 2)), [50, 80], "in percent"),
@@ -182,6 +182,7 @@ def test_calibration_is_drawn_beside_the_ideal_and_told_at_50_80_and_95(ax):
     np.testing.assert_array_equal(line.get_xydata(), np.stack([levels, levels**2], axis=1))
     assert levels[line.get_markevery()].tolist() == list(LEVELS)
     assert line.get_label() == "last 7: 25 / 64 / 90 %"
+    assert {axis.get_major_formatter()(0.25) for axis in (ax.xaxis, ax.yaxis)} == {"25 %"}
     ideal = ax.lines[0]
     assert ideal.get_linestyle() == "--"
     np.testing.assert_array_equal(ideal.get_xdata(), ideal.get_ydata())
@@ -194,6 +195,7 @@ def test_curves_over_time_show_what_they_are_given_and_the_band_that_will_do(ax)
     assert error_over_time(ax, movements, values).get_xydata().tolist() == [[300, 0.5], [600, 0.75]]
     other = Figure().add_subplot()
     assert coverage_over_time(other, movements, values).get_ydata().tolist() == [0.5, 0.75]
+    assert other.yaxis.get_major_formatter()(0.25) == "25 %"
     band = other.patches[0].get_extents().transformed(other.transData.inverted())
     assert (band.y0, band.y1) == pytest.approx((0.7, 0.9))
 

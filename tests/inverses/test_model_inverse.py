@@ -75,6 +75,15 @@ def test_without_steps_it_picks_among_what_is_known(taught, goals):
         assert np.abs(nearest - inverse(NO_CONTEXT, goal).theta).max(axis=1).min() < 1e-6  # rounded to float32
 
 
+def test_an_estimate_that_should_land_nearer_than_all_that_is_known_is_kept(taught, goals):
+    memory, model = taught
+    descended = ModelInverse(memory, model, ARM.policies)
+    for goal in goals[:5]:
+        estimate = descended(NO_CONTEXT, goal)
+        inverse = ModelInverse(memory, model, ARM.policies, start=lambda context, goal, e=estimate: e, steps=0)
+        np.testing.assert_allclose(inverse(NO_CONTEXT, goal).theta, estimate.theta, atol=1e-6)  # rounded to float32
+
+
 def test_of_two_ways_to_a_goal_the_reliable_one_wins():
     memory, rng = Memory(0, 2, 2), stream(0, "exemplars")
     for theta in rng.random((1500, 2)):  # theta_1 moves nothing, but the larger, the noisier

@@ -88,24 +88,22 @@ def test_what_an_entry_takes_its_parameters_are(kind, word, entry):
 def test_defaults_of_options_are_those_of_the_library():
     """So that help need not load what it explains."""
     compared = set()
-    for kind, word in ((each.name, each.default) for each in fields(Config) if each.name in CATALOGUE):
-        entry = find(kind, word)
+    for word, entry in [*((word, entry) for _, word, entry in ENTRIES), *SHARED.items()]:
         parameters = dict(inspect.signature(entry.load()).parameters)
-        if word in ("sgim-d", "sagg-riac"):
+        if word in ("sgim-d", "sagg-riac"):  # they hand their parts on
             parameters |= inspect.signature(load("sgimd_torch.algorithms:goal_babbling")).parameters
         for parameter, option in entry.uses.items():
-            default, ours = parameters[parameter].default, getattr(Config, option, None)
-            if default is inspect.Parameter.empty or ours is None:
+            given, ours = parameters.get(parameter), getattr(Config, option, None)
+            if given is None or given.default is given.empty or ours is None:
                 continue
+            default = given.default
             compared.add(option)
             assert default is (find(option, ours).load() if option in CATALOGUE else ours) or default == ours, option
     assert compared >= {"goals", "inverse", "search", "competence", "budget", "social", "window", "progress", "choice"}
-    assert compared >= {"imitations", "epsilon"}
+    assert compared >= {"imitations", "epsilon", "residual", "members", "noise_heads", "training", "focus", "anchored"}
     evaluate, rod = (load(at) for at in ("sgimd_torch.evaluation:evaluate", "sgimd_torch:FishingRod"))
     assert inspect.signature(evaluate).parameters["repeats"].default == Config.repeats
     assert inspect.signature(rod).parameters["noise"].default == Config.noise
-    for name, (parameter, option) in {"model": ("members", "members")}.items():
-        assert inspect.signature(SHARED[name].load()).parameters[parameter].default == getattr(Config, option)
 
 
 def test_algorithms_have_a_name_and_a_colour_and_unknown_ones_their_word():

@@ -82,9 +82,8 @@ def test_the_tiles_of_rod_and_arm_begin_at_one_corner():
     assert tiles_reached(np.array([[-0.99, 0.91], [0.85, 0.05], [0.95, -0.05]]), benchmark) == 1
 
 
-@pytest.mark.parametrize("n_joints", ARMS.values())
-def test_demonstrations_for_an_arm_lead_from_rest_to_equal_bends_all_over_its_reach(n_joints):
-    arm = PlanarArm(n_joints)
+@pytest.mark.parametrize("arm", [*map(PlanarArm, ARMS.values()), PlanarArm(3, length=2.0, max_angle=1.5)])
+def test_demonstrations_for_an_arm_lead_from_rest_to_equal_bends_all_over_its_reach(arm):
     shown = arm_demonstrations(arm)
     assert len(shown) == 127
     for demonstration in shown:
@@ -95,10 +94,14 @@ def test_demonstrations_for_an_arm_lead_from_rest_to_equal_bends_all_over_its_re
         np.testing.assert_array_equal(arm.angles(theta), trajectory[-1])
         end = arm.execute(NO_CONTEXT, theta, stream(0, "any"))
         np.testing.assert_allclose(end, demonstration.outcome, atol=1e-14)
-    # A 127th of the area is a disc of radius 1 / sqrt(127): neighbours are between one and two such radii apart.
+    # A 127th of the area is a disc of this radius: neighbours are between one and two such radii apart.
+    radius = np.sqrt((arm.length**2 - arm.min_radius**2) / 127)
     ends = np.array([demonstration.outcome for demonstration in shown])
     gaps = np.linalg.norm(ends[:, None] - ends, axis=2)[~np.eye(127, dtype=bool)].reshape(127, 126).min(axis=1)
-    assert 1 / np.sqrt(127) < gaps.min() <= gaps.max() < 2 / np.sqrt(127)
+    assert radius < gaps.min() <= gaps.max() < 2 * radius
+    far = np.linalg.norm(ends, axis=1)
+    assert far.min() < arm.min_radius + radius
+    assert arm.length - radius / 4 < far.max() <= arm.length
 
 
 def test_an_imitating_arm_varies_the_posture_that_it_was_shown(tmp_path):

@@ -21,7 +21,7 @@ from sgimd_torch.runs import run as run_script
 from sgimd_torch.runs.build import build
 from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.config import Config
-from sgimd_torch.runs.process import command
+from sgimd_torch.runs.process import Stopped, Stopping, command
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.spaces import Demonstration, stream
 
@@ -374,7 +374,7 @@ def test_the_misfit_of_the_demonstrations_is_reported(tmp_path, go, capsys):
     )
 
 
-@pytest.mark.parametrize("slip", ["three samples", "degrees", "milliseconds"])
+@pytest.mark.parametrize("slip", ["three samples", "degrees", "milliseconds", "a few milliseconds"])
 def test_recordings_that_the_robot_cannot_play_are_refused_before_anything_is_written(tmp_path, go, capsys, slip):
     shown = load_demonstrations()[5]
     times, trajectory = shown.times, shown.trajectory
@@ -383,7 +383,7 @@ def test_recordings_that_the_robot_cannot_play_are_refused_before_anything_is_wr
     elif slip == "degrees":
         trajectory = np.degrees(trajectory)
     else:
-        times = 1000 * times
+        times = 1000 * times if slip == "milliseconds" else times / 1000
     save_demonstrations(tmp_path / "own.npz", [shown, Demonstration(shown.context, times, trajectory, shown.outcome)])
     assert go(tmp_path / "runs", "--demonstrations", tmp_path / "own.npz") == 2
     said = capsys.readouterr().err
@@ -418,6 +418,20 @@ def test_an_error_while_running_is_one_line(tmp_path, go, capsys, monkeypatch):
 def test_evaluate_at_may_be_joined_by_an_equals_sign(tmp_path, go):
     assert go(tmp_path, "--evaluate-at=5,6", "--movements=8") == 0
     assert read_run(tmp_path / "sgim-d" / "seed-003").evaluation["movements"].tolist() == [5, 6, 8]
+
+
+def test_a_signal_waits_for_the_next_check_but_where_it_may_come_at_once():
+    with Stopping() as stopping:
+        with stopping.at_once():
+            pass
+        try:
+            signal.raise_signal(signal.SIGTERM)
+        except Stopped:
+            pytest.fail("a signal interrupts what it should not")
+        with pytest.raises(Stopped), stopping.at_once():
+            pass
+    with Stopping() as stopping, pytest.raises(Stopped), stopping.at_once():
+        signal.raise_signal(signal.SIGTERM)
 
 
 SCRIPTS = {**os.environ, "PYTHONPATH": str(ROOT)}

@@ -207,9 +207,9 @@ def test_a_run_without_movements_is_refused(run_path, tmp_path, capsys):
 
 
 def filmed(run_path, out, gl, *options):
-    words = [sys.executable, "-m", "sgimd_torch", "film", str(run_path), "--goals", "0.2,0.5"]
+    words = [sys.executable, "-m", "sgimd_torch", "film", str(run_path), "--goals", "0.2,0.5", "--width", "320"]
     process = subprocess.run(
-        [*words, "--width", "320", "--out", str(out / "film.mp4"), *options],
+        [*words, "--out", str(out / "film.mp4"), *options],
         env={**os.environ, "PYTHONPATH": str(ROOT), "MUJOCO_GL": gl},
         cwd=out,
         capture_output=True,
@@ -233,6 +233,55 @@ def test_a_film_is_made_without_a_display_or_the_lack_of_opengl_is_explained(run
     assert 0 < red[0] < red[-1]  # the float, then also the path that it has taken
     assert np.abs(pictures[-1] - pictures[-10]).mean() < 2  # the landing stands still
     assert np.abs(pictures[-1] - pictures[0]).max() > 100  # and is not where it began
+
+
+SEEN = """
+import sys
+from dataclasses import replace
+import numpy as np
+from sgimd_torch.environments.fishing_rod import FishingRod
+from sgimd_torch.spaces import stream
+from sgimd_torch.views.film.camera import Camera, Shot
+
+rod = FishingRod(noise=0.0, threads=1)
+moved = rod.record([], stream(0, "film").random(25), stream(1, "noise"))
+still = replace(moved, states=np.repeat(moved.states[:1], len(moved.states), axis=0))
+with Camera(rod.model, width=640, height=480) as camera:
+    half, landed = moved.landed / 2, moved.landed
+    shots = {"moved": (moved, half), "still": (still, half), "landed": (moved, landed)}
+    np.savez(sys.argv[1], **{name: camera.frame(Shot(each, moved.outcome), t) for name, (each, t) in shots.items()})
+"""
+
+
+def test_a_frame_shows_the_arm_as_it_was_and_rings_on_the_water_about_base_and_goal(tmp_path):
+    words = [sys.executable, "-c", SEEN, str(tmp_path / "seen.npz")]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "MUJOCO_GL": "egl"}
+    done = subprocess.run(words, env=environment, capture_output=True, text=True)
+    if "NoGraphics" in done.stderr:  # a machine without EGL
+        return
+    assert done.returncode == 0, done.stderr
+    seen = {name: frame.astype(int) for name, frame in np.load(tmp_path / "seen.npz").items()}
+    assert (np.abs(seen["moved"] - seen["still"]).max(axis=2) > 30).sum() > 800  # pixels, of which the arm has several
+    red, green, blue = np.moveaxis(seen["landed"], 2, 0)
+    on_float = np.median(np.argwhere((red > 150) & (green < 100))[:, 1])  # column; it landed at its goal
+    on_ring = np.argwhere((red > 180) & (green > 170) & (blue < 110))[:, 1]
+    assert on_ring.min() < on_float < on_ring.max()
+    white = np.flatnonzero((seen["landed"][:420].min(axis=2) > 180).any(axis=0))  # above the caption
+    assert np.ptp(white) > 640 / 2  # the ring one metre from the base; all else that is white stands near the middle
+
+
+def test_what_is_filmed_after_some_movements_does_not_know_what_came_later(run_path, go, tmp_path):
+    assert go(tmp_path, "--movements", 20, "--evaluate_at", "[]", "--repeats", 0) == 0
+    x, y = read_run(run_path).outcomes[-1]
+    sheets = []
+    for path in (tmp_path / "sgim-d" / "seed-003", run_path):
+        lapse = ("--goals", f"{x},{y}", "--time-lapse", "--after", "20", "--sheet", "sheet.png")
+        code, _, errors = filmed(path, tmp_path, "egl", *lapse)
+        if "MUJOCO_GL" in errors:  # a machine without EGL
+            return
+        assert code == 0, errors
+        sheets.append((tmp_path / "sheet.png").read_bytes())
+    assert sheets[0] == sheets[1]
 
 
 @pytest.mark.parametrize("gl", ["disable", "bogus"])

@@ -325,6 +325,44 @@ def test_algorithms_without_a_colour_of_their_own_can_be_told_apart(copy):
     assert one.get_linestyle() != other.get_linestyle()
 
 
+def test_a_variant_alone_shows_each_of_its_seeds_and_several_only_their_means(runs):
+    lives = [read_life(runs / "sgim-d" / f"seed-00{seed}") for seed in (3, 4)]
+    variant, alone, beside = Variant("sgim-d", lives), Figure(), Figure()
+    figures.curves.__wrapped__(alone, [variant])
+    figures.curves.__wrapped__(beside, [variant, Variant("uniform", lives)])
+    drawn = [line.get_ydata().tolist() for line in alone.axes[0].lines]
+    assert all(errors in drawn for errors in variant.errors.tolist())
+    assert [line.get_ydata().tolist() for line in beside.axes[0].lines] == 2 * [variant.curve[0].tolist()]
+
+
+def test_variants_behind_a_curve_do_not_stretch_its_axis(runs):
+    life = read_life(runs / "sgim-d" / "seed-003")
+    figure, variant, longer = Figure(), Variant("sgim-d", [life]), Variant("uniform", [life])
+    longer.evaluated = 100 * longer.evaluated
+    figures.curves.__wrapped__(figure, [variant], behind=[longer])
+    assert 60 <= figure.axes[0].get_xlim()[1] < 70  # movements; the other went on to 6000
+
+
+def test_of_options_that_differ_only_values_that_most_variants_share_are_pale(pages, copy):
+    def marked(text):
+        return re.findall(
+            '<td class="(.*?)">', text[text.index("Only options in which runs differ") :].partition("</tbody>")[0]
+        )
+
+    assert set(marked(pages["many"])) == {"usual", "other"}  # three variants
+    shutil.rmtree(copy / "observation")
+    assert report.main([str(copy)]) == 0
+    assert set(marked((copy / "report.html").read_text(encoding="utf-8"))) == {"other"}  # no two of two agree
+
+
+def test_options_that_this_version_lacks_are_named_beside_the_command(pages, copy):
+    assert "does not have" not in pages["one"]
+    path = copy / "sgim-d" / "seed-003" / "config.json"
+    path.write_text(json.dumps({**json.loads(path.read_text()), "patience": 3}))
+    assert report.main([str(path.parent)]) == 0
+    assert "this version does not have are missing here: patience." in (path.parent / "report.html").read_text()
+
+
 def test_without_motor_noise_nothing_is_divided_by_the_floor(copy):
     run = copy / "observation" / "seed-003"
     header, *lines = (run / "evaluation.csv").read_bytes().splitlines(keepends=True)

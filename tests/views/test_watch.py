@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -59,15 +60,20 @@ def server(runs):
             timer.cancel()
 
 
-def test_terminating_it_ends_tensorboard_too(runs):
-    port = free_port(8000)
-    with watching(runs, port) as process:
-        while "http" not in process.stdout.readline():
-            assert process.poll() is None
-        process.terminate()
-        assert process.wait(timeout=30) == 143
+def test_beside_a_taken_port_it_names_its_own_and_terminating_it_ends_tensorboard_too(runs):
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", free_port(8000)))
+        taken.listen()
+        asked = taken.getsockname()[1]
+        with watching(runs, asked) as process:
+            while not (address := re.search(r"http://127\.0\.0\.1:(\d+)", process.stdout.readline())):
+                assert process.poll() is None
+            process.terminate()
+            _, errors = process.communicate(timeout=30)
+        assert process.returncode == 143
+        assert f"port {asked} is taken, {address[1]} is free" in errors
     with pytest.raises(OSError, match="refused"):
-        DIRECT.open(f"http://127.0.0.1:{port}", timeout=5)
+        DIRECT.open(address[0], timeout=5)
 
 
 def curve(ask, tag):
@@ -132,6 +138,7 @@ def test_ctrl_c_ends_it_without_a_traceback(server):
     _, errors = process.communicate(timeout=30)
     assert process.returncode == 130
     assert "Traceback" not in errors
+    assert "is taken" not in errors
 
 
 def test_a_port_that_is_taken_is_passed_over():
