@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from read_results import LAST, Evaluated
+from read_results import FIRST, LAST, Evaluated
 from sgimd_torch.spaces import Array
 from sgimd_torch.views.statistics import (
     LEVEL,
@@ -86,8 +86,11 @@ class Results:
         return movements, errors
 
     def lives(self, variant: str) -> Array:
-        """``(n_seeds,)``, the mean of each error curve over its movements."""
-        return mean_over_life(*self.curves(variant))
+        """``(n_seeds,)``, the mean of each error curve over its movements; none of curves that begin late."""
+        movements, errors = self.curves(variant)
+        if movements[0] > FIRST:
+            raise NotRun(f"{variant}: no evaluation at {FIRST}")
+        return mean_over_life(movements, errors)
 
     def iqm(self, variant: str, movements: int = LAST, values: str = "errors") -> Interval:
         """The interquartile mean over seeds."""

@@ -16,9 +16,9 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from sgimd_torch.runs.config import OWN
 from sgimd_torch.runs.process import say
 from sgimd_torch.runs.read import Run, read_run
-from sgimd_torch.runs.tables import OWN
 from sgimd_torch.spaces import Array
 
 HEADER = (
@@ -34,6 +34,7 @@ REGIONS: Final = (50, 80, 95)  # percent of the outcomes that a region of the mo
 UNKNOWN: Final = ("", "nan")
 MAY_BE_UNKNOWN: Final = ("noise_floor_m", "goals_claimed", "goals_met")
 LEARNERS: Final = ("random", "sagg-riac", "observation", "imitation", "sgim-d")  # the paper's five
+FIRST: Final = 250  # movements before the first evaluation
 LAST: Final = 5000  # movements in the life of a learner of the paper
 
 

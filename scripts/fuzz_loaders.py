@@ -91,6 +91,41 @@ def _load_memory(path: Path) -> dict[str, Any]:
     return {name: getattr(memory, name) for name in ("contexts", "thetas", "outcomes", "context_weight")}
 
 
+def _save_life(path: Path) -> None:
+    from sgimd_torch.algorithms import observation, random_exploration
+    from sgimd_torch.environments.planar_arm import PlanarArm
+    from sgimd_torch.spaces import Demonstration, stream
+
+    arm = PlanarArm(3, context=True)
+    learner = random_exploration(arm, 0)
+    watching = observation(arm, 0, correspondence=arm.correspondence)
+    learner.social, learner.correspondence = watching.social, watching.correspondence
+    lesson = Demonstration(np.zeros(1), np.arange(4) / 50, np.full((4, 3), 0.5), np.zeros(2))
+    for k in range(20):
+        context = arm.observe(stream(k, "context"))
+        move = learner.ask(context)
+        assert move is not None
+        learner.tell(arm.execute(context, move.theta, stream(k, "environment")))
+        if k % 5 == 0:
+            learner.watch(lesson)
+            learner.ask(context)
+            learner.interrupt()
+    learner.save(path)
+
+
+def _load_life(path: Path) -> dict[str, Any]:
+    from sgimd_torch.learner.life import read_life
+    from sgimd_torch.memory import Memory
+
+    life = read_life(path, Memory(1, 3, 2))
+    found: dict[str, Any] = {"begun": life.begun, "crc32": life.memory_crc32}
+    for k, event in enumerate(life.events):
+        lesson = () if event.lesson is None else vars(event.lesson).items()
+        parts = [*event._asdict().items(), *lesson]
+        found |= {f"{name} of {k}": part for name, part in parts if part is not None and name != "lesson"}
+    return found
+
+
 def _save_model(path: Path) -> None:
     rng, memory = np.random.default_rng(0), Memory(0, 3, 2)
     for theta in rng.random((60, 3)):
@@ -133,6 +168,7 @@ LOADERS: Final = {
     "benchmark": Loader(_save_benchmark, lambda path: vars(load_benchmark(path)), rewritten_npz),
     "demonstrations": Loader(_save_demonstrations, _load_demonstrations, rewritten_npz),
     "memory": Loader(_save_memory, _load_memory, rewritten_npz),
+    "life": Loader(_save_life, _load_life, rewritten_npz),
     "model": Loader(_save_model, _load_model, rewritten_model),
     "run": Loader(_save_run, _load_run, rewritten_text),
 }

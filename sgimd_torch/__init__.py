@@ -13,6 +13,7 @@ Where each part of the paper lives:
     5.2    evaluation                                      evaluation (eq. 10)
     5.3    demonstrations and teachers                     demonstrations, teachers
     -      our addition: a forward model                   forward_model, inverses.through_model, searches.through_model
+    -      robots of gymnasium, and ours as its            environments.from_gymnasium, environments.to_gymnasium
     -      rivals of other schools                         rivals, goals.alp_gmm, searches.cma_es
 
 Runs on disk are made by ``runs`` and looked at by ``views``, with ``board`` (TensorBoard) and ``figures``; the command

@@ -7,6 +7,7 @@ from .competence import absolute_performance as absolute_performance
 from .competence import performance as performance
 from .demonstrations import load_demonstrations as load_demonstrations
 from .demonstrations import save_demonstrations as save_demonstrations
+from .environments.check import check_environment as check_environment
 from .environments.fishing_rod import FishingRod as FishingRod
 from .environments.motor_primitives import GaussianPrimitive as GaussianPrimitive
 from .environments.planar_arm import PlanarArm as PlanarArm

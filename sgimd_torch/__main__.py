@@ -23,6 +23,9 @@ class Command(NamedTuple):
 COMMANDS: Final = {
     "run": Command("runs.command_line", "run one learner, evaluate it, write everything to a directory"),
     "sweep": Command("runs.sweep", "many runs: options crossed with each other and with seeds, in parallel"),
+    "check": Command("views.check", "does an environment keep every promise? each slip by name"),
+    "demonstrations": Command("views.demonstrations", "are they right for a robot? import from CSV and LeRobot"),
+    "suite": Command("views.suite", "one learner on many robots, against random movements"),
     "table": Command("views.table", "results of runs, over their seeds"),
     "report": Command("views.report.command", "one page about one run, or about many side by side", "report"),
     "watch": Command("views.watch", "TensorBoard on the boards of runs, also while they are still running"),
@@ -35,12 +38,14 @@ A robot arm learns where its float can land, by its own curiosity and by imitati
 (SGIM-D; Nguyen & Oudeyer, 2014).
 
 commands:
-{"".join(f"  {name:8}{each.about}{chr(10)}" for name, each in COMMANDS.items())}
+{"".join(f"  {name:16}{each.about}{chr(10)}" for name, each in COMMANDS.items())}
 examples:
   sgimd demo                                         see it learn, in a minute or two
   sgimd run --algorithm sgim-d --seed 3              one run of 5000 movements, into runs/sgim-d/seed-003
   sgimd run --algorithm sgim-d --seed 3 --resume     after Ctrl-C or a power cut
   sgimd run --environment mypackage.toss:make        on a robot of your own
+  sgimd check mypackage.toss:make                    what is wrong with it, if anything
+  sgimd demonstrations check shown.npz --task fishing-rod
   sgimd sweep --vary goals=interest-map,uniform --seeds 0-9 --out study
   sgimd table study                                  error of each variant, over its seeds
   sgimd report study                                 curves, maps and tables on one page

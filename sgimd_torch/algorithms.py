@@ -3,6 +3,9 @@
 Section 5.1 of Nguyen & Oudeyer (2014). Every part is a keyword, so an ablation changes one word:
     learner = sgim_d(environment, seed, correspondence=environment.primitive.correspondence, goals=UniformGoals)
 Parts are passed as constructors, because they need boxes, the memory and random streams, which are made here.
+
+Every builder takes a ``memory`` to start from, which it copies: of another run, of another version of the robot, or of
+demonstrations, such as the memory of an ``observation`` learner that has watched them all.
 """
 
 from __future__ import annotations
@@ -17,9 +20,12 @@ from sgimd_torch.competence import AttemptCompetence, Competence, Performance, p
 from sgimd_torch.environments.protocol import Environment, check_rest
 from sgimd_torch.goals.interest_map import InterestMap
 from sgimd_torch.goals.protocol import Goals
+from sgimd_torch.goals.uniform import UniformGoals
+from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.inverses.locally_linear import LocallyLinear
 from sgimd_torch.learner import Learner
 from sgimd_torch.memory import Memory
+from sgimd_torch.searches.perturb import practise
 from sgimd_torch.searches.simplex import nelder_mead
 from sgimd_torch.spaces import Array, Box, Estimate, Search, stream
 from sgimd_torch.strategies import Babble, Emulate, GoalBabbling, Imitate, Judge, Remember, Rest, SocialStrategy
@@ -46,27 +52,71 @@ class Parts(TypedDict, total=False):
     give_up: float
 
 
-def random_exploration(environment: Environment, seed: int) -> Learner:
+def random_exploration(
+    environment: Environment, seed: int, *, inverse: MakeInverse = LocallyLinear, memory: Memory | None = None
+) -> Learner:
     """Random: uniform movements."""
-    return Learner(_empty_memory(environment), Babble(environment.policies, stream(seed, "babble")))
+    memory = start_memory(environment, memory)
+    return Learner(memory, Babble(environment.policies, stream(seed, "babble")), inverse=inverse(memory))
 
 
-def sagg_riac(environment: Environment, seed: int, **parts: Unpack[Parts]) -> Learner:
+def sagg_riac(environment: Environment, seed: int, *, memory: Memory | None = None, **parts: Unpack[Parts]) -> Learner:
     """SAGG-RIAC: active goal babbling, without a teacher."""
-    memory = _empty_memory(environment)
-    return Learner(memory, goal_babbling(environment, seed, memory, **parts))
+    memory = start_memory(environment, memory)
+    babbling = goal_babbling(environment, seed, memory, **parts)
+    return Learner(memory, babbling, inverse=babbling.inverse)
 
 
-def observation(environment: Environment, seed: int, *, correspondence: Correspondence) -> Learner:
+def practice(environment: Environment, seed: int, *, memory: Memory | None = None, **parts: Unpack[Parts]) -> Learner:
+    """Practice, which is ours: goals anywhere in T, and at each one movement, the answer of a local process plus noise.
+
+    It has no teacher, and nothing in it knows a unit or a robot. What the answer gets wrong is what it learns next.
+    """
+    answer = partial(LocalProcess, noise=environment.outcome_noise)
+    chosen: Parts = {"goals": UniformGoals, "inverse": answer, "search": practise, "budget": 1}
+    chosen.update(parts)
+    return sagg_riac(environment, seed, memory=memory, **chosen)
+
+
+def observation(
+    environment: Environment,
+    seed: int,
+    *,
+    correspondence: Correspondence,
+    inverse: MakeInverse = LocallyLinear,
+    memory: Memory | None = None,
+) -> Learner:
     """Observation: watches and remembers, never moves."""
-    memory = _empty_memory(environment)
-    return Learner(memory, Rest(), social=Remember(memory), correspondence=correspondence)
+    memory = start_memory(environment, memory)
+    return Learner(
+        memory,
+        Rest(),
+        social=Remember(memory),
+        correspondence=correspondence,
+        inverse=inverse(memory),
+        policies=environment.policies,
+    )
 
 
-def imitation(environment: Environment, seed: int, *, correspondence: Correspondence, epsilon: float = 0.05) -> Learner:
+def imitation(
+    environment: Environment,
+    seed: int,
+    *,
+    correspondence: Correspondence,
+    epsilon: float = 0.05,
+    inverse: MakeInverse = LocallyLinear,
+    memory: Memory | None = None,
+) -> Learner:
     """Imitation: repeats the last demonstration with small variations until the next one."""
-    imitate = Imitate(environment.policies, stream(seed, "imitate"), repeats=None, epsilon=epsilon)
-    return Learner(_empty_memory(environment), Rest(), social=imitate, correspondence=correspondence)
+    memory = start_memory(environment, memory)
+    return Learner(
+        memory,
+        Rest(),
+        social=Imitate(environment.policies, stream(seed, "imitate"), repeats=None, epsilon=epsilon),
+        correspondence=correspondence,
+        inverse=inverse(memory),
+        policies=environment.policies,
+    )
 
 
 def imitating(
@@ -94,6 +144,7 @@ def sgim_d(
     *,
     correspondence: Correspondence,
     social: MakeSocial = imitating,
+    memory: Memory | None = None,
     **parts: Unpack[Parts],
 ) -> Learner:
     """SGIM-D: SAGG-RIAC, interrupted by a short imitation whenever the teacher demonstrates.
@@ -102,11 +153,19 @@ def sgim_d(
         environment, seed, parts: as ``goal_babbling``.
         correspondence: (times, trajectory) -> theta_d, eq. (6).
         social: (goal babbling, T, rng) -> the answer to a demonstration.
+        memory: to start from; None for an empty one.
     """
-    memory = _empty_memory(environment)
+    memory = start_memory(environment, memory)
     babbling = goal_babbling(environment, seed, memory, **parts)
     answer = social(babbling, environment.outcomes, stream(seed, "imitate"))
-    return Learner(memory, babbling, social=answer, correspondence=correspondence)
+    return Learner(
+        memory,
+        babbling,
+        social=answer,
+        correspondence=correspondence,
+        inverse=babbling.inverse,
+        policies=environment.policies,
+    )
 
 
 def remembered(memory: Memory, measure: Performance) -> Judge:
@@ -141,7 +200,7 @@ def goal_babbling(
         seed: of all streams of this learner.
         memory: of the learner.
         goals: (contexts, outcomes, rng) -> the goal model.
-        inverse: (memory) -> the inverse model.
+        inverse: (memory) -> the inverse model, where searches begin and by which the learner answers.
         search: (policies, rng) -> the refinement of its estimate.
         judge: (memory, measure) -> the competence that the goal model is told.
         measure: J; None for eq. (7), relative to the distance from rest.
@@ -172,6 +231,18 @@ def goal_babbling(
     )
 
 
-def _empty_memory(environment: Environment) -> Memory:
+def start_memory(environment: Environment, start: Memory | None) -> Memory:
+    """The memory of a new learner: empty, or a copy of ``start``.
+
+    Raises:
+        ValueError: ``rest`` outside T, or exemplars that this robot cannot have: other dimensions, thetas outside Pi.
+    """
     check_rest(environment)
-    return Memory(environment.contexts.dim, environment.policies.dim, environment.outcomes.dim)
+    dims = environment.contexts.dim, environment.policies.dim, environment.outcomes.dim
+    if start is None:
+        return Memory(*dims)
+    found = start.context_dim, start.theta_dim, start.outcome_dim
+    if found != dims:
+        raise ValueError(f"a memory to start from must have dims {dims} of context, theta, outcome, got {found}")
+    environment.policies.check("thetas of a memory to start from", start.thetas, "of another robot?")
+    return start.copy()

@@ -27,7 +27,8 @@ class Entry:
         at: where it is, ``package.module:attribute``.
         about: what it is, for ``--help``.
         uses: its parameter -> the option of a run that it takes, or the part that a run shares with it: "model",
-            "trust", "policies", "correspondence". An option that is None leaves the parameter at its own default.
+            "trust", "policies", "outcome_noise", "correspondence". An option that is None leaves the parameter at its
+            own default.
         fixed: its parameter -> value; a text with a colon is an attribute, loaded like ``at``.
         also: options that matter with it, but are used by another part.
         ignores: options that have no effect with it, though others use them.
@@ -101,6 +102,11 @@ def _at(place: str, about: str, **more: Any) -> Entry:
     return Entry(f"{_IN_THE_PACKAGE}.{place}", about, **more)
 
 
+def _toy(name: str, side: float, about: str) -> Entry:
+    make = f"{_IN_THE_PACKAGE}.environments.toys:{name}"
+    return _at("runs.tasks:toy", about, fixed={"make": make, "side": side})
+
+
 ROD: Final = "fishing-rod"  # the environment of all runs before there was a choice
 # Colours after Okabe & Ito: distinct with any colour vision, and in grey.
 CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
@@ -109,6 +115,12 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
             "algorithms:random_exploration", "uniform movements", ignores=_AIM, label="Random", colour="#7f7f7f"
         ),
         "sagg-riac": _at("algorithms:sagg_riac", "goal babbling", uses=_PURSUES, label="SAGG-RIAC", colour="#0072b2"),
+        "practice": _at(
+            "algorithms:practice",
+            "one movement a goal, as a local process answers; evaluate it with --inverse process",
+            label="Practice",
+            colour="#332288",
+        ),
         "observation": _at(
             "algorithms:observation",
             "watches and remembers, never moves",
@@ -170,6 +182,12 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
         ),
         "planar-arm-7": _at("runs.tasks:planar_arm", "7 joints, no noise", fixed={"n_joints": 7}),
         "planar-arm-50": _at("runs.tasks:planar_arm", "50 joints, no noise", fixed={"n_joints": 50}),
+        "swimmer": _at("runs.tasks:swimmer", "gymnasium's Swimmer-v5: three links, two motors (extra gym)"),
+        "half-reached": _at("runs.tasks:half_reached", "7 joints, and a T of which less than half can be reached"),
+        "toss": _toy("toss", 0.4, "a ball in the wind, which is the context"),
+        "crawler": _toy("crawler", 0.1, "four legs, whose phases are periodic parameters"),
+        "two-elbows": _toy("two_elbows", 0.1, "an arm with two separate families of postures"),
+        "spatial-arm": _toy("spatial_arm", 25.0, "six joints, three outcomes, in cm"),
     },
     "goals": {
         "interest-map": _at("goals.interest_map:InterestMap", "where competence changes, in regions", uses=_REGIONS),
@@ -196,6 +214,7 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
             fixed={"noise": 0.0, "complete": True, "xatol": 1e-4, "fatol": 1e-4},
         ),
         "perturb": _at("searches.perturb:perturb", "the best so far plus noise"),
+        "practice": _at("searches.perturb:practise", "what the inverse model infers plus a little noise"),
         "cma-es": _at("searches.cma_es:cma_es", "an evolution strategy (extra rivals)"),
         "gradient": _at(
             "searches.through_model:gradient_search",
@@ -222,6 +241,11 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
         "linear": _at("inverses.locally_linear:LocallyLinear", "eq. (9) corrected to first order"),
         "paper": _at("inverses.local:LocalInverse", "the weighted mean of eq. (9)"),
         "nearest": _at("inverses.local:NearestNeighbour", "the movement that came nearest"),
+        "process": _at(
+            "inverses.local_process:LocalProcess",
+            "what a local Gaussian process proposes, if it should beat the nearest",
+            uses={"noise": "outcome_noise"},
+        ),
         "model": _at(
             "inverses.through_model:ModelInverse",
             "linear when learning, through a forward model in evaluations (extra forward); it helps learners that "

@@ -11,12 +11,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
-import numpy as np
-
 from sgimd_torch.environments.protocol import Environment
-from sgimd_torch.learner import Learner
+from sgimd_torch.learner import Learner, ReplayError
+from sgimd_torch.learner.life import check_repeats
 from sgimd_torch.spaces import Array, Episode, check_count, read_only, stream
 from sgimd_torch.teachers import Teacher
+
+__all__ = ["Execute", "Recorded", "ReplayError", "live", "replay", "run"]
 
 Execute = Callable[[int, Array, Array], Array]
 """(index, context, theta) -> outcome of movement ``index``."""
@@ -27,10 +28,6 @@ class Recorded(NamedTuple):
 
     theta: Array | None
     outcome: Array | None
-
-
-class ReplayError(RuntimeError):
-    """The learner does not repeat what was recorded: another library version, processor or configuration."""
 
 
 def run(
@@ -95,21 +92,12 @@ def replay(recorded: Sequence[Recorded], then: Execute) -> Execute:
         ReplayError: the learner proposes another theta than the recorded one.
     """
 
-    slip = "was it recorded by another version, on another processor or with another configuration?"
-
     def execute(index: int, context: Array, theta: Array) -> Array:
         if index >= len(recorded):
             return then(index, context, theta)
         record = recorded[index]
-        if record.theta is None or record.outcome is None:
-            raise ReplayError(f"movement {index} was recorded as rest, the learner now moves; {slip}")
-        differ = np.flatnonzero(record.theta != theta)
-        if differ.size:
-            k = differ[0]
-            raise ReplayError(
-                f"movement {index} was recorded with another theta: theta_{k} was {record.theta[k]}, now {theta[k]}; "
-                f"{differ.size} of {theta.size} parameters differ; {slip}"
-            )
+        check_repeats(index, None if record.outcome is None else record.theta, theta)
+        assert record.outcome is not None
         return record.outcome
 
     return execute

@@ -19,7 +19,8 @@ ROWS = [  # a room imports only from the rows before its own
     {"competence", "teachers", "evaluation", "forward_model"},
     {"strategies", "inverses", "searches", "figures"},
     {"learner", "board"},
-    {"algorithms", "session", "rivals"},
+    {"algorithms", "session"},
+    {"rivals"},
     {"runs"},
     {"views"},
     {"__main__"},
@@ -43,7 +44,9 @@ LIBRARIES = {  # library: the only rooms that may import it; of a folder, where 
     "tqdm": {"runs/process", "views"},
     "cma": {"searches/cma_es"},
     "sklearn": {"goals/alp_gmm"},
-    "ribs": {"rivals/quality_diversity"},
+    "ribs": {"rivals"},
+    "pyarrow": {"demonstrations/lerobot"},
+    "gymnasium": {"environments/from_gymnasium", "environments/to_gymnasium"},
 }
 WORLDS = {"environments"}
 PROTOCOL = "environments.protocol"  # what works with every environment
@@ -214,7 +217,18 @@ def loaded_by(program: str) -> set[str]:
     return set(subprocess.run(words, capture_output=True, text=True, check=True).stdout.split())
 
 
-HEAVY = {"torch", "lightning", "pytorch_lightning", "matplotlib", "tensorboard", "sklearn", "cma", "ribs", "jinja2"}
+HEAVY = {
+    "torch",
+    "lightning",
+    "pytorch_lightning",
+    "matplotlib",
+    "tensorboard",
+    "sklearn",
+    "cma",
+    "ribs",
+    "jinja2",
+    "gymnasium",
+}
 
 
 def test_importing_the_package_loads_no_heavy_library():

@@ -72,9 +72,10 @@ class GaussianPrimitive:
     def correspondence(self, times: ArrayLike, trajectory: ArrayLike) -> Array:
         """theta_d, the policy that reproduces a demonstrated trajectory most closely, eq. (6).
 
-        delta is the demonstration's own duration. If ``durations`` do not include it, the shape is fitted and played in
-        the nearest duration allowed. For a fixed delta eq. (5) is linear in the knots, so each joint is one bounded
-        linear least squares problem (trust-region reflective, the paper's algorithm), exact up to its tolerance.
+        delta is the demonstration's own duration. One shorter than ``durations`` allow is played in the shortest of
+        them; a longer one is refused, as it would be another movement if it were played faster. For a fixed delta eq.
+        (5) is linear in the knots, so each joint is one bounded linear least squares problem (trust-region reflective,
+        the paper's algorithm), exact up to its tolerance.
 
         Args:
             times: ``(n_times,)`` s, increasing, at least ``n_knots`` of them.
@@ -84,12 +85,18 @@ class GaussianPrimitive:
             ``(theta_dim,)`` in [0, 1].
 
         Raises:
-            ValueError: shapes that do not fit, too few samples, values that are not finite, or unsorted times.
+            ValueError: shapes that do not fit, too few samples, values that are not finite, unsorted times, or a
+                recording longer than the longest movement.
         """
         from scipy.optimize import lsq_linear  # takes longer to import than this whole library
 
         times, trajectory = self._check_recording(times, trajectory)
         span = times[-1] - times[0]
+        if span > self.durations[1] * (1 + 1e-9):
+            raise ValueError(
+                f"a movement lasts {self.durations[1]:g} s at most, the recording {span:g} s; is it in milliseconds? A "
+                "slow one can be played faster: multiply its times"
+            )
         weights = self._weights((times - times[0]) / span)
         low, sides = self.joints.low, self.joints.sides
         scaled = (trajectory - low) / sides

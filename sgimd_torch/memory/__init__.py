@@ -116,6 +116,12 @@ class Memory:
         """For each of ``rows`` what :meth:`near_policies` gives for its context and theta; it is its own neighbour."""
         return self._policy_side.nearest(self._policy_side.keys.rows[rows], k, within)
 
+    def copy(self) -> Memory:
+        """The same exemplars, in a memory that grows on its own."""
+        same = Memory(self.context_dim, self.theta_dim, self.outcome_dim, context_weight=self.context_weight)
+        same._append(self.contexts, self.thetas, self.outcomes)
+        return same
+
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write an npz file without pickle; ``path`` holds the old file or the whole new one."""
         arrays = {"contexts": self.contexts, "thetas": self.thetas, "outcomes": self.outcomes}

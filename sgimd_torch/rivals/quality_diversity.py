@@ -13,11 +13,12 @@ from typing import Any, TypedDict, Unpack
 
 import numpy as np
 
-from sgimd_torch.algorithms import Correspondence
-from sgimd_torch.environments.protocol import Environment, check_rest
+from sgimd_torch.algorithms import Correspondence, start_memory
+from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.learner import Learner
 from sgimd_torch.memory import Memory
-from sgimd_torch.spaces import Array, Attempt, Box, Demonstration, Move, check_count, stream
+from sgimd_torch.rivals.explorer import QualityDiversity, Shown
+from sgimd_torch.spaces import check_count, stream
 from sgimd_torch.strategies import Imitate
 
 try:
@@ -39,7 +40,8 @@ class Options(TypedDict, total=False):
     ``cells`` for each dimension of T, None for about 400 in all. ``again``: share of the movements that repeat elites,
     whose cell is then that of their mean outcome; 0 believes the first outcome, however lucky. ``correspondence``, eq.
     (6): what is demonstrated is imitated as by SGIM-D, ``imitations`` times with variations up to ``epsilon``, and
-    enters the archive; None learns alone.
+    enters the archive; None learns alone. ``memory`` to start from: its exemplars enter the archive, and take the place
+    of first movements.
     """
 
     cells: int | None
@@ -47,6 +49,7 @@ class Options(TypedDict, total=False):
     correspondence: Correspondence | None
     imitations: int
     epsilon: float
+    memory: Memory | None
 
 
 def map_elites(
@@ -162,105 +165,6 @@ def cma_mae(
     return _learner(environment, seed, "cma-mae", team, annealed, **options)
 
 
-class QualityDiversity:
-    """The movements of a scheduler, batch after batch; it is told of a batch when all of it was executed.
-
-    The objective, which decides between elites of one cell, is little effort: minus the mean square of a movement's
-    distance from the middle of Pi, in sides. Outcomes outside T count for the nearest cell of its border. In a T far
-    larger than what can be reached nearly all outcomes share a few cells, and few elites are left to vary.
-
-    Each attempt is one movement; if it is interrupted before its outcome is told, it is proposed again.
-
-    Args:
-        policies: Pi.
-        scheduler: with its archive over T, of movements in sides of Pi. Deviation: what lies outside Pi is executed
-            clipped, but told as it was proposed, and its effort counts. CMA-ES itself would draw again, and never end
-            once its mean lies in a corner of many dimensions.
-        origin: of the movements, for the log.
-        again: share of the movements that repeat elites.
-    """
-
-    def __init__(self, policies: Box, scheduler: Scheduler, origin: str, again: float = 0.0) -> None:
-        if not 0 <= again < 1:
-            raise ValueError(f"again must lie in [0, 1), got {again}; it is a share of the movements")
-        self.policies = policies
-        self.archive = scheduler.archive
-        self._scheduler = scheduler
-        self._origin = origin
-        self._again = again
-        self._landed: dict[bytes, list[Array]] = {}  # outcomes of each movement, where elites are repeated
-        self._ask()
-
-    def attempt(self, context: Array) -> Attempt:
-        """The next movement of the batch."""
-        theta = self.policies.low + self.policies.sides * self._batch[len(self._outcomes)]
-        outcome = yield Move(self.policies.clip(theta), None, self._origin)
-        self._outcomes.append(outcome)
-        if len(self._outcomes) == len(self._batch):
-            self._tell()
-            self._ask()
-
-    def add(self, thetas: Array, outcomes: Array) -> None:
-        """Movements ``(n, theta_dim)`` in Pi that were not its own, with their outcomes, for the archive."""
-        batch = (thetas - self.policies.low) / self.policies.sides
-        self._remember(batch, outcomes)
-        self.archive.add(batch, _objectives(batch), outcomes)
-
-    def _ask(self) -> None:
-        new = self._scheduler.ask()
-        n = 0 if self.archive.empty else round(len(new) * self._again / (1 - self._again))
-        repeated = [self.archive.sample_elites(n)["solution"]] if n else []
-        self._batch: Array = np.concatenate([new, *repeated])  # (n, theta_dim)
-        self._new = len(new)
-        self._outcomes: list[Array] = []
-
-    def _tell(self) -> None:
-        outcomes, new = np.stack(self._outcomes), slice(self._new)
-        self._remember(self._batch, outcomes)
-        self._scheduler.tell(_objectives(self._batch[new]), outcomes[new])
-        if len(self._batch) > self._new:
-            elites = self.archive.data("solution")
-            means = np.stack([np.mean(self._landed[elite.tobytes()], axis=0) for elite in elites])
-            self.archive.clear()
-            self.archive.add(elites, _objectives(elites), means)
-
-    def _remember(self, batch: Array, outcomes: Array) -> None:
-        if self._again:
-            for theta, outcome in zip(batch, outcomes, strict=True):
-                self._landed.setdefault(theta.tobytes(), []).append(outcome)
-
-
-class Shown:
-    """Imitate what is demonstrated, as SGIM-D does; what was executed enters the archive, where it is varied."""
-
-    def __init__(self, explorer: QualityDiversity, imitate: Imitate) -> None:
-        self.explorer, self.imitate = explorer, imitate
-
-    def attempt(self, context: Array, theta_d: Array, demonstration: Demonstration) -> Attempt:
-        """The movements of the imitation."""
-        thetas: list[Array] = []
-        outcomes: list[Array] = []
-        moves = self.imitate.attempt(context, theta_d, demonstration)
-        move = next(moves, None)
-        try:
-            while move is not None:
-                outcome = yield move
-                thetas.append(move.theta)
-                outcomes.append(outcome)
-                try:
-                    move = moves.send(outcome)
-                except StopIteration:
-                    return
-        finally:  # also when the next demonstration interrupts
-            if outcomes:
-                self.explorer.add(np.stack(thetas), np.stack(outcomes))
-
-
-def _objectives(batch: Array) -> Array:
-    objectives: Array = -np.square(batch - 0.5).mean(axis=1)
-    return objectives
-
-
 def _check_sd(sd: float) -> None:
     if not 0 < sd < np.inf:
         raise ValueError(f"sd must be positive and finite, got {sd}; without noise nothing new is tried")
@@ -308,10 +212,11 @@ def _learner(
     correspondence: Correspondence | None = None,
     imitations: int = 10,
     epsilon: float = 0.05,
+    memory: Memory | None = None,
 ) -> Learner:
     if environment.contexts.dim:
         raise ValueError(f"quality diversity knows one context only, got contexts of dim {environment.contexts.dim}")
-    check_rest(environment)
+    memory = start_memory(environment, memory)
     outcomes, rng = environment.outcomes, stream(seed, origin)
     cells = max(2, round(_DEFAULT_CELLS ** (1 / outcomes.dim))) if cells is None else check_count("cells", cells, 1)
     if cells**outcomes.dim > _MAX_CELLS:
@@ -323,12 +228,18 @@ def _learner(
         seed=_seed(rng),
         **(annealed or {}),
     )
-    explorer = QualityDiversity(environment.policies, Scheduler(archive, emitters(archive, rng)), origin, again)
-    memory = Memory(environment.contexts.dim, environment.policies.dim, environment.outcomes.dim)
+    scheduler = Scheduler(archive, emitters(archive, rng))
+    explorer = QualityDiversity(environment.policies, scheduler, origin, again, memory)
     if correspondence is None:
         return Learner(memory, explorer)
     imitate = Imitate(environment.policies, stream(seed, "imitate"), repeats=imitations, epsilon=epsilon)
-    return Learner(memory, explorer, social=Shown(explorer, imitate), correspondence=correspondence)
+    return Learner(
+        memory,
+        explorer,
+        social=Shown(explorer, imitate),
+        correspondence=correspondence,
+        policies=environment.policies,
+    )
 
 
 def _seed(rng: np.random.Generator) -> int:

@@ -17,9 +17,8 @@ from sgimd_torch.evaluation import Evaluation
 from sgimd_torch.runs import model_record as run_model
 from sgimd_torch.runs.build import RunParts
 from sgimd_torch.runs.clock import Seconds
-from sgimd_torch.runs.config import having
+from sgimd_torch.runs.config import OWN, having
 from sgimd_torch.runs.directory import RunDirectory
-from sgimd_torch.runs.tables import OWN
 from sgimd_torch.spaces import Array, Box, Episode
 
 if TYPE_CHECKING:

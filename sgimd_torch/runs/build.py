@@ -15,8 +15,7 @@ from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.goals.regions import Region
 from sgimd_torch.learner import Learner
-from sgimd_torch.runs.config import Config
-from sgimd_torch.runs.tables import OWN
+from sgimd_torch.runs.config import OWN, Config
 from sgimd_torch.runs.tasks import Task, benchmark_of, correspondence_of, demonstrations_of
 from sgimd_torch.spaces import Array, Demonstration, Estimate, stream
 from sgimd_torch.teachers import Teacher
@@ -132,8 +131,8 @@ class _Parts:
     def _make(self, name: str) -> Any:
         robot = self._task.environment
         match name:
-            case "policies":
-                return robot.policies
+            case "policies" | "outcome_noise":
+                return getattr(robot, name)
             case "correspondence":
                 return correspondence_of(self._task)
             case "model":

@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from sgimd_torch.catalogue import CATALOGUE, ROD, SHARED, Entry, find
-from sgimd_torch.runs.tables import OWN
 
 
 class Option(NamedTuple):
@@ -76,6 +75,7 @@ RUN, ROBOT, LEARNER, MODEL, TEACHER, EVALUATION = (
     "The teacher",
     "Evaluation",
 )
+OWN: Final = "own"  # the answer of the inverse model that a run chose
 _MOST_THREADS: Final = max(64, os.cpu_count() or 1)
 
 

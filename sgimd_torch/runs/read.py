@@ -14,9 +14,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sgimd_torch.runs.config import Config, before_there_was_a_choice, from_settings, having, options
+from sgimd_torch.runs.config import OWN, Config, before_there_was_a_choice, from_settings, having, options
 from sgimd_torch.runs.log import Columns, RunError, read_json
-from sgimd_torch.runs.tables import EVALUATION, OWN, SMALL, small_table
+from sgimd_torch.runs.tables import EVALUATION, SMALL, small_table
 from sgimd_torch.spaces import Array
 
 NO_EVALUATION: Final = {name: np.empty(0) for name in EVALUATION}

@@ -14,11 +14,11 @@ from sgimd_torch.evaluation import evaluate
 from sgimd_torch.runs.board import RunBoard
 from sgimd_torch.runs.build import RunParts
 from sgimd_torch.runs.clock import Seconds
+from sgimd_torch.runs.config import OWN
 from sgimd_torch.runs.directory import RunDirectory
 from sgimd_torch.runs.log import RunError
 from sgimd_torch.runs.model_record import RunModel
 from sgimd_torch.runs.process import Failed, Progress, Stopped, Stopping, say
-from sgimd_torch.runs.tables import OWN
 from sgimd_torch.session import ReplayError, live, replay, run
 from sgimd_torch.spaces import Episode
 

@@ -21,13 +21,13 @@ from typing import Final
 import numpy as np
 
 from sgimd_torch.files import write_bytes
+from sgimd_torch.runs.config import OWN
 from sgimd_torch.spaces import Array
 
 SMALL: Final = ("evaluation.csv", "regions.csv", "predictions.csv", "refreshes.csv")
 EVALUATION: Final = (
     *("movements", "answer", "mean_error_m", "median_error_m", "p90_error_m", "noise_floor_m", "goals_met"),
 )
-OWN: Final = "own"  # the answer of the inverse model that a run chose
 _LATER: Final = {"answer": OWN, "goals_met": "nan"}  # columns that earlier versions lacked, and what they mean there
 REFRESHES: Final = ("movements", "exemplars", "steps", "held_out", "relative_error", "diverged")
 Rows = list[list[str]]

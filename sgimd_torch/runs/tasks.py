@@ -21,6 +21,7 @@ from sgimd_torch.demonstrations import SHIPPED as SHIPPED_DEMONSTRATIONS
 from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.environments.protocol import Environment
+from sgimd_torch.environments.toys import Toy
 from sgimd_torch.evaluation import SHIPPED as SHIPPED_BENCHMARK
 from sgimd_torch.evaluation import Benchmark, load_benchmark, tile_goals
 from sgimd_torch.spaces import Array, Box, Demonstration, stream
@@ -28,9 +29,11 @@ from sgimd_torch.spaces import Array, Box, Demonstration, stream
 if TYPE_CHECKING:
     from sgimd_torch.environments.fishing_rod import FishingRod
 
+DATA: Final = SHIPPED_BENCHMARK.parent
 SIDE: Final = 0.1  # m, of a benchmark tile; it leaves 311 goals in the disc of radius 1 m that these arms reach
 SHOWN: Final = 127  # demonstrations, as many as each shipped demonstrator recorded
 SAMPLES: Final = 5  # of each of them
+REACHING: Final = 20_000  # uniform movements that show what a toy can reach
 MOST_GOALS: Final = 500  # of a task that has none
 STRETCH: Final = 3.0  # a demonstration this many times slower or faster than the robot can move has wrong times
 MISFIT: Final = 0.5  # rad; a larger misfit means that this robot cannot make the movement
@@ -77,6 +80,35 @@ def planar_arm(*, n_joints: int) -> Task:
     """An arm without noise; its outcome is the position of its end."""
     arm = PlanarArm(n_joints)
     return Task(arm, partial(arm_benchmark, arm), partial(arm_demonstrations, arm), arm.correspondence, None, n_joints)
+
+
+def swimmer() -> Task:
+    """gymnasium's Swimmer-v5; its demonstrations are torques."""
+    from sgimd_torch.environments.swimmer import Swimmer  # gymnasium is loaded only when it is needed
+
+    robot, goals, shown = Swimmer(), DATA / "swimmer_benchmark.npz", DATA / "swimmer_demonstrations.npz"
+    return Task(robot, goals, shown, misfit=robot.misfit, n_joints=2)
+
+
+def half_reached() -> Task:
+    """The arm of 7 joints, with a little noise and a T of which it cannot reach a half and a bit."""
+    arm = PlanarArm(7, noise=0.02, outcomes=Box(np.array([-1.0, -1.0]), np.array([3.0, 1.0])))
+    return Task(arm, partial(arm_benchmark, arm))
+
+
+def toy(*, make: Callable[[], Toy], side: float) -> Task:
+    """A toy robot; its goals lie on tiles of ``side``, in the unit of T."""
+    robot = make()
+    return Task(robot, partial(toy_benchmark, robot, side))
+
+
+def toy_benchmark(robot: Toy, side: float) -> Benchmark:
+    """One random goal in each tile that uniform movements reach, in the middle of C; always the same ones."""
+    rng = stream(0, "goals for a toy")
+    thetas = robot.policies.low + robot.policies.sides * rng.random((REACHING, robot.policies.dim))
+    context = (robot.contexts.low + robot.contexts.high) / 2
+    reached = robot.effect(np.tile(context, (REACHING, 1)), thetas)
+    return Benchmark(type(robot).__name__, tile_goals(reached, robot.outcomes, side, rng), side)
 
 
 def arm_benchmark(arm: PlanarArm) -> Benchmark:

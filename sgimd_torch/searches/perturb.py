@@ -1,4 +1,4 @@
-"""The field's simplest search: the best movement so far, plus noise.
+"""The simplest searches: the best movement so far, plus noise; or again and again what was inferred, plus less noise.
 
 search = perturb(policies, rng)(estimate, goal); theta = next(search); theta = search.send(outcome) ...
 """
@@ -6,7 +6,7 @@ search = perturb(policies, rng)(estimate, goal); theta = next(search); theta = s
 from __future__ import annotations
 
 import math
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 
 import numpy as np
 
@@ -26,11 +26,7 @@ def perturb(policies: Box, rng: np.random.Generator, *, sd: float = 0.05) -> Sea
     Raises:
         ValueError: ``sd`` is not positive.
     """
-    if not sd > 0:
-        raise ValueError(f"sd must be positive, got {sd}; without noise nothing new is tried")
-
-    def vary(theta: Array) -> Array:
-        return policies.clip(rng.normal(theta, sd * policies.sides))
+    vary = _variation(policies, rng, sd)
 
     def search(start: Estimate, goal: Array) -> Generator[Array, Array, None]:
         distances = np.linalg.norm(start.outcomes - goal, axis=1)
@@ -44,3 +40,31 @@ def perturb(policies: Box, rng: np.random.Generator, *, sd: float = 0.05) -> Sea
             theta = vary(best)
 
     return search
+
+
+def practise(policies: Box, rng: np.random.Generator, *, sd: float = 0.02) -> Search:
+    """Gaussian noise around theta_g, whatever came of it, clipped to ``policies``; never ends.
+
+    So the inverse model is corrected where it errs, and sees in which directions the outcome changes. It is meant for
+    an inverse model that is nearly right, and for one movement or two at each goal.
+
+    Args:
+        policies, rng, sd: as in `perturb`.
+
+    Raises:
+        ValueError: ``sd`` is not positive.
+    """
+    vary = _variation(policies, rng, sd)
+
+    def search(start: Estimate, goal: Array) -> Generator[Array, Array, None]:
+        theta = policies.check("theta of the estimate", start.theta)
+        while True:
+            yield vary(theta)
+
+    return search
+
+
+def _variation(policies: Box, rng: np.random.Generator, sd: float) -> Callable[[Array], Array]:
+    if not sd > 0:
+        raise ValueError(f"sd must be positive, got {sd}; without noise nothing new is tried")
+    return lambda theta: policies.clip(rng.normal(theta, sd * policies.sides))

@@ -22,10 +22,10 @@ from typing import Final
 
 import numpy as np
 
+from sgimd_torch.runs.config import OWN
 from sgimd_torch.runs.log import RunError
 from sgimd_torch.runs.process import say
 from sgimd_torch.runs.read import NO_EVALUATION, Run, find_runs, read_run
-from sgimd_torch.runs.tables import OWN
 from sgimd_torch.spaces import Array
 
 EARLY: Final = 1000  # movements, for a column of its own

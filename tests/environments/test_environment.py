@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 from scipy.optimize import minimize
 
-from contracts import check_environment
+from sgimd_torch.environments.check import check_environment
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.environments.protocol import BatchEnvironment, SimulationError, check_movement, execute_many
 from sgimd_torch.spaces import Array, Box, stream
@@ -44,7 +44,7 @@ class FastSlope(Slope):
         return 2 * thetas
 
 
-@pytest.mark.parametrize(
+environments = pytest.mark.parametrize(
     "environment",
     [
         PlanarArm(),
@@ -56,8 +56,31 @@ class FastSlope(Slope):
     ],
     ids=["arm", "two joints", "noise and context", "large task space", "user's", "user's batches"],
 )
+
+
+@environments
 def test_environment_keeps_the_contract(environment):
     check_environment(environment)
+
+
+@environments
+def test_many_movements_are_those_of_single_ones_and_what_does_not_fit_is_refused(environment):
+    contexts = np.stack([environment.observe(stream(k, "observe")) for k in range(3)])
+    thetas = np.stack([environment.policies.sample(stream(k, "theta")) for k in range(3)])
+    outcomes = execute_many(environment, contexts, thetas, [stream(k, "row") for k in range(3)])
+    for k, (context, theta) in enumerate(zip(contexts, thetas, strict=True)):
+        assert outcomes[k].tolist() == environment.execute(context, theta, stream(k, "row")).tolist()
+    assert execute_many(environment, contexts[:0], thetas[:0], []).shape == (0, environment.outcomes.dim)
+    rngs = [stream(k, "row") for k in range(3)]
+    bad = np.vstack([thetas[:2], np.full_like(thetas[:1], np.nan)])
+    for batch in (
+        (contexts, bad, rngs),
+        (contexts, thetas, rngs[:1]),
+        (contexts[:1], thetas, rngs),
+        (contexts[0], thetas[0], []),
+    ):
+        with pytest.raises(ValueError, match="thetas"):
+            execute_many(environment, *batch)
 
 
 def test_a_batch_is_executed_at_once_where_the_environment_can():

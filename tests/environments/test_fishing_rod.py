@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from contracts import check_environment
+from sgimd_torch.environments.check import check_environment
 from sgimd_torch.environments.fishing_rod import HOLD, JOINTS, FishingRod
 from sgimd_torch.environments.protocol import SimulationError
 from sgimd_torch.learner import Learner

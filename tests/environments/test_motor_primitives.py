@@ -157,14 +157,22 @@ def test_a_shape_that_four_knots_cannot_follow_leaves_a_residual() -> None:
     assert skill.residual(theta, times, trembling) == pytest.approx(0.1, abs=0.02)  # sd .2 / sqrt(2), over two joints
 
 
-@pytest.mark.parametrize(("duration", "pace"), [(0.2, 0.0), (0.8, 0.0), (1.2, 0.5), (1.6, 1.0), (5.0, 1.0)])
-def test_a_demonstration_is_played_at_its_own_pace_or_the_nearest_allowed(duration: float, pace: float) -> None:
+@pytest.mark.parametrize(("duration", "pace"), [(0.2, 0.0), (0.8, 0.0), (1.2, 0.5), (1.6, 1.0)])
+def test_a_demonstration_is_played_at_its_own_pace_or_the_fastest_allowed(duration: float, pace: float) -> None:
     skill, theta = primitive(), stream(1, "theta").random(9)
     _, trajectory = skill.trajectory(theta)
     found = skill.correspondence(np.linspace(0, duration, len(trajectory)), trajectory)
     assert found[-1] == pytest.approx(pace)
     assert found[:-1] == pytest.approx(theta[:-1], abs=1e-6)  # the shape is kept
     assert skill.residual(found, np.linspace(0, duration, len(trajectory)), trajectory) < 1e-6
+
+
+@pytest.mark.parametrize("duration", [1.61, 5.0, 1400.0])
+def test_a_demonstration_longer_than_the_longest_movement_is_refused(duration: float) -> None:
+    skill = primitive()
+    _, trajectory = skill.trajectory(np.full(9, 0.5))
+    with pytest.raises(ValueError, match=f"lasts 1.6 s at most, the recording {duration:g} s; is it in milliseconds"):
+        skill.correspondence(np.linspace(0, duration, len(trajectory)), trajectory)
 
 
 def test_arguments_are_left_as_they_were() -> None:

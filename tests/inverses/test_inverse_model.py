@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from sgimd_torch.inverses.local import LocalInverse, NearestNeighbour
+from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.inverses.locally_linear import LocallyLinear
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, Box, Estimate, stream
@@ -17,6 +18,7 @@ INVERSES: dict[str, Callable[[Memory], Inverse]] = {
     "local": LocalInverse,
     "nearest neighbour": NearestNeighbour,
     "locally linear": LocallyLinear,
+    "local process": LocalProcess,
 }
 every_inverse = pytest.mark.parametrize("inverse_of", INVERSES.values(), ids=INVERSES.keys())
 

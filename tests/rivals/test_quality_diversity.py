@@ -1,17 +1,19 @@
-"""MAP-Elites and CMA-ME as learners: batches, interruptions, an archive that fills, and draws from one stream."""
+"""Quality diversity as learners: batches, interruptions, an archive that fills, demonstrations, noise."""
 
 import numpy as np
 import pytest
 
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.learner import Learner
-from sgimd_torch.rivals.quality_diversity import cma_me, map_elites
+from sgimd_torch.rivals.quality_diversity import cma_mae, cma_me, isoline, map_elites
+from sgimd_torch.runs.tasks import arm_demonstrations
 from sgimd_torch.session import run
-from sgimd_torch.spaces import Array, Box
+from sgimd_torch.spaces import Array, Box, stream
 from worlds import NO_CONTEXT
 
 ARM = PlanarArm(6)
-BOTH = pytest.mark.parametrize("make", [map_elites, cma_me])
+ELITES, TEAMS = (map_elites, isoline), (cma_me, cma_mae)
+BOTH = pytest.mark.parametrize("make", [*ELITES, *TEAMS])
 
 
 class Elsewhere(PlanarArm):
@@ -60,7 +62,7 @@ def test_an_interruption_at_any_movement_costs_nothing(make):
 
 @BOTH
 def test_the_archive_is_told_of_a_batch_when_all_its_movements_were_made(make):
-    learner = make(ARM, 4, batch=8, **({"first": 8} if make is map_elites else {}))
+    learner = make(ARM, 4, batch=8, **({"first": 8} if make in ELITES else {"emitters": 1}))
     found = []
     for _ in range(24):
         live(learner, 1)
@@ -112,4 +114,50 @@ def test_what_makes_no_sense_is_refused(make):
     with pytest.raises(ValueError, match="rest of the environment must lie in"):
         make(Elsewhere(ARM.policies, Box.cube(2, 3, 2), ARM.contexts), 0)
     with pytest.raises(ValueError, match="must be a whole number"):
-        map_elites(ARM, 0, first=0) if make is map_elites else cma_me(ARM, 0, emitters=0)
+        make(ARM, 0, **({"first": 0} if make in ELITES else {"emitters": 0}))
+    with pytest.raises(ValueError, match=r"again must lie in \[0, 1\), got 1"):
+        make(ARM, 0, again=1)
+
+
+def test_a_learning_rate_is_a_share():
+    for rate in (0.0, 1.5, np.nan):
+        with pytest.raises(ValueError, match=r"learning_rate must lie in \(0, 1\]"):
+            cma_mae(ARM, 0, learning_rate=rate)
+
+
+def test_movements_of_cma_mae_stay_compact():
+    """Its thresholds keep a cell worth improving, so it comes back with less effort; CMA-ME goes on to new cells."""
+    effort = {make: np.square(live(make(ARM, 5), 1500)[-500:] - 0.5).mean() for make in TEAMS}
+    assert effort[cma_mae] < effort[cma_me]
+
+
+@BOTH
+def test_what_is_demonstrated_is_imitated_and_enters_the_archive(make):
+    shown = arm_demonstrations(ARM)[3]
+    learner = make(ARM, 2, correspondence=ARM.correspondence, imitations=4, epsilon=0.01)
+    learner.watch(shown)
+    moves = []
+    for _ in range(4):
+        moves.append(learner.ask(NO_CONTEXT))
+        learner.tell(ARM.execute(NO_CONTEXT, moves[-1].theta, stream(0, "arm")))
+    assert [move.origin for move in moves] == ["imitate"] * 4
+    assert learner.ask(NO_CONTEXT).origin != "imitate"  # its own batch goes on
+    theta_d = ARM.correspondence(shown.times, shown.trajectory)
+    assert np.abs(np.array([move.theta for move in moves]) - theta_d).max() <= 0.01
+    elites = learner.autonomous.archive.data("solution")
+    assert 1 <= len(elites) <= 4
+    assert np.abs(elites - theta_d).max() <= 0.01
+
+
+def test_elites_that_are_repeated_stand_where_they_land_in_the_mean():
+    noisy = PlanarArm(6, noise=0.05)
+    learner = map_elites(noisy, 1, first=20, batch=20, again=0.5)
+    for _ in run(learner, noisy, 0, movements=20 + 6 * 40):
+        pass
+    thetas, outcomes = learner.memory.thetas, learner.memory.outcomes
+    _, counts = np.unique(thetas, axis=0, return_counts=True)
+    assert 0.3 < (counts - 1).sum() / len(thetas) < 0.5  # the first batch has none to repeat
+    archive = learner.autonomous.archive
+    assert counts.max() > 2
+    for theta, measures in zip(archive.data("solution"), archive.data("measures"), strict=True):
+        np.testing.assert_allclose(measures, outcomes[(thetas == theta).all(axis=1)].mean(axis=0))

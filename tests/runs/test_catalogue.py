@@ -4,6 +4,7 @@ import inspect
 import re
 import subprocess
 import sys
+import typing
 from dataclasses import fields
 
 import numpy as np
@@ -73,12 +74,13 @@ def toss(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize(("kind", "word", "entry"), ENTRIES, ids=lambda each: each if isinstance(each, str) else "")
 def test_what_an_entry_takes_its_parameters_are(kind, word, entry):
-    parameters = inspect.signature(entry.load()).parameters
-    names = {each.name for each in parameters.values()}
-    builders = {"sagg_riac", "sgim_d"}  # these hand their parts on
-    if entry.at.rpartition(":")[2] not in builders:
-        assert {*entry.uses, *entry.fixed} <= names
-    known = {each.name for each in fields(Config)} | SHARED.keys() | {"policies", "correspondence"}
+    made = entry.load()
+    names = set(inspect.signature(made).parameters)
+    for handed_on in typing.get_type_hints(made).values() if inspect.isfunction(made) else ():
+        if typing.get_origin(handed_on) is typing.Unpack:  # **parts: Unpack[Parts]
+            names |= typing.get_args(handed_on)[0].__annotations__.keys()
+    assert {*entry.uses, *entry.fixed} <= names
+    known = {each.name for each in fields(Config)} | SHARED.keys() | {"policies", "outcome_noise", "correspondence"}
     assert {*entry.options, *entry.ignores} <= known
     assert entry.learns_with is None or entry.learns_with in CATALOGUE[kind]
 

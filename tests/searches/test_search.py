@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize, rosen
 
-from sgimd_torch.searches.perturb import perturb
+from sgimd_torch.searches.perturb import perturb, practise
 from sgimd_torch.searches.simplex import limit, nelder_mead, simplex_descent
 from sgimd_torch.spaces import Array, Box, Estimate, Search, stream
 
@@ -234,10 +234,11 @@ def searches(policies: Box, rng: np.random.Generator) -> dict[str, Search]:
         "adaptive": simplex_search(policies, rng, adaptive=True),
         "noisy": simplex_search(policies, rng, noise=0.5),
         "perturb": perturb(policies, rng, sd=0.5),
+        "practise": practise(policies, rng, sd=0.5),
     }
 
 
-@pytest.mark.parametrize("name", ["complete", "incomplete", "adaptive", "noisy", "perturb"])
+@pytest.mark.parametrize("name", ["complete", "incomplete", "adaptive", "noisy", "perturb", "practise"])
 def test_no_search_leaves_the_policy_space_even_from_its_corners_towards_noise(name: str) -> None:
     rng = stream(3, "noise")
     for seed in range(1, 8):
@@ -261,7 +262,10 @@ def test_a_simplex_begun_in_a_corner_steps_inwards_and_is_not_flat(corner: float
 def test_a_start_outside_the_policy_space_is_refused() -> None:
     world = World(dim=2, k=2)
     outside = world.start._replace(theta=np.array([0.5, 1.5]))
-    for search in (simplex_search(world.policies, rng()), perturb(world.policies, stream(0, "search"))):
+    for search in (
+        simplex_search(world.policies, rng()),
+        *(make(world.policies, rng()) for make in (perturb, practise)),
+    ):
         with pytest.raises(ValueError, match="must lie in"):
             next(search(outside, world.goal))
 
@@ -273,8 +277,9 @@ def test_wrong_steps_and_noise_are_refused() -> None:
     for noise in (-0.1, 0.6, np.nan):
         with pytest.raises(ValueError, match="noise"):
             nelder_mead(Box.cube(0, 1, 2), rng(), noise=noise)
-    with pytest.raises(ValueError, match="sd"):
-        perturb(Box.cube(0, 1, 2), stream(0, "search"), sd=0.0)
+    for make in (perturb, practise):
+        with pytest.raises(ValueError, match="sd"):
+            make(Box.cube(0, 1, 2), stream(0, "search"), sd=0.0)
 
 
 def test_perturb_executes_a_new_theta_first_but_not_a_remembered_one() -> None:
@@ -294,6 +299,17 @@ def test_perturb_spreads_by_sd_of_each_side_around_the_best_remembered() -> None
     # Standard errors: of the mean sd / 45, of the standard deviation sd / 63; five of them fail once in a million.
     assert executed.mean(axis=0) == pytest.approx([0.5, 0.0], abs=5 * 4 / 45)
     assert executed[:, 0].mean() == pytest.approx(0.5, abs=5 * 0.02 / 45)
+    assert executed.std(axis=0) == pytest.approx([0.02, 4.0], rel=5 / 63)
+
+
+def test_practise_spreads_around_what_was_inferred_whatever_comes_of_it() -> None:
+    policies = Box(np.array([0.0, -100.0]), np.array([1.0, 100.0]))
+    start = Estimate(np.array([0.3, 5.0]), np.array([[0.3, 5.0], [0.5, 0.0]]), np.array([[9.0], [0.0]]))
+    executed = np.array(
+        drive(practise(policies, stream(0, "search"))(start, np.zeros(1)), lambda theta: theta[:1], 2000)
+    )
+    assert executed[:, 0].mean() == pytest.approx(0.3, abs=5 * 0.02 / 45)
+    assert executed[:, 1].mean() == pytest.approx(5.0, abs=5 * 4 / 45)
     assert executed.std(axis=0) == pytest.approx([0.02, 4.0], rel=5 / 63)
 
 

@@ -20,10 +20,9 @@ from tqdm import tqdm
 from sgimd_torch.catalogue import CATALOGUE, ROD
 from sgimd_torch.figures.learning import NAMES
 from sgimd_torch.runs.build import task_of
-from sgimd_torch.runs.config import Config
+from sgimd_torch.runs.config import OWN, Config
 from sgimd_torch.runs.log import RunError
 from sgimd_torch.runs.read import NO_EVALUATION, Run, read_run
-from sgimd_torch.runs.tables import OWN
 from sgimd_torch.runs.tasks import demonstrations_of
 from sgimd_torch.spaces import Array
 from sgimd_torch.views.statistics import Interval, iqm_interval, mean_over_life, ratio_interval, rng

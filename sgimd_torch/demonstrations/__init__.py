@@ -23,7 +23,7 @@ from sgimd_torch.files import UNPACKED, read_npz, write_npz
 from sgimd_torch.spaces import Array, Demonstration, first_entry
 
 VERSION = 1
-SHIPPED = Path(__file__).with_name("data") / "demonstrator_3.npz"
+SHIPPED = Path(__file__).parents[1] / "data" / "demonstrator_3.npz"
 _MOST = 100_000  # recordings in a file
 _FIELDS = ("lengths", "times", "trajectories", "outcomes", "contexts")
 

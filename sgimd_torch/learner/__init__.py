@@ -2,19 +2,36 @@
 
 Algorithm 1 of Nguyen & Oudeyer (2014), rebuilt. All five learners of the paper are this class with two slots, an
 autonomous and a social strategy. The caller owns the loop: ``move = learner.ask(context)``, execute it,
-``learner.tell(outcome)``; ``learner.watch(demonstration)`` whenever the teacher shows something.
+``learner.tell(outcome)``; ``learner.watch(demonstration)`` whenever the teacher shows something. Which movement
+reaches a goal? ``learner.inverse(context, goal).theta``. ``learner.save(path)`` and ``learner.load(path)`` keep its
+life.
 """
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from sgimd_torch.inverses.locally_linear import LocallyLinear
+from sgimd_torch.learner.life import (
+    Event,
+    Kind,
+    ReplayError,
+    check_lesson,
+    check_repeats,
+    memory_crc32,
+    read_life,
+    write_life,
+)
 from sgimd_torch.memory import Memory
-from sgimd_torch.spaces import Array, Attempt, Demonstration, Move, check_point, read_only
+from sgimd_torch.spaces import Array, Attempt, Box, Demonstration, Estimate, Move, check_point, read_only
 from sgimd_torch.strategies import SocialStrategy, Strategy
+from sgimd_torch.teachers import Teacher
+
+__all__ = ["Learner", "ReplayError"]
 
 
 class Learner:
@@ -25,6 +42,9 @@ class Learner:
         autonomous: what it does on its own.
         social: how it answers a demonstration; None for a learner that cannot be taught.
         correspondence: (times, trajectory) -> theta_d, eq. (6); needed with ``social``.
+        inverse: (context, goal) -> estimate, by which it answers; None for `LocallyLinear`. The attribute may be
+            replaced, by a `ModelInverse` of the same memory, for example.
+        policies: Pi, which a demonstration must not leave; None does not check that.
 
     Raises:
         ValueError: ``social`` without ``correspondence``.
@@ -37,6 +57,8 @@ class Learner:
         *,
         social: SocialStrategy | None = None,
         correspondence: Callable[[Array, Array], Array] | None = None,
+        inverse: Callable[[Array, Array], Estimate] | None = None,
+        policies: Box | None = None,
     ) -> None:
         if social is not None and correspondence is None:
             raise ValueError("a social strategy needs a correspondence, which translates trajectories into theta")
@@ -44,10 +66,20 @@ class Learner:
         self.autonomous = autonomous
         self.social = social
         self.correspondence = correspondence
+        self.inverse: Callable[[Array, Array], Estimate] = LocallyLinear(memory) if inverse is None else inverse
+        self.policies = policies
         self._attempt: Attempt | None = None
         self._context: Array = np.zeros(0)
         self._move: Move | None = None  # the next movement of the attempt, not yet told
         self._asked = False
+        self._events: list[int | Event] = []  # a movement is the row of memory that keeps it
+        self._begun = len(memory)
+        self._movements = 0
+
+    @property
+    def movements(self) -> int:
+        """How many it has made, those at rest included: the ``first`` of a `run` that goes on."""
+        return self._movements
 
     @property
     def idle(self) -> bool:
@@ -87,7 +119,9 @@ class Learner:
         elif context is not self._context and not np.array_equal(context, self._context):
             raise RuntimeError(f"the attempt under way began in context {self._context}, got {context}; see idle")
         if self._move is None:
-            self.interrupt()
+            self._events.append(Event(Kind.RESTED, self._context))
+            self._movements += 1
+            self._end()
             return None
         self._asked = True
         return self._move
@@ -107,6 +141,8 @@ class Learner:
             raise RuntimeError("tell() needs the outcome of a movement, but ask() has not proposed one")
         self.memory.add(self._context, self._move.theta, outcome)
         self._asked = False
+        self._events.append(len(self.memory) - 1)
+        self._movements += 1
         try:
             self._move = self._attempt.send(self.memory.outcomes[-1])
         except StopIteration:
@@ -117,7 +153,8 @@ class Learner:
 
         Raises:
             RuntimeError: this learner has no social strategy, or the last movement's outcome was not told.
-            ValueError: a demonstration that does not fit the spaces or the correspondence.
+            ValueError: a demonstration that does not fit the spaces or the correspondence, or whose theta_d leaves Pi;
+                nothing has happened then.
         """
         if self.social is None or self.correspondence is None:
             raise RuntimeError("this learner has no social strategy, so it cannot be taught; use no teacher")
@@ -127,11 +164,85 @@ class Learner:
         check_point("outcome of the demonstration", demonstration.outcome, self.memory.outcome_dim)
         theta_d = self.correspondence(demonstration.times, demonstration.trajectory)
         theta_d = check_point("theta_d of the correspondence", theta_d, self.memory.theta_dim)
-        self.interrupt()
+        if self.policies is not None:
+            self.policies.check("theta_d of the correspondence", theta_d)
+        self._end()
+        self._events.append(Event(Kind.SHOWN, lesson=demonstration))
         self._begin(self.social.attempt(context, theta_d, demonstration), context)
 
     def interrupt(self) -> None:
         """End the attempt under way; what it learnt so far counts. An outcome not yet told is no longer expected."""
+        if self._asked and self._move is not None:
+            self._events.append(Event(Kind.DROPPED, self._context, self._move.theta))
+        elif self._attempt is not None:
+            self._events.append(Event(Kind.INTERRUPTED))
+        self._end()
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write its life: contexts, movements, rests, outcomes and lessons, an npz file without pickle.
+
+        A movement that was asked for and not told yet is left out: after `load`, ask for it again.
+
+        Raises:
+            ValueError: lessons whose shapes differ.
+            OSError: ``path`` is a directory, or cannot be written.
+        """
+        write_life(path, self._events, self._begun, self.memory)
+
+    def load(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        teacher: Teacher | None = None,
+        after: Callable[[Move | None], object] | None = None,
+    ) -> None:
+        """Live through a saved life again without executing anything, and go on as if it had never stopped.
+
+        Args:
+            path: what `save` wrote.
+            teacher: freshly built, too, if one draws lessons at random: it is asked before each movement, as in `run`,
+                so that it goes on in the same way. None for the lessons of the file alone.
+            after: called after each movement, told or at rest (then with None), as your loop does to refresh a forward
+                model.
+
+        Raises:
+            ReplayError: this learner would have moved otherwise, or its memory comes out otherwise. It has then lived a
+                part of that life; build another one.
+            RuntimeError: it has lived already.
+            ValueError: not such a file, damaged, or of another robot.
+            OSError: there is no file, or it is a directory.
+        """
+        if self._events or self._attempt is not None:
+            raise RuntimeError("load() needs a learner freshly built; this one has lived already")
+        life, offered = read_life(path, self.memory), -1
+        if life.begun != self._begun:
+            raise ReplayError(f"{path} began with {life.begun} exemplars in memory, this learner with {self._begun}")
+        for event in life.events:
+            if teacher is not None and offered < self.movements and event.kind != Kind.INTERRUPTED:
+                offered = self.movements
+                check_lesson(offered, event.lesson, teacher.offer(offered, self.memory))
+            move = self._live_again(event)
+            if after is not None and event.kind in (Kind.MOVED, Kind.RESTED):
+                after(move)
+        if life.memory_crc32 != memory_crc32(self.memory):
+            raise ReplayError(f"{path} ended with another memory; were exemplars added to one of them by hand?")
+
+    def _live_again(self, event: Event) -> Move | None:
+        if event.lesson is not None:
+            self.watch(event.lesson)
+        if event.context is None:
+            if event.kind == Kind.INTERRUPTED:
+                self.interrupt()
+            return None
+        index, move = self.movements, self.ask(event.context)
+        check_repeats(index, event.theta, None if move is None else move.theta)
+        if event.outcome is not None:
+            self.tell(event.outcome)
+        elif event.kind == Kind.DROPPED:
+            self.interrupt()
+        return move
+
+    def _end(self) -> None:
         if self._attempt is not None:
             self._attempt.close()
         self._attempt = self._move = None

@@ -1,0 +1,189 @@
+"""Recordings as people have them: tables with a row for each sample, whose columns the user names.
+
+    columns = Columns(joints=("shoulder", "elbow"), outcome=("x", "y"))
+    shown = read_csv("recordings", columns)                  # a folder with one file a demonstration, or one long table
+    save_demonstrations("shown.npz", shown)
+A column may hold vectors, as those of LeRobot do: ``observation.state`` is all its entries, ``observation.state[0:6]``
+and ``observation.state[2]`` are some.
+"""
+
+from __future__ import annotations
+
+import csv
+import os
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from sgimd_torch.spaces import Array, Demonstration, check_vector
+
+_NAME: Final = re.compile(r"(?P<name>[^\[\]]+)(\[(?P<first>\d+)(?P<slice>:(?P<end>\d+)?)?\])?")
+_MOST_BYTES: Final = 1 << 30  # of a csv file
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Which columns of a table hold what.
+
+    Args:
+        joints: angles (rad) or commands, in the order in which the robot's correspondence wants them.
+        outcome: where the movement ended; of each recording the last row counts.
+        context: of each recording the first row counts; empty without contexts.
+        time: s; a recording may begin at any time.
+        recording: the number or name of the recording that a row belongs to; None if a table is one recording.
+        degrees: joints are in degrees; they are turned to rad.
+    """
+
+    joints: tuple[str, ...]
+    outcome: tuple[str, ...]
+    context: tuple[str, ...] = ()
+    time: str = "time"
+    recording: str | None = None
+    degrees: bool = False
+
+    def __post_init__(self) -> None:
+        if not self.joints or not self.outcome:
+            raise ValueError("name at least one column for joints and one for outcome")
+        for name in self.names:
+            if _NAME.fullmatch(name) is None:
+                raise ValueError(f"{name!r} is no column: write state, state[2] or state[0:6]")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of all columns, as the user wrote them."""
+        grouped = () if self.recording is None else (self.recording,)
+        return (*self.joints, *self.outcome, *self.context, self.time, *grouped)
+
+    @property
+    def plain(self) -> list[str]:
+        """Names of the table's columns that are needed, each once."""
+        return list(dict.fromkeys(name.partition("[")[0] for name in self.names))
+
+
+def read_csv(path: str | os.PathLike[str], columns: Columns) -> list[Demonstration]:
+    """Recordings from CSV: a folder of files, one for each demonstration, or one file.
+
+    A file may hold many recordings, if ``columns.recording`` tells which row belongs to which. The first line names the
+    columns.
+
+    Raises:
+        ValueError: a column is missing, a field is no number, or a recording is none; file, line or recording is named.
+        OSError: there is no file.
+    """
+    path = Path(path)
+    files = sorted(path.glob("*.csv")) if path.is_dir() else [path]
+    if not files:
+        raise ValueError(f"{path} holds no .csv file")
+    found: list[Demonstration] = []
+    for file in files:
+        found += recordings(str(file), _table(file, columns.plain), columns)
+    return found
+
+
+def recordings(source: str, table: Mapping[str, np.ndarray], columns: Columns) -> list[Demonstration]:
+    """The recordings of one table.
+
+    Args:
+        source: what to call it in errors.
+        table: for each of ``columns.plain`` its ``(n,)`` values, or ``(n, k)`` vectors.
+        columns: which is which.
+
+    Raises:
+        ValueError: the name of a vector's entry that it does not have, or a recording of fewer than two samples, whose
+            rows are apart, or whose times do not increase.
+    """
+    times = _values(source, table, (columns.time,))
+    if times.shape[1] != 1:
+        raise ValueError(f"{source}: {columns.time} must be one number for each row, got {times.shape[1]}")
+    joints = _values(source, table, columns.joints)
+    joints = np.deg2rad(joints) if columns.degrees else joints
+    outcomes, contexts = _values(source, table, columns.outcome), _values(source, table, columns.context)
+    found: list[Demonstration] = []
+    for name, rows in _groups(source, table, columns.recording, len(times)):
+        what = source if name is None else f"{source}: recording {name}"
+        since = times[rows, 0] - times[rows.start, 0]
+        if len(since) < 2:
+            raise ValueError(
+                f"{what} has {len(since)} sample, at least 2 are needed; does {columns.recording} name rows?"
+            )
+        if not (np.diff(since) > 0).all():
+            raise ValueError(f"{what}: {columns.time} must increase from row to row; were the rows shuffled?")
+        found.append(Demonstration(contexts[rows.start], since, joints[rows], outcomes[rows.stop - 1]))
+    return found
+
+
+def _table(file: Path, names: Sequence[str]) -> dict[str, np.ndarray]:
+    """Columns of a CSV file, as numbers where they all are."""
+    if file.stat().st_size > _MOST_BYTES:
+        raise ValueError(f"{file} is larger than {_MOST_BYTES} bytes; split it")
+    with open(file, encoding="utf-8-sig", errors="replace", newline="") as text:
+        lines = csv.reader(text)
+        try:
+            heads = [head.strip() for head in next(lines, [])]
+            rows = [line for line in lines if line]
+        except csv.Error as error:
+            raise ValueError(f"{file}: line {lines.line_num} is no CSV: {error}") from error
+    missing = [name for name in names if name not in heads]
+    if missing:
+        raise ValueError(f"{file} has no column {', '.join(missing)}; it has {', '.join(heads[:20])}")
+    if not rows:
+        raise ValueError(f"{file} has no rows below the names of its columns")
+    for number, row in enumerate(rows, 1):
+        if len(row) != len(heads):
+            raise ValueError(f"{file}: row {number} has {len(row)} fields, {len(heads)} were wanted; is it cut short?")
+    found = {}
+    for name in names:
+        fields = [row[heads.index(name)].strip() for row in rows]
+        try:
+            found[name] = np.array([float(field) for field in fields])
+        except ValueError:
+            found[name] = np.array(fields)
+    return found
+
+
+def _values(source: str, table: Mapping[str, np.ndarray], names: Sequence[str]) -> Array:
+    """``(n, dim)`` of the columns called ``names``, side by side."""
+    parts = [np.empty((len(next(iter(table.values()))), 0))]
+    for written in names:
+        match = _NAME.fullmatch(written)
+        assert match is not None
+        values = table[match["name"]]
+        if values.dtype.kind == "U":
+            wrong = next(text for text in values.tolist() if not _is_number(text))
+            raise ValueError(f"{source}: {match['name']} must be numbers, got {wrong[:40]!r}; is a field missing?")
+        vectors = values.reshape(len(values), -1)
+        if match["first"] is not None:
+            first = int(match["first"])
+            end = first + 1 if match["slice"] is None else int(match["end"] or vectors.shape[1])
+            if not first < end <= vectors.shape[1]:
+                raise ValueError(f"{source}: {written} is not there, {match['name']} has {vectors.shape[1]} entries")
+            vectors = vectors[:, first:end]
+        parts.append(check_vector(f"{source}: {written}", vectors, vectors.shape[1]))
+    return np.concatenate(parts, axis=1)
+
+
+def _groups(source: str, table: Mapping[str, np.ndarray], recording: str | None, n: int) -> list[tuple[object, slice]]:
+    """Name and rows of each recording, in order."""
+    if recording is None:
+        return [(None, slice(0, n))]
+    names = table[recording].tolist()
+    starts = [row for row in range(n) if row == 0 or names[row] != names[row - 1]]
+    groups = [(names[row], slice(row, end)) for row, end in zip(starts, [*starts[1:], n], strict=True)]
+    seen: set[object] = set()
+    for name, _ in groups:
+        if name in seen:
+            raise ValueError(f"{source}: the rows of recording {name} are apart; sort them by {recording} and time")
+        seen.add(name)
+    return groups
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

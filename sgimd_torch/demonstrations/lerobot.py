@@ -1,0 +1,91 @@
+"""Recordings from a LeRobot dataset on disk, format v3: several episodes in a parquet file; videos are not read.
+
+    columns = Columns(joints=("observation.state[0:6]",), outcome=("observation.environment_state[0:2]",),
+                      time="timestamp", recording="episode_index")
+    shown = read_lerobot("datasets/my_arm", columns)
+The layout, as its version 3.0 has it: ``meta/info.json`` with the version, the counts and the features, and
+``data/chunk-000/file-000.parquet`` and so on with a row for each frame.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sgimd_torch.demonstrations.columns import Columns, recordings
+from sgimd_torch.spaces import Demonstration
+
+try:
+    import pyarrow
+    import pyarrow.parquet
+except ImportError as error:
+    raise ImportError(f"a LeRobot dataset needs pyarrow: pip install 'sgimd-torch[lerobot]' ({error})") from error
+
+
+def read_lerobot(root: str | os.PathLike[str], columns: Columns) -> list[Demonstration]:
+    """All episodes of a dataset, in order.
+
+    Args:
+        root: its folder, which holds ``meta`` and ``data``.
+        columns: of the features; ``time`` is usually ``timestamp``, ``recording`` is ``episode_index``.
+
+    Raises:
+        ValueError: no such dataset, of another version, without one of the columns, with fewer episodes or frames than
+            it says, or with an episode that is no recording.
+        OSError: a file cannot be read.
+    """
+    root = Path(root)
+    info = _info(root / "meta" / "info.json")
+    version = str(info.get("codebase_version"))
+    if not version.startswith("v3."):
+        raise ValueError(f"{root} has format {version[:20]}, this library reads v3; lerobot itself converts older ones")
+    features = info.get("features")
+    known = list(features) if isinstance(features, dict) else []
+    missing = [name for name in columns.plain if name not in known]
+    if missing:
+        raise ValueError(f"{root} has no feature {', '.join(missing)}; it has {', '.join(known)}")
+    files = sorted((root / "data").glob("*/*.parquet"))
+    if not files:
+        raise ValueError(f"{root} has no data/chunk-000/file-000.parquet; were only its videos copied?")
+    parts = [_columns(file, columns.plain) for file in files]
+    try:
+        table = {name: np.concatenate([part[name] for part in parts]) for name in columns.plain}
+    except ValueError as error:
+        raise ValueError(f"{root}: its files differ in the shapes of their columns: {error}") from error
+    found = recordings(str(root), table, columns)
+    rows = len(table[columns.time])
+    for what, said, read in (("frames", "total_frames", rows), ("episodes", "total_episodes", len(found))):
+        if info.get(said) != read:
+            raise ValueError(f"{root} says {info.get(said)} {what}, {read} were found; is a file missing?")
+    return found
+
+
+def _info(path: Path) -> dict[str, Any]:
+    try:
+        info = json.loads(path.read_text(encoding="utf-8"))
+    except (FileNotFoundError, NotADirectoryError):
+        raise ValueError(f"{path.parents[1]} is no LeRobot dataset: it has no meta/info.json") from None
+    except (ValueError, RecursionError) as error:
+        raise ValueError(f"{path} is no json: {str(error)[:100]}") from error
+    if not isinstance(info, dict):
+        raise ValueError(f"{path} must hold an object, got {type(info).__name__}")
+    return info
+
+
+def _columns(file: Path, names: list[str]) -> dict[str, np.ndarray]:
+    """``(n,)`` or ``(n, k)`` for each name."""
+    try:
+        table = pyarrow.parquet.read_table(file, columns=names)
+        found = {name: np.array(table.column(name).to_pylist()) for name in names}
+    except (pyarrow.ArrowException, OSError, ValueError, KeyError) as error:
+        raise ValueError(f"{file} cannot be read: {str(error)[:200]}; is it whole, with all of {names}?") from error
+    for name, values in found.items():
+        if values.dtype == object or values.ndim > 2:
+            raise ValueError(
+                f"{file}: {name} must be numbers or vectors of one length, got {values.dtype} {values.shape}"
+            )
+    return found

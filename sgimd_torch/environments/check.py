@@ -1,0 +1,243 @@
+"""Every promise of `Environment`, tried on a real one; a promise that it breaks is told with the likely slip.
+
+check_environment(Toss())        # ValueError with a line for each slip; ``sgimd check toss:Toss`` prints them
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, Final
+
+import numpy as np
+
+from sgimd_torch.environments.protocol import BatchEnvironment, Environment, check_rest
+from sgimd_torch.spaces import Array, Box, check_count, stream
+
+_FACTOR: Final = 10.0  # between the noise announced and that of a few movements; a wrong unit is farther off
+Movements = Sequence[tuple[Array, Array]]
+
+
+def check_environment(environment: Environment, *, movements: int = 3) -> None:
+    """Refuse an environment that breaks a promise of its protocol.
+
+    Args:
+        environment: is observed and executed, about 8 times for each movement.
+        movements: number of random movements to try; two corners of Pi are tried, too.
+
+    Raises:
+        ValueError: a line for each slip: what was found, what was wanted, the likely cause. Promises that rest on a
+            broken one are not tried, so a second look may find more.
+    """
+    check_count("movements", movements, 1)
+    stages: list[tuple[Callable[..., Iterator[str]], ...]] = [(_spaces,), (_contexts,), (_outcomes,), (_repeats,)]
+    stages.append((_noise, _batches, _refusals))
+    found: list[str] = []
+    tried: Movements = ()
+    for stage in stages:
+        for promise in stage:
+            try:
+                found += promise(environment, tried)
+            except _RaisedError as error:
+                found.append(str(error))
+        if found:
+            raise ValueError("\n  ".join([f"{type(environment).__name__} is no environment yet:", *found]))
+        if stage == (_contexts,):
+            tried = _movements(environment, movements)
+
+
+class _RaisedError(Exception):
+    """A member of the environment raised what it should not raise."""
+
+
+def _movements(environment: Environment, n: int) -> Movements:
+    box = environment.policies
+    thetas = [*(box.sample(stream(k, "theta")) for k in range(n)), box.low.copy(), box.high.copy()]
+    return [(environment.observe(stream(k, "observe")), theta) for k, theta in enumerate(thetas)]
+
+
+def _spaces(environment: Environment, _: Movements) -> Iterator[str]:
+    for name, least in (("contexts", 0), ("policies", 1), ("outcomes", 1)):
+        box = getattr(environment, name, None)
+        if not isinstance(box, Box):
+            slip = "; without contexts it is Box.cube(0, 1, 0)" if name == "contexts" else ""
+            yield f"{name} must be a sgimd_torch.Box, got {type(box).__name__}{slip}"
+        elif box.dim < least:
+            yield f"{name} must have a dimension at least, got a Box of none"
+    for name in ("observe", "execute"):
+        if not callable(getattr(environment, name, None)):
+            yield f"{name} must be a method, got {type(getattr(environment, name, None)).__name__}"
+    noise: Any = getattr(environment, "outcome_noise", None)
+    if not isinstance(noise, int | float | np.number) or isinstance(noise, bool) or not 0 <= noise < np.inf:
+        yield f"outcome_noise must be a number >= 0, got {noise!r}; it is the standard deviation of the outcomes"
+    rest: Any = getattr(environment, "rest", None)
+    if not isinstance(rest, np.ndarray):
+        yield f"rest must be an array, the outcome of not moving, got {type(rest).__name__}; np.zeros(2), for example"
+    elif isinstance(getattr(environment, "outcomes", None), Box):
+        try:
+            check_rest(environment)
+        except ValueError as error:
+            yield f"{error}; rest is the outcome of not moving, one point of T (outcomes)"
+
+
+def _contexts(environment: Environment, _: Movements) -> Iterator[str]:
+    before = _global_streams()
+    context = _call(environment, "observe", stream(1, "observe"))
+    if (wrong := _misshapen("observe()", context, environment.contexts.dim)) is not None:
+        yield wrong
+        return
+    kept = context.copy()
+    if not environment.contexts.contains(context):
+        yield f"observe() gave {_text(context)}, outside C (contexts); contexts.sample(rng) gives points inside"
+    _call(environment, "observe", stream(2, "observe"))
+    if not np.array_equal(context, kept):
+        yield _used_twice("observe()")
+    if not np.array_equal(_call(environment, "observe", stream(1, "observe")), kept):
+        yield "observe() gave two contexts for equal streams; does it draw from something else than its rng?"
+    if _global_streams() != before:
+        yield _drew_from_global("observe()")
+
+
+def _outcomes(environment: Environment, tried: Movements) -> Iterator[str]:
+    for context, theta in tried:
+        arguments = context.copy(), theta.copy()
+        outcome = _call(environment, "execute", *arguments, stream(1, "execute"))
+        if (wrong := _misshapen("execute()", outcome, environment.outcomes.dim)) is not None:
+            yield wrong
+            return
+        if not np.isfinite(outcome).all():
+            yield f"execute() gave {_text(outcome)} for theta {_text(theta)}; raise SimulationError where it diverges"
+            return
+        for name, given, now in zip(("context", "theta"), (context, theta), arguments, strict=True):
+            if not np.array_equal(given, now):
+                yield f"execute() changed the {name} that it was given; write x = x * 2 in the place of x *= 2"
+                return
+
+
+def _repeats(environment: Environment, tried: Movements) -> Iterator[str]:
+    """Equal streams give equal outcomes, whatever was executed before."""
+    context, theta = tried[0]
+    before, rng = _global_streams(), stream(1, "execute")
+    untouched = rng.bit_generator.state
+    _call(environment, "execute", context, theta, stream(1, "execute"))  # so that the next two come after the same one
+    first = _call(environment, "execute", context, theta, rng)
+    kept, again = first.copy(), _call(environment, "execute", context, theta, stream(1, "execute")).copy()
+    if _global_streams() != before:
+        yield _drew_from_global("execute()")
+    elif not np.array_equal(kept, again):
+        found = f"execute() gave {_text(kept)}, then {_text(again)} for the same movement and equal streams"
+        if environment.outcome_noise and rng.bit_generator.state == untouched:
+            yield f"{found}: its noise is not from the rng, of which nothing was drawn; has it a generator of its own?"
+        else:
+            yield f"{found}: state is carried over; does each movement begin with positions, speeds, filters set anew?"
+    else:
+        _call(environment, "execute", *tried[1], stream(2, "execute"))
+        if not np.array_equal(first, kept):
+            yield _used_twice("execute()")
+        last = _call(environment, "execute", context, theta, stream(1, "execute"))
+        if not np.array_equal(last, kept):
+            yield (
+                f"execute() gave {_text(kept)}, but {_text(last)} after another movement: state is carried over; does "
+                "each movement begin with positions, speeds, filters set anew?"
+            )
+
+
+def _noise(environment: Environment, tried: Movements) -> Iterator[str]:
+    announced = float(environment.outcome_noise)
+    pairs = [[_call(environment, "execute", *each, stream(k, "execute")).copy() for k in (1, 2)] for each in tried]
+    found = float(np.sqrt(np.mean([np.square(one - other) / 2 for one, other in pairs])))
+    if not announced and found:
+        yield f"outcome_noise is 0, but outcomes of a movement scatter by about {found:.2g}; announce that"
+    elif announced and not found:
+        yield f"outcome_noise is {announced:g}, but no movement scatters; does execute() use its rng?"
+    elif announced and not announced / _FACTOR <= found <= announced * _FACTOR:
+        yield f"outcome_noise is {announced:g}, but outcomes of a movement scatter by {found:.2g}; in other units?"
+
+
+def _batches(environment: Environment, tried: Movements) -> Iterator[str]:
+    if not isinstance(environment, BatchEnvironment):
+        return
+    contexts, thetas = (np.stack(part) for part in zip(*tried, strict=True))
+
+    def rngs() -> list[np.random.Generator]:
+        return [stream(row, "row") for row in range(len(tried))]
+
+    together = _call(environment, "execute_many", contexts.copy(), thetas.copy(), rngs())
+    if (wrong := _misshapen("execute_many()", together, len(tried), environment.outcomes.dim)) is not None:
+        yield wrong
+        return
+    kept = together.copy()
+    for row, (movement, rng) in enumerate(zip(tried, rngs(), strict=True)):
+        single = _call(environment, "execute", *movement, rng)
+        if not np.array_equal(single, kept[row]):
+            yield (
+                f"row {row} of execute_many() is {_text(kept[row])}, execute() gives {_text(single)}; they must be "
+                "equal to the last bit: does each row use its own rng, in the same order of draws and of sums?"
+            )
+            return
+    last = _call(environment, "execute_many", contexts[-1:].copy(), thetas[-1:].copy(), rngs()[-1:])
+    if not np.array_equal(together, kept):
+        yield _used_twice("execute_many()")
+    if not np.array_equal(last, kept[-1:]):
+        yield "a row of execute_many() depends on the others in its batch; must they be of one length?"
+
+
+def _refusals(environment: Environment, tried: Movements) -> Iterator[str]:
+    for position, (name, box) in enumerate((("context", environment.contexts), ("theta", environment.policies))):
+        for value in _invalid(tried[0][position], box):
+            context, theta = (value, tried[0][1]) if position == 0 else (tried[0][0], value)
+            found = f"execute() {{}} a {name} of shape {value.shape}, {_text(value)}"
+            try:
+                environment.execute(context, theta, stream(1, "execute"))
+            except ValueError as error:
+                if name in str(error) or "one movement" in str(error):
+                    continue
+                found = found.format("refused") + f" without naming it ({error})"
+            except Exception as error:
+                found = found.format("failed at") + f" with {type(error).__name__}, a ValueError was wanted"
+            else:
+                found = found.format("accepted")
+            yield f"{found}; begin with context, theta = check_movement(self, context, theta)"
+            break
+
+
+def _invalid(point: Array, box: Box) -> list[Array]:
+    """Of another length, a batch, and with a last entry that is NaN, infinite or outside."""
+    values = [np.append(point, 0.0), np.stack((point, point))]
+    if len(point) > 0:
+        outside = box.high[-1] + box.sides[-1]
+        values += [point[:-1], *(np.append(point[:-1], entry) for entry in (np.nan, np.inf, outside))]
+    return values
+
+
+def _call(environment: Environment, name: str, *arguments: Any) -> Any:
+    try:
+        return getattr(environment, name)(*arguments)
+    except Exception as error:  # whatever the user's code does
+        given = f" for theta {_text(arguments[1])}" if name == "execute" else ""
+        raise _RaisedError(f"{name}() raised {type(error).__name__}{given}: {error}") from error
+
+
+def _misshapen(what: str, value: Any, *shape: int) -> str | None:
+    if not isinstance(value, np.ndarray):
+        return f"{what} must give an array of shape {shape}, got {type(value).__name__}; np.array([x]) makes one"
+    if value.shape != shape or value.dtype != np.float64:
+        slip = "is it called with one movement?" if value.ndim != len(shape) else "was an axis forgotten, or a dtype?"
+        return f"{what} must give float64 of shape {shape}, got {value.dtype} {value.shape}; {slip}"
+    return None
+
+
+def _used_twice(what: str) -> str:
+    return f"{what} changed an array that it gave before: one buffer is used twice; give a copy"
+
+
+def _drew_from_global(what: str) -> str:
+    return f"{what} drew from a global random stream; write rng.normal() in the place of np.random.normal()"
+
+
+def _global_streams() -> tuple[str, str]:
+    return str(np.random.get_state()), str(random.getstate())  # noqa: NPY002 - of which nobody may draw
+
+
+def _text(point: Array) -> str:
+    return str(np.asarray(point).round(4).tolist())

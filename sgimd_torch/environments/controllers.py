@@ -1,0 +1,174 @@
+"""How a theta becomes a sequence of commands: sums of knots, or a sinusoid for each joint.
+
+A controller has ``policies``, its Pi, and ``at(theta, times)``, the commands, as `GaussianPrimitive` has; so each can
+stand in the place of the others. Each translates a recording by its ``correspondence``, eq. (6) of Nguyen & Oudeyer
+(2014).
+    swim = Sinusoids(actions, frequencies=(0.2, 2.0)); commands = swim.at(theta, times)
+"""
+
+from __future__ import annotations
+
+from typing import Final, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sgimd_torch.spaces import Array, Box, check_vector
+
+_GRID: Final = 200  # frequencies that are tried before the best one is refined
+
+
+class Controller(Protocol):
+    """Open loop: the commands of a movement depend on its theta alone."""
+
+    @property
+    def policies(self) -> Box:
+        """Pi."""
+        ...
+
+    def at(self, theta: Array, times: Array) -> Array:
+        """``(n_times, n_commands)`` at ``times`` ``(n_times,)`` s after the start."""
+        ...
+
+
+class Knots:
+    """Commands at equally spaced times, with straight lines between them.
+
+    theta in [0, 1]^(n_commands * n_knots) holds the knots command by command, scaled to their ranges.
+
+    Args:
+        commands: ``(n_commands,)`` box of their ranges, such as the torques of motors.
+        duration: s, from the first knot to the last; the last one is held.
+        n_knots: for each command, at least 2.
+
+    Raises:
+        ValueError: a duration that is not positive, or fewer than two knots.
+    """
+
+    def __init__(self, commands: Box, duration: float, *, n_knots: int = 5) -> None:
+        if not 0 < duration < np.inf or n_knots < 2:
+            raise ValueError(f"needs a duration > 0 s and n_knots >= 2, got {duration} and {n_knots}")
+        self.commands, self.duration, self.n_knots = commands, duration, n_knots
+        self.policies = Box.cube(0.0, 1.0, commands.dim * n_knots)
+
+    def at(self, theta: Array, times: Array) -> Array:
+        """``(n_times, n_commands)`` at ``times`` (s)."""
+        knots = theta.reshape(self.commands.dim, self.n_knots)
+        return self.commands.low + self.commands.sides * (self._weights(times / self.duration) @ knots.T)
+
+    def correspondence(self, times: ArrayLike, trajectory: ArrayLike) -> Array:
+        """theta_d, the policy whose commands come nearest to the recorded ones, eq. (6); each knot inside its range.
+
+        Args:
+            times: ``(n_times,)`` s, increasing.
+            trajectory: ``(n_times, n_commands)``.
+
+        Raises:
+            ValueError: shapes that do not fit, values that are not finite, unsorted times, or a recording longer than
+                ``duration``.
+        """
+        from scipy.optimize import lsq_linear  # takes longer to import than this whole library
+
+        times, trajectory = check_recording(times, trajectory, self.commands.dim, self.duration)
+        weights = self._weights((times - times[0]) / self.duration)
+        scaled = (trajectory - self.commands.low) / self.commands.sides
+        # A recording may end before the last knots; these then stay in the middle, as nothing else pulls at them.
+        steady = 1e-6 * np.eye(self.n_knots)
+        weights = np.vstack([weights, steady])
+        scaled = np.vstack([scaled, np.full((self.n_knots, self.commands.dim), 0.5e-6)])
+        knots = [lsq_linear(weights, column, bounds=(0.0, 1.0), tol=1e-12).x for column in scaled.T]
+        return self.policies.clip(np.concatenate(knots))
+
+    def _weights(self, phases: Array) -> Array:
+        places = np.clip(phases, 0.0, 1.0) * (self.n_knots - 1)
+        return np.maximum(0.0, 1.0 - np.abs(places[:, None] - np.arange(self.n_knots)))
+
+
+class Sinusoids:
+    """One sinusoid for each command: amplitude, phase and offset; all share one frequency.
+
+    theta in [0, 1]^(3 n_commands + 1) holds amplitude, phase and offset command by command, then the frequency. An
+    amplitude of 1 is half of the command's range, an offset moves the middle by ``steer`` of that at most; what leaves
+    the range is clipped. A phase of 1 is that of 0.
+
+    Args:
+        commands: ``(n_commands,)`` box of their ranges, such as the torques of motors.
+        frequencies: lowest and highest (Hz).
+        steer: the largest offset, in half ranges.
+
+    Raises:
+        ValueError: frequencies that are not 0 < lowest < highest, or ``steer`` outside (0, 1].
+    """
+
+    def __init__(self, commands: Box, frequencies: tuple[float, float], *, steer: float = 0.5) -> None:
+        if not 0 < frequencies[0] < frequencies[1] < np.inf or not 0 < steer <= 1:
+            raise ValueError(f"needs 0 < lowest < highest frequency and 0 < steer <= 1, got {frequencies} and {steer}")
+        self.commands, self.frequencies, self.steer = commands, frequencies, steer
+        self.policies = Box.cube(0.0, 1.0, 3 * commands.dim + 1)
+
+    def at(self, theta: Array, times: Array) -> Array:
+        """``(n_times, n_commands)`` at ``times`` (s)."""
+        amplitudes, phases, offsets = theta[:-1].reshape(-1, 3).T
+        angles = 2 * np.pi * (self._frequency(theta[-1]) * times[:, None] + phases)
+        waves = amplitudes * np.sin(angles) + self.steer * (2 * offsets - 1)
+        low, high = self.commands.low, self.commands.high
+        return self.commands.clip((low + high) / 2 + (high - low) / 2 * waves)
+
+    def correspondence(self, times: ArrayLike, trajectory: ArrayLike) -> Array:
+        """theta_d, the policy whose commands come nearest to the recorded ones, eq. (6).
+
+        For a fixed frequency the fit is linear; the frequency is the best of a grid, then refined. It is exact where no
+        command is clipped.
+
+        Args:
+            times: ``(n_times,)`` s, increasing.
+            trajectory: ``(n_times, n_commands)``.
+
+        Raises:
+            ValueError: shapes that do not fit, values that are not finite, or unsorted times.
+        """
+        from scipy.optimize import minimize_scalar
+
+        times, trajectory = check_recording(times, trajectory, self.commands.dim)
+        times = np.subtract(times, times[0])
+        waves = (2 * trajectory - self.commands.low - self.commands.high) / self.commands.sides
+
+        def fit(pace: float) -> tuple[float, Array]:
+            angles = np.multiply(2 * np.pi * self._frequency(pace), times)
+            columns = np.stack([np.sin(angles), np.cos(angles), np.ones_like(angles)], axis=1)
+            found = np.linalg.lstsq(columns, waves, rcond=None)[0]  # (3, n_commands)
+            return float(np.square(columns @ found - waves).sum()), found
+
+        grid = np.linspace(0.0, 1.0, _GRID)
+        best = float(min(grid, key=lambda pace: fit(pace)[0]))
+        around = (max(0.0, best - grid[1]), min(1.0, best + grid[1]))
+        pace = float(minimize_scalar(lambda pace: fit(pace)[0], bounds=around, method="bounded").x)
+        sine, cosine, offset = fit(pace)[1]
+        phases = np.arctan2(cosine, sine) / (2 * np.pi) % 1.0
+        each = np.stack([np.hypot(sine, cosine), phases, (offset / self.steer + 1) / 2], axis=1)
+        return self.policies.clip(np.append(each.ravel(), pace))
+
+    def _frequency(self, pace: float) -> float:
+        lowest, highest = self.frequencies
+        return float(lowest + pace * (highest - lowest))
+
+
+def check_recording(
+    times: ArrayLike, trajectory: ArrayLike, n_commands: int, longest: float = np.inf
+) -> tuple[Array, Array]:
+    """A recording as float64: ``(n_times,)`` s and ``(n_times, n_commands)``.
+
+    Raises:
+        ValueError: shapes that do not fit, fewer than 2 samples, values that are not finite, unsorted times, or a
+            recording that lasts longer than ``longest`` s.
+    """
+    trajectory = check_vector("trajectory", trajectory, n_commands, "one column for each command")
+    if trajectory.ndim != 2 or len(trajectory) < 2:
+        raise ValueError(f"trajectory needs 2 samples or more in rows, got shape {trajectory.shape}")
+    times = check_vector("times", times, len(trajectory), "one time in s for each row of the trajectory")
+    if times.ndim != 1 or not (np.diff(times) > 0).all():
+        raise ValueError(f"times must increase from sample to sample, got {times}; were the rows shuffled?")
+    lasts = times[-1] - times[0]
+    if lasts > longest * (1 + 1e-9):
+        raise ValueError(f"a movement lasts {longest:g} s at most, the recording {lasts:g} s; is it in milliseconds?")
+    return times, trajectory

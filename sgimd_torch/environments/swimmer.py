@@ -1,0 +1,49 @@
+"""gymnasium's Swimmer-v5 as a task of ours: how does a swimmer of three links get to a place in 6 seconds?
+
+theta: amplitude, phase and offset of a sinusoid for each of its two joints, and a frequency. The outcome is how far the
+body has come (m), x and y. Where it starts is a little uncertain: this is the noise.
+    swimmer = Swimmer(); outcome = swimmer.execute(np.zeros(0), theta, rng)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Final
+
+import numpy as np
+
+from sgimd_torch.environments.controllers import Sinusoids
+from sgimd_torch.environments.from_gymnasium import FromGymnasium, make_world
+from sgimd_torch.spaces import Array, Box
+
+STEPS: Final = 150  # of .04 s
+FREQUENCIES: Final = (0.2, 2.0)  # Hz
+START: Final = 0.02  # half range of positions (m, rad) and speeds at the start
+NOISE: Final = 0.015  # m, as measured_noise gives it
+
+
+class Swimmer(FromGymnasium):
+    """theta in [0, 1]^7 -> how far it has come (m).
+
+    Args:
+        start: half the range from which its first positions and speeds are drawn; 0 always starts alike.
+
+    Raises:
+        ValueError: gymnasium cannot make Swimmer-v5.
+    """
+
+    def __init__(self, *, start: float = START) -> None:
+        super().__init__(
+            make_world("Swimmer-v5", reset_noise_scale=start, exclude_current_positions_from_observation=False),
+            Sinusoids(Box.cube(-1.0, 1.0, 2), FREQUENCIES),
+            outcomes=Box.cube(-1.5, 1.5, 2),
+            rest=np.zeros(2),
+            outcome_noise=NOISE * start / START,
+            steps=STEPS,
+            outcome=travelled,
+        )
+
+
+def travelled(observations: Sequence[Any]) -> Array:
+    """``(2,)`` m, x and y from the first observation to the last; of both they are the first two numbers."""
+    return np.asarray(observations[-1][:2] - observations[0][:2], dtype=np.float64)

@@ -1,0 +1,108 @@
+"""Our environments as gymnasium's: an episode is one movement, the action is theta, observations are those of a goal
+environment.
+
+    world = ToGymnasium(PlanarArm()); observation, _ = world.reset(seed=0); world.step(world.action_space.sample())
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sgimd_torch.environments.protocol import Environment
+from sgimd_torch.spaces import Array, Box, check_point
+
+try:
+    import gymnasium
+except ImportError as error:
+    raise ImportError(f"this environment needs gymnasium: pip install 'sgimd-torch[gym]' ({error})") from error
+
+Observation = dict[str, Array]
+
+
+class ToGymnasium(gymnasium.Env[Any, Any]):
+    """A goal environment of one step.
+
+    ``observation`` is the context, ``achieved_goal`` the outcome (``rest`` before the movement), ``desired_goal`` the
+    goal, uniform over T or given as ``reset(options={"goal": ...})``; likewise ``"context"``. The reward is minus their
+    distance; ``info`` has ``is_success``.
+
+    Args:
+        environment: of ours.
+        tolerance: distance at which the goal counts as reached; None for the outcome noise, but at least .02.
+        goals: ``(n, outcome_dim)`` in T, of which one is drawn; None for any goal in T.
+
+    Raises:
+        ValueError: goals outside T.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 - as gymnasium declares it
+
+    def __init__(
+        self, environment: Environment, *, tolerance: float | None = None, goals: ArrayLike | None = None
+    ) -> None:
+        self.environment = environment
+        self.tolerance = max(environment.outcome_noise, 0.02) if tolerance is None else tolerance
+        self.goals = None if goals is None else environment.outcomes.check("goals", goals)
+        anywhere = gymnasium.spaces.Box(-np.inf, np.inf, (environment.outcomes.dim,), np.float64)  # also outside T
+        self.observation_space: gymnasium.spaces.Dict[Any] = gymnasium.spaces.Dict(
+            {
+                "observation": _box(environment.contexts),
+                "achieved_goal": anywhere,
+                "desired_goal": _box(environment.outcomes),
+            }
+        )
+        self.action_space: gymnasium.spaces.Box[Any] = _box(environment.policies)
+        self._goal: Array | None = None
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """A new context and goal.
+
+        Raises:
+            ValueError: a goal outside T or a context outside C.
+        """
+        super().reset(seed=seed)
+        wanted, robot = options or {}, self.environment
+        self._context = robot.contexts.check("context", wanted.get("context", robot.observe(self.np_random)))
+        drawn = robot.outcomes.sample(self.np_random)
+        if self.goals is not None:
+            drawn = self.goals[int(self.np_random.integers(len(self.goals)))]
+        self._goal = robot.outcomes.check("goal", wanted.get("goal", drawn), "was a theta passed instead?")
+        return self._observation(robot.rest), {}
+
+    def step(self, action: ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """The movement ``action`` ``(theta_dim,)``; it ends the episode.
+
+        Raises:
+            RuntimeError: the episode has ended.
+            ValueError: a theta outside Pi.
+        """
+        if self._goal is None:
+            raise RuntimeError("step() needs a reset() first: an episode is one movement")
+        theta = check_point("action", np.asarray(action, dtype=np.float64), self.environment.policies.dim)
+        outcome = self.environment.execute(self._context.copy(), theta, self.np_random)
+        observation = self._observation(outcome)
+        distance = float(np.linalg.norm(outcome - self._goal))
+        info = {"is_success": distance <= self.tolerance}
+        self._goal = None
+        return observation, -distance, True, False, info
+
+    def compute_reward(self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: Any = None) -> Array:
+        """Minus the distance, ``(...)`` for ``(..., outcome_dim)``; what hindsight relabelling needs."""
+        return -np.linalg.norm(np.subtract(achieved_goal, desired_goal), axis=-1)
+
+    def _observation(self, outcome: Array) -> Observation:
+        assert self._goal is not None
+        return {
+            "observation": self._context.copy(),
+            "achieved_goal": np.array(outcome, dtype=np.float64),
+            "desired_goal": self._goal.copy(),
+        }
+
+
+def _box(box: Box) -> gymnasium.spaces.Box[Any]:
+    return gymnasium.spaces.Box(box.low, box.high, dtype=np.float64)

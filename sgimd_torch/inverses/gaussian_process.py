@@ -1,0 +1,176 @@
+"""A Gaussian process: what a movement would lead to, and how sure that is, from the movements most like it.
+
+Our addition, not in the paper; Rasmussen & Williams (2006), chapters 2 and 5. All outcome dimensions share one kernel,
+smooth plus rough, both Matern 5/2; the rough part stands for what the smooth one does not explain though it is no
+noise. So only the noise that the environment states counts as noise.
+    kernel = choose_kernel(groups, noise); process = Process(inputs, outcomes, kernel); process.predict(candidates)
+Inputs are in lengths: how far each must change for the outcome to change, see ``fit_lengths``.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+from scipy.linalg import solve_triangular
+from scipy.optimize import minimize
+
+from sgimd_torch.memory import Rows
+from sgimd_torch.spaces import Array
+
+_ROOT5: Final = np.sqrt(5)
+_LEAST: Final = 1e-6  # noise variance in units of the kernel's; less makes its matrix singular
+_TINY: Final = 1e-300
+_NOISES: Final = (_LEAST, 1e-4, 1e-3, 1e-2, 0.03, 0.1, 0.3, 1.0, 3.0)
+_SCALES: Final = (0.5, 1.0, 2.0)
+_ROUGH: Final = ((1.0, 0.0), *itertools.product((4.0, 12.0), (0.03, 0.1, 0.3, 0.6)))  # (finer, share)
+_STEPS: Final = 30  # of the fit of lengths
+
+
+class Kernel(NamedTuple):
+    """``scale`` multiplies all inputs; the rough part has ``share`` of the variance and is ``finer`` by that factor;
+    ``noise`` is a variance in units of the kernel's."""
+
+    scale: float
+    finer: float
+    share: float
+    noise: float
+
+    def __call__(self, squared: Array) -> Array:
+        """Covariances at these ``squared`` distances, 1 at 0."""
+        distances = self.scale * np.sqrt(squared)
+        return (1 - self.share) * _matern(distances) + self.share * _matern(self.finer * distances)
+
+    def slope(self, squared: Array) -> Array:
+        """The derivative of the covariance by the input, in units of the difference of the inputs."""
+        distances = self.scale * np.sqrt(squared)
+        rough = self.finer**2 * _matern_slope(self.finer * distances)
+        return self.scale**2 * ((1 - self.share) * _matern_slope(distances) + self.share * rough)
+
+
+class Process:
+    """The process given some movements.
+
+    Args:
+        inputs: ``(n, dim)``, theta and context in lengths.
+        outcomes: ``(n, outcome_dim)``.
+        kernel: its variance is chosen here, as the most likely one.
+    """
+
+    def __init__(self, inputs: Array, outcomes: Array, kernel: Kernel) -> None:
+        self.inputs, self.outcomes, self.kernel = inputs, outcomes, kernel
+        self.mean = outcomes.mean(axis=0)
+        n, dim = outcomes.shape
+        covariance = kernel(squared_distances(inputs, inputs)) + kernel.noise * np.eye(n)
+        root = solve_triangular(np.linalg.cholesky(covariance), np.eye(n), lower=True)
+        self._root = root.T  # times its transpose it is the inverse of the covariance
+        self._weights = self._root @ (root @ (outcomes - self.mean))  # (n, outcome_dim)
+        self._precisions = (root * root).sum(axis=0)
+        self.variance = max(float(((outcomes - self.mean) * self._weights).sum()) / (n * dim), _TINY)
+
+    def predict(self, inputs: Array) -> tuple[Array, Array]:
+        """The expected outcomes ``(m, outcome_dim)`` of ``(m, dim)`` new inputs, and the variance ``(m,)`` of each
+        dimension; noise comes on top."""
+        across = self.kernel(squared_distances(inputs, self.inputs))
+        known = across @ self._root
+        return across @ self._weights + self.mean, self.variance * np.maximum(1 - (known * known).sum(axis=1), 0)
+
+    def without_noise(self, rows: Rows) -> tuple[Array, Array]:
+        """What the movements in ``rows`` lead to but for their noise, and the variance of that: as `predict`."""
+        noise = self.kernel.noise
+        variances = self.variance * noise * np.maximum(1 - noise * self._precisions[rows], 0)
+        return self.outcomes[rows] - noise * self._weights[rows], variances
+
+    def surprise(self, rows: Rows) -> float:
+        """Mean squared error of predicting each of ``rows`` from all others, in units of what was expected; 1 if the
+        process is right about its own errors."""
+        squared = (self._weights[rows] ** 2).mean(axis=1)
+        return float((squared / self._precisions[rows]).mean()) / self.variance
+
+    def jacobian(self, point: Array) -> Array:
+        """``(outcome_dim, dim)`` of the expected outcome at ``(dim,)``."""
+        differences = point - self.inputs
+        slopes = self.kernel.slope((differences * differences).sum(axis=1))
+        return self._weights.T @ (slopes[:, None] * differences)
+
+
+def fit_lengths(inputs: Array, outcomes: Array) -> Array:
+    """``(dim,)`` the most likely length of each input, in its standard deviations.
+
+    Type II maximum likelihood by L-BFGS, with a weak prior; an input without effect gets at most twice the first guess,
+    as few movements cannot show that it has none.
+
+    Args:
+        inputs: ``(n, dim)`` of standard deviation 1; the time grows with n^3.
+        outcomes: ``(n, outcome_dim)``, not all the same.
+    """
+    n, dim = inputs.shape
+    deviations = outcomes - outcomes.mean(axis=0)
+    deviations = deviations / deviations.std()
+    guess = np.log(1.5 * np.sqrt(dim))
+    squares = inputs * inputs
+
+    def loss(parameters: Array) -> tuple[float, Array]:
+        shrunk, noise = np.exp(-parameters[:dim]), float(np.exp(parameters[dim]))
+        scaled = inputs * shrunk
+        distances = np.sqrt(squared_distances(scaled, scaled))
+        root = np.linalg.inv(np.linalg.cholesky(_matern(distances) + noise * np.eye(n)))
+        inverse = root.T @ root
+        weights = inverse @ deviations
+        variance = (deviations * weights).mean()
+        by_covariance = 0.5 * (deviations.shape[1] * inverse - weights @ weights.T / variance)
+        by_square = -by_covariance * _matern_slope(distances)
+        off = (parameters[:dim] - guess) / 1.5
+        gradient = 2 * (by_square.sum(axis=1) @ squares - (inputs * (by_square @ inputs)).sum(axis=0)) * shrunk**2
+        likelihood = 0.5 * deviations.size * np.log(variance) - deviations.shape[1] * np.log(np.diag(root)).sum()
+        value = float(likelihood + 0.5 * (off * off).sum())
+        return value, np.append(gradient + off / 1.5, noise * np.trace(by_covariance))
+
+    bounds = [(guess - 5, guess + np.log(2))] * dim + [(np.log(_LEAST), np.log(3))]
+    start = np.append(np.full(dim, guess), np.log(0.05))
+    found = minimize(loss, start, jac=True, method="L-BFGS-B", bounds=bounds, options={"maxiter": _STEPS})
+    return np.exp(found.x[:dim])
+
+
+def choose_kernel(groups: Sequence[tuple[Array, Array]], noise: float) -> Kernel:
+    """The most likely kernel of a grid, over all groups of neighbours together.
+
+    Args:
+        groups: inputs ``(n, dim)`` in lengths, and outcomes ``(n, outcome_dim)``, not all the same.
+        noise: standard deviation of each outcome dimension, as the environment states it. It may be twice or half as
+            large near some movements, so other values are less likely, not impossible; but 0 is none.
+    """
+    noises = np.array(_NOISES if noise > 0 else [_LEAST])
+    scores: dict[tuple[float, float, float], Array] = {}
+    for inputs, outcomes in groups:
+        squared, deviations = squared_distances(inputs, inputs), outcomes - outcomes.mean(axis=0)
+        n, dim = outcomes.shape
+        for scale, (finer, share) in itertools.product(_SCALES, _ROUGH):
+            values, vectors = np.linalg.eigh(Kernel(scale, finer, share, 0.0)(squared))
+            spectrum = np.maximum(values, 0) + noises[:, None]  # (noises, n)
+            projected = ((vectors.T @ deviations) ** 2).sum(axis=1)
+            variances = np.maximum((projected / spectrum).sum(axis=1) / (n * dim), _TINY)
+            score = -0.5 * dim * (n * np.log(variances) + np.log(spectrum).sum(axis=1))
+            if noise > 0:
+                score -= 2 * dim * np.log(noises * variances / noise**2) ** 2 * n / 60
+            scores[scale, finer, share] = scores.get((scale, finer, share), np.zeros(len(noises))) + score
+    best = max(scores, key=lambda each: scores[each].max())
+    return Kernel(*best, noise=float(noises[scores[best].argmax()]))
+
+
+def squared_distances(one: Array, other: Array) -> Array:
+    """``(n, m)`` between rows."""
+    products = (one * one).sum(axis=1)[:, None] + (other * other).sum(axis=1) - 2 * one @ other.T
+    return np.maximum(products, 0)
+
+
+def _matern(distances: Array) -> Array:
+    """Matern 5/2."""
+    return (1 + _ROOT5 * distances + 5 / 3 * distances**2) * np.exp(-_ROOT5 * distances)
+
+
+def _matern_slope(distances: Array) -> Array:
+    """Its derivative, divided by the distance."""
+    return -5 / 3 * (1 + _ROOT5 * distances) * np.exp(-_ROOT5 * distances)

@@ -1,0 +1,163 @@
+"""An answer that has to prove itself: what a local Gaussian process proposes, if it should beat the nearest exemplar.
+
+Our addition, not in the paper. The process learns from the movements near the goal and those most like them. Candidates
+are found by Gauss-Newton steps through it, from the nearest exemplars, and there is the answer of `LocallyLinear`. Each
+is judged by the squared error that the process expects of it, its own uncertainty included; where it was surprised by
+exemplars near the goal, it counts as less sure. If no candidate is clearly better, the nearest exemplar answers.
+    inverse = LocalProcess(memory, noise=environment.outcome_noise); estimate = inverse(context, goal)
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from sgimd_torch.inverses.gaussian_process import Kernel, Process, choose_kernel, fit_lengths
+from sgimd_torch.inverses.local import NearestNeighbour
+from sgimd_torch.inverses.locally_linear import LocallyLinear
+from sgimd_torch.memory import Memory
+from sgimd_torch.memory.neighbours import PolicyNeighbours, Rows, Table
+from sgimd_torch.spaces import Array, Estimate, stream
+
+_FIRST, _GROWTH = 16, 1.5  # exemplars at the first fit, and how many times more at each later one
+_FITTED: Final = 300  # exemplars, drawn from all, that lengths are fitted to
+_GROUPS, _GROUP = 8, 60  # groups of neighbours that the kernel is chosen by, and exemplars in each
+_NEAR: Final = 20  # outcomes near the goal that the process learns from, and that its surprise is measured on
+_LEARNT: Final = 100  # exemplars that the process learns from
+_STARTS, _STEPS = 3, 4  # exemplars that steps begin at, and steps from each
+_DAMPINGS: Final = (1e-3, 0.1, 1.0, 10.0)
+_CLEARLY: Final = 0.8  # of the squared error expected of the nearest exemplar: what a candidate has to be below
+
+
+class LocalProcess:
+    """The inverse model; it only reads, draws nothing, and depends on the memory alone.
+
+    Lengths and kernel are fitted anew when the memory has grown by half, so a call never passes over the memory. Units
+    do not matter. The answer is clipped to the box around all that was ever executed.
+
+    Args:
+        memory: of the learner.
+        noise: standard deviation of each outcome dimension, ``outcome_noise`` of the environment.
+
+    Raises:
+        ValueError: ``noise`` is negative or not finite.
+    """
+
+    def __init__(self, memory: Memory, *, noise: float = 0.0) -> None:
+        if not 0 <= noise < np.inf:
+            raise ValueError(f"noise must be a standard deviation, finite and >= 0, got {noise}")
+        self.memory, self.noise = memory, noise
+        self._nearest, self._linear = NearestNeighbour(memory, _NEAR), LocallyLinear(memory)
+        self._fitted = 0  # exemplars at the last fit
+        self._kernel: Kernel | None = None  # None: outcomes are all the same
+
+    def __call__(self, context: Array, goal: Array) -> Estimate:
+        """The answer, and the exemplars of the nearest outcomes, nearest first.
+
+        Raises:
+            RuntimeError: the memory is empty.
+        """
+        estimate = self._nearest(context, goal)
+        self._catch_up()
+        if self._kernel is None:
+            return estimate
+        near = self.memory.near_outcomes(context, goal, _NEAR)
+        rows = self._neighbours(near)
+        outcomes = self.memory.outcomes[rows]
+        process = Process(self._inputs.keys.rows[rows], outcomes, self._kernel)
+        chosen = np.arange(len(near))  # of rows, which begin with these
+        if self.memory.context_dim:
+            expected, variances = process.predict(self._in_lengths(context, self.memory.thetas[near]))
+        else:
+            expected, variances = process.without_noise(chosen)
+        # Two corrections to how sure it is: by what it was surprised by here, and because a process with a length for
+        # each of many inputs, fitted to few movements, is wrong just where it looks for the best.
+        dim, n = len(self._lengths), len(self.memory)
+        doubt = len(goal) * max(1.0, process.surprise(chosen)) * (1 + dim**2 / n)
+        exemplars = ((expected - goal) ** 2).sum(axis=1) + doubt * variances
+        best = int(exemplars.argmin())
+        linear = self._linear(context, goal).theta[None]
+        candidates = [
+            (float(exemplars[best]), estimate.thetas[best]),
+            (float(self._expected_error(process, context, goal, doubt, linear)[0]), linear[0]),
+            *(self._descend(process, context, goal, doubt, theta) for theta in estimate.thetas[:_STARTS]),
+        ]
+        error, theta = min(candidates, key=lambda candidate: candidate[0])
+        return estimate._replace(theta=theta) if error < _CLEARLY * exemplars[0] else estimate
+
+    def _descend(
+        self, process: Process, context: Array, goal: Array, doubt: float, theta: Array
+    ) -> tuple[float, Array]:
+        """Damped Gauss-Newton steps from ``theta``: the least expected squared error, and where. They are as short as
+        possible in theta, so what hardly matters hardly changes."""
+        least = np.inf
+        for _ in range(_STEPS):
+            here = self._in_lengths(context, theta[None])
+            ahead = goal - process.predict(here)[0][0]
+            jacobian = process.jacobian(here[0])[:, : len(theta)] / self._lengths[: len(theta)]
+            square = jacobian @ jacobian.T
+            size = np.trace(square) / len(goal) + 1e-300
+            steps = [jacobian.T @ np.linalg.solve(square + d * size * np.eye(len(goal)), ahead) for d in _DAMPINGS]
+            spread = self._spreads[: len(theta)]
+            tried = np.clip(theta + spread * np.array(steps), *self.memory.theta_range)
+            errors = self._expected_error(process, context, goal, doubt, tried)
+            if not errors.min() < least:
+                break
+            least, theta = float(errors.min()), tried[errors.argmin()]
+        return least, theta
+
+    def _expected_error(self, process: Process, context: Array, goal: Array, doubt: float, thetas: Array) -> Array:
+        """``(m,)`` squared errors that the process expects of ``thetas`` ``(m, theta_dim)``, noise aside."""
+        expected, variances = process.predict(self._in_lengths(context, thetas))
+        errors: Array = ((expected - goal) ** 2).sum(axis=1) + doubt * variances
+        return errors
+
+    def _neighbours(self, near: Rows) -> Rows:
+        """Rows to learn from: those ``near`` the goal first, then those most like the first of them."""
+        keys = self._inputs.keys.rows[near[:_STARTS]]
+        alike = self._inputs.nearest(keys, min(_LEARNT, len(self.memory)))
+        rows = np.concatenate((near, np.stack(alike, axis=1).ravel()))
+        _, first = np.unique(rows, return_index=True)
+        found: Rows = rows[np.sort(first)[:_LEARNT]]
+        return found
+
+    def _catch_up(self) -> None:
+        """Take in new exemplars; fit anew when there are half as many again."""
+        n, wanted = len(self.memory), 0
+        size = float(_FIRST)
+        while size <= n:
+            wanted, size = int(size), size * _GROWTH
+        if wanted > self._fitted:
+            self._fit(wanted)
+        if self._kernel is not None and len(self._inputs.keys) < n:
+            self._inputs.keys.append(self._scaled(len(self._inputs.keys)))
+
+    def _fit(self, n: int) -> None:
+        """Fit lengths and kernel to the first ``n`` exemplars, whatever was added since."""
+        self._fitted, self._kernel = n, None
+        raw = np.concatenate((self.memory.thetas[:n], self.memory.contexts[:n]), axis=1)
+        outcomes = self.memory.outcomes[:n]
+        self._spreads = np.where(raw.std(axis=0) > 0, raw.std(axis=0), 1.0)
+        if not outcomes.std() > 0:
+            return
+        order = stream(n, "fit of a local process").permutation(n)
+        self._lengths = fit_lengths(raw[order[:_FITTED]] / self._spreads, outcomes[order[:_FITTED]])
+        self._inputs = PolicyNeighbours(Table(raw.shape[1]))
+        self._inputs.keys.append(self._scaled(0)[:n])
+        centres = self._inputs.keys.rows[order[:_GROUPS]]
+        groups = self._inputs.nearest(centres, min(_GROUP, n))
+        varied = [rows for rows in groups if np.ptp(outcomes[rows], axis=0).any()]
+        if varied:
+            inputs = self._inputs.keys.rows
+            self._kernel = choose_kernel([(inputs[rows], outcomes[rows]) for rows in varied], self.noise)
+
+    def _scaled(self, first: int) -> Array:
+        """Inputs from row ``first`` on, in lengths."""
+        raw = np.concatenate((self.memory.thetas[first:], self.memory.contexts[first:]), axis=1)
+        return raw / self._spreads / self._lengths
+
+    def _in_lengths(self, context: Array, thetas: Array) -> Array:
+        inputs = np.concatenate((thetas, np.tile(context, (len(thetas), 1))), axis=1)
+        scaled: Array = inputs / self._spreads / self._lengths
+        return scaled

@@ -1,0 +1,86 @@
+"""Does an environment keep every promise? Each slip is one line: what was found, and the likely cause.
+
+An environment is named as for sgimd run --environment: a word of the catalogue, or package.module:attribute for one of
+your own, a class or a function that returns an environment or a Task; packages of the working directory are found.
+Tried are some random movements and two corners of Pi (policies):
+
+  contexts, policies, outcomes    are Boxes, and rest lies in outcomes
+  observe, execute                give float64 arrays of the right shape, draw from their rng alone, and change nothing
+                                  that they were given or gave before
+  nothing carries over            the same movement with an equal stream ends in the same place, whatever came before
+  outcome_noise                   is 0 if and only if outcomes never scatter, and not ten times too large or small
+  execute_many                    if there is one: each row equals execute to the last bit
+  what is no movement             is refused with a ValueError
+  a Task                          its goals lie in T, and its demonstrations can be translated
+
+Examples:
+  sgimd check mypackage.toss:make
+  sgimd check fishing-rod --movements 20
+
+Exit code: 0 it keeps them all, 2 it does not.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Sequence
+
+from sgimd_torch.environments.check import check_environment
+from sgimd_torch.environments.protocol import execute_many
+from sgimd_torch.runs.build import task_of
+from sgimd_torch.runs.config import Config
+from sgimd_torch.runs.tasks import Task, benchmark_of, demonstrations_of
+from sgimd_torch.spaces import check_count, stream
+
+TIMED = 20  # movements
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Print what was tried; the exit code, 0.
+
+    Raises:
+        ValueError: there is no such environment, or it breaks a promise.
+    """
+    parser = argparse.ArgumentParser(
+        prog="sgimd check", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("environment", metavar="ENVIRONMENT", help="fishing-rod, or mypackage.toss:make")
+    parser.add_argument("--movements", type=int, default=3, metavar="N", help="random movements to try (default: 3)")
+    options = parser.parse_args(argv)
+    check_count("--movements", options.movements, 1)
+    config = Config(environment=options.environment)
+    try:
+        task = task_of(config)
+    except (ValueError, OSError):
+        raise
+    except Exception as error:  # whatever the user's code does
+        why = f"{type(error).__name__}: {error}"
+        raise ValueError(f"environment {options.environment} cannot be made: {why}") from error
+    check_environment(task.environment, movements=options.movements)
+    for line in (f"{type(task.environment).__name__} keeps every promise", *_sizes(task), *_lessons(task)):
+        print(line)
+    return 0
+
+
+def _sizes(task: Task) -> list[str]:
+    robot = task.environment
+    rngs = [stream(k, "check") for k in range(TIMED)]
+    contexts, thetas = [robot.observe(rng) for rng in rngs], [robot.policies.sample(rng) for rng in rngs]
+    begun = time.perf_counter()
+    execute_many(robot, contexts, thetas, rngs)
+    milliseconds = 1e3 * (time.perf_counter() - begun) / TIMED
+    dims = f"context {robot.contexts.dim}, theta {robot.policies.dim}, outcome {robot.outcomes.dim}"
+    goals, notes, _ = benchmark_of(task, None)
+    return [
+        f"  dimensions: {dims}; {milliseconds:.3g} ms a movement, {TIMED} together",
+        f"  goals of evaluation: {len(goals.goals)}",
+        *(f"  {note}" for note in notes),
+    ]
+
+
+def _lessons(task: Task) -> list[str]:
+    if task.demonstrations is None:
+        return ["  demonstrations: none"]
+    shown, notes, _ = demonstrations_of(task, None)
+    return [f"  demonstrations: {len(shown)}", *(f"  {note}" for note in notes)]

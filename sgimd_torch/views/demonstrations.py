@@ -1,0 +1,231 @@
+"""Demonstrations: are they right for a robot? And how do they get here from other files?
+
+  check    a table with a line for each recording: what it says and where it lands on the simulated robot, how far it is
+           from what the robot can play, what lies outside its limits; --figure draws the curves and the places
+  import   recordings in CSV or in a LeRobot dataset (v3) become a file for sgimd run --demonstrations
+
+SOURCE is a file that save_demonstrations wrote (.npz); a CSV file or a folder of them, one for each recording; or the
+folder of a LeRobot dataset. All but the first need the names of the columns; a column may be a vector, as in LeRobot:
+observation.state is all its entries, observation.state[0:6] some. The outcome is read in the last row of a recording,
+the context in the first.
+
+Examples:
+  sgimd demonstrations check shown.npz --task fishing-rod --figure shown.png
+  sgimd demonstrations check recordings --task mypackage.toss:make --joints shoulder,elbow --outcome x,y
+  sgimd demonstrations import datasets/my_arm --joints observation.state[0:6] --outcome observation.place[0:2]
+      --time timestamp --recording episode_index --degrees --out shown.npz
+
+Exit code: 0 each recording can be used, 2 some cannot, or the request is wrong.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
+from sgimd_torch.demonstrations.columns import Columns, read_csv
+from sgimd_torch.environments.protocol import Environment
+from sgimd_torch.runs.build import task_of
+from sgimd_torch.runs.config import Config
+from sgimd_torch.runs.tasks import Task, correspondence_of
+from sgimd_torch.spaces import Array, Demonstration, stream
+
+
+@dataclass(frozen=True, eq=False)
+class Checked:
+    """One recording on a robot.
+
+    ``theta`` and ``lands`` ``(outcome_dim,)`` are None if it cannot be translated; ``refused`` says why. ``misfit`` is
+    NaN where the task cannot tell. ``remarks`` say what lies outside a limit.
+    """
+
+    shown: Demonstration
+    theta: Array | None
+    lands: Array | None
+    misfit: float
+    remarks: list[str]
+    refused: str = ""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Check or import; the exit code, 0.
+
+    Raises:
+        ValueError: the source cannot be read, or the robot cannot use all of it.
+        OSError: a file cannot be read or written.
+    """
+    parser = argparse.ArgumentParser(
+        prog="sgimd demonstrations", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    commands = parser.add_subparsers(dest="command", required=True, metavar="check|import")
+    for name in ("check", "import"):
+        each = commands.add_parser(name, description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+        each.add_argument("source", type=Path, metavar="SOURCE")
+        for option in ("joints", "outcome", "context"):
+            each.add_argument(f"--{option}", type=_names, default=(), metavar="COLUMN,COLUMN")
+        each.add_argument("--time", metavar="COLUMN", help="seconds (default: time; of a LeRobot dataset: timestamp)")
+        each.add_argument(
+            "--recording", metavar="COLUMN", help="number or name of the recording (of LeRobot: episode_index)"
+        )
+        each.add_argument("--degrees", action="store_true", help="joints are in degrees")
+        if name == "check":
+            each.add_argument("--task", required=True, metavar="ENVIRONMENT", help="as sgimd run --environment")
+            each.add_argument(
+                "--figure", type=Path, metavar="FILE.png", help="draw curves and places (needs extra plot)"
+            )
+        else:
+            each.add_argument("--out", type=Path, required=True, metavar="FILE.npz")
+    options = parser.parse_args(argv)
+    shown = read(options)
+    if options.command == "import":
+        save_demonstrations(options.out, shown)
+        print(f"{options.out}: {len(shown)} recordings, {shown[0].trajectory.shape[1]} joints")
+        return 0
+    task = task_of(Config(environment=options.task))
+    found = [check(task, each, row) for row, each in enumerate(shown)]
+    print("\n".join(table(found)))
+    if options.figure is not None:
+        try:  # matplotlib is loaded only when it is needed
+            from sgimd_torch.figures.demonstrations import draw
+            from sgimd_torch.figures.save import save_figure
+        except ModuleNotFoundError as error:
+            raise ImportError(f"--figure needs {error.name}: pip install 'sgimd-torch[plot]'") from error
+
+        if options.figure.suffix not in (".png", ".svg", ".pdf"):
+            raise ValueError(f"--figure must end in .png, .svg or .pdf, got {options.figure}")
+        played = [None if each.theta is None else playing(task.environment, each) for each in found]
+        places = [each.lands for each in found]
+        stem = options.figure.with_suffix("")
+        save_figure(lambda: draw(shown, played, places), stem, options.figure.suffix[1:])
+    refused = [row for row, each in enumerate(found) if each.refused]
+    if refused:
+        first = f"the first is recording {refused[0]}: {found[refused[0]].refused}"
+        raise ValueError(f"{len(refused)} of {len(found)} recordings of {options.source} cannot be used; {first}")
+    return 0
+
+
+def read(options: argparse.Namespace) -> list[Demonstration]:
+    """The recordings of the source, whatever kind it is.
+
+    Raises:
+        ValueError: see the readers; or columns are not named.
+        OSError: there is no such source.
+    """
+    source: Path = options.source
+    if not source.exists():
+        raise FileNotFoundError(f"there is no {source}")
+    if source.suffix == ".npz":
+        return load_demonstrations(source)
+    if not options.joints or not options.outcome:
+        raise ValueError(f"{source} is no .npz file, so name its columns: --joints COLUMN,... --outcome COLUMN,...")
+    is_dataset = (source / "meta").is_dir()
+    columns = Columns(
+        options.joints,
+        options.outcome,
+        options.context,
+        options.time or ("timestamp" if is_dataset else "time"),
+        options.recording or ("episode_index" if is_dataset else None),
+        options.degrees,
+    )
+    if not is_dataset:
+        return read_csv(source, columns)
+    from sgimd_torch.demonstrations.lerobot import read_lerobot  # pyarrow is loaded only when it is needed
+
+    return read_lerobot(source, columns)
+
+
+def check(task: Task, shown: Demonstration, row: int) -> Checked:
+    """One recording, translated and executed on the task's robot with a noise of its own."""
+    robot = task.environment
+    remarks = _remarks(robot, shown)
+    try:
+        for name, box, point in (
+            ("context", robot.contexts, shown.context),
+            ("outcome", robot.outcomes, shown.outcome),
+        ):
+            if point.shape != (box.dim,):
+                raise ValueError(f"its {name} has {point.size} numbers, the robot's has {box.dim}")
+        context = robot.contexts.check("its context", shown.context)
+        theta = correspondence_of(task)(shown.times, shown.trajectory)
+        theta = robot.policies.check("theta_d of the correspondence", theta)
+        misfit = float("nan") if task.misfit is None else task.misfit(shown)
+    except ValueError as error:
+        return Checked(shown, None, None, float("nan"), remarks, str(error))
+    lands = robot.execute(context, theta.copy(), stream(row, "demonstrations check"))
+    return Checked(shown, theta, lands, misfit, remarks)
+
+
+def table(found: Sequence[Checked]) -> list[str]:
+    """A line for each recording, and their summary."""
+    heads = ("recording", "lasts (s)", "samples", "says", "lands", "apart", "misfit", "remarks")
+    cells = [heads]
+    for row, each in enumerate(found):
+        lands, apart = "-", "-"
+        if each.lands is not None:
+            lands, apart = _point(each.lands), f"{np.linalg.norm(each.lands - each.shown.outcome):.3f}"
+        misfit = "-" if np.isnan(each.misfit) else f"{each.misfit:.3f}"
+        remarks = "; ".join([*([f"cannot be used: {each.refused}"] if each.refused else []), *each.remarks])
+        lasts = f"{each.shown.times[-1] - each.shown.times[0]:.3g}"
+        cells.append(
+            (str(row), lasts, str(len(each.shown.times)), _point(each.shown.outcome), lands, apart, misfit, remarks)
+        )
+    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+    lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in cells]
+    apart_by = np.array([np.linalg.norm(each.lands - each.shown.outcome) for each in found if each.lands is not None])
+    if len(apart_by):
+        remarked = sum(bool(each.remarks) for each in found)
+        lines.append(
+            f"{len(apart_by)} of {len(found)} can be used; they land {np.median(apart_by):.3f} (median), "
+            f"{apart_by.max():.3f} (most) from where they say; {remarked} have remarks"
+        )
+    return lines
+
+
+def playing(robot: Environment, each: Checked) -> Array | None:
+    """``(n_times, n_joints)`` that the robot plays in the place of a recording; None for one that cannot tell."""
+    player = _player(robot)
+    if player is None or each.theta is None:
+        return None
+    played: Array = player.at(each.theta, np.asarray(each.shown.times - each.shown.times[0]))
+    return played if played.shape == each.shown.trajectory.shape else None
+
+
+def _player(robot: Environment) -> Any:
+    """What turns theta into joint angles or commands: ``primitive`` or ``controller`` of a robot that has one."""
+    player = getattr(robot, "primitive", None) or getattr(robot, "controller", None)
+    return player if hasattr(player, "at") else None
+
+
+def _remarks(robot: Environment, shown: Demonstration) -> list[str]:
+    """What lies outside the limits of the robot, as far as it tells them."""
+    remarks, player = [], _player(robot)
+    box = getattr(player, "joints", getattr(player, "commands", None))
+    if box is not None and shown.trajectory.ndim == 2 and shown.trajectory.shape[1] == box.dim:
+        outside = (shown.trajectory < box.low) | (shown.trajectory > box.high)
+        for joint in np.flatnonzero(outside.any(axis=0)):
+            sample = int(outside[:, joint].argmax())
+            remarks.append(
+                f"joint {joint} is {shown.trajectory[sample, joint]:.3g} at sample {sample}, its range "
+                f"[{box.low[joint]:g}, {box.high[joint]:g}]"
+            )
+    shortest, longest = getattr(player, "durations", (0.0, getattr(player, "duration", np.inf)))
+    lasts = float(shown.times[-1] - shown.times[0])
+    if not shortest * (1 - 1e-9) <= lasts <= longest * (1 + 1e-9):
+        remarks.append(f"too {'fast' if lasts < shortest else 'long'}: movements last {shortest:g} to {longest:g} s")
+    if shown.outcome.shape == (robot.outcomes.dim,) and not robot.outcomes.contains(shown.outcome):
+        remarks.append("its outcome is outside T: it is imitated, but never a goal")
+    return remarks
+
+
+def _point(point: Array) -> str:
+    return f"({', '.join(f'{x:.3g}' for x in point)})"
+
+
+def _names(text: str) -> tuple[str, ...]:
+    return tuple(name.strip() for name in text.split(",") if name.strip())

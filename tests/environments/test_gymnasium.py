@@ -1,0 +1,287 @@
+"""Both directions of gymnasium: its environments keep our promises, ours pass its own check; the swimmer is a task."""
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+from sgimd_torch.algorithms import sagg_riac
+from sgimd_torch.environments.check import check_environment
+from sgimd_torch.environments.controllers import Knots, Sinusoids
+from sgimd_torch.environments.from_gymnasium import FromGymnasium, make_world, measured_noise
+from sgimd_torch.environments.motor_primitives import GaussianPrimitive
+from sgimd_torch.environments.planar_arm import PlanarArm
+from sgimd_torch.environments.protocol import SimulationError
+from sgimd_torch.environments.swimmer import Swimmer
+from sgimd_torch.environments.to_gymnasium import ToGymnasium
+from sgimd_torch.runs.build import task_of
+from sgimd_torch.runs.config import Config
+from sgimd_torch.runs.tasks import benchmark_of, demonstrations_of
+from sgimd_torch.session import run
+from sgimd_torch.spaces import Box, Demonstration, stream
+
+PUSHES = Box.cube(-1, 1, 2)
+NO_CONTEXT = np.zeros(0)
+SPACE = gymnasium.spaces.Box(-np.inf, np.inf, (2,), np.float64)
+
+
+class Sled(gymnasium.Env):
+    """A point on ice, pushed for .1 s by each action; a goal environment. It starts up to .1 m away from its middle."""
+
+    dt = 0.1
+
+    def __init__(self, *, ends_at=np.inf, noise=0.1):
+        self.action_space = gymnasium.spaces.Box(-1, 1, (2,), np.float32)
+        self.observation_space = gymnasium.spaces.Dict(
+            dict.fromkeys(("observation", "achieved_goal", "desired_goal"), SPACE)
+        )
+        self.ends_at, self.noise, self.actions = ends_at, noise, []
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        self.place, self.speed = self.np_random.uniform(-self.noise, self.noise, 2), np.zeros(2)
+        self.actions = []
+        return self.seen(), {}
+
+    def step(self, action):
+        assert self.action_space.contains(action)
+        self.actions.append(action.copy())
+        self.speed += self.dt * action
+        self.place += self.dt * self.speed
+        return self.seen(), 0.0, bool(np.linalg.norm(self.place) > self.ends_at), False, {}
+
+    def seen(self):
+        return {"observation": self.speed, "achieved_goal": self.place, "desired_goal": np.zeros(2)}  # its own buffers
+
+
+def sled(controller=None, *, world=None, **options):
+    controller = Knots(PUSHES, 2.0, n_knots=3) if controller is None else controller
+    settings = {"outcomes": Box.cube(-3, 3, 2), "rest": np.zeros(2), "outcome_noise": 0.06, "steps": 20}
+    return FromGymnasium(Sled() if world is None else world, controller, **{**settings, **options})
+
+
+class Brake:
+    """A policy of the user's: it pushes towards a place, and brakes."""
+
+    policies = Box.cube(-1, 1, 2)
+
+    def act(self, theta, observation, time):
+        return 2 * (theta - observation["achieved_goal"]) - 3 * observation["observation"]
+
+
+@pytest.mark.parametrize(
+    "controller",
+    [
+        Knots(PUSHES, 2.0, n_knots=3),
+        Sinusoids(PUSHES, (0.2, 2.0)),
+        GaussianPrimitive(PUSHES, (1.0, 2.0)),
+        Brake(),
+    ],
+    ids=lambda each: type(each).__name__,
+)
+def test_an_environment_of_gymnasium_keeps_every_promise_with_every_controller(controller):
+    noise = 0.06 if not isinstance(controller, Brake) else 0.02
+    check_environment(sled(controller, outcome_noise=noise))
+
+
+def test_a_movement_is_an_episode_of_the_controllers_commands():
+    robot = sled(world=Sled(noise=0.0))
+    theta = np.array([1.0, 1.0, 1.0, 0.5, 0.5, 0.5])  # full to the right, nothing upwards
+    outcome = robot.execute(NO_CONTEXT, theta, stream(0, "any"))
+    np.testing.assert_allclose(outcome, [0.1 * 0.1 * 20 * 21 / 2, 0.0], atol=1e-12)  # the sum of speeds .1, .2 .. 2
+    assert np.array(robot.world.actions).tolist() == [[1.0, 0.0]] * 20
+
+
+def test_a_policy_of_the_users_sees_what_it_does():
+    outcome = sled(Brake(), steps=100).execute(NO_CONTEXT, [0.5, -0.5], stream(0, "any"))
+    np.testing.assert_allclose(outcome, [0.5, -0.5], atol=0.01)
+
+
+def test_an_episode_ends_when_the_world_says_so():
+    robot = sled(world=Sled(ends_at=0.5, noise=0.0))
+    outcome = robot.execute(NO_CONTEXT, np.ones(6), stream(0, "any"))
+    assert 0.5 < np.linalg.norm(outcome) < 0.8
+
+
+def test_an_outcome_may_be_a_slice_or_any_function_of_what_was_observed():
+    class Flat(Sled):
+        def seen(self):
+            return np.concatenate((self.place, self.speed))
+
+    robot = sled(world=Flat(), outcome=slice(2, 4))
+    assert robot.execute(NO_CONTEXT, np.full(6, 0.5), stream(0, "any")).tolist() == [0.0, 0.0]
+    farthest = sled(world=Flat(), outcome=lambda seen: np.max(seen, axis=0)[:2])
+    assert farthest.execute(NO_CONTEXT, np.full(6, 0.5), stream(0, "any")).shape == (2,)
+    with pytest.raises(ValueError, match="outcome= is needed: observations are no dict with achieved_goal"):
+        sled(world=Flat()).execute(NO_CONTEXT, np.full(6, 0.5), stream(0, "any"))
+
+
+def place(world, context):
+    world.unwrapped.place[:] = context
+    return world.unwrapped.seen()
+
+
+def start(observation):
+    return observation["achieved_goal"]
+
+
+def test_a_context_is_read_off_the_first_observation_and_every_movement_begins_in_it():
+    robot = sled(contexts=Box.cube(-0.1, 0.1, 2), context=start, place=place, outcome_noise=0.0)
+    check_environment(robot)
+    context = robot.observe(stream(3, "context"))
+    still = np.full(6, 0.5)
+    assert robot.execute(context, still, stream(1, "any")).tolist() == context.tolist()
+    learner = sagg_riac(robot, 0)
+    assert len(list(run(learner, robot, 0, movements=30))) == 30
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: sled(contexts=Box.cube(-0.1, 0.1, 2), context=start), "contexts need context=, .* and place="),
+        (lambda: sled(rest=[9.0, 9.0]), "rest of the environment must lie in its box"),
+        (lambda: sled(rest=[0.0]), r"rest must have shape \(..., 2\)"),
+        (
+            lambda: sled(world=gymnasium.make("CartPole-v1")),
+            r"needs continuous actions, .* Discrete\(2\)",
+        ),
+        (lambda: sled(world=gymnasium.make("MountainCarContinuous-v0")), "needs dt > 0, .* this world does not say it"),
+        (lambda: sled(steps=0), "steps must be a whole number >= 1"),
+        (lambda: make_world("Swimmer-v55"), "Swimmer-v55 cannot be made"),
+    ],
+)
+def test_what_cannot_be_a_task_is_refused(make, message):
+    with pytest.raises(ValueError, match=message):
+        make()
+
+
+def test_a_place_that_leads_elsewhere_is_told():
+    robot = sled(contexts=Box.cube(-0.1, 0.1, 2), context=start, place=lambda world, context: place(world, context / 2))
+    with pytest.raises(ValueError, match=r"place= led to the context \[0.05, 0.05\], \[0.1, 0.1\] was wanted"):
+        robot.execute([0.1, 0.1], np.full(6, 0.5), stream(0, "any"))
+    beyond = sled(contexts=Box.cube(-0.01, 0.01, 2), context=start, place=place)
+    with pytest.raises(ValueError, match="context of an observation must lie in its box"):
+        beyond.observe(stream(0, "context"))
+
+
+def test_a_world_that_diverges_names_the_theta():
+    class Breaking(Sled):
+        def step(self, action):
+            self.place *= np.nan
+            return super().step(action)
+
+    with pytest.raises(SimulationError, match=r"not finite; theta=\[0.5, "):
+        sled(world=Breaking()).execute(NO_CONTEXT, np.full(6, 0.5), stream(0, "any"))
+
+
+def test_the_noise_of_resets_is_measured():
+    found = measured_noise(sled(), stream(0, "any"), movements=200)
+    assert found == pytest.approx(0.1 / np.sqrt(3), rel=0.1)  # the uniform start is the only noise
+
+
+@pytest.mark.parametrize("arm", [PlanarArm(3), PlanarArm(noise=0.02, context=True)], ids=["arm", "contexts and noise"])
+@pytest.mark.filterwarnings(
+    "ignore:.*Box observation space m.*imum value is.*infinity", "ignore:.*Not able to test alternative render modes"
+)
+def test_our_environments_pass_gymnasiums_own_check(arm):
+    check_env(ToGymnasium(arm))
+
+
+def test_an_episode_of_ours_is_one_movement_whose_reward_is_the_distance_to_the_goal():
+    arm = PlanarArm(3)
+    world = ToGymnasium(arm)
+    observation, _ = world.reset(seed=3, options={"goal": [0.5, 0.5]})
+    assert observation["desired_goal"].tolist() == [0.5, 0.5]
+    assert observation["achieved_goal"].tolist() == arm.rest.tolist()
+    observation, reward, terminated, truncated, info = world.step(arm.solve(NO_CONTEXT, [0.5, 0.5]))
+    assert (terminated, truncated, info["is_success"]) == (True, False, True)
+    np.testing.assert_allclose(observation["achieved_goal"], [0.5, 0.5], atol=1e-9)
+    assert reward == pytest.approx(world.compute_reward(observation["achieved_goal"], [0.5, 0.5]))
+    rewards = world.compute_reward(np.zeros((4, 2)), np.ones((4, 2)), [{}] * 4)
+    np.testing.assert_allclose(rewards, -np.sqrt(2))
+    with pytest.raises(RuntimeError, match="an episode is one movement"):
+        world.step(np.full(3, 0.5))
+
+
+def test_goals_and_contexts_of_ours_come_from_the_seed_or_from_the_caller():
+    arm = PlanarArm(3, context=True)
+    world = ToGymnasium(arm, goals=[[0.5, 0.0], [0.0, 0.5]])
+    goals = {tuple(world.reset(seed=seed)[0]["desired_goal"].tolist()) for seed in range(20)}
+    assert goals == {(0.5, 0.0), (0.0, 0.5)}
+    assert world.reset(options={"context": [0.3]})[0]["observation"].tolist() == [0.3]
+    for options in ({"goal": [5.0, 0.0]}, {"context": [5.0]}, {"goal": [0.0]}):
+        with pytest.raises(ValueError, match=r"goal|context"):
+            world.reset(options=options)
+    world.reset()
+    with pytest.raises(ValueError, match="theta must lie in its box"):
+        world.step([2.0, 0.5, 0.5])
+
+
+def test_ours_and_theirs_are_the_same_when_one_is_put_into_the_other():
+    arm = PlanarArm(3)
+    back = FromGymnasium(
+        ToGymnasium(arm), Angles(), outcomes=arm.outcomes, rest=arm.rest, outcome_noise=0, steps=1, dt=1.0
+    )
+    check_environment(back)
+    theta = arm.policies.sample(stream(0, "theta"))
+    there, here = (each.execute(NO_CONTEXT, theta, stream(0, "any")) for each in (back, arm))
+    assert there.tolist() == here.tolist()
+
+
+def test_a_recording_that_no_controller_can_play_is_refused():
+    with pytest.raises(ValueError, match="Brake cannot translate recorded actions"):
+        sled(Brake()).misfit(Demonstration(NO_CONTEXT, np.arange(3.0), np.zeros((3, 2)), np.zeros(2)))
+
+
+class Angles:
+    """The action is theta itself."""
+
+    policies = Box.cube(0, 1, 3)
+
+    def at(self, theta, times):
+        return np.tile(theta, (len(times), 1))
+
+
+@pytest.fixture(scope="module")
+def swimmer():
+    return Swimmer()
+
+
+def test_the_swimmer_keeps_every_promise(swimmer):
+    check_environment(swimmer)
+
+
+def test_a_swimmer_that_starts_alike_scatters_not_at_all():
+    still = Swimmer(start=0.0)
+    assert still.outcome_noise == 0
+    check_environment(still, movements=1)
+
+
+def test_the_noise_of_the_swimmer_is_as_announced(swimmer):
+    assert measured_noise(swimmer, stream(1001, "noise")) == pytest.approx(swimmer.outcome_noise, rel=0.25)
+
+
+def test_a_wave_along_its_body_moves_the_swimmer_and_the_opposite_one_moves_it_back():
+    still = Swimmer(start=0.0)
+    ahead, back = (still.execute(NO_CONTEXT, [1, 0, 0.5, 1, lag, 0.5, 0.25], stream(0, "any")) for lag in (0.25, 0.75))
+    assert np.linalg.norm(ahead) > 0.5
+    assert np.linalg.norm(back) > 0.5
+    assert ahead @ back < 0
+    assert np.linalg.norm(still.execute(NO_CONTEXT, [0, 0, 0.5, 0, 0, 0.5, 0.5], stream(0, "any"))) < 1e-9
+
+
+def test_the_swimmer_is_a_task_with_goals_and_demonstrations():
+    task = task_of(Config(environment="swimmer"))
+    benchmark, _, _ = benchmark_of(task, None)
+    assert len(benchmark.goals) > 100
+    shown, _, _ = demonstrations_of(task, None)
+    assert len(shown) == 100
+    assert 0 < max(map(task.misfit, shown)) < 0.3  # the hand shook
+    still = Swimmer(start=0.0)
+    for each in shown[:3]:
+        np.testing.assert_allclose(still.replay(each.trajectory), each.outcome, atol=1e-9)
+        theta = still.correspondence(each.times, each.trajectory)
+        landed = still.execute(NO_CONTEXT, theta, stream(0, "any"))
+        assert np.linalg.norm(landed - each.outcome) < 0.3
+    with pytest.raises(ValueError, match="needs 1 to 150 actions in rows"):
+        still.replay(np.zeros((151, 2)))

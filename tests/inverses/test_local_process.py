@@ -1,0 +1,177 @@
+"""The local Gaussian process: its laws, and an answer that is given only where it should beat the nearest exemplar."""
+
+import numpy as np
+import pytest
+
+from sgimd_torch.environments.toys import Toy, toss, two_elbows
+from sgimd_torch.inverses.gaussian_process import Kernel, Process, choose_kernel, fit_lengths
+from sgimd_torch.inverses.local import NearestNeighbour
+from sgimd_torch.inverses.local_process import LocalProcess
+from sgimd_torch.inverses.locally_linear import LocallyLinear
+from sgimd_torch.memory import Memory
+from sgimd_torch.spaces import Array, stream
+
+NO_CONTEXT = np.zeros(0)
+SMOOTH = Kernel(scale=1.0, finer=1.0, share=0.0, noise=1e-6)
+ROUGH = Kernel(scale=0.5, finer=4.0, share=0.3, noise=0.1)
+
+
+def remember(thetas: Array, outcomes: Array, contexts: Array | None = None) -> Memory:
+    contexts = np.zeros((len(thetas), 0)) if contexts is None else contexts
+    memory = Memory(contexts.shape[1], thetas.shape[1], outcomes.shape[1])
+    for exemplar in zip(contexts, thetas, outcomes, strict=True):
+        memory.add(*exemplar)
+    return memory
+
+
+def played(toy: Toy, n: int, seed: int = 0) -> Memory:
+    """Uniform movements, each in a context of its own, without noise."""
+    rng = stream(seed, "test process")
+    thetas = rng.uniform(size=(n, toy.policies.dim))
+    contexts = np.array([toy.observe(rng) for _ in range(n)]).reshape(n, toy.contexts.dim)
+    return remember(thetas, toy.effect(contexts, thetas), contexts)
+
+
+def waves(n: int = 30) -> tuple[Array, Array]:
+    inputs = stream(0, "waves").uniform(0, 3, (n, 2))
+    return inputs, np.stack([np.sin(inputs.sum(axis=1)), np.cos(inputs[:, 0])], axis=1)
+
+
+def test_without_noise_it_knows_what_it_was_given_and_far_away_only_the_mean() -> None:
+    inputs, outcomes = waves()
+    process = Process(inputs, outcomes, SMOOTH)
+    expected, variances = process.predict(inputs)
+    assert expected == pytest.approx(outcomes, abs=1e-3)
+    assert variances == pytest.approx(0, abs=1e-4 * process.variance)
+    expected, variances = process.predict(np.full((1, 2), 1e3))
+    assert expected[0] == pytest.approx(outcomes.mean(axis=0))
+    assert variances[0] == pytest.approx(process.variance)
+
+
+@pytest.mark.parametrize("kernel", [SMOOTH, ROUGH])
+def test_its_jacobian_is_the_slope_of_what_it_predicts(kernel: Kernel) -> None:
+    process = Process(*waves(), kernel)
+    point, step = np.array([1.3, 0.9]), 1e-5
+    ahead, back = (process.predict(point + sign * step * np.eye(2))[0] for sign in (1, -1))
+    assert process.jacobian(point) == pytest.approx(((ahead - back) / (2 * step)).T, rel=1e-4, abs=1e-5)
+
+
+def test_a_remembered_outcome_without_its_noise_is_what_the_process_predicts_there() -> None:
+    inputs, outcomes = waves()
+    process, rows = Process(inputs, outcomes, ROUGH), np.array([3, 7])
+    for mine, predicted in zip(process.without_noise(rows), process.predict(inputs[rows]), strict=True):
+        assert mine == pytest.approx(predicted)
+
+
+def test_surprise_is_the_error_of_predicting_each_from_all_others() -> None:
+    inputs, outcomes = waves()
+    outcomes -= outcomes.mean(axis=0)
+    process, rows = Process(inputs, outcomes, ROUGH), np.array([3, 7])
+    squared = []
+    for row in rows:
+        others = np.delete(np.arange(len(inputs)), row)
+        covariance = ROUGH(((inputs[:, None] - inputs) ** 2).sum(axis=2)) + ROUGH.noise * np.eye(len(inputs))
+        gains = np.linalg.solve(covariance[np.ix_(others, others)], covariance[others, row])
+        variance = process.variance * (covariance[row, row] - gains @ covariance[others, row])
+        squared.append(((outcomes[row] - gains @ outcomes[others]) ** 2).mean() / variance)
+    assert process.surprise(rows) == pytest.approx(np.mean(squared))
+
+
+def test_the_length_of_an_input_that_matters_is_the_shortest() -> None:
+    inputs = stream(0, "inputs").normal(size=(80, 4))
+    lengths = fit_lengths(inputs, np.sin(2 * inputs[:, 2:3]))
+    assert lengths.argmin() == 2
+    assert (np.delete(lengths, 2) > 3 * lengths[2]).all()
+
+
+@pytest.mark.parametrize("noise", [0.01, 0.3])
+def test_the_kernel_takes_about_as_much_for_noise_as_is_stated(noise: float) -> None:
+    rng = stream(0, "noisy")
+    inputs = rng.uniform(0, 3, (60, 2))
+    outcomes = np.sin(inputs.sum(axis=1, keepdims=True)) + rng.normal(0, noise, (60, 1))
+    kernel = choose_kernel([(inputs, outcomes)], noise)
+    assert noise / 3 < np.sqrt(kernel.noise * Process(inputs, outcomes, kernel).variance) < 3 * noise
+    assert choose_kernel([(inputs, outcomes)], 0.0).noise == 1e-6
+
+
+def errors(toy: Toy, memory: Memory, make: object, goals: Array, contexts: Array) -> Array:
+    inverse = make(memory)  # type: ignore[operator]
+    thetas = np.stack([inverse(context, goal).theta for context, goal in zip(contexts, goals, strict=True)])
+    distances: Array = np.linalg.norm(toy.effect(contexts, thetas) - goals, axis=1)
+    return distances
+
+
+def test_where_several_families_of_movements_lead_to_a_place_it_beats_the_nearest_and_the_linear() -> None:
+    toy = two_elbows()
+    memory, goals = played(toy, 300), played(toy, 40, seed=1).outcomes
+    process, nearest, linear = (
+        errors(toy, memory, make, goals, np.zeros((40, 0))).mean()
+        for make in (LocalProcess, NearestNeighbour, LocallyLinear)
+    )
+    assert process < 0.6 * min(nearest, linear)
+
+
+def test_in_a_context_that_never_came_it_beats_the_nearest() -> None:
+    toy = toss()
+    memory, asked = played(toy, 200), played(toy, 40, seed=1)
+    process, nearest = (
+        errors(toy, memory, make, asked.outcomes, asked.contexts).mean() for make in (LocalProcess, NearestNeighbour)
+    )
+    assert process < 0.4 * nearest
+
+
+def test_where_nothing_can_be_predicted_the_nearest_exemplar_answers() -> None:
+    rng = stream(0, "chaos")
+    memory = remember(rng.uniform(size=(200, 3)), rng.normal(size=(200, 2)))
+    inverse, nearest = LocalProcess(memory), NearestNeighbour(memory)
+    same = [
+        np.array_equal(inverse(NO_CONTEXT, g).theta, nearest(NO_CONTEXT, g).theta) for g in rng.normal(size=(30, 2))
+    ]
+    assert np.mean(same) > 0.9
+
+
+def test_stated_noise_is_averaged_out() -> None:
+    rng = stream(0, "noisy line")
+    thetas = rng.uniform(size=(300, 1))
+    memory = remember(thetas, thetas + rng.normal(0, 0.2, thetas.shape))
+    goals = np.linspace(0.2, 0.8, 30)
+    off = {
+        make: np.mean([abs(make(memory)(NO_CONTEXT, np.array([goal])).theta[0] - goal) for goal in goals])
+        for make in (NearestNeighbour, lambda memory: LocalProcess(memory, noise=0.2))
+    }
+    nearest, process = off.values()
+    assert process < 0.4 * nearest
+
+
+def test_units_do_not_matter() -> None:
+    toy = two_elbows()
+    memory, goals = played(toy, 120), played(toy, 5, seed=1).outcomes
+    other = LocalProcess(remember(memory.thetas * 7 + 3, memory.outcomes * 1000), noise=10.0)
+    inverse = LocalProcess(memory, noise=0.01)
+    for goal in goals:
+        theta = inverse(NO_CONTEXT, goal).theta
+        assert other(NO_CONTEXT, 1000 * goal).theta == pytest.approx(7 * theta + 3, abs=1e-3)
+
+
+def test_an_answer_depends_on_the_memory_and_not_on_when_it_was_asked() -> None:
+    whole = played(two_elbows(), 200)
+    memory, goal = remember(whole.thetas[:50], whole.outcomes[:50]), np.array([0.3, 0.2])
+    inverse = LocalProcess(memory)
+    inverse(NO_CONTEXT, goal)
+    for row in range(50, 200):
+        memory.add(NO_CONTEXT, whole.thetas[row], whole.outcomes[row])
+        if row % 40 == 0:
+            inverse(NO_CONTEXT, goal)
+    assert np.array_equal(inverse(NO_CONTEXT, goal).theta, LocalProcess(whole)(NO_CONTEXT, goal).theta)
+
+
+def test_outcomes_that_are_all_the_same_teach_it_nothing() -> None:
+    thetas = stream(0, "still").uniform(size=(40, 2))
+    inverse = LocalProcess(remember(thetas, np.ones((40, 2))))
+    assert inverse(NO_CONTEXT, np.zeros(2)).theta.tolist() == thetas[0].tolist()
+
+
+@pytest.mark.parametrize("noise", [-1.0, np.nan, np.inf])
+def test_noise_that_is_no_standard_deviation_is_refused(noise: float) -> None:
+    with pytest.raises(ValueError, match="noise must be"):
+        LocalProcess(Memory(0, 1, 1), noise=noise)

@@ -1,0 +1,382 @@
+"""A saved life is lived through again: every learner goes on as if it had never stopped; another one is refused."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+
+from sgimd_torch.algorithms import observation, random_exploration, sagg_riac, sgim_d
+from sgimd_torch.environments.planar_arm import PlanarArm
+from sgimd_torch.evaluation import evaluate
+from sgimd_torch.files import write_npz
+from sgimd_torch.forward_model.model import ForwardModel
+from sgimd_torch.goals.alp_gmm import AlpGmm
+from sgimd_torch.inverses.local import NearestNeighbour
+from sgimd_torch.inverses.locally_linear import LocallyLinear
+from sgimd_torch.learner import Learner, ReplayError
+from sgimd_torch.learner.life import Kind, read_life
+from sgimd_torch.memory import Memory
+from sgimd_torch.rivals.quality_diversity import cma_mae, cma_me, isoline, map_elites
+from sgimd_torch.searches.cma_es import cma_es
+from sgimd_torch.searches.through_model import gradient_search
+from sgimd_torch.session import run
+from sgimd_torch.spaces import Demonstration, Move, stream
+from sgimd_torch.strategies import Babble
+from sgimd_torch.teachers import PeriodicTeacher
+from worlds import ALGORITHMS, NO_CONTEXT, TAUGHT, demonstrate, demonstrations, last_posture
+
+ARM = PlanarArm(4, noise=0.02)
+TURNED = PlanarArm(4, noise=0.02, context=True)
+LEARNERS = {
+    **{name: (partial(build, ARM), name in TAUGHT, ARM) for name, build in ALGORITHMS.items()},
+    "map-elites": (partial(map_elites, ARM, first=20), False, ARM),
+    "cma-me": (partial(cma_me, ARM), False, ARM),
+    "isoline": (partial(isoline, ARM, first=20, again=0.2, correspondence=last_posture), True, ARM),
+    "alp-gmm and cma-es": (partial(sagg_riac, ARM, goals=AlpGmm, search=cma_es), False, ARM),
+    "contexts": (partial(sgim_d, TURNED, correspondence=last_posture), True, TURNED),
+}
+every_learner = pytest.mark.parametrize("name", LEARNERS)
+
+
+def teacher_for(name, seed=0):
+    _, taught, arm = LEARNERS[name]
+    if not taught:
+        return None
+    context = np.zeros(arm.contexts.dim)
+    shown = [demonstrate(arm, each.outcome, context) for each in demonstrations(PlanarArm(4))]
+    return PeriodicTeacher(shown, stream(seed, "teacher"), every=20)
+
+
+def line(episode):
+    move, outcome = episode.move, episode.outcome
+    return (
+        *(episode.index, episode.context.tobytes(), move and (move.theta.tobytes(), move.origin)),
+        *(outcome is not None and outcome.tobytes(), episode.demonstration and episode.demonstration.outcome.tobytes()),
+    )
+
+
+def step(robot, outcome=(0.1, 0.2)):
+    move = robot.ask(NO_CONTEXT)
+    if move is not None:
+        robot.tell(outcome)
+    return move
+
+
+@every_learner
+def test_a_loaded_learner_goes_on_as_if_it_had_never_stopped(name, tmp_path):
+    build, _, arm = LEARNERS[name]
+    whole, teacher = build(seed=1), teacher_for(name)
+    lines, saved = [], {}
+    for episode in run(whole, arm, 1, movements=130, teacher=teacher):
+        lines.append(line(episode))
+        if episode.index + 1 in (1, 23, 50, 77, 96):  # of which some are in the middle of an attempt
+            path = saved[episode.index + 1] = tmp_path / f"{episode.index}.npz"
+            whole.save(path)
+    for movements, path in saved.items():
+        learner, again = build(seed=1), teacher_for(name)
+        learner.load(path, teacher=again)
+        assert learner.movements == movements
+        rest = [line(episode) for episode in run(learner, arm, 1, movements=130, first=movements, teacher=again)]
+        assert rest == lines[movements:]
+        for part in ("contexts", "thetas", "outcomes"):
+            assert getattr(learner.memory, part).tobytes() == getattr(whole.memory, part).tobytes()
+        again_saved = tmp_path / "again.npz"
+        learner.save(again_saved)
+        whole.save(tmp_path / "whole.npz")
+        assert read_life(again_saved, learner.memory).memory_crc32 == read_life(again_saved, whole.memory).memory_crc32
+
+
+@every_learner
+def test_which_movement_reaches_a_goal_is_one_call_for_all_of_them(name):
+    build, _, arm = LEARNERS[name]
+    learner = build(seed=2)
+    for _ in run(learner, arm, 2, movements=60, teacher=teacher_for(name)):
+        pass
+    goal, context = np.array([0.3, 0.4]), np.zeros(arm.contexts.dim)
+    assert arm.policies.contains(learner.inverse(context, goal).theta)
+    found = evaluate(learner.inverse, arm, goal[None], seed=2, movements=60)
+    assert np.array_equal(found.thetas[0], LocallyLinear(learner.memory)(context, goal).theta)
+
+
+def test_the_builders_inverse_is_the_one_that_it_is_given():
+    for build in (partial(observation, correspondence=last_posture), random_exploration, sagg_riac):
+        assert isinstance(build(ARM, 0, inverse=NearestNeighbour).inverse, NearestNeighbour)
+    learner = sagg_riac(ARM, 0, inverse=NearestNeighbour)
+    assert learner.inverse is learner.autonomous.inverse
+
+
+def test_a_learner_that_was_interrupted_asked_in_vain_and_rested_is_the_same_again(tmp_path):
+    lesson = demonstrate(PlanarArm(4), [-0.5, 0.5])
+
+    def live(robot, moves):
+        for k in range(40):
+            if k == 9:
+                robot.watch(lesson)
+            if k % 7 == 3:
+                robot.ask(NO_CONTEXT)  # the simulation failed, say
+                robot.interrupt()
+            if k % 11 == 5:
+                robot.interrupt()
+            moves.append(step(robot, (0.01 * k, 0.2)))
+
+    whole, moves = sgim_d(ARM, 3, correspondence=last_posture), []
+    live(whole, moves)
+    whole.save(tmp_path / "life.npz")
+    kinds = {event.kind for event in read_life(tmp_path / "life.npz", whole.memory).events}
+    assert kinds == {Kind.MOVED, Kind.SHOWN, Kind.DROPPED, Kind.INTERRUPTED}
+    again = sgim_d(ARM, 3, correspondence=last_posture)
+    again.load(tmp_path / "life.npz")
+    assert again.movements == whole.movements == 40
+    for _ in range(30):
+        assert np.array_equal(step(again).theta, step(whole).theta)
+
+
+def test_a_movement_that_was_asked_for_and_not_told_is_asked_for_again(tmp_path):
+    robot, again = sagg_riac(ARM, 4), sagg_riac(ARM, 4)
+    for _ in range(10):
+        step(robot)
+    move = robot.ask(NO_CONTEXT)
+    robot.save(tmp_path / "life.npz")
+    again.load(tmp_path / "life.npz")
+    assert again.movements == 10
+    assert np.array_equal(again.ask(NO_CONTEXT).theta, move.theta)
+
+
+def test_a_learner_without_a_life_is_saved_and_loaded(tmp_path):
+    sagg_riac(ARM, 4).save(tmp_path / "life.npz")
+    again = sagg_riac(ARM, 5)  # it has not moved yet, so nobody can tell
+    again.load(tmp_path / "life.npz")
+    assert again.movements == 0
+
+
+@pytest.mark.slow
+def test_a_search_through_a_model_goes_on_when_the_model_is_refreshed_as_the_loop_did(tmp_path):
+    def build():
+        model = ForwardModel(0, 4, 2, members=2, seed=0)
+        return model, sagg_riac(ARM, 5, search=partial(gradient_search, model=model))
+
+    model, whole = build()
+    lines = []
+    for episode in run(whole, ARM, 5, movements=140):
+        lines.append(line(episode))
+        model.refresh(whole.memory, episode.move.goal)
+        if episode.index == 99:
+            whole.save(tmp_path / "life.npz")
+    assert model.trained
+    model, again = build()
+    again.load(tmp_path / "life.npz", after=lambda move: model.refresh(again.memory, move.goal))
+    rest = []
+    for episode in run(again, ARM, 5, movements=140, first=100):
+        rest.append(line(episode))
+        model.refresh(again.memory, episode.move.goal)
+    assert rest == lines[100:]
+
+
+@pytest.fixture
+def saved(tmp_path):
+    """A life of SGIM-D with 50 movements and 2 lessons."""
+    learner = sgim_d(ARM, 6, correspondence=last_posture)
+    for _ in run(learner, ARM, 6, movements=50, teacher=teacher_for("sgim-d")):
+        pass
+    learner.save(tmp_path / "life.npz")
+    return tmp_path / "life.npz"
+
+
+@pytest.mark.parametrize(
+    ("learner", "message"),
+    [
+        (
+            lambda: sgim_d(ARM, 7, correspondence=last_posture),
+            "movement 0 was recorded with another theta: theta_0 was",
+        ),
+        (
+            lambda: sgim_d(ARM, 6, correspondence=lambda times, trajectory: trajectory[0]),
+            "movement 20 was recorded with another theta",
+        ),
+        (
+            lambda: Learner(Memory(0, 4, 2), ALGORITHMS["observation"](ARM, 6).autonomous),
+            "movement 0 was recorded as a movement, the learner now rests",
+        ),
+        (
+            lambda: sgim_d(ARM, 6, correspondence=last_posture, memory=exemplars(3)),
+            r"life\.npz began with 0 exemplars in memory, this learner with 3",
+        ),
+    ],
+)
+def test_a_learner_that_would_have_moved_otherwise_is_refused(saved, learner, message):
+    with pytest.raises(ReplayError, match=message):
+        learner().load(saved)
+
+
+def exemplars(n, arm=ARM):
+    memory = Memory(0, arm.policies.dim, 2)
+    for k in range(n):
+        theta = arm.policies.sample(stream(k, "theta"))
+        memory.add(NO_CONTEXT, theta, arm.execute(NO_CONTEXT, theta, stream(k, "environment")))
+    return memory
+
+
+def test_a_teacher_that_shows_something_else_is_refused(saved):
+    learner = sgim_d(ARM, 6, correspondence=last_posture)
+    with pytest.raises(ReplayError, match="movement 20 a demonstration was shown, the teacher now offers another"):
+        learner.load(saved, teacher=teacher_for("sgim-d", seed=9))
+    teacher = teacher_for("sgim-d")
+    teacher.every = 10
+    with pytest.raises(ReplayError, match="before movement 10 nothing was shown, the teacher now offers a demonstr"):
+        sgim_d(ARM, 6, correspondence=last_posture).load(saved, teacher=teacher)
+
+
+def test_exemplars_that_were_added_by_hand_are_noticed(tmp_path):
+    robot = random_exploration(ARM, 8)
+    step(robot)
+    robot.memory.add(NO_CONTEXT, np.full(4, 0.5), [0.0, 0.0])
+    robot.save(tmp_path / "life.npz")
+    with pytest.raises(ReplayError, match="ended with another memory"):
+        random_exploration(ARM, 8).load(tmp_path / "life.npz")
+
+
+def test_only_a_learner_freshly_built_can_load(saved):
+    learner = sgim_d(ARM, 6, correspondence=last_posture)
+    step(learner)
+    with pytest.raises(RuntimeError, match="freshly built"):
+        learner.load(saved)
+
+
+def test_a_life_of_another_robot_and_other_files_are_refused(saved, tmp_path):
+    with pytest.raises(ValueError, match=r"thetas must be float64 \(50, 5\), got float64 \(50, 4\); .*another robot"):
+        sagg_riac(PlanarArm(5), 6).load(saved)
+    exemplars(3).save(tmp_path / "memory.npz")
+    with pytest.raises(ValueError, match=r"memory\.npz is no saved life: it lacks begun, kinds"):
+        sagg_riac(ARM, 6).load(tmp_path / "memory.npz")
+    with pytest.raises(FileNotFoundError):
+        sagg_riac(ARM, 6).load(tmp_path / "nothing.npz")
+    arrays = dict(np.load(saved))
+    for changes, message in (
+        ({"kinds": arrays["kinds"] + 5}, "events of an unknown kind"),
+        ({"kinds": arrays["kinds"].astype(float)}, "kinds must be integers"),
+        ({"thetas": arrays["thetas"][:-1]}, r"thetas must be float64 \(50, 4\)"),
+        ({"outcomes": arrays["outcomes"] * np.nan}, "outcomes must be finite"),
+        ({"lesson_times": arrays["lesson_times"][:-1]}, "lesson_times must be"),
+        ({"version": 2}, "has version 2, this library reads 1"),
+    ):
+        write_npz(tmp_path / "other.npz", {**arrays, **changes})
+        learner = sgim_d(ARM, 6, correspondence=last_posture)
+        with pytest.raises(ValueError, match=message):
+            learner.load(tmp_path / "other.npz")
+        assert learner.movements == 0
+
+
+def test_the_file_holds_no_pickle_and_nothing_but_what_happened(saved):
+    with np.load(saved, allow_pickle=False) as arrays:
+        assert sorted(arrays) == [
+            *("begun", "contexts", "kinds", "lesson_contexts", "lesson_lengths", "lesson_outcomes", "lesson_times"),
+            *("lesson_trajectories", "memory_crc32", "outcomes", "thetas", "version"),
+        ]
+        assert arrays["kinds"].tolist() == [0] * 20 + [3] + [0] * 20 + [3] + [0] * 10
+
+
+def test_lessons_that_differ_in_shape_cannot_be_saved_and_leave_the_old_file(tmp_path):
+    robot = observation(ARM, 0, correspondence=lambda times, trajectory: np.full(4, 0.5))
+    robot.save(tmp_path / "life.npz")
+    before = (tmp_path / "life.npz").read_bytes()
+    for n_joints in (2, 3):
+        robot.watch(Demonstration(NO_CONTEXT, np.arange(5.0), np.zeros((5, n_joints)), np.zeros(2)))
+    with pytest.raises(ValueError, match="differ in their number of joints"):
+        robot.save(tmp_path / "life.npz")
+    robot = observation(ARM, 0, correspondence=lambda times, trajectory: np.full(4, 0.5))
+    robot.watch(Demonstration(NO_CONTEXT, np.arange(5.0), np.zeros(5), np.zeros(2)))
+    with pytest.raises(ValueError, match=r"it needs \(n_times,\) times and a"):
+        robot.save(tmp_path / "life.npz")
+    assert (tmp_path / "life.npz").read_bytes() == before
+    assert len(list(tmp_path.iterdir())) == 1
+
+
+@pytest.mark.parametrize("build", [random_exploration, sagg_riac, map_elites, cma_me, cma_mae, isoline])
+def test_a_learner_starts_from_a_memory_and_leaves_it_as_it_was(build):
+    start = exemplars(30)
+    learner = build(ARM, 0, memory=start)
+    for _ in run(learner, ARM, 0, movements=25):
+        pass
+    assert len(learner.memory) == 55
+    assert len(start) == 30
+    assert np.array_equal(learner.memory.thetas[:30], start.thetas)
+
+
+def test_goal_babbling_from_a_memory_uses_it_at_its_first_movement():
+    empty, full = (next(run(sagg_riac(ARM, 0, memory=start), ARM, 0, movements=1)) for start in (None, exemplars(200)))
+    assert empty.move.origin == "global"
+    assert full.move.origin == "local"
+
+
+def test_map_elites_from_a_memory_varies_its_elites_at_once():
+    start = exemplars(40)
+    moves = [e.move.theta for e in run(map_elites(ARM, 0, memory=start, sd=0.01), ARM, 0, movements=10)]
+    nearest = [np.abs(start.thetas - theta).max(axis=1).min() for theta in moves]
+    assert max(nearest) < 0.06
+
+
+def test_demonstrations_become_a_memory_by_a_learner_that_watches_them():
+    watching = observation(ARM, 0, correspondence=last_posture)
+    for shown in demonstrations(PlanarArm(4)):
+        watching.watch(shown)
+    learner = sgim_d(ARM, 0, correspondence=last_posture, memory=watching.memory)
+    assert len(learner.memory) == 20
+
+
+def test_a_life_that_started_from_a_memory_is_loaded_by_one_that_starts_from_the_same(tmp_path):
+    whole = sagg_riac(ARM, 0, memory=exemplars(30))
+    for _ in range(10):
+        step(whole)
+    whole.save(tmp_path / "life.npz")
+    again = sagg_riac(ARM, 0, memory=exemplars(30))
+    again.load(tmp_path / "life.npz")
+    assert np.array_equal(step(again).theta, step(whole).theta)
+    with pytest.raises(ReplayError, match="began with 30 exemplars in memory, this learner with 0"):
+        sagg_riac(ARM, 0).load(tmp_path / "life.npz")
+
+
+def test_a_memory_of_another_robot_is_no_start():
+    with pytest.raises(ValueError, match=r"must have dims \(0, 4, 2\) of context, theta, outcome, got \(0, 5, 2\)"):
+        sagg_riac(ARM, 0, memory=exemplars(3, PlanarArm(5)))
+    memory = Memory(0, 4, 2)
+    memory.add(NO_CONTEXT, np.full(4, 1.5), [0.0, 0.0])
+    with pytest.raises(ValueError, match="thetas of a memory to start from must lie in its box"):
+        random_exploration(ARM, 0, memory=memory)
+
+
+@pytest.mark.parametrize(
+    ("theta_d", "message"),
+    [
+        (np.full(4, 1.5), "theta_d of the correspondence must lie in its box, but .* is 1.5 .*, outside"),
+        (np.full(5, 0.5), r"theta_d of the correspondence must have shape \(..., 4\), got \(5,\)"),
+        (np.full((1, 4), 0.5), r"theta_d of the correspondence must have shape \(4,\)"),
+        (np.full(4, np.nan), "theta_d of the correspondence must be finite"),
+    ],
+)
+@pytest.mark.parametrize("name", sorted(TAUGHT))
+def test_a_correspondence_that_leaves_pi_is_refused_where_it_enters(name, theta_d, message):
+    learner = ALGORITHMS[name](ARM, 0)
+    learner.correspondence = lambda times, trajectory: theta_d
+    with pytest.raises(ValueError, match=message):
+        learner.watch(demonstrate(PlanarArm(4), [0.5, 0.5]))
+    assert learner.idle
+    assert len(learner.memory) == 0
+
+
+def test_a_strategy_without_a_builder_is_saved_too(tmp_path):
+    class Sweep:
+        def attempt(self, context):
+            for k in range(3):
+                yield Move(np.full(4, k / 10), None, "sweep")
+            yield None
+
+    whole, again = (Learner(Memory(0, 4, 2), Sweep()) for _ in range(2))
+    moves = [step(whole) for _ in range(6)]
+    assert [move is None for move in moves] == [False, False, False, True, False, False]
+    whole.save(tmp_path / "life.npz")
+    again.load(tmp_path / "life.npz")
+    assert again.movements == 6
+    assert step(again).theta[0] == step(whole).theta[0] == 0.2
+    other = Learner(Memory(0, 4, 2), Babble(ARM.policies, stream(0, "babble")))
+    with pytest.raises(ReplayError, match="movement 0 was recorded with another theta"):
+        other.load(tmp_path / "life.npz")

@@ -1,0 +1,132 @@
+"""The suite: which runs it makes, what it shows of them, and what it refuses."""
+
+import numpy as np
+import pytest
+
+from sgimd_torch.catalogue import CATALOGUE
+from sgimd_torch.runs.build import task_of
+from sgimd_torch.runs.config import Config
+from sgimd_torch.runs.process import command
+from sgimd_torch.runs.read import read_run
+from sgimd_torch.runs.tasks import goals_all_over
+from sgimd_torch.views.suite import RANDOM, TASKS, UNIFORM, _options, errors_of, main, runs_of
+from sgimd_torch.views.suite_figure import figure, relative, table
+
+SHORT = ("--movements", "40", "--evaluate-at", "20", "--processes", "1")
+LEARNER = ("--goals", "uniform", "--search", "perturb", "--budget", "1")
+
+
+def suite(*words):
+    """The exit code."""
+    return command(main, [str(word) for word in words])
+
+
+def configs_of(*words):
+    return runs_of(*_options(words))[0]
+
+
+def errors(**learners):
+    """Of one task, after 100 movements."""
+    return {"toss": {name.replace("_", "-"): {100: np.array(values)} for name, values in learners.items()}}
+
+
+def test_half_of_the_tasks_and_no_more_are_used_to_choose_defaults():
+    assert sum(task.new for task in TASKS.values()) >= len(TASKS) // 2
+    assert all(task.options["environment"] in CATALOGUE["environment"] for task in TASKS.values())
+
+
+@pytest.mark.parametrize("name", [name for name, task in TASKS.items() if task.quick])
+def test_a_task_states_its_noise_and_has_goals_of_its_own(name):
+    task = task_of(Config(algorithm="random", **TASKS[name].options))
+    assert task.benchmark is not None
+    assert len(goals_all_over(task.environment).goals)
+    assert task.environment.outcome_noise >= 0
+
+
+def test_each_task_is_run_with_the_learner_and_with_the_two_that_it_has_to_beat():
+    configs = configs_of("--tasks", "toss", "rod-large", "--seeds", "3,4", "--budget", "7", "--out", "here", *SHORT)
+    assert len({config.directory for config in configs}) == 2 * 2 * 3
+    ours = [config for config in configs if config.variant == "sagg-riac"]
+    assert {(config.environment, config.task_space, config.seed) for config in ours} == {
+        (word, side, seed) for word, side in (("toss", 1.0), ("fishing-rod", 100.0)) for seed in (3, 4)
+    }
+    assert {(config.variant, config.budget) for config in configs} == {(RANDOM, 15), (UNIFORM, 1), ("sagg-riac", 7)}
+    assert {config.movements for config in configs} == {40}
+    assert {config.evaluate_at for config in configs} == {(20,)}
+
+
+def test_what_is_varied_gives_a_learner_for_each_value():
+    configs = configs_of("--tasks", "toss", "--vary", "inverse=process,nearest", *LEARNER)
+    assert [config.inverse for config in configs[2:]] == ["process", "nearest"]
+    assert [config.variant for config in configs] == [RANDOM, UNIFORM, "inverse=process", "inverse=nearest"]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("--environment toss", "--environment cannot be given here: each task has its own"),
+        ("--task_space=2", "--task-space cannot be given here"),
+        ("--vary environment=toss,crawler", "--environment cannot be given here"),
+        ("--tasks tos", "invalid choice: 'tos'"),
+        ("--tasks toss --algorithm imitation", "comes without demonstrations"),
+        ("--tasks toss --vary seed=1,2", "--seed cannot be given here: --seeds takes them"),
+    ],
+)
+def test_what_makes_no_sense_is_refused_before_anything_is_written(tmp_path, monkeypatch, capsys, words, message):
+    monkeypatch.chdir(tmp_path)
+    assert suite(*words.split(), *SHORT) == 2
+    assert message in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_suite_is_run_shown_and_gone_on_with(tmp_path, capsys):
+    out = tmp_path / "study"
+    words = ("--tasks", "toss", "half-reached", "--out", out, *LEARNER, *SHORT)
+    assert suite(*words) == 0
+    shown = capsys.readouterr().out
+    assert (out / "suite.png").read_bytes().startswith(b"\x89PNG")
+    at_40 = {
+        name: read_run(out / "toss" / name / "seed-000").evaluation["mean_error_m"][-1] for name in (RANDOM, UNIFORM)
+    }
+    line = next(line.split() for line in shown.splitlines() if line.startswith("40") and "toss" in line)
+    assert line[2:4] == [f"{at_40[RANDOM]:.4g}", f"{at_40[UNIFORM] / at_40[RANDOM]:.2f}"]
+    assert suite(*words, "--dry-run") == 0
+    assert capsys.readouterr().out == ""
+    assert suite(*words, "--seeds", "0-1", "--dry-run") == 0
+    assert "toss: sagg-riac seed 1: 0 of 40 movements" in capsys.readouterr().out
+
+
+def test_seeds_give_the_ratio_of_means_and_an_interval_around_it():
+    found = relative({100: np.array([0.1, 0.14])}, {100: np.array([0.2, 0.4])}, 100)
+    assert found.value == pytest.approx(0.4)
+    assert 0.1 / 0.4 <= found.low < 0.4 < found.high <= 0.14 / 0.2
+    alone = relative({100: np.array([0.1])}, {100: np.array([0.2])}, 100)
+    assert alone.low == alone.value == alone.high == pytest.approx(0.5)
+
+
+def test_what_was_not_evaluated_is_a_dash_and_no_mean():
+    found = errors(random_nearest=[0.2], mine=[0.1])
+    found["crawler (new)"] = {"random-nearest": {100: np.array([0.5])}}
+    lines = table(found).splitlines()
+    assert lines[1].split() == ["100", "toss", "0.2", "0.50"]
+    assert lines[2].split() == ["100", "crawler", "(new)", "0.5", "-"]
+    assert lines[3].split() == ["100", "interquartile", "mean", "0.50"]
+
+
+def test_the_figure_has_a_panel_for_each_task_with_a_curve_for_each_learner():
+    found = errors(random_nearest=[0.2], mine=[0.1], other=[0.3])
+    found["crawler (new)"] = found["toss"]
+    panels = [ax for ax in figure(found).axes if ax.axison]
+    assert [ax.get_title() for ax in panels] == ["toss", "crawler (new)"]
+    assert [line.get_label() for line in panels[0].lines] == [RANDOM, "mine", "other"]
+    assert panels[0].lines[1].get_ydata() == pytest.approx([0.5])
+
+
+def test_runs_that_are_there_are_read_by_task_and_learner(tmp_path):
+    words = ("--tasks", "toss", "--out", str(tmp_path), *LEARNER, *SHORT)
+    assert suite(*words) == 0
+    found = errors_of(configs_of(*words))
+    assert list(found) == ["toss"]
+    assert {name: sorted(curve) for name, curve in found["toss"].items()} == {
+        name: [20, 40] for name in (RANDOM, UNIFORM, "sagg-riac")
+    }
