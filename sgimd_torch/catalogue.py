@@ -86,15 +86,20 @@ _MODEL: Final = {"model": "model", "trust": "trust"}
 _REFINED: Final = {**_MODEL, "residual": "residual"}
 _AIM: Final = ("focus",)  # it is the share near the goal pursued: no effect without goals
 _IN_THE_PACKAGE: Final = "sgimd_torch"
-
-
 _IMITATED: Final = {**_SHOWN, "imitations": "imitations", "epsilon": "epsilon"}
-_SCHOOL: Final[tuple[tuple[str, str, dict[str, object], str], ...]] = (  # of quality diversity
-    ("map-elites", "map_elites", {}, "fills an archive of outcomes"),
-    ("isoline", "isoline", {}, "the same along lines between elites"),
-    ("isoline-again", "isoline", {"again": 0.2}, "the same, and repeats elites because outcomes are noisy"),
-    ("cma-me", "cma_me", {}, "the same with evolution strategies"),
-    ("cma-mae", "cma_mae", {}, "the same with thresholds that rise slowly"),
+_SCHOOL: Final[tuple[tuple[str, str, dict[str, object], str, str, tuple[str, str]], ...]] = (  # of quality diversity
+    ("map-elites", "map_elites", {}, "fills an archive of outcomes", "MAP-Elites", ("#56b4e9", "#1f78a8")),
+    ("isoline", "isoline", {}, "the same along lines between elites", "Isoline", ("#999933", "#5c5c1f")),
+    (
+        "isoline-again",
+        "isoline",
+        {"again": 0.2},
+        "the same, elites repeated",
+        "Isoline, repeated",
+        ("#ddcc77", "#a08c2c"),
+    ),
+    ("cma-me", "cma_me", {}, "the same with evolution strategies", "CMA-ME", ("#e69f00", "#8f6300")),
+    ("cma-mae", "cma_mae", {}, "the same with thresholds that rise slowly", "CMA-MAE", ("#882255", "#4d1330")),
 )
 
 
@@ -146,20 +151,6 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
             label="SGIM-D",
             colour="#d55e00",
         ),
-        "map-elites": _at(
-            "rivals.quality_diversity:map_elites",
-            "fills an archive of outcomes (extra rivals)",
-            ignores=_AIM,
-            label="MAP-Elites",
-            colour="#56b4e9",
-        ),
-        "cma-me": _at(
-            "rivals.quality_diversity:cma_me",
-            "the same with evolution strategies (extra rivals)",
-            ignores=_AIM,
-            label="CMA-ME",
-            colour="#e69f00",
-        ),
         **{
             f"{name}{ending}": _at(
                 f"rivals.quality_diversity:{place}",
@@ -168,10 +159,11 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
                 fixed=fixed,
                 also=_TAUGHT if shown else (),
                 ignores=_AIM,
+                label=f"{label}, taught" if shown else label,
+                colour=colours[bool(shown)],
             )
             for ending, shown in (("", ""), ("-taught", ", and imitates what it is shown"))
-            for name, place, fixed, about in _SCHOOL
-            if ending or name not in ("map-elites", "cma-me")
+            for name, place, fixed, about, label, colours in _SCHOOL
         },
     },
     "environment": {
