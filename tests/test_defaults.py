@@ -23,6 +23,7 @@ DEFAULTS = {
     "environments.planar_arm:PlanarArm": {"n_joints": 7, "length": 1.0, "noise": 0.0},
     "evaluation:evaluate": {"repeats": 3},
     "forward_model.anchored:Trust": {"noise": 0.04, "share": 0.1, "doubt": 0.06, "caution": 10.0, "error": 0.25},
+    "forward_model.ensemble:Ensemble": NETWORKS,
     "forward_model.model:ForwardModel": {**NETWORKS, **ONLINE},
     "goals.alp_gmm:AlpGmm": {"refit": 50, "memory": 250, "components": 10, "uniform": 0.2},
     "goals.interest_map:InterestMap": {**TREE, "g_max": 30, "cuts": 20, "min_side": 1 / 15, "max_aspect": 5.0},

@@ -28,6 +28,12 @@ def test_each_joint_shows_what_was_demonstrated():
     assert (axes[1].get_xlabel(), axes[1].get_ylabel()) == ("time (s)", "angle (rad)")
 
 
+def test_joints_without_names_are_counted_from_one():
+    axes = Figure().subplots(1, 2)
+    trajectories(axes, [demonstration()])
+    assert [ax.get_title() for ax in axes] == ["joint 1", "joint 2"]
+
+
 @pytest.mark.parametrize(
     ("n_axes", "shown", "names"),
     [

@@ -170,6 +170,8 @@ def test_cells_lie_where_their_outcomes_did_and_show_their_number(ax):
     mesh = error_map(ax, error_by_cell(observed, observed + np.array([0.3, 0.0]), T, 2), T)
     np.testing.assert_array_equal(mesh.get_array().mask, [[True, False], [False, True]])  # rows are y, from below
     assert {(*text.get_position(), text.get_text()) for text in ax.texts} == {(-0.5, 0.5, "2"), (0.5, -0.5, "1")}
+    exact = error_map(Figure().add_subplot(), error_by_cell(observed, observed, T, 2), T)
+    assert 0 == exact.norm.vmin < exact.norm.vmax < 1e-3  # m
     empty = error_map(Figure().add_subplot(), error_by_cell(observed + 9, observed, T, 2), T)
     assert empty.get_array().mask.all()
     with pytest.raises(ValueError, match=r"shape \(2, 2, 2\) over 3 dimensions"):

@@ -1,11 +1,13 @@
 """The demo as a new user starts it, with runs of a few movements and a benchmark of a few goals."""
 
 import os
+import re
 import shutil
 import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -74,6 +76,15 @@ def test_the_table_compares_both_algorithms_in_error_noise_and_seconds(runs):
         assert line.lower().split()[:5] == [name, f"{error:.3f}", "m", f"{floor:.3f}", "m"]
     last = [run.evaluation["mean_error_m"][-1] for run in runs.values()]
     assert f"{last[0] / last[1]:.2f} times" in ratio
+
+
+def test_the_table_of_long_runs_has_columns_on_the_way_too(runs):
+    when = np.array([500, 1000, 2000, 3000])
+    columns = {"movements": when, "mean_error_m": 100.0 / when, "noise_floor_m": np.full(4, 0.01)}
+    longer = {algorithm: replace(run, answers=dict.fromkeys(run.answers, columns)) for algorithm, run in runs.items()}
+    head, sgim_d, *_ = table(longer).splitlines()
+    assert re.findall(r"error (\d+)", head) == ["1000", "2000", "3000"]
+    assert sgim_d.split()[1:7:2] == ["0.100", "0.050", "0.033"]
 
 
 def test_the_table_is_shown(finished, runs):

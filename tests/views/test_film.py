@@ -248,8 +248,11 @@ moved = rod.record([], stream(0, "film").random(25), stream(1, "noise"))
 still = replace(moved, states=np.repeat(moved.states[:1], len(moved.states), axis=0))
 with Camera(rod.model, width=640, height=480) as camera:
     half, landed = moved.landed / 2, moved.landed
-    shots = {"moved": (moved, half), "still": (still, half), "landed": (moved, landed)}
-    np.savez(sys.argv[1], **{name: camera.frame(Shot(each, moved.outcome), t) for name, (each, t) in shots.items()})
+    shots = {"moved": Shot(moved, moved.outcome), "still": Shot(still, moved.outcome)}
+    seen = {name: camera.frame(shot, half) for name, shot in shots.items()}
+    seen |= {"landed": camera.frame(shots["moved"], landed)}
+    seen |= {"past": camera.frame(Shot(moved, moved.outcome, past=np.array([[0.3, -0.6], [-0.6, -0.4]])), landed)}
+    np.savez(sys.argv[1], **seen)
 """
 
 
@@ -263,11 +266,13 @@ def test_a_frame_shows_the_arm_as_it_was_and_rings_on_the_water_about_base_and_g
     seen = {name: frame.astype(int) for name, frame in np.load(tmp_path / "seen.npz").items()}
     assert (np.abs(seen["moved"] - seen["still"]).max(axis=2) > 30).sum() > 800  # pixels, of which the arm has several
     red, green, blue = np.moveaxis(seen["landed"], 2, 0)
-    on_float = np.median(np.argwhere((red > 150) & (green < 100))[:, 1])  # column; it landed at its goal
-    on_ring = np.argwhere((red > 180) & (green > 170) & (blue < 110))[:, 1]
-    assert on_ring.min() < on_float < on_ring.max()
+    row, column = np.median(np.argwhere((red > 150) & (green < 100)), axis=0)  # of the float, which landed at its goal
+    ring = np.argwhere((red > 180) & (green > 170) & (blue < 110))
+    assert ring[:, 1].min() < column < ring[:, 1].max()
+    assert ring[:, 0].max() > row + 5  # also between float and camera
     white = np.flatnonzero((seen["landed"][:420].min(axis=2) > 180).any(axis=0))  # above the caption
     assert np.ptp(white) > 640 / 2  # the ring one metre from the base; all else that is white stands near the middle
+    assert 0 < (np.abs(seen["past"] - seen["landed"]).max(axis=2) > 30).sum() < 200  # two small tiles
 
 
 def test_what_is_filmed_after_some_movements_does_not_know_what_came_later(run_path, go, tmp_path):
