@@ -25,8 +25,9 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import takewhile
 from pathlib import Path
 from typing import Any, Final
 
@@ -126,9 +127,11 @@ class Columns:
 
     def recorded(self, lines: Sequence[bytes]) -> list[Recorded]:
         """What ``session.replay`` needs of these lines."""
-        _, thetas, _, outcomes = self.split([line.decode().split(",")[:-1] for line in lines])
-        rest = Recorded(None, None)
-        return [rest if np.isnan(o).any() else Recorded(t, o) for t, o in zip(thetas, outcomes, strict=True)]
+        rest, found = Recorded(None, None), list[Recorded]()
+        for k in range(0, len(lines), 1000):  # the fields of all lines at once would take ten times their size
+            _, thetas, _, outcomes = self.split([line.decode().split(",")[:-1] for line in lines[k : k + 1000]])
+            found += [rest if np.isnan(o).any() else Recorded(t, o) for t, o in zip(thetas, outcomes, strict=True)]
+        return found
 
 
 def read_json(path: Path, *, missing: Any) -> Any:
@@ -151,6 +154,6 @@ def read_json(path: Path, *, missing: Any) -> Any:
     return content
 
 
-def _in_order(rows: Rows) -> int:
+def _in_order(rows: Iterable[list[str]]) -> int:
     """How many rows, from the first on, are numbered in order."""
-    return next((k for k, row in enumerate(rows) if row[0] != str(k)), len(rows))
+    return sum(1 for _ in takewhile(lambda each: each[1][0] == str(each[0]), enumerate(rows)))

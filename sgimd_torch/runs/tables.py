@@ -56,11 +56,14 @@ class Found:
     @property
     def rows(self) -> Rows:
         """The fields of each line, its checksum left out."""
-        rows = [line.decode().rstrip("\n").split(",")[: -1 if self.checked else None] for line in self.lines]
-        for row in rows:
-            for place, value in self.later.items():
-                row.insert(place, value)
-        return rows
+        return [self.fields(line) for line in self.lines]
+
+    def fields(self, line: bytes) -> list[str]:
+        """Of one of the lines."""
+        row = line.decode().rstrip("\n").split(",")[: -1 if self.checked else None]
+        for place, value in self.later.items():
+            row.insert(place, value)
+        return row
 
     @property
     def bad(self) -> int | None:
@@ -89,11 +92,16 @@ class Table:
         path: of the file; nothing is written before ``begin`` or ``replace``.
         names: of the columns, without crc32.
         grows: it is written line by line, rather than replaced whole.
-        standing: (rows) -> how many of them, from the first on, make sense together.
+        standing: (rows) -> how many of them, from the first on, make sense together; None: all of them.
     """
 
     def __init__(
-        self, path: Path, names: Sequence[str], *, grows: bool = False, standing: Callable[[Rows], int] = len
+        self,
+        path: Path,
+        names: Sequence[str],
+        *,
+        grows: bool = False,
+        standing: Callable[[Iterable[list[str]]], int] | None = None,
     ) -> None:
         self.path, self.names, self._grows, self._standing = path, tuple(names), grows, standing
         self.header = _header(names)
@@ -122,7 +130,8 @@ class Table:
         n = next((k for k, line in enumerate(lines) if not is_good(line)), len(lines))
         places = {place: later[name] for place, name in enumerate(self.names) if name in later}
         found = Found(lines, len(content), b"", checked, self._grows, places).first(n)
-        return found.first(self._standing(found.rows))
+        # One row at a time: all rows of a long log would take ten times its size.
+        return found if self._standing is None else found.first(self._standing(map(found.fields, found.lines)))
 
     def notes(self, found: Found, outlook: str) -> list[str]:
         """Messages: what was bad, with the ``outlook``: what happens now; and whether checksums were missing."""
@@ -212,7 +221,7 @@ def small_table(path: Path, dims: int | None = None) -> Table:
             return Table(path, REFRESHES, grows=True)
 
 
-def _whole_maps(rows: Rows) -> int:
+def _whole_maps(rows: Iterable[list[str]]) -> int:
     """How many rows of regions.csv belong to evaluations that have all their regions."""
     n = 0
     for _, regions in groupby(rows, key=lambda row: row[0]):

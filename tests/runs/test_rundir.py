@@ -1,5 +1,6 @@
 """The run directory's files: exact numbers, lines that show whether they were changed, clear refusals."""
 
+import tracemalloc
 import zlib
 from pathlib import Path
 
@@ -46,6 +47,21 @@ def test_numbers_are_read_back_exactly(tmp_path_factory, rows):
     wanted = np.array([[0.25, a, b, np.nan if goal is None else goal, outcome] for a, b, goal, outcome in rows])
     found = np.concatenate((run.contexts, run.thetas, run.goals, run.outcomes), axis=1)
     assert found.tobytes() == wanted.reshape(-1, 5).tobytes()
+
+
+def test_a_replay_reads_its_log_in_memory_of_a_few_times_its_size(tmp_path):
+    """The content, its lines and the numbers of each; the fields of all lines at once would take twice as much."""
+    columns = Columns(0, 7, 2)
+    thetas = np.random.default_rng(0).random((5000, 7))
+    moves = (Episode(k, np.zeros(0), Move(t, t[:2], "local"), t[2:4], None) for k, t in enumerate(thetas))
+    path = tmp_path / "episodes.csv"
+    path.write_bytes(columns.header + b"".join(columns.line(move, None) for move in moves))
+    tracemalloc.start()
+    recorded = columns.recorded(columns.table(tmp_path).read().lines)
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert len(recorded) == 5000
+    assert most < 5 * path.stat().st_size
 
 
 def test_a_movement_at_rest_has_neither_theta_nor_outcome(tmp_path):
