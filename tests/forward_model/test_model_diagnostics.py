@@ -143,7 +143,9 @@ def test_refinements_are_counted_goal_by_goal_without_imitation_and_chance(dim):
 
 @pytest.mark.parametrize("life", [[], LIFE[:1], LIFE[5:7], LIFE[10:]])
 def test_without_refinements_there_is_no_share(life):
-    assert np.isnan(improvements(*lived(life)).share)
+    found = improvements(*lived(life))
+    assert np.isnan(found.share)
+    assert len(found.first) == len(found.nearest) == len(found.movements)  # an entry for each goal, if there is any
 
 
 def test_goals_without_their_outcomes_are_refused():
