@@ -15,6 +15,7 @@ import time
 from collections.abc import Sequence
 from contextlib import redirect_stderr
 from pathlib import Path
+from types import ModuleType
 
 from sgimd_torch.runs.process import Failed, say
 
@@ -50,6 +51,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("runs", nargs="?", type=Path, default=Path("runs"), help="where to look for boards (runs)")
     parser.add_argument("--port", type=int, default=6006, help="the first port to try (6006)")
     options = parser.parse_args(argv)
+    tensorboard_program()  # what is missing is named first, as without it no run has a board
     boards = boards_below(options.runs)
     port = free_port(options.port)
     if port != options.port:
@@ -94,12 +96,11 @@ def free_port(first: int) -> int:
     raise ValueError(f"no port from {first} on is free; give another --port")
 
 
-def serve(runs: Path, port: int) -> None:
-    """Start TensorBoard in a thread; returns once it answers.
+def tensorboard_program() -> ModuleType:
+    """What starts TensorBoard.
 
     Raises:
         ValueError: tensorboard is not installed.
-        Failed: it cannot start.
     """
     try:
         from tensorboard import program
@@ -107,6 +108,17 @@ def serve(runs: Path, port: int) -> None:
         raise ValueError(
             f"watching needs {error.name}, which is not installed; pip install 'sgimd-torch[board]'"
         ) from error
+    return program
+
+
+def serve(runs: Path, port: int) -> None:
+    """Start TensorBoard in a thread; returns once it answers.
+
+    Raises:
+        ValueError: as `tensorboard_program`.
+        Failed: it cannot start.
+    """
+    program = tensorboard_program()
     words = ["", "--logdir", str(runs), "--host", "127.0.0.1", "--port", str(port), "--reload_interval", "5"]
     kept = ",".join(f"{plugin}={POINTS}" for plugin in ("scalars", "images", "text"))
     board, said = program.TensorBoard(), io.StringIO()
