@@ -126,6 +126,14 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
             label="Practice",
             colour="#332288",
         ),
+        "practice-taught": _at(
+            "algorithms:practice_taught",
+            "the same, and does once what it is shown; best with --teacher initial --every 1",
+            uses=_SHOWN,
+            also=_TAUGHT,
+            label="Practice, taught",
+            colour="#aa4499",
+        ),
         "observation": _at(
             "algorithms:observation",
             "watches and remembers, never moves",
