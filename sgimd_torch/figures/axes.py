@@ -6,8 +6,9 @@ Each function draws on the axes it is given.   mesh = ax.pcolormesh(x, y, z); co
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
+from typing import Any, Final
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import PatchCollection
@@ -18,13 +19,20 @@ from matplotlib.ticker import MaxNLocator
 from sgimd_torch.spaces import Array, Box
 
 GREY: Final = "0.45"
+LEGEND: Final[dict[str, Any]] = {
+    "loc": "lower center",
+    "bbox_to_anchor": (0.5, 1.0),  # above the axes
+    "ncols": 2,
+    "frameon": False,
+    "borderaxespad": 0.2,
+    "handletextpad": 0.2,
+}
 
 
 def plane(ax: Axes, box: Box) -> None:
-    """Axes in metres, equal aspect, showing all of ``box``."""
-    ax.set(
-        xlim=(box.low[0], box.high[0]), ylim=(box.low[1], box.high[1]), aspect="equal", xlabel="x (m)", ylabel="y (m)"
-    )
+    """Axes in metres, equal aspect unless a side is much longer, showing all of ``box``."""
+    limits = {"xlim": (box.low[0], box.high[0]), "ylim": (box.low[1], box.high[1])}
+    ax.set(**limits, aspect="equal" if alike(box.sides) else "auto", xlabel="x (m)", ylabel="y (m)")
     ax.xaxis.set_major_locator(MaxNLocator(4))
     ax.yaxis.set_major_locator(MaxNLocator(4))
 
@@ -34,9 +42,12 @@ def water_plane(ax: Axes, box: Box, *, legend: bool = True) -> None:
     ax.plot(0, 0, "^", color="black", markeredgecolor="white", markersize=10, label="base of the arm")
     plane(ax, box)
     if legend:
-        ax.legend(
-            loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, frameon=False, borderaxespad=0.2, handletextpad=0.2
-        )
+        ax.legend(**LEGEND)
+
+
+def alike(sides: Array) -> bool:
+    """Whether two sides have about one scale, so that a picture need not distort them."""
+    return bool(np.max(sides) <= 8 * np.min(sides))
 
 
 def coloured_regions(

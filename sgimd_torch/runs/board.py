@@ -108,8 +108,8 @@ class RunBoard:
         board = self._board
         if not self._draws:
             return board.recall("error", "answers", "grid_error", needs=("error/mean",))
-        picture = "about/regions" if self._parts.regions else "map/error" if self._in_the_plane else "error/mean"
-        whole = board.recall("error", "answers", "grid_error", "map", "about", needs=("error/mean", picture))
+        last = "about/regions" if self._parts.regions else "map/error"
+        whole = board.recall("error", "answers", "grid_error", "map", "about", needs=("error/mean", last))
         if whole:
             self._drawn_at = board.movements
         return whole
@@ -132,27 +132,22 @@ class RunBoard:
         doubled, and at the end."""
         return self._board.movements >= 2 * self._drawn_at or self._board.movements == self._parts.config.movements
 
-    @property
-    def _in_the_plane(self) -> bool:
-        return self._parts.environment.outcomes.dim == 2
-
     def _draw(self, found: Evaluation) -> None:
         from sgimd_torch.board.pictures import draw, where  # loaded only when there is a board
 
         board, space, regions = self._board, self._parts.environment.outcomes, self._parts.regions
         self._drawn_at = board.movements
-        if self._in_the_plane:
-            pictures = draw(
-                regions,
-                space,
-                outcomes=self._parts.learner.memory.outcomes,
-                goals=np.array(self._goals).reshape(-1, space.dim),
-                demonstrated=np.array(self._demonstrated).reshape(-1, space.dim),
-                benchmark=self._parts.benchmark.goals,
-                errors=found.errors,
-            )
-            for name, png in pictures.items():
-                board.image(f"map/{name}", png)
+        pictures = draw(
+            regions,
+            space,
+            outcomes=self._parts.learner.memory.outcomes,
+            goals=np.array(self._goals).reshape(-1, space.dim),
+            demonstrated=np.array(self._demonstrated).reshape(-1, space.dim),
+            benchmark=self._parts.benchmark.goals,
+            errors=found.errors,
+        )
+        for name, png in pictures.items():
+            board.image(f"map/{name}", png)
         if regions:
             board.text("about/regions", where(regions))
 

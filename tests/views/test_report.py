@@ -264,7 +264,7 @@ def test_a_damaged_run_alone_has_no_last_error(copy):
 
 
 @pytest.mark.parametrize("dim", [1, 3])
-def test_outcomes_that_are_not_in_the_plane_have_everything_but_maps(copy, dim):
+def test_outcomes_that_are_not_in_the_plane_have_maps_of_strips_or_pairs(copy, dim):
     path = copy / "sgim-d" / "seed-003"
     run, rng = read_run(path), np.random.default_rng(0)
     columns = Columns(0, 2, dim)
@@ -288,7 +288,10 @@ def test_outcomes_that_are_not_in_the_plane_have_everything_but_maps(copy, dim):
         assert f"Its outcomes have {dim} dimension" in text
         assert f"{run.evaluation['mean_error_m'][-1]:.4f}" in Page(text).all("td")
     alts = [given["alt"] for name, given in Page((path / "report.html").read_text()).elements if name == "img"]
-    assert alts == ["Error curve of SGIM-D"]
+    assert alts == [
+        *("Error curve of SGIM-D", "Landing points of SGIM-D"),
+        *("Interest map of SGIM-D", "Interest maps over time of SGIM-D"),
+    ]
 
 
 def test_names_may_be_more_and_in_any_order(copy, monkeypatch):

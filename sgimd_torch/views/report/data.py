@@ -62,10 +62,8 @@ class Life(Run):
 
     @property
     def landed(self) -> Array:
-        """``(n, 2)`` m where movements ended; none if outcomes are not in the plane."""
-        return (
-            self.outcomes[np.isfinite(self.outcomes).all(axis=1)] if self.outcomes.shape[1] == 2 else np.empty((0, 2))
-        )
+        """``(n, outcome_dim)`` m where movements ended."""
+        return self.outcomes[np.isfinite(self.outcomes).all(axis=1)]
 
     @property
     def shown(self) -> NDArray[np.int64]:
@@ -74,10 +72,9 @@ class Life(Run):
 
     @property
     def has_map(self) -> bool:
-        """Whether there is an interest map of the plane to draw."""
-        if not self.regions or not len(self.regions["movements"]):
-            return False
-        return self.outcomes.shape[1] == 2 and "low_2" not in self.regions
+        """Whether there is an interest map to draw."""
+        sides = sum(name.startswith("low_") for name in self.regions or ())  # of contexts, then of outcomes
+        return bool(self.regions and len(self.regions["movements"])) and 0 < self.outcomes.shape[1] <= sides
 
     def at(self, movements: int, column: str = "mean_error_m", answer: str = OWN) -> float:
         """An entry of evaluation.csv, NaN if there is none."""
@@ -202,8 +199,9 @@ class Variant:
 
     @cached_property
     def landed(self) -> Array:
-        """``(n, 2)`` m where movements of all its runs ended."""
-        return np.concatenate([life.landed for life in self.lives])
+        """``(n, outcome_dim)`` m where movements of all its runs ended."""
+        dim = self.typical.landed.shape[1]
+        return np.concatenate([life.landed for life in self.lives if life.landed.shape[1] == dim])
 
     @property
     def ratio(self) -> Interval | None:
@@ -238,7 +236,7 @@ def over_seeds(values: Array) -> Interval | None:
 
 
 def demonstrated(lives: Sequence[Life]) -> tuple[Array, str]:
-    """``(n, 2)`` m what the runs were shown, each demonstration once; and a message if that is not known."""
+    """``(n, outcome_dim)`` m what the runs were shown, each demonstration once; and a message if that is not known."""
     rows = {
         (life.environment, *(str(life.config.get(f"demonstrations{which}")) for which in ("", "_crc32")), row)
         for life in lives
@@ -249,7 +247,7 @@ def demonstrated(lives: Sequence[Life]) -> tuple[Array, str]:
         outcomes = [_recorded(environment, *file)[row] for environment, *file, row in sorted(rows)]
     except (OSError, ValueError, IndexError) as error:
         return np.empty((0, 2)), f"What they were shown is left out: {error}."
-    return np.array(outcomes, dtype=np.float64).reshape(-1, 2), ""
+    return np.array(outcomes, dtype=np.float64).reshape(len(outcomes), -1 if outcomes else 0), ""
 
 
 @cache

@@ -22,12 +22,14 @@ from sgimd_torch.figures.axes import over_movements
 from sgimd_torch.figures.learning import COLOURS, interest_map, landing_points, map_after
 from sgimd_torch.figures.movements import interest_over_time
 from sgimd_torch.figures.results import Difference, forest
+from sgimd_torch.figures.sections import Section, of_regions, sections
 from sgimd_torch.spaces import Array, Box
 from sgimd_torch.views.report.data import Life, Variant
 from sgimd_torch.views.statistics import difference_interval, paired_differences, rng
 
 P = ParamSpec("P")
 REACH: Final = 1.5  # m; a float or the end of an arm hardly ever lands farther from the base
+TINY: Final = 1e-6  # so that a picture of one point has a size
 GOALS: Final = 100  # the last ones are shown
 MOST_CURVES: Final = 8
 STYLE: Final[Any] = {
@@ -138,10 +140,18 @@ def _forest(figure: Figure, rows: Sequence[Difference], reference: str) -> None:
 @png
 def landing(figure: Figure, landed: Array, shown: Array) -> None:
     """Where movements landed, and the demonstrated outcomes; the plane is large enough for them."""
-    far = float(np.quantile(np.abs(landed).max(axis=1), 0.99))
-    reach = far if far > REACH or 0 < far < REACH / 10 else REACH
-    box, side = Box.cube(-reach, reach, 2), reach / 30
-    landing_points(figure.subplots(), landed, box, demonstrated=shown if len(shown) else None, side=side)
+    if landed.shape[1] == 2:
+        far = float(np.quantile(np.abs(landed).max(axis=1), 0.99))
+        reach = far if far > REACH or 0 < far < REACH / 10 else REACH
+        box = Box.cube(-reach, reach, 2)
+    else:
+        low, high = np.quantile(landed, (0.005, 0.995), axis=0)
+        box = Box(low - 0.05 * (high - low) - TINY, high + 0.05 * (high - low) + TINY)
+    crosses = shown if len(shown) and shown.shape[1] == landed.shape[1] else None
+    panels = sections(box)
+    for ax, section in zip(_panels(figure, panels), panels, strict=True):
+        side = float(section.box.sides[0]) / 60
+        landing_points(ax, landed, box, demonstrated=crosses, side=side, section=section)
 
 
 @png
@@ -149,7 +159,9 @@ def interest(figure: Figure, life: Life) -> None:
     """The interest map at the last evaluation, with the goals chosen before it."""
     assert life.regions is not None
     last = map_after(life.regions, life.regions["movements"].max())
-    interest_map(figure.subplots(), *last, goals=life.chosen_goals()[-GOALS:])
+    panels = of_regions(*last[:2], life.outcomes.shape[1])
+    for ax, section in zip(_panels(figure, panels), panels, strict=True):
+        interest_map(ax, *last, goals=life.chosen_goals()[-GOALS:], section=section)
 
 
 @png
@@ -158,11 +170,21 @@ def splitting(figure: Figure, life: Life) -> None:
     assert life.regions is not None
     n = min(4, len(np.unique(life.regions["movements"])))
     axes = figure.subplots(1 + (n > 2), min(2, n), squeeze=False)
-    interest_over_time(axes.flat, life.regions)
+    last = map_after(life.regions, life.regions["movements"].max())
+    interest_over_time(axes.flat, life.regions, of_regions(*last[:2], life.outcomes.shape[1])[0])
     for ax in axes.flat:  # the maps are small
         ax.set_title(ax.get_title().replace(": ", ":\n"), fontsize=10)
         ax.tick_params(labelsize=9)
         ax.label_outer()
+
+
+def _panels(figure: Figure, shown: Sequence[Section]) -> list[Axes]:
+    """An axis for each section, below each other; a strip is low."""
+    if len(shown) > 1:
+        figure.set_size_inches(6, 4.6 * len(shown))
+    elif len(shown[0].dims) == 1:
+        figure.set_size_inches(6, 3)
+    return list(figure.subplots(len(shown), 1, squeeze=False).flat)
 
 
 def _floor(ax: Axes, movements: Array, floors: Array) -> None:
