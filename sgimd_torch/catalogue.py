@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from functools import partial, wraps
+from pathlib import Path
 from typing import Any, Final
 
 
@@ -113,6 +114,7 @@ def _toy(name: str, side: float, about: str) -> Entry:
 
 
 ROD: Final = "fishing-rod"  # the environment of all runs before there was a choice
+_OF_ROD: Final = {"noise": "noise", "task_space": "task_space", "threads": "threads"}
 # Colours after Okabe & Ito: distinct with any colour vision, and in grey.
 CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
     "algorithm": {
@@ -170,7 +172,19 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
         ROD: _at(
             "runs.tasks:fishing_rod",
             "the paper's arm with a rod, in MuJoCo",
-            uses={"noise": "noise", "task_space": "task_space", "threads": "threads"},
+            uses=_OF_ROD,
+        ),
+        "rod-wind": _at(
+            "runs.tasks:fishing_rod",
+            "the same in a side wind on the float, up to a quarter of its weight, which is the context",
+            uses=_OF_ROD,
+            fixed={"max_wind": 0.05},
+        ),
+        "rod-yaw": _at(
+            "runs.tasks:fishing_rod",
+            "the same with its base turned by up to half a radian, which is the context",
+            uses=_OF_ROD,
+            fixed={"max_yaw": 0.5},
         ),
         "planar-arm-7": _at("runs.tasks:planar_arm", "7 joints, no noise", fixed={"n_joints": 7}),
         "planar-arm-50": _at("runs.tasks:planar_arm", "50 joints, no noise", fixed={"n_joints": 50}),
@@ -377,6 +391,20 @@ def load(place: str, what: str = "") -> Any:
             raise ValueError(f"{what}: {module} has no {attribute}{did_you_mean(name, public, 3)}")
         found = getattr(found, name)
     return found
+
+
+def source(word: str) -> Path | None:
+    """The file that a thing of your own, ``package.module:attribute``, is written in; None if it has none.
+
+    Raises:
+        ValueError: see ``load``.
+    """
+    made = inspect.unwrap(load(word))
+    while isinstance(made, partial):
+        made = made.func
+    module = inspect.getmodule(made) or sys.modules[word.partition(":")[0]]
+    file = getattr(module, "__file__", None)
+    return Path(file) if file else None
 
 
 def label(algorithm: str) -> str:

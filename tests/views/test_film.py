@@ -19,7 +19,8 @@ from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.spaces import stream
 from sgimd_torch.views.film import command as film
-from sgimd_torch.views.film.camera import PAUSE, RATE, Shot, count_frames, tiled, write_film, write_sheet
+from sgimd_torch.views.film.camera import caption
+from sgimd_torch.views.film.reel import PAUSE, RATE, Shot, count_frames, tiled, write_film, write_sheet
 
 THETAS = stream(0, "film").random((100, 25))[40:]  # some reach the water before the line is let out
 FRAMES = [np.full((48, 64, 3), 4 * k, np.uint8) for k in range(30)]
@@ -117,9 +118,9 @@ def test_the_caption_says_when_the_line_is_let_out_and_how_far_the_goal_was_miss
     recording = next(r for r in recordings if r.let_out is not None)
     shot = Shot(recording, recording.outcome + np.array([0.03, 0.04]))
     assert shot.missed == pytest.approx(0.05)
-    assert "let out" not in shot.caption(recording.let_out)
-    assert "line let out" in shot.caption((recording.let_out + recording.landed) / 2)
-    assert shot.caption(recording.landed).endswith("missed by 5 cm")
+    assert "let out" not in caption(shot, recording.let_out)
+    assert "line let out" in caption(shot, (recording.let_out + recording.landed) / 2)
+    assert caption(shot, recording.landed).endswith("missed by 5 cm")
 
 
 def test_tiles_stand_row_by_row():
@@ -175,7 +176,9 @@ def test_a_forward_model_learns_again_what_it_learnt_in_the_run(tmp_path, go):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ("--goals 0.3", "must be x,y in metres such as 0.3,0.6, got '0.3'"),
+        ("--goals 0.3", "--goals must be 2 numbers each, got 0.3"),
+        ("--goals 0.3,0.6 1,2,3", "--goals must be 2 numbers each, got 1,2,3"),
+        ("--goals 0.3,", "must be numbers such as 0.3,0.6, x and y in metres for the rod, got '0.3,'"),
         ("--goals -0.3,far", "got '-0.3,far'"),
         ("--goals 0.3,0.6 -30,60", "outside"),
         ("--goals nan,0", "must be finite"),
@@ -241,7 +244,8 @@ from dataclasses import replace
 import numpy as np
 from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.spaces import stream
-from sgimd_torch.views.film.camera import Camera, Shot
+from sgimd_torch.views.film.camera import Camera
+from sgimd_torch.views.film.reel import Shot
 
 rod = FishingRod(noise=0.0, threads=1)
 moved = rod.record([], stream(0, "film").random(25), stream(1, "noise"))

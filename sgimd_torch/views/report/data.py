@@ -82,6 +82,18 @@ class Life(Run):
         found = evaluation[column][evaluation["movements"] == movements]
         return float(found[0]) if len(found) else float("nan")
 
+    def in_contexts(self, movements: int) -> dict[str, float]:
+        """The mean error (m) of its own answers in each part of C, by the part in words; {} without contexts."""
+        if self.by_context is None:
+            return {}
+        names = ("movements", "answer", "context", "low", "high", "mean_error_m")
+        rows = zip(*(self.by_context[name].tolist() for name in names), strict=True)
+        return {
+            f"context {context}: {low:.3g} to {high:.3g}": error
+            for when, answer, context, low, high, error in rows
+            if (when, answer) == (movements, OWN)
+        }
+
     def seconds(self, part: str) -> float:
         """Spent on "physics", "learner" or "evaluation"; NaN if the summary does not have it."""
         value = self.summary.get(f"seconds_{part}")

@@ -11,6 +11,8 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import Any, Final, NamedTuple
 
+import numpy as np
+
 from sgimd_torch.runs.config import before_there_was_a_choice, having, options, words
 from sgimd_torch.views.report.data import Life, Variant
 
@@ -62,6 +64,18 @@ def doubts(variants: Sequence[Variant]) -> Iterator[str]:
         some = any(variant.used and variant.used[0].state == "finished" for variant in variants)
         rest = "; maps show them, errors over seeds leave them out" if some else ""
         yield f"{count(len(cut), 'run')} not finished, stopped or still running{rest}: {'; '.join(cut)}."
+
+
+def by_context(variants: Sequence[Variant]) -> Table:
+    """The last error (m) in each part of C, the mean over seeds, of the variants that have contexts."""
+    found = [(v.label, [life.in_contexts(v.last) for life in v.used]) for v in variants]
+    parts = list(dict.fromkeys(part for _, lives in found for life in lives for part in life))
+    rows = []
+    for label, lives in found:
+        means = [np.mean([life.get(part, np.nan) for life in lives]) for part in parts]
+        if any(lives):
+            rows.append((label, [f"{mean:.3f}" if np.isfinite(mean) else "–" for mean in means]))
+    return Table(parts, rows)
 
 
 def versions(variants: Sequence[Variant]) -> Table:
