@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sgimd_torch.evaluation import Evaluation
+from sgimd_torch.evaluation import PARTS, Evaluation
 from sgimd_torch.goals.regions import Region
 from sgimd_torch.runs.tables import EVALUATION, Rows, Table, numbers, small_table
 from sgimd_torch.spaces import Box
@@ -54,9 +54,12 @@ class Evaluations:
         return {name: float(field) for name, field in row.items() if name != "answer"}
 
     def keep(self, movements: Iterable[int], answers: Sequence[str]) -> None:
-        """Keep only those after these numbers of ``movements`` that have these ``answers``."""
-        evaluated, *_ = self._rows.values()
+        """Keep only those after these numbers of ``movements`` that have these ``answers``, in all parts of C."""
+        evaluated, *others = self._rows.values()
         complete = {number for number, rows in evaluated.items() if [row[1] for row in rows] == [*answers]}
+        if self._contexts.dim:
+            n_parts = len(answers) * PARTS * self._contexts.dim
+            complete = {number for number in complete if len(others[0].get(number, ())) == n_parts}
         wanted = {number for number in movements if number in self and number in complete}
         for table, rows in self._rows.items():
             self._rows[table] = {number: rows[number] for number in wanted}
