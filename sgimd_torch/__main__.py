@@ -46,6 +46,7 @@ examples:
   sgimd run --algorithm sgim-d --seed 3 --resume     after Ctrl-C or a power cut
   sgimd run --environment mypackage.toss:make        on a robot of your own
   sgimd check mypackage.toss:make                    what is wrong with it, if anything
+  sgimd benchmark pool --out goals.npz               goals for it, where runs in pool have been
   sgimd demonstrations check shown.npz --task fishing-rod
   sgimd sweep --vary goals=interest-map,uniform --seeds 0-9 --out study
   sgimd table study                                  error of each variant, over its seeds

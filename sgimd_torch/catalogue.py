@@ -35,6 +35,7 @@ class Entry:
         ignores: options that have no effect with it, though others use them.
         learns_with: of an inverse: the one to use while learning, if it is another one.
         label, colour: what figures call it, and how they draw it.
+        filmed: of an environment: whether `sgimd film` shows it.
     """
 
     at: str
@@ -46,6 +47,7 @@ class Entry:
     learns_with: str | None = None
     label: str = ""
     colour: str = "black"
+    filmed: bool = False
 
     @property
     def options(self) -> list[str]:
@@ -173,23 +175,28 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
             "runs.tasks:fishing_rod",
             "the paper's arm with a rod, in MuJoCo",
             uses=_OF_ROD,
+            filmed=True,
         ),
         "rod-wind": _at(
             "runs.tasks:fishing_rod",
             "the same in a side wind on the float, up to a quarter of its weight, which is the context",
             uses=_OF_ROD,
             fixed={"max_wind": 0.05},
+            filmed=True,
         ),
         "rod-yaw": _at(
             "runs.tasks:fishing_rod",
             "the same with its base turned by up to half a radian, which is the context",
             uses=_OF_ROD,
             fixed={"max_yaw": 0.5},
+            filmed=True,
         ),
-        "planar-arm-7": _at("runs.tasks:planar_arm", "7 joints, no noise", fixed={"n_joints": 7}),
-        "planar-arm-50": _at("runs.tasks:planar_arm", "50 joints, no noise", fixed={"n_joints": 50}),
+        "planar-arm-7": _at("runs.tasks:planar_arm", "7 joints, no noise", fixed={"n_joints": 7}, filmed=True),
+        "planar-arm-50": _at("runs.tasks:planar_arm", "50 joints, no noise", fixed={"n_joints": 50}, filmed=True),
         "swimmer": _at("runs.tasks:swimmer", "gymnasium's Swimmer-v5: three links, two motors (extra gym)"),
-        "half-reached": _at("runs.tasks:half_reached", "7 joints, and a T of which less than half can be reached"),
+        "half-reached": _at(
+            "runs.tasks:half_reached", "7 joints, and a T of which less than half can be reached", filmed=True
+        ),
         "toss": _toy("toss", 0.4, "a ball in the wind, which is the context"),
         "crawler": _toy("crawler", 0.1, "four legs, whose phases are periodic parameters"),
         "two-elbows": _toy("two_elbows", 0.1, "an arm with two separate families of postures"),

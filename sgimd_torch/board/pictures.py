@@ -87,13 +87,19 @@ def _competence(ax: Axes, regions: Sequence[Region], section: Section) -> None:
 
 
 def _errors(ax: Axes, benchmark: Array, errors: Array, section: Section) -> None:
-    x, y = section.points(benchmark).T
-    most = FARTHEST if section.space.dim == 2 else SHARE * float(section.space.sides.max())
-    drawn = ax.scatter(x, y, c=errors, s=14, cmap="viridis_r", vmin=0, vmax=most, edgecolors="none")
-    colour_bar([ax], drawn, "distance from goal to landing point (m)", extend="max")
-    section.frame(ax, legend=False)
-    ax.autoscale(axis="both" if len(section.dims) == 2 else "x")  # where the goals are, even in a large space
     ax.set_title(f"{len(errors)} benchmark goals, mean error {errors.mean():.3f} m")
+    label = "distance from goal to landing point (m)"
+    if section.is_strip:  # there is room for heights
+        ax.plot(benchmark[:, 0], errors, ".", color="#0072b2", markersize=4)
+        ax.set(xlabel="outcome", ylabel=label)
+        ax.set_ylim(bottom=0)
+        return
+    most = FARTHEST if section.space.dim == 2 else SHARE * float(section.space.sides.max())
+    x, y = section.points(benchmark).T
+    drawn = ax.scatter(x, y, c=errors, s=14, cmap="viridis_r", vmin=0, vmax=most, edgecolors="none")
+    colour_bar([ax], drawn, label, extend="max")
+    section.frame(ax, legend=False)
+    ax.autoscale()  # where the goals are, even in a large space
 
 
 def _name(ax: Axes, regions: Sequence[Region], section: Section) -> None:
@@ -102,7 +108,7 @@ def _name(ax: Axes, regions: Sequence[Region], section: Section) -> None:
     rows = {regions[k]: row for row, k in enumerate(np.flatnonzero(met).tolist())}
     named = branches(list(rows), LEVEL)
     for path, below in named.items():
-        if f"{path}0" in named:
+        if {f"{path}0", f"{path}1"} & named.keys():
             continue
         among = [rows[region] for region in below]
         low, high = lows[among].min(axis=0), highs[among].max(axis=0)

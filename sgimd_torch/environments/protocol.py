@@ -14,7 +14,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sgimd_torch.spaces import Array, Box
+from sgimd_torch.spaces import Array, Box, read_only
 
 
 class Environment(Protocol):
@@ -93,11 +93,24 @@ class Sketch:
         step: s from one drawing to the next.
         chains: ``(n_steps, n_points, 2)`` the robot as points that are joined by lines; one point is a ball. The last
             point leaves a path.
+
+    Raises:
+        ValueError: other shapes, numbers that are not finite, or a step that is not above 0.
     """
 
     outcome: Array
     step: float
     chains: Array
+
+    def __post_init__(self) -> None:
+        for name, axes, wanted in (("outcome", 1, "(outcome_dim,)"), ("chains", 3, "(n_steps, n_points, 2)")):
+            value = np.asarray(getattr(self, name))
+            numbers = value.size > 0 and value.dtype.kind in "iuf" and np.isfinite(value).all()
+            if not numbers or value.ndim != axes or (name == "chains" and value.shape[2] != 2):
+                raise ValueError(f"{name} of a Sketch must be finite numbers {wanted}, got shape {value.shape}")
+            object.__setattr__(self, name, read_only(value.astype(np.float64)))
+        if not 0 < self.step < np.inf:
+            raise ValueError(f"step of a Sketch must be above 0 s, got {self.step}")
 
     @property
     def landed(self) -> float:

@@ -27,6 +27,11 @@ class Section:
     dims: tuple[int, ...]
 
     @property
+    def is_strip(self) -> bool:
+        """Whether T has one dimension."""
+        return len(self.dims) == 1
+
+    @property
     def box(self) -> Box:
         """What the picture covers, of two dimensions; a strip has the height 1."""
         return Box(self._flat(self.space.low, 0.0), self._flat(self.space.high, 1.0))
@@ -38,7 +43,7 @@ class Section:
     def tile(self, side: float) -> Array:
         """``(2,)`` a tile of this ``side`` along x; as long along y, if both have about one scale."""
         sides = self.box.sides
-        return np.array([side, 1.0 if len(self.dims) == 1 else side if alike(sides) else side * sides[1] / sides[0]])
+        return np.array([side, 1.0 if self.is_strip else side if alike(sides) else side * sides[1] / sides[0]])
 
     def cut(self, lows: Array, highs: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
         """The regions that the picture meets: their corners in it, twice ``(n_met, 2)``, and ``(n,)`` which they are.
@@ -73,7 +78,7 @@ class Section:
             water_plane(ax, self.box, legend=legend)
             return
         plane(ax, self.box)
-        if len(self.dims) == 1:
+        if self.is_strip:
             ax.set(xlabel="outcome", ylabel="", aspect="auto", yticks=[])
             ax.xaxis.set_major_locator(MaxNLocator(6))
         else:
@@ -89,7 +94,7 @@ class Section:
 
     def _flat(self, points: Array, height: float) -> Array:
         shown = np.asarray(points)[..., list(self.dims)]
-        return shown if len(self.dims) == 2 else np.concatenate([shown, np.full_like(shown, height)], axis=-1)
+        return shown if not self.is_strip else np.concatenate([shown, np.full_like(shown, height)], axis=-1)
 
 
 def sections(space: Box) -> list[Section]:

@@ -338,19 +338,9 @@ def test_a_recorded_movement_of_an_arm_ends_where_the_executed_one_does():
 def test_an_arm_is_filmed_without_opengl(tmp_path, monkeypatch, gl):
     monkeypatch.chdir(tmp_path)
     live(ARM)
-    words = [
-        "film",
-        "runs/sagg-riac/seed-000",
-        "--goals",
-        "0.5,0.5",
-        "-0.4,-0.4",
-        "--width",
-        "320",
-        "--sheet",
-        "sheet.png",
-    ]
+    words = "film runs/sagg-riac/seed-000 --goals 0.5,0.5 -0.4,-0.4 --width 320 --sheet sheet.png"
     process = subprocess.run(
-        [sys.executable, "-m", "sgimd_torch", *words],
+        [sys.executable, "-m", "sgimd_torch", *words.split()],
         env={**os.environ, "PYTHONPATH": str(ROOT), "MUJOCO_GL": gl},
         capture_output=True,
         text=True,
@@ -385,8 +375,13 @@ def test_a_picture_of_ones_own_is_filmed_for_outcomes_of_any_dimension(own, caps
     [
         ("sliders:NoPicture", "sliders:NoPicture, which cannot be filmed: it brings no picture of its movements, a "),
         ("crawler", "is of crawler, which cannot be filmed"),
-        ("sliders:WrongPicture", "record() of WrongPicture must give a Sketch, got list; sgimd_torch.environments."),
-        ("sliders:FlatPicture", "chains of a Sketch of FlatPicture must be finite (n_steps, n_points, 2), got (5, 2)"),
+        (
+            "sliders:WrongPicture",
+            "WrongPicture must give a Sketch with an outcome of 1 dimensions, got list",
+        ),
+        ("sliders:FlatPicture", "chains of a Sketch must be finite numbers (n_steps, n_points, 2), got shape (5, 2)"),
+        ("sliders:OtherPicture", "with an outcome of 1 dimensions, got one of 2"),
+        ("sliders:LostPicture", "record() of LostPicture failed: KeyError: 'where'"),
     ],
 )
 def test_what_has_no_picture_is_refused_in_a_line(own, capsys, word, message):

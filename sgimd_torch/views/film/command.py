@@ -21,14 +21,14 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
-from sgimd_torch.environments.protocol import Sketch
+from sgimd_torch.environments.protocol import Recorded, Sketch
 from sgimd_torch.runs.build import RunParts, build
 from sgimd_torch.runs.log import RunError
 from sgimd_torch.runs.read import Run, config_of, read_run
 from sgimd_torch.spaces import Array, stream
 from sgimd_torch.strategies import Remember
 from sgimd_torch.views.film.reel import Filming, Shot, count_frames, landed, shoot, write_film, write_sheet
-from sgimd_torch.views.film.sketch import Sketchbook, check_sketch, in_picture
+from sgimd_torch.views.film.sketch import Sketchbook, in_picture
 
 AFTER = (100, 500, 1000, 5000)
 EXAMPLES = """examples:
@@ -48,7 +48,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     options = _options(argv)
     run = read_run(options.run)
     parts = _parts(run)
-    if parts.record is None:
+    if not callable(parts.record):
         raise RunError(
             f"{run.path} is of {run.config['environment']}, which cannot be filmed: it brings no picture of its "
             "movements, a method record(context, theta, rng) -> Sketch"
@@ -117,7 +117,6 @@ def _cast(run: Run, parts: RunParts, goals: Array, stages: Sequence[int], *, say
     shots = []
     robot: Any = parts.environment
     context = (robot.contexts.low + robot.contexts.high) / 2
-    assert parts.record is not None
     title = f"{run.config['name'] or run.config['algorithm']}, seed {run.config['seed']}"
     for before, movements in zip((0, *stages), stages, strict=False):
         remember(run, parts, before, movements)
@@ -128,13 +127,27 @@ def _cast(run: Run, parts: RunParts, goals: Array, stages: Sequence[int], *, say
         stage = []
         for k, goal in enumerate(goals):
             theta = parts.inverse(context, goal).theta
-            recording = parts.record(context, theta, stream(run.config["seed"], "film", k))
-            if not hasattr(recording, "states"):  # those of the rod in MuJoCo
-                check_sketch(type(robot).__name__, recording, robot.outcomes.dim)
+            recording = _record(parts, context, theta, stream(run.config["seed"], "film", k))
             shown = f"after {movements} movements" if say_movements else f"{title}, after {movements} movements"
             stage.append(Shot(recording, goal, shown, past))
         shots.append(stage)
     return shots
+
+
+def _record(parts: RunParts, context: Array, theta: Array, rng: np.random.Generator) -> Recorded:
+    """A movement, to be drawn."""
+    assert parts.record is not None
+    name, dim = type(parts.environment).__name__, parts.environment.outcomes.dim
+    try:
+        found = parts.record(context, theta, rng)
+    except Exception as error:  # whatever a user's code does
+        raise RunError(f"record() of {name} failed: {type(error).__name__}: {error}") from error
+    if hasattr(found, "states"):  # of the rod in MuJoCo
+        return found
+    if not isinstance(found, Sketch) or len(found.outcome) != dim:
+        what = f"one of {len(found.outcome)}" if isinstance(found, Sketch) else type(found).__name__
+        raise RunError(f"record() of {name} must give a Sketch with an outcome of {dim} dimensions, got {what}")
+    return found
 
 
 def _film(options: argparse.Namespace, camera: Filming, scenes: list[list[Shot]]) -> None:

@@ -94,20 +94,3 @@ def _sketch(shot: Shot) -> Sketch:
 def in_picture(points: Array) -> Array:
     """``(n, 2)`` where outcomes ``(n, outcome_dim)`` lie in the picture."""
     return points[:, :2] if points.shape[1] > 1 else np.column_stack([points, np.zeros(len(points))])
-
-
-def check_sketch(name: str, found: object, outcome_dim: int) -> Sketch:
-    """What a user's ``record`` gave.
-
-    Raises:
-        ValueError: it is no Sketch, or not one that can be drawn.
-    """
-    if not isinstance(found, Sketch):
-        slip = "sgimd_torch.environments.protocol has it"
-        raise ValueError(f"record() of {name} must give a Sketch, got {type(found).__name__}; {slip}")
-    chains, outcome = np.asarray(found.chains), np.asarray(found.outcome)
-    if chains.ndim != 3 or chains.shape[2] != 2 or 0 in chains.shape or not np.isfinite(chains).all():
-        raise ValueError(f"chains of a Sketch of {name} must be finite (n_steps, n_points, 2), got {chains.shape}")
-    if outcome.shape != (outcome_dim,) or not 0 < found.step < np.inf:
-        raise ValueError(f"a Sketch of {name} needs an outcome ({outcome_dim},) and a step above 0 s, got {found.step}")
-    return found

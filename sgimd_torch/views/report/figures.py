@@ -182,7 +182,7 @@ def _panels(figure: Figure, shown: Sequence[Section]) -> list[Axes]:
     """An axis for each section, below each other; a strip is low."""
     if len(shown) > 1:
         figure.set_size_inches(6, 4.6 * len(shown))
-    elif len(shown[0].dims) == 1:
+    elif shown[0].is_strip:
         figure.set_size_inches(6, 3)
     return list(figure.subplots(len(shown), 1, squeeze=False).flat)
 

@@ -18,7 +18,7 @@ from typing import Final
 import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from sgimd_torch.catalogue import ROD
+from sgimd_torch.catalogue import CATALOGUE
 from sgimd_torch.runs.log import RunError
 from sgimd_torch.views.report import figures, record
 from sgimd_torch.views.report.data import Variant, counted, demonstrated
@@ -28,6 +28,7 @@ from sgimd_torch.views.statistics import Interval, show
 EARLY: Final = 1000  # movements, for the column next to the last error
 ORIGINS: Final = {"global": "global", "local": "local", "imitate": "imitation", "babble": "random", "": "at rest"}
 PARTS: Final = {"physics": "physics (s)", "learner": "learning (s)", "evaluation": "evaluation (s)"}
+FILMED: Final = [word for word, entry in CATALOGUE["environment"].items() if entry.filmed]
 MOST: Final = 3 * 2**20  # bytes of one film
 ROOM: Final = 5 * 2**20  # bytes of all films of a page
 
@@ -61,7 +62,7 @@ def page(place: Path, variants: Sequence[Variant], unread: Sequence[str]) -> str
         early=EARLY,
         lived=lived(variants),
         films=films,
-        rod=ROD,
+        filmed=FILMED,
         figures=figures,
         record=record,
         counted=counted,
@@ -97,12 +98,12 @@ def find_films(run: Path) -> list[Path]:
 
 
 def make_films(variants: Sequence[Variant]) -> None:
-    """Film the runs of the rod that the page shows, as ``sgimd film`` does, if there is no film yet.
+    """Film the runs that the page shows, as ``sgimd film`` does, if there is no film yet and our robot can be filmed.
 
     Raises:
         RunError: filming failed; the reason is on stderr.
     """
-    for run in [variant.typical.path for variant in variants if variant.typical.environment == ROD]:
+    for run in [variant.typical.path for variant in variants if variant.typical.environment in FILMED]:
         if find_films(run):
             continue
         command = [sys.executable, "-m", "sgimd_torch", "film", "--", str(run)]
