@@ -211,7 +211,14 @@ def tile_side(outcomes: Array, box: Box, tiles: int = TILES, *, at_least: int = 
 def _reached(outcomes: Array, box: Box, side: float, at_least: int) -> Array:
     """``(n_tiles, dim)`` the tiles of T with ``at_least`` so many outcomes, counted from its lower corner, in order."""
     inside = outcomes[box.contains(outcomes)]
-    tiles, counts = np.unique(np.floor((inside - box.low) / side), axis=0, return_counts=True)
+    tiles = np.floor((inside - box.low) / side)
+    per_side = np.floor(box.sides / side) + 1
+    if np.log2(per_side).sum() < 53:  # each tile has a number of its own, which is quicker to sort than its row
+        numbers = tiles @ np.append(np.cumprod(per_side[:0:-1])[::-1], 1.0)
+        _, first, counts = np.unique(numbers, return_index=True, return_counts=True)
+        tiles = tiles[first]
+    else:
+        tiles, counts = np.unique(tiles, axis=0, return_counts=True)
     return np.asarray(tiles[counts >= at_least])
 
 

@@ -133,7 +133,7 @@ def _png(picture: Callable[[Axes, Section], object], shown: Sequence[Section]) -
     with rc_context(STYLE):
         figure = Figure(figsize=(4.0 * n, 3.5), dpi=90)
         axes = figure.subplots(1, n, squeeze=False)
-        figure.subplots_adjust(left=0.13 / n, bottom=0.13, right=1 - 0.08 / n, top=0.88)
+        figure.subplots_adjust(left=0.13 / n, bottom=0.13, right=1 - 0.08 / n, top=0.88, wspace=0.4)
         for ax, section in zip(axes.flat, shown, strict=True):
             picture(ax, section)
         content = io.BytesIO()

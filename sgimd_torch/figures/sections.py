@@ -9,6 +9,7 @@ the dimensions that are not shown, and at the middle of C where regions include 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -17,6 +18,8 @@ from numpy.typing import NDArray
 
 from sgimd_torch.figures.axes import LEGEND, alike, note, plane, water_plane
 from sgimd_torch.spaces import Array, Box
+
+_MOST_NAMED: Final = 2  # dimensions, in a note: more would not fit
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +73,8 @@ class Section:
         context_dim, middle = lows.shape[1] - self.space.dim, (lows.min(axis=0) + highs.max(axis=0)) / 2
         names = [f"context {k}" for k in range(context_dim)] + [f"outcome {k}" for k in range(self.space.dim)]
         hidden = [k for k in range(len(names)) if k - context_dim not in self.dims]
+        if len(hidden) > _MOST_NAMED:
+            return f"the middle of {len(hidden)} others"
         return ", ".join(f"{names[k]} = {middle[k]:.3g}" for k in hidden)
 
     def frame(self, ax: Axes, *, legend: bool = True) -> None:

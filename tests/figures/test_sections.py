@@ -62,6 +62,8 @@ def test_regions_are_cut_at_the_middle_of_what_is_not_shown():
     assert met.tolist() == [False, True, False, True]
     assert (low.tolist(), high.tolist()) == ([[0.0, 0.0], [0.0, 0.7]], [[1.0, 0.7], [1.0, 1.0]])
     assert second.cut_at(lows, highs) == "context 0 = 0.5, outcome 1 = 0.5"
+    (plane, *_) = of_regions(np.zeros((1, 7)), np.ones((1, 7)), 6)
+    assert plane.cut_at(np.zeros((1, 7)), np.ones((1, 7))) == "the middle of 5 others"
 
 
 @pytest.mark.parametrize(("context_dim", "dim"), [(0, 1), (1, 1), (1, 2), (0, 3), (2, 3), (0, 6)])
