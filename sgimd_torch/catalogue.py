@@ -115,8 +115,12 @@ def _toy(name: str, side: float, about: str) -> Entry:
     return _at("runs.tasks:toy", about, fixed={"make": make, "side": side})
 
 
+def _rod(about: str, **fixed: object) -> Entry:
+    uses = {"noise": "noise", "task_space": "task_space", "threads": "threads"}
+    return _at("runs.tasks:fishing_rod", about, uses=uses, fixed=fixed, filmed=True)
+
+
 ROD: Final = "fishing-rod"  # the environment of all runs before there was a choice
-_OF_ROD: Final = {"noise": "noise", "task_space": "task_space", "threads": "threads"}
 # Colours after Okabe & Ito: distinct with any colour vision, and in grey.
 CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
     "algorithm": {
@@ -171,26 +175,9 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
         },
     },
     "environment": {
-        ROD: _at(
-            "runs.tasks:fishing_rod",
-            "the paper's arm with a rod, in MuJoCo",
-            uses=_OF_ROD,
-            filmed=True,
-        ),
-        "rod-wind": _at(
-            "runs.tasks:fishing_rod",
-            "the same in a side wind on the float, up to a quarter of its weight, which is the context",
-            uses=_OF_ROD,
-            fixed={"max_wind": 0.05},
-            filmed=True,
-        ),
-        "rod-yaw": _at(
-            "runs.tasks:fishing_rod",
-            "the same with its base turned by up to half a radian, which is the context",
-            uses=_OF_ROD,
-            fixed={"max_yaw": 0.5},
-            filmed=True,
-        ),
+        ROD: _rod("the paper's arm with a rod, in MuJoCo"),
+        "rod-wind": _rod("the same in a side wind, up to a quarter of the float's weight: a context", max_wind=0.05),
+        "rod-yaw": _rod("the same with its base turned by up to half a radian: a context", max_yaw=0.5),
         "planar-arm-7": _at("runs.tasks:planar_arm", "7 joints, no noise", fixed={"n_joints": 7}, filmed=True),
         "planar-arm-50": _at("runs.tasks:planar_arm", "50 joints, no noise", fixed={"n_joints": 50}, filmed=True),
         "swimmer": _at("runs.tasks:swimmer", "gymnasium's Swimmer-v5: three links, two motors (extra gym)"),
