@@ -388,7 +388,7 @@ def load(place: str, what: str = "") -> Any:
 
 
 def source(word: str) -> Path | None:
-    """The file that a thing of your own, ``package.module:attribute``, is written in; None if it has none.
+    """The file that a thing of your own, ``package.module:attribute``, is written in; None if there is none.
 
     Raises:
         ValueError: see ``load``.
@@ -398,7 +398,7 @@ def source(word: str) -> Path | None:
         made = made.func
     module = inspect.getmodule(made) or sys.modules[word.partition(":")[0]]
     file = getattr(module, "__file__", None)
-    return Path(file) if file else None
+    return Path(file) if file and Path(file).is_file() else None
 
 
 def label(algorithm: str) -> str:

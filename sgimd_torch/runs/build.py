@@ -94,7 +94,7 @@ def build(config: Config) -> RunParts:
         model=parts["model"] if "model" in parts.used else None,
         trust=parts["trust"] if "model" in parts.used else None,
         notes=[*config.without_effect, *notes],
-        record=task.record or getattr(task.environment, "record", None),
+        record=task.picture,
     )
 
 

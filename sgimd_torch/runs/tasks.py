@@ -63,6 +63,12 @@ class Task:
     n_joints: int | None = None
     record: Callable[[Array, Array, np.random.Generator], Recorded] | None = None
 
+    @property
+    def picture(self) -> Callable[[Array, Array, np.random.Generator], Recorded] | None:
+        """``record``, or that of the environment; None if neither has one that can be called."""
+        found = self.record or getattr(self.environment, "record", None)
+        return found if callable(found) else None
+
 
 def fishing_rod(*, noise: float, task_space: float, threads: int, max_yaw: float = 0.0, max_wind: float = 0.0) -> Task:
     """The paper's task; goals come from a square of half side ``task_space`` m.

@@ -207,8 +207,7 @@ def test_what_is_said_to_be_filmed_brings_a_picture(word):
     if word == "swimmer":
         pytest.importorskip("gymnasium")
     task = task_of(Config(environment=word))
-    brings = task.record or getattr(task.environment, "record", None)
-    assert CATALOGUE["environment"][word].filmed == (brings is not None)
+    assert CATALOGUE["environment"][word].filmed == (task.picture is not None)
 
 
 def test_a_part_without_its_members_is_refused_by_name():

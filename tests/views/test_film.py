@@ -20,6 +20,7 @@ from sgimd_torch.runs.build import build
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.spaces import stream
+from sgimd_torch.views import check
 from sgimd_torch.views.film import command as film
 from sgimd_torch.views.film.camera import caption
 from sgimd_torch.views.film.reel import PAUSE, RATE, Shot, count_frames, tiled, write_film, write_sheet
@@ -368,6 +369,23 @@ def test_a_picture_of_ones_own_is_filmed_for_outcomes_of_any_dimension(own, caps
     assert six == (5 if word == "Slider" else 6) * one  # two of the six places have one x
     assert command(film.main, f"{run} --goals 0.1,0.2,0.3,0.4".split()) == 2
     assert "number" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("word", "code", "message"),
+    [
+        ("sliders:Slider", 0, ""),
+        ("planar-arm-7", 0, ""),
+        ("fishing-rod", 0, ""),
+        ("sliders:NoPicture", 0, ""),
+        ("sliders:OtherPicture", 2, "record() of OtherPicture ends at [0.0, 0.0], execute() with an equal stream at ["),
+        ("sliders:LostPicture", 2, "record() of LostPicture fails: KeyError: 'where'"),
+        ("sliders:WrongPicture", 2, "record() of WrongPicture fails: AttributeError: 'list' object has no"),
+    ],
+)
+def test_the_check_of_an_environment_looks_at_its_picture(own, capsys, word, code, message):
+    assert command(check.main, [word]) == code
+    assert message in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

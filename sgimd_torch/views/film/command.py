@@ -48,7 +48,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     options = _options(argv)
     run = read_run(options.run)
     parts = _parts(run)
-    if not callable(parts.record):
+    if parts.record is None:
         raise RunError(
             f"{run.path} is of {run.config['environment']}, which cannot be filmed: it brings no picture of its "
             "movements, a method record(context, theta, rng) -> Sketch"
