@@ -54,19 +54,13 @@ class Section:
         Args:
             lows, highs: ``(n, context_dim + outcome_dim)`` corners of regions.
         """
-        shown = lows.shape[1] - self.space.dim + np.array(self.dims)
-        middle = (lows.min(axis=0) + highs.max(axis=0)) / 2
+        context_dim, middle = lows.shape[1] - self.space.dim, (lows.min(axis=0) + highs.max(axis=0)) / 2
         inside = (lows <= middle) & (middle < highs)
-        inside[:, shown] = True
+        inside[:, context_dim + np.array(self.dims)] = True
         met = inside.all(axis=1)
         if not met.any():  # regions of a user's own may leave gaps
             met[:] = True
-        context_dim = lows.shape[1] - self.space.dim
-        return (
-            self._flat(lows[met, context_dim:], 0.0),
-            self._flat(highs[met, context_dim:], 1.0),
-            met,
-        )
+        return self._flat(lows[met, context_dim:], 0.0), self._flat(highs[met, context_dim:], 1.0), met
 
     def cut_at(self, lows: Array, highs: Array) -> str:
         """Where ``cut`` cuts, in words; "" if nothing is hidden."""

@@ -7,7 +7,7 @@ are x and y of the picture; an outcome of one dimension lies on y = 0.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -28,34 +28,27 @@ class Sketchbook:
 
     Args:
         space: T, whose frame is drawn.
-        shots: all that will be drawn, so that pictures have one scale.
+        shots: all that will be drawn, so that pictures have one scale; they show what happens, not all of T.
         width, height: of an image, pixels, even.
     """
 
-    def __init__(self, space: Box, shots: Iterable[Shot], *, width: int = 640, height: int = 480) -> None:
-        corners = in_picture(np.stack([space.low, space.high]))
-        seen = [corners, *(_sketch(shot).chains.reshape(-1, 2) for shot in shots)]
-        everything = np.concatenate(seen)
-        self._low, self._high = everything.min(axis=0), everything.max(axis=0)
-        self._frame = [tuple(corner) for corner in corners] if space.dim > 1 else None
+    def __init__(self, space: Box, shots: Sequence[Shot], *, width: int = 640, height: int = 480) -> None:
+        self._frame = in_picture(np.stack([space.low, space.high])) if space.dim > 1 else None
+        seen = [_sketch(shot).chains.reshape(-1, 2) for shot in shots]
+        seen += [in_picture(space.clip([*shot.past, shot.goal])) for shot in shots]
+        low, high = (end(np.concatenate(seen), axis=0) for end in (np.min, np.max))
         self._size = np.array([width, height]) * _SHARPER
         room = self._size * (1 - 2 * np.array(MARGINS))
-        self._scale = float((room / np.maximum(self._high - self._low, 1e-9)).min())  # pixels for each unit
+        self._middle = (low + high) / 2
+        self._scale = float((room / np.maximum(high - low, 1e-9)).min())  # pixels for each unit
+        self._papers: dict[int, Image.Image] = {}
 
     def frame(self, shot: Shot, time: float) -> Frame:
         """The robot at ``time`` (s); from its end on, where it ended."""
         sketch = _sketch(shot)
         row = min(round(time / sketch.step), len(sketch.chains) - 1)
-        image = Image.new("RGB", tuple(self._size.tolist()), _PAPER)
+        image = self._paper(shot).copy()
         pen = ImageDraw.Draw(image)
-        if self._frame is not None:
-            (left, bottom), (right, top) = self._pixels(np.array(self._frame))
-            pen.rectangle((left, top, right, bottom), outline=_FRAME, width=_SHARPER)
-        for past in self._pixels(in_picture(shot.past)):
-            self._dot(pen, past, 1.5, _PAST)
-        goal, thick = self._pixels(in_picture(shot.goal[None]))[0], 3 * _SHARPER
-        radius = 9 * _SHARPER
-        pen.ellipse((*(goal - radius), *(goal + radius)), outline=_GOAL, width=thick)
         self._line(pen, sketch.chains[: row + 1, -1], _PATH, 2)
         self._line(pen, sketch.chains[row], _LINK, 5)
         for joint in self._pixels(sketch.chains[row][:-1]):
@@ -64,10 +57,24 @@ class Sketchbook:
         small = image.resize(tuple((self._size // _SHARPER).tolist()), Image.Resampling.LANCZOS)
         return captioned(small, shot.title, caption(shot, time))
 
+    def _paper(self, shot: Shot) -> Image.Image:
+        """What does not move: the frame of T, past outcomes and the goal; drawn once."""
+        if id(shot) not in self._papers:
+            image = Image.new("RGB", tuple(self._size.tolist()), _PAPER)
+            pen = ImageDraw.Draw(image)
+            if self._frame is not None:
+                (left, bottom), (right, top) = self._pixels(self._frame)
+                pen.rectangle((left, top, right, bottom), outline=_FRAME, width=_SHARPER)
+            for past in self._pixels(in_picture(shot.past)):
+                self._dot(pen, past, 1.5, _PAST)
+            goal, radius = self._pixels(in_picture(shot.goal[None]))[0], 9 * _SHARPER
+            pen.ellipse((*(goal - radius), *(goal + radius)), outline=_GOAL, width=3 * _SHARPER)
+            self._papers[id(shot)] = image
+        return self._papers[id(shot)]
+
     def _pixels(self, points: Array) -> Array:
         """``(n, 2)`` from places in the plane, y upwards, to pixels, y downwards."""
-        middle = (self._low + self._high) / 2
-        return self._size / 2 + (points - middle) * np.array([self._scale, -self._scale])
+        return self._size / 2 + (points - self._middle) * np.array([self._scale, -self._scale])
 
     def _line(self, pen: ImageDraw.ImageDraw, points: Array, colour: str, width: int) -> None:
         if len(points) > 1:
