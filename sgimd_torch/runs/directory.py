@@ -214,14 +214,17 @@ def sources(config: Config) -> dict[str, str]:
 
 def stale(config: Config) -> list[str]:
     """The same notes for a run on disk; none if what made it is as it was, or cannot be read."""
-    before: dict[str, Any] = read_json(config.directory / "versions.json", missing={})
+    try:
+        before: dict[str, Any] = read_json(config.directory / "versions.json", missing={})
+    except RunError:  # the run itself says so when it is resumed
+        return []
     return changed_sources(before, sources(config))
 
 
 def changed_sources(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
     """A note for each file of a user's own that is another one than ``before``, of two versions.json."""
     return [
-        f"{was.partition(',')[0]} has changed since this run was made ({was} -> {now.get(name)}): what is recorded was "
+        f"{str(was).partition(',')[0]} has changed since this run was made ({was} -> {now.get(name)}): what is recorded was "
         f"made by the earlier {name.removeprefix(_SOURCE)}, only new movements and evaluations are by this one"
         for name, was in before.items()
         if name.startswith(_SOURCE) and name in now and now[name] != was
