@@ -223,11 +223,11 @@ def stale(config: Config) -> list[str]:
 
 def changed_sources(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
     """A note for each file of a user's own that is another one than ``before``, of two versions.json."""
+    changed = {name: str(was) for name, was in before.items() if name.startswith(_SOURCE) and now.get(name, was) != was}
     return [
-        f"{str(was).partition(',')[0]} has changed since this run was made ({was} -> {now.get(name)}): what is recorded was "
+        f"{was.partition(',')[0]} has changed since this run was made ({was} -> {now[name]}): what is recorded was "
         f"made by the earlier {name.removeprefix(_SOURCE)}, only new movements and evaluations are by this one"
-        for name, was in before.items()
-        if name.startswith(_SOURCE) and name in now and now[name] != was
+        for name, was in changed.items()
     ]
 
 
