@@ -6,7 +6,7 @@ pictures = draw(regions, space, outcomes=..., ...); pictures["competence"] is a 
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,16 +16,17 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
-from sgimd_torch.board.scalars import branches
-from sgimd_torch.figures.axes import colour_bar
+from sgimd_torch.board.scalars import Grid, branches
+from sgimd_torch.figures.axes import colour_bar, plane
 from sgimd_torch.figures.learning import competence_map, interest_map, landing_points
 from sgimd_torch.goals.regions import Region
 from sgimd_torch.spaces import Array, Box
 
-LEVEL = 2  # of the tree: regions named in the pictures, as on the board's page of curves
+LEVEL = 3  # of the tree: regions named in the pictures, those with curves of their own
 # Fixed scales, so that pictures of different times and runs can be compared; values beyond look like the end.
 WORST = -0.25
 FARTHEST = 0.3  # m
+NARROW = 0.2  # of the picture's width; the name of a narrower region stands upright
 STYLE: Any = {"font.size": 8, "axes.titlesize": 8}
 
 
@@ -38,6 +39,9 @@ def draw(
     demonstrated: Array,
     benchmark: Array,
     errors: Array,
+    cells: Grid,
+    shares: Mapping[str, float],
+    since: Mapping[str, int],
 ) -> dict[str, bytes]:
     """The pictures, as png.
 
@@ -46,13 +50,19 @@ def draw(
         space: T, of the plane.
         outcomes, goals, demonstrated: ``(n, 2)`` m, where the float landed; the learner's last goals; demonstrated.
         benchmark, errors: ``(n, 2)`` and ``(n,)`` m, its goals and how far from each the float landed.
+        cells: of the plane.
+        shares, since: by cell the share of its goals that are met, and since when half of them were, see ``Curves``.
     """
     side = float(space.sides[0]) / 40
 
     def landed(ax: Axes) -> None:
         landing_points(ax, outcomes, space, demonstrated=demonstrated if len(demonstrated) else None, side=side)
 
-    pictures = {"landed": landed, "error": lambda ax: _errors(ax, benchmark, errors)}
+    pictures = {
+        "since": lambda ax: _since(ax, cells, shares, since),
+        "landed": landed,
+        "error": lambda ax: _errors(ax, benchmark, errors),
+    }
     if regions and len(regions[0].low) == space.dim:
         pictures["interest"] = lambda ax: _interest(ax, regions, goals)
         pictures["competence"] = lambda ax: _competence(ax, regions)
@@ -83,6 +93,25 @@ def _competence(ax: Axes, regions: Sequence[Region]) -> None:
     _name(ax, regions)
 
 
+def _since(ax: Axes, cells: Grid, shares: Mapping[str, float], since: Mapping[str, int]) -> None:
+    """Each cell coloured by the share of its goals that are met; where half of them are, since when is written."""
+    n, box = cells.per_side, cells.box
+    values = np.array([shares.get(name, np.nan) for name in cells.names]).reshape(n, n).T  # (n_y, n_x)
+    x, y = (np.linspace(low, high, n + 1) for low, high in zip(box.low, box.high, strict=True))
+    mesh = ax.pcolormesh(x, y, np.ma.masked_invalid(values), cmap="viridis", vmin=0, vmax=1, edgecolors="white")
+    for k, name in enumerate(cells.names):
+        if name in shares:
+            column, row = divmod(k, n)
+            said = f"since\n{since[name]}" if name in since else f"{shares[name]:.0%}"
+            ink = "white" if shares[name] < 0.6 else "black"
+            middle = x[column : column + 2].mean(), y[row : row + 2].mean()
+            weight = "bold" if name in since else "normal"
+            ax.text(*middle, said, ha="center", va="center", color=ink, fontweight=weight)
+    colour_bar([ax], mesh, "share of the goals met now")
+    plane(ax, box)
+    ax.set_title("since which movement half of the goals are met")
+
+
 def _errors(ax: Axes, benchmark: Array, errors: Array) -> None:
     drawn = ax.scatter(
         benchmark[:, 0], benchmark[:, 1], c=errors, s=14, cmap="viridis_r", vmin=0, vmax=FARTHEST, edgecolors="none"
@@ -97,14 +126,16 @@ def _errors(ax: Axes, benchmark: Array, errors: Array) -> None:
 
 def _name(ax: Axes, regions: Sequence[Region]) -> None:
     """Frame and name the regions of the curves."""
-    named = branches(regions, LEVEL)
+    named, (lowest, highest) = branches(regions, LEVEL), _corners(regions)
     for path, below in named.items():
         if f"{path}0" in named:
             continue
         low, high = _corners(below)
         ax.add_patch(Rectangle((low[0], low[1]), *(high - low), fill=False, edgecolor="black", linewidth=1.6))
         x, y = (low + high) / 2
-        text = ax.text(x, y, path, ha="center", va="center", fontweight="bold")
+        wide, tall = (high - low) / (highest - lowest)
+        upright = wide < NARROW and tall > wide
+        text = ax.text(x, y, path, ha="center", va="center", fontweight="bold", rotation=90 if upright else 0)
         text.set_bbox({"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 1.2})
 
 

@@ -38,9 +38,9 @@ def landing_points(
 
     Args:
         ax: drawn on, and given a colour bar unless ``colour_bar`` is False.
-        outcomes: ``(n, 2)`` m; how many lie outside ``box`` is written in the corner.
-        box: T, the part of the plane that is shown.
-        demonstrated: ``(n, 2)`` m, drawn as crosses.
+        outcomes: ``(n, 2)`` m; those outside ``box`` are marked at its edge, and their number is written there.
+        box: T, or another part of the plane, which is shown.
+        demonstrated: ``(n, 2)`` m, drawn as crosses, those that were demonstrated several times once.
         side: of a tile, m.
         most: the count at the end of the colour scale, so that two histograms can share it; None for their own.
 
@@ -52,15 +52,23 @@ def landing_points(
     """
     mesh = histogram(ax, outcomes, box, side=side, most=most)
     if colour_bar:
-        count_bar([ax], mesh, f"movements on a tile of {100 * side:g} cm")
+        count_bar([ax], mesh, f"movements on a tile of {100 * side:.3g} cm")
     if demonstrated is not None:
-        label = f"{len(demonstrated)} demonstrated outcomes"
-        ax.plot(*demonstrated.T, "x", color=COLOURS["sgim-d"], markersize=5, markeredgewidth=1.3, label=label)
-    outside = len(outcomes) - int(box.contains(outcomes).sum())
-    if outside:
-        note(ax, f"{outside} of {len(outcomes)} landed outside")
+        different = each_once(demonstrated)
+        label = f"{len(different)} demonstrated outcome{'s' * (len(different) != 1)}"
+        ax.plot(*different.T, "x", color=COLOURS["sgim-d"], markersize=5, markeredgewidth=1.3, label=label)
+    outside = outcomes[~box.contains(outcomes)]
+    if len(outside):
+        ax.plot(*box.clip(outside).T, "s", color="0.25", markersize=3, alpha=0.5, clip_on=False)
+        note(ax, f"{len(outside)} of {len(outcomes)} landed outside: squares at the edge")
     water_plane(ax, box)
     return mesh
+
+
+def each_once(demonstrated: Array) -> Array:
+    """``(m, 2)`` the demonstrated outcomes: of those of all demonstrations ``(n, 2)``, in order, each once."""
+    _, first = np.unique(demonstrated, axis=0, return_index=True)
+    return demonstrated[np.sort(first)]
 
 
 def histogram(ax: Axes, points: Array, box: Box, *, side: float, most: float | None = None) -> QuadMesh:
