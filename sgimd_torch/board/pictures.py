@@ -1,6 +1,6 @@
 """The pictures on the board: the water plane from above, coloured by competence, interest, landing points and error.
 
-pictures = draw(regions, space, outcomes=..., ...); pictures["competence"] is a png
+pictures = draw(regions, space, outcomes=..., ...); pictures["map/competence"] is a png, by its tag
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def draw(
     shares: Mapping[str, float],
     since: Mapping[str, int],
 ) -> dict[str, bytes]:
-    """The pictures, as png.
+    """The pictures, as png, by tag.
 
     Args:
         regions: of the goal model; no pictures of them if there are none, or if they include contexts.
@@ -59,13 +59,13 @@ def draw(
         landing_points(ax, outcomes, space, demonstrated=demonstrated if len(demonstrated) else None, side=side)
 
     pictures = {
-        "since": lambda ax: _since(ax, cells, shares, since),
-        "landed": landed,
-        "error": lambda ax: _errors(ax, benchmark, errors),
+        "competent/since": lambda ax: _since(ax, cells, shares, since),
+        "map/landed": landed,
+        "map/error": lambda ax: _errors(ax, benchmark, errors),
     }
     if regions and len(regions[0].low) == space.dim:
-        pictures["interest"] = lambda ax: _interest(ax, regions, goals)
-        pictures["competence"] = lambda ax: _competence(ax, regions)
+        pictures["map/interest"] = lambda ax: _interest(ax, regions, goals)
+        pictures["map/competence"] = lambda ax: _competence(ax, regions)
     return {name: _png(picture) for name, picture in pictures.items()}
 
 
@@ -109,7 +109,7 @@ def _since(ax: Axes, cells: Grid, shares: Mapping[str, float], since: Mapping[st
             ax.text(*middle, said, ha="center", va="center", color=ink, fontweight=weight)
     colour_bar([ax], mesh, "share of the goals met now")
     plane(ax, box)
-    ax.set_title("since which movement half of the goals are met")
+    ax.set_title("since when half of the goals are met, else the share")
 
 
 def _errors(ax: Axes, benchmark: Array, errors: Array) -> None:

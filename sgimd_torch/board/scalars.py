@@ -51,7 +51,10 @@ LEGEND: Final = {
 Charts = Mapping[str, Mapping[tuple[str, str], str]]
 """Category -> (what a run must have for this chart, "" for all; title of the chart) -> tag, as a regular expression."""
 EVERYWHERE: Final = "everywhere"
-COMPETENT: Final = "Where is it competent, and since when? Share of the benchmark's goals met (within {near:g} m)"
+COMPETENT: Final = (
+    "Where is it competent, and since when? Share of the benchmark's goals met, missed by {near:.2g} m at most; "
+    "competent is from one half on"
+)
 _LAYOUT: Final[Charts] = {
     "Does it learn?": {
         ("", "mean error on the benchmark (m)"): "error/mean",
@@ -262,7 +265,9 @@ def layout_of(
         has: what the run has, of ``ALL``; charts that would stay empty are left out.
         more: charts of your own.
     """
-    met = {name: re.escape(f"met/{name}") for name in (EVERYWHERE, *(places if len(places) > 1 else ()))}
+    met = {f"goals met {EVERYWHERE}": f"met/{EVERYWHERE}"}
+    if len(places) > 1:
+        met |= {f"goals met at {name}": re.escape(f"met/{name}") for name in places}
     charts = {
         category: {chart: tag for (need, chart), tag in each.items() if not need or need in has}
         for category, each in {**_LAYOUT, **(more or {})}.items()

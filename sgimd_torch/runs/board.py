@@ -27,7 +27,7 @@ OF_EVALUATIONS: Final = ("error", "answers", "grid_error", "grid_met", "met")  #
 LEGEND: Final = {
     "time": "Seconds spent so far: on physics, by the learner and on evaluations.",
     "answers": "error/mean (m) if another inverse model answers, such as linear in all runs: compare learners by it.",
-    "map/since": "Where half of the benchmark's goals are met, and since which movement; elsewhere the share now.",
+    "competent/since": "Where half of the benchmark's goals are met, and since which movement; elsewhere the share now.",
     "map/competence": "The regions, named like the curves, coloured by the mean competence of the goals they remember.",
     "map/interest": "The regions, coloured by interest, and the last goals that the learner chose.",
     "map/landed": "Where movements have landed so far, and what was demonstrated.",
@@ -119,7 +119,7 @@ class RunBoard:
         if not self._draws:
             return board.recall(*OF_EVALUATIONS, needs=needs)
         picture = "about/regions" if self._parts.regions else "map/error" if self._in_the_plane else "error/mean"
-        whole = board.recall(*OF_EVALUATIONS, "map", "about", needs=(*needs, picture))
+        whole = board.recall(*OF_EVALUATIONS, "competent", "map", "about", needs=(*needs, picture))
         if whole:
             self._drawn_at = board.movements
         return whole
@@ -165,7 +165,7 @@ class RunBoard:
                 since=board.curves.since,
             )
             for name, png in pictures.items():
-                board.image(f"map/{name}", png)
+                board.image(name, png)
         if regions:
             board.text("about/regions", where(regions))
 

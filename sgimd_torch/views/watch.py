@@ -28,7 +28,7 @@ Begin here:  {url}{begin}
 
 TensorBoard shows {boards} of {runs}   (Ctrl-C ends it)
   {url}/#images
-      The same as a map (map/since); the regions that curves are named after; where movements landed.
+      The same as a map (competent/since); the regions that curves are named after; where movements landed.
   {url}/#scalars&_smoothingWeight=0
       Every curve by itself; steps are movements. A click on (i) explains a curve; so does the tab Text.
   {url}/#hparams

@@ -129,7 +129,7 @@ def test_the_server_explains_its_curves_and_shows_pictures_and_the_page_of_chart
     assert all(tag["description"] for tag in tags.values())
     assert len(tags) < 140
     pictures = ask("images/tags")[RUN]
-    assert pictures.keys() == {"map/since", "map/competence", "map/interest", "map/landed", "map/error"}
+    assert pictures.keys() == {"competent/since", "map/competence", "map/interest", "map/landed", "map/error"}
     (page,) = [page for page in [ask("custom_scalars/layout")] if page]
     assert len(page["category"]) == 3
 
