@@ -21,25 +21,28 @@ from sgimd_torch.spaces import Array, Box
 GREY: Final = "0.45"
 
 
-def limits(points: Array, *, steps: int = 40) -> Box:
-    """Where the points lie, far ones left out: a box in round numbers, its longest side some ``steps`` long.
+def limits(points: Array) -> Box:
+    """Where the points lie, far ones left out, in round numbers: so a single far point leaves a map its scale.
 
-    So a map keeps its scale when a single point is far away: in a dimension farther from the middle half of the
-    distinct points than three times its width, Tukey's outer fence.
+    Far is, in a dimension, what lies farther from the middle half of the distinct points than 1.5 times its width
+    (Tukey's fence).
 
     Args:
         points: ``(n, dim)``, n >= 1, finite.
-        steps: the numbers are multiples of 1, 2 or 5 times a power of ten, about a ``steps``-th of the longest side.
     """
     lower, upper = np.quantile(np.unique(points, axis=0), (0.25, 0.75), axis=0)
-    fence = 3 * (upper - lower)
+    fence = 1.5 * (upper - lower)
     near = np.where((points >= lower - fence) & (points <= upper + fence), points, np.nan)
     low, high = np.nanmin(near, axis=0), np.nanmax(near, axis=0)
-    longest = float((high - low).max()) or float(np.abs(points).max()) or 1.0
-    power = 10 ** np.floor(np.log10(longest / steps))
-    step = power * next(k for k in (1, 2, 5, 10) if power * k >= longest / steps)
+    step = rounded((float((high - low).max()) or float(np.abs(points).max()) or 1.0) / 40)
     low, high = np.floor(low / step) * step, np.ceil(high / step) * step
     return Box(low, np.where(high > low, high, low + step))
+
+
+def rounded(length: float) -> float:
+    """The next larger of 1, 2 and 5 times a power of ten."""
+    power = 10.0 ** np.floor(np.log10(length))
+    return float(power * next(k for k in (1, 2, 5, 10) if power * k >= length))
 
 
 def plane(ax: Axes, box: Box) -> None:

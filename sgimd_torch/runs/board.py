@@ -27,7 +27,7 @@ OF_EVALUATIONS: Final = ("error", "answers", "grid_error", "grid_met", "met")  #
 LEGEND: Final = {
     "time": "Seconds spent so far: on physics, by the learner and on evaluations.",
     "answers": "error/mean (m) if another inverse model answers, such as linear in all runs: compare learners by it.",
-    "competent/since": "Where half of the benchmark's goals are met, and since which movement; elsewhere the share now.",
+    "competent/since": "Where half of the benchmark's goals are met, and since when; elsewhere the share now.",
     "map/competence": "The regions, named like the curves, coloured by the mean competence of the goals they remember.",
     "map/interest": "The regions, coloured by interest, and the last goals that the learner chose.",
     "map/landed": "Where movements have landed so far, and what was demonstrated.",

@@ -18,7 +18,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from PIL import Image
 
-from sgimd_torch.figures.axes import limits, over_movements
+from sgimd_torch.figures.axes import limits, over_movements, rounded
 from sgimd_torch.figures.learning import COLOURS, interest_map, landing_points, map_after
 from sgimd_torch.figures.movements import interest_over_time
 from sgimd_torch.figures.results import Difference, forest
@@ -27,7 +27,7 @@ from sgimd_torch.views.report.comparison import Comparison
 from sgimd_torch.views.report.data import Life, Variant
 
 P = ParamSpec("P")
-TILES: Final = 50  # along the longer side of a map
+TILES: Final = 50  # along the longer side of a map, at most
 GOALS: Final = 100  # the last ones are shown
 MOST_CURVES: Final = 8
 STYLE: Final[Any] = {
@@ -167,7 +167,7 @@ def planes_of(variants: Sequence[Variant]) -> dict[str, Box]:
 @png
 def landing(figure: Figure, landed: Array, shown: Array, plane: Box) -> None:
     """Where movements landed, and the demonstrated outcomes, on a part of the plane; the rest is marked at its edge."""
-    side = float(plane.sides.max()) / TILES
+    side = rounded(float(plane.sides.max()) / TILES)
     landing_points(figure.subplots(), landed, plane, demonstrated=shown if len(shown) else None, side=side)
 
 
