@@ -25,7 +25,7 @@ FEW: Final = f"fewer than {LEAST_SEEDS} common seeds"
 @dataclass(frozen=True, eq=False)
 class Comparison:
     """The last error of a ``variant`` less that of the baseline: ``seeds`` ``(n_seeds,)`` m, one for each common seed,
-    and their interquartile mean ``found`` (m), its interval of width 0 where there are few seeds."""
+    and their interquartile mean ``found`` (m), whose interval is NaN where there are few."""
 
     variant: Variant
     seeds: Array

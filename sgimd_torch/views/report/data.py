@@ -244,7 +244,7 @@ class Variant:
 
 
 def over_seeds(values: Array) -> Interval | None:
-    """Interquartile mean and its 95 % interval, of width 0 with fewer than 5 seeds; None if any value is missing."""
+    """Interquartile mean and its 95 % interval, NaN with fewer than 5 seeds; None if any value is missing."""
     if not len(values) or not np.isfinite(values).all():
         return None
     few = len(values) < LEAST_SEEDS
@@ -252,7 +252,7 @@ def over_seeds(values: Array) -> Interval | None:
 
 
 def _point(value: float) -> Interval:
-    return Interval(value, value, value)
+    return Interval(value, np.nan, np.nan)
 
 
 def demonstrated(lives: Sequence[Life]) -> tuple[Array, str]:

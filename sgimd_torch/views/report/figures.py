@@ -146,11 +146,7 @@ def differences(figure: Figure, compared: Sequence[Comparison], baseline: Varian
         baseline: what they are compared with.
     """
     figure.set_size_inches(6.8, 1.1 + 0.36 * len(compared))
-    rows = []
-    for each in compared:
-        value, *ends = each.found
-        low, high = (np.nan, np.nan) if each.few else ends
-        rows.append(Difference(_plain(each.variant.label), each.seeds, value, low, high))
+    rows = [Difference(_plain(each.variant.label), each.seeds, *each.found) for each in compared]
     forest(figure.subplots(), rows, reference=_plain(baseline.label))
 
 

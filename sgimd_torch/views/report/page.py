@@ -158,10 +158,10 @@ def _still(path: Path) -> str:
 
 
 def _interval(found: Interval | None, form: str = ".3f") -> str:
-    """``0.060 [0.058, 0.062]``; without brackets for one seed, a dash for nothing."""
+    """``0.060 [0.058, 0.062]``; without brackets for few seeds, a dash for nothing."""
     if found is None:
         return "–"
-    return f"{found.value:{form}}" if found.low == found.value == found.high else show(found, form)
+    return f"{found.value:{form}}" if np.isnan(found.low) else show(found, form)
 
 
 def _number(value: float, digits: int) -> str:
