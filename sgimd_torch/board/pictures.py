@@ -27,6 +27,7 @@ LEVEL = 3  # of the tree: regions named in the pictures, those with curves of th
 WORST = -0.25
 FARTHEST = 0.3  # m
 NARROW = 0.2  # of the picture's width; the name of a narrower region stands upright
+THIN = 0.1  # of the picture's side; narrower than a name
 STYLE: Any = {"font.size": 8, "axes.titlesize": 8}
 
 
@@ -127,14 +128,16 @@ def _errors(ax: Axes, benchmark: Array, errors: Array) -> None:
 def _name(ax: Axes, regions: Sequence[Region]) -> None:
     """Frame and name the regions of the curves."""
     named, (lowest, highest) = branches(regions, LEVEL), _corners(regions)
-    for path, below in named.items():
-        if f"{path}0" in named:
-            continue
-        low, high = _corners(below)
+    frontier = [path for path in named if not {f"{path}0", f"{path}1"} & named.keys()]
+    for k, path in enumerate(frontier):
+        low, high = _corners(named[path])
         ax.add_patch(Rectangle((low[0], low[1]), *(high - low), fill=False, edgecolor="black", linewidth=1.6))
-        x, y = (low + high) / 2
-        wide, tall = (high - low) / (highest - lowest)
-        upright = wide < NARROW and tall > wide
+        size = (high - low) / (highest - lowest)
+        upright = size[0] < NARROW and size[1] > size[0]
+        place = np.full(2, 0.5)
+        if size.min() < THIN:  # names of neighbours must not cover each other
+            place[int(size.argmax())] = (0.25, 0.75)[k % 2]
+        x, y = low + place * (high - low)
         text = ax.text(x, y, path, ha="center", va="center", fontweight="bold", rotation=90 if upright else 0)
         text.set_bbox({"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 1.2})
 

@@ -51,10 +51,7 @@ LEGEND: Final = {
 Charts = Mapping[str, Mapping[tuple[str, str], str]]
 """Category -> (what a run must have for this chart, "" for all; title of the chart) -> tag, as a regular expression."""
 EVERYWHERE: Final = "everywhere"
-COMPETENT: Final = (
-    "Where is it competent, and since when? Share of the benchmark's goals met, missed by {near:.2g} m at most; "
-    "competent is from one half on"
-)
+COMPETENT: Final = "Where is it competent (half of the goals met, within {near:.2g} m), and since when?"
 _LAYOUT: Final[Charts] = {
     "Does it learn?": {
         ("", "mean error on the benchmark (m)"): "error/mean",
@@ -265,9 +262,9 @@ def layout_of(
         has: what the run has, of ``ALL``; charts that would stay empty are left out.
         more: charts of your own.
     """
-    met = {f"goals met {EVERYWHERE}": f"met/{EVERYWHERE}"}
+    met = {f"share of goals met {EVERYWHERE}": f"met/{EVERYWHERE}"}
     if len(places) > 1:
-        met |= {f"goals met at {name}": re.escape(f"met/{name}") for name in places}
+        met |= {f"share met at {name}": re.escape(f"met/{name}") for name in places}
     charts = {
         category: {chart: tag for (need, chart), tag in each.items() if not need or need in has}
         for category, each in {**_LAYOUT, **(more or {})}.items()
