@@ -308,15 +308,15 @@ def test_a_run_with_a_forward_model_has_a_section_that_says_how_good_it_was_and_
     assert "different versions of torch" not in text
 
 
-def test_the_figure_of_a_model_is_grey_where_it_was_not_asked(modelled):
+def test_the_figure_of_a_model_is_shaded_where_it_was_not_asked(modelled):
     life, figure = read_life(modelled / "model" / "seed-000"), Figure()
     model.over_time.__wrapped__(figure, life)
     asked = model_run(life).asked
     assert not asked[:50].any()  # it has not learnt yet
     for ax in figure.axes:
         assert max(ax.get_xlim()) < 200
-        (grey,) = (each for each in ax.collections if isinstance(each, PolyCollection))
-        spans = [(path.vertices[:, 0].min(), path.vertices[:, 0].max()) for path in grey.get_paths()]
+        (shade,) = (each for each in ax.collections if isinstance(each, PolyCollection))
+        spans = [(path.vertices[:, 0].min(), path.vertices[:, 0].max()) for path in shade.get_paths()]
         covered = [any(low <= k <= high for low, high in spans) for k in range(170)]
         assert covered[0]
         assert sum(covered) == pytest.approx((~asked).sum(), abs=len(spans))

@@ -21,6 +21,7 @@ from sgimd_torch.views.report.record import Table
 
 NEWEST: Final = 1000  # predictions
 LEVEL: Final = 0.8  # of the regions
+NOT_ASKED: Final = "#f3e3bf"  # where the model was not asked
 WINDOW: Final = 100  # predictions, from one point of a curve to the next
 HEAD: Final = (
     *("predictions", f"error, last {NEWEST} (m)", f"inside the {LEVEL:.0%} region (%)", "asked from movement"),
@@ -52,7 +53,7 @@ def drawable(life: Life) -> bool:
 
 @png
 def over_time(figure: Figure, life: Life) -> None:
-    """Error and coverage of a run's predictions against movements, grey where the model was not asked."""
+    """Error and coverage of a run's predictions against movements, shaded where it was not asked."""
     figure.set_size_inches(6.4, 6.4)
     model = model_run(life)
     windows = running(model.observed, model.mean, model.spread, WINDOW)
@@ -63,9 +64,9 @@ def over_time(figure: Figure, life: Life) -> None:
     asked = model.asked
     for ax in (above, below):
         ax.fill_between(
-            life.index, 0, 1, where=~asked, step="post", transform=ax.get_xaxis_transform(), color="0.9", zorder=0
+            life.index, 0, 1, where=~asked, step="post", transform=ax.get_xaxis_transform(), color=NOT_ASKED, zorder=0
         )
-    above.plot([], [], color="0.9", linewidth=8, label=f"not asked: relative error above {TRUSTED_UP_TO:g}")
+    above.plot([], [], color=NOT_ASKED, linewidth=8, label=f"not asked: relative error above {TRUSTED_UP_TO:g}")
     above.set_xlabel("")
     above.legend()
 
