@@ -60,7 +60,8 @@ _LAYOUT: Final[Charts] = {
     },
     "What did it do, and its teacher?": {
         ("regions", "interest, everywhere: how fast competence changes"): "interest/R",
-        ("", "share of movements by what proposed them; point at a line for its name"): "regime/.*",
+        ("goals", "share of movements: searches for its own goals"): "regime/local",
+        ("imitates", "share of movements: imitations"): "regime/imitate",
         ("teacher", "demonstrations so far"): "teacher/demonstrations",
         ("imitates", "imitations miss what was shown by (m)"): "teacher/missed_by",
     },
@@ -269,7 +270,7 @@ def layout_of(
         category: {chart: tag for (need, chart), tag in each.items() if not need or need in has}
         for category, each in {**_LAYOUT, **(more or {})}.items()
     }
-    return {COMPETENT.format(near=near): met, **charts}
+    return {COMPETENT.format(near=near): met, **{category: each for category, each in charts.items() if each}}
 
 
 def branches(regions: Sequence[Region], depth: int) -> dict[str, list[Region]]:
