@@ -55,11 +55,11 @@ def landing_points(
         count_bar([ax], mesh, f"movements on a tile of {100 * side:.3g} cm")
     if demonstrated is not None:
         different = each_once(demonstrated)
-        label = f"{len(different)} demonstrated outcome{'s' * (len(different) != 1)}"
+        label = f"{len(different)} demonstrated outcomes"
         ax.plot(*different.T, "x", color=COLOURS["sgim-d"], markersize=5, markeredgewidth=1.3, label=label)
     outside = outcomes[~box.contains(outcomes)]
     if len(outside):
-        ax.plot(*box.clip(outside).T, "s", color="0.25", markersize=3, alpha=0.5, clip_on=False)
+        ax.scatter(*box.clip(outside).T, marker="s", color="0.25", s=9, alpha=0.5, linewidths=0, clip_on=False)
         note(ax, f"{len(outside)} of {len(outcomes)} landed outside: squares at the edge")
     water_plane(ax, box)
     return mesh

@@ -337,8 +337,8 @@ def test_one_outlier_neither_shrinks_a_map_nor_is_lost(runs):
     figure = Figure()
     figures.landing.__wrapped__(figure, far.landed, np.empty((0, 2)), planes["fishing-rod"])
     assert np.ptp(figure.axes[0].get_xlim()) < 4
-    squares = next(line for line in figure.axes[0].lines if line.get_marker() == "s")
-    assert squares.get_xdata().max() == planes["fishing-rod"].high[0]
+    squares = figure.axes[0].collections[1].get_offsets()
+    assert squares[:, 0].max() == planes["fishing-rod"].high[0]
 
 
 def test_board_and_report_show_the_same_demonstrated_outcomes(tmp_path, go, monkeypatch):
