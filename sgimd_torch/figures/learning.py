@@ -59,7 +59,8 @@ def landing_points(
         ax.plot(*different.T, "x", color=COLOURS["sgim-d"], markersize=5, markeredgewidth=1.3, label=label)
     outside = outcomes[~box.contains(outcomes)]
     if len(outside):
-        ax.scatter(*box.clip(outside).T, marker="s", color="0.25", s=9, alpha=0.5, linewidths=0, clip_on=False)
+        x, y = box.clip(outside).T
+        ax.scatter(x, y, marker="s", color="0.25", s=9, alpha=0.5, linewidths=0, clip_on=False)
         note(ax, f"{len(outside)} of {len(outcomes)} landed outside: squares at the edge")
     water_plane(ax, box)
     return mesh
