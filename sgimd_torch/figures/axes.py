@@ -34,7 +34,8 @@ def limits(points: Array) -> Box:
     fence = 1.5 * (upper - lower)
     near = np.where((points >= lower - fence) & (points <= upper + fence), points, np.nan)
     low, high = np.nanmin(near, axis=0), np.nanmax(near, axis=0)
-    step = rounded((float((high - low).max()) or float(np.abs(points).max()) or 1.0) / 40)
+    longest = float((high - low).max()) or float(np.abs(points).max()) or 1.0
+    step = np.array([rounded((side or longest) / 40) for side in (high - low).tolist()])
     low, high = np.floor(low / step) * step, np.ceil(high / step) * step
     return Box(low, np.where(high > low, high, low + step))
 

@@ -183,12 +183,12 @@ def test_one_outlier_neither_shrinks_a_map_nor_is_lost(runs):
     landed[row] = [400.0, 0.3]
     far = Variant("far", [dataclasses.replace(life, outcomes=landed)])
     planes = figures.planes_of([Variant("sgim-d", [life]), far])
-    assert (planes["fishing-rod"].sides < 4).all()
+    assert (planes["fishing-rod", 2].sides < 4).all()
     figure = Figure()
-    figures.landing.__wrapped__(figure, far.landed, np.empty((0, 2)), planes["fishing-rod"])
+    figures.landing.__wrapped__(figure, far.landed, np.empty((0, 2)), planes["fishing-rod", 2])
     assert np.ptp(figure.axes[0].get_xlim()) < 4
     squares = figure.axes[0].collections[1].get_offsets()
-    assert squares[:, 0].max() == planes["fishing-rod"].high[0]
+    assert squares[:, 0].max() == planes["fishing-rod", 2].high[0]
 
 
 def test_board_and_report_show_the_same_demonstrated_outcomes(tmp_path, go, monkeypatch):

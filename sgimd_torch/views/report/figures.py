@@ -150,13 +150,13 @@ def differences(figure: Figure, compared: Sequence[Comparison], baseline: Varian
     forest(figure.subplots(), rows, reference=_plain(baseline.label))
 
 
-def planes_of(variants: Sequence[Variant]) -> dict[str, Box]:
-    """For each environment the part of the plane that its maps show: where the movements of all its variants landed."""
-    found: dict[str, list[Array]] = {}
+def planes_of(variants: Sequence[Variant]) -> dict[tuple[str, int], Box]:
+    """For each environment and outcome_dim the part of T that maps show: where movements of all variants landed."""
+    found: dict[tuple[str, int], list[Array]] = {}
     for variant in variants:
         if len(variant.landed):
             box = limits(variant.landed)
-            found.setdefault(variant.typical.environment, []).extend([box.low, box.high])
+            found.setdefault((variant.typical.environment, box.dim), []).extend([box.low, box.high])
     return {name: Box(np.min(corners, axis=0), np.max(corners, axis=0)) for name, corners in found.items()}
 
 
