@@ -204,9 +204,8 @@ def test_board_and_report_show_the_same_demonstrated_outcomes(tmp_path, go, monk
     assert len(life.shown) > 3
     shown, missing = demonstrated([life])
     assert missing == ""
-    figures.landing.__wrapped__(
-        figure, life.landed, shown, figures.planes_of([Variant("sgim-d", [life])])["fishing-rod"]
-    )
+    (plane,) = figures.planes_of([Variant("sgim-d", [life])]).values()
+    figures.landing.__wrapped__(figure, life.landed, shown, plane)
     in_report = figure.axes[0].lines[0]
     assert on_board.get_label() == in_report.get_label() == "3 demonstrated outcomes"
     assert {*map(tuple, on_board.get_xydata())} == {*map(tuple, in_report.get_xydata())}
