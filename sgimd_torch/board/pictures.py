@@ -1,12 +1,12 @@
 """The pictures on the board: the water plane from above, coloured by competence, interest, landing points and error.
 
-pictures = draw(regions, space, outcomes=..., ...); pictures["competence"] is a png
+pictures = draw(regions, space, outcomes=..., ...); pictures["map/competence"] is a png, by its tag
 """
 
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,18 +15,20 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from sgimd_torch.board.scalars import branches
-from sgimd_torch.figures.axes import colour_bar
+from sgimd_torch.board.scalars import Grid, branches
+from sgimd_torch.figures.axes import colour_bar, plane
 from sgimd_torch.figures.learning import competence_map, interest_map, landing_points
 from sgimd_torch.figures.sections import Section, sections
 from sgimd_torch.goals.regions import Region
 from sgimd_torch.spaces import Array, Box
 
-LEVEL = 2  # of the tree: regions named in the pictures, as on the board's page of curves
+LEVEL = 3  # of the tree: regions named in the pictures, those with curves of their own
 # Fixed scales, so that pictures of different times and runs can be compared; values beyond look like the end.
 WORST = -0.25
 FARTHEST = 0.3  # m
 SHARE = 0.15  # of the longest side of T, likewise where T is not a plane
+NARROW = 0.2  # of the picture's width; the name of a narrower region stands upright
+THIN = 0.1  # of the picture's side; narrower than a name
 STYLE: Any = {"font.size": 8, "axes.titlesize": 8}
 
 
@@ -39,8 +41,11 @@ def draw(
     demonstrated: Array,
     benchmark: Array,
     errors: Array,
+    cells: Grid,
+    shares: Mapping[str, float],
+    since: Mapping[str, int],
 ) -> dict[str, bytes]:
-    """The pictures, as png.
+    """The pictures, as png, by tag.
 
     Args:
         regions: of the goal model; no pictures of them if there are none.
@@ -48,16 +53,23 @@ def draw(
         outcomes, goals, demonstrated: ``(n, outcome_dim)`` m, where the float landed; the learner's last goals;
             demonstrated.
         benchmark, errors: ``(n, outcome_dim)`` and ``(n,)`` m, its goals and how far from each the float landed.
+        cells: of T; they have a picture in the plane only.
+        shares, since: by cell the share of its goals that are met, and since when half of them were, see ``Curves``.
     """
 
     def landed(ax: Axes, section: Section) -> None:
         side, shown = float(section.box.sides[0]) / 40, demonstrated if len(demonstrated) else None
         landing_points(ax, outcomes, space, demonstrated=shown, side=side, section=section)
 
-    pictures = {"landed": landed, "error": lambda ax, section: _errors(ax, benchmark, errors, section)}
+    pictures: dict[str, Callable[[Axes, Section], object]] = {
+        "map/landed": landed,
+        "map/error": lambda ax, section: _errors(ax, benchmark, errors, section),
+    }
+    if space.dim == 2:
+        pictures = {"competent/since": lambda ax, section: _since(ax, cells, shares, since), **pictures}
     if regions:
-        pictures["interest"] = lambda ax, section: _interest(ax, regions, goals, section)
-        pictures["competence"] = lambda ax, section: _competence(ax, regions, section)
+        pictures["map/interest"] = lambda ax, section: _interest(ax, regions, goals, section)
+        pictures["map/competence"] = lambda ax, section: _competence(ax, regions, section)
     return {name: _png(picture, sections(space)) for name, picture in pictures.items()}
 
 
@@ -86,6 +98,25 @@ def _competence(ax: Axes, regions: Sequence[Region], section: Section) -> None:
     _name(ax, regions, section)
 
 
+def _since(ax: Axes, cells: Grid, shares: Mapping[str, float], since: Mapping[str, int]) -> None:
+    """Each cell coloured by the share of its goals that are met; where half of them are, since when is written."""
+    n, box = cells.per_side, cells.box
+    values = np.array([shares.get(name, np.nan) for name in cells.names]).reshape(n, n).T  # (n_y, n_x)
+    x, y = (np.linspace(low, high, n + 1) for low, high in zip(box.low, box.high, strict=True))
+    mesh = ax.pcolormesh(x, y, np.ma.masked_invalid(values), cmap="viridis", vmin=0, vmax=1, edgecolors="white")
+    for k, name in enumerate(cells.names):
+        if name in shares:
+            column, row = divmod(k, n)
+            said = f"since\n{since[name]}" if name in since else f"{shares[name]:.0%}"
+            ink = "white" if shares[name] < 0.6 else "black"
+            middle = x[column : column + 2].mean(), y[row : row + 2].mean()
+            weight = "bold" if name in since else "normal"
+            ax.text(*middle, said, ha="center", va="center", color=ink, fontweight=weight)
+    colour_bar([ax], mesh, "share of the goals met now")
+    plane(ax, box)
+    ax.set_title("since when half of the goals are met, else the share")
+
+
 def _errors(ax: Axes, benchmark: Array, errors: Array, section: Section) -> None:
     ax.set_title(f"{len(errors)} benchmark goals, mean error {errors.mean():.3f} m")
     label = "distance from goal to landing point (m)"
@@ -106,15 +137,19 @@ def _name(ax: Axes, regions: Sequence[Region], section: Section) -> None:
     """Frame and name the regions of the curves."""
     lows, highs, met = section.cut(*_boxes(regions))
     rows = {regions[k]: row for row, k in enumerate(np.flatnonzero(met).tolist())}
-    named = branches(list(rows), LEVEL)
-    for path, below in named.items():
-        if {f"{path}0", f"{path}1"} & named.keys():
-            continue
-        among = [rows[region] for region in below]
+    named, (lowest, highest) = branches(list(rows), LEVEL), (lows.min(axis=0), highs.max(axis=0))
+    frontier = [path for path in named if not {f"{path}0", f"{path}1"} & named.keys()]
+    for k, path in enumerate(frontier):
+        among = [rows[region] for region in named[path]]
         low, high = lows[among].min(axis=0), highs[among].max(axis=0)
         ax.add_patch(Rectangle((low[0], low[1]), *(high - low), fill=False, edgecolor="black", linewidth=1.6))
-        x, y = (low + high) / 2
-        text = ax.text(x, y, path, ha="center", va="center", fontweight="bold")
+        size = (high - low) / (highest - lowest)
+        upright = size[0] < NARROW and size[1] > size[0]
+        place = np.full(2, 0.5)
+        if size.min() < THIN:  # names of neighbours must not cover each other
+            place[int(size.argmax())] = (0.25, 0.75)[k % 2]
+        x, y = low + place * (high - low)
+        text = ax.text(x, y, path, ha="center", va="center", fontweight="bold", rotation=90 if upright else 0)
         text.set_bbox({"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 1.2})
 
 

@@ -29,6 +29,31 @@ LEGEND: Final[dict[str, Any]] = {
 }
 
 
+def limits(points: Array) -> Box:
+    """Where the points lie, far ones left out, in round numbers: so a single far point leaves a map its scale.
+
+    Far is, in a dimension, what lies farther from the middle half of the distinct points than 1.5 times its width
+    (Tukey's fence).
+
+    Args:
+        points: ``(n, dim)``, n >= 1, finite.
+    """
+    lower, upper = np.quantile(np.unique(points, axis=0), (0.25, 0.75), axis=0)
+    fence = 1.5 * (upper - lower)
+    near = np.where((points >= lower - fence) & (points <= upper + fence), points, np.nan)
+    low, high = np.nanmin(near, axis=0), np.nanmax(near, axis=0)
+    longest = float((high - low).max()) or float(np.abs(points).max()) or 1.0
+    step = np.array([rounded((side or longest) / 40) for side in (high - low).tolist()])
+    low, high = np.floor(low / step) * step, np.ceil(high / step) * step
+    return Box(low, np.where(high > low, high, low + step))
+
+
+def rounded(length: float) -> float:
+    """The next larger of 1, 2 and 5 times a power of ten."""
+    power = 10.0 ** np.floor(np.log10(length))
+    return float(power * next(k for k in (1, 2, 5, 10) if power * k >= length))
+
+
 def plane(ax: Axes, box: Box) -> None:
     """Axes in metres, equal aspect unless a side is much longer, showing all of ``box``."""
     limits = {"xlim": (box.low[0], box.high[0]), "ylim": (box.low[1], box.high[1])}

@@ -40,9 +40,9 @@ def landing_points(
 
     Args:
         ax: drawn on, and given a colour bar unless ``colour_bar`` is False.
-        outcomes: ``(n, outcome_dim)`` m; how many lie outside ``box`` is written in the corner.
-        box: T, the part that is shown.
-        demonstrated: ``(n, outcome_dim)`` m, drawn as crosses.
+        outcomes: ``(n, outcome_dim)`` m; those outside ``box`` are marked at its edge, with their number.
+        box: T, or another part of it, which is shown.
+        demonstrated: ``(n, outcome_dim)`` m, drawn as crosses, those that were demonstrated several times once.
         side: of a tile, m.
         most: the count at the end of the colour scale, so that two histograms can share it; None for their own.
         section: which dimensions to show; needed unless T has two.
@@ -57,22 +57,24 @@ def landing_points(
     mesh = histogram(ax, section.points(outcomes), section.box, side=section.tile(side), most=most)
     if colour_bar:
         metric = box.dim == 2 and alike(box.sides)
-        count_bar([ax], mesh, f"movements on a tile of {100 * side:g} cm" if metric else "movements on a tile")
+        count_bar([ax], mesh, f"movements on a tile of {100 * side:.3g} cm" if metric else "movements on a tile")
     if demonstrated is not None:
-        label = f"{len(demonstrated)} demonstrated outcomes"
-        ax.plot(
-            *section.points(demonstrated).T,
-            "x",
-            color=COLOURS["sgim-d"],
-            markersize=5,
-            markeredgewidth=1.3,
-            label=label,
-        )
-    outside = len(outcomes) - int(box.contains(outcomes).sum())
-    if outside:
-        note(ax, f"{outside} of {len(outcomes)} landed outside")
+        different = each_once(demonstrated)
+        crosses, label = section.points(different), f"{len(different)} demonstrated outcomes"
+        ax.plot(*crosses.T, "x", color=COLOURS["sgim-d"], markersize=5, markeredgewidth=1.3, label=label)
+    outside = outcomes[~box.contains(outcomes)]
+    if len(outside):
+        x, y = section.points(box.clip(outside)).T
+        ax.scatter(x, y, marker="s", color="0.25", s=9, alpha=0.5, linewidths=0, clip_on=False)
+        note(ax, f"{len(outside)} of {len(outcomes)} landed outside: squares at the edge")
     section.frame(ax)
     return mesh
+
+
+def each_once(demonstrated: Array) -> Array:
+    """``(m, dim)`` the demonstrated outcomes: of those of all demonstrations ``(n, dim)``, in order, each once."""
+    _, first = np.unique(demonstrated, axis=0, return_index=True)
+    return demonstrated[np.sort(first)]
 
 
 def histogram(ax: Axes, points: Array, box: Box, *, side: float | Array, most: float | None = None) -> QuadMesh:

@@ -27,6 +27,8 @@ _SOURCE: Final = "source of "  # in versions.json, before the word that names a 
 _UNFINISHED = ("lock", "versions.json")  # what a run killed before its config.json may have left, besides *.part
 # Files count by their content, of which a checksum is recorded; a benchmark may be another one when a run is resumed.
 MAY_CHANGE: Final = (*having("on_resume"), "benchmark_crc32")
+LIBRARIES: Final = {"numpy": "numpy", "scipy": "scipy", "faiss": "faiss-cpu", "mujoco": "mujoco"}
+FORWARD: Final = ("torch", "lightning", "safetensors")  # of runs with a forward model
 EVALUATION_SETTINGS: Final = (*having("evaluates"), "benchmark_crc32")  # all evaluations of a run share these
 
 
@@ -61,7 +63,7 @@ class RunDirectory:
         self.notes: list[str] = []
         self.summary: dict[str, Any] = {}
         self._settings: dict[str, Any] = plain({**vars(config), **parts.data})
-        self._versions = {**versions(), **sources(config)}
+        self._versions = {**versions(forward=parts.model is not None), **sources(config)}
         _refuse_foreign(path)
         make_folder(path)
         try:
@@ -140,7 +142,8 @@ class RunDirectory:
         earlier = old.pop("before", [])
         if not isinstance(earlier, list):
             earlier = []
-        differ = [name for name, now in self._versions.items() if old.get(name) != now]
+        unknown = {name: now for name, now in self._versions.items() if name in FORWARD}  # earlier versions left it out
+        differ = [name for name, now in self._versions.items() if {**unknown, **old}.get(name) != now]
         if old and differ:
             changes = ", ".join(f"{name} {old.get(name)} -> {self._versions[name]}" for name in differ)
             self.notes += [f"resumed with other versions: {changes}", *changed_sources(old, self._versions)]
@@ -231,9 +234,13 @@ def changed_sources(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[s
     ]
 
 
-def versions() -> dict[str, Any]:
-    """What runs here; ``commit`` is None outside a git repository and ends in "-dirty" when files were changed."""
-    packages = {"numpy": "numpy", "scipy": "scipy", "faiss": "faiss-cpu", "mujoco": "mujoco"}
+def versions(*, forward: bool) -> dict[str, Any]:
+    """What runs here; ``commit`` is None outside a git repository and ends in "-dirty" when files were changed.
+
+    Args:
+        forward: also of the libraries of a forward model, which a run without one does not need.
+    """
+    packages = LIBRARIES | (dict(zip(FORWARD, FORWARD, strict=True)) if forward else {})
     here = str(Path(__file__).parent)
     describe = ["git", "-C", here, "describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"]
     try:

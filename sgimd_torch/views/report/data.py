@@ -25,7 +25,15 @@ from sgimd_torch.runs.log import RunError
 from sgimd_torch.runs.read import NO_EVALUATION, Run, read_run
 from sgimd_torch.runs.tasks import demonstrations_of
 from sgimd_torch.spaces import Array
-from sgimd_torch.views.statistics import Interval, iqm_interval, mean_over_life, ratio_interval, rng
+from sgimd_torch.views.statistics import (
+    LEAST_SEEDS,
+    Interval,
+    interquartile_mean,
+    iqm_interval,
+    mean_over_life,
+    ratio_interval,
+    rng,
+)
 
 NOISELESS: Final = 1e-9  # m; a lower noise floor is rounding, so errors are not divided by it
 _NEEDED: Final = {"algorithm": str, "seed": int, "movements": int}
@@ -192,6 +200,11 @@ class Variant:
         """A column of evaluation.csv over its seeds; None where one of them has no value."""
         return over_seeds(np.array([life.at(movements, column, answer) for life in self.used]))
 
+    @property
+    def few(self) -> bool:
+        """Whether there are too few seeds for intervals."""
+        return len(self.used) < LEAST_SEEDS
+
     @cached_property
     def errors(self) -> Array:
         """``(n_seeds, n)`` m, at ``evaluated``."""
@@ -221,8 +234,8 @@ class Variant:
         floors = np.array([life.at(self.last, "noise_floor_m") for life in self.used])
         if not self.last_error or not over_seeds(floors) or floors.min() < NOISELESS:
             return None
-        if len(floors) == 1:
-            return over_seeds(self.errors[:, -1] / floors)
+        if self.few:
+            return _point(float(interquartile_mean(self.errors[:, -1]) / interquartile_mean(floors)))
         return ratio_interval(self.errors[:, -1], floors, rng=rng(), paired=True)
 
     @property
@@ -241,10 +254,15 @@ class Variant:
 
 
 def over_seeds(values: Array) -> Interval | None:
-    """Interquartile mean and its 95 % interval; for one seed its value; None if any is missing."""
+    """Interquartile mean and its 95 % interval, NaN with fewer than 5 seeds; None if any value is missing."""
     if not len(values) or not np.isfinite(values).all():
         return None
-    return iqm_interval(values, rng=rng()) if len(values) > 1 else Interval(*map(float, (*values,) * 3))
+    few = len(values) < LEAST_SEEDS
+    return _point(float(interquartile_mean(values))) if few else iqm_interval(values, rng=rng())
+
+
+def _point(value: float) -> Interval:
+    return Interval(value, np.nan, np.nan)
 
 
 def demonstrated(lives: Sequence[Life]) -> tuple[Array, str]:

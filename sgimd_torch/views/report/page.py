@@ -20,10 +20,10 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from sgimd_torch.catalogue import CATALOGUE
 from sgimd_torch.runs.log import RunError
-from sgimd_torch.views.report import figures, record
+from sgimd_torch.views.report import comparison, figures, model, record
 from sgimd_torch.views.report.data import Variant, counted, demonstrated
 from sgimd_torch.views.report.figures import data_uri
-from sgimd_torch.views.statistics import Interval, show
+from sgimd_torch.views.statistics import LEAST_SEEDS, Interval, show
 
 EARLY: Final = 1000  # movements, for the column next to the last error
 ORIGINS: Final = {"global": "global", "local": "local", "imitate": "imitation", "babble": "random", "": "at rest"}
@@ -33,16 +33,22 @@ MOST: Final = 3 * 2**20  # bytes of one film
 ROOM: Final = 5 * 2**20  # bytes of all films of a page
 
 
-def page(place: Path, variants: Sequence[Variant], unread: Sequence[str]) -> str:
+def page(place: Path, variants: Sequence[Variant], unread: Sequence[str], baseline: str | None = None) -> str:
     """The page.
 
     Args:
         place: where the runs were found.
         variants: the best first, not empty.
         unread: a line for each run that could not be read.
+        baseline: name of the variant that the others are compared with; see `comparison.baseline_of`.
+
+    Raises:
+        ValueError: the baseline is no variant with errors.
     """
+    reference = comparison.baseline_of(variants, baseline)
     films, notes = read_films(variants)
     lives = [life for variant in variants for life in variant.lives]
+    warnings = [*comparison.few_seeds(variants), *record.doubts(variants), *(f"Left out, damaged: {x}" for x in unread)]
     jinja = Environment(
         loader=FileSystemLoader(Path(__file__).parent), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
@@ -58,13 +64,19 @@ def page(place: Path, variants: Sequence[Variant], unread: Sequence[str]) -> str
         variants=variants,
         single=lives[0] if len(lives) == 1 else None,
         n_runs=len(lives),
-        warnings=[*record.doubts(variants), *(f"Left out, damaged: {line}" for line in unread), *notes],
+        warnings=[*warnings, *notes],
+        baseline=reference,
+        compared=comparison.compare(variants, reference) if reference else [],
+        colours=figures.colours_of(variants),
+        planes=figures.planes_of(variants),
         early=EARLY,
+        least_seeds=LEAST_SEEDS,
         lived=lived(variants),
         films=films,
         filmed=FILMED,
         figures=figures,
         record=record,
+        model=model,
         counted=counted,
         demonstrated=demonstrated,
     )
@@ -147,10 +159,10 @@ def _still(path: Path) -> str:
 
 
 def _interval(found: Interval | None, form: str = ".3f") -> str:
-    """``0.060 [0.058, 0.062]``; without brackets for one seed, a dash for nothing."""
+    """``0.060 [0.058, 0.062]``; without brackets for few seeds, a dash for nothing."""
     if found is None:
         return "–"
-    return f"{found.value:{form}}" if found.low == found.value == found.high else show(found, form)
+    return f"{found.value:{form}}" if np.isnan(found.low) else show(found, form)
 
 
 def _number(value: float, digits: int) -> str:
