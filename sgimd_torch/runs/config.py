@@ -305,6 +305,12 @@ class Config:
         return (used | {each.name for each in fields(self)} - named) - ignored
 
     @property
+    def own(self) -> list[str]:
+        """The things of a user's own in this run, ``package.module:attribute``."""
+        used = [getattr(self, name) for name in CATALOGUE if name in self.used]
+        return sorted({word for word in (*used, *self.answered) if ":" in word})
+
+    @property
     def uses_model(self) -> bool:
         """Whether a forward model is learnt."""
         return "model" in self.used

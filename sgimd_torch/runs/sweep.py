@@ -75,6 +75,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     out = configs[0].out
     counts = f"{len(variants)} variants, {len(options.seeds)} seeds"
     say(f"{len(configs)} runs ({counts}), {len(configs) - len(left)} of them finished: {out}")
+    own = [config for config in configs if config.own and config not in left]
+    if own:
+        from sgimd_torch.runs.directory import stale  # loads numpy
+
+        say(*dict.fromkeys(f"{config.title}: {note}" for config in own for note in stale(config)))
     if options.dry_run:
         for config in left:
             print(f"{config.title}: {movements_on_disk(config.directory)} of {config.movements} movements")

@@ -2,9 +2,9 @@
 
 It takes any folder with run directories, OUT/NAME/seed-000. Variants are compared after the last number of movements at
 which all finished runs were evaluated, or after --at. The worst comes first. Errors and noise floors are means over
-seeds in metres, ± the standard deviation; "by linear" is the error if LocallyLinear answers, whatever inverse model
-the run has: compare learners by it. Costs are milliseconds for each movement. Runs that are damaged, not finished
-or not evaluated there are left out, and named below the table.
+seeds in metres, ± the standard deviation; with fewer than 5 seeds there is none, and a note. "by linear" is the error
+if LocallyLinear answers, whatever inverse model the run has: compare learners by it. Costs are milliseconds for each
+movement. Runs that are damaged, not finished or not evaluated there are left out, and named below the table.
 
   sgimd table runs
   sgimd table study --at 2000       also with unfinished runs that were evaluated there
@@ -27,6 +27,7 @@ from sgimd_torch.runs.log import RunError
 from sgimd_torch.runs.process import say
 from sgimd_torch.runs.read import NO_EVALUATION, Run, find_runs, read_run
 from sgimd_torch.spaces import Array
+from sgimd_torch.views.statistics import LEAST_SEEDS
 
 EARLY: Final = 1000  # movements, for a column of its own
 
@@ -68,6 +69,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     widths = [max(map(len, cells)) for cells in zip(*table, strict=True)]
     for cells in table:
         print("  ".join(cell.ljust(width) for cell, width in zip(cells, widths, strict=True)).rstrip(), flush=True)
+    few = [f"{name} ({len(theirs)})" for name, theirs in worst_first if len(theirs) < LEAST_SEEDS]
+    if few:
+        say(f"fewer than {LEAST_SEEDS} seeds, too few for a verdict or a deviation: {', '.join(few)}")
     say(*(f"left out: {reason}" for reason in left_out))
     return 0
 
@@ -93,7 +97,7 @@ def _row(name: str, runs: Sequence[Run], at: int) -> tuple[str, ...]:
         name,
         str(len(runs)),
         _metres(_at(runs, EARLY, "mean_error_m")),
-        f"{errors.mean():.3f}" + (f" ± {errors.std(ddof=1):.3f}" if len(runs) > 1 else ""),
+        f"{errors.mean():.3f}" + (f" ± {errors.std(ddof=1):.3f}" if len(runs) >= LEAST_SEEDS else ""),
         _metres(_at(runs, at, "mean_error_m", "linear")),
         _metres(_at(runs, at, "noise_floor_m")),
         *(f"{np.mean([_milliseconds(run, part) for run in runs]):.2f}" for part in ("physics", "learner")),

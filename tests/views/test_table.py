@@ -12,12 +12,15 @@ from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.views.table import main
 
+SEEDS = 5
+FEW = "fewer than 5 seeds, too few for a verdict or a deviation: sgim-d (1)\n"
+
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory):
     out = tmp_path_factory.mktemp("runs")
     save_benchmark(out / "tiny.npz", Benchmark("FishingRod", np.array([[0.0, 0.6], [0.3, 0.5]]), 0.1))
-    for algorithm, seed in (("random", 0), ("random", 1), ("sgim-d", 0)):
+    for algorithm, seed in (*(("random", seed) for seed in range(SEEDS)), ("sgim-d", 0)):
         options = f"--algorithm {algorithm} --seed {seed} --movements 40 --repeats 2 --evaluate_at 20"
         assert live([*options.split(), "--benchmark", str(out / "tiny.npz"), "--out", str(out)]) == 0
     return out
@@ -33,20 +36,28 @@ def table(*options):
     return command(main, [str(option) for option in options])
 
 
-def test_the_table_gives_mean_and_deviation_over_seeds(runs, capsys):
+def test_the_table_gives_mean_and_deviation_over_five_seeds_or_more_and_a_note_where_there_are_fewer(runs, capsys):
     assert table(runs, "--at", 40) == 0
-    lines = {line.split()[0]: line for line in capsys.readouterr().out.splitlines()}
-    errors = [read_run(runs / "random" / f"seed-00{seed}").evaluation["mean_error_m"][-1] for seed in (0, 1)]
-    assert f"{np.mean(errors):.3f} ± {abs(errors[0] - errors[1]) / np.sqrt(2):.3f}" in lines["random"]
-    assert lines["random"].split()[1] == "2"
+    said = capsys.readouterr()
+    lines = {line.split()[0]: line for line in said.out.splitlines()}
+    errors, few = (
+        np.array([read_run(path).evaluation["mean_error_m"][-1] for path in sorted((runs / name).iterdir())])
+        for name in ("random", "sgim-d")
+    )
+    deviation = np.sqrt(((errors - errors.mean()) ** 2).sum() / (SEEDS - 1))
+    assert f"{errors.mean():.3f} ± {deviation:.3f}" in lines["random"]
+    assert lines["random"].split()[1] == "5"
+    assert lines["sgim-d"].split()[1] == "1"
+    assert f"{few.mean():.3f}" in lines["sgim-d"]
     assert "±" not in lines["sgim-d"]
+    assert said.err == FEW
 
 
 def test_variants_are_compared_where_all_finished_runs_were_evaluated_the_last_time(runs, copied, capsys):
     assert table(copied) == 0
     said = capsys.readouterr()
     assert "at 40 (m)" in said.out
-    assert not said.err
+    assert said.err == FEW
     options = "--algorithm random --name longer --movements 60 --repeats 0 --evaluate_at 20"
     assert live([*options.split(), "--benchmark", str(runs / "tiny.npz"), "--out", str(copied)]) == 0
     capsys.readouterr()
@@ -64,12 +75,14 @@ def test_a_run_that_is_not_finished_is_named_and_left_out_unless_at_says_where_t
     (path / "summary.json").write_text(json.dumps({**summary, "finished": False}))
     assert table(copied) == 0
     said = capsys.readouterr()
-    assert next(line for line in said.out.splitlines() if line.startswith("random")).split()[1] == "1"
-    assert said.err == f"left out: {path} is not finished: 40 of 40 movements; --resume goes on\n"
+    assert next(line for line in said.out.splitlines() if line.startswith("random")).split()[1] == "4"
+    few, left_out = said.err.splitlines()
+    assert "random (4)" in few
+    assert left_out == f"left out: {path} is not finished: 40 of 40 movements; --resume goes on"
     assert table(copied, "--at", 20) == 0
     said = capsys.readouterr()
-    assert next(line for line in said.out.splitlines() if line.startswith("random")).split()[1] == "2"
-    assert not said.err
+    assert next(line for line in said.out.splitlines() if line.startswith("random")).split()[1] == "5"
+    assert said.err == FEW
 
 
 def test_runs_without_a_common_evaluation_need_at(runs, copied, capsys):
@@ -105,11 +118,12 @@ def test_a_damaged_run_is_named_in_one_line_below_the_others(copied, capsys, dam
         (run / "summary.json").write_text("[]")
     assert table(copied) == 0
     said = capsys.readouterr()
-    assert said.err.startswith("left out: ")
-    assert said.err.count("\n") == 1
-    assert str(run) in said.err
+    few, left_out = said.err.splitlines()
+    assert few.startswith("fewer than 5 seeds")
+    assert left_out.startswith("left out: ")
+    assert str(run) in left_out
     counts = {line.split()[0]: line.split()[1] for line in said.out.splitlines()}
-    assert counts == {"variant": "seeds", "random": "1", "sgim-d": "1"}
+    assert counts == {"variant": "seeds", "random": "4", "sgim-d": "1"}
 
 
 def test_where_every_run_is_damaged_there_is_nothing_to_show(copied, capsys):
@@ -119,7 +133,7 @@ def test_where_every_run_is_damaged_there_is_nothing_to_show(copied, capsys):
     said = capsys.readouterr()
     assert not said.out
     assert "there is nothing to compare" in said.err
-    assert said.err.count("summary.json is missing or damaged") == 3
+    assert said.err.count("summary.json is missing or damaged") == SEEDS + 1
 
 
 def test_what_was_not_measured_is_a_dash(runs, capsys):
