@@ -17,11 +17,13 @@ from sgimd_torch.runs.log import RunError
 from sgimd_torch.runs.process import say
 from sgimd_torch.views.report.data import find, read
 from sgimd_torch.views.report.page import make_films, page
+from sgimd_torch.views.table import known
 
 EXAMPLES = """examples:
   sgimd report runs/sgim-d/seed-003               one run, into runs/sgim-d/seed-003/report.html
   sgimd report runs/sgim-d                        all seeds of a variant
   sgimd report runs --out paper.html              every variant in runs, compared
+  sgimd report runs --baseline sagg-riac          the same; differences are those to sagg-riac
   sgimd report runs/sgim-d/seed-003 --film        the same with a film, made first if there is none
 """
 
@@ -41,9 +43,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         variants, unread = read(found)
         for line in unread:
             say(f"left out, damaged: {line}")
+        if options.baseline is not None:
+            known(options.baseline, [variant.name for variant in variants if variant.last_error])
         if options.film:
             make_films(variants)
-        write_bytes(out, page(options.runs, variants, unread).encode())
+        write_bytes(out, page(options.runs, variants, unread, options.baseline).encode())
     except KeyboardInterrupt:
         say("stopped; no page was written")
         raise
@@ -70,5 +74,6 @@ def _options(argv: Sequence[str] | None) -> argparse.Namespace:
     )
     parser.add_argument("runs", type=Path, help="a run's directory, a variant's folder, or the --out of sgimd run")
     parser.add_argument("--out", type=Path, metavar="FILE", help="the page (default: RUNS/report.html)")
+    parser.add_argument("--baseline", metavar="NAME", help="variant that the others are compared with, seed by seed")
     parser.add_argument("--film", action="store_true", help="film the runs that are shown, if there is no film yet")
     return parser.parse_args(argv)

@@ -32,13 +32,14 @@ MOST: Final = 3 * 2**20  # bytes of one film
 ROOM: Final = 5 * 2**20  # bytes of all films of a page
 
 
-def page(place: Path, variants: Sequence[Variant], unread: Sequence[str]) -> str:
+def page(place: Path, variants: Sequence[Variant], unread: Sequence[str], baseline: str | None = None) -> str:
     """The page.
 
     Args:
         place: where the runs were found.
         variants: the best first, not empty.
         unread: a line for each run that could not be read.
+        baseline: the variant that the others are compared with; None for sgim-d, or else the best.
     """
     films, notes = read_films(variants)
     lives = [life for variant in variants for life in variant.lives]
@@ -57,6 +58,7 @@ def page(place: Path, variants: Sequence[Variant], unread: Sequence[str]) -> str
         variants=variants,
         single=lives[0] if len(lives) == 1 else None,
         n_runs=len(lives),
+        baseline=baseline or "sgim-d",
         warnings=[*record.doubts(variants), *(f"Left out, damaged: {line}" for line in unread), *notes],
         early=EARLY,
         lived=lived(variants),
