@@ -12,7 +12,7 @@ import pytest
 
 from compare import collect, compared, last_rows, main, runs_of, table_in
 from read_results import GOALS_HEADER, HEADER, read_goals, read_results
-from runs import ROOT, signal_after, start
+from runs import ROOT, signal_after, start, sweep_here
 from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.files import locked
@@ -21,7 +21,6 @@ from sgimd_torch.runs.config import Config, words
 from sgimd_torch.runs.log import RunError
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import Run, read_run
-from sgimd_torch.runs.sweep import sweep
 from tables import RESULTS, Table, goal_rows, goals_claimed, result_rows, tiles_reached
 from variants import ARMS, EXPERIMENTS, make_subsets, shipped, tables_of, teacher_of
 
@@ -355,7 +354,7 @@ def test_rows_are_drawn_by_lot_and_made_again_in_a_folder_of_their_own(tmp_path,
     results = table_in(tmp_path, "forward_model.csv")
     config = Config(algorithm="sgim-d", environment="planar-arm-7", name="sgim-d-arm-7", movements=20)
     again = replace(config, evaluate_at=(20,), floor_at=(), answers=("own", "nearest"), out=tmp_path / "first")
-    assert sweep([again], 1) == []
+    assert sweep_here([again]) == []
     _, row = result_rows("planar-arm-7", again, read_run(again.directory))
     results.merge([row, [*row[:4], 1, 20, "nearest", 0.5, "", 7, 7, 7]])
     words = ["planar-arm-7", "--only", "sgim-d-arm-7", "--results", ".", "--verify", "2", "--processes", "1"]

@@ -14,13 +14,13 @@ from pathlib import Path
 
 import pytest
 
-from runs import ROOT, csv_of, signal_after, start
+from runs import ROOT, csv_of, signal_after, start, sweep_here
 from sgimd_torch.files import locked
 from sgimd_torch.runs.command_line import main as run
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import finished, movements_on_disk
-from sgimd_torch.runs.sweep import main, sweep, variants_of
+from sgimd_torch.runs.sweep import main, variants_of
 
 SWEEP = "import sys; from sgimd_torch.runs import process, sweep; sys.exit(process.command(sweep.main))"
 # An arm without physics; 40 movements and one evaluation take a moment.
@@ -145,7 +145,7 @@ def test_every_run_is_what_it_would_be_alone_and_a_second_start_does_nothing(tmp
 def whole(tmp_path_factory):
     """A finished run."""
     config = short(tmp_path_factory.mktemp("whole"))
-    assert sweep([config], 1) == []
+    assert sweep_here([config]) == []
     return config
 
 
@@ -219,7 +219,7 @@ def test_without_keep_going_a_failure_stops_the_others_and_is_raised(tmp_path):
     (tmp_path / "random/seed-000").write_text("a file where its directory should be")
     other = long(tmp_path, seed=1)
     with pytest.raises(ValueError, match="random seed 0 failed: "):
-        sweep([long(tmp_path), other], 2, keep_going=False)
+        sweep_here([long(tmp_path), other], 2, keep_going=False)
     assert not locked(other.directory / "lock")
     assert not finished(other)
 
@@ -234,7 +234,7 @@ def test_a_run_that_is_killed_is_named_and_goes_on_next_time(tmp_path):
     assert finished(long(tmp_path, seed=1))
     before = (config.directory / "episodes.csv").read_bytes()
     assert 5 < before.count(b"\n") < 1001
-    assert sweep([config], 1) == []
+    assert sweep_here([config]) == []
     assert (config.directory / "episodes.csv").read_bytes().startswith(before)
 
 
@@ -292,15 +292,15 @@ def test_on_end_is_called_once_for_each_finished_run_and_its_error_is_a_failure(
         if config is whole:
             raise ValueError("its rows are damaged")
 
-    assert sweep(configs, 2, on_end=on_end) == ["random seed 0 failed: its rows are damaged"]
+    assert sweep_here(configs, 2, on_end=on_end) == ["random seed 0 failed: its rows are damaged"]
     assert sorted(ended, key=lambda config: config.seed) == configs
     with pytest.raises(ValueError, match="its rows are damaged"):
-        sweep([whole], 1, on_end=on_end, keep_going=False)
+        sweep_here([whole], on_end=on_end, keep_going=False)
 
 
 def test_two_runs_with_one_directory_are_refused(tmp_path):
     with pytest.raises(ValueError, match=r"two runs would be written to .*seed-000"):
-        sweep([short(tmp_path), short(tmp_path, budget=3)], 1)
+        sweep_here([short(tmp_path), short(tmp_path, budget=3)])
     assert not list(tmp_path.iterdir())
 
 
