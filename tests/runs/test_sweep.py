@@ -88,6 +88,12 @@ def test_values_and_further_options_become_those_of_the_runs():
         ("--vary out=a,b", "--out cannot be given here: all runs of a sweep go to one --out"),
         ("--seed 3", "--seed cannot be given here: --seeds takes them, such as 5, 0-19 or 0,3,7-9"),
         ("--name=mine", "--name cannot be given here"),
+        ("--shard 0/4", "--shard: must be like 1/4, the first of four parts, got '0/4'"),
+        ("--shard 5/4", "--shard: must be like 1/4, .*, got '5/4'"),
+        ("--shard 2", "--shard: must be like 1/4, .*, got '2'"),
+        ("--shard 1/x", "--shard: must be like 1/4, .*, got '1/x'"),
+        ("--engine slurm", "--engine: invalid choice: 'slurm'"),
+        ("--address auto", "--address auto is of a Ray cluster; it needs --engine ray"),
         ("--vary goals=grid --vary goals=uniform", "--goals is there twice"),
         ("--vary task_space=1,2 --task-space 3", "--task-space is there twice"),
         ("--gaols uniform", "unknown option --gaols; did you mean --goals?"),
@@ -121,6 +127,45 @@ def test_seeds_are_one_or_a_range_or_a_list(tmp_path, monkeypatch, capsys):
         lines = capsys.readouterr().out.splitlines()
         assert lines == [f"sgim-d seed {seed}: 0 of 5000 movements" for seed in wanted]
     assert not list(tmp_path.iterdir())
+
+
+def listed(capsys, *options):
+    """The titles of the runs that are still to be done."""
+    capsys.readouterr()
+    assert swept(*options, "--dry-run") == 0
+    return [line.partition(":")[0] for line in capsys.readouterr().out.splitlines()]
+
+
+def test_shards_are_consecutive_parts_of_the_list_and_together_the_whole(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    options = ["--vary", "goals=interest-map,uniform", "--seeds", "0-4"]
+    whole = listed(capsys, *options)
+    for n in (1, 3, 4, 10, 12):
+        parts = [listed(capsys, *options, "--shard", f"{k}/{n}") for k in range(1, n + 1)]
+        assert [run for part in parts for run in part] == whole
+        assert {len(part) for part in parts} <= {10 // n, -(-10 // n)}
+    assert swept(*options, "--shard", "3/4", "--dry-run") == 0
+    assert "2 runs (2 variants, 5 seeds, shard 3/4 of 10 runs), 0 of them finished: runs" in capsys.readouterr().err
+
+
+def test_a_shard_carries_out_its_runs_alone_and_what_is_finished_does_not_shift_it(tmp_path, capsys):
+    options = [*SHORT, "--seeds", "0-3", "--out", tmp_path]
+    assert swept(*options, "--shard", "2/2") == 0
+    assert [finished(short(tmp_path, seed=seed)) for seed in range(4)] == [False, False, True, True]
+    assert listed(capsys, *options, "--shard", "1/2") == ["random seed 0", "random seed 1"]
+    assert listed(capsys, *options, "--shard", "2/2") == []
+    assert swept(*options, "--shard", "1/9") == 0  # more parts than runs: an empty one
+    assert not finished(short(tmp_path, seed=0))
+
+
+def test_without_ray_the_extra_that_brings_it_is_named(tmp_path):
+    program = f"import sys; sys.modules['ray'] = None; {SWEEP}"
+    process = start(program, *SHORT, "--engine", "ray", "--out", tmp_path / "study")
+    _, said = process.communicate()
+    assert process.returncode == 2
+    slip = "pip install 'sgimd-torch[ray]' installs it"
+    assert said.splitlines()[-1] == f"error: --engine ray needs ray, which is not installed; {slip}"
+    assert not (tmp_path / "study").exists()
 
 
 def test_every_run_is_what_it_would_be_alone_and_a_second_start_does_nothing(tmp_path, capsys):

@@ -10,7 +10,7 @@ from __future__ import annotations
 import logging
 import os
 import signal
-import socket
+import subprocess
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -30,7 +30,7 @@ from sgimd_torch.runs.engines.local import LOOK_EVERY, PATIENCE, Job
 from sgimd_torch.runs.engines.parcels import Keeper, carry_out
 from sgimd_torch.runs.process import SIGNALS, Failed
 
-ANSWER_WITHIN: Final = 10.0  # s, for a cluster
+ANSWER_WITHIN: Final = 30.0  # s, for a cluster
 STORE: Final = 100 * 2**20  # bytes, for what is on its way; Ray would take a third of the memory
 SEND_EVERY: Final = 3.0  # s; what a run loses at most when its node dies, and how long it may take to hear of Ctrl-C
 # A process whose task was killed must not go on alone: prctl(PR_SET_PDEATHSIG, SIGKILL).
@@ -88,13 +88,13 @@ class OnRay:
             try:
                 error = done.result()
             except RayError as lost:
-                error = Failed(f"Ray has lost it: {_first_line(lost)}")
+                error = Failed(f"Ray has lost it: {_first_line(str(lost))}")
             if error is None:
                 future.set_result(None)
             else:
                 future.set_exception(error)
 
-        self._task.remote(self._actor, job.config, job.flags).future().add_done_callback(end)
+        self._task.remote(self._actor, job.config, job.flags, SEND_EVERY).future().add_done_callback(end)
         return future
 
     def refresh(self) -> None:
@@ -102,7 +102,7 @@ class OnRay:
         try:
             states = self._keeper.states()
         except RayError as error:
-            raise Failed(f"the Ray cluster is gone: {_first_line(error)}") from error
+            raise Failed(f"the Ray cluster is gone: {_first_line(str(error))}") from error
         for directory, state in states.items():
             job = self._jobs[directory]
             if state == "held":
@@ -127,9 +127,9 @@ class _Distant:
         return call
 
 
-def _carry_out(actor: Any, config: Config, flags: Sequence[str]) -> Exception | None:
+def _carry_out(actor: Any, config: Config, flags: Sequence[str], every: float) -> Exception | None:
     """The task. It returns what went wrong: what is raised, Ray wraps."""
-    return carry_out(cast(Keeper, _Distant(actor)), config, flags, PROGRAM, SEND_EVERY)
+    return carry_out(cast(Keeper, _Distant(actor)), config, flags, PROGRAM, every)
 
 
 def _connect(address: str | None, processes: int, ships: bool) -> None:
@@ -138,15 +138,10 @@ def _connect(address: str | None, processes: int, ships: bool) -> None:
     Raises:
         ValueError: there is none, or it cannot be used.
     """
-    if address not in (None, "auto"):
-        host, _, port = str(address).rpartition(":")
-        if "/" in host or not (host and port.isdecimal()):
-            raise ValueError(f"--address must be like 10.0.0.1:6379, or auto, got {address}")
-        try:
-            socket.create_connection((host, int(port)), ANSWER_WITHIN).close()  # Ray would wait for minutes
-        except (OSError, OverflowError) as error:
-            slip = "is its head running, and is this the port of ray start?"
-            raise ValueError(f"no Ray cluster at {address} answers ({error}); {slip}") from error
+    if "://" in (address or ""):
+        raise ValueError(f"--address must be host:port, or auto, got {address}; start the sweep on a node of it")
+    if address is not None:
+        _try(address)
     logging.getLogger("ray").setLevel(logging.ERROR)
     options: dict[str, Any] = {"runtime_env": {"working_dir": os.getcwd()}} if ships else {}
     if address is None:
@@ -154,8 +149,21 @@ def _connect(address: str | None, processes: int, ships: bool) -> None:
     try:
         ray.init(address or "local", log_to_driver=False, configure_logging=False, **options)
     except (ConnectionError, RuntimeError, ValueError, RayError) as error:
-        raise ValueError(f"no Ray cluster can be used at --address {address}: {_first_line(error)}") from error
+        raise ValueError(f"Ray cannot be used here: {_first_line(str(error))}") from error
 
 
-def _first_line(error: Exception) -> str:
-    return next(iter(str(error).strip().splitlines()), type(error).__name__)[:300]
+def _try(address: str) -> None:
+    """Connect to a cluster from another process: where nothing answers, Ray would try for minutes and then abort."""
+    words = [sys.executable, "-c", "import ray, sys; ray.init(sys.argv[1], log_to_driver=False)", address]
+    try:
+        tried = subprocess.run(words, capture_output=True, text=True, timeout=ANSWER_WITHIN)
+    except subprocess.TimeoutExpired as error:
+        slip = "is its head running, and is this the port of ray start?"
+        raise ValueError(f"no Ray cluster answers at {address} within {ANSWER_WITHIN:g} s; {slip}") from error
+    if tried.returncode:
+        why = tried.stderr.strip().rpartition("\n")[2][:400] or f"it ended with {tried.returncode}"
+        raise ValueError(f"no Ray cluster can be used at {address}: {why}")
+
+
+def _first_line(text: str) -> str:
+    return text.strip().partition("\n")[0][:400]
