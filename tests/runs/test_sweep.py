@@ -94,6 +94,7 @@ def test_values_and_further_options_become_those_of_the_runs():
         ("--shard 1/x", "--shard: must be like 1/4, .*, got '1/x'"),
         ("--engine slurm", "--engine: invalid choice: 'slurm'"),
         ("--address auto", "--address auto is of a Ray cluster; it needs --engine ray"),
+        ("--engine ray --address auto --processes 2", "--processes cannot be given with --address: a cluster runs as"),
         ("--vary goals=grid --vary goals=uniform", "--goals is there twice"),
         ("--vary task_space=1,2 --task-space 3", "--task-space is there twice"),
         ("--gaols uniform", "unknown option --gaols; did you mean --goals?"),
