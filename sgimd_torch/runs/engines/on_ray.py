@@ -32,7 +32,7 @@ from sgimd_torch.runs.process import SIGNALS, Failed
 
 ANSWER_WITHIN: Final = 30.0  # s, for a cluster
 STORE: Final = 100 * 2**20  # bytes, for what is on its way; Ray would take a third of the memory
-SEND_EVERY: Final = 3.0  # s; what a run loses at most when its node dies, and how long it may take to hear of Ctrl-C
+SEND_EVERY: Final = 5.0  # s; what a run loses at most when its node dies, and how long it may take to hear of Ctrl-C
 # A process whose task was killed must not go on alone: prctl(PR_SET_PDEATHSIG, SIGKILL).
 PROGRAM: Final = (
     ("-c", "import ctypes, runpy; ctypes.CDLL(None).prctl(1, 9); runpy.run_module('sgimd_torch', run_name='__main__')")
