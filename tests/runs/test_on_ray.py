@@ -153,6 +153,7 @@ def test_stopped_it_leaves_no_run_behind_and_goes_on_as_if_nothing_had_happened(
     assert not any(locked(directory / "lock") for directory in directories)
     before = log.read_bytes()
     assert 20 <= before.count(b"\n") < 251
+    assert not directories[1].exists()  # there is one core, and the other run waits for it
     monkeypatch.chdir(place)
     monkeypatch.delenv("NAP")
     assert command(main, [*LIVES, "--out", "stopped"]) == 0  # now without Ray

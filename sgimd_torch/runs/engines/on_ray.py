@@ -119,8 +119,8 @@ class _Distant:
 
     def __getattr__(self, name: str) -> Callable[..., Any]:
         def call(*arguments: Any) -> Any:
-            try:
-                return ray.get(getattr(self._actor, name).remote(*arguments))
+            try:  # not by ray.get: while a task waits there, Ray gives its core to another one
+                return getattr(self._actor, name).remote(*arguments).future().result()
             except RayTaskError as error:
                 raise error.cause from None  # as it was raised there
 
