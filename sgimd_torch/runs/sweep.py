@@ -142,7 +142,7 @@ def engine_of(options: argparse.Namespace, configs: Sequence[Config]) -> Engine:
     except ModuleNotFoundError as error:
         slip = "pip install 'sgimd-torch[ray]' installs it"
         raise ImportError(f"--engine ray needs {error.name}, which is not installed; {slip}") from error
-    return OnRay(options.address, processes, ships=any(map(_uses_working_directory, configs)))
+    return OnRay(options.address, processes, ships=any(map(_uses_working_directory, configs)), out=configs[0].out)
 
 
 @dataclass(frozen=True)

@@ -134,6 +134,19 @@ def test_a_variant_of_two_experiments_is_one_run_in_the_table_of_each(compare, t
     assert again == [["learners", *row[1:]] for row in rows if row[1] == "random"]
 
 
+def test_shards_share_out_the_runs_and_one_of_two_experiments_stays_together(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    wanted = ["learners", "forward-model", "--seeds", "0-1", "--results", ".", "--dry-run"]
+    parts = []
+    for shard in ("1/1", "1/3", "2/3", "3/3"):
+        assert command(main, [*wanted, "--shard", shard]) == 0
+        parts.append(capsys.readouterr().out.splitlines())
+    whole, *parts = parts
+    assert sorted(line for part in parts for line in part) == sorted(whole)
+    runs = [{line.partition(": ")[2] for line in part} for part in parts]
+    assert len(set.union(*runs)) == sum(map(len, runs)) < len(whole)
+
+
 def test_what_is_in_one_table_is_still_to_be_done_for_the_other(tmp_path, monkeypatch, capsys):
     rows = [["learners", "sgim-d", 3, 1.0, 0, 5000, answer, 0.1, "", 7, "", ""] for answer in ANSWERS]
     Table(tmp_path / "paper.csv", *RESULTS).merge(rows)

@@ -13,7 +13,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import suppress
 from pathlib import Path
@@ -47,18 +47,20 @@ class OnRay:
     Args:
         address: ``host:port`` of a cluster that this machine belongs to, or ``auto``; None starts one on this machine.
         processes: how many run at a time, of a cluster that is started here.
-        ships: send a copy of the working directory along, which the runs import from; without those of its files that
-            .gitignore names.
+        ships: send a copy of the working directory along, which the runs import from.
+        out: a folder that is not sent; neither is what .gitignore names.
     """
 
-    def __init__(self, address: str | None, processes: int = 1, *, ships: bool = False) -> None:
-        self._address, self._processes, self._ships = address, processes, ships
+    def __init__(self, address: str | None, processes: int = 1, *, ships: bool = False, out: Path = Path()) -> None:
+        self._address, self._processes = address, processes
+        sent = {"working_dir": os.getcwd(), "excludes": [f"/{os.path.relpath(out)}"]}
+        self._options: dict[str, Any] = {"runtime_env": sent} if ships else {}
         self._jobs: dict[Path, Job] = {}
 
     def __enter__(self) -> Self:
         heard = {signum: signal.getsignal(signum) for signum in SIGNALS}
         try:
-            _connect(self._address, self._processes, self._ships)
+            _connect(self._address, self._processes, self._options)
         finally:
             for signum, handler in heard.items():  # Ray has its own
                 signal.signal(signum, handler)
@@ -88,7 +90,7 @@ class OnRay:
             try:
                 error = done.result()
             except RayError as lost:
-                error = Failed(f"Ray has lost it: {_first_line(str(lost))}")
+                error = Failed(f"Ray has lost it: {_in_one_line(lost)}")
             if error is None:
                 future.set_result(None)
             else:
@@ -102,7 +104,7 @@ class OnRay:
         try:
             states = self._keeper.states()
         except RayError as error:
-            raise Failed(f"the Ray cluster is gone: {_first_line(str(error))}") from error
+            raise Failed(f"the Ray cluster is gone: {_in_one_line(error)}") from error
         for directory, state in states.items():
             job = self._jobs[directory]
             if state == "held":
@@ -132,7 +134,7 @@ def _carry_out(actor: Any, config: Config, flags: Sequence[str], every: float) -
     return carry_out(cast(Keeper, _Distant(actor)), config, flags, PROGRAM, every)
 
 
-def _connect(address: str | None, processes: int, ships: bool) -> None:
+def _connect(address: str | None, processes: int, options: Mapping[str, Any]) -> None:
     """To the cluster at ``address``, or to one that is started here.
 
     Raises:
@@ -143,13 +145,12 @@ def _connect(address: str | None, processes: int, ships: bool) -> None:
     if address is not None:
         _try(address)
     logging.getLogger("ray").setLevel(logging.ERROR)
-    options: dict[str, Any] = {"runtime_env": {"working_dir": os.getcwd()}} if ships else {}
     if address is None:
-        options |= {"num_cpus": processes, "object_store_memory": STORE, "include_dashboard": False}
+        options = {**options, "num_cpus": processes, "object_store_memory": STORE, "include_dashboard": False}
     try:
         ray.init(address or "local", log_to_driver=False, configure_logging=False, **options)
     except (ConnectionError, RuntimeError, ValueError, RayError) as error:
-        raise ValueError(f"Ray cannot be used here: {_first_line(str(error))}") from error
+        raise ValueError(f"Ray cannot be used here: {_in_one_line(error)}") from error
 
 
 def _try(address: str) -> None:
@@ -165,5 +166,5 @@ def _try(address: str) -> None:
         raise ValueError(f"no Ray cluster can be used at {address}: {why}")
 
 
-def _first_line(text: str) -> str:
-    return text.strip().partition("\n")[0][:400]
+def _in_one_line(error: Exception) -> str:
+    return " ".join(str(error).split())[:400]
