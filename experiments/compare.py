@@ -42,6 +42,7 @@ examples:
   python experiments/compare.py forward-model planar-arm-7 planar-arm-50
   python experiments/compare.py ablations --only uniform-goals grid
   python experiments/compare.py --dry-run                         what is still to be done
+  python experiments/compare.py --shard 3/20                      a part of the runs, see docs/clusters.md
   python experiments/compare.py --verify 10 --lot 7               ten rows of the tables, drawn by lot, made again
 
 Exit code: 0 all runs are in the tables, 1 some failed, 2 the request is wrong, 130 or 143 stopped by a signal.

@@ -134,7 +134,7 @@ def engine_of(options: argparse.Namespace, configs: Sequence[Config]) -> Engine:
         raise ValueError("--processes cannot be given with --address: a cluster runs as many as it has cores")
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1  # we may use
     processes = options.processes or cores
-    if options.engine == "local":
+    if options.engine == "local" or not configs:  # nothing to do needs no cluster
         return Local(processes)
     try:
         with loading():
