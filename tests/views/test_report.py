@@ -5,6 +5,7 @@ import re
 import shlex
 import shutil
 import signal
+from html import escape
 
 import numpy as np
 import pytest
@@ -157,6 +158,18 @@ def test_what_a_configuration_names_is_not_executed(copy, tmp_path, monkeypatch)
     assert report.main([str(run)]) == 0
     assert not (tmp_path / "was-here").exists()
     assert "they are not known without running hostile:make" in (run / "report.html").read_text()
+
+
+def test_differences_are_those_to_the_baseline_that_was_chosen(runs, pages, tmp_path, capsys):
+    out = tmp_path / "page.html"
+    assert report.main([str(runs), "--baseline", ODD, "--out", str(out)]) == 0
+    captions = [f"Last error minus that of {escape(name)}, paired" for name in ("SGIM-D", ODD)]
+    assert [caption in pages["many"] for caption in captions] == [True, False]
+    assert [caption in out.read_text() for caption in captions] == [False, True]
+    out.unlink()
+    assert command(report.main, [str(runs), "--baseline", "observtion", "--out", str(out)]) == 2
+    assert "did you mean observation?" in capsys.readouterr().err
+    assert not out.exists()
 
 
 def test_only_options_that_differ_are_compared(pages):

@@ -143,6 +143,48 @@ def test_what_was_not_measured_is_a_dash(runs, capsys):
     assert said.splitlines()[1].split()[2] == "-"
 
 
+def last_column(said):
+    """Of each variant, and the head of the column."""
+    head, *lines = said.splitlines()
+    place = head.index("  minus ") + 2
+    return head[place:], {line.split()[0]: line[place:] for line in lines}
+
+
+def test_few_seeds_are_compared_with_the_baseline_by_their_differences_alone(runs, capsys):
+    assert table(runs, "--at", 40, "--baseline", "random") == 0
+    head, found = last_column(capsys.readouterr().out)
+    ours, theirs = (read_run(runs / name / "seed-000").evaluation["mean_error_m"][-1] for name in ("sgim-d", "random"))
+    assert head == "minus random (m)"
+    assert found == {"random": "-", "sgim-d": f"{ours - theirs:+.4f}"}  # of the only seed that both have
+
+
+def test_with_five_seeds_the_difference_to_the_baseline_has_its_interval(tmp_path, capsys):
+    options = ["--environment", "planar-arm-7", "--movements", "30", "--evaluate-at", "30", "--repeats", "0", "--out"]
+    for name in ("random", "sagg-riac"):
+        for seed in range(5):
+            assert live([*options, str(tmp_path), "--algorithm", name, "--seed", str(seed)]) == 0
+    capsys.readouterr()
+    assert table(tmp_path, "--baseline", "sagg-riac") == 0
+    _, found = last_column(capsys.readouterr().out)
+    errors = {
+        name: [read_run(tmp_path / name / f"seed-00{seed}").evaluation["mean_error_m"][-1] for seed in range(5)]
+        for name in ("random", "sagg-riac")
+    }
+    differences = np.sort(np.subtract(errors["random"], errors["sagg-riac"]))
+    assert found["sagg-riac"] == "-"
+    centre, low, high = map(float, found["random"].replace("[", "").replace("]", "").replace(",", "").split())
+    assert centre == pytest.approx(differences[1:4].mean(), abs=6e-5)  # of five, the middle three
+    assert differences[0] - 6e-5 <= low < centre < high <= differences[-1] + 6e-5
+
+
+def test_a_baseline_that_is_no_variant_is_refused_with_the_near_name(runs, capsys):
+    assert table(runs, "--at", 40, "--baseline", "randon") == 2
+    said = capsys.readouterr()
+    assert not said.out
+    assert "got 'randon'; these are random, sgim-d; did you mean random?" in said.err
+    assert said.err.count("\n") == 1
+
+
 def test_the_help_teaches(capsys):
     assert table("--help") == 0
     assert "sgimd table study --at 2000" in capsys.readouterr().out

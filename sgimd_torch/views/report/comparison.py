@@ -10,10 +10,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from sgimd_torch.catalogue import did_you_mean
 from sgimd_torch.spaces import Array
 from sgimd_torch.views.report.data import Variant, over_seeds
 from sgimd_torch.views.statistics import LEAST_SEEDS, Interval, paired_differences
+from sgimd_torch.views.table import known
 
 USUAL: Final = "sgim-d"  # the baseline where nobody chose one
 BETTER: Final = "better"
@@ -53,11 +53,7 @@ def baseline_of(variants: Sequence[Variant], name: str | None = None) -> Variant
     evaluated = {variant.name: variant for variant in variants if variant.last_error}
     if name is None:
         return evaluated.get(USUAL) or next(iter(evaluated.values()), None)
-    if name not in evaluated:
-        known = [variant.name for variant in variants]
-        why = "has no errors to compare with" if name in known else f"is none of {', '.join(known)}"
-        raise ValueError(f"the baseline {name} {why}{did_you_mean(name, evaluated)}")
-    return evaluated[name]
+    return evaluated[known(name, evaluated)]
 
 
 def compare(variants: Sequence[Variant], baseline: Variant) -> list[Comparison]:
