@@ -5,10 +5,10 @@ import re
 import shlex
 import shutil
 import signal
-from html import escape
 
 import numpy as np
 import pytest
+from markupsafe import escape
 from matplotlib.figure import Figure
 
 from pages import Page, rows_of
