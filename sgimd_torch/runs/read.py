@@ -64,6 +64,12 @@ class Run:
         """The evaluations of the run's own answers."""
         return self.answers[OWN]
 
+    def at(self, movements: int, column: str = "mean_error_m", answer: str = OWN) -> float:
+        """An entry of evaluation.csv, NaN if there is none."""
+        evaluation = self.answers.get(answer, NO_EVALUATION)
+        found = evaluation[column][evaluation["movements"] == movements]
+        return float(found[0]) if len(found) else float("nan")
+
     def chosen_goals(self) -> Array:
         """``(n, outcome_dim)``, the goals that the learner chose itself, in order, each once even if it took several
         movements. The goals of imitation are the teacher's, so they are left out."""

@@ -18,12 +18,12 @@ from sgimd_torch.spaces import Array
 Key = TypeVar("Key", bound=Hashable)
 LEVEL = 0.95
 RESAMPLES = 9999
-LEAST_SEEDS: Final = 5  # with fewer, a report shows points: no interval, no verdict
+LEAST_SEEDS: Final = 5  # with fewer there are points: no interval, no verdict
 SEED: Final = 2014  # of the bootstrap: each number draws from its own default_rng(SEED)
 
 
 class Interval(NamedTuple):
-    """A statistic of the data, and its interval from ``low`` to ``high``, of 95 % unless said."""
+    """A statistic of the data, and its interval from ``low`` to ``high``, of 95 % unless said; NaN for few seeds."""
 
     value: float
     low: float
@@ -53,8 +53,9 @@ def rng() -> np.random.Generator:
 
 
 def show(found: Interval, form: str = ".2f", unit: str = "") -> str:
-    """``0.48 [0.45, 0.52]``, followed by a unit."""
-    return f"{found.value:{form}} [{found.low:{form}}, {found.high:{form}}]" + (f" {unit}" if unit else "")
+    """``0.48 [0.45, 0.52]``, followed by a unit; without brackets for few seeds."""
+    between = "" if np.isnan(found.low) else f" [{found.low:{form}}, {found.high:{form}}]"
+    return f"{found.value:{form}}{between}{f' {unit}' if unit else ''}"
 
 
 def metres(found: Interval, form: str = "+.4f") -> str:
@@ -126,6 +127,18 @@ def iqm_interval(*strata: Array, rng: np.random.Generator, level: float = LEVEL)
         ValueError: see ``interval``.
     """
     return interval(lambda *drawn: interquartile_mean(np.concatenate(drawn, axis=-1)), *strata, rng=rng, level=level)
+
+
+def point(value: float) -> Interval:
+    """A statistic of too few seeds for an interval."""
+    return Interval(value, np.nan, np.nan)
+
+
+def over_seeds(values: Array) -> Interval | None:
+    """Interquartile mean of ``(n_seeds,)``; its interval with ``LEAST_SEEDS`` or more; None if a value is missing."""
+    if not len(values) or not np.isfinite(values).all():
+        return None
+    return point(float(interquartile_mean(values))) if len(values) < LEAST_SEEDS else iqm_interval(values, rng=rng())
 
 
 def ratio_interval(
@@ -218,6 +231,12 @@ def paired_differences(ours: Mapping[int, float], theirs: Mapping[int, float]) -
         alone = sorted(ours.keys() ^ theirs.keys())
         raise ValueError(f"pairs need the same seeds on both sides, but only one side has {alone}")
     return np.array([ours[seed] - theirs[seed] for seed in sorted(ours)])
+
+
+def common_differences(ours: Mapping[int, float], theirs: Mapping[int, float]) -> Array:
+    """The same, of the seeds that both have."""
+    both = ours.keys() & theirs.keys()
+    return paired_differences({seed: ours[seed] for seed in both}, {seed: theirs[seed] for seed in both})
 
 
 def difference_interval(

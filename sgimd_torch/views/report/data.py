@@ -22,15 +22,16 @@ from sgimd_torch.figures.learning import NAMES
 from sgimd_torch.runs.build import task_of
 from sgimd_torch.runs.config import OWN, Config
 from sgimd_torch.runs.log import RunError
-from sgimd_torch.runs.read import NO_EVALUATION, Run, read_run
+from sgimd_torch.runs.read import Run, read_run
 from sgimd_torch.runs.tasks import demonstrations_of
 from sgimd_torch.spaces import Array
 from sgimd_torch.views.statistics import (
     LEAST_SEEDS,
     Interval,
     interquartile_mean,
-    iqm_interval,
     mean_over_life,
+    over_seeds,
+    point,
     ratio_interval,
     rng,
 )
@@ -83,12 +84,6 @@ class Life(Run):
         """Whether there is an interest map to draw."""
         sides = sum(name.startswith("low_") for name in self.regions or ())  # of contexts, then of outcomes
         return bool(self.regions and len(self.regions["movements"])) and 0 < self.outcomes.shape[1] <= sides
-
-    def at(self, movements: int, column: str = "mean_error_m", answer: str = OWN) -> float:
-        """An entry of evaluation.csv, NaN if there is none."""
-        evaluation = self.answers.get(answer, NO_EVALUATION)
-        found = evaluation[column][evaluation["movements"] == movements]
-        return float(found[0]) if len(found) else float("nan")
 
     def in_contexts(self, movements: int) -> dict[str, float]:
         """The mean error (m) of its own answers in each part of C, by the part in words; {} without contexts."""
@@ -235,7 +230,7 @@ class Variant:
         if not self.last_error or not over_seeds(floors) or floors.min() < NOISELESS:
             return None
         if self.few:
-            return _point(float(interquartile_mean(self.errors[:, -1]) / interquartile_mean(floors)))
+            return point(float(interquartile_mean(self.errors[:, -1]) / interquartile_mean(floors)))
         return ratio_interval(self.errors[:, -1], floors, rng=rng(), paired=True)
 
     @property
@@ -251,18 +246,6 @@ class Variant:
         if not self.last:
             return max(self.lives, key=lambda life: len(life.index))
         return sorted(self.used, key=lambda life: life.at(self.last))[(len(self.used) - 1) // 2]
-
-
-def over_seeds(values: Array) -> Interval | None:
-    """Interquartile mean and its 95 % interval, NaN with fewer than 5 seeds; None if any value is missing."""
-    if not len(values) or not np.isfinite(values).all():
-        return None
-    few = len(values) < LEAST_SEEDS
-    return _point(float(interquartile_mean(values))) if few else iqm_interval(values, rng=rng())
-
-
-def _point(value: float) -> Interval:
-    return Interval(value, np.nan, np.nan)
 
 
 def demonstrated(lives: Sequence[Life]) -> tuple[Array, str]:
