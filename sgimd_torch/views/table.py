@@ -1,10 +1,11 @@
 """One table with the results of runs: error, noise floor and costs of each variant, over its seeds.
 
-It takes any folder with run directories, OUT/NAME/seed-000. Variants are compared after the last number of movements at
-which all finished runs were evaluated, or after --at. The worst comes first. Errors and noise floors are means over
-seeds in metres, ± the standard deviation; with fewer than 5 seeds there is none, and a note. "by linear" is the error
-if LocallyLinear answers, whatever inverse model the run has: compare learners by it. Costs are milliseconds for each
-movement. Runs that are damaged, not finished or not evaluated there are left out, and named below the table.
+It takes a folder with run directories, OUT/NAME/seed-000, or one variant's, OUT/NAME. Variants are compared after the
+last number of movements at which all finished runs were evaluated, or after --at. The worst comes first. Errors and
+noise floors are means over seeds in metres, ± the standard deviation; with fewer than 5 seeds there is none, and a
+note. "by linear" is the error if LocallyLinear answers, whatever inverse model the run has: compare learners by it.
+Costs are milliseconds for each movement. Runs that are damaged, not finished or not evaluated there are left out, and
+named below the table.
 
 With --baseline there is a column more: error minus that of the baseline, paired by seed, interquartile mean over the
 seeds that both have; with five seeds or more, its bootstrap interval of 95 % in brackets. Below 0 is better.
@@ -30,7 +31,7 @@ from sgimd_torch.catalogue import did_you_mean
 from sgimd_torch.runs.config import OWN
 from sgimd_torch.runs.log import RunError
 from sgimd_torch.runs.process import say
-from sgimd_torch.runs.read import Run, find_runs, read_run
+from sgimd_torch.runs.read import Run, find_runs, read_run, variant_of
 from sgimd_torch.spaces import Array
 from sgimd_torch.views.statistics import LEAST_SEEDS, common_differences, over_seeds, show
 
@@ -48,7 +49,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("runs", type=Path, metavar="OUT", help="folder of runs: the --out of sgimd run or sgimd sweep")
+    parser.add_argument("runs", type=Path, help="a run's directory, a variant's folder, or an --out of runs")
     parser.add_argument("--at", type=int, metavar="MOVEMENTS", help="compare after this number of movements")
     parser.add_argument("--baseline", metavar="NAME", help="variant that the others are compared with, seed by seed")
     options = parser.parse_args(argv)
@@ -65,7 +66,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     variants: dict[str, list[Run]] = {}
     for run in runs:
         if at in _evaluated(run):
-            variants.setdefault(run.path.parent.name, []).append(run)
+            variants.setdefault(variant_of(run.path), []).append(run)
     if not variants:
         raise RunError("\n".join(["there is nothing to compare; is --at another number of movements?", *left_out]))
     errors = (f"error at {EARLY}", f"at {at} (m)", "by linear (m)", "noise floor (m)")

@@ -5,7 +5,6 @@ variants, unread = read(find(Path("runs"))); variants[0].last_error    # interqu
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -22,7 +21,7 @@ from sgimd_torch.figures.learning import NAMES
 from sgimd_torch.runs.build import task_of
 from sgimd_torch.runs.config import OWN, Config
 from sgimd_torch.runs.log import RunError
-from sgimd_torch.runs.read import Run, read_run
+from sgimd_torch.runs.read import Run, find_runs, read_run
 from sgimd_torch.runs.tasks import demonstrations_of
 from sgimd_torch.spaces import Array
 from sgimd_torch.views.statistics import (
@@ -124,22 +123,15 @@ def read_life(path: Path) -> Life:
 
 
 def find(place: Path) -> dict[str, list[Path]]:
-    """The runs of a run directory, of a variant's folder, or of a folder of variants, by variant, seeds in order.
-
-    Next to a run, every folder called seed-* counts as a run, so that damaged ones are named.
+    """As `find_runs`; next to a run, every folder called seed-* counts as a run, so that damaged ones are named.
 
     Raises:
-        RunError: there is none, or no such folder.
+        RunError: see `find_runs`.
     """
-    if not place.is_dir():
-        why = "is a file, not a folder" if place.exists() else "does not exist"
-        raise RunError(f"{place} {why}; wanted a run's directory, or the --out of sgimd run")
-    runs = [path.parent for pattern in ("", "seed-*/", "*/seed-*/") for path in place.glob(f"{pattern}config.json")]
-    if not runs:
-        raise RunError(f"{place} holds no runs; they are in OUT/NAME/seed-000")
-    if place in runs:
-        return {Path(os.path.abspath(place)).parent.name: [place]}
-    folders = {Path(os.path.abspath(run)).parent.name: run.parent for run in sorted(runs)}
+    found = find_runs(place)
+    if [place] in found.values():
+        return found
+    folders = {name: runs[0].parent for name, runs in found.items()}
     return {name: sorted(path for path in folder.glob("seed-*") if path.is_dir()) for name, folder in folders.items()}
 
 
