@@ -136,7 +136,7 @@ def interest_map(
     drawn = regions_in(ax, lows, highs, interests, "Oranges", (0, most), section)
     colour_bar([ax], drawn, "interest: recent change of competence")
     if goals is not None:
-        shown = goals if section is None else section.points(goals)
+        shown = _section_of(lows, highs, section).points(goals)
         ax.plot(*shown.T, ".", color="#0072b2", markersize=4, label=f"last {len(goals)} goals")
     frame_regions(ax, lows, highs, section)
     return drawn

@@ -116,7 +116,5 @@ def in_the_plane(box: Box) -> Section:
         ValueError: it has others.
     """
     if box.dim != 2:
-        raise ValueError(
-            f"the water plane has 2 dimensions, got a box of {box.dim}; sections(box) show any, one by one"
-        )
+        raise ValueError(f"the water plane has 2 dimensions, got a box of {box.dim}; others need a section")
     return Section(box, (0, 1))
