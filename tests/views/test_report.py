@@ -6,6 +6,7 @@ import re
 import shlex
 import shutil
 import signal
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
@@ -15,6 +16,7 @@ from matplotlib.figure import Figure
 
 from runs import start
 from sgimd_torch.figures.learning import NAMES
+from sgimd_torch.figures.results import Difference
 from sgimd_torch.runs.command_line import parse
 from sgimd_torch.runs.log import Columns
 from sgimd_torch.runs.process import command
@@ -165,6 +167,7 @@ def test_the_numbers_of_a_variant_are_interquartile_means_over_its_seeds(pages, 
     errors = np.array([evaluation["mean_error_m"][-1] for evaluation in evaluations])
     floors = np.array([evaluation["noise_floor_m"][-1] for evaluation in evaluations])
     cells = page.all("td")
+    assert "error after 1000 (m)" in page.all("th")
     # the interval of two seeds reaches from one to the other
     assert f"{interquartile_mean(errors):.3f} [{errors.min():.3f}, {errors.max():.3f}]" in cells
     assert any(cell.startswith(f"{errors.mean() / floors.mean():.2f} [") for cell in cells)
@@ -341,6 +344,30 @@ def test_variants_behind_a_curve_do_not_stretch_its_axis(runs):
     longer.evaluated = 100 * longer.evaluated
     figures.curves.__wrapped__(figure, [variant], behind=[longer])
     assert 60 <= figure.axes[0].get_xlim()[1] < 70  # movements; the other went on to 6000
+
+
+@pytest.mark.parametrize(("moments", "rows", "columns"), [(1, 1, 1), (2, 1, 2), (3, 2, 2), (4, 2, 2), (9, 2, 2)])
+def test_at_most_four_maps_of_a_run_are_shown_in_rows_of_two(runs, moments, rows, columns):
+    life, figure = read_life(runs / "sgim-d" / "seed-003"), Figure()
+    last = life.regions["movements"] == 60
+    once = {name: column[last] for name, column in life.regions.items()}
+    regions = {name: np.tile(column, moments) for name, column in once.items()}
+    regions["movements"] = np.repeat(100 * np.arange(1, moments + 1), last.sum())
+    figures.splitting.__wrapped__(figure, replace(life, regions=regions))
+    maps = [ax for ax in figure.axes if ax.get_title()]
+    assert len(maps) == min(moments, 4)
+    assert {ax.get_subplotspec().get_geometry()[:2] for ax in maps} == {(rows, columns)}
+
+
+def test_the_rows_of_a_figure_of_differences_are_two_or_three_lines_of_text_high():
+    heights = []
+    for n in (2, 7):
+        figure = Figure()
+        rows = [Difference(f"variant {k}", np.array([1.0, 1.2]), 1.1, 1.0, 1.2) for k in range(n)]
+        figures._forest.__wrapped__(figure, rows, "reference")
+        heights.append(72 * figure.get_size_inches()[1])  # points
+    line = 1.2 * figures.STYLE["font.size"]
+    assert 1.5 * line < (heights[1] - heights[0]) / 5 < 3 * line
 
 
 def test_of_options_that_differ_only_values_that_most_variants_share_are_pale(pages, copy):
