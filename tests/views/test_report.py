@@ -1,6 +1,8 @@
 """The report: one file that shows what the files of runs hold, for one run or many, finished or not."""
 
+import base64
 import html
+import io
 import json
 import re
 import shlex
@@ -13,6 +15,7 @@ import numpy as np
 import pytest
 from markupsafe import escape
 from matplotlib.figure import Figure
+from PIL import Image
 
 from runs import start
 from sgimd_torch.figures.learning import NAMES
@@ -368,6 +371,14 @@ def test_the_rows_of_a_figure_of_differences_are_two_or_three_lines_of_text_high
         heights.append(72 * figure.get_size_inches()[1])  # points
     line = 1.2 * figures.STYLE["font.size"]
     assert 1.5 * line < (heights[1] - heights[0]) / 5 < 3 * line
+
+
+def test_no_picture_of_a_page_can_be_packed_smaller(pages):
+    source = next(given["src"] for name, given in Page(pages["one"]).elements if name == "img")
+    content, again = base64.b64decode(source.partition(",")[2]), io.BytesIO()
+    with Image.open(io.BytesIO(content)) as picture:
+        picture.save(again, "png", optimize=True)
+    assert len(content) <= len(again.getvalue())
 
 
 def test_of_options_that_differ_only_values_that_most_variants_share_are_pale(pages, copy):
