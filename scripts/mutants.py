@@ -8,7 +8,8 @@
 It needs ``pip install cosmic-ray==8.7.0 pytest-cov==7.1.0`` and a copy of the repository to work in: it changes files
 of ``sgimd_torch/`` while it runs. A lot draws a place, then one of the mutations that Cosmic Ray has for it. The first
 test that fails kills the mutant. Asked are the tests that reach its lines, those first that reach the fewest lines in
-all; for lines that run on import, the tests that reach anything in their file. docs/robustness.md has the counts.
+all; for lines that run on import, tests/test_defaults.py and the tests that reach anything in their file. An exit code
+below 0 is a crash, which may have other causes: judge again. docs/robustness.md has the counts.
 """
 
 from __future__ import annotations
@@ -162,6 +163,8 @@ def judge(mutant: Mutant, reached: Reached) -> tuple[int, str]:
     runs_on_import = not any(node.body[0].lineno <= lines.start <= (node.end_lineno or 0) for node in functions)
     here = reached.get(path.relative_to(ROOT).as_posix(), {})
     asked = {test for line in here if runs_on_import or int(line) in lines for test in here[line]}
+    if runs_on_import:
+        asked.add("tests/test_defaults.py")  # reads signatures, whose lines were reached by whoever imported them first
     length = Counter(test for each in reached.values() for tests in each.values() for test in tests)
     tests, size, killed = sorted(asked, key=lambda test: (length[test], test)), 5, ""
     try:
