@@ -15,6 +15,7 @@ from tensorboard.util.tensor_util import make_ndarray
 from runs import EAGER, arguments, csv_of, signal_after, start
 from sgimd_torch import InterestMap, PeriodicTeacher, PlanarArm, evaluate, run, stream
 from sgimd_torch.algorithms import random_exploration, sagg_riac
+from sgimd_torch.board.pictures import draw
 from sgimd_torch.board.scalars import LEGEND, Curves, Grid, branches
 from sgimd_torch.board.writer import Board, read_events
 from sgimd_torch.environments.fishing_rod import FishingRod
@@ -516,6 +517,30 @@ def test_the_regions_of_any_goal_model_are_shown(tmp_path):
     assert read.regions["goals"][-2] > 0
     assert curves["regions/count"] == {50: 2, 100: 2}
     assert {"competence/R0", "region_size/R1", "map/interest"} < curves.keys()
+
+
+def test_the_map_of_interest_shows_the_last_hundred_goals(tmp_path):
+    robot, made = Slider(2), []
+
+    def make(environment, seed):
+        made.append(sagg_riac(environment, seed, budget=1))
+        return made[0]
+
+    directory = live_as(tmp_path, robot, make)
+    goals = read_run(directory).goals
+    goals = goals[np.isfinite(goals).all(axis=1)]
+    assert len(np.unique(goals, axis=0)) == len(goals) > 100
+    none, regions = np.empty((0, 2)), made[0].autonomous.goals.regions
+    pictures = draw(
+        regions,
+        robot.outcomes,
+        outcomes=goals,
+        goals=goals[-100:],
+        demonstrated=none,
+        benchmark=goals,
+        errors=goals[:, 0],
+    )
+    assert curves_of(directory)["map/interest"][120][2] == pictures["interest"]
 
 
 def test_the_cells_of_a_grid_are_shown_and_kept_by_a_resumed_run(tmp_path, go):
