@@ -373,6 +373,13 @@ def test_the_rows_of_a_figure_of_differences_are_two_or_three_lines_of_text_high
     assert 1.5 * line < (heights[1] - heights[0]) / 5 < 3 * line
 
 
+def test_a_variant_is_not_compared_with_itself(runs):
+    lives = [read_life(runs / "sgim-d" / f"seed-00{seed}") for seed in (3, 4)]
+    reference = Variant("sgim-d", lives)
+    assert figures.differences([reference], reference) == ""
+    assert figures.differences([reference, Variant("again", lives)], reference)
+
+
 def test_no_picture_of_a_page_can_be_packed_smaller(pages):
     source = next(given["src"] for name, given in Page(pages["one"]).elements if name == "img")
     content, again = base64.b64decode(source.partition(",")[2]), io.BytesIO()
