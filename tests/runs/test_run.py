@@ -474,3 +474,13 @@ def test_a_run_finishes_whatever_happens_to_its_output(tmp_path, benchmark, redi
     assert "Traceback" not in done.stderr
     assert "Exception ignored" not in done.stderr
     assert read_run(tmp_path / "Å" / "seed-003").summary["finished"] is True
+
+
+@pytest.mark.parametrize(("chosen", "threads"), [({}, "1"), ({"OMP_NUM_THREADS": "3"}, "3")])
+def test_small_matrices_get_one_thread_unless_the_user_chose(chosen, threads):
+    program = "import os, sys; from sgimd_torch.__main__ import main; main(); print(os.environ['OMP_NUM_THREADS'])"
+    others = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
+    said = subprocess.run(
+        [sys.executable, "-c", program, "--version"], env=others | chosen, capture_output=True, text=True, check=True
+    ).stdout
+    assert said.split()[-1] == threads
