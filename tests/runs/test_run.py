@@ -484,3 +484,16 @@ def test_small_matrices_get_one_thread_unless_the_user_chose(chosen, threads):
         [sys.executable, "-c", program, "--version"], env=others | chosen, capture_output=True, text=True, check=True
     ).stdout
     assert said.split()[-1] == threads
+
+
+def test_practice_answers_by_its_own_inverse_unless_another_is_named(tmp_path):
+    learning = ["--algorithm", "practice", "--environment", "two-elbows", "--movements", "60", "--evaluate-at", "60"]
+    options = [*learning, "--repeats", "0", "--answers", "own,process,nearest", "--out", str(tmp_path)]
+    errors = {}
+    for name, more in (("default", []), ("named", ["--inverse", "nearest"])):
+        assert main([*options, "--name", name, *more]) == 0
+        answers = read_run(tmp_path / name / "seed-000").answers
+        errors[name] = {answer: float(table["mean_error_m"][-1]) for answer, table in answers.items()}
+    assert errors["default"]["own"] == errors["default"]["process"] != errors["default"]["nearest"]
+    assert errors["named"]["own"] == errors["named"]["nearest"]
+    assert errors["named"]["process"] == errors["default"]["process"]  # learning is the same
