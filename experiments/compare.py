@@ -27,9 +27,10 @@ with loading():  # Ctrl-C shows no traceback
     from sgimd_torch.catalogue import did_you_mean
     from sgimd_torch.files import make_folder
     from sgimd_torch.runs.config import Config
+    from sgimd_torch.runs.engines.loop import sweep
     from sgimd_torch.runs.log import RunError
     from sgimd_torch.runs.read import finished, read_run
-    from sgimd_torch.runs.sweep import add_options, sweep
+    from sgimd_torch.runs.sweep import add_engines, add_options, engine_of
     from tables import GOALS, RESULTS, Key, Table, as_text, goal_rows, result_rows
     from variants import EXPERIMENTS, FEW, HALF, make_subsets, tables_of
 
@@ -41,6 +42,7 @@ examples:
   python experiments/compare.py forward-model planar-arm-7 planar-arm-50
   python experiments/compare.py ablations --only uniform-goals grid
   python experiments/compare.py --dry-run                         what is still to be done
+  python experiments/compare.py --shard 3/20                      a part of the runs, see docs/clusters.md
   python experiments/compare.py --verify 10 --lot 7               ten rows of the tables, drawn by lot, made again
 
 Exit code: 0 all runs are in the tables, 1 some failed, 2 the request is wrong, 130 or 143 stopped by a signal.
@@ -60,29 +62,33 @@ def main(argv: Sequence[str] | None = None) -> int:
         The exit code, 1 where runs failed.
     """
     options = _options(argv)
-    wanted = runs_of(options.experiments, options.only, options.seeds, options.out)
+    whole = runs_of(options.experiments, options.only, options.seeds, options.out)
+    runs = list(dict.fromkeys(config for _, config in whole))
+    mine = {*options.shard.of(runs)}
+    wanted = [(name, config) for name, config in whole if config in mine]
     if options.verify:
         return verify(wanted, options)
     names = dict.fromkeys(table for name, _ in wanted for table in tables_of(name))
     rows = {table: table_in(options.results, table).rows() for table in names}
     left = [(name, config) for name, config in wanted if not last_rows(config) <= rows[tables_of(name)[0]].keys()]
     where = " and ".join(str(options.results / table) for table in names)
-    say(f"{len(wanted)} runs, {len(wanted) - len(left)} of them in {where} already")
+    say(f"{len(wanted)} runs{options.shard.note(runs)}, {len(wanted) - len(left)} of them in {where} already")
     if options.dry_run:
         print("".join(f"{name}: {config.title}\n" for name, config in left), end="")
         return 0
     make_folder(options.results)
     make_subsets(options.out / "demonstrations")
-    runs: dict[Config, list[str]] = {}  # with the experiments that it belongs to
+    homes: dict[Config, list[str]] = {}  # the experiments that a run belongs to
     for name, config in left:
-        runs.setdefault(config, []).append(name)
+        homes.setdefault(config, []).append(name)
 
     def on_end(config: Config) -> None:
-        for name in runs[config]:
+        for name in homes[config]:
             collect(name, config, options.results)
 
-    failures = sweep(list(runs), options.processes, on_end=on_end)
-    say(f"{len(runs) - len(failures)} runs ended well, {len(failures)} failed: {where}", *failures)
+    with engine_of(options, list(homes)) as engine:
+        failures = sweep(list(homes), engine, on_end=on_end)
+    say(f"{len(homes) - len(failures)} runs ended well, {len(failures)} failed: {where}", *failures)
     return 1 if failures else 0
 
 
@@ -113,7 +119,9 @@ def verify(wanted: Sequence[tuple[str, Config]], options: argparse.Namespace) ->
         print("".join(f"{config.title} at {config.movements}\n" for config in again.values()), end="")
         return 0
     make_subsets(options.out / "demonstrations")
-    failures = sweep(list(dict.fromkeys(again.values())), options.processes)
+    configs = list(dict.fromkeys(again.values()))
+    with engine_of(options, configs) as engine:
+        failures = sweep(configs, engine)
     found_now = {
         number: row_now(found[number][0], config, found[number][2][ANSWER]) for number, config in again.items()
     }
@@ -206,6 +214,7 @@ def _options(argv: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("experiments", nargs="*", metavar="EXPERIMENT", help="which; all if none is named")
     parser.add_argument("--only", nargs="+", default=[], metavar="VARIANT", help="only these of their variants")
     add_options(parser, seeds="0-9")
+    add_engines(parser)
     parser.add_argument("--out", type=Path, default=Path("runs"), help="where the runs go (default: %(default)s)")
     parser.add_argument(
         "--results", type=Path, default=Path("results"), help="folder of the tables (default: %(default)s)"

@@ -22,7 +22,6 @@ import io
 import math
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
@@ -32,7 +31,6 @@ from sgimd_torch.runs.process import command, loading
 with loading():  # Ctrl-C shows no traceback
     import numpy as np
     from matplotlib.figure import Figure
-    from numpy.typing import ArrayLike, NDArray
     from tqdm import tqdm
 
     from figures import REACH
@@ -40,11 +38,10 @@ with loading():  # Ctrl-C shows no traceback
     from sgimd_torch.figures import predictions as plots
     from sgimd_torch.figures.save import save_figure
     from sgimd_torch.files import make_folder, write_text
-    from sgimd_torch.forward_model.diagnostics import LEVELS, coverage, error_by_cell, improvements, running
+    from sgimd_torch.forward_model.diagnostics import LEVELS, error_by_cell, improvements, running
     from sgimd_torch.runs.log import RunError
-    from sgimd_torch.runs.read import Run, read_run
-    from sgimd_torch.runs.tables import WHOLE, small_table
-    from sgimd_torch.spaces import Array, Box
+    from sgimd_torch.spaces import Box
+    from sgimd_torch.views.model_run import ModelRun, read_model_run
 
 NEWEST: Final = 1000  # predictions
 LATE: Final = 2000  # movements, from which on the spread must be honest
@@ -52,63 +49,6 @@ HEAD: Final = (
     *("run", "predicted", "error (m)", "inside 50 / 80 / 95 %", f"from {LATE} on", "improved (%)"),
     *("refreshes", "ms each"),
 )
-
-
-@dataclass(frozen=True, eq=False)
-class ModelRun:
-    """What the forward model of one run predicted.
-
-    ``movements`` ``(n,)``: executed before each of the predicted ones; ``observed``, ``mean`` and ``spread``
-    ``(n, outcome_dim)`` m; ``refreshes`` ``(n_refreshes,)`` for each of its columns.
-    """
-
-    run: Run
-    movements: NDArray[np.int64]
-    observed: Array
-    mean: Array
-    spread: Array
-    refreshes: dict[str, np.ndarray]
-
-    @property
-    def name(self) -> str:
-        """Such as "sgim-d/seed-003"."""
-        return "/".join(self.run.path.resolve().parts[-2:])
-
-    def inside(self, chosen: slice | NDArray[np.bool_], levels: ArrayLike = LEVELS) -> Array:
-        """Coverage ``(n_levels,)`` of the ``chosen`` predictions; NaN if there are none."""
-        observed, mean, spread = (values[chosen] for values in (self.observed, self.mean, self.spread))
-        return coverage(observed, mean, spread, levels) if len(observed) else np.full(np.shape(levels), np.nan)
-
-
-def read_model_run(path: Path) -> ModelRun:
-    """A run with a forward model, finished or not; predictions of movements that its log lacks are left out.
-
-    Raises:
-        RunError: it has no model, has predicted nothing yet, or its files are damaged or do not belong together.
-    """
-    run, file = read_run(path), path / "predictions.csv"
-    if run.predictions is None:
-        raise RunError(f"{path} has no {file.name}: it ran without a forward model; see --inverse model of sgimd run")
-    exemplars, *values = _checked(run, file.name, run.predictions).values()
-    lived = np.flatnonzero(np.isfinite(run.outcomes).all(axis=1))
-    rows = exemplars[exemplars < len(lived)]
-    if not len(rows):
-        raise RunError(f"{file} holds no prediction of a movement yet; the model learns from 50 before its first")
-    if (np.diff(exemplars) <= 0).any():
-        raise RunError(f"{file} must name exemplars by whole numbers that increase; was it edited?")
-    observed, mean, epistemic, aleatoric = np.split(np.stack(values, axis=1)[: len(rows)], 4, axis=1)
-    differ = (observed != run.outcomes[lived[rows]]).any(axis=1)
-    if differ.any():
-        raise RunError(f"{file}: exemplar {rows[differ][0]} is another one in episodes.csv; is it another run's file?")
-    spread = np.hypot(epistemic, aleatoric)
-    if not (spread > 0).all():
-        raise RunError(f"{file}: exemplar {rows[(spread <= 0).any(axis=1)][0]} has a spread of 0; was it edited?")
-    if run.refreshes is None:
-        raise RunError(f"{path}/refreshes.csv is missing; was it deleted?")
-    refreshes = _checked(run, "refreshes.csv", run.refreshes)
-    if not len(refreshes["diverged"]) or not np.isin(refreshes["diverged"], (0, 1)).all():
-        raise RunError(f"{path}/refreshes.csv must hold a refresh, and 0 or 1 for diverged; was it cut or edited?")
-    return ModelRun(run, lived[rows], observed, mean, spread, refreshes)
 
 
 def row(model_run: ModelRun) -> dict[str, Any]:
@@ -159,24 +99,6 @@ def figure_of(model_run: ModelRun) -> Figure:
     plots.held_out_over_time(axes["held out"], refreshes["movements"], refreshes["held_out"], diverged)
     figure.suptitle(f"{model_run.name}: {len(observed)} predictions, each made before the model learnt from it")
     return figure
-
-
-def _checked(run: Run, name: str, table: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """The ``table`` of a model as it is.
-
-    Raises:
-        RunError: it is damaged, or has other outcomes.
-    """
-    path, bad = run.path / name, run.damage.get(name, 1)
-    names = small_table(path, run.outcomes.shape[1]).names
-    if name not in run.damage and tuple(table) == names:
-        return table
-    line = path.read_text(errors="replace").split("\n")[bad - 1][:60]
-    if bad == 1:
-        raise RunError(f"{path} must begin with {','.join(names)}, got {line}; was it edited?")
-    whole = ", ".join(column for column in names if column in WHOLE)
-    wanted = f"{len(names)} numbers" + ("" if name in run.unchecked else " and their checksum")
-    raise RunError(f"{path}, line {bad}: needs {wanted}, got {line!r} (whole ones for {whole}); was it edited?")
 
 
 def _printed(cells: dict[str, Any]) -> list[str]:

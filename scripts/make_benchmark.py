@@ -1,56 +1,55 @@
 """Make the benchmark set: one goal in each tile that several learners reached together (section 5.2 of the paper).
 
-Random, SAGG-RIAC and SGIM-D are run with several seeds each, and their landing points are put together. The side of the
-tiles is chosen so that about 358 of them, the paper's number, were reached. One goal is drawn at random in each.
+Random, SAGG-RIAC and SGIM-D are run on the fishing rod with several seeds each, and `sgimd benchmark` tiles what they
+reached together. The side of the tiles is chosen so that about 358 of them, the paper's number, were reached. One goal
+is drawn at random in each.
 """
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Iterable
-from concurrent.futures import ProcessPoolExecutor
 from itertools import product
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
-from tqdm import tqdm
 
 from options import at_least, writable_file
-from sgimd_torch.algorithms import random_exploration, sagg_riac, sgim_d
-from sgimd_torch.demonstrations import load_demonstrations
-from sgimd_torch.environments.fishing_rod import FishingRod
-from sgimd_torch.evaluation import SHIPPED, Benchmark, save_benchmark, tile_goals
-from sgimd_torch.session import run
-from sgimd_torch.spaces import Array, stream
-from sgimd_torch.teachers import PeriodicTeacher
+from sgimd_torch.evaluation import SHIPPED
+from sgimd_torch.runs.config import Config
+from sgimd_torch.runs.engines.local import Local
+from sgimd_torch.runs.engines.loop import sweep
+from sgimd_torch.runs.read import read_run
+from sgimd_torch.spaces import Array
+from sgimd_torch.views import benchmark
 
 
-def memory_of(algorithm: str, seed: int, movements: int) -> tuple[Array, Array]:
-    """What one learner remembers: thetas ``(movements, theta_dim)``, outcomes ``(movements, 2)`` m."""
-    rod = FishingRod(threads=1)
-    teacher = None
-    if algorithm == "random":
-        learner = random_exploration(rod, seed)
-    elif algorithm == "sagg-riac":
-        learner = sagg_riac(rod, seed)
-    else:
-        learner = sgim_d(rod, seed, correspondence=rod.primitive.correspondence)
-        teacher = PeriodicTeacher(load_demonstrations(), stream(seed, "teacher"))
-    for _ in run(learner, rod, seed, movements=movements, teacher=teacher):
-        pass
-    return learner.memory.thetas, learner.memory.outcomes
+def live(learners: Iterable[tuple[str, int]], movements: int, processes: int, folder: Path) -> list[Path]:
+    """Run ``learners``, each an algorithm with a seed, without evaluations; their run directories, in this order."""
+    configs = [
+        Config(algorithm=algorithm, seed=seed, movements=movements, evaluate_at=(), out=folder)
+        for algorithm, seed in learners
+    ]
+    with Local(processes) as engine:
+        sweep(configs, engine, keep_going=False)
+    return [config.directory for config in configs]
 
 
 def pooled(learners: Iterable[tuple[str, int]], movements: int, processes: int) -> tuple[Array, Array]:
-    """The memories of all ``learners``, each an algorithm with a seed, put together."""
-    with ProcessPoolExecutor(processes) as pool:
-        pending = [pool.submit(memory_of, *each, movements) for each in learners]
-        memories = [future.result() for future in tqdm(pending, desc="learning")]
-    thetas, outcomes = (np.concatenate(parts) for parts in zip(*memories, strict=True))
+    """The movements of all ``learners`` together: thetas ``(n, theta_dim)``, outcomes ``(n, 2)`` m."""
+    with TemporaryDirectory() as folder:
+        runs = [read_run(path) for path in live(learners, movements, processes, Path(folder))]
+    moved = [np.isfinite(run.outcomes).all(axis=1) for run in runs]
+    thetas, outcomes = (
+        np.concatenate([getattr(run, name)[rows] for run, rows in zip(runs, moved, strict=True)])
+        for name in ("thetas", "outcomes")
+    )
     return thetas, outcomes
 
 
 def main() -> None:
-    """Run the learners, tile what they reached, draw the goals and write the file."""
+    """Run the learners and make the goals from what they reached."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=writable_file, default=SHIPPED, help="file to write (default: the shipped one)")
     parser.add_argument(
@@ -62,15 +61,9 @@ def main() -> None:
     parser.add_argument("--processes", type=at_least(1), default=2, help="(default: %(default)s)")
     options = parser.parse_args()
     learners = product(("random", "sagg-riac", "sgim-d"), range(options.seed, options.seed + options.runs))
-    _, outcomes = pooled(learners, options.movements, options.processes)
-    box = FishingRod().outcomes
-
-    def goals(side: float) -> Array:
-        return tile_goals(outcomes, box, side, stream(options.seed, "benchmark"))
-
-    side = min(np.linspace(0.05, 0.2, 301), key=lambda side: abs(len(goals(side)) - options.tiles))
-    save_benchmark(options.out, Benchmark("FishingRod", goals(side), float(side)))
-    print(f"{len(goals(side))} tiles of {side:.4f} m reached by {len(outcomes)} movements: {options.out}")
+    with TemporaryDirectory() as folder:
+        live(learners, options.movements, options.processes, Path(folder))
+        benchmark.main([folder, f"--out={options.out}", f"--seed={options.seed}", f"--tiles={options.tiles}"])
 
 
 if __name__ == "__main__":

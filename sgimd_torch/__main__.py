@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import os
 import sys
 from collections.abc import Sequence
 from typing import Final, NamedTuple
@@ -26,6 +27,7 @@ COMMANDS: Final = {
     "check": Command("views.check", "does an environment keep every promise? each slip by name"),
     "demonstrations": Command("views.demonstrations", "are they right for a robot? import from CSV and LeRobot"),
     "suite": Command("views.suite", "one learner on many robots, against random movements"),
+    "benchmark": Command("views.benchmark", "goals of evaluation from what runs have reached"),
     "table": Command("views.table", "results of runs, over their seeds"),
     "report": Command("views.report.command", "one page about one run, or about many side by side", "report"),
     "watch": Command("views.watch", "TensorBoard on the boards of runs, also while they are still running"),
@@ -45,6 +47,7 @@ examples:
   sgimd run --algorithm sgim-d --seed 3 --resume     after Ctrl-C or a power cut
   sgimd run --environment mypackage.toss:make        on a robot of your own
   sgimd check mypackage.toss:make                    what is wrong with it, if anything
+  sgimd benchmark pool --out goals.npz               goals for it, where runs in pool have been
   sgimd demonstrations check shown.npz --task fishing-rod
   sgimd sweep --vary goals=interest-map,uniform --seeds 0-9 --out study
   sgimd table study                                  error of each variant, over its seeds
@@ -55,6 +58,8 @@ sgimd COMMAND --help explains a command; sgimd --version prints the version."""
 
 def main() -> int:
     """Run the command that the first word names; the exit code."""
+    for library in ("OMP", "OPENBLAS", "MKL"):  # matrices are small here: their threads would only wait for each other
+        os.environ.setdefault(f"{library}_NUM_THREADS", "1")
     return command(_call)
 
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import TypedDict, Unpack
+from typing import Any, TypedDict, Unpack
 
 import numpy as np
 
@@ -27,14 +27,16 @@ from sgimd_torch.learner import Learner
 from sgimd_torch.memory import Memory
 from sgimd_torch.searches.perturb import practise
 from sgimd_torch.searches.simplex import nelder_mead
+from sgimd_torch.searches.widening import Widening
 from sgimd_torch.spaces import Array, Box, Estimate, Search, stream
-from sgimd_torch.strategies import Babble, Emulate, GoalBabbling, Imitate, Judge, Remember, Rest, SocialStrategy
+from sgimd_torch.strategies import Babble, Emulate, GoalBabbling, Imitate, Judge, Look, Remember, Rest, SocialStrategy
 
 Correspondence = Callable[[Array, Array], Array]
 MakeGoals = Callable[[Box, Box, np.random.Generator], Goals]
 MakeInverse = Callable[[Memory], Callable[[Array, Array], Estimate]]
 MakeSearch = Callable[[Box, np.random.Generator], Search]
 MakeJudge = Callable[[Memory, Performance], Judge]
+MakeLook = Callable[[Box, Memory, Any, np.random.Generator], Look]
 MakeSocial = Callable[[GoalBabbling, Box, np.random.Generator], SocialStrategy]
 
 
@@ -48,6 +50,7 @@ class Parts(TypedDict, total=False):
     measure: Performance | None
     budget: int
     tolerance: float | None
+    look: MakeLook | None
     global_range: tuple[float, float]
     give_up: float
 
@@ -72,10 +75,39 @@ def practice(environment: Environment, seed: int, *, memory: Memory | None = Non
 
     It has no teacher, and nothing in it knows a unit or a robot. What the answer gets wrong is what it learns next.
     """
-    answer = partial(LocalProcess, noise=environment.outcome_noise)
-    chosen: Parts = {"goals": UniformGoals, "inverse": answer, "search": practise, "budget": 1}
-    chosen.update(parts)
-    return sagg_riac(environment, seed, memory=memory, **chosen)
+    return sagg_riac(environment, seed, memory=memory, **_practising(environment, parts))
+
+
+def practice_taught(
+    environment: Environment,
+    seed: int,
+    *,
+    correspondence: Correspondence,
+    memory: Memory | None = None,
+    **parts: Unpack[Parts],
+) -> Learner:
+    """The same with a teacher: what is shown is executed once, exactly. Best when all is shown at the start."""
+    return sgim_d(
+        environment,
+        seed,
+        correspondence=correspondence,
+        social=partial(imitating, repeats=1),
+        memory=memory,
+        **_practising(environment, parts),
+    )
+
+
+def _practising(environment: Environment, changed: Parts) -> Parts:
+    parts: Parts = {
+        "goals": UniformGoals,
+        "inverse": partial(LocalProcess, noise=environment.outcome_noise),
+        "search": practise,
+        "budget": 1,
+        "look": Widening,
+        "global_range": (0.02, 0.3),
+    }
+    parts.update(changed)
+    return parts
 
 
 def observation(
@@ -190,6 +222,7 @@ def goal_babbling(
     measure: Performance | None = None,
     budget: int = 15,
     tolerance: float | None = None,
+    look: MakeLook | None = None,
     global_range: tuple[float, float] = (0.05, 0.95),
     give_up: float = -0.5,
 ) -> GoalBabbling:
@@ -206,6 +239,7 @@ def goal_babbling(
         measure: J; None for eq. (7), relative to the distance from rest.
         budget: the most movements for one goal.
         tolerance: distance (m) at which a goal counts as reached; None for the outcome noise, but at least .02 m.
+        look: (policies, memory, inverse, rng) -> how the global regime draws movements; None: uniformly from Pi.
         global_range: least and greatest probability of the global exploration regime.
         give_up: below this competence a goal is given up when a movement does not raise it; -1 never gives up.
 
@@ -215,17 +249,19 @@ def goal_babbling(
     noise = max(environment.outcome_noise, 0.02)
     if measure is None:
         measure = partial(performance, rest=environment.rest, d_min=noise)
+    made = inverse(memory)
     return GoalBabbling(
         environment.policies,
         memory,
         goals(environment.contexts, environment.outcomes, stream(seed, "goals")),
-        inverse(memory),
+        made,
         search(environment.policies, stream(seed, "search")),
         Competence(memory, measure),
         judge(memory, measure),
         stream(seed, "regime"),
         budget=budget,
         tolerance=noise if tolerance is None else tolerance,
+        look=None if look is None else look(environment.policies, memory, made, stream(seed, "look")),
         global_range=global_range,
         give_up=give_up,
     )

@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from functools import partial, wraps
+from pathlib import Path
 from typing import Any, Final
 
 
@@ -32,8 +33,10 @@ class Entry:
         fixed: its parameter -> value; a text with a colon is an attribute, loaded like ``at``.
         also: options that matter with it, but are used by another part.
         ignores: options that have no effect with it, though others use them.
+        answers: of an algorithm: its learner's own answer stands in the place of the default of --inverse.
         learns_with: of an inverse: the one to use while learning, if it is another one.
         label, colour: what figures call it, and how they draw it.
+        filmed: of an environment: whether `sgimd film` shows it.
     """
 
     at: str
@@ -42,9 +45,11 @@ class Entry:
     fixed: Mapping[str, object] = field(default_factory=dict)
     also: tuple[str, ...] = ()
     ignores: tuple[str, ...] = ()
+    answers: bool = False
     learns_with: str | None = None
     label: str = ""
     colour: str = "black"
+    filmed: bool = False
 
     @property
     def options(self) -> list[str]:
@@ -112,6 +117,11 @@ def _toy(name: str, side: float, about: str) -> Entry:
     return _at("runs.tasks:toy", about, fixed={"make": make, "side": side})
 
 
+def _rod(about: str, **fixed: object) -> Entry:
+    uses = {"noise": "noise", "task_space": "task_space", "threads": "threads"}
+    return _at("runs.tasks:fishing_rod", about, uses=uses, fixed=fixed, filmed=True)
+
+
 ROD: Final = "fishing-rod"  # the environment of all runs before there was a choice
 # Colours after Okabe & Ito: distinct with any colour vision, and in grey.
 CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
@@ -122,9 +132,19 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
         "sagg-riac": _at("algorithms:sagg_riac", "goal babbling", uses=_PURSUES, label="SAGG-RIAC", colour="#0072b2"),
         "practice": _at(
             "algorithms:practice",
-            "one movement a goal, as a local process answers; evaluate it with --inverse process",
+            "one movement a goal, as a local process answers",
+            answers=True,
             label="Practice",
             colour="#332288",
+        ),
+        "practice-taught": _at(
+            "algorithms:practice_taught",
+            "the same, and does once what it is shown; best with --teacher initial --every 1",
+            uses=_SHOWN,
+            also=_TAUGHT,
+            answers=True,
+            label="Practice, taught",
+            colour="#aa4499",
         ),
         "observation": _at(
             "algorithms:observation",
@@ -167,15 +187,15 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
         },
     },
     "environment": {
-        ROD: _at(
-            "runs.tasks:fishing_rod",
-            "the paper's arm with a rod, in MuJoCo",
-            uses={"noise": "noise", "task_space": "task_space", "threads": "threads"},
-        ),
-        "planar-arm-7": _at("runs.tasks:planar_arm", "7 joints, no noise", fixed={"n_joints": 7}),
-        "planar-arm-50": _at("runs.tasks:planar_arm", "50 joints, no noise", fixed={"n_joints": 50}),
+        ROD: _rod("the paper's arm with a rod, in MuJoCo"),
+        "rod-wind": _rod("the same in a side wind, up to a quarter of the float's weight: a context", max_wind=0.05),
+        "rod-yaw": _rod("the same with its base turned by up to half a radian: a context", max_yaw=0.5),
+        "planar-arm-7": _at("runs.tasks:planar_arm", "7 joints, no noise", fixed={"n_joints": 7}, filmed=True),
+        "planar-arm-50": _at("runs.tasks:planar_arm", "50 joints, no noise", fixed={"n_joints": 50}, filmed=True),
         "swimmer": _at("runs.tasks:swimmer", "gymnasium's Swimmer-v5: three links, two motors (extra gym)"),
-        "half-reached": _at("runs.tasks:half_reached", "7 joints, and a T of which less than half can be reached"),
+        "half-reached": _at(
+            "runs.tasks:half_reached", "7 joints, and a T of which less than half can be reached", filmed=True
+        ),
         "toss": _toy("toss", 0.4, "a ball in the wind, which is the context"),
         "crawler": _toy("crawler", 0.1, "four legs, whose phases are periodic parameters"),
         "two-elbows": _toy("two_elbows", 0.1, "an arm with two separate families of postures"),
@@ -377,6 +397,20 @@ def load(place: str, what: str = "") -> Any:
             raise ValueError(f"{what}: {module} has no {attribute}{did_you_mean(name, public, 3)}")
         found = getattr(found, name)
     return found
+
+
+def source(word: str) -> Path | None:
+    """The file that a thing of your own, ``package.module:attribute``, is written in; None if there is none.
+
+    Raises:
+        ValueError: see ``load``.
+    """
+    made = inspect.unwrap(load(word))
+    while isinstance(made, partial):
+        made = made.func
+    module = inspect.getmodule(made) or sys.modules[word.partition(":")[0]]
+    file = getattr(module, "__file__", None)
+    return Path(file) if file and Path(file).is_file() else None
 
 
 def label(algorithm: str) -> str:

@@ -11,8 +11,10 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from sgimd_torch.environments.protocol import Environment, execute_many
 from sgimd_torch.files import read_npz, write_npz
@@ -20,6 +22,9 @@ from sgimd_torch.spaces import Array, Box, Estimate, check_count, check_vector, 
 
 VERSION = 1
 SHIPPED = Path(__file__).with_name("data") / "benchmark.npz"
+TILES: Final = 358  # of the paper's benchmark
+PARTS: Final = 3  # of the range of each context, for errors by context
+SIDES: Final = np.linspace(0.025, 0.1, 301)  # of a tile in the plane, as parts of T's; they leave 1600 to 100 tiles
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +46,7 @@ class Benchmark:
         if found != self.environment or environment.outcomes.dim != self.goals.shape[1]:
             raise ValueError(
                 f"the benchmark was made for {self.environment} with {self.goals.shape[1]} outcome dimensions, got "
-                f"{found} with {environment.outcomes.dim}; make one with scripts/make_benchmark.py"
+                f"{found} with {environment.outcomes.dim}; make one with sgimd benchmark"
             )
         space = environment.outcomes
         if not space.contains(self.goals).all():
@@ -56,12 +61,14 @@ class Benchmark:
 class Evaluation:
     """What ``evaluate`` found. ``errors`` ``(n,)`` m, one for each goal; ``thetas`` ``(n, theta_dim)`` that were
     executed; ``outcomes`` ``(n, outcome_dim)`` where they landed; ``scatter`` ``(n,)`` m, the mean distance of the
-    repeated landing points of each theta to their true mean (estimated, see ``evaluate``), NaN without repeats."""
+    repeated landing points of each theta to their true mean (estimated, see ``evaluate``), NaN without repeats;
+    ``contexts`` ``(n, context_dim)`` in which they were executed."""
 
     errors: Array
     thetas: Array
     outcomes: Array
     scatter: Array
+    contexts: Array
 
     @property
     def mean_error(self) -> float:
@@ -77,6 +84,40 @@ class Evaluation:
         """How many goals were missed by ``near`` (m) or less."""
         return int((self.errors <= near).sum())
 
+    def by_context(self, contexts: Box) -> list[Part]:
+        """The errors by context: C is cut into thirds, along one of its dimensions after the other."""
+        found = []
+        for k in range(contexts.dim):
+            edges = np.linspace(contexts.low[k], contexts.high[k], PARTS + 1)
+            part = np.clip(np.searchsorted(edges, self.contexts[:, k], "right") - 1, 0, PARTS - 1)
+            for n in range(PARTS):
+                there = self.errors[part == n]
+                mean = float(there.mean()) if len(there) else float("nan")
+                found.append(Part(k, float(edges[n]), float(edges[n + 1]), len(there), mean))
+        return found
+
+
+class Part(NamedTuple):
+    """A part of C: ``context``, the dimension, from ``low`` to ``high``; how many ``goals`` were evaluated in it, and
+    their ``mean_error`` (m), NaN without any."""
+
+    context: int
+    low: float
+    high: float
+    goals: int
+    mean_error: float
+
+
+def contexts_of_goals(environment: Environment, n: int) -> Array:
+    """``(n, context_dim)`` as the environment gives them, one for each goal: the same in all evaluations of all runs.
+
+    So comparisons are paired. An environment without contexts is not asked.
+    """
+    if environment.contexts.dim == 0:
+        return np.zeros((n, 0))
+    drawn = [environment.observe(stream(0, "contexts of evaluation", goal)) for goal in range(n)]
+    return environment.contexts.check("contexts that the environment observes", np.stack(drawn))
+
 
 def evaluate(
     inverse: Callable[[Array, Array], Estimate],
@@ -85,7 +126,7 @@ def evaluate(
     seed: int,
     movements: int,
     *,
-    context: Array | None = None,
+    context: ArrayLike | None = None,
     repeats: int = 3,
 ) -> Evaluation:
     """Invert every goal, execute the result once, and ``repeats`` times more to measure the noise.
@@ -98,7 +139,8 @@ def evaluate(
         environment: executed, all goals side by side if it can do that.
         goals: ``(n, outcome_dim)`` m.
         seed, movements: name the random streams, so that each evaluation of a run has its own.
-        context: ``(context_dim,)`` in which to execute; None for the middle of C.
+        context: in which to execute: ``(context_dim,)`` for all goals, or ``(n, context_dim)``; None draws one for
+            each goal, see `contexts_of_goals`.
         repeats: k; 0 does not measure the noise; otherwise 2 or more, as one landing point does not scatter. Landing
             points lie nearer to their own mean than to the true one, so the scatter is multiplied by sqrt(k / (k - 1)):
             for Gaussian noise its mean is then the same for every k.
@@ -114,20 +156,26 @@ def evaluate(
     if check_count("repeats", repeats, 0) == 1:
         raise ValueError("repeats must be 0 or at least 2, got 1; one landing point does not scatter")
     if context is None:
-        context = (environment.contexts.low + environment.contexts.high) / 2
+        contexts = contexts_of_goals(environment, len(goals))
+    else:
+        given = environment.contexts.check("context", context)
+        contexts = np.broadcast_to(given, (len(goals), environment.contexts.dim))
     many = getattr(inverse, "many", None)  # a forward model is ten times as fast in batches
-    estimates = many(context, goals) if many is not None else [inverse(context, goal) for goal in goals]
+    if many is not None and (contexts == contexts[0]).all():
+        estimates = many(contexts[0], goals)
+    else:
+        estimates = [inverse(*each) for each in zip(contexts, goals, strict=True)]
     thetas = np.stack([estimate.theta for estimate in estimates])
     copies = np.tile(thetas, (1 + repeats, 1))  # all goals once, then again: the judged rows do not depend on repeats
     rngs = [stream(seed, f"evaluation {movements}", row) for row in range(len(copies))]
-    landed = execute_many(environment, np.tile(context, (len(copies), 1)), copies, rngs)
+    landed = execute_many(environment, np.tile(contexts, (1 + repeats, 1)), copies, rngs)
     landed = landed.reshape(1 + repeats, *goals.shape)
     outcomes, again = landed[0], landed[1:]
     scatter = np.full(len(goals), np.nan)
     if repeats:
         bessel = np.sqrt(repeats / (repeats - 1))
         scatter = bessel * np.linalg.norm(again - again.mean(axis=0), axis=2).mean(axis=0)
-    return Evaluation(np.linalg.norm(outcomes - goals, axis=1), thetas, outcomes, scatter)
+    return Evaluation(np.linalg.norm(outcomes - goals, axis=1), thetas, outcomes, scatter, contexts)
 
 
 def tile_goals(outcomes: Array, box: Box, side: float, rng: np.random.Generator, *, at_least: int = 2) -> Array:
@@ -143,10 +191,35 @@ def tile_goals(outcomes: Array, box: Box, side: float, rng: np.random.Generator,
     Returns:
         ``(n_tiles, outcome_dim)`` m, in the order of the tiles.
     """
-    inside = outcomes[box.contains(outcomes)]
-    tiles, counts = np.unique(np.floor((inside - box.low) / side), axis=0, return_counts=True)
-    tiles = tiles[counts >= at_least]
+    tiles = _reached(outcomes, box, side, at_least)
     return box.clip(box.low + (tiles + rng.random(tiles.shape)) * side)
+
+
+def tile_side(outcomes: Array, box: Box, tiles: int = TILES, *, at_least: int = 2) -> float:
+    """The side (m) at which about so many ``tiles`` are reachable; other arguments as for `tile_goals`.
+
+    Tried are sides of a fortieth to a tenth of T's in the plane, and in other dimensions those that leave as many tiles
+    of T. Where less than a tenth of a side of T was reached, what was reached counts in its place.
+    """
+    inside = outcomes[box.contains(outcomes)]
+    reached = np.ptp(inside, axis=0) if len(inside) else box.sides
+    lengths = np.where((reached > 0) & (reached < box.sides / 10), reached, box.sides)
+    sides = np.prod(lengths) ** (1 / box.dim) * SIDES ** (2 / box.dim)
+    return float(min(sides, key=lambda side: abs(len(_reached(inside, box, side, at_least)) - tiles)))
+
+
+def _reached(outcomes: Array, box: Box, side: float, at_least: int) -> Array:
+    """``(n_tiles, dim)`` the tiles of T with ``at_least`` so many outcomes, counted from its lower corner, in order."""
+    inside = outcomes[box.contains(outcomes)]
+    tiles = np.floor((inside - box.low) / side)
+    per_side = np.floor(box.sides / side) + 1
+    if np.log2(per_side).sum() < 53:  # each tile has a number of its own, which is quicker to sort than its row
+        numbers = tiles @ np.append(np.cumprod(per_side[:0:-1])[::-1], 1.0)
+        _, first, counts = np.unique(numbers, return_index=True, return_counts=True)
+        tiles = tiles[first]
+    else:
+        tiles, counts = np.unique(tiles, axis=0, return_counts=True)
+    return np.asarray(tiles[counts >= at_least])
 
 
 def save_benchmark(path: str | os.PathLike[str], benchmark: Benchmark) -> None:
@@ -169,7 +242,7 @@ def load_benchmark(path: str | os.PathLike[str] = SHIPPED) -> Benchmark:
         OSError: there is no file, or it is a directory.
     """
     names = ("environment", "goals", "side")
-    return _checked(str(path), *read_npz(path, "benchmark", "scripts/make_benchmark.py", VERSION, names))
+    return _checked(str(path), *read_npz(path, "benchmark", "sgimd benchmark", VERSION, names))
 
 
 def _checked(source: str, name: np.ndarray, goals: np.ndarray, side: np.ndarray) -> Benchmark:

@@ -161,6 +161,11 @@ def _array(content: bytes) -> Stored:
     return array
 
 
+def checksum(path: Path) -> str:
+    """Of the content of a file, in hexadecimal."""
+    return f"{zlib.crc32(path.read_bytes()):08x}"
+
+
 def make_folder(path: Path) -> None:
     """Make a folder, and its parents if they are missing.
 

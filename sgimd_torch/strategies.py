@@ -22,6 +22,10 @@ Judge = Callable[[Array, Array, Array], float]
 """(context, goal, outcomes of the attempt) -> the competence at the goal when the attempt has ended, in [-1, 0]."""
 
 
+Look = Callable[[Array], Array]
+"""context -> the next theta of global exploration."""
+
+
 class Strategy(Protocol):
     """What a learner does on its own. An attempt stays in one context, and has to yield at least once."""
 
@@ -69,9 +73,10 @@ class GoalBabbling:
         search: refines the estimate movement by movement.
         competence: gamma, from memory; decides between the regimes.
         judge: the competence that ``goals`` is told at the end of an attempt.
-        rng: draws the regimes and the movements of the global regime.
+        rng: draws the regimes.
         budget: the most movements for one goal.
         tolerance: distance (m) at which a goal counts as reached.
+        look: draws the movements of the global regime; None: uniformly from Pi, by ``rng``.
         global_range: least and greatest probability of the global exploration regime.
         give_up: a goal with competence below this is given up at the first movement that does not raise it; -1 never
             gives up. Deviation: the paper spends the whole budget on every goal. But in a task space far larger than
@@ -94,6 +99,7 @@ class GoalBabbling:
         *,
         budget: int = 15,
         tolerance: float = 0.02,
+        look: Look | None = None,
         global_range: tuple[float, float] = (0.05, 0.95),
         give_up: float = -0.5,
     ) -> None:
@@ -113,6 +119,7 @@ class GoalBabbling:
         self.rng = rng
         self.budget = check_count("budget", budget, 1)
         self.tolerance = tolerance
+        self.look: Look = look if look is not None else lambda context: policies.sample(rng)
         self.global_range = global_range
         self.give_up = give_up
 
@@ -156,7 +163,7 @@ class GoalBabbling:
         while True:
             if self.rng.random() < self._global_probability(context, goal):
                 # Deviation: the paper prints "theta in T", which must be Pi.
-                yield Move(self.policies.sample(self.rng), goal, "global")
+                yield Move(self.look(context), goal, "global")
             else:
                 yield from self._optimise(context, goal)
 

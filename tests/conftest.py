@@ -1,8 +1,11 @@
 """A tiny benchmark, a short run on it, and what that run writes when nothing disturbs it."""
 
+import sys
+
 import numpy as np
 import pytest
 
+from own import MODULE
 from runs import arguments, csv_of
 from sgimd_torch.evaluation import Benchmark, save_benchmark
 from sgimd_torch.runs.command_line import main
@@ -32,3 +35,13 @@ def reference(tmp_path_factory, go):
     out = tmp_path_factory.mktemp("reference")
     assert go(out) == 0
     return csv_of(out / "sgim-d" / "seed-003")
+
+
+@pytest.fixture
+def own(tmp_path, monkeypatch):
+    """Environments of a user's own, the module ``sliders`` of the working directory, which is ``tmp_path``."""
+    (tmp_path / "sliders.py").write_text(MODULE)
+    monkeypatch.chdir(tmp_path)
+    yield tmp_path
+    sys.path[:] = [place for place in sys.path if place != str(tmp_path)]
+    sys.modules.pop("sliders", None)

@@ -11,6 +11,8 @@ import sgimd_torch
 from sgimd_torch.runs.build import build
 from sgimd_torch.runs.command_line import parse
 from sgimd_torch.runs.directory import RunDirectory
+from sgimd_torch.runs.engines.local import Local
+from sgimd_torch.runs.engines.loop import sweep
 from sgimd_torch.runs.process import Stopping
 from sgimd_torch.runs.run import live_in
 
@@ -39,6 +41,12 @@ def accept_loss(out, benchmark, *options):
     with Stopping() as stopping, RunDirectory(parts, resume=True, accept_loss=True) as directory:
         live_in(directory, parts, stopping)
     return directory.notes
+
+
+def sweep_here(configs, processes=1, **options):
+    """On this machine; the failures."""
+    with Local(processes) as engine:
+        return sweep(configs, engine, **options)
 
 
 def start(program, *options, limit=""):

@@ -8,7 +8,17 @@ import pytest
 
 from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.evaluation import Benchmark, Evaluation, evaluate, load_benchmark, save_benchmark, tile_goals
+from sgimd_torch.environments.toys import toss
+from sgimd_torch.evaluation import (
+    Benchmark,
+    Evaluation,
+    Part,
+    contexts_of_goals,
+    evaluate,
+    load_benchmark,
+    save_benchmark,
+    tile_goals,
+)
 from sgimd_torch.inverses.local import LocalInverse, NearestNeighbour
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, Box, Estimate, stream
@@ -51,6 +61,69 @@ def test_a_perfect_inverse_makes_no_error_in_any_context() -> None:
     for context in (None, np.array([0.0]), np.array([0.7])):
         evaluation = evaluate(perfect(arm), arm, goals, 0, 0, context=context, repeats=0)
         assert evaluation.errors == pytest.approx(np.zeros(20), abs=1e-9)
+
+
+def test_each_goal_has_a_context_of_its_own_the_same_in_every_evaluation_of_every_run() -> None:
+    arm, goals = PlanarArm(5, context=True), stream(0, "goals").uniform(-0.6, 0.6, (200, 2))
+    asked: list[list[float]] = []
+
+    def inverse(context: Array, goal: Array) -> Estimate:
+        asked.append(context.tolist())
+        return perfect(arm)(context, goal)
+
+    first = evaluate(inverse, arm, goals, seed=0, movements=100, repeats=2)
+    assert first.errors == pytest.approx(np.zeros(200), abs=1e-9)  # executed in the context that was asked about
+    assert first.contexts.tolist() == asked
+    for seed, movements in ((0, 200), (1, 100)):
+        later = evaluate(perfect(arm), arm, goals, seed, movements, repeats=0)
+        assert np.array_equal(later.contexts, first.contexts)
+    assert np.array_equal(contexts_of_goals(arm, 50), first.contexts[:50])  # goal k, whatever their number
+    # Uniform in +-pi / 4: mean 0, sd pi / 4 / sqrt(3) = .453; four standard errors of 200 are .13 and .06.
+    assert arm.contexts.contains(first.contexts).all()
+    assert first.contexts.mean() == pytest.approx(0, abs=0.13)
+    assert first.contexts.std() == pytest.approx(0.453, abs=0.06)
+
+
+def test_a_context_for_each_goal_may_be_given() -> None:
+    arm, goals = PlanarArm(5, context=True), stream(0, "goals").uniform(-0.6, 0.6, (4, 2))
+    given = np.array([[0.1], [-0.2], [0.3], [0.0]])
+    found = evaluate(perfect(arm), arm, goals, 0, 0, context=given, repeats=0)
+    assert np.array_equal(found.contexts, given)
+    assert found.errors == pytest.approx(np.zeros(4), abs=1e-9)
+
+
+def test_without_contexts_an_environment_is_not_asked_for_any() -> None:
+    class Silent(PlanarArm):
+        def observe(self, rng: np.random.Generator) -> Array:
+            raise AssertionError
+
+    found = evaluate(perfect(PlanarArm(5)), Silent(5), np.array([[0.5, 0.5]]), 0, 0)
+    assert found.contexts.shape == (1, 0)
+
+
+def test_errors_by_context_are_those_of_the_thirds_of_each_of_its_dimensions() -> None:
+    contexts = np.array([[-3.0, 0.0], [-1.5, 0.1], [-1.0, 0.2], [1.0, 0.3], [3.0, 0.1]])
+    empty = np.zeros((5, 0))
+    found = Evaluation(np.array([1.0, 3.0, 5.0, 7.0, 9.0]), empty, empty, np.zeros(5), contexts)
+    parts = found.by_context(Box(np.array([-3.0, 0.0]), np.array([3.0, 0.9])))
+    assert parts[:3] == [Part(0, -3, -1, 2, 2.0), Part(0, -1, 1, 1, 5.0), Part(0, 1, 3, 2, 8.0)]
+    assert [(part.context, part.goals, part.mean_error) for part in parts[3:5]] == [(1, 4, 4.5), (1, 1, 7.0)]
+    assert parts[5].goals == 0
+    assert np.isnan(parts[5].mean_error)
+    assert found.by_context(Box.cube(0, 1, 0)) == []
+
+
+def test_the_wind_of_a_ball_is_drawn_and_its_error_falls_with_what_is_known_of_it() -> None:
+    ball = toss(noise=0.0)
+    theta = np.array([0.5, 0.9, 0.9, 0.5])
+    goal = ball.effect(np.zeros(1), theta)
+
+    def inverse(context: Array, goal: Array) -> Estimate:
+        return Estimate(theta, theta[None], goal[None])
+
+    found = evaluate(inverse, ball, np.tile(goal, (300, 1)), 0, 0, repeats=0)
+    left, middle, right = found.by_context(ball.contexts)
+    assert middle.mean_error < 0.5 * min(left.mean_error, right.mean_error)  # without wind it would be 0
 
 
 def test_without_repeats_there_is_no_noise_floor_and_without_noise_it_is_zero() -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sgimd_torch.algorithms import practice, sagg_riac
+from sgimd_torch.algorithms import practice, practice_taught, sagg_riac
 from sgimd_torch.environments.toys import toss, two_elbows
 from sgimd_torch.evaluation import evaluate
 from sgimd_torch.goals.uniform import UniformGoals
@@ -13,11 +13,13 @@ from sgimd_torch.learner import Learner
 from sgimd_torch.runs.tasks import toy_benchmark
 from sgimd_torch.searches.perturb import perturb
 from sgimd_torch.session import run
+from sgimd_torch.spaces import Demonstration
+from sgimd_torch.teachers import InitialTeacher
 
 SEEDS = (1, 2)
 
 
-def after(learner: Learner, robot, seed: int, movements: int = 150) -> Learner:
+def after(learner: Learner, robot, seed: int, movements: int = 200) -> Learner:
     for _ in run(learner, robot, seed, movements=movements):
         pass
     return learner
@@ -34,7 +36,7 @@ def test_practice_beats_uniform_goals_with_the_nearest_and_noise(make, side):
         for row, inverse in enumerate(
             (LocalProcess(ours.memory, noise=robot.outcome_noise), NearestNeighbour(theirs.memory))
         ):
-            errors[row, k] = evaluate(inverse, robot, goals, seed, 150, repeats=0).mean_error
+            errors[row, k] = evaluate(inverse, robot, goals, seed, 200, repeats=0).mean_error
     assert (errors[0] < 0.75 * errors[1]).all()
 
 
@@ -44,3 +46,14 @@ def test_each_part_of_practice_is_one_changed_word():
     goals = [episode.move.goal for episode in run(learner, robot, 0, movements=30)]
     lengths = np.diff(np.flatnonzero(np.diff(goals, axis=0, prepend=np.nan).any(axis=1)))
     assert lengths.max() == 3
+
+
+def test_taught_practice_does_once_what_it_is_shown_and_then_pursues_goals_of_its_own():
+    robot = two_elbows()
+    shown = [Demonstration(np.zeros(0), np.arange(2.0), np.stack((t, t)), np.zeros(2)) for t in np.eye(3)]
+    teacher = InitialTeacher(shown, np.random.default_rng(0), every=1)
+    learner = practice_taught(robot, 0, correspondence=lambda times, trajectory: trajectory[-1])
+    moves = [episode.move for episode in run(learner, robot, 0, movements=9, teacher=teacher)]
+    assert {tuple(move.theta) for move in moves[:3]} == {tuple(t) for t in np.eye(3)}
+    assert {move.origin for move in moves[:3]} == {"imitate"}
+    assert {move.origin for move in moves[3:]} <= {"global", "local"}

@@ -38,6 +38,7 @@ def test_the_example_of_the_readme_is_short_enough_to_read():
         "README.md",
         "CONTRIBUTING.md",
         "CHANGELOG.md",
+        "docs/clusters.md",
         "docs/runs.md",
         "experiments/README.md",
         "sgimd_torch/data/README.md",

@@ -12,9 +12,13 @@ import kill_runs
 import make_benchmark
 import make_demonstrations
 import make_teachers
+from sgimd_torch.algorithms import random_exploration, sagg_riac, sgim_d
 from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.environments.fishing_rod import FishingRod
-from sgimd_torch.spaces import stream
+from sgimd_torch.evaluation import load_benchmark, tile_goals
+from sgimd_torch.session import run
+from sgimd_torch.spaces import Box, stream
+from sgimd_torch.teachers import PeriodicTeacher
 
 
 @pytest.mark.parametrize(
@@ -61,11 +65,42 @@ def test_what_makes_no_sense_is_refused_and_nothing_is_written(tmp_path, monkeyp
     assert not list(tmp_path.iterdir())
 
 
+def lived(algorithm, seed, movements):
+    """The memory of a learner of the library, without runs on disk."""
+    rod, teacher = FishingRod(threads=1), PeriodicTeacher(load_demonstrations(), stream(seed, "teacher"))
+    learner = {
+        "random": lambda: random_exploration(rod, seed),
+        "sagg-riac": lambda: sagg_riac(rod, seed),
+        "sgim-d": lambda: sgim_d(rod, seed, correspondence=rod.primitive.correspondence),
+    }[algorithm]()
+    for _ in run(learner, rod, seed, movements=movements, teacher=teacher if algorithm == "sgim-d" else None):
+        pass
+    return learner.memory
+
+
+def test_the_benchmark_is_a_goal_in_each_tile_that_the_three_learners_reached(tmp_path, monkeypatch):
+    monkeypatch.setattr(
+        sys, "argv", f"make_benchmark.py --out {tmp_path}/b.npz --runs 1 --movements 40 --seed 2007 --tiles 20".split()
+    )
+    make_benchmark.main()
+    outcomes = np.concatenate([lived(name, 2007, 40).outcomes for name in ("random", "sagg-riac", "sgim-d")])
+    box = Box.cube(-1, 1, 2)
+
+    def goals(side):
+        return tile_goals(outcomes, box, side, stream(2007, "benchmark"))
+
+    side = min(np.linspace(0.05, 0.2, 301), key=lambda side: abs(len(goals(side)) - 20))
+    made = load_benchmark(tmp_path / "b.npz")
+    assert (made.environment, made.side) == ("FishingRod", side)
+    np.testing.assert_array_equal(made.goals, goals(side))
+    assert [path.name for path in tmp_path.iterdir()] == ["b.npz"]
+
+
 @pytest.fixture(scope="module")
 def pool():
     """What two SAGG-RIAC learners remember after 30 movements each, as far as it lies in T."""
-    memories = [make_benchmark.memory_of("sagg-riac", seed, 30) for seed in (4000, 4001)]
-    thetas, outcomes = (np.concatenate(parts) for parts in zip(*memories, strict=True))
+    memories = [lived("sagg-riac", seed, 30) for seed in (4000, 4001)]
+    thetas, outcomes = (np.concatenate([getattr(each, name) for each in memories]) for name in ("thetas", "outcomes"))
     inside = FishingRod().outcomes.contains(outcomes)
     return thetas[inside], outcomes[inside]
 

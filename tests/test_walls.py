@@ -46,6 +46,7 @@ LIBRARIES = {  # library: the only rooms that may import it; of a folder, where 
     "sklearn": {"goals/alp_gmm"},
     "ribs": {"rivals"},
     "pyarrow": {"demonstrations/lerobot"},
+    "ray": {"runs/engines/on_ray"},
     "gymnasium": {"environments/from_gymnasium", "environments/to_gymnasium"},
 }
 WORLDS = {"environments"}

@@ -1,12 +1,12 @@
 """The pictures on the board: the water plane from above, coloured by competence, interest, landing points and error.
 
-pictures = draw(regions, space, outcomes=..., ...); pictures["competence"] is a png
+pictures = draw(regions, space, outcomes=..., ...); pictures["map/competence"] is a png, by its tag
 """
 
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,18 +14,21 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
-from matplotlib.ticker import MaxNLocator
 
-from sgimd_torch.board.scalars import branches
-from sgimd_torch.figures.axes import colour_bar
+from sgimd_torch.board.scalars import Grid, branches
+from sgimd_torch.figures.axes import colour_bar, plane
 from sgimd_torch.figures.learning import competence_map, interest_map, landing_points
+from sgimd_torch.figures.sections import Section, sections
 from sgimd_torch.goals.regions import Region
 from sgimd_torch.spaces import Array, Box
 
-LEVEL = 2  # of the tree: regions named in the pictures, as on the board's page of curves
+LEVEL = 3  # of the tree: regions named in the pictures, those with curves of their own
 # Fixed scales, so that pictures of different times and runs can be compared; values beyond look like the end.
 WORST = -0.25
 FARTHEST = 0.3  # m
+SHARE = 0.15  # of the longest side of T, likewise where T is not a plane
+NARROW = 0.2  # of the picture's width; the name of a narrower region stands upright
+THIN = 0.1  # of the picture's side; narrower than a name
 STYLE: Any = {"font.size": 8, "axes.titlesize": 8}
 
 
@@ -38,25 +41,36 @@ def draw(
     demonstrated: Array,
     benchmark: Array,
     errors: Array,
+    cells: Grid,
+    shares: Mapping[str, float],
+    since: Mapping[str, int],
 ) -> dict[str, bytes]:
-    """The pictures, as png.
+    """The pictures, as png, by tag.
 
     Args:
-        regions: of the goal model; no pictures of them if there are none, or if they include contexts.
-        space: T, of the plane.
-        outcomes, goals, demonstrated: ``(n, 2)`` m, where the float landed; the learner's last goals; demonstrated.
-        benchmark, errors: ``(n, 2)`` and ``(n,)`` m, its goals and how far from each the float landed.
+        regions: of the goal model; no pictures of them if there are none.
+        space: T; of more than two dimensions, a picture shows pairs next to each other.
+        outcomes, goals, demonstrated: ``(n, outcome_dim)`` m, where the float landed; the learner's last goals;
+            demonstrated.
+        benchmark, errors: ``(n, outcome_dim)`` and ``(n,)`` m, its goals and how far from each the float landed.
+        cells: of T; they have a picture in the plane only.
+        shares, since: by cell the share of its goals that are met, and since when half of them were, see ``Curves``.
     """
-    side = float(space.sides[0]) / 40
 
-    def landed(ax: Axes) -> None:
-        landing_points(ax, outcomes, space, demonstrated=demonstrated if len(demonstrated) else None, side=side)
+    def landed(ax: Axes, section: Section) -> None:
+        side, shown = float(section.box.sides[0]) / 40, demonstrated if len(demonstrated) else None
+        landing_points(ax, outcomes, space, demonstrated=shown, side=side, section=section)
 
-    pictures = {"landed": landed, "error": lambda ax: _errors(ax, benchmark, errors)}
-    if regions and len(regions[0].low) == space.dim:
-        pictures["interest"] = lambda ax: _interest(ax, regions, goals)
-        pictures["competence"] = lambda ax: _competence(ax, regions)
-    return {name: _png(picture) for name, picture in pictures.items()}
+    pictures: dict[str, Callable[[Axes, Section], object]] = {
+        "map/landed": landed,
+        "map/error": lambda ax, section: _errors(ax, benchmark, errors, section),
+    }
+    if space.dim == 2:
+        pictures = {"competent/since": lambda ax, section: _since(ax, cells, shares, since), **pictures}
+    if regions:
+        pictures["map/interest"] = lambda ax, section: _interest(ax, regions, goals, section)
+        pictures["map/competence"] = lambda ax, section: _competence(ax, regions, section)
+    return {name: _png(picture, sections(space)) for name, picture in pictures.items()}
 
 
 def where(regions: Sequence[Region]) -> str:
@@ -72,39 +86,70 @@ def where(regions: Sequence[Region]) -> str:
     return "\n".join(lines)
 
 
-def _interest(ax: Axes, regions: Sequence[Region], goals: Array) -> None:
-    interest_map(ax, *_boxes(regions), np.array([region.interest() for region in regions]), goals=goals)
-    _name(ax, regions)
+def _interest(ax: Axes, regions: Sequence[Region], goals: Array, section: Section) -> None:
+    interests = np.array([region.interest() for region in regions])
+    interest_map(ax, *_boxes(regions), interests, goals=goals, section=section)
+    _name(ax, regions, section)
 
 
-def _competence(ax: Axes, regions: Sequence[Region]) -> None:
+def _competence(ax: Axes, regions: Sequence[Region], section: Section) -> None:
     means = [region.competences.mean() if len(region.goals) else np.nan for region in regions]
-    competence_map(ax, *_boxes(regions), np.array(means), worst=WORST)
-    _name(ax, regions)
+    competence_map(ax, *_boxes(regions), np.array(means), worst=WORST, section=section)
+    _name(ax, regions, section)
 
 
-def _errors(ax: Axes, benchmark: Array, errors: Array) -> None:
-    drawn = ax.scatter(
-        benchmark[:, 0], benchmark[:, 1], c=errors, s=14, cmap="viridis_r", vmin=0, vmax=FARTHEST, edgecolors="none"
-    )
-    colour_bar([ax], drawn, "distance from goal to landing point (m)", extend="max")
-    ax.plot(0, 0, "^", color="black", markeredgecolor="white", markersize=9)
-    ax.set(xlabel="x (m)", ylabel="y (m)", aspect="equal")
-    ax.xaxis.set_major_locator(MaxNLocator(4))
-    ax.yaxis.set_major_locator(MaxNLocator(4))
+def _since(ax: Axes, cells: Grid, shares: Mapping[str, float], since: Mapping[str, int]) -> None:
+    """Each cell coloured by the share of its goals that are met; where half of them are, since when is written."""
+    n, box = cells.per_side, cells.box
+    values = np.array([shares.get(name, np.nan) for name in cells.names]).reshape(n, n).T  # (n_y, n_x)
+    x, y = (np.linspace(low, high, n + 1) for low, high in zip(box.low, box.high, strict=True))
+    mesh = ax.pcolormesh(x, y, np.ma.masked_invalid(values), cmap="viridis", vmin=0, vmax=1, edgecolors="white")
+    for k, name in enumerate(cells.names):
+        if name in shares:
+            column, row = divmod(k, n)
+            said = f"since\n{since[name]}" if name in since else f"{shares[name]:.0%}"
+            ink = "white" if shares[name] < 0.6 else "black"
+            middle = x[column : column + 2].mean(), y[row : row + 2].mean()
+            weight = "bold" if name in since else "normal"
+            ax.text(*middle, said, ha="center", va="center", color=ink, fontweight=weight)
+    colour_bar([ax], mesh, "share of the goals met now")
+    plane(ax, box)
+    ax.set_title("since when half of the goals are met, else the share")
+
+
+def _errors(ax: Axes, benchmark: Array, errors: Array, section: Section) -> None:
     ax.set_title(f"{len(errors)} benchmark goals, mean error {errors.mean():.3f} m")
+    label = "distance from goal to landing point (m)"
+    if section.is_strip:  # there is room for heights
+        ax.plot(benchmark[:, 0], errors, ".", color="#0072b2", markersize=4)
+        ax.set(xlabel="outcome", ylabel=label)
+        ax.set_ylim(bottom=0)
+        return
+    most = FARTHEST if section.space.dim == 2 else SHARE * float(section.space.sides.max())
+    x, y = section.points(benchmark).T
+    drawn = ax.scatter(x, y, c=errors, s=14, cmap="viridis_r", vmin=0, vmax=most, edgecolors="none")
+    colour_bar([ax], drawn, label, extend="max")
+    section.frame(ax, legend=False)
+    ax.autoscale()  # where the goals are, even in a large space
 
 
-def _name(ax: Axes, regions: Sequence[Region]) -> None:
+def _name(ax: Axes, regions: Sequence[Region], section: Section) -> None:
     """Frame and name the regions of the curves."""
-    named = branches(regions, LEVEL)
-    for path, below in named.items():
-        if f"{path}0" in named:
-            continue
-        low, high = _corners(below)
+    lows, highs, met = section.cut(*_boxes(regions))
+    rows = {regions[k]: row for row, k in enumerate(np.flatnonzero(met).tolist())}
+    named, (lowest, highest) = branches(list(rows), LEVEL), (lows.min(axis=0), highs.max(axis=0))
+    frontier = [path for path in named if not {f"{path}0", f"{path}1"} & named.keys()]
+    for k, path in enumerate(frontier):
+        among = [rows[region] for region in named[path]]
+        low, high = lows[among].min(axis=0), highs[among].max(axis=0)
         ax.add_patch(Rectangle((low[0], low[1]), *(high - low), fill=False, edgecolor="black", linewidth=1.6))
-        x, y = (low + high) / 2
-        text = ax.text(x, y, path, ha="center", va="center", fontweight="bold")
+        size = (high - low) / (highest - lowest)
+        upright = size[0] < NARROW and size[1] > size[0]
+        place = np.full(2, 0.5)
+        if size.min() < THIN:  # names of neighbours must not cover each other
+            place[int(size.argmax())] = (0.25, 0.75)[k % 2]
+        x, y = low + place * (high - low)
+        text = ax.text(x, y, path, ha="center", va="center", fontweight="bold", rotation=90 if upright else 0)
         text.set_bbox({"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 1.2})
 
 
@@ -117,13 +162,15 @@ def _corners(regions: Sequence[Region]) -> tuple[Array, Array]:
     return lows.min(axis=0), highs.max(axis=0)
 
 
-def _png(picture: Callable[[Axes], object]) -> bytes:
-    """A png, as large as TensorBoard shows it."""
+def _png(picture: Callable[[Axes, Section], object], shown: Sequence[Section]) -> bytes:
+    """A png, as large as TensorBoard shows it; the sections next to each other."""
+    n = len(shown)
     with rc_context(STYLE):
-        figure = Figure(figsize=(4.0, 3.5), dpi=90)
-        ax = figure.subplots()
-        figure.subplots_adjust(left=0.13, bottom=0.13, right=0.92, top=0.88)
-        picture(ax)
+        figure = Figure(figsize=(4.0 * n, 3.5), dpi=90)
+        axes = figure.subplots(1, n, squeeze=False)
+        figure.subplots_adjust(left=0.13 / n, bottom=0.13, right=1 - 0.08 / n, top=0.88, wspace=0.4)
+        for ax, section in zip(axes.flat, shown, strict=True):
+            picture(ax, section)
         content = io.BytesIO()
         figure.savefig(content, format="png", pil_kwargs={"compress_level": 3})
     return content.getvalue()

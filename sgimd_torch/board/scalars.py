@@ -7,7 +7,8 @@ Interest and competence by region are those of section 3.2.1 of Nguyen & Oudeyer
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+import re
+from collections.abc import Collection, Mapping, Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -32,6 +33,9 @@ LEGEND: Final = {
     "grid_competence": "Mean competence of the remembered goals in one cell of a grid that is the same in all "
     "runs on one benchmark.",
     "grid_error": "Mean error (m) over the benchmark goals in one cell of this grid.",
+    "grid_met": "Share of the benchmark goals in one cell of this grid that were met: missed by half the side of a "
+    "tile of the benchmark or less.",
+    "met": "The same share in larger cells, and everywhere. Read off where the robot is competent, and since when.",
     "regions/count": "How many regions the goal model has.",
     "regions": "Over all regions, also those too small for curves of their own: 10 %, half or 90 % lie below this.",
     "regime": "Share of the last movements that came from global exploration, local optimisation, imitation, babbling "
@@ -44,40 +48,40 @@ LEGEND: Final = {
     "teacher/missed_by": "Distance (m) from a demonstrated outcome to where its imitations landed, mean over the last "
     "movements.",
 }
-# One page that answers four questions: category -> chart -> tag.
-_PARTS: Final = ("R", "R0", "R1", "R00", "R01", "R10", "R11")
-LAYOUT: Final = {
+Charts = Mapping[str, Mapping[tuple[str, str], str]]
+"""Category -> (what a run must have for this chart, "" for all; title of the chart) -> tag, as a regular expression."""
+EVERYWHERE: Final = "everywhere"
+COMPETENT: Final = "Where is it competent (half of the goals met, within {near:.2g} m), and since when?"
+_LAYOUT: Final[Charts] = {
     "Does it learn?": {
-        "mean error on the benchmark (m)": "error/mean",
-        "noise floor: what noise alone makes of it (m)": "error/noise_floor",
-        "share of the last 50 goals reached": "goals/reached_share",
-    },
-    "Where is it competent? 0: goals are reached, -1: no better than resting. Each run has regions of its own": {
-        f"competence, {'everywhere (R)' if part == 'R' else f'region {part}'}": f"competence/{part}" for part in _PARTS
-    },
-    "Where does it make progress? Goals are drawn where interest is high": {
-        f"interest, {'everywhere (R)' if part == 'R' else f'region {part}'}": f"interest/{part}" for part in _PARTS
+        ("", "mean error on the benchmark (m)"): "error/mean",
+        ("repeats", "noise floor: what noise alone makes of it (m)"): "error/noise_floor",
+        ("goals", "share of the last 50 goals reached"): "goals/reached_share",
     },
     "What did it do, and its teacher?": {
-        **{f"share of movements: {regime}": f"regime/{regime}" for regime in ("global", "local", "imitate")},
-        "demonstrations so far": "teacher/demonstrations",
-        "imitations miss what was shown by (m)": "teacher/missed_by",
+        ("regions", "interest, everywhere: how fast competence changes"): "interest/R",
+        ("goals", "share of movements: searches for its own goals"): "regime/local",
+        ("imitates", "share of movements: imitations"): "regime/imitate",
+        ("teacher", "demonstrations so far"): "teacher/demonstrations",
+        ("imitates", "imitations miss what was shown by (m)"): "teacher/missed_by",
     },
 }
+ALL: Final = frozenset({"repeats", "goals", "regions", "teacher", "imitates"})
+MET: Final = 0.5  # share of the goals of a cell from which on a learner counts as competent there
 METRICS: Final = ("error/mean", "error/noise_floor", "competence/R", "goals/reached_share")  # that summarise a run
 _RECENT: Final = 50  # goals
-_MOST_CELLS: Final = 16
+MOST_PLACES: Final = 8  # that have charts of their own on the first page: 2 x 2 in the plane
 
 
 class Grid:
-    """``box`` cut into cells of equal size, at most 16: 4 x 4 in the plane.
+    """``box`` cut into cells of equal size, at ``most`` 16: 4 x 4 in the plane.
 
     ``names`` tell each cell's bounds, such as "x -1..-0.5, y 0..0.5".
     """
 
-    def __init__(self, box: Box) -> None:
+    def __init__(self, box: Box, most: int = 16) -> None:
         self.box = box
-        self.per_side = max(1, int(_MOST_CELLS ** (1 / max(1, box.dim)) + 1e-9))
+        self.per_side = max(1, int(most ** (1 / max(1, box.dim)) + 1e-9))
         axes = "xy" if box.dim == 2 else [f"outcome_{k}" for k in range(box.dim)]
         edges = np.linspace(box.low, box.high, self.per_side + 1).T
         bounds = [
@@ -106,18 +110,29 @@ class Grid:
         """The mean of each cell that is not empty, by its name."""
         return {self.names[k]: float(sums[k] / counts[k]) for k in np.flatnonzero(counts)}
 
+    def means_of(self, points: Array, values: Array) -> dict[str, float]:
+        """The mean of the ``values`` ``(n,)`` at ``points`` ``(n, dim)`` in each cell that has some, by its name."""
+        return self.means(*self.sums(points, values))
+
 
 class Curves:
     """Counts what happens in one run.
 
+    ``shares`` are those of the benchmark's goals that were met at the last evaluation, by cell of the ``grid``;
+    ``since`` is for each cell where half of them or more are met now the number of movements from which on this was so.
+
     Args:
         grid: the part of T that is cut into cells.
         tolerance: distance (m) at which a goal counts as reached.
+        near: distance (m) at which a goal of the benchmark counts as met.
         depth: regions have curves of their own down to this level of the tree: at most ``2 ** (depth + 1) - 1``.
     """
 
-    def __init__(self, grid: Box, *, tolerance: float = 0.02, depth: int = 3) -> None:
-        self.grid, self.tolerance, self.depth = Grid(grid), tolerance, depth
+    def __init__(self, grid: Box, *, tolerance: float = 0.02, near: float = 0.05, depth: int = 3) -> None:
+        self.grid, self.places = Grid(grid), Grid(grid, MOST_PLACES)
+        self.tolerance, self.near, self.depth = tolerance, near, depth
+        self.shares: dict[str, float] = {}
+        self.since: dict[str, int] = {}
         self._origins: dict[str, int] = {}  # since the last point
         self._imitated: list[float] = []  # m, since the last point
         self._demonstrations = 0
@@ -200,8 +215,18 @@ class Curves:
             "error/p90": float(np.quantile(errors, 0.9)),
             "error/noise_floor": noise_floor,
         }
-        means = self.grid.means(*self.grid.sums(goals, errors))
-        return values | {f"grid_error/{name}": mean for name, mean in means.items()}
+        met = (errors <= self.near).astype(np.float64)
+        values[f"met/{EVERYWHERE}"] = float(met.mean())
+        cut = {"grid_error": (self.grid, errors), "grid_met": (self.grid, met), "met": (self.places, met)}
+        for family, (grid, each) in cut.items():
+            values |= {f"{family}/{name}": mean for name, mean in grid.means_of(goals, each).items()}
+        return values
+
+    def evaluated(self, movements: int, values: Mapping[str, float]) -> None:
+        """Note where it is competent after these ``movements``, from the ``values`` of an evaluation by tag, also one
+        that an earlier part of the run has made."""
+        self.shares = {tag.partition("/")[2]: share for tag, share in values.items() if tag.startswith("grid_met/")}
+        self.since = {name: self.since.get(name, movements) for name, share in self.shares.items() if share >= MET}
 
     def _leaf(self, region: Region) -> _Leaf:
         return _Leaf(
@@ -225,6 +250,27 @@ class _Leaf(NamedTuple):
     reached: int
     volume: float
     cells: tuple[Array, Array]
+
+
+def layout_of(
+    places: Sequence[str], near: float, has: Collection[str] = ALL, more: Charts | None = None
+) -> dict[str, dict[str, str]]:
+    """The page of charts to begin with: category -> chart -> tag, as a regular expression.
+
+    Args:
+        places: those that have goals of the benchmark, by name.
+        near: distance (m) at which these count as met.
+        has: what the run has, of ``ALL``; charts that would stay empty are left out.
+        more: charts of your own.
+    """
+    met = {f"share of goals met {EVERYWHERE}": f"met/{EVERYWHERE}"}
+    if len(places) > 1:
+        met |= {f"share met at {name}": re.escape(f"met/{name}") for name in places}
+    charts = {
+        category: {chart: tag for (need, chart), tag in each.items() if not need or need in has}
+        for category, each in {**_LAYOUT, **(more or {})}.items()
+    }
+    return {COMPETENT.format(near=near): met, **{category: each for category, each in charts.items() if each}}
 
 
 def branches(regions: Sequence[Region], depth: int) -> dict[str, list[Region]]:

@@ -32,7 +32,7 @@ from tensorboard.plugins.hparams import api_pb2, plugin_data_pb2
 from tensorboard.plugins.hparams import metadata as hparams_metadata
 from tensorboard.summary.writer.record_writer import RecordWriter
 
-from sgimd_torch.board.scalars import LAYOUT, LEGEND, METRICS, Curves
+from sgimd_torch.board.scalars import LEGEND, METRICS, Curves, layout_of
 from sgimd_torch.goals.regions import Region
 from sgimd_torch.spaces import Array, Box, Episode
 
@@ -46,10 +46,12 @@ class Board:
         directory: of the run, made if missing.
         grid: the part of T that is cut into cells, the same for runs to be compared.
         tolerance: distance (m) at which a goal counts as reached.
+        near: distance (m) at which a goal of the benchmark counts as met.
         every: movements from one point of a curve to the next.
         depth: regions have curves of their own down to this level of the tree, 15 at most with 3.
         legend: a sentence for each tag that you add, or for the part of it before the slash.
-        layout: charts of them for the tab Custom Scalars, category -> chart -> tag, after those of ``LAYOUT``.
+        layout: the charts of the tab Custom Scalars, category -> chart -> tag, a regular expression; None for those of
+            ``layout_of``.
         replace: the run is replayed, and its event files are to be replaced by the first ``publish``.
 
     Raises:
@@ -63,6 +65,7 @@ class Board:
         grid: Box,
         *,
         tolerance: float = 0.02,
+        near: float = 0.05,
         every: int = 50,
         depth: int = 3,
         legend: Mapping[str, str] | None = None,
@@ -75,8 +78,8 @@ class Board:
             raise ValueError(f"{directory} holds the board of a run already; give this one another directory")
         self.every, self.movements = every, 0
         self.legend = {**LEGEND, "about": "What this run is, and how to read its board.", **(legend or {})}
-        self.layout = {**LAYOUT, **(layout or {})}
-        self.curves = Curves(grid, tolerance=tolerance, depth=depth)
+        self.curves = Curves(grid, tolerance=tolerance, near=near, depth=depth)
+        self.layout = layout_of(self.curves.places.names, near) if layout is None else layout
         self._explained: set[str] = set()
         self._file = _EventFile(Path(directory))
         if not replace:
@@ -109,7 +112,9 @@ class Board:
 
     def evaluation(self, goals: Array, errors: Array, noise_floor: float) -> None:
         """A point for the error: on ``goals`` ``(n, outcome_dim)``, of ``errors`` ``(n,)``, all in m."""
-        self.scalars(self.curves.of_evaluation(goals, errors, noise_floor))
+        values = self.curves.of_evaluation(goals, errors, noise_floor)
+        self.curves.evaluated(self.movements, values)
+        self.scalars(values)
 
     def scalars(self, values: Mapping[str, float]) -> None:
         """A point for each curve, by tag; those that are not finite are left out.
@@ -165,6 +170,9 @@ class Board:
             return False
         for wall_time, tensors in events:
             self._write(tensors, wall_time)
+            if "error/mean" in tensors:
+                numbers = {tag: tensor.float_val[0] for tag, tensor in tensors.items() if tensor.float_val}
+                self.curves.evaluated(self.movements, numbers)
         return bool(tags)
 
     def publish(self) -> None:

@@ -8,8 +8,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sgimd_torch.environments.protocol import check_movement, check_rng
+from sgimd_torch.environments.protocol import Sketch, check_movement, check_rng
 from sgimd_torch.spaces import Array, Box, check_count, check_vector, first_entry
+
+_STEP = 0.04  # s, of a recorded movement
+_STEPS = 26  # of it, from rest to its posture
 
 
 class PlanarArm:
@@ -69,11 +72,16 @@ class PlanarArm:
             TypeError: ``rng`` is not a Generator.
         """
         context, theta = check_movement(self, context, theta)
-        check_rng(rng)
-        # Also drawn without noise: the stream then goes on in the same way.
-        angles = self.angles(theta) + self.noise * rng.standard_normal(len(theta))
-        directions = np.cumsum(angles) + context.sum()  # an empty context sums to 0
-        return self.length / len(theta) * np.array([np.cos(directions).sum(), np.sin(directions).sum()])
+        return self._end(context, self._moved(theta, rng))
+
+    def record(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Sketch:
+        """As ``execute``, drawn: from the straight arm, ``rest``, all joints turn smoothly to their angles in 1 s."""
+        context, theta = check_movement(self, context, theta)
+        angles, times = self._moved(theta, rng), np.linspace(0, 1, _STEPS)[:, None]
+        directions = np.cumsum(times**2 * (3 - 2 * times) * angles, axis=1) + context.sum()
+        links = self.length / len(theta) * np.stack([np.cos(directions), np.sin(directions)], axis=2)
+        joints = np.concatenate([np.zeros((_STEPS, 1, 2)), np.cumsum(links, axis=1)], axis=1)
+        return Sketch(self._end(context, angles), _STEP, joints)
 
     def angles(self, theta: ArrayLike) -> Array:
         """``(..., n_joints)`` rad, the angle of each joint without noise; ``theta`` is ``(..., n_joints)``.
@@ -138,6 +146,16 @@ class PlanarArm:
         first = np.arctan2(goal[1], goal[0]) - context.sum() - (n - 1) / 2 * bend  # the chord halves the total turn
         angles = np.array([np.angle(np.exp(1j * first))] + [bend] * (n - 1))
         return self.policies.clip((angles / self._limits + 1) / 2)
+
+    def _moved(self, theta: Array, rng: np.random.Generator) -> Array:
+        """``(n_joints,)`` rad, the angles with their noise."""
+        check_rng(rng)
+        # Also drawn without noise: the stream then goes on in the same way.
+        return self.angles(theta) + self.noise * rng.standard_normal(len(theta))
+
+    def _end(self, context: Array, angles: Array) -> Array:
+        directions = np.cumsum(angles) + context.sum()  # an empty context sums to 0
+        return self.length / len(angles) * np.array([np.cos(directions).sum(), np.sin(directions).sum()])
 
     def _radius(self, bend: float) -> float:
         """How far the end is when all joints but the first have this bend: from the length down to 0 at a full turn."""

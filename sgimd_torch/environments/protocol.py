@@ -8,12 +8,13 @@ Section 2.1 of Nguyen & Oudeyer (2014): M(c, theta) = tau. An environment of you
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sgimd_torch.spaces import Array, Box
+from sgimd_torch.spaces import Array, Box, read_only
 
 
 class Environment(Protocol):
@@ -65,6 +66,56 @@ class BatchEnvironment(Environment, Protocol):
     def execute_many(self, contexts: Array, thetas: Array, rngs: Sequence[np.random.Generator]) -> Array:
         """``(n, outcome_dim)``, row i equal to ``execute(contexts[i], thetas[i], rngs[i])`` bit for bit."""
         ...
+
+
+class Recorded(Protocol):
+    """A movement that can be filmed: its ``outcome`` ``(outcome_dim,)``, and ``landed``, how long (s) it takes."""
+
+    @property
+    def outcome(self) -> Array:
+        """``(outcome_dim,)`` as ``execute`` gives it with an equal stream."""
+        ...
+
+    @property
+    def landed(self) -> float:
+        """s, when the outcome is reached."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Sketch:
+    """A movement as a drawing, which `sgimd film` shows: what ``record(context, theta, rng)`` gives, an optional method
+    of an environment.
+
+    Args:
+        outcome: ``(outcome_dim,)`` as ``execute`` gives it with an equal stream. Its first two dimensions are places in
+            the drawing; with one, y is 0.
+        step: s from one drawing to the next.
+        chains: ``(n_steps, n_points, 2)`` the robot as points that are joined by lines; one point is a ball. The last
+            point leaves a path.
+
+    Raises:
+        ValueError: other shapes, numbers that are not finite, or a step that is not above 0.
+    """
+
+    outcome: Array
+    step: float
+    chains: Array
+
+    def __post_init__(self) -> None:
+        for name, axes, wanted in (("outcome", 1, "(outcome_dim,)"), ("chains", 3, "(n_steps, n_points, 2)")):
+            value = np.asarray(getattr(self, name))
+            numbers = value.size > 0 and value.dtype.kind in "iuf" and np.isfinite(value).all()
+            if not numbers or value.ndim != axes or (name == "chains" and value.shape[2] != 2):
+                raise ValueError(f"{name} of a Sketch must be finite numbers {wanted}, got shape {value.shape}")
+            object.__setattr__(self, name, read_only(value.astype(np.float64)))
+        if not 0 < self.step < np.inf:
+            raise ValueError(f"step of a Sketch must be above 0 s, got {self.step}")
+
+    @property
+    def landed(self) -> float:
+        """How long (s) the movement takes."""
+        return self.step * (len(self.chains) - 1)
 
 
 class SimulationError(RuntimeError):

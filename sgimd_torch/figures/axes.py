@@ -6,8 +6,9 @@ Each function draws on the axes it is given.   mesh = ax.pcolormesh(x, y, z); co
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
+from typing import Any, Final
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import PatchCollection
@@ -18,13 +19,45 @@ from matplotlib.ticker import MaxNLocator
 from sgimd_torch.spaces import Array, Box
 
 GREY: Final = "0.45"
+LEGEND: Final[dict[str, Any]] = {
+    "loc": "lower center",
+    "bbox_to_anchor": (0.5, 1.0),  # above the axes
+    "ncols": 2,
+    "frameon": False,
+    "borderaxespad": 0.2,
+    "handletextpad": 0.2,
+}
+
+
+def limits(points: Array) -> Box:
+    """Where the points lie, far ones left out, in round numbers: so a single far point leaves a map its scale.
+
+    Far is, in a dimension, what lies farther from the middle half of the distinct points than 1.5 times its width
+    (Tukey's fence).
+
+    Args:
+        points: ``(n, dim)``, n >= 1, finite.
+    """
+    lower, upper = np.quantile(np.unique(points, axis=0), (0.25, 0.75), axis=0)
+    fence = 1.5 * (upper - lower)
+    near = np.where((points >= lower - fence) & (points <= upper + fence), points, np.nan)
+    low, high = np.nanmin(near, axis=0), np.nanmax(near, axis=0)
+    longest = float((high - low).max()) or float(np.abs(points).max()) or 1.0
+    step = np.array([rounded((side or longest) / 40) for side in (high - low).tolist()])
+    low, high = np.floor(low / step) * step, np.ceil(high / step) * step
+    return Box(low, np.where(high > low, high, low + step))
+
+
+def rounded(length: float) -> float:
+    """The next larger of 1, 2 and 5 times a power of ten."""
+    power = 10.0 ** np.floor(np.log10(length))
+    return float(power * next(k for k in (1, 2, 5, 10) if power * k >= length))
 
 
 def plane(ax: Axes, box: Box) -> None:
-    """Axes in metres, equal aspect, showing all of ``box``."""
-    ax.set(
-        xlim=(box.low[0], box.high[0]), ylim=(box.low[1], box.high[1]), aspect="equal", xlabel="x (m)", ylabel="y (m)"
-    )
+    """Axes in metres, equal aspect unless a side is much longer, showing all of ``box``."""
+    limits = {"xlim": (box.low[0], box.high[0]), "ylim": (box.low[1], box.high[1])}
+    ax.set(**limits, aspect="equal" if alike(box.sides) else "auto", xlabel="x (m)", ylabel="y (m)")
     ax.xaxis.set_major_locator(MaxNLocator(4))
     ax.yaxis.set_major_locator(MaxNLocator(4))
 
@@ -34,9 +67,12 @@ def water_plane(ax: Axes, box: Box, *, legend: bool = True) -> None:
     ax.plot(0, 0, "^", color="black", markeredgecolor="white", markersize=10, label="base of the arm")
     plane(ax, box)
     if legend:
-        ax.legend(
-            loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, frameon=False, borderaxespad=0.2, handletextpad=0.2
-        )
+        ax.legend(**LEGEND)
+
+
+def alike(sides: Array) -> bool:
+    """Whether two sides have about one scale, so that a picture need not distort them."""
+    return bool(np.max(sides) <= 8 * np.min(sides))
 
 
 def coloured_regions(

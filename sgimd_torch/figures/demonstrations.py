@@ -13,7 +13,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sgimd_torch.figures.axes import GREY
-from sgimd_torch.spaces import Array, Demonstration
+from sgimd_torch.figures.sections import sections
+from sgimd_torch.spaces import Array, Box, Demonstration
 
 RECORDED: Final = "#0072b2"
 PLAYED: Final = "#d55e00"
@@ -56,12 +57,13 @@ def curves(ax: Axes, shown: Sequence[Demonstration], played: Sequence[Array | No
 def outcomes(ax: Axes, shown: Sequence[Demonstration], places: Sequence[Array | None]) -> None:
     """Where the recordings say that they end, and where the simulated robot ends; the first two dimensions."""
     said = np.stack([each.outcome for each in shown])
-    flat = said if said.shape[1] > 1 else np.column_stack([said, np.zeros(len(said))])
+    section, *_ = sections(Box.cube(0, 1, said.shape[1]))
+    flat = section.points(said)
     for point, place in zip(flat, places, strict=True):
         if place is not None:
-            end = place if len(place) > 1 else np.append(place, 0.0)
+            end = section.points(place)
             ax.plot([point[0], end[0]], [point[1], end[1]], color=GREY, lw=0.8, zorder=1)
-            ax.plot(*end[:2], "x", color=PLAYED, markersize=5)
+            ax.plot(*end, "x", color=PLAYED, markersize=5)
     ax.plot(flat[:, 0], flat[:, 1], "o", color=RECORDED, markersize=4, label="recorded")
     ax.set(xlabel="outcome 0", ylabel="outcome 1" if said.shape[1] > 1 else "", title="said (o) and landed (x)")
     ax.set_aspect("equal", adjustable="datalim")

@@ -17,7 +17,8 @@ from matplotlib.colors import ListedColormap, LogNorm
 from matplotlib.ticker import LogLocator, NullLocator
 
 from sgimd_torch.catalogue import CATALOGUE
-from sgimd_torch.figures.axes import colour_bar, coloured_regions, note, water_plane
+from sgimd_torch.figures.axes import alike, colour_bar, coloured_regions, note
+from sgimd_torch.figures.sections import Section, in_the_plane
 from sgimd_torch.spaces import Array, Box
 
 COLOURS = {word: entry.colour for word, entry in CATALOGUE["algorithm"].items()}
@@ -33,37 +34,50 @@ def landing_points(
     side: float = 0.05,
     most: float | None = None,
     colour_bar: bool = True,
+    section: Section | None = None,
 ) -> QuadMesh:
     """Where the float landed, and how often: a histogram on a logarithmic scale, empty tiles white.
 
     Args:
         ax: drawn on, and given a colour bar unless ``colour_bar`` is False.
-        outcomes: ``(n, 2)`` m; how many lie outside ``box`` is written in the corner.
-        box: T, the part of the plane that is shown.
-        demonstrated: ``(n, 2)`` m, drawn as crosses.
+        outcomes: ``(n, outcome_dim)`` m; those outside ``box`` are marked at its edge, with their number.
+        box: T, or another part of it, which is shown.
+        demonstrated: ``(n, outcome_dim)`` m, drawn as crosses, those that were demonstrated several times once.
         side: of a tile, m.
         most: the count at the end of the colour scale, so that two histograms can share it; None for their own.
+        section: which dimensions to show; needed unless T has two.
 
     Returns:
         The tiles; their array holds the counts, ``(n_y, n_x)``, masked where 0.
 
     Raises:
-        ValueError: ``box`` is not in the plane.
+        ValueError: ``box`` is not in the plane, and there is no ``section``.
     """
-    mesh = histogram(ax, outcomes, box, side=side, most=most)
+    section = in_the_plane(box) if section is None else section
+    mesh = histogram(ax, section.points(outcomes), section.box, side=section.tile(side), most=most)
     if colour_bar:
-        count_bar([ax], mesh, f"movements on a tile of {100 * side:g} cm")
+        metric = box.dim == 2 and alike(box.sides)
+        count_bar([ax], mesh, f"movements on a tile of {100 * side:.3g} cm" if metric else "movements on a tile")
     if demonstrated is not None:
-        label = f"{len(demonstrated)} demonstrated outcomes"
-        ax.plot(*demonstrated.T, "x", color=COLOURS["sgim-d"], markersize=5, markeredgewidth=1.3, label=label)
-    outside = len(outcomes) - int(box.contains(outcomes).sum())
-    if outside:
-        note(ax, f"{outside} of {len(outcomes)} landed outside")
-    water_plane(ax, box)
+        different = each_once(demonstrated)
+        crosses, label = section.points(different), f"{len(different)} demonstrated outcomes"
+        ax.plot(*crosses.T, "x", color=COLOURS["sgim-d"], markersize=5, markeredgewidth=1.3, label=label)
+    outside = outcomes[~box.contains(outcomes)]
+    if len(outside):
+        x, y = section.points(box.clip(outside)).T
+        ax.scatter(x, y, marker="s", color="0.25", s=9, alpha=0.5, linewidths=0, clip_on=False)
+        note(ax, f"{len(outside)} of {len(outcomes)} landed outside: squares at the edge")
+    section.frame(ax)
     return mesh
 
 
-def histogram(ax: Axes, points: Array, box: Box, *, side: float, most: float | None = None) -> QuadMesh:
+def each_once(demonstrated: Array) -> Array:
+    """``(m, dim)`` the demonstrated outcomes: of those of all demonstrations ``(n, dim)``, in order, each once."""
+    _, first = np.unique(demonstrated, axis=0, return_index=True)
+    return demonstrated[np.sort(first)]
+
+
+def histogram(ax: Axes, points: Array, box: Box, *, side: float | Array, most: float | None = None) -> QuadMesh:
     """How many of the ``points`` ``(n, 2)`` m lie on each tile, nothing else; arguments and result of
     ``landing_points``."""
     tiles = np.ma.masked_equal(tile_counts(points, box, side), 0)
@@ -82,7 +96,7 @@ def count_bar(axes: Sequence[Axes], mesh: QuadMesh, label: str) -> Colorbar:
     return bar
 
 
-def tile_counts(outcomes: Array, box: Box, side: float = 0.05) -> Array:
+def tile_counts(outcomes: Array, box: Box, side: float | Array = 0.05) -> Array:
     """``(n_y, n_x)`` how many of the ``outcomes`` ``(n, 2)`` lie on each tile of the plane.
 
     Raises:
@@ -93,56 +107,98 @@ def tile_counts(outcomes: Array, box: Box, side: float = 0.05) -> Array:
 
 
 def interest_map(
-    ax: Axes, lows: Array, highs: Array, interests: Array, *, goals: Array | None = None
+    ax: Axes,
+    lows: Array,
+    highs: Array,
+    interests: Array,
+    *,
+    goals: Array | None = None,
+    section: Section | None = None,
 ) -> PatchCollection:
     """The regions of the interest map, coloured by interest, eq. (3); recent goals as points.
 
     Args:
         ax: drawn on, and given a colour bar.
-        lows, highs: ``(n_regions, 2)`` m, the corners of the regions.
+        lows, highs: ``(n_regions, context_dim + outcome_dim)`` m, the corners of the regions.
         interests: ``(n_regions,)``.
-        goals: ``(n, 2)`` m.
+        goals: ``(n, outcome_dim)`` m.
+        section: which dimensions to show; needed unless regions are of the plane.
 
     Returns:
-        One rectangle for each region, in their order; their array holds the interests.
+        One rectangle for each region that is shown, in their order; their array holds the interests.
 
     Raises:
-        ValueError: regions not in the plane, such as those that include contexts, or numbers that do not match.
+        ValueError: without a ``section``, regions not in the plane, such as those that include contexts, or numbers
+            that do not match.
     """
-    drawn = coloured_regions(ax, lows, highs, interests, "Oranges", (0, max(float(interests.max()), 1e-6)))
+    most = max(float(interests.max()), 1e-6)
+    drawn = regions_in(ax, lows, highs, interests, "Oranges", (0, most), section)
     colour_bar([ax], drawn, "interest: recent change of competence")
     if goals is not None:
-        ax.plot(*goals.T, ".", color="#0072b2", markersize=4, label=f"last {len(goals)} goals")
-    water_plane(ax, Box(lows.min(axis=0), highs.max(axis=0)))
+        shown = goals if section is None else section.points(goals)
+        ax.plot(*shown.T, ".", color="#0072b2", markersize=4, label=f"last {len(goals)} goals")
+    _frame(ax, lows, highs, section)
     return drawn
 
 
-def competence_map(ax: Axes, lows: Array, highs: Array, competences: Array, *, worst: float = -1.0) -> PatchCollection:
+def competence_map(
+    ax: Axes,
+    lows: Array,
+    highs: Array,
+    competences: Array,
+    *,
+    worst: float = -1.0,
+    section: Section | None = None,
+) -> PatchCollection:
     """Like ``interest_map``, but coloured by mean competence, eqs. (2) and (7): 0 met, -1 no better than rest.
 
     Args:
-        ax, lows, highs: as for ``interest_map``.
+        ax, lows, highs, section: as for ``interest_map``.
         competences: ``(n_regions,)``; NaN, a region without goals, is left white.
         worst: the competence at the end of the colour scale.
     """
-    drawn = coloured_regions(ax, lows, highs, np.ma.masked_invalid(competences), "viridis", (worst, 0.0))
+    drawn = regions_in(ax, lows, highs, np.ma.masked_invalid(competences), "viridis", (worst, 0.0), section)
     colour_bar([ax], drawn, "mean competence: 0 met, -1 not at all")
-    water_plane(ax, Box(lows.min(axis=0), highs.max(axis=0)))
+    _frame(ax, lows, highs, section)
     return drawn
 
 
+def regions_in(
+    ax: Axes,
+    lows: Array,
+    highs: Array,
+    values: Array,
+    colours: str,
+    limits: tuple[float, float],
+    section: Section | None,
+) -> PatchCollection:
+    """The regions that a ``section`` meets, None for all of the plane, coloured; nothing else. Arguments, result and
+    errors of ``coloured_regions``."""
+    if section is not None:
+        lows, highs, met = section.cut(lows, highs)
+        values = values[met]
+    return coloured_regions(ax, lows, highs, values, colours, limits)
+
+
 def map_after(regions: Mapping[str, np.ndarray], movements: int) -> tuple[Array, Array, Array]:
-    """Corners ``(n_regions, 2)`` m, twice, and interest ``(n_regions,)``: one map of the columns of regions.csv."""
+    """Corners ``(n_regions, context_dim + outcome_dim)`` m, twice, and interest ``(n_regions,)``: one map of the
+    columns of regions.csv."""
     now = regions["movements"] == movements
-    lows, highs = (np.stack([regions[f"{side}_{k}"][now] for k in (0, 1)], axis=1) for side in ("low", "high"))
+    dims = range(sum(name.startswith("low_") for name in regions))
+    lows, highs = (np.stack([regions[f"{side}_{k}"][now] for k in dims], axis=1) for side in ("low", "high"))
     return lows, highs, regions["interest"][now]
 
 
-def _edges(box: Box, side: float) -> tuple[Array, Array]:
+def _frame(ax: Axes, lows: Array, highs: Array, section: Section | None) -> None:
+    section = in_the_plane(Box(lows.min(axis=0), highs.max(axis=0))) if section is None else section
+    section.frame_cut(ax, lows, highs)
+
+
+def _edges(box: Box, side: float | Array) -> tuple[Array, Array]:
     if box.dim != 2:
         raise ValueError(f"the water plane has 2 dimensions, got a box of {box.dim}")
     x, y = (
-        np.linspace(low, high, max(1, round((high - low) / side)) + 1)
-        for low, high in zip(box.low, box.high, strict=True)
+        np.linspace(low, high, max(1, round((high - low) / each)) + 1)
+        for low, high, each in zip(box.low, box.high, np.broadcast_to(side, 2), strict=True)
     )
     return x, y

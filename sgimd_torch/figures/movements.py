@@ -13,8 +13,9 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PatchCollection
 from matplotlib.lines import Line2D
 
-from sgimd_torch.figures.axes import colour_bar, coloured_regions, water_plane
-from sgimd_torch.figures.learning import map_after
+from sgimd_torch.figures.axes import colour_bar
+from sgimd_torch.figures.learning import map_after, regions_in
+from sgimd_torch.figures.sections import Section, in_the_plane
 from sgimd_torch.spaces import Box, Demonstration
 
 _DEMONSTRATED = "0.55"
@@ -57,12 +58,15 @@ def trajectories(
     return drawn
 
 
-def interest_over_time(axes: Iterable[Axes], regions: Mapping[str, np.ndarray]) -> list[PatchCollection]:
+def interest_over_time(
+    axes: Iterable[Axes], regions: Mapping[str, np.ndarray], section: Section | None = None
+) -> list[PatchCollection]:
     """The interest map as it splits: one map on each axis, evenly picked from the first to the last, on one scale.
 
     Args:
         axes: at least one; the last gets the colour bar for all, those without a map are hidden.
         regions: the columns of a run's regions.csv, ``movements``, ``low_0`` to ``high_1`` (m) and ``interest``.
+        section: which dimensions to show; needed unless regions are of the plane.
 
     Returns:
         The rectangles of each map.
@@ -71,15 +75,16 @@ def interest_over_time(axes: Iterable[Axes], regions: Mapping[str, np.ndarray]) 
         ValueError: there is no map, or its regions are not in the plane.
     """
     axes, moments = list(axes), np.unique(regions["movements"])
-    if not len(moments) or "low_2" in regions:
+    if not len(moments) or (section is None and "low_2" in regions):
         raise ValueError("needs at least one interest map of the plane; was the run never evaluated?")
     picked = moments[np.unique(np.linspace(len(moments) - 1, 0, len(axes)).round().astype(int))]
     most = max(float(regions["interest"][np.isin(regions["movements"], picked)].max()), 1e-6)
     drawn = []
     for ax, movements in zip(axes, picked, strict=False):
         lows, highs, interests = map_after(regions, movements)
-        drawn.append(coloured_regions(ax, lows, highs, interests, "Oranges", (0.0, most)))
-        water_plane(ax, Box(lows.min(axis=0), highs.max(axis=0)), legend=False)
+        drawn.append(regions_in(ax, lows, highs, interests, "Oranges", (0.0, most), section))
+        shown = in_the_plane(Box(lows.min(axis=0), highs.max(axis=0))) if section is None else section
+        shown.frame_cut(ax, lows, highs, legend=False)
         ax.set_title(f"after {movements} movements: {len(lows)} region{'s' * (len(lows) > 1)}", fontsize="medium")
     for ax in axes[len(drawn) :]:
         ax.set_visible(False)

@@ -37,7 +37,7 @@ class SeedCurves(NamedTuple):
 
 class Difference(NamedTuple):
     """A variant against the learner that it varies: ``seeds`` ``(n_seeds,)`` paired differences of error (m), their
-    ``centre`` and its interval from ``low`` to ``high`` (m)."""
+    ``centre`` and its interval from ``low`` to ``high`` (m), NaN where there are too few seeds for one."""
 
     label: str
     seeds: Array
@@ -120,14 +120,18 @@ def goal_distances(ax: Axes, runs: Mapping[str, Sequence[Array]], *, reach: floa
 def forest(ax: Axes, differences: Sequence[Difference], *, reference: str) -> list[Line2D]:
     """One row for each variant, the best on top: error (m) minus the reference's, with interval.
 
-    A filled mark: the interval excludes 0. Small points behind are seeds; their number is next to the name.
+    A filled mark: the interval excludes 0. Small ticks behind are seeds; their number is next to the name. A row
+    without an interval has its seeds as points and no mark.
 
     Returns:
-        The marks of the centres, from the top.
+        The marks of the centres, from the top; of a row without an interval its points.
     """
     ordered = sorted(differences, key=lambda row: row.centre)
     marks = []
     for height, row in enumerate(ordered):
+        if np.isnan(row.low):
+            marks += ax.plot(row.seeds, np.full(len(row.seeds), height), "o", color=GREY, markersize=4.5)
+            continue
         certain = row.low > 0 or row.high < 0
         ax.plot(row.seeds, np.full(len(row.seeds), height), "|", color=GREY, markersize=7, alpha=0.6, zorder=1)
         ax.plot([row.low, row.high], [height, height], color="black", linewidth=1.8, solid_capstyle="butt")

@@ -13,6 +13,7 @@ from typing import Final
 
 import torch
 
+from sgimd_torch.forward_model.diagnostics import TRUSTED_UP_TO
 from sgimd_torch.forward_model.model import ForwardModel
 from sgimd_torch.spaces import Array, Box
 
@@ -45,7 +46,7 @@ class Trust:
     share: float = 0.1
     doubt: float = 0.06
     caution: float = 10.0
-    error: float = 0.25
+    error: float = TRUSTED_UP_TO
     anchors: bool = True
 
     def __post_init__(self) -> None:

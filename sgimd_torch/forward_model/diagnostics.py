@@ -16,6 +16,7 @@ from scipy.special import gammaincinv
 from sgimd_torch.spaces import Array, Box, check_count, check_vector, first_entry
 
 LEVELS: Final = (0.5, 0.8, 0.95)
+TRUSTED_UP_TO: Final = 0.25  # relative error (`ForwardModel.relative_error`); with a larger one a model is not asked
 _NOT_REFINING: Final = ("imitate", "global")  # movements with a goal that do not start from an estimate for it
 
 

@@ -86,6 +86,18 @@ class LocalProcess:
         error, theta = min(candidates, key=lambda candidate: candidate[0])
         return estimate._replace(theta=theta) if error < _CLEARLY * exemplars[0] else estimate
 
+    def predict(self, context: Array, theta: Array) -> Array | None:
+        """``(outcome_dim,)`` what ``theta`` should lead to, judging by the movements most like it; None while there are
+        too few of them, or all had the same outcome."""
+        self._catch_up()
+        if self._kernel is None:
+            return None
+        here = self._in_lengths(context, theta[None])
+        rows = self._inputs.nearest(here, min(_LEARNT, len(self.memory)))[0]
+        process = Process(self._inputs.keys.rows[rows], self.memory.outcomes[rows], self._kernel)
+        expected: Array = process.predict(here)[0][0]
+        return expected
+
     def _descend(
         self, process: Process, context: Array, goal: Array, doubt: float, theta: Array
     ) -> tuple[float, Array]:

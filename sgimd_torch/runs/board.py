@@ -9,10 +9,11 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import Field, fields
-from typing import TYPE_CHECKING, Any, Final, Self
+from typing import Any, Final, Self
 
 import numpy as np
 
+from sgimd_torch.board.scalars import EVERYWHERE, MOST_PLACES, Grid, layout_of
 from sgimd_torch.evaluation import Evaluation
 from sgimd_torch.runs import model_record as run_model
 from sgimd_torch.runs.build import RunParts
@@ -21,13 +22,12 @@ from sgimd_torch.runs.config import OWN, having
 from sgimd_torch.runs.directory import RunDirectory
 from sgimd_torch.spaces import Array, Box, Episode
 
-if TYPE_CHECKING:
-    pass
-
 GOALS: Final = 100  # the last ones are drawn
+OF_EVALUATIONS: Final = ("error", "answers", "grid_error", "grid_met", "met")  # families of tags
 LEGEND: Final = {
     "time": "Seconds spent so far: on physics, by the learner and on evaluations.",
     "answers": "error/mean (m) if another inverse model answers, such as linear in all runs: compare learners by it.",
+    "competent/since": "Where half of the benchmark's goals are met, and since when; elsewhere the share now.",
     "map/competence": "The regions, named like the curves, coloured by the mean competence of the goals they remember.",
     "map/interest": "The regions, coloured by interest, and the last goals that the learner chose.",
     "map/landed": "Where movements have landed so far, and what was demonstrated.",
@@ -55,10 +55,17 @@ class RunBoard:
         self._timed = False  # earlier event files hold times
         tolerance = getattr(parts.learner.autonomous, "tolerance", 0.02)
         cells = cells_of(parts.environment.outcomes, parts.benchmark.goals)
-        legend, layout = LEGEND, None
-        if parts.model is not None:
-            legend, layout = {**LEGEND, **run_model.LEGEND}, run_model.LAYOUT
-        self._board = Board(directory.path, cells, tolerance=tolerance, legend=legend, layout=layout, replace=True)
+        near = parts.benchmark.side / 2
+        legend, charts = ({}, {}) if parts.model is None else (run_model.LEGEND, run_model.LAYOUT)
+        self._board = Board(
+            directory.path,
+            cells,
+            tolerance=tolerance,
+            near=near,
+            legend={**LEGEND, **legend},
+            layout=layout_of(_places(cells, parts.benchmark.goals), near, _has(parts), charts),
+            replace=True,
+        )
         settings = {field.name: _plain(field, getattr(parts.config, field.name)) for field in fields(parts.config)}
         self._board.settings(settings, first=having("leads"))
 
@@ -93,10 +100,12 @@ class RunBoard:
         It is on disk when this returns."""
         board, found = self._board, answers[OWN]
         board.scalars({f"answers/{answer}": each.mean_error for answer, each in answers.items() if answer != OWN})
+        values = board.curves.of_evaluation(self._parts.benchmark.goals, found.errors, found.noise_floor)
+        board.curves.evaluated(board.movements, values)
         # The error comes last: where an event file holds it, it holds all of this evaluation, see recall_evaluation.
         if self._draws:
             self._draw(found)
-        board.evaluation(self._parts.benchmark.goals, found.errors, found.noise_floor)
+        board.scalars(values)
         board.flush()
 
     def recall_evaluation(self) -> bool:
@@ -106,10 +115,11 @@ class RunBoard:
             Whether they hold all of it; if not, it has to be evaluated again.
         """
         board = self._board
+        needs = ("error/mean", f"met/{EVERYWHERE}")
         if not self._draws:
-            return board.recall("error", "answers", "grid_error", needs=("error/mean",))
-        picture = "about/regions" if self._parts.regions else "map/error" if self._in_the_plane else "error/mean"
-        whole = board.recall("error", "answers", "grid_error", "map", "about", needs=("error/mean", picture))
+            return board.recall(*OF_EVALUATIONS, needs=needs)
+        last = "about/regions" if self._parts.regions else "map/error"
+        whole = board.recall(*OF_EVALUATIONS, "competent", "map", "about", needs=(*needs, last))
         if whole:
             self._drawn_at = board.movements
         return whole
@@ -132,27 +142,25 @@ class RunBoard:
         doubled, and at the end."""
         return self._board.movements >= 2 * self._drawn_at or self._board.movements == self._parts.config.movements
 
-    @property
-    def _in_the_plane(self) -> bool:
-        return self._parts.environment.outcomes.dim == 2
-
     def _draw(self, found: Evaluation) -> None:
         from sgimd_torch.board.pictures import draw, where  # loaded only when there is a board
 
         board, space, regions = self._board, self._parts.environment.outcomes, self._parts.regions
         self._drawn_at = board.movements
-        if self._in_the_plane:
-            pictures = draw(
-                regions,
-                space,
-                outcomes=self._parts.learner.memory.outcomes,
-                goals=np.array(self._goals).reshape(-1, space.dim),
-                demonstrated=np.array(self._demonstrated).reshape(-1, space.dim),
-                benchmark=self._parts.benchmark.goals,
-                errors=found.errors,
-            )
-            for name, png in pictures.items():
-                board.image(f"map/{name}", png)
+        pictures = draw(
+            regions,
+            space,
+            outcomes=self._parts.learner.memory.outcomes,
+            goals=np.array(self._goals).reshape(-1, space.dim),
+            demonstrated=np.array(self._demonstrated).reshape(-1, space.dim),
+            benchmark=self._parts.benchmark.goals,
+            errors=found.errors,
+            cells=board.curves.grid,
+            shares=board.curves.shares,
+            since=board.curves.since,
+        )
+        for name, png in pictures.items():
+            board.image(name, png)
         if regions:
             board.text("about/regions", where(regions))
 
@@ -167,6 +175,23 @@ def cells_of(space: Box, goals: Array) -> Box:
     low = space.clip(np.floor(goals.min(axis=0) / step) * step + 0.0)  # no -0 in the names of cells
     high = space.clip(np.ceil(goals.max(axis=0) / step) * step + 0.0)
     return Box(np.where(low < high, low, space.low), np.where(low < high, high, space.high))
+
+
+def _places(cells: Box, goals: Array) -> list[str]:
+    """The places on the first page that have goals of the benchmark."""
+    return list(Grid(cells, MOST_PLACES).means_of(goals, np.ones(len(goals))))
+
+
+def _has(parts: RunParts) -> set[str]:
+    """What the run has that a chart of the first page needs."""
+    found = {
+        "repeats": parts.config.repeats > 0,
+        "goals": getattr(parts.learner.autonomous, "goals", None) is not None,
+        "regions": len(parts.regions) > 0,
+        "teacher": parts.teacher is not None,
+        "imitates": parts.teacher is not None and "epsilon" in parts.config.used,
+    }
+    return {name for name, there in found.items() if there}
 
 
 def _plain(field: Field[Any], value: object) -> bool | float | str:

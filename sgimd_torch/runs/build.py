@@ -10,8 +10,10 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
+import numpy as np
+
 from sgimd_torch.catalogue import CATALOGUE, SHARED, checked, find
-from sgimd_torch.environments.protocol import Environment
+from sgimd_torch.environments.protocol import Environment, Recorded
 from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.goals.regions import Region
 from sgimd_torch.learner import Learner
@@ -32,7 +34,8 @@ class RunParts:
     """What a run needs. ``config`` is what it was made from. ``answers`` are the inverses to evaluate by, the run's own
     first; they read the learner's memory. ``model`` is refreshed after each movement; it and its ``trust`` are None for
     a run without a model. ``teacher`` is None, and ``demonstrations`` are empty, for a learner that learns alone.
-    ``data`` holds checksums of the files that were read, ``notes`` messages for the user."""
+    ``data`` holds checksums of the files that were read, ``notes`` messages for the user. ``record`` gives a movement
+    to be filmed, None if the task has no picture of its own."""
 
     config: Config
     environment: Environment
@@ -45,6 +48,7 @@ class RunParts:
     model: ForwardModel | None
     trust: Trust | None
     notes: Sequence[str] = ()
+    record: Callable[[Array, Array, np.random.Generator], Recorded] | None = None
 
     @property
     def inverse(self) -> Callable[[Array, Array], Estimate]:
@@ -75,8 +79,11 @@ def build(config: Config) -> RunParts:
         teacher = parts["teacher"](demonstrations, stream(config.seed, "teacher"))
     learner = parts["algorithm"](task.environment, config.seed)
     words = {answer: config.inverse if answer == OWN else answer for answer in config.answered}
+    if config.entry("algorithm").answers and config.inverse == Config.inverse:
+        words[OWN] = OWN
     inverses = {
-        word: parts.maker("inverse", word, learning=False)(learner.memory) for word in dict.fromkeys(words.values())
+        word: learner.inverse if word == OWN else parts.maker("inverse", word, learning=False)(learner.memory)
+        for word in dict.fromkeys(words.values())
     }
     return RunParts(
         config=config,
@@ -90,6 +97,7 @@ def build(config: Config) -> RunParts:
         model=parts["model"] if "model" in parts.used else None,
         trust=parts["trust"] if "model" in parts.used else None,
         notes=[*config.without_effect, *notes],
+        record=task.picture,
     )
 
 

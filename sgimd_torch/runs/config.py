@@ -151,7 +151,10 @@ class Config:
         before=-0.5,
     )
     inverse: str = option(
-        "linear", LEARNER, "Which movement is inferred for a goal, when learning and in evaluations.", leads=True
+        "linear",
+        LEARNER,
+        "Which movement is inferred for a goal, when learning and in evaluations; practice has one of its own.",
+        leads=True,
     )
     members: int = option(3, MODEL, "Number of networks.", least=1, most=100, slip="5 are many", before=3)
     noise_heads: bool = option(True, MODEL, "Whether its noise depends on the movement.", before=True)
@@ -303,6 +306,12 @@ class Config:
         entries = [*SHARED.values(), *(entry for entries in CATALOGUE.values() for entry in entries.values())]
         named = {each for entry in entries for each in entry.options}
         return (used | {each.name for each in fields(self)} - named) - ignored
+
+    @property
+    def own(self) -> list[str]:
+        """The things of a user's own in this run, ``package.module:attribute``."""
+        used = [getattr(self, name) for name in CATALOGUE if name in self.used]
+        return sorted({word for word in (*used, *self.answered) if ":" in word})
 
     @property
     def uses_model(self) -> bool:

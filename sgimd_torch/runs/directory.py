@@ -10,20 +10,25 @@ import importlib.metadata
 import os
 import platform
 import subprocess
+from collections.abc import Mapping
 from itertools import count
 from pathlib import Path
 from typing import Any, Final, Self
 
 import sgimd_torch
-from sgimd_torch.files import lock, make_folder, write_bytes, write_json
+from sgimd_torch.catalogue import source
+from sgimd_torch.files import checksum, lock, make_folder, write_bytes, write_json
 from sgimd_torch.runs.build import RunParts
-from sgimd_torch.runs.config import before_there_was_a_choice, having, plain
+from sgimd_torch.runs.config import Config, before_there_was_a_choice, having, plain
 from sgimd_torch.runs.evaluations import Evaluations
 from sgimd_torch.runs.log import Columns, RunError, read_json
 
+_SOURCE: Final = "source of "  # in versions.json, before the word that names a thing of a user's own
 _UNFINISHED = ("lock", "versions.json")  # what a run killed before its config.json may have left, besides *.part
 # Files count by their content, of which a checksum is recorded; a benchmark may be another one when a run is resumed.
 MAY_CHANGE: Final = (*having("on_resume"), "benchmark_crc32")
+LIBRARIES: Final = {"numpy": "numpy", "scipy": "scipy", "faiss": "faiss-cpu", "mujoco": "mujoco"}
+FORWARD: Final = ("torch", "lightning", "safetensors")  # of runs with a forward model
 EVALUATION_SETTINGS: Final = (*having("evaluates"), "benchmark_crc32")  # all evaluations of a run share these
 
 
@@ -58,7 +63,7 @@ class RunDirectory:
         self.notes: list[str] = []
         self.summary: dict[str, Any] = {}
         self._settings: dict[str, Any] = plain({**vars(config), **parts.data})
-        self._versions = versions()
+        self._versions = {**versions(forward=parts.model is not None), **sources(config)}
         _refuse_foreign(path)
         make_folder(path)
         try:
@@ -75,7 +80,8 @@ class RunDirectory:
             self._copy = self._read_log(accept_loss)
             if len(self.lines) > config.movements:
                 raise RunError(f"{path} has {len(self.lines)} movements already, {config.movements} were asked for")
-            self.evaluations = Evaluations(path, len(parts.regions[0].low) if parts.regions else None, self.notes)
+            region_dims = len(parts.regions[0].low) if parts.regions else None
+            self.evaluations = Evaluations(path, robot.contexts, region_dims, self.notes)
             alike = before is not None and all(before.get(name) == self._settings[name] for name in EVALUATION_SETTINGS)
             kept = [n for n in config.evaluations if alike and n <= len(self.lines)]
             self.evaluations.keep(kept, config.answered)
@@ -136,10 +142,11 @@ class RunDirectory:
         earlier = old.pop("before", [])
         if not isinstance(earlier, list):
             earlier = []
-        differ = [name for name, now in self._versions.items() if old.get(name) != now]
+        unknown = {name: now for name, now in self._versions.items() if name in FORWARD}  # earlier versions left it out
+        differ = [name for name, now in self._versions.items() if {**unknown, **old}.get(name) != now]
         if old and differ:
             changes = ", ".join(f"{name} {old.get(name)} -> {self._versions[name]}" for name in differ)
-            self.notes.append(f"resumed with other versions: {changes}")
+            self.notes += [f"resumed with other versions: {changes}", *changed_sources(old, self._versions)]
             earlier = [*earlier, old]
         if earlier:
             self._versions["before"] = earlier
@@ -198,9 +205,42 @@ def _refuse_foreign(path: Path) -> None:
         raise RunError(f"{path} holds {', '.join(foreign[:3])} but no run (no config.json); choose another --out")
 
 
-def versions() -> dict[str, Any]:
-    """What runs here; ``commit`` is None outside a git repository and ends in "-dirty" when files were changed."""
-    packages = {"numpy": "numpy", "scipy": "scipy", "faiss": "faiss-cpu", "mujoco": "mujoco"}
+def sources(config: Config) -> dict[str, str]:
+    """The file of each thing of a user's own in a run, and its checksum, such as "toss.py, crc32 8f0a1b2c"."""
+    found = {}
+    for word in config.own:
+        if (file := source(word)) is not None:
+            depth = word.partition(":")[0].count(".") + 1 + (file.stem == "__init__")
+            found[f"{_SOURCE}{word}"] = f"{Path(*file.parts[-depth:]).as_posix()}, crc32 {checksum(file)}"
+    return found
+
+
+def stale(config: Config) -> list[str]:
+    """The same notes for a run on disk; none if what made it is as it was, or cannot be read."""
+    try:
+        before: dict[str, Any] = read_json(config.directory / "versions.json", missing={})
+    except RunError:  # the run itself says so when it is resumed
+        return []
+    return changed_sources(before, sources(config))
+
+
+def changed_sources(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
+    """A note for each file of a user's own that is another one than ``before``, of two versions.json."""
+    changed = {name: str(was) for name, was in before.items() if name.startswith(_SOURCE) and now.get(name, was) != was}
+    return [
+        f"{was.partition(',')[0]} has changed since this run was made ({was} -> {now[name]}): what is recorded was "
+        f"made by the earlier {name.removeprefix(_SOURCE)}, only new movements and evaluations are by this one"
+        for name, was in changed.items()
+    ]
+
+
+def versions(*, forward: bool) -> dict[str, Any]:
+    """What runs here; ``commit`` is None outside a git repository and ends in "-dirty" when files were changed.
+
+    Args:
+        forward: also of the libraries of a forward model, which a run without one does not need.
+    """
+    packages = LIBRARIES | (dict(zip(FORWARD, FORWARD, strict=True)) if forward else {})
     here = str(Path(__file__).parent)
     describe = ["git", "-C", here, "describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"]
     try:

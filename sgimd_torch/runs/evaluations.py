@@ -1,4 +1,5 @@
-"""The files that evaluations write: evaluation.csv, and regions.csv, the regions of the goal model at each of them."""
+"""The files that evaluations write: evaluation.csv; by_context.csv, where there are contexts; and regions.csv, the
+regions of the goal model at each of them."""
 
 from __future__ import annotations
 
@@ -8,9 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from sgimd_torch.evaluation import Evaluation
+from sgimd_torch.evaluation import PARTS, Evaluation
 from sgimd_torch.goals.regions import Region
 from sgimd_torch.runs.tables import EVALUATION, Rows, Table, numbers, small_table
+from sgimd_torch.spaces import Box
 
 
 class Evaluations:
@@ -18,12 +20,16 @@ class Evaluations:
 
     Args:
         directory: of the run.
+        contexts: C.
         region_dims: dimensions of C x T, where the goal model has regions; None where it has none.
         notes: gets lines on what was dropped.
     """
 
-    def __init__(self, directory: Path, region_dims: int | None, notes: list[str]) -> None:
+    def __init__(self, directory: Path, contexts: Box, region_dims: int | None, notes: list[str]) -> None:
+        self._contexts = contexts
         tables = [small_table(directory / "evaluation.csv", 0)]
+        if contexts.dim:
+            tables.append(small_table(directory / "by_context.csv", 0))
         if region_dims is not None:
             tables.append(small_table(directory / "regions.csv", region_dims))
         self._rows: dict[Table, dict[int, Rows]] = {}  # by the number of movements before the evaluation
@@ -48,9 +54,12 @@ class Evaluations:
         return {name: float(field) for name, field in row.items() if name != "answer"}
 
     def keep(self, movements: Iterable[int], answers: Sequence[str]) -> None:
-        """Keep only those after these numbers of ``movements`` that have these ``answers``."""
-        evaluated, *_ = self._rows.values()
+        """Keep only those after these numbers of ``movements`` that have these ``answers``, in all parts of C."""
+        evaluated, *others = self._rows.values()
         complete = {number for number, rows in evaluated.items() if [row[1] for row in rows] == [*answers]}
+        if self._contexts.dim:
+            n_parts = len(answers) * PARTS * self._contexts.dim
+            complete = {number for number in complete if len(others[0].get(number, ())) == n_parts}
         wanted = {number for number in movements if number in self and number in complete}
         for table, rows in self._rows.items():
             self._rows[table] = {number: rows[number] for number in wanted}
@@ -70,9 +79,15 @@ class Evaluations:
             near: distance (m) at which a goal counts as met.
             regions: of the goal model, none if it has none.
         """
-        errors = [[answer, *_errors(each, near)] for answer, each in found.items()]
-        for table, found_there in zip(self._rows, (errors, map(_fields, regions)), strict=False):
-            self._rows[table][movements] = [[str(movements), *fields] for fields in found_there]
+        rows = {
+            "evaluation.csv": [[answer, *_errors(each, near)] for answer, each in found.items()],
+            "by_context.csv": [
+                [answer, *map(str, part)] for answer, each in found.items() for part in each.by_context(self._contexts)
+            ],
+            "regions.csv": [_fields(region) for region in regions],
+        }
+        for table in self._rows:
+            self._rows[table][movements] = [[str(movements), *fields] for fields in rows[table.path.name]]
             if self._begun:
                 self._write(table)
 

@@ -7,6 +7,7 @@
                          context_*, theta_*, goal_*, outcome_*
     evaluation.csv   movements, answer, mean_error_m, median_error_m, p90_error_m, noise_floor_m, goals_met: a line for
                          each inverse model that answered
+    by_context.csv   where there are contexts: the mean error in each third of each of them
     regions.csv      the regions of the goal model at each evaluation, a line for each, corners in C x T
     predictions.csv  with a forward model: what it predicted of each exemplar before learning it, and what happened
     refreshes.csv    with a forward model: a line each time that it has learnt

@@ -35,12 +35,12 @@ LEGEND: Final = {
     "first guess.",
     "model/ms": "Milliseconds of a refresh, the mean so far.",
 }
-LAYOUT: Final = {
+LAYOUT: Final = {  # as that of board/scalars.py
     "Does the forward model predict where movements land?": {
-        "distance to where they landed (m)": "model/error",
-        f"share in its {LEVEL:.0%} region": "model/coverage",
-        "relative error on what it never learns from; 1 is no better than their mean": "model/relative_error",
-        f"share of refinements that helped, last {LATELY} movements": "model/improved",
+        ("", "distance to where they landed (m)"): "model/error",
+        ("", f"share in its {LEVEL:.0%} region"): "model/coverage",
+        ("", "relative error on what it never learns from; 1 is no better than their mean"): "model/relative_error",
+        ("goals", f"share of refinements that helped, last {LATELY} movements"): "model/improved",
     },
 }
 

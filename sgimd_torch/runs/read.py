@@ -6,7 +6,6 @@ run = read_run("runs/sgim-d/seed-003"); run.outcomes, run.evaluation["mean_error
 from __future__ import annotations
 
 import os
-import zlib
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -14,6 +13,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from sgimd_torch.files import checksum
 from sgimd_torch.runs.config import OWN, Config, before_there_was_a_choice, from_settings, having, options
 from sgimd_torch.runs.log import Columns, RunError, read_json
 from sgimd_torch.runs.tables import EVALUATION, SMALL, small_table
@@ -30,7 +30,8 @@ class Run:
     ``index`` ``(n,)``, ``origin`` ``(n,)`` names, "" at rest, ``demonstration`` ``(n,)`` row of the demonstration just
     before, -1 if there was none; ``contexts``, ``thetas``, ``goals`` and ``outcomes`` ``(n, dim)``, NaN where there was
     none. ``answers`` has, for each answer, an array for each column of evaluation.csv, an entry for each evaluation;
-    ``regions`` likewise, with an entry for each region at each evaluation, None for a goal model without regions;
+    ``by_context`` likewise, with an entry for each part of C and each answer, None without contexts; ``regions``
+    likewise, with an entry for each region at each evaluation, None for a goal model without regions;
     ``predictions`` and ``refreshes`` likewise, None without a forward model. ``config``, ``versions``,
     ``summary``: as in their files.
 
@@ -54,6 +55,7 @@ class Run:
     regions: dict[str, np.ndarray] | None
     predictions: dict[str, np.ndarray] | None = None
     refreshes: dict[str, np.ndarray] | None = None
+    by_context: dict[str, np.ndarray] | None = None
     damage: dict[str, int] = field(default_factory=dict)
     unchecked: tuple[str, ...] = ()
 
@@ -115,9 +117,36 @@ def read_run(path: str | os.PathLike[str]) -> Run:
         regions=arrays.get("regions.csv"),
         predictions=arrays.get("predictions.csv"),
         refreshes=arrays.get("refreshes.csv"),
+        by_context=arrays.get("by_context.csv"),
         damage={name: table.damage for name, table in found.items() if table.damage is not None},
         unchecked=tuple(name for name, table in found.items() if not table.checked),
     )
+
+
+def config_of(run: Run) -> Config:
+    """The configuration of a run.
+
+    Raises:
+        RunError: it makes no sense today.
+    """
+    try:
+        return from_settings(run.config)
+    except (TypeError, ValueError) as error:
+        raise RunError(f"{run.path}/config.json does not describe a run of this version: {error}") from error
+
+
+def runs_below(place: Path) -> list[Path]:
+    """The run directories that ``place`` is or holds: a run, the folder of a variant, or one of variants.
+
+    Raises:
+        RunError: there is none.
+    """
+    patterns = ("config.json", "seed-*/config.json", "*/seed-*/config.json")
+    found = [config.parent for pattern in patterns for config in sorted(place.glob(pattern))]
+    if not found:
+        why = "holds no runs" if place.is_dir() else "is no folder" if place.exists() else "does not exist"
+        raise RunError(f"{place} {why}; runs are in OUT/NAME/seed-000")
+    return found
 
 
 def find_runs(out: str | os.PathLike[str]) -> dict[str, list[Path]]:
@@ -149,8 +178,7 @@ def finished(config: Config) -> bool:
         same = all(getattr(found, name) == getattr(config, name) for name in options() if name not in place)
         files = [(name, getattr(config, name)) for name in ("benchmark", "demonstrations")]
         return (whole and evaluated and same) and all(
-            file is None or settings.get(f"{name}_crc32") in (None, f"{zlib.crc32(file.read_bytes()):08x}")
-            for name, file in files
+            file is None or settings.get(f"{name}_crc32") in (None, checksum(file)) for name, file in files
         )
     except (ValueError, OSError):  # of another version, or unreadable: the run says so when it is resumed
         return False

@@ -7,6 +7,8 @@ varied: sgim-d,goals=uniform if algorithm and goals are. All other options of sg
   sgimd sweep --vary goals=interest-map,uniform --seeds 0-19 --out study   is the interest map worth it?
   sgimd sweep --vary algorithm=sagg-riac,sgim-d --vary budget=5,15 --seeds 0-4 --movements 2000 --out study
   sgimd sweep --vary noise=0,0.03 --seeds 0,3,7-9 --out study --dry-run    what is still to be done
+  sgimd sweep --vary goals=interest-map,uniform --seeds 0-19 --shard 2/4   the second quarter of them, see --dry-run
+  sgimd sweep --vary goals=interest-map,uniform --seeds 0-999 --engine ray --address auto        on a cluster
   sgimd table study                                                        their results
 
 Start the same command again after Ctrl-C or a power cut, or with more seeds: finished runs stay as they are, the
@@ -21,25 +23,22 @@ import argparse
 import itertools
 import os
 import re
-import signal
-import subprocess
 import sys
-import threading
-from collections import Counter
-from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Final
+from typing import Final, TypeVar
 
-from sgimd_torch.files import locked, make_folder
+from sgimd_torch.catalogue import CATALOGUE
+from sgimd_torch.files import make_folder
 from sgimd_torch.runs.command_line import parse
-from sgimd_torch.runs.config import Config, dashed, words
-from sgimd_torch.runs.process import Failed, Progress, loading, say
+from sgimd_torch.runs.config import Config, dashed
+from sgimd_torch.runs.engines.local import Engine, Local
+from sgimd_torch.runs.engines.loop import sweep
+from sgimd_torch.runs.process import loading, say
 from sgimd_torch.runs.read import finished, movements_on_disk
 
-LOOK_EVERY: Final = 0.3  # s, from one look at the runs to the next
-PATIENCE: Final = 20.0  # s, for a stopped run to write what it has; then it is killed and loses a second at most
+Item = TypeVar("Item")
 NOT_VARIED: Final = {
     "seed": "--seeds takes them, such as 5, 0-19 or 0,3,7-9",
     "name": "a sweep names its variants by what is varied",
@@ -68,33 +67,114 @@ def main(argv: Sequence[str] | None = None) -> int:
         help="one option of sgimd run and its values; a list is one value in brackets: floor-at=[1000],[1000,5000]",
     )
     add_options(parser, seeds="0")
+    add_engines(parser)
     options, rest = parser.parse_known_args(argv)
     variants, flags = variants_of(options.vary, rest)
-    configs = [replace(variant, seed=seed) for seed in options.seeds for variant in variants]
+    whole = [replace(variant, seed=seed) for seed in options.seeds for variant in variants]
+    configs = options.shard.of(whole)
     left = [config for config in configs if not finished(config)]
-    out = configs[0].out
-    counts = f"{len(variants)} variants, {len(options.seeds)} seeds"
+    out = variants[0].out
+    counts = f"{len(variants)} variants, {len(options.seeds)} seeds{options.shard.note(whole)}"
     say(f"{len(configs)} runs ({counts}), {len(configs) - len(left)} of them finished: {out}")
+    own = [config for config in configs if config.own and config not in left]
+    if own:
+        from sgimd_torch.runs.directory import stale  # loads numpy
+
+        say(*dict.fromkeys(f"{config.title}: {note}" for config in own for note in stale(config)))
     if options.dry_run:
         for config in left:
             print(f"{config.title}: {movements_on_disk(config.directory)} of {config.movements} movements")
+    if options.dry_run or not left:
         return 0
     with loading():
         from sgimd_torch.runs.build import build  # after --help
-    for variant in variants if left else []:
+    for variant in variants:
         build(variant)  # a wrong option is refused before anything starts
-    make_folder(out)
-    failures = sweep(left, options.processes, flags=flags)
+    with engine_of(options, left) as engine:
+        make_folder(out)
+        failures = sweep(left, engine, flags=flags)
     say(f"{len(left) - len(failures)} runs ended well, {len(failures)} failed: {out}", *failures)
     return 1 if failures else 0
 
 
 def add_options(parser: argparse.ArgumentParser, *, seeds: str) -> None:
     """Options of every command with many runs: --seeds, with that default, --processes and --dry-run."""
-    cores = os.cpu_count() or 1
     parser.add_argument("--seeds", type=_seeds, default=seeds, help="5, 0-19 or 0,3,7-9 (default: %(default)s)")
-    parser.add_argument("--processes", type=_count, default=cores, help="runs at a time (default: cores, %(default)s)")
+    parser.add_argument("--processes", type=_count, help="runs at a time (default: one for each core)")
     parser.add_argument("--dry-run", action="store_true", help="only list what is still to be done")
+
+
+def add_engines(parser: argparse.ArgumentParser) -> None:
+    """Options of where runs are carried out: --shard, --engine and --address."""
+    parser.add_argument(
+        "--shard",
+        type=Shard.parse,
+        default="1/1",
+        metavar="K/N",
+        help="only the K-th of N equal parts of the list of runs, for a job array",
+    )
+    parser.add_argument(
+        "--engine",
+        choices=("local", "ray"),
+        default="local",
+        help="processes of this machine, or tasks of a Ray cluster, extra ray (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--address",
+        metavar="HOST:PORT",
+        help="of a running Ray cluster to which this machine belongs, or auto; without it, Ray starts one here",
+    )
+
+
+def engine_of(options: argparse.Namespace, configs: Sequence[Config]) -> Engine:
+    """What the options of ``add_options`` and ``add_engines`` ask for, for these runs; its block starts it.
+
+    Raises:
+        ValueError: they contradict each other.
+        ImportError: Ray is not installed.
+    """
+    if options.engine == "local" and options.address is not None:
+        raise ValueError(f"--address {options.address} is of a Ray cluster; it needs --engine ray")
+    if options.address is not None and options.processes is not None:
+        raise ValueError("--processes cannot be given with --address: a cluster runs as many as it has cores")
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1  # we may use
+    processes = options.processes or cores
+    if options.engine == "local" or not configs:  # nothing to do needs no cluster
+        return Local(processes)
+    try:
+        with loading():
+            from sgimd_torch.runs.engines.on_ray import OnRay  # takes longer than all else to import
+    except ModuleNotFoundError as error:
+        slip = "pip install 'sgimd-torch[ray]' installs it"
+        raise ImportError(f"--engine ray needs {error.name}, which is not installed; {slip}") from error
+    return OnRay(options.address, processes, ships=any(map(_uses_working_directory, configs)), out=configs[0].out)
+
+
+@dataclass(frozen=True)
+class Shard:
+    """The ``k``-th of ``n`` parts of a list, 1 the first: consecutive runs, so that each part has nearly all variants.
+
+    Which runs they are depends on the list alone, not on what is finished. Sizes differ by 1 at most.
+    """
+
+    k: int
+    n: int
+
+    @classmethod
+    def parse(cls, text: str) -> Shard:
+        """Of ``2/4``."""
+        k, slash, n = text.partition("/")
+        if not (slash and k.isdecimal() and n.isdecimal() and 1 <= int(k) <= int(n)):
+            raise argparse.ArgumentTypeError(f"must be like 1/4, the first of four parts, got {text!r}")
+        return cls(int(k), int(n))
+
+    def of(self, whole: Sequence[Item]) -> Sequence[Item]:
+        """This part of the list."""
+        return whole[(self.k - 1) * len(whole) // self.n : self.k * len(whole) // self.n]
+
+    def note(self, whole: Sequence[Item]) -> str:
+        """For a message; nothing if it is the whole list."""
+        return f", shard {self.k}/{self.n} of {len(whole)} runs" if self.n > 1 else ""
 
 
 def variants_of(varied: Sequence[str], options: Sequence[str]) -> tuple[list[Config], list[str]]:
@@ -131,161 +211,10 @@ def variants_of(varied: Sequence[str], options: Sequence[str]) -> tuple[list[Con
     return found, [f"--{dashed(flag)}" for flag, on in flags.items() if on]
 
 
-def sweep(
-    configs: Sequence[Config],
-    processes: int,
-    *,
-    flags: Sequence[str] = (),
-    on_end: Callable[[Config], None] | None = None,
-    keep_going: bool = True,
-) -> list[str]:
-    """Run them, in this order, and show how far they are; those that are finished already are not started.
-
-    If another process writes a run, such as one left by a killed sweep, it is waited for and then taken over.
-        failures = sweep([Config(seed=seed) for seed in range(20)], processes=4)
-
-    Args:
-        configs: the runs, each with a directory of its own.
-        processes: how many run at a time.
-        flags: of ``sgimd run``, for all of them, besides --resume.
-        on_end: called with each run that ended well, in this thread; its ValueError or OSError counts as a failure.
-        keep_going: False: the first failure stops the others, and is raised.
-
-    Returns:
-        The failures: which run, the last words of its log, and where the log is.
-
-    Raises:
-        ValueError: two runs have one directory; without ``keep_going`` also: a run refused its request.
-        Failed: without ``keep_going``: a run failed under way.
-        KeyboardInterrupt: a signal came. All runs were stopped first, and nothing is lost.
-    """
-    twice = [path for path, n in Counter(config.directory for config in configs).items() if n > 1]
-    if twice:
-        raise ValueError(f"two runs would be written to {twice[0]}; their variants need different names")
-    runs, failures = [_Run(config, flags) for config in configs], list[str]()
-    total = sum(config.movements for config in configs)
-    # Threads that each wait for a process of their own: a pool of processes would break, for all runs, when the system
-    # kills one of its processes.
-    pool, stop = ThreadPoolExecutor(processes), threading.Event()
-    try:
-        with Progress("sweep", total, _done(runs), every=30.0) as progress:
-            pending = {pool.submit(run.carry_out, stop): run for run in runs}
-            while pending:
-                for future in wait(pending, LOOK_EVERY, FIRST_COMPLETED).done:
-                    run = pending.pop(future)
-                    run.look()
-                    try:
-                        future.result()
-                        if on_end is not None:
-                            on_end(run.config)
-                        run.state = "done"
-                    except (Failed, ValueError, OSError) as error:
-                        run.state = "failed"
-                        progress.total -= run.config.movements - run.done  # the rest will not be run
-                        failures.append(f"{run.config.title} failed: {error}")
-                        if not keep_going:
-                            raise (Failed if isinstance(error, Failed) else ValueError)(failures[0]) from error
-                progress.show(_done(runs), _note(runs))
-    except KeyboardInterrupt:
-        say("stopping all runs; the same command goes on from here")
-        raise
-    finally:
-        stop.set()
-        pool.shutdown(cancel_futures=True)
-    return failures
-
-
-@dataclass(eq=False)
-class _Run:
-    """One of the runs. ``state``: waiting, held by another process, running, done or failed."""
-
-    config: Config
-    flags: Sequence[str]
-    state: str = "waiting"
-
-    def __post_init__(self) -> None:
-        self.log = self.config.directory.with_suffix(".log")  # its output, next to its directory
-        self.look()
-
-    def look(self) -> None:
-        """Update ``done``, its number of movements on disk."""
-        self.done = min(movements_on_disk(self.config.directory), self.config.movements)
-
-    def carry_out(self, stop: threading.Event) -> None:
-        """Run it, or resume it, to its end; returns early after ``stop``.
-
-        Raises:
-            ValueError: it refused its request (exit code 2), or there is no place for its directory.
-            Failed: it failed under way.
-            OSError: its log cannot be written, or no process started.
-        """
-        directory = self.config.directory
-        make_folder(directory.parent)
-        while not stop.is_set():
-            if locked(directory / "lock"):
-                if self.state != "held":
-                    say(f"{self.config.title}: waiting for another process, which writes this run")
-                self.state = "held"
-                stop.wait(LOOK_EVERY)
-                continue
-            if finished(self.config):
-                return
-            self.state = "running"
-            code = self._process(stop)
-            if code == 0:
-                return
-            if not stop.is_set() and not locked(directory / "lock"):  # else another process took it over first
-                raise (ValueError if code == 2 else Failed)(self._last_words(code))
-
-    def _process(self, stop: threading.Event) -> int:
-        """Start its process, wait for it, stop it after ``stop``; its exit code."""
-        command = [sys.executable, "-m", "sgimd_torch", "run", "--resume", *self.flags, *words(vars(self.config))]
-        one_thread = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL")}
-        with self.log.open("wb") as log:
-            process = subprocess.Popen(
-                command,
-                stdin=subprocess.DEVNULL,
-                stdout=log,
-                stderr=log,
-                env={**os.environ, **one_thread},
-                process_group=0,  # only we get Ctrl-C, and pass it on
-            )
-        while not stop.is_set():
-            try:
-                return process.wait(LOOK_EVERY)
-            except subprocess.TimeoutExpired:
-                continue
-        process.send_signal(signal.SIGINT)
-        try:
-            return process.wait(PATIENCE)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            return process.wait()
-
-    def _last_words(self, code: int) -> str:
-        _, mark, said = ("\n" + self.log.read_text(errors="replace").rstrip()).rpartition("\nerror: ")
-        if not mark:
-            said = said.rpartition("\n")[2] or "it said nothing"
-        if code < 0:
-            said = f"stopped by {signal.Signals(-code).name}; the same command goes on with it"
-        return f"{said}\nIts whole log: {self.log}"
-
-
-def _done(runs: Sequence[_Run]) -> int:
-    """Movements on disk of all of them."""
-    for run in runs:
-        if run.state in ("held", "running"):
-            run.look()
-    return sum(run.done for run in runs)
-
-
-def _note(runs: Sequence[_Run]) -> str:
-    """How many runs are in each state, and how far the running ones are."""
-    states = Counter(run.state for run in runs)
-    parts = [f"{states['done']} of {len(runs)} runs"]
-    parts += [f"{states['failed']} failed"] if states["failed"] else []
-    parts += [f"waiting for {states['held']} held by another process"] if states["held"] else []
-    return ", ".join([*parts, *(f"{run.config.title} at {run.done}" for run in runs if run.state == "running")])
+def _uses_working_directory(config: Config) -> bool:
+    """Whether one of its parts comes from a module there, which was loaded when it was chosen."""
+    modules = [sys.modules.get(str(getattr(config, kind)).partition(":")[0]) for kind in CATALOGUE]
+    return any(Path(module.__file__ or "").is_relative_to(Path.cwd()) for module in modules if module)
 
 
 def _in_name(option: str, value: str) -> str:

@@ -24,14 +24,15 @@ from sgimd_torch.files import write_bytes
 from sgimd_torch.runs.config import OWN
 from sgimd_torch.spaces import Array
 
-SMALL: Final = ("evaluation.csv", "regions.csv", "predictions.csv", "refreshes.csv")
+SMALL: Final = ("evaluation.csv", "by_context.csv", "regions.csv", "predictions.csv", "refreshes.csv")
 EVALUATION: Final = (
     *("movements", "answer", "mean_error_m", "median_error_m", "p90_error_m", "noise_floor_m", "goals_met"),
 )
+BY_CONTEXT: Final = ("movements", "answer", "context", "low", "high", "goals", "mean_error_m")
 _LATER: Final = {"answer": OWN, "goals_met": "nan"}  # columns that earlier versions lacked, and what they mean there
 REFRESHES: Final = ("movements", "exemplars", "steps", "held_out", "relative_error", "diverged")
 Rows = list[list[str]]
-WHOLE: Final = ("movements", "attempts", "goals", "exemplar", "exemplars", "steps", "diverged")
+WHOLE: Final = ("movements", "attempts", "goals", "exemplar", "exemplars", "steps", "diverged", "context")
 _CELL: Final = r"R(\.[0-9]{1,6})+"  # the path of a cell of a grid
 _PART_OF_A_HEADER: Final = re.compile(rb"[a-z0-9_,]*")
 _MAY_BE_NAN: Final = ("noise_floor_m", "goals_met", "competence")  # not measured; no goals
@@ -200,7 +201,7 @@ def small_table(path: Path, dims: int | None = None) -> Table:
     """One of the small tables, by the name of its file.
 
     Args:
-        path: of evaluation.csv, regions.csv, predictions.csv or refreshes.csv.
+        path: of evaluation.csv, by_context.csv, regions.csv, predictions.csv or refreshes.csv.
         dims: of C x T for regions, of outcomes for predictions; None for those that the file names.
     """
     if dims is None:
@@ -210,6 +211,8 @@ def small_table(path: Path, dims: int | None = None) -> Table:
     match path.name:
         case "evaluation.csv":
             return Table(path, EVALUATION)
+        case "by_context.csv":
+            return Table(path, BY_CONTEXT)
         case "regions.csv":
             corners = (f"{corner}_{k}" for corner in ("low", "high") for k in range(dims))
             names = ("movements", "path", *corners, "attempts", "goals", "competence", "interest")

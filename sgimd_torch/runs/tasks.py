@@ -7,9 +7,8 @@ exactly, are made here, the same for every seed. An environment of your own may 
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -20,10 +19,11 @@ from sgimd_torch.algorithms import Correspondence
 from sgimd_torch.demonstrations import SHIPPED as SHIPPED_DEMONSTRATIONS
 from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.environments.protocol import Environment
+from sgimd_torch.environments.protocol import Environment, Recorded
 from sgimd_torch.environments.toys import Toy
 from sgimd_torch.evaluation import SHIPPED as SHIPPED_BENCHMARK
 from sgimd_torch.evaluation import Benchmark, load_benchmark, tile_goals
+from sgimd_torch.files import checksum
 from sgimd_torch.spaces import Array, Box, Demonstration, stream
 
 if TYPE_CHECKING:
@@ -51,6 +51,8 @@ class Task:
         misfit: demonstration -> how far (rad) it is from what the robot can play; raises ValueError if it cannot be
             translated. None for the correspondence alone.
         n_joints: columns of a demonstrated trajectory; None for any.
+        record: (context, theta, rng) -> a movement that `sgimd film` shows, see ``Sketch`` in environments/protocol.py;
+            None for the environment's own, if it has one.
     """
 
     environment: Environment
@@ -59,17 +61,29 @@ class Task:
     correspondence: Correspondence | None = None
     misfit: Callable[[Demonstration], float] | None = None
     n_joints: int | None = None
+    record: Callable[[Array, Array, np.random.Generator], Recorded] | None = None
+
+    @property
+    def picture(self) -> Callable[[Array, Array, np.random.Generator], Recorded] | None:
+        """``record``, or that of the environment; None if neither has one that can be called."""
+        found = self.record or getattr(self.environment, "record", None)
+        return found if callable(found) else None
 
 
-def fishing_rod(*, noise: float, task_space: float, threads: int) -> Task:
-    """The paper's task; goals come from a square of half side ``task_space`` m."""
+def fishing_rod(*, noise: float, task_space: float, threads: int, max_yaw: float = 0.0, max_wind: float = 0.0) -> Task:
+    """The paper's task; goals come from a square of half side ``task_space`` m.
+
+    With a context, ``max_yaw`` (rad) or ``max_wind`` (N) above 0, what was demonstrated was demonstrated in the context
+    0, and the goals are those that can be reached in it.
+    """
     from sgimd_torch.environments.fishing_rod import JOINTS, FishingRod  # MuJoCo is loaded only when it is needed
 
-    rod = FishingRod(noise=noise, outcomes=Box.cube(-task_space, task_space, 2), threads=threads)
+    space = Box.cube(-task_space, task_space, 2)
+    rod = FishingRod(noise=noise, outcomes=space, max_yaw=max_yaw, max_wind=max_wind, threads=threads)
     return Task(
         rod,
         SHIPPED_BENCHMARK,
-        SHIPPED_DEMONSTRATIONS,
+        partial(_in_context_zero, rod.contexts.dim) if rod.contexts.dim else SHIPPED_DEMONSTRATIONS,
         rod.primitive.correspondence,
         partial(_misfit, rod),
         len(JOINTS),
@@ -152,9 +166,9 @@ def benchmark_of(task: Task, file: Path | None) -> tuple[Benchmark, list[str], s
         ValueError: they do not fit the environment, or the file is damaged.
         OSError: there is no such file.
     """
-    source, robot, notes, checksum = file or task.benchmark, task.environment, list[str](), None
+    source, robot, notes, crc32 = file or task.benchmark, task.environment, list[str](), None
     if isinstance(source, Path):
-        checksum = _checksum("benchmark", source)
+        crc32 = _checksum("benchmark", source)
         benchmark = load_benchmark(source)
     elif source is not None:
         benchmark = source()
@@ -162,10 +176,10 @@ def benchmark_of(task: Task, file: Path | None) -> tuple[Benchmark, list[str], s
         benchmark = goals_all_over(robot)
         notes.append(
             f"{type(robot).__name__} has no benchmark goals: evaluations use {len(benchmark.goals)} points all over T, "
-            "also where it cannot reach; a file of goals (--benchmark) or a Task with a benchmark is more informative"
+            "also where it cannot reach; sgimd benchmark makes goals from runs for --benchmark; a Task may have its own"
         )
     benchmark.check(robot)
-    return benchmark, notes, checksum
+    return benchmark, notes, crc32
 
 
 def demonstrations_of(task: Task, file: Path | None) -> tuple[Sequence[Demonstration], list[str], str | None]:
@@ -188,7 +202,7 @@ def demonstrations_of(task: Task, file: Path | None) -> tuple[Sequence[Demonstra
     if not isinstance(source, Path):
         made = source()
         return made, _fit(robot, made, [0.0] * len(made)), None
-    checksum = _checksum("demonstrations", source)
+    crc32 = _checksum("demonstrations", source)
     found = load_demonstrations(
         source, n_joints=task.n_joints, outcome_dim=robot.outcomes.dim, context_dim=robot.contexts.dim
     )
@@ -200,7 +214,7 @@ def demonstrations_of(task: Task, file: Path | None) -> tuple[Sequence[Demonstra
             misfits.append(0.0 if task.misfit is None else task.misfit(demonstration))
         except ValueError as error:
             raise ValueError(f"{source}: recording {row} cannot be translated: {error}") from error
-    return found, _fit(robot, found, misfits), checksum
+    return found, _fit(robot, found, misfits), crc32
 
 
 def _fit(robot: Environment, shown: Sequence[Demonstration], misfits: Sequence[float]) -> list[str]:
@@ -230,6 +244,11 @@ def correspondence_of(task: Task) -> Correspondence:
             "a method correspondence(times, trajectory) -> theta, or return Task(environment, correspondence=...)"
         )
     return found
+
+
+def _in_context_zero(context_dim: int) -> list[Demonstration]:
+    """The shipped demonstrations, for a rod with contexts."""
+    return [replace(shown, context=np.zeros(context_dim)) for shown in load_demonstrations()]
 
 
 def _misfit(rod: FishingRod, demonstration: Demonstration) -> float:
@@ -269,4 +288,4 @@ def _checksum(what: str, path: Path) -> str:
         raise IsADirectoryError(f"{what}: {path} is a directory, a file was wanted")
     if not path.is_file():
         raise FileNotFoundError(f"{what}: there is no file {path}")
-    return f"{zlib.crc32(path.read_bytes()):08x}"
+    return checksum(path)

@@ -31,8 +31,7 @@ def perturb(policies: Box, rng: np.random.Generator, *, sd: float = 0.05) -> Sea
     def search(start: Estimate, goal: Array) -> Generator[Array, Array, None]:
         distances = np.linalg.norm(start.outcomes - goal, axis=1)
         best, shortest = start.thetas[distances.argmin()], float(distances.min())
-        remembered = (start.thetas == start.theta).all(axis=1).any()
-        theta = vary(best) if remembered else policies.check("theta of the estimate", start.theta)
+        theta = vary(best) if _remembered(start) else policies.check("theta of the estimate", start.theta)
         while True:
             distance = math.dist(goal, (yield theta))
             if distance < shortest:
@@ -42,26 +41,35 @@ def perturb(policies: Box, rng: np.random.Generator, *, sd: float = 0.05) -> Sea
     return search
 
 
-def practise(policies: Box, rng: np.random.Generator, *, sd: float = 0.02) -> Search:
+def practise(policies: Box, rng: np.random.Generator, *, sd: float = 0.02, unsure: float = 0.05) -> Search:
     """Gaussian noise around theta_g, whatever came of it, clipped to ``policies``; never ends.
 
     So the inverse model is corrected where it errs, and sees in which directions the outcome changes. It is meant for
-    an inverse model that is nearly right, and for one movement or two at each goal.
+    an inverse model that is nearly right, and for one movement or two at each goal. Where theta_g is the copy of a
+    remembered theta, the inverse model knows nothing better, and more noise looks farther around it.
 
     Args:
-        policies, rng, sd: as in `perturb`.
+        policies, rng: as in `perturb`.
+        sd: standard deviation of the noise, in sides of ``policies``.
+        unsure: the same around a copy.
 
     Raises:
-        ValueError: ``sd`` is not positive.
+        ValueError: one of the two is not positive.
     """
-    vary = _variation(policies, rng, sd)
+    vary, look_around = _variation(policies, rng, sd), _variation(policies, rng, unsure)
 
     def search(start: Estimate, goal: Array) -> Generator[Array, Array, None]:
         theta = policies.check("theta of the estimate", start.theta)
+        next_one = look_around if _remembered(start) else vary
         while True:
-            yield vary(theta)
+            yield next_one(theta)
 
     return search
+
+
+def _remembered(start: Estimate) -> bool:
+    """Whether theta_g is a copy of a theta that the estimate was made from."""
+    return bool((start.thetas == start.theta).all(axis=1).any())
 
 
 def _variation(policies: Box, rng: np.random.Generator, sd: float) -> Callable[[Array], Array]:

@@ -11,6 +11,7 @@ Tried are some random movements and two corners of Pi (policies):
   outcome_noise                   is 0 if and only if outcomes never scatter, and not ten times too large or small
   execute_many                    if there is one: each row equals execute to the last bit
   what is no movement             is refused with a ValueError
+  record                          if there is one: its outcome is that of execute with an equal stream
   a Task                          its goals lie in T, and its demonstrations can be translated
 
 Examples:
@@ -25,6 +26,8 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Sequence
+
+import numpy as np
 
 from sgimd_torch.environments.check import check_environment
 from sgimd_torch.environments.protocol import execute_many
@@ -58,9 +61,33 @@ def main(argv: Sequence[str] | None = None) -> int:
         why = f"{type(error).__name__}: {error}"
         raise ValueError(f"environment {options.environment} cannot be made: {why}") from error
     check_environment(task.environment, movements=options.movements)
+    _check_picture(task)
     for line in (f"{type(task.environment).__name__} keeps every promise", *_sizes(task), *_lessons(task)):
         print(line)
     return 0
+
+
+def _check_picture(task: Task) -> None:
+    """One movement that is executed and recorded.
+
+    Raises:
+        ValueError: it ends in two places, or cannot be recorded.
+    """
+    robot, record = task.environment, task.picture
+    if record is None:
+        return
+    context, theta = robot.observe(stream(0, "check")), robot.policies.sample(stream(1, "check"))
+    outcome = robot.execute(context.copy(), theta.copy(), stream(2, "check"))
+    name = type(robot).__name__
+    try:
+        drawn = np.asarray(record(context, theta, stream(2, "check")).outcome)
+    except Exception as error:  # whatever the user's code does
+        raise ValueError(f"record() of {name} fails: {type(error).__name__}: {error}") from error
+    if not np.array_equal(drawn, outcome):
+        raise ValueError(
+            f"record() of {name} ends at {drawn.tolist()}, execute() with an equal stream at "
+            f"{outcome.tolist()}; does it draw its noise in the same order?"
+        )
 
 
 def _sizes(task: Task) -> list[str]:

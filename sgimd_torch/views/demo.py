@@ -29,8 +29,9 @@ from typing import Final
 
 from sgimd_torch.catalogue import ROD
 from sgimd_torch.runs.command_line import parse
+from sgimd_torch.runs.engines.local import Local
+from sgimd_torch.runs.engines.loop import sweep
 from sgimd_torch.runs.process import loading, say
-from sgimd_torch.runs.sweep import sweep
 
 ALGORITHMS: Final = ("sgim-d", "random")
 
@@ -52,7 +53,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     began = time.monotonic()
     configs = {algorithm: replace(base, algorithm=algorithm) for algorithm in ALGORITHMS}
     say(f"SGIM-D and Random, {base.movements} movements each, seed {base.seed}: {base.out}")
-    sweep(list(configs.values()), processes=2, keep_going=False)
+    with Local(processes=2) as engine:
+        sweep(list(configs.values()), engine, keep_going=False)
     runs = {algorithm: read_life(config.directory) for algorithm, config in configs.items()}
     (figure,) = save_figure(partial(draw, runs), options.out / "demo", "png")
     print(f"\nMean distance to the benchmark goals (m) after so many movements, and seconds spent\n\n{table(runs)}\n")

@@ -18,6 +18,7 @@ from sgimd_torch.spaces import Array
 Key = TypeVar("Key", bound=Hashable)
 LEVEL = 0.95
 RESAMPLES = 9999
+LEAST_SEEDS: Final = 5  # with fewer, a report shows points: no interval, no verdict
 SEED: Final = 2014  # of the bootstrap: each number draws from its own default_rng(SEED)
 
 

@@ -28,9 +28,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 from sgimd_torch.catalogue import ROD
 from sgimd_torch.runs.config import Config
+from sgimd_torch.runs.engines.loop import sweep
 from sgimd_torch.runs.process import loading, say
 from sgimd_torch.runs.read import finished, movements_on_disk, read_run
-from sgimd_torch.runs.sweep import add_options, sweep, variants_of
+from sgimd_torch.runs.sweep import add_engines, add_options, engine_of, variants_of
 
 if TYPE_CHECKING:
     from sgimd_torch.spaces import Array
@@ -81,9 +82,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run what is not finished, print the table, draw the figure; 1 where runs failed."""
     options, rest = _options(argv)
     configs, flags = runs_of(options, rest)
-    left = [config for config in configs if not finished(config)]
-    out = configs[0].out.parent
-    say(f"{len(configs)} runs, {len(configs) - len(left)} of them finished: {out}")
+    mine, out = options.shard.of(configs), configs[0].out.parent
+    left = [config for config in mine if not finished(config)]
+    say(f"{len(mine)} runs{options.shard.note(configs)}, {len(mine) - len(left)} of them finished: {out}")
     if options.dry_run:
         for config in left:
             done = movements_on_disk(config.directory)
@@ -94,7 +95,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         from sgimd_torch.views.suite_figure import draw, table
     for config in {(each.out, each.variant): each for each in left}.values():
         build(config)  # a wrong option is refused before anything starts
-    failures = sweep(left, options.processes, flags=flags)
+    with engine_of(options, left) as engine:
+        failures = sweep(left, engine, flags=flags)
     errors = errors_of([config for config in configs if finished(config)])
     if errors:
         print(table(errors))
@@ -175,6 +177,7 @@ def _options(argv: Sequence[str] | None) -> tuple[argparse.Namespace, list[str]]
         "--vary", action="append", default=[], metavar="OPTION=VALUE,VALUE", help="one option of sgimd run"
     )
     add_options(parser, seeds="0")
+    add_engines(parser)
     options, rest = parser.parse_known_args(argv)
     chosen = {"quick": [name for name, task in TASKS.items() if task.quick], "all": list(TASKS)}
     options.tasks = list(dict.fromkeys(name for word in options.tasks for name in chosen.get(word, [word])))

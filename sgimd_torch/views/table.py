@@ -2,12 +2,16 @@
 
 It takes any folder with run directories, OUT/NAME/seed-000. Variants are compared after the last number of movements at
 which all finished runs were evaluated, or after --at. The worst comes first. Errors and noise floors are means over
-seeds in metres, ± the standard deviation; "by linear" is the error if LocallyLinear answers, whatever inverse model
-the run has: compare learners by it. Costs are milliseconds for each movement. Runs that are damaged, not finished
-or not evaluated there are left out, and named below the table.
+seeds in metres, ± the standard deviation; with fewer than 5 seeds there is none, and a note. "by linear" is the error
+if LocallyLinear answers, whatever inverse model the run has: compare learners by it. Costs are milliseconds for each
+movement. Runs that are damaged, not finished or not evaluated there are left out, and named below the table.
+
+With --baseline there is a column more: error minus that of the baseline, paired by seed, interquartile mean over the
+seeds that both have; with five seeds or more, its bootstrap interval of 95 % in brackets. Below 0 is better.
 
   sgimd table runs
-  sgimd table study --at 2000       also with unfinished runs that were evaluated there
+  sgimd table study --at 2000                      also with unfinished runs that were evaluated there
+  sgimd table study --baseline goals=interest-map  what the others are compared with
 
 Exit code: 0 a table was printed, 2 there is nothing to show.
 """
@@ -16,19 +20,22 @@ from __future__ import annotations
 
 import argparse
 import itertools
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
+from sgimd_torch.catalogue import did_you_mean
 from sgimd_torch.runs.config import OWN
 from sgimd_torch.runs.log import RunError
 from sgimd_torch.runs.process import say
 from sgimd_torch.runs.read import NO_EVALUATION, Run, find_runs, read_run
 from sgimd_torch.spaces import Array
+from sgimd_torch.views.statistics import LEAST_SEEDS
 
 EARLY: Final = 1000  # movements, for a column of its own
+FEWEST: Final = 5  # seeds; of fewer, an interval would be too narrow
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -44,6 +51,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("runs", type=Path, metavar="OUT", help="folder of runs: the --out of sgimd run or sgimd sweep")
     parser.add_argument("--at", type=int, metavar="MOVEMENTS", help="compare after this number of movements")
+    parser.add_argument("--baseline", metavar="NAME", help="variant that the others are compared with, seed by seed")
     options = parser.parse_args(argv)
     runs, left_out = _readable(options.runs)
     at = options.at
@@ -65,11 +73,30 @@ def main(argv: Sequence[str] | None = None) -> int:
     heads = ("variant", "seeds", *errors, "physics (ms)", "learning (ms)")
     worst_first = sorted(variants.items(), key=lambda variant: -_at(variant[1], at, "mean_error_m").mean())
     table = [heads, *(_row(name, theirs, at) for name, theirs in worst_first)]
+    if options.baseline is not None:
+        baseline = variants[known(options.baseline, variants)]
+        further = [f"minus {options.baseline} (m)", *(_minus(theirs, baseline, at) for _, theirs in worst_first)]
+        table = [(*cells, cell) for cells, cell in zip(table, further, strict=True)]
     widths = [max(map(len, cells)) for cells in zip(*table, strict=True)]
     for cells in table:
         print("  ".join(cell.ljust(width) for cell, width in zip(cells, widths, strict=True)).rstrip(), flush=True)
+    few = [f"{name} ({len(theirs)})" for name, theirs in worst_first if len(theirs) < LEAST_SEEDS]
+    if few:
+        say(f"fewer than {LEAST_SEEDS} seeds, too few for a verdict or a deviation: {', '.join(few)}")
     say(*(f"left out: {reason}" for reason in left_out))
     return 0
+
+
+def known(baseline: str, variants: Collection[str]) -> str:
+    """The ``baseline``, which has to be one of the variants with errors to compare.
+
+    Raises:
+        ValueError: it is not; they are named.
+    """
+    if baseline not in variants:
+        names = f"{', '.join(sorted(variants))}{did_you_mean(baseline, variants)}"
+        raise ValueError(f"--baseline must be a variant with errors to compare, got {baseline!r}; these are {names}")
+    return baseline
 
 
 def _readable(out: Path) -> tuple[list[Run], list[str]]:
@@ -93,11 +120,25 @@ def _row(name: str, runs: Sequence[Run], at: int) -> tuple[str, ...]:
         name,
         str(len(runs)),
         _metres(_at(runs, EARLY, "mean_error_m")),
-        f"{errors.mean():.3f}" + (f" ± {errors.std(ddof=1):.3f}" if len(runs) > 1 else ""),
+        f"{errors.mean():.3f}" + (f" ± {errors.std(ddof=1):.3f}" if len(runs) >= LEAST_SEEDS else ""),
         _metres(_at(runs, at, "mean_error_m", "linear")),
         _metres(_at(runs, at, "noise_floor_m")),
         *(f"{np.mean([_milliseconds(run, part) for run in runs]):.2f}" for part in ("physics", "learner")),
     )
+
+
+def _minus(ours: Sequence[Run], theirs: Sequence[Run], at: int) -> str:
+    """Our errors minus theirs, over the seeds that both have."""
+    from sgimd_torch.views.statistics import difference_interval, interquartile_mean, paired_differences, rng, show
+
+    errors = [{run.config["seed"]: float(_at([run], at, "mean_error_m")[0]) for run in runs} for runs in (ours, theirs)]
+    both = errors[0].keys() & errors[1].keys()
+    pair = [{seed: found[seed] for seed in both} for found in errors]
+    if ours is theirs or not both:
+        return "-"
+    if len(both) < FEWEST:
+        return f"{interquartile_mean(paired_differences(*pair)):+.4f}"
+    return show(difference_interval(*pair, rng=rng()), "+.4f")
 
 
 def _metres(lengths: Array) -> str:

@@ -12,26 +12,36 @@ import argparse
 import io
 import socket
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import redirect_stderr
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 from sgimd_torch.runs.process import Failed, say
 
 PORTS = 50  # how many are tried
 POINTS = 100_000  # that TensorBoard keeps of each curve, enough for all; 0 should mean all, but shows none
 WHERE = """
-TensorBoard shows {boards} of {runs} at  {url}   (Ctrl-C ends it)
+Begin here:  {url}{begin}
+      Where is it competent, and since when? Does it learn? What did it do, and its teacher?
 
-  {url}/#custom_scalars&_smoothingWeight=0
-      Begin here: does it learn, where is it competent, where does it make progress, what did its teacher do?
+TensorBoard shows {boards} of {runs}   (Ctrl-C ends it)
   {url}/#images
-      The regions that curves are named after; where the float landed; the error at each goal.
+      The same as a map (competent/since); the regions that curves are named after; where movements landed.
   {url}/#scalars&_smoothingWeight=0
       Every curve by itself; steps are movements. A click on (i) explains a curve; so does the tab Text.
   {url}/#hparams
       Runs next to each other: their options and results.
+"""
+BEGIN = "/begin"
+# TensorBoard leaves a tenth of the values out of a chart's range, such as the first and lowest ones of a learner. Only
+# the browser's memory can change that, so a page of our own writes there, and goes on to the charts.
+BEGINNING = b"""<!DOCTYPE html>
+<html lang="en"><head><meta charset="utf-8"><title>sgimd watch</title></head><body><script>
+localStorage.setItem("_ignoreYOutliers", "false");
+location.replace("/#custom_scalars&_smoothingWeight=0");
+</script></body></html>
 """
 
 
@@ -58,7 +68,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         say(f"port {options.port} is taken, {port} is free")
     shown = "1 board" if boards == 1 else f"{boards} boards"
     serve(options.runs, port)
-    print(WHERE.format(boards=shown, runs=options.runs, url=f"http://127.0.0.1:{port}"), flush=True)
+    print(WHERE.format(boards=shown, runs=options.runs, url=f"http://127.0.0.1:{port}", begin=BEGIN), flush=True)
     while True:
         time.sleep(3600)
 
@@ -111,6 +121,19 @@ def tensorboard_program() -> ModuleType:
     return program
 
 
+def beginning(tensorboard: Callable[..., Any]) -> Callable[..., Any]:
+    """TensorBoard's web application, with the page to begin with at ``BEGIN``."""
+
+    def application(environ: dict[str, Any], start_response: Callable[..., Any]) -> Any:
+        if environ["PATH_INFO"] != BEGIN:
+            return tensorboard(environ, start_response)
+        about = {"Content-Type": "text/html; charset=utf-8", "Content-Length": str(len(BEGINNING))}
+        start_response("200 OK", list(about.items()))
+        return [BEGINNING]
+
+    return application
+
+
 def serve(runs: Path, port: int) -> None:
     """Start TensorBoard in a thread; returns once it answers.
 
@@ -121,7 +144,9 @@ def serve(runs: Path, port: int) -> None:
     program = tensorboard_program()
     words = ["", "--logdir", str(runs), "--host", "127.0.0.1", "--port", str(port), "--reload_interval", "5"]
     kept = ",".join(f"{plugin}={POINTS}" for plugin in ("scalars", "images", "text"))
-    board, said = program.TensorBoard(), io.StringIO()
+    server = program.create_port_scanning_werkzeug_server
+    board = program.TensorBoard(server_class=lambda app, flags: server(beginning(app), flags))
+    said = io.StringIO()
     try:
         with redirect_stderr(said):  # notes about its own development
             board.configure([*words, "--samples_per_plugin", kept])

@@ -1,12 +1,14 @@
 """The board: what its curves count, what its file holds, and that a resumed run leaves one continuous board."""
 
 import dataclasses
+import re
 import signal
 import subprocess
 import sys
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from tensorboard.backend.event_processing.event_file_loader import EventFileLoader
 from tensorboard.plugins.custom_scalar import layout_pb2
 from tensorboard.plugins.hparams import metadata as hparams
@@ -15,11 +17,12 @@ from tensorboard.util.tensor_util import make_ndarray
 from runs import EAGER, arguments, csv_of, signal_after, start
 from sgimd_torch import InterestMap, PeriodicTeacher, PlanarArm, evaluate, run, stream
 from sgimd_torch.algorithms import random_exploration, sagg_riac
-from sgimd_torch.board.pictures import draw
+from sgimd_torch.board import pictures
 from sgimd_torch.board.scalars import LEGEND, Curves, Grid, branches
 from sgimd_torch.board.writer import Board, read_events
 from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.evaluation import Benchmark, load_benchmark
+from sgimd_torch.figures.sections import sections
 from sgimd_torch.inverses.local import LocalInverse
 from sgimd_torch.runs.board import cells_of
 from sgimd_torch.runs.build import build
@@ -166,7 +169,7 @@ def test_points_of_another_dimension_are_refused_rather_than_spread_over_the_dia
     goals = np.full((4, dim), 0.6)
     with pytest.raises(ValueError, match=rf"points must have shape \(..., 2\), got \(4, {dim}\)"):
         Curves(PLANE).of_evaluation(goals, np.ones(4), 0.0)
-    (cell,) = (tag for tag in Curves(Box.cube(-1, 1, dim)).of_evaluation(goals, np.ones(4), 0.0) if "grid" in tag)
+    (cell,) = (tag for tag in Curves(Box.cube(-1, 1, dim)).of_evaluation(goals, np.ones(4), 0.0) if "grid_error" in tag)
     assert cell.count("outcome_") == dim
 
 
@@ -236,15 +239,103 @@ def test_a_tag_without_an_explanation_is_refused(tmp_path):
         board.scalars({"mine": 1.0})
 
 
-def test_the_page_of_charts_names_only_curves_that_are_there(board):
+def charts_of(directory):
+    """Of the page of charts: the patterns of tags by category."""
+    layout = layout_pb2.Layout.FromString(curves_of(directory)["custom_scalars__config__"][0])
+    return {each.title: [tag for chart in each.chart for tag in chart.multiline.tag] for each in layout.category}
+
+
+def empty_charts(directory):
+    tags = curves_of(directory).keys()
+    patterns = [pattern for each in charts_of(directory).values() for pattern in each]
+    assert len(patterns) == len(set(patterns))
+    return [pattern for pattern in patterns if not any(re.match(pattern, tag) for tag in tags)]
+
+
+def test_the_page_of_charts_begins_with_where_it_is_competent_by_places_with_goals(watched):
+    first, *others = charts_of(watched).items()
+    assert first[0] == "Where is it competent (half of the goals met, within 0.05 m), and since when?"
+    titles = [pattern.replace("\\", "") for pattern in first[1]]
+    assert titles[0] == "^met/everywhere$"
+    places = ("x -0.4..-0.05, y 0.4..0.5", "x -0.05..0.3, y 0.4..0.5", "x -0.05..0.3, y 0.5..0.6")
+    assert titles[1:] == [f"^met/{place}$" for place in places]  # and not the one that no goal lies in
+    assert len(others) == 2
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        (),
+        ("--algorithm", "random"),
+        ("--algorithm", "observation", "--repeats", 0),
+        ("--algorithm", "imitation"),
+        ("--algorithm", "sagg-riac"),
+        ("--social", "emulate", "--goals", "uniform"),
+        ("--goals", "grid", "--search", "perturb"),
+    ],
+)
+def test_no_chart_of_the_first_page_is_empty_whatever_the_learner(tmp_path, go, options):
+    assert go(tmp_path, "--board", "true", *options) == 0
+    ((directory,),) = [list(path.glob("seed-*")) for path in tmp_path.iterdir()]
+    assert all(charts_of(directory).values())
+    assert empty_charts(directory) == []
+
+
+def test_a_board_of_your_own_has_all_charts_and_those_of_places_with_goals_have_curves(board):
     directory, _ = board
-    curves = curves_of(directory)
-    layout = layout_pb2.Layout.FromString(curves["custom_scalars__config__"][0])
-    tags = {tag for category in layout.category for chart in category.chart for tag in chart.multiline.tag}
-    missing = {tag.strip("^$") for tag in tags} - curves.keys()
-    assert "^error/mean$" in tags
-    assert all(f"{tag[:-1]}0" in missing for tag in missing)  # parts of a region that was not cut
-    assert {tag.partition("/")[0] for tag in missing} <= {"competence", "interest"}
+    charts = [pattern for each in charts_of(directory).values() for pattern in each]
+    assert {"^error/mean$", "^interest/R$", "^teacher/missed_by$", "^regime/local$", "^regime/imitate$"} < set(charts)
+    assert len(empty_charts(directory)) == 2  # of four places; the two goals lie in the others
+
+
+def test_the_share_of_goals_met_is_counted_by_place_and_everywhere():
+    goals = np.array([[-0.9, -0.9], [-0.8, -0.9], [0.5, 0.5], [0.6, 0.6]])
+    values = Curves(PLANE, near=0.05).of_evaluation(goals, np.array([0.01, 0.2, 0.05, 0.0]), 0.0)
+    assert values["met/everywhere"] == 0.75
+    assert (values["met/x -1..0, y -1..0"], values["met/x 0..1, y 0..1"]) == (0.5, 1)
+    assert "met/x -1..0, y 0..1" not in values  # no goals there
+    assert values["grid_met/x -1..-0.5, y -1..-0.5"] == 0.5
+
+
+def test_a_cell_counts_as_competent_since_half_of_its_goals_are_met_without_interruption():
+    curves = Curves(PLANE)
+    for movements, share in ((250, 0.5), (500, 0.4), (1000, 0.6), (2000, 1.0)):
+        curves.evaluated(movements, {"grid_met/here": share, "grid_met/there": 0.1, "error/mean": 0.2})
+    assert curves.since == {"here": 1000}
+    assert curves.shares == {"here": 1.0, "there": 0.1}
+
+
+def test_a_recalled_evaluation_tells_since_when_it_is_competent(tmp_path):
+    goals, cell = np.array([[0.2, 0.2]]), "x 0..0.5, y 0..0.5"
+    with Board(tmp_path, PLANE) as board:
+        board.movements = 250
+        board.evaluation(goals, np.array([0.01]), 0.0)
+    with Board(tmp_path, PLANE, replace=True) as board:
+        board.movements = 250
+        assert board.recall("error", "grid_met", needs=("error/mean",))
+        board.movements = 500
+        board.evaluation(goals, np.array([0.02]), 0.0)
+        assert board.curves.since == {cell: 250}
+
+
+def test_the_map_says_where_since_when_and_what_is_missing_elsewhere():
+    ax, names = Figure().add_subplot(), Grid(PLANE).names
+    pictures._since(ax, Grid(PLANE), {names[0]: 0.75, names[7]: 0.25}, {names[0]: 1000})
+    texts = {text.get_text(): text.get_position() for text in ax.texts}
+    assert texts == {"since\n1000": (-0.75, -0.75), "25%": (-0.25, 0.75)}  # as the names say
+    assert (names[0], names[7]) == ("x -1..-0.5, y -1..-0.5", "x -0.5..0, y 0.5..1")
+    assert ax.collections[0].get_array()[3, 1] == 0.25
+
+
+def test_the_names_of_regions_lie_where_they_are_and_are_those_of_the_curves():
+    regions = interest_map().regions
+    ax = Figure().add_subplot()
+    pictures._competence(ax, regions, *sections(PLANE))
+    named = branches(regions, 3)
+    places = {text.get_text(): text.get_position() for text in ax.texts}
+    assert places.keys() == {path for path in named if not {f"{path}0", f"{path}1"} & named.keys()}
+    for path, (x, y) in places.items():
+        assert any((r.low <= [x, y]).all() and ([x, y] <= r.high).all() for r in named[path])
 
 
 def test_runs_can_be_compared_by_settings_and_results(board):
@@ -477,10 +568,8 @@ def live_as(out, robot, make, **options):
     return directory.path
 
 
-@pytest.mark.parametrize(("dim", "context_dim", "cells"), [(1, 0, 16), (3, 0, 8), (2, 0, 16), (2, 1, 16), (5, 0, 1)])
-def test_outcomes_of_any_dimension_have_curves_and_cells_and_those_of_the_plane_pictures(
-    tmp_path, dim, context_dim, cells
-):
+@pytest.mark.parametrize(("dim", "context_dim", "cells"), [(1, 0, 16), (3, 0, 8), (2, 0, 16), (2, 1, 16), (6, 0, 1)])
+def test_outcomes_of_any_dimension_have_curves_cells_and_pictures(tmp_path, dim, context_dim, cells):
     directory = live_as(tmp_path, Slider(dim, context_dim), sagg_riac)
     curves, read = curves_of(directory), read_run(directory)
     expected = dict(zip(read.evaluation["movements"], read.evaluation["mean_error_m"], strict=True))
@@ -490,9 +579,9 @@ def test_outcomes_of_any_dimension_have_curves_and_cells_and_those_of_the_plane_
     assert 1 <= len(names) <= cells
     assert all(name.count("..") == dim for name in names)
     assert sum(curves[f"grid_error/{name}"][120] > 0 for name in names) == len(names)
-    pictures = {tag for tag in curves if tag.startswith("map/")}
-    of_regions = {"map/interest", "map/competence"} if context_dim == 0 else set()
-    assert pictures == ({"map/landed", "map/error"} | of_regions if dim == 2 else set())
+    pictures = {tag for tag in curves if tag.startswith(("map/", "competent/"))}
+    wanted = {"map/landed", "map/error", "map/interest", "map/competence"}
+    assert pictures == wanted | ({"competent/since"} if dim == 2 else set())
     assert len(read.regions["low_0"])
     assert f"high_{dim + context_dim - 1}" in read.regions
 
@@ -530,17 +619,19 @@ def test_the_map_of_interest_shows_the_last_hundred_goals(tmp_path):
     goals = read_run(directory).goals
     goals = goals[np.isfinite(goals).all(axis=1)]
     assert len(np.unique(goals, axis=0)) == len(goals) > 100
-    none, regions = np.empty((0, 2)), made[0].autonomous.goals.regions
-    pictures = draw(
-        regions,
+    drawn = pictures.draw(
+        made[0].autonomous.goals.regions,
         robot.outcomes,
         outcomes=goals,
         goals=goals[-100:],
-        demonstrated=none,
+        demonstrated=np.empty((0, 2)),
         benchmark=goals,
         errors=goals[:, 0],
+        cells=Grid(robot.outcomes),
+        shares={},
+        since={},
     )
-    assert curves_of(directory)["map/interest"][120][2] == pictures["interest"]
+    assert curves_of(directory)["map/interest"][120][2] == drawn["map/interest"]
 
 
 def test_the_cells_of_a_grid_are_shown_and_kept_by_a_resumed_run(tmp_path, go):

@@ -12,7 +12,13 @@ from scipy.optimize import minimize
 
 from sgimd_torch.environments.check import check_environment
 from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.environments.protocol import BatchEnvironment, SimulationError, check_movement, execute_many
+from sgimd_torch.environments.protocol import (
+    BatchEnvironment,
+    SimulationError,
+    Sketch,
+    check_movement,
+    execute_many,
+)
 from sgimd_torch.spaces import Array, Box, stream
 
 NO_CONTEXT = np.empty(0)
@@ -285,3 +291,25 @@ def test_an_impossible_arm_is_refused(options):
 def test_a_seed_instead_of_a_generator_is_refused():
     with pytest.raises(TypeError, match="got int; was the seed passed instead of a Generator"):
         PlanarArm(5).execute(NO_CONTEXT, np.full(5, 0.5), 0)
+
+
+def test_a_sketch_lasts_from_its_first_drawing_to_its_last() -> None:
+    assert Sketch(np.zeros(1), 0.1, np.zeros((11, 1, 2))).landed == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("outcome", "step", "chains", "message"),
+    [
+        (np.zeros(2), 0.1, np.zeros((5, 2)), r"chains of a Sketch must be finite numbers .* got shape \(5, 2\)"),
+        (np.zeros(2), 0.1, np.zeros((5, 3, 3)), r"\(n_steps, n_points, 2\), got shape \(5, 3, 3\)"),
+        (np.zeros(2), 0.1, np.zeros((0, 3, 2)), "chains of a Sketch must be finite"),
+        (np.zeros(2), 0.1, np.full((5, 3, 2), np.nan), "chains of a Sketch must be finite"),
+        (np.zeros((1, 2)), 0.1, np.zeros((5, 3, 2)), r"outcome of a Sketch must be finite numbers \(outcome_dim,\)"),
+        (np.array(["far"]), 0.1, np.zeros((5, 3, 2)), "outcome of a Sketch"),
+        (np.zeros(2), 0.0, np.zeros((5, 3, 2)), "step of a Sketch must be above 0 s, got 0.0"),
+        (np.zeros(2), np.nan, np.zeros((5, 3, 2)), "step of a Sketch"),
+    ],
+)
+def test_a_sketch_that_cannot_be_drawn_is_refused(outcome: Array, step: float, chains: Array, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        Sketch(outcome, step, chains)

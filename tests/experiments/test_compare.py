@@ -12,7 +12,7 @@ import pytest
 
 from compare import collect, compared, last_rows, main, runs_of, table_in
 from read_results import GOALS_HEADER, HEADER, read_goals, read_results
-from runs import ROOT, signal_after, start
+from runs import ROOT, signal_after, start, sweep_here
 from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.files import locked
@@ -21,7 +21,6 @@ from sgimd_torch.runs.config import Config, words
 from sgimd_torch.runs.log import RunError
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import Run, read_run
-from sgimd_torch.runs.sweep import sweep
 from tables import RESULTS, Table, goal_rows, goals_claimed, result_rows, tiles_reached
 from variants import ARMS, EXPERIMENTS, make_subsets, shipped, tables_of, teacher_of
 
@@ -133,6 +132,19 @@ def test_a_variant_of_two_experiments_is_one_run_in_the_table_of_each(compare, t
     assert 0 < tiles[0] <= tiles[1] <= 40  # at most one a movement
     again = table(tmp_path / "results/paper.csv")[1]
     assert again == [["learners", *row[1:]] for row in rows if row[1] == "random"]
+
+
+def test_shards_share_out_the_runs_and_one_of_two_experiments_stays_together(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    wanted = ["learners", "forward-model", "--seeds", "0-1", "--results", ".", "--dry-run"]
+    parts = []
+    for shard in ("1/1", "1/3", "2/3", "3/3"):
+        assert command(main, [*wanted, "--shard", shard]) == 0
+        parts.append(capsys.readouterr().out.splitlines())
+    whole, *parts = parts
+    assert sorted(line for part in parts for line in part) == sorted(whole)
+    runs = [{line.partition(": ")[2] for line in part} for part in parts]
+    assert len(set.union(*runs)) == sum(map(len, runs)) < len(whole)
 
 
 def test_what_is_in_one_table_is_still_to_be_done_for_the_other(tmp_path, monkeypatch, capsys):
@@ -355,7 +367,7 @@ def test_rows_are_drawn_by_lot_and_made_again_in_a_folder_of_their_own(tmp_path,
     results = table_in(tmp_path, "forward_model.csv")
     config = Config(algorithm="sgim-d", environment="planar-arm-7", name="sgim-d-arm-7", movements=20)
     again = replace(config, evaluate_at=(20,), floor_at=(), answers=("own", "nearest"), out=tmp_path / "first")
-    assert sweep([again], 1) == []
+    assert sweep_here([again]) == []
     _, row = result_rows("planar-arm-7", again, read_run(again.directory))
     results.merge([row, [*row[:4], 1, 20, "nearest", 0.5, "", 7, 7, 7]])
     words = ["planar-arm-7", "--only", "sgim-d-arm-7", "--results", ".", "--verify", "2", "--processes", "1"]

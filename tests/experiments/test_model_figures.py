@@ -7,10 +7,11 @@ import math
 import numpy as np
 import pytest
 
-from model_figures import LATE, figure_of, main, read_model_run, row
+from model_figures import LATE, figure_of, main, row
 from sgimd_torch.runs.log import Columns
 from sgimd_torch.runs.process import command
 from sgimd_torch.spaces import Episode, Move, stream
+from sgimd_torch.views.model_run import read_model_run
 
 FIRST = 50  # exemplars that are learnt before anything is predicted
 SPREAD = 0.1

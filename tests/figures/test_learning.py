@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from sgimd_torch.figures.axes import limits
 from sgimd_torch.figures.learning import (
     COLOURS,
     NAMES,
@@ -34,7 +35,8 @@ def test_each_landing_point_inside_is_counted_on_its_tile_and_those_outside_are_
     outcomes = np.array([[-0.9, 0.9], [-0.8, 0.8], [0.9, -0.9], [3.0, 0.0]])
     counts = landing_points(ax, outcomes, T, side=1.0).get_array()
     np.testing.assert_array_equal(counts.filled(0), [[0, 1], [2, 0]])  # rows are y, from below
-    assert [text.get_text() for text in ax.texts] == ["1 of 4 landed outside"]
+    assert [text.get_text() for text in ax.texts] == ["1 of 4 landed outside: squares at the edge"]
+    np.testing.assert_array_equal(ax.collections[1].get_offsets(), [[1.0, 0.0]])
 
 
 def test_two_histograms_can_share_their_scale(ax):
@@ -52,6 +54,33 @@ def test_demonstrated_outcomes_are_crosses_and_the_base_is_at_the_origin(ax):
     crosses, base = ax.lines
     np.testing.assert_array_equal(crosses.get_xydata(), demonstrated)
     np.testing.assert_array_equal(base.get_xydata(), [[0, 0]])
+
+
+def test_what_was_demonstrated_several_times_is_one_demonstrated_outcome(ax):
+    demonstrated = np.array([[0.1, 0.2], [-0.3, 0.4], [0.1, 0.2]])
+    landing_points(ax, np.zeros((3, 2)), T, demonstrated=demonstrated)
+    assert ax.lines[0].get_label() == "2 demonstrated outcomes"
+    np.testing.assert_array_equal(ax.lines[0].get_xydata(), demonstrated[:2])
+
+
+@pytest.mark.parametrize("n", [20, 60, 400])
+def test_limits_hold_every_point_but_one_that_is_far_away(n):
+    points = stream(0, "test").uniform([-0.4, 0.1], [0.3, 0.9], (n, 2))
+    near = limits(points)
+    assert near.contains(points).all()
+    assert (near.sides < 1).all()
+    points[n // 2] = [500.0, -3.0]
+    assert (np.abs(limits(points).low - near.low) < 0.1).all()
+    assert (np.abs(limits(points).high - near.high) < 0.1).all()
+
+
+@pytest.mark.parametrize(
+    "points", [[[0.2, 0.3]], [[0.0, 0.0]], [[0.2, 0.3], [0.2, 0.7]], [[-7e-5, 3e-5], [2e-5, 9e-5]]]
+)
+def test_limits_of_few_points_hold_all_of_them(points):
+    box = limits(np.array(points))
+    assert (box.sides > 0).all()
+    assert box.contains(points).all()
 
 
 def test_landing_points_need_a_plane(ax):

@@ -74,6 +74,13 @@ def test_the_share_of_goals_within_a_distance_counts_all_seeds_alike(ax):
     assert "(%)" in ax.get_ylabel()
 
 
+def test_a_row_of_a_forest_without_an_interval_shows_its_seeds_alone(ax):
+    few = Difference("few", np.array([-0.2, -0.1]), -0.15, np.nan, np.nan)
+    (points,) = forest(ax, [few], reference="SGIM-D")
+    np.testing.assert_array_equal(points.get_xdata(), few.seeds)
+    assert not [line for line in ax.lines if line.get_color() == "black"]  # neither mark nor interval
+
+
 def test_a_forest_has_the_best_on_top_and_a_full_mark_where_zero_is_excluded(ax):
     worse = Difference("worse", np.array([0.1, 0.3]), 0.2, 0.1, 0.3)
     unsure = Difference("unsure", np.array([-0.1, 0.2, 0.0]), 0.05, -0.1, 0.2)

@@ -202,6 +202,14 @@ def test_goals_all_over_a_space_are_at_most_500_and_inside():
         assert (np.abs(goals.mean(axis=0) - middle) < 0.05 * half).all()  # evenly
 
 
+@pytest.mark.parametrize("word", CATALOGUE["environment"])
+def test_what_is_said_to_be_filmed_brings_a_picture(word):
+    if word == "swimmer":
+        pytest.importorskip("gymnasium")
+    task = task_of(Config(environment=word))
+    assert CATALOGUE["environment"][word].filmed == (task.picture is not None)
+
+
 def test_a_part_without_its_members_is_refused_by_name():
     with pytest.raises(ValueError, match=r"gave a int without sample, add; wanted \(contexts, outcomes, rng\)"):
         checked("goals", "mine:Own", lambda: 7)()

@@ -1,5 +1,6 @@
 """Runs with a forward model: what they record and report, what they refuse, and that a stop leaves no trace."""
 
+import importlib.metadata
 import json
 import re
 import shlex
@@ -342,6 +343,20 @@ def test_the_board_of_a_run_without_a_model_has_nothing_of_it(tmp_path, live):
     assert not [tag for tag in curves if tag.startswith("model/")]
     assert "model/" not in str(curves["about/legend"])
     assert not [tag for tag in charts_of(curves) if tag.startswith("model/")]
+
+
+def test_its_libraries_are_recorded_and_a_run_of_before_they_were_is_no_run_with_others(tmp_path, live, capsys):
+    assert live(tmp_path, *MODEL, "--movements", 10) == 0
+    path = tmp_path / "sgim-d" / "seed-003" / "versions.json"
+    versions = json.loads(path.read_text())
+    forward = ("torch", "lightning", "safetensors")
+    assert {name: versions[name] for name in forward} == {name: importlib.metadata.version(name) for name in forward}
+    path.write_text(json.dumps({name: value for name, value in versions.items() if name not in forward}))
+    assert live(tmp_path, *MODEL, "--movements", 12, "--resume") == 0
+    assert json.loads(path.read_text()) == versions
+    path.write_text(json.dumps({**versions, "torch": "0.1"}))
+    assert live(tmp_path, *MODEL, "--movements", 14, "--resume") == 0
+    assert f"torch 0.1 -> {versions['torch']}" in capsys.readouterr().err
 
 
 def test_a_run_made_before_there_were_these_options_is_resumed_as_if_they_stood_at_their_defaults(

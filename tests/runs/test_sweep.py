@@ -14,13 +14,13 @@ from pathlib import Path
 
 import pytest
 
-from runs import ROOT, csv_of, signal_after, start
+from runs import ROOT, csv_of, signal_after, start, sweep_here
 from sgimd_torch.files import locked
 from sgimd_torch.runs.command_line import main as run
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import finished, movements_on_disk
-from sgimd_torch.runs.sweep import main, sweep, variants_of
+from sgimd_torch.runs.sweep import main, variants_of
 
 SWEEP = "import sys; from sgimd_torch.runs import process, sweep; sys.exit(process.command(sweep.main))"
 # An arm without physics; 40 movements and one evaluation take a moment.
@@ -88,6 +88,13 @@ def test_values_and_further_options_become_those_of_the_runs():
         ("--vary out=a,b", "--out cannot be given here: all runs of a sweep go to one --out"),
         ("--seed 3", "--seed cannot be given here: --seeds takes them, such as 5, 0-19 or 0,3,7-9"),
         ("--name=mine", "--name cannot be given here"),
+        ("--shard 0/4", "--shard: must be like 1/4, the first of four parts, got '0/4'"),
+        ("--shard 5/4", "--shard: must be like 1/4, .*, got '5/4'"),
+        ("--shard 2", "--shard: must be like 1/4, .*, got '2'"),
+        ("--shard 1/x", "--shard: must be like 1/4, .*, got '1/x'"),
+        ("--engine slurm", "--engine: invalid choice: 'slurm'"),
+        ("--address auto", "--address auto is of a Ray cluster; it needs --engine ray"),
+        ("--engine ray --address auto --processes 2", "--processes cannot be given with --address: a cluster runs as"),
         ("--vary goals=grid --vary goals=uniform", "--goals is there twice"),
         ("--vary task_space=1,2 --task-space 3", "--task-space is there twice"),
         ("--gaols uniform", "unknown option --gaols; did you mean --goals?"),
@@ -123,6 +130,45 @@ def test_seeds_are_one_or_a_range_or_a_list(tmp_path, monkeypatch, capsys):
     assert not list(tmp_path.iterdir())
 
 
+def listed(capsys, *options):
+    """The titles of the runs that are still to be done."""
+    capsys.readouterr()
+    assert swept(*options, "--dry-run") == 0
+    return [line.partition(":")[0] for line in capsys.readouterr().out.splitlines()]
+
+
+def test_shards_are_consecutive_parts_of_the_list_and_together_the_whole(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    options = ["--vary", "goals=interest-map,uniform", "--seeds", "0-4"]
+    whole = listed(capsys, *options)
+    for n in (1, 3, 4, 10, 12):
+        parts = [listed(capsys, *options, "--shard", f"{k}/{n}") for k in range(1, n + 1)]
+        assert [run for part in parts for run in part] == whole
+        assert {len(part) for part in parts} <= {10 // n, -(-10 // n)}
+    assert swept(*options, "--shard", "3/4", "--dry-run") == 0
+    assert "2 runs (2 variants, 5 seeds, shard 3/4 of 10 runs), 0 of them finished: runs" in capsys.readouterr().err
+
+
+def test_a_shard_carries_out_its_runs_alone_and_what_is_finished_does_not_shift_it(tmp_path, capsys):
+    options = [*SHORT, "--seeds", "0-3", "--out", tmp_path]
+    assert swept(*options, "--shard", "2/2") == 0
+    assert [finished(short(tmp_path, seed=seed)) for seed in range(4)] == [False, False, True, True]
+    assert listed(capsys, *options, "--shard", "1/2") == ["random seed 0", "random seed 1"]
+    assert listed(capsys, *options, "--shard", "2/2") == []
+    assert swept(*options, "--shard", "1/9") == 0  # more parts than runs: an empty one
+    assert not finished(short(tmp_path, seed=0))
+
+
+def test_without_ray_the_extra_that_brings_it_is_named(tmp_path):
+    program = f"import sys; sys.modules['ray'] = None; {SWEEP}"
+    process = start(program, *SHORT, "--engine", "ray", "--out", tmp_path / "study")
+    _, said = process.communicate()
+    assert process.returncode == 2
+    slip = "pip install 'sgimd-torch[ray]' installs it"
+    assert said.splitlines()[-1] == f"error: --engine ray needs ray, which is not installed; {slip}"
+    assert not (tmp_path / "study").exists()
+
+
 def test_every_run_is_what_it_would_be_alone_and_a_second_start_does_nothing(tmp_path, capsys):
     options = [*ALONE, "--vary", "algorithm=random,sagg-riac", "--processes", 2, "--out", tmp_path / "study"]
     assert swept(*options, "--seeds", "0-1") == 0
@@ -145,7 +191,7 @@ def test_every_run_is_what_it_would_be_alone_and_a_second_start_does_nothing(tmp
 def whole(tmp_path_factory):
     """A finished run."""
     config = short(tmp_path_factory.mktemp("whole"))
-    assert sweep([config], 1) == []
+    assert sweep_here([config]) == []
     return config
 
 
@@ -219,7 +265,7 @@ def test_without_keep_going_a_failure_stops_the_others_and_is_raised(tmp_path):
     (tmp_path / "random/seed-000").write_text("a file where its directory should be")
     other = long(tmp_path, seed=1)
     with pytest.raises(ValueError, match="random seed 0 failed: "):
-        sweep([long(tmp_path), other], 2, keep_going=False)
+        sweep_here([long(tmp_path), other], 2, keep_going=False)
     assert not locked(other.directory / "lock")
     assert not finished(other)
 
@@ -234,7 +280,7 @@ def test_a_run_that_is_killed_is_named_and_goes_on_next_time(tmp_path):
     assert finished(long(tmp_path, seed=1))
     before = (config.directory / "episodes.csv").read_bytes()
     assert 5 < before.count(b"\n") < 1001
-    assert sweep([config], 1) == []
+    assert sweep_here([config]) == []
     assert (config.directory / "episodes.csv").read_bytes().startswith(before)
 
 
@@ -292,15 +338,15 @@ def test_on_end_is_called_once_for_each_finished_run_and_its_error_is_a_failure(
         if config is whole:
             raise ValueError("its rows are damaged")
 
-    assert sweep(configs, 2, on_end=on_end) == ["random seed 0 failed: its rows are damaged"]
+    assert sweep_here(configs, 2, on_end=on_end) == ["random seed 0 failed: its rows are damaged"]
     assert sorted(ended, key=lambda config: config.seed) == configs
     with pytest.raises(ValueError, match="its rows are damaged"):
-        sweep([whole], 1, on_end=on_end, keep_going=False)
+        sweep_here([whole], on_end=on_end, keep_going=False)
 
 
 def test_two_runs_with_one_directory_are_refused(tmp_path):
     with pytest.raises(ValueError, match=r"two runs would be written to .*seed-000"):
-        sweep([short(tmp_path), short(tmp_path, budget=3)], 1)
+        sweep_here([short(tmp_path), short(tmp_path, budget=3)])
     assert not list(tmp_path.iterdir())
 
 

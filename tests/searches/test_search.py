@@ -302,15 +302,15 @@ def test_perturb_spreads_by_sd_of_each_side_around_the_best_remembered() -> None
     assert executed.std(axis=0) == pytest.approx([0.02, 4.0], rel=5 / 63)
 
 
-def test_practise_spreads_around_what_was_inferred_whatever_comes_of_it() -> None:
+@pytest.mark.parametrize(("theta", "sd"), [((0.3, 5.0), 0.05), ((0.4, 6.0), 0.02)], ids=["a copy", "inferred"])
+def test_practise_spreads_around_the_answer_and_farther_where_it_is_a_copy(theta, sd) -> None:
     policies = Box(np.array([0.0, -100.0]), np.array([1.0, 100.0]))
-    start = Estimate(np.array([0.3, 5.0]), np.array([[0.3, 5.0], [0.5, 0.0]]), np.array([[9.0], [0.0]]))
+    start = Estimate(np.array(theta), np.array([[0.3, 5.0], [0.5, 0.0]]), np.array([[9.0], [0.0]]))
     executed = np.array(
         drive(practise(policies, stream(0, "search"))(start, np.zeros(1)), lambda theta: theta[:1], 2000)
     )
-    assert executed[:, 0].mean() == pytest.approx(0.3, abs=5 * 0.02 / 45)
-    assert executed[:, 1].mean() == pytest.approx(5.0, abs=5 * 4 / 45)
-    assert executed.std(axis=0) == pytest.approx([0.02, 4.0], rel=5 / 63)
+    assert (executed.mean(axis=0) - theta) / (sd * policies.sides) == pytest.approx([0, 0], abs=5 / 45)
+    assert executed.std(axis=0) / policies.sides == pytest.approx([sd, sd], rel=5 / 63)
 
 
 def test_perturb_follows_the_best_it_has_executed() -> None:

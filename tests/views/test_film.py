@@ -13,13 +13,17 @@ from imageio_ffmpeg import get_ffmpeg_exe
 
 from runs import ROOT
 from sgimd_torch.environments.fishing_rod import HOLD, FishingRod
+from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import evaluate
+from sgimd_torch.runs import command_line
 from sgimd_torch.runs.build import build
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.spaces import stream
+from sgimd_torch.views import check
 from sgimd_torch.views.film import command as film
-from sgimd_torch.views.film.camera import PAUSE, RATE, Shot, count_frames, tiled, write_film, write_sheet
+from sgimd_torch.views.film.camera import caption
+from sgimd_torch.views.film.reel import PAUSE, RATE, Shot, count_frames, tiled, write_film, write_sheet
 
 THETAS = stream(0, "film").random((100, 25))[40:]  # some reach the water before the line is let out
 FRAMES = [np.full((48, 64, 3), 4 * k, np.uint8) for k in range(30)]
@@ -117,9 +121,9 @@ def test_the_caption_says_when_the_line_is_let_out_and_how_far_the_goal_was_miss
     recording = next(r for r in recordings if r.let_out is not None)
     shot = Shot(recording, recording.outcome + np.array([0.03, 0.04]))
     assert shot.missed == pytest.approx(0.05)
-    assert "let out" not in shot.caption(recording.let_out)
-    assert "line let out" in shot.caption((recording.let_out + recording.landed) / 2)
-    assert shot.caption(recording.landed).endswith("missed by 5 cm")
+    assert "let out" not in caption(shot, recording.let_out)
+    assert "line let out" in caption(shot, (recording.let_out + recording.landed) / 2)
+    assert caption(shot, recording.landed).endswith("missed by 5 cm")
 
 
 def test_tiles_stand_row_by_row():
@@ -175,7 +179,9 @@ def test_a_forward_model_learns_again_what_it_learnt_in_the_run(tmp_path, go):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ("--goals 0.3", "must be x,y in metres such as 0.3,0.6, got '0.3'"),
+        ("--goals 0.3", "--goals must be 2 numbers each, got 0.3"),
+        ("--goals 0.3,0.6 1,2,3", "--goals must be 2 numbers each, got 1,2,3"),
+        ("--goals 0.3,", "must be numbers such as 0.3,0.6, x and y in metres for the rod, got '0.3,'"),
         ("--goals -0.3,far", "got '-0.3,far'"),
         ("--goals 0.3,0.6 -30,60", "outside"),
         ("--goals nan,0", "must be finite"),
@@ -241,7 +247,8 @@ from dataclasses import replace
 import numpy as np
 from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.spaces import stream
-from sgimd_torch.views.film.camera import Camera, Shot
+from sgimd_torch.views.film.camera import Camera
+from sgimd_torch.views.film.reel import Shot
 
 rod = FishingRod(noise=0.0, threads=1)
 moved = rod.record([], stream(0, "film").random(25), stream(1, "noise"))
@@ -305,6 +312,106 @@ def test_the_handlers_of_signals_are_put_back(run_path):
     before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
     assert command(film.main, [str(run_path), "--goals", "30,0"]) == 2
     assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before
+
+
+ARM = "--environment planar-arm-7 --algorithm sagg-riac --movements 60 --evaluate-at [] --out runs"
+
+
+def live(words):
+    assert command(command_line.main, words.split()) == 0
+
+
+def test_a_recorded_movement_of_an_arm_ends_where_the_executed_one_does():
+    arm, context = PlanarArm(5, noise=0.1, context=True), np.array([0.3])
+    for k in range(5):
+        theta = stream(0, "arm", k).random(5)
+        sketch = arm.record(context, theta, stream(1, "noise", k))
+        np.testing.assert_array_equal(sketch.outcome, arm.execute(context, theta, stream(1, "noise", k)))
+        np.testing.assert_allclose(sketch.chains[-1, -1], sketch.outcome, atol=1e-12)
+        np.testing.assert_allclose(sketch.chains[:, 0], 0)
+        links = np.linalg.norm(np.diff(sketch.chains, axis=1), axis=2)
+        np.testing.assert_allclose(links, 0.2)  # of five links of an arm of 1 m, at every moment
+        np.testing.assert_allclose(sketch.chains[0, -1], [np.cos(0.3), np.sin(0.3)])  # straight, turned by the context
+        assert np.linalg.norm(np.diff(sketch.chains, axis=0), axis=2).max() < 0.6  # without a jump
+    assert sketch.landed == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("gl", ["egl", "disable", "bogus"])
+def test_an_arm_is_filmed_without_opengl(tmp_path, monkeypatch, gl):
+    monkeypatch.chdir(tmp_path)
+    live(ARM)
+    words = "film runs/sagg-riac/seed-000 --goals 0.5,0.5 -0.4,-0.4 --width 320 --sheet sheet.png"
+    process = subprocess.run(
+        [sys.executable, "-m", "sgimd_torch", *words.split()],
+        env={**os.environ, "PYTHONPATH": str(ROOT), "MUJOCO_GL": gl},
+        capture_output=True,
+        text=True,
+    )
+    assert process.returncode == 0, process.stderr
+    assert "after 60 movements: mean distance to the goal" in process.stdout
+    pictures, _ = decoded(tmp_path / "runs/sagg-riac/seed-000.mp4", 240, 320)
+    assert len(pictures) == 2 * np.ceil((1.0 + PAUSE) * RATE)
+    goal = [(p[..., 0] > 180) & (p[..., 2] < 90) & (p[..., 1] > 110) for p in pictures[[0, -1]]]  # the ring, in yellow
+    first, last = (np.argwhere(ring).mean(axis=0) for ring in goal)
+    assert first[1] > last[1]  # right, then left
+    assert first[0] < last[0]  # above, then below
+    assert np.abs(pictures[0] - pictures[60]).max() > 100
+    assert np.abs(pictures[40] - pictures[60]).mean() < 2  # it has arrived
+
+
+@pytest.mark.parametrize(("word", "goal"), [("Slider", "0.4"), ("Slider3", "0.4,0.2,0.9"), ("Slider6", "0,0,0,0,0,1")])
+def test_a_picture_of_ones_own_is_filmed_for_outcomes_of_any_dimension(own, capsys, word, goal):
+    live(f"--environment sliders:{word} --algorithm random --movements 30 --evaluate-at [] --out runs")
+    run = "runs/random/seed-000"
+    assert command(film.main, f"{run} --width 160 --out one.mp4 --goals {goal}".split()) == 0
+    assert command(film.main, f"{run} --width 160 --out six.mp4".split()) == 0
+    one, six = (len(decoded(own / name, 120, 160)[0]) for name in ("one.mp4", "six.mp4"))
+    assert one == np.ceil((1.0 + PAUSE) * RATE)
+    assert six == (5 if word == "Slider" else 6) * one  # two of the six places have one x
+    assert command(film.main, f"{run} --goals 0.1,0.2,0.3,0.4".split()) == 2
+    assert "number" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("word", "code", "message"),
+    [
+        ("sliders:Slider", 0, ""),
+        ("planar-arm-7", 0, ""),
+        ("fishing-rod", 0, ""),
+        ("sliders:NoPicture", 0, ""),
+        ("sliders:OtherPicture", 2, "record() of OtherPicture ends at [0.0, 0.0], execute() with an equal stream at ["),
+        ("sliders:LostPicture", 2, "record() of LostPicture fails: KeyError: 'where'"),
+        ("sliders:WrongPicture", 2, "record() of WrongPicture fails: AttributeError: 'list' object has no"),
+    ],
+)
+def test_the_check_of_an_environment_looks_at_its_picture(own, capsys, word, code, message):
+    assert command(check.main, [word]) == code
+    assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("word", "message"),
+    [
+        ("sliders:NoPicture", "sliders:NoPicture, which cannot be filmed: it brings no picture of its movements, a "),
+        ("crawler", "is of crawler, which cannot be filmed"),
+        (
+            "sliders:WrongPicture",
+            "WrongPicture must give a Sketch with an outcome of 1 dimensions, got list",
+        ),
+        ("sliders:FlatPicture", "chains of a Sketch must be finite numbers (n_steps, n_points, 2), got shape (5, 2)"),
+        ("sliders:OtherPicture", "with an outcome of 1 dimensions, got one of 2"),
+        ("sliders:LostPicture", "record() of LostPicture failed: KeyError: 'where'"),
+    ],
+)
+def test_what_has_no_picture_is_refused_in_a_line(own, capsys, word, message):
+    live(f"--environment {word} --algorithm random --movements 20 --evaluate-at [] --out runs --name one")
+    before = sorted(own.glob("runs/*/*"))
+    capsys.readouterr()
+    assert command(film.main, ["runs/one/seed-000"]) == 2
+    said = capsys.readouterr().err
+    assert message in said
+    assert said.count("\n") == 1
+    assert sorted(own.glob("runs/*/*")) == before
 
 
 def test_the_help_teaches(capsys):

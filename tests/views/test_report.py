@@ -1,7 +1,6 @@
 """The report: one file that shows what the files of runs hold, for one run or many, finished or not."""
 
 import base64
-import html
 import io
 import json
 import re
@@ -9,17 +8,16 @@ import shlex
 import shutil
 import signal
 from dataclasses import replace
-from html.parser import HTMLParser
+from html import escape
 
 import numpy as np
 import pytest
-from markupsafe import escape
 from matplotlib.figure import Figure
 from PIL import Image
 
+from pages import Page, rows_of
 from runs import start
 from sgimd_torch.figures.learning import NAMES
-from sgimd_torch.figures.results import Difference
 from sgimd_torch.runs.command_line import parse
 from sgimd_torch.runs.log import Columns
 from sgimd_torch.runs.process import command
@@ -29,9 +27,10 @@ from sgimd_torch.spaces import Episode, Move
 from sgimd_torch.views.report import command as report
 from sgimd_torch.views.report import figures
 from sgimd_torch.views.report import page as pages_of
+from sgimd_torch.views.report.comparison import Comparison, compare
 from sgimd_torch.views.report.data import Variant, read_life
 from sgimd_torch.views.report.record import AGAIN, doubts
-from sgimd_torch.views.statistics import interquartile_mean
+from sgimd_torch.views.statistics import Interval, interquartile_mean
 
 ODD = "<b>&'$x\" "
 
@@ -62,40 +61,6 @@ def copy(runs, tmp_path):
     return shutil.copytree(runs, tmp_path / "runs")
 
 
-class Page(HTMLParser):
-    """The elements with their attributes, and the text of headings, cells and code; refuses unclosed ones."""
-
-    def __init__(self, text):
-        super().__init__()
-        self.open, self.elements, self.texts = [], [], []
-        self.feed(text)
-        assert self.open == []
-
-    def handle_starttag(self, name, attributes):
-        self.elements.append((name, dict(attributes)))
-        if name == "table":
-            assert self.elements[-2][1]["class"] == "scroll"
-        if name not in ("meta", "link", "img"):
-            self.open.append(name)
-
-    def handle_endtag(self, name):
-        assert self.open.pop() == name
-
-    def handle_data(self, text):
-        self.texts.append((self.open[-1] if self.open else "", text))
-
-    def all(self, name):
-        return [text for element, text in self.texts if element == name]
-
-
-def rows_of(text, caption):
-    """The cells of the first table whose caption begins so, head first."""
-    table = text[text.index(f'<p class="soft">{escape(caption)}') :]
-    table = table[table.index("<tr>") : table.index("</tbody>")]
-    cells = [re.findall("<t[hd][^>]*>(.*?)</t[hd]>", row, re.DOTALL) for row in table.split("</tr>")[:-1]]
-    return [[html.unescape(re.sub("<[^>]*>", "", cell)) for cell in row] for row in cells]
-
-
 @pytest.mark.parametrize("name", ["many", "one"])
 def test_a_page_is_one_file_that_asks_for_nothing_else(pages, name):
     page = Page(pages[name])
@@ -115,6 +80,19 @@ def test_every_image_has_words_for_those_who_do_not_see_it(pages):
     # all curves, differences; each variant its curve; where the float landed of those that move; two maps of one
     assert len(images) == 2 + 3 + 2 + 2
     assert all(given["alt"] for given in images)
+
+
+def test_a_page_without_a_model_has_no_section_of_one(pages):
+    assert "forward model" not in pages["many"].lower()
+
+
+def test_every_table_scrolls_by_itself_so_that_a_narrow_page_reaches_each_column(pages):
+    style = pages["many"][pages["many"].index("<style>") : pages["many"].index("</style>")]
+    assert re.search(r"\.scroll \{[^}]*overflow-x: auto", style)
+    assert not re.search(r"(html|body|main) \{[^}]*overflow", style)
+    scrolled = [given for name, given in Page(pages["many"]).elements if given.get("class") == "scroll"]
+    assert len(scrolled) == len([name for name, _ in Page(pages["many"]).elements if name == "table"])
+    assert all(given["tabindex"] == "0" for given in scrolled)  # also by the keys
 
 
 def test_names_are_text_and_never_markup(pages):
@@ -171,9 +149,8 @@ def test_the_numbers_of_a_variant_are_interquartile_means_over_its_seeds(pages, 
     floors = np.array([evaluation["noise_floor_m"][-1] for evaluation in evaluations])
     cells = page.all("td")
     assert "error after 1000 (m)" in page.all("th")
-    # the interval of two seeds reaches from one to the other
-    assert f"{interquartile_mean(errors):.3f} [{errors.min():.3f}, {errors.max():.3f}]" in cells
-    assert any(cell.startswith(f"{errors.mean() / floors.mean():.2f} [") for cell in cells)
+    assert f"{interquartile_mean(errors):.3f}" in cells
+    assert f"{errors.mean() / floors.mean():.2f}" in cells
     assert all(f"{error:.4f}" in cells for error in errors)
 
 
@@ -187,6 +164,18 @@ def test_what_a_configuration_names_is_not_executed(copy, tmp_path, monkeypatch)
     assert report.main([str(run)]) == 0
     assert not (tmp_path / "was-here").exists()
     assert "they are not known without running hostile:make" in (run / "report.html").read_text()
+
+
+def test_differences_are_those_to_the_baseline_that_was_chosen(runs, pages, tmp_path, capsys):
+    out = tmp_path / "page.html"
+    assert report.main([str(runs), "--baseline", ODD, "--out", str(out)]) == 0
+    captions = [f"Last error minus that of {escape(name)}, paired" for name in ("SGIM-D", ODD)]
+    assert [caption in pages["many"] for caption in captions] == [True, False]
+    assert [caption in out.read_text() for caption in captions] == [False, True]
+    out.unlink()
+    assert command(report.main, [str(runs), "--baseline", "observtion", "--out", str(out)]) == 2
+    assert "did you mean observation?" in capsys.readouterr().err
+    assert not out.exists()
 
 
 def test_only_options_that_differ_are_compared(pages):
@@ -270,7 +259,7 @@ def test_a_damaged_run_alone_has_no_last_error(copy):
 
 
 @pytest.mark.parametrize("dim", [1, 3])
-def test_outcomes_that_are_not_in_the_plane_have_everything_but_maps(copy, dim):
+def test_outcomes_that_are_not_in_the_plane_have_maps_of_strips_or_pairs(copy, dim):
     path = copy / "sgim-d" / "seed-003"
     run, rng = read_run(path), np.random.default_rng(0)
     columns = Columns(0, 2, dim)
@@ -294,7 +283,10 @@ def test_outcomes_that_are_not_in_the_plane_have_everything_but_maps(copy, dim):
         assert f"Its outcomes have {dim} dimension" in text
         assert f"{run.evaluation['mean_error_m'][-1]:.4f}" in Page(text).all("td")
     alts = [given["alt"] for name, given in Page((path / "report.html").read_text()).elements if name == "img"]
-    assert alts == ["Error curve of SGIM-D"]
+    assert alts == [
+        *("Error curve of SGIM-D", "Landing points of SGIM-D"),
+        *("Interest map of SGIM-D", "Interest maps over time of SGIM-D"),
+    ]
 
 
 def test_names_may_be_more_and_in_any_order(copy, monkeypatch):
@@ -325,17 +317,21 @@ def test_algorithms_without_a_colour_of_their_own_can_be_told_apart(copy):
         (path / "config.json").write_text(json.dumps({**config, "algorithm": algorithm}))
         lives.append(read_life(path))
     figure = Figure()
-    figures.curves.__wrapped__(figure, [Variant(life.config["algorithm"], [life]) for life in lives])
+    variants = [Variant(life.config["algorithm"], [life]) for life in lives]
+    figures.curves.__wrapped__(figure, variants, figures.colours_of(variants))
     one, other = figure.axes[0].lines
-    assert one.get_color() == other.get_color()
+    assert one.get_color() != other.get_color()
+    figures.curves.__wrapped__(again := Figure(), variants, {"sixth": "red", "seventh": "red"})
+    one, other = again.axes[0].lines
     assert one.get_linestyle() != other.get_linestyle()
 
 
 def test_a_variant_alone_shows_each_of_its_seeds_and_several_only_their_means(runs):
     lives = [read_life(runs / "sgim-d" / f"seed-00{seed}") for seed in (3, 4)]
     variant, alone, beside = Variant("sgim-d", lives), Figure(), Figure()
-    figures.curves.__wrapped__(alone, [variant])
-    figures.curves.__wrapped__(beside, [variant, Variant("uniform", lives)])
+    colours = {"sgim-d": "red", "uniform": "blue"}
+    figures.curves.__wrapped__(alone, [variant], colours)
+    figures.curves.__wrapped__(beside, [variant, Variant("uniform", lives)], colours)
     drawn = [line.get_ydata().tolist() for line in alone.axes[0].lines]
     assert all(errors in drawn for errors in variant.errors.tolist())
     assert [line.get_ydata().tolist() for line in beside.axes[0].lines] == 2 * [variant.curve[0].tolist()]
@@ -345,7 +341,7 @@ def test_variants_behind_a_curve_do_not_stretch_its_axis(runs):
     life = read_life(runs / "sgim-d" / "seed-003")
     figure, variant, longer = Figure(), Variant("sgim-d", [life]), Variant("uniform", [life])
     longer.evaluated = 100 * longer.evaluated
-    figures.curves.__wrapped__(figure, [variant], behind=[longer])
+    figures.curves.__wrapped__(figure, [variant], {"sgim-d": "red"}, behind=[longer])
     assert 60 <= figure.axes[0].get_xlim()[1] < 70  # movements; the other went on to 6000
 
 
@@ -362,12 +358,12 @@ def test_at_most_four_maps_of_a_run_are_shown_in_rows_of_two(runs, moments, rows
     assert {ax.get_subplotspec().get_geometry()[:2] for ax in maps} == {(rows, columns)}
 
 
-def test_the_rows_of_a_figure_of_differences_are_two_or_three_lines_of_text_high():
-    heights = []
+def test_the_rows_of_a_figure_of_differences_are_two_or_three_lines_of_text_high(runs):
+    variant, heights = Variant("sgim-d", [read_life(runs / "sgim-d" / "seed-003")]), []
     for n in (2, 7):
         figure = Figure()
-        rows = [Difference(f"variant {k}", np.array([1.0, 1.2]), 1.1, 1.0, 1.2) for k in range(n)]
-        figures._forest.__wrapped__(figure, rows, "reference")
+        compared = [Comparison(variant, np.array([0.1, 0.2]), Interval(0.15, 0.1, 0.2)) for _ in range(n)]
+        figures.differences.__wrapped__(figure, compared, variant)
         heights.append(72 * figure.get_size_inches()[1])  # points
     line = 1.2 * figures.STYLE["font.size"]
     assert 1.5 * line < (heights[1] - heights[0]) / 5 < 3 * line
@@ -375,9 +371,8 @@ def test_the_rows_of_a_figure_of_differences_are_two_or_three_lines_of_text_high
 
 def test_a_variant_is_not_compared_with_itself(runs):
     lives = [read_life(runs / "sgim-d" / f"seed-00{seed}") for seed in (3, 4)]
-    reference = Variant("sgim-d", lives)
-    assert figures.differences([reference], reference) == ""
-    assert figures.differences([reference, Variant("again", lives)], reference)
+    baseline, other = Variant("sgim-d", lives), Variant("again", lives)
+    assert [each.variant for each in compare([baseline, other], baseline)] == [other]
 
 
 def test_no_picture_of_a_page_can_be_packed_smaller(pages):

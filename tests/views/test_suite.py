@@ -94,6 +94,8 @@ def test_a_suite_is_run_shown_and_gone_on_with(tmp_path, capsys):
     assert capsys.readouterr().out == ""
     assert suite(*words, "--seeds", "0-1", "--dry-run") == 0
     assert "toss: sagg-riac seed 1: 0 of 40 movements" in capsys.readouterr().out
+    assert suite(*words, "--seeds", "0-1", "--shard", "1/2", "--dry-run") == 0
+    assert capsys.readouterr().out == ""  # the first half of the list is seed 0
 
 
 def test_seeds_give_the_ratio_of_means_and_an_interval_around_it():

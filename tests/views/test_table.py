@@ -12,12 +12,15 @@ from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.views.table import main
 
+SEEDS = 5
+FEW = "fewer than 5 seeds, too few for a verdict or a deviation: sgim-d (1)\n"
+
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory):
     out = tmp_path_factory.mktemp("runs")
     save_benchmark(out / "tiny.npz", Benchmark("FishingRod", np.array([[0.0, 0.6], [0.3, 0.5]]), 0.1))
-    for algorithm, seed in (("random", 0), ("random", 1), ("sgim-d", 0)):
+    for algorithm, seed in (*(("random", seed) for seed in range(SEEDS)), ("sgim-d", 0)):
         options = f"--algorithm {algorithm} --seed {seed} --movements 40 --repeats 2 --evaluate_at 20"
         assert live([*options.split(), "--benchmark", str(out / "tiny.npz"), "--out", str(out)]) == 0
     return out
@@ -33,20 +36,28 @@ def table(*options):
     return command(main, [str(option) for option in options])
 
 
-def test_the_table_gives_mean_and_deviation_over_seeds(runs, capsys):
+def test_the_table_gives_mean_and_deviation_over_five_seeds_or_more_and_a_note_where_there_are_fewer(runs, capsys):
     assert table(runs, "--at", 40) == 0
-    lines = {line.split()[0]: line for line in capsys.readouterr().out.splitlines()}
-    errors = [read_run(runs / "random" / f"seed-00{seed}").evaluation["mean_error_m"][-1] for seed in (0, 1)]
-    assert f"{np.mean(errors):.3f} ± {abs(errors[0] - errors[1]) / np.sqrt(2):.3f}" in lines["random"]
-    assert lines["random"].split()[1] == "2"
+    said = capsys.readouterr()
+    lines = {line.split()[0]: line for line in said.out.splitlines()}
+    errors, few = (
+        np.array([read_run(path).evaluation["mean_error_m"][-1] for path in sorted((runs / name).iterdir())])
+        for name in ("random", "sgim-d")
+    )
+    deviation = np.sqrt(((errors - errors.mean()) ** 2).sum() / (SEEDS - 1))
+    assert f"{errors.mean():.3f} ± {deviation:.3f}" in lines["random"]
+    assert lines["random"].split()[1] == "5"
+    assert lines["sgim-d"].split()[1] == "1"
+    assert f"{few.mean():.3f}" in lines["sgim-d"]
     assert "±" not in lines["sgim-d"]
+    assert said.err == FEW
 
 
 def test_variants_are_compared_where_all_finished_runs_were_evaluated_the_last_time(runs, copied, capsys):
     assert table(copied) == 0
     said = capsys.readouterr()
     assert "at 40 (m)" in said.out
-    assert not said.err
+    assert said.err == FEW
     options = "--algorithm random --name longer --movements 60 --repeats 0 --evaluate_at 20"
     assert live([*options.split(), "--benchmark", str(runs / "tiny.npz"), "--out", str(copied)]) == 0
     capsys.readouterr()
@@ -64,12 +75,14 @@ def test_a_run_that_is_not_finished_is_named_and_left_out_unless_at_says_where_t
     (path / "summary.json").write_text(json.dumps({**summary, "finished": False}))
     assert table(copied) == 0
     said = capsys.readouterr()
-    assert next(line for line in said.out.splitlines() if line.startswith("random")).split()[1] == "1"
-    assert said.err == f"left out: {path} is not finished: 40 of 40 movements; --resume goes on\n"
+    assert next(line for line in said.out.splitlines() if line.startswith("random")).split()[1] == "4"
+    few, left_out = said.err.splitlines()
+    assert "random (4)" in few
+    assert left_out == f"left out: {path} is not finished: 40 of 40 movements; --resume goes on"
     assert table(copied, "--at", 20) == 0
     said = capsys.readouterr()
-    assert next(line for line in said.out.splitlines() if line.startswith("random")).split()[1] == "2"
-    assert not said.err
+    assert next(line for line in said.out.splitlines() if line.startswith("random")).split()[1] == "5"
+    assert said.err == FEW
 
 
 def test_runs_without_a_common_evaluation_need_at(runs, copied, capsys):
@@ -105,11 +118,12 @@ def test_a_damaged_run_is_named_in_one_line_below_the_others(copied, capsys, dam
         (run / "summary.json").write_text("[]")
     assert table(copied) == 0
     said = capsys.readouterr()
-    assert said.err.startswith("left out: ")
-    assert said.err.count("\n") == 1
-    assert str(run) in said.err
+    few, left_out = said.err.splitlines()
+    assert few.startswith("fewer than 5 seeds")
+    assert left_out.startswith("left out: ")
+    assert str(run) in left_out
     counts = {line.split()[0]: line.split()[1] for line in said.out.splitlines()}
-    assert counts == {"variant": "seeds", "random": "1", "sgim-d": "1"}
+    assert counts == {"variant": "seeds", "random": "4", "sgim-d": "1"}
 
 
 def test_where_every_run_is_damaged_there_is_nothing_to_show(copied, capsys):
@@ -119,7 +133,7 @@ def test_where_every_run_is_damaged_there_is_nothing_to_show(copied, capsys):
     said = capsys.readouterr()
     assert not said.out
     assert "there is nothing to compare" in said.err
-    assert said.err.count("summary.json is missing or damaged") == 3
+    assert said.err.count("summary.json is missing or damaged") == SEEDS + 1
 
 
 def test_what_was_not_measured_is_a_dash(runs, capsys):
@@ -127,6 +141,48 @@ def test_what_was_not_measured_is_a_dash(runs, capsys):
     said = capsys.readouterr().out
     assert "nan" not in said
     assert said.splitlines()[1].split()[2] == "-"
+
+
+def last_column(said):
+    """Of each variant, and the head of the column."""
+    head, *lines = said.splitlines()
+    place = head.index("  minus ") + 2
+    return head[place:], {line.split()[0]: line[place:] for line in lines}
+
+
+def test_few_seeds_are_compared_with_the_baseline_by_their_differences_alone(runs, capsys):
+    assert table(runs, "--at", 40, "--baseline", "random") == 0
+    head, found = last_column(capsys.readouterr().out)
+    ours, theirs = (read_run(runs / name / "seed-000").evaluation["mean_error_m"][-1] for name in ("sgim-d", "random"))
+    assert head == "minus random (m)"
+    assert found == {"random": "-", "sgim-d": f"{ours - theirs:+.4f}"}  # of the only seed that both have
+
+
+def test_with_five_seeds_the_difference_to_the_baseline_has_its_interval(tmp_path, capsys):
+    options = ["--environment", "planar-arm-7", "--movements", "30", "--evaluate-at", "30", "--repeats", "0", "--out"]
+    for name in ("random", "sagg-riac"):
+        for seed in range(5):
+            assert live([*options, str(tmp_path), "--algorithm", name, "--seed", str(seed)]) == 0
+    capsys.readouterr()
+    assert table(tmp_path, "--baseline", "sagg-riac") == 0
+    _, found = last_column(capsys.readouterr().out)
+    errors = {
+        name: [read_run(tmp_path / name / f"seed-00{seed}").evaluation["mean_error_m"][-1] for seed in range(5)]
+        for name in ("random", "sagg-riac")
+    }
+    differences = np.sort(np.subtract(errors["random"], errors["sagg-riac"]))
+    assert found["sagg-riac"] == "-"
+    centre, low, high = map(float, found["random"].replace("[", "").replace("]", "").replace(",", "").split())
+    assert centre == pytest.approx(differences[1:4].mean(), abs=6e-5)  # of five, the middle three
+    assert differences[0] - 6e-5 <= low < centre < high <= differences[-1] + 6e-5
+
+
+def test_a_baseline_that_is_no_variant_is_refused_with_the_near_name(runs, capsys):
+    assert table(runs, "--at", 40, "--baseline", "randon") == 2
+    said = capsys.readouterr()
+    assert not said.out
+    assert "got 'randon'; these are random, sgim-d; did you mean random?" in said.err
+    assert said.err.count("\n") == 1
 
 
 def test_the_help_teaches(capsys):

@@ -10,9 +10,12 @@ import sys
 import threading
 import urllib.parse
 import urllib.request
+import zipfile
+from pathlib import Path
 
 import numpy as np
 import pytest
+import tensorboard
 
 from runs import ROOT
 from sgimd_torch.runs.process import command
@@ -45,7 +48,7 @@ def server(runs):
         timer = threading.Timer(120, process.kill)
         timer.start()
         try:
-            said = "".join(process.stdout.readline() for _ in range(4))
+            said = "".join(process.stdout.readline() for _ in range(6))
             address = f"http://127.0.0.1:{port}"
             assert address in said, process.stderr.read()
 
@@ -126,14 +129,29 @@ def test_the_server_explains_its_curves_and_shows_pictures_and_the_page_of_chart
     assert all(tag["description"] for tag in tags.values())
     assert len(tags) < 140
     pictures = ask("images/tags")[RUN]
-    assert pictures.keys() == {"map/competence", "map/interest", "map/landed", "map/error"}
+    assert pictures.keys() == {"competent/since", "map/competence", "map/interest", "map/landed", "map/error"}
     (page,) = [page for page in [ask("custom_scalars/layout")] if page]
-    assert len(page["category"]) == 4
+    assert len(page["category"]) == 3
+
+
+def test_the_first_address_is_the_page_to_begin_with_and_its_charts_show_every_value(server):
+    _, said, _ = server
+    first = re.search(r"http://\S+", said)[0]
+    assert said.index("Begin here") < said.index(first)
+    with DIRECT.open(first, timeout=30) as reply:
+        page = reply.read().decode()
+        assert reply.headers["Content-Type"].startswith("text/html")
+    key, value = re.search(r'localStorage.setItem\("(.*?)", "(.*?)"\)', page).groups()
+    assert value == "false"
+    with zipfile.ZipFile(Path(tensorboard.__file__).with_name("webfiles.zip")) as assets:
+        script = assets.read("index.js").decode()
+    assert f'"{key}",{{defaultValue:!0,useLocalStorage:!0}}' in script  # what TensorBoard reads, and it is on by itself
+    assert re.search(r"location.replace\(\"/#(.*?)\"\)", page)[1].startswith("custom_scalars&_smoothingWeight=0")
 
 
 def test_ctrl_c_ends_it_without_a_traceback(server):
     process, said, _ = server
-    assert "custom_scalars" in said
+    assert "/begin" in said
     process.send_signal(signal.SIGINT)
     _, errors = process.communicate(timeout=30)
     assert process.returncode == 130

@@ -12,60 +12,23 @@ from __future__ import annotations
 import copy
 import math
 import os
-import subprocess
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import suppress
-from dataclasses import dataclass, field
-from itertools import chain, pairwise
+from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any, Final, Self
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
+from PIL import Image
 
 from sgimd_torch.environments.rod_physics import Recording
-from sgimd_torch.files import replacing
 from sgimd_torch.spaces import Array
+from sgimd_torch.views.film.reel import Frame, Shot, captioned, place
 
-try:
-    from imageio_ffmpeg import get_ffmpeg_exe
-    from PIL import Image, ImageDraw, ImageFont
-except ImportError as error:
-    raise ImportError(f"films need {error.name}; install the extra film: pip install 'sgimd-torch[film]'") from error
-
-Frame = NDArray[np.uint8]  # (height, width, 3)
-
-RATE: Final = 25  # frames a second
-PAUSE: Final = 1.6  # s, the landing is shown
 MOST_PAST: Final = 300  # landings that are drawn: this many take as much time as all the rest
 
 _Colour = tuple[float, float, float, float]
 _INK, _FLOAT, _GOAL, _PATH = (0.06, 0.06, 0.08, 1), (0.92, 0.18, 0.06, 1), (1, 0.88, 0.1, 1), (1, 0.6, 0.4, 1)
 _PAST, _RING, _SHADOW = (0.95, 0.97, 1, 0.8), (0.85, 0.92, 0.97, 0.8), (0.05, 0.15, 0.25, 0.6)
-
-
-@dataclass(frozen=True, eq=False)
-class Shot:
-    """One movement to film: the ``goal`` ``(2,)`` m that it is for, a ``title``, and ``past`` landings ``(n, 2)`` m, of
-    which ``MOST_PAST`` are drawn, evenly picked."""
-
-    recording: Recording
-    goal: Array
-    title: str = ""
-    past: Array = field(default_factory=lambda: np.empty((0, 2)))
-
-    @property
-    def missed(self) -> float:
-        """Distance (m) between goal and landing."""
-        return float(np.linalg.norm(self.recording.outcome - self.goal))
-
-    def caption(self, time: float) -> str:
-        """The text below the picture at ``time`` (s)."""
-        recording = self.recording
-        if time >= recording.landed:
-            return f"goal {_place(self.goal)}, landed {_place(recording.outcome)}: missed by {100 * self.missed:.0f} cm"
-        let_out = recording.let_out is not None and time > recording.let_out
-        return f"goal {_place(self.goal)}   {time:.2f} s{'   line let out' if let_out else ''}"
 
 
 class NoGraphics(ImportError):
@@ -91,7 +54,6 @@ class Camera:
         self._data = mujoco.MjData(self._model)
         self._tip = self._model.site("tip").id
         self._line = [self._model.body(f"line_{k:02}").id for k in range(2, 31)]
-        self._font = ImageFont.load_default(height / 24)
         try:
             self._renderer = mujoco.Renderer(self._model, height, width)
         except (
@@ -111,6 +73,7 @@ class Camera:
     def frame(self, shot: Shot, time: float) -> Frame:
         """The scene at ``time`` (s); from the landing on, the landing."""
         recording = shot.recording
+        assert isinstance(recording, Recording)
         time = min(time, recording.landed)
         row = min(round(time / recording.step), len(recording.states) - 1)
         mujoco.mj_setState(self._model, self._data, recording.states[row], mujoco.mjtState.mjSTATE_FULLPHYSICS)
@@ -121,7 +84,7 @@ class Camera:
         self._draw_line(scene, recording, time)
         if time == recording.landed:
             _draw_chain(scene, [np.append(shot.goal, 0.006), np.append(recording.outcome, 0.006)], 0.005, _GOAL)
-        return self._captioned(self._renderer.render(), shot.title, shot.caption(time))
+        return captioned(Image.fromarray(self._renderer.render()), shot.title, caption(shot, time))
 
     def _draw_line(self, scene: mujoco.MjvScene, recording: Recording, time: float) -> None:
         """The line, the float, and where the float has been."""
@@ -135,15 +98,15 @@ class Camera:
         if here[2] > 0.03:
             _draw(scene, mujoco.mjtGeom.mjGEOM_CYLINDER, (0.024, 0.001, 0), np.append(here[:2], 0.008), _SHADOW)
 
-    def _captioned(self, pixels: Frame, title: str, caption: str) -> Frame:
-        image = Image.fromarray(pixels)
-        pen, margin = ImageDraw.Draw(image, "RGBA"), image.height // 48
-        for text, anchor, y in ((title, "la", margin), (caption, "ld", image.height - margin)):
-            if text:
-                left, top, right, bottom = pen.textbbox((2 * margin, y), text, self._font, anchor)
-                pen.rectangle((left - margin, top - margin / 2, right + margin, bottom + margin / 2), (15, 30, 45, 190))
-                pen.text((2 * margin, y), text, "white", self._font, anchor)
-        return np.asarray(image)
+
+def caption(shot: Shot, time: float) -> str:
+    """The text below the picture at ``time`` (s)."""
+    recording = shot.recording
+    assert isinstance(recording, Recording)
+    if time >= recording.landed:
+        return f"goal {place(shot.goal)} m, landed {place(recording.outcome)} m: missed by {100 * shot.missed:.0f} cm"
+    let_out = recording.let_out is not None and time > recording.let_out
+    return f"goal {place(shot.goal)} m   {time:.2f} s{'   line let out' if let_out else ''}"
 
 
 def no_graphics(error: Exception) -> str:
@@ -153,91 +116,6 @@ def no_graphics(error: Exception) -> str:
         f"MuJoCo finds no OpenGL to draw with (MUJOCO_GL={asked}: {error}); without a display set MUJOCO_GL=egl and "
         "install libegl1 (Debian, Ubuntu), or MUJOCO_GL=osmesa and libosmesa6"
     )
-
-
-def shoot(camera: Camera, scenes: Iterable[Sequence[Shot]], *, columns: int = 2) -> Iterator[Frame]:
-    """The frames of a film: scene after scene, the shots of each side by side until all have landed, then a pause."""
-    for shots in scenes:
-        for k in range(_length(shots)):
-            yield tiled([camera.frame(shot, k / RATE) for shot in shots], columns)
-
-
-def landed(camera: Camera, shots: Sequence[Shot], *, columns: int = 2) -> Frame:
-    """The last frame of a scene: all its shots have landed."""
-    return tiled([camera.frame(shot, shot.recording.landed) for shot in shots], columns)
-
-
-def count_frames(scenes: Iterable[Sequence[Shot]]) -> int:
-    """How many frames ``shoot`` yields."""
-    return sum(map(_length, scenes))
-
-
-def tiled(frames: Sequence[Frame], columns: int) -> Frame:
-    """One image made of several of equal size, row by row; empty places are black."""
-    columns = min(columns, len(frames))
-    rows = math.ceil(len(frames) / columns)
-    height, width, _ = frames[0].shape
-    image = np.zeros((rows * height, columns * width, 3), np.uint8)
-    for k, frame in enumerate(frames):
-        y, x = k // columns * height, k % columns * width
-        image[y : y + height, x : x + width] = frame
-    return image
-
-
-def write_film(path: str | os.PathLike[str], frames: Iterable[Frame]) -> None:
-    """An mp4 file that every player opens (H.264, yuv420p); it appears whole or not at all.
-
-    Args:
-        path: ends in .mp4.
-        frames: one or more, all of one size, even in height and width.
-
-    Raises:
-        OSError: ``path`` cannot be written, or the encoder fails.
-    """
-    frames = iter(frames)
-    with replacing(path) as partial:
-        partial.touch()  # fails before the first frame is drawn if the folder is not writable
-        first = next(frames)
-        size = f"{first.shape[1]}x{first.shape[0]}"
-        given = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", size, "-r", str(RATE), "-i", "-"]
-        wanted = ["-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "23", "-movflags", "+faststart", "-f", "mp4"]
-        _encode([get_ffmpeg_exe(), "-v", "error", *given, *wanted, "-y", str(partial)], chain([first], frames))
-
-
-def _encode(command: Sequence[str], frames: Iterable[Frame]) -> None:
-    # In a session of its own, so that Ctrl-C reaches only the process that draws the frames.
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True) as encoder:
-        assert encoder.stdin is not None
-        try:
-            with suppress(BrokenPipeError):  # it failed, and its error output says why
-                for frame in frames:
-                    encoder.stdin.write(frame.tobytes())
-            _, said = encoder.communicate()
-        except BaseException:
-            encoder.kill()
-            raise
-    if encoder.returncode:
-        raise OSError(f"the film was not encoded: {said.decode(errors='replace').strip() or encoder.returncode}")
-
-
-def write_sheet(path: str | os.PathLike[str], frames: Sequence[Frame], *, columns: int = 3, width: int = 420) -> None:
-    """A png file of several frames, each made ``width`` pixels wide. It appears whole or not at all.
-
-    Raises:
-        OSError: ``path`` cannot be written.
-    """
-    height = round(width * frames[0].shape[0] / frames[0].shape[1])
-    small = [np.asarray(Image.fromarray(frame).resize((width, height), Image.Resampling.LANCZOS)) for frame in frames]
-    with replacing(path) as partial:
-        Image.fromarray(tiled(small, columns)).save(partial, "PNG", optimize=True)
-
-
-def _length(shots: Sequence[Shot]) -> int:
-    return math.ceil((max(shot.recording.landed for shot in shots) + PAUSE) * RATE)
-
-
-def _place(point: Array) -> str:
-    return f"({point[0]:.2f}, {point[1]:.2f}) m"
 
 
 def _draw_plane(scene: mujoco.MjvScene, shot: Shot) -> None:

@@ -1,8 +1,10 @@
-"""Film what a run has learnt: the arm casts for chosen goals, with the movements that the run's own memory infers.
+"""Film what a run has learnt: the robot moves for chosen goals, with the movements that the run's own memory infers.
 
-Each goal is answered by the run's inverse model, its memory rebuilt from the log, and executed once with motor noise.
-A yellow ring is the goal, white dots are past landings, circles are half a metre and a metre around the base. If the
-float has not met the water after the movement, the line is let out and the float falls; the film says so.
+Each goal is answered by the run's inverse model, its memory rebuilt from the log, in the middle of C, and executed once
+with noise. Of the rod: a yellow ring is the goal, white dots are past landings, circles are half a metre and a metre
+around the base. If the float has not met the water after the movement, the line is let out and the float falls; the
+film says so. Planar arms, and environments of your own with record(context, theta, rng) -> Sketch, are drawn in the
+plane.
 """
 
 from __future__ import annotations
@@ -12,27 +14,21 @@ import os
 import re
 import sys
 from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Any
-
-if "mujoco" not in sys.modules and sys.platform == "linux":
-    os.environ.setdefault("MUJOCO_GL", "egl")  # draws without a display
-try:
-    import mujoco  # noqa: F401
-except (ImportError, AttributeError, RuntimeError) as error:  # each kind of OpenGL fails in its own way
-    asked = os.environ.get("MUJOCO_GL")
-    raise ImportError(f"MUJOCO_GL={asked} does not work here ({error}); set MUJOCO_GL=egl, or unset it") from error
 
 import numpy as np
 from tqdm import tqdm
 
+from sgimd_torch.environments.protocol import Recorded, Sketch
 from sgimd_torch.runs.build import RunParts, build
-from sgimd_torch.runs.config import Config, from_settings
 from sgimd_torch.runs.log import RunError
-from sgimd_torch.runs.read import Run, read_run
+from sgimd_torch.runs.read import Run, config_of, read_run
 from sgimd_torch.spaces import Array, stream
 from sgimd_torch.strategies import Remember
-from sgimd_torch.views.film.camera import Camera, Shot, count_frames, landed, shoot, write_film, write_sheet
+from sgimd_torch.views.film.reel import Filming, Shot, count_frames, landed, shoot, write_film, write_sheet
+from sgimd_torch.views.film.sketch import Sketchbook, in_picture
 
 AFTER = (100, 500, 1000, 5000)
 EXAMPLES = """examples:
@@ -51,38 +47,53 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     options = _options(argv)
     run = read_run(options.run)
-    parts = build(config_of(run))
-    robot: Any = parts.environment
-    if not (hasattr(robot, "record") and hasattr(robot, "model")):
+    parts = _parts(run)
+    if parts.record is None:
         raise RunError(
-            f"{run.path} is of {run.config['environment']}, which cannot be filmed: it has no model of MuJoCo and no "
-            "method record(context, theta, rng)"
+            f"{run.path} is of {run.config['environment']}, which cannot be filmed: it brings no picture of its "
+            "movements, a method record(context, theta, rng) -> Sketch"
         )
-    goals = robot.outcomes.check("goals", options.goals or _spread(parts.benchmark.goals), "in metres")
+    goals = _goals(options.goals, parts)
     stages = _stages(run, options)
     width = options.width or (480 if len(stages) > 1 else 640)
-    with Camera(robot.model, width=width, height=width * 3 // 4) as camera:
-        shots = _cast(run, parts, robot, goals, stages, say_movements=len(stages) > 1)
+    size = {"width": width, "height": width * 3 // 4}
+    shots = _cast(run, parts, goals, stages, say_movements=len(stages) > 1)
+    with _camera(parts.environment, shots, size) as camera:
         _film(options, camera, [[stage[k] for stage in shots] for k in range(len(goals))])
     for movements, stage in zip(stages, shots, strict=True):
         missed = np.array([shot.missed for shot in stage])
-        print(
-            f"after {movements} movements: mean distance to the goal {missed.mean():.3f} m, at most {missed.max():.3f}"
-        )
+        print(f"after {movements} movements: mean distance to the goal {missed.mean():.3f}, at most {missed.max():.3f}")
     print(f"Film {options.out}" + (f", sheet {options.sheet}" if options.sheet else ""))
     return 0
 
 
-def config_of(run: Run) -> Config:
-    """The configuration of a run.
-
-    Raises:
-        RunError: they make no sense.
-    """
+def _parts(run: Run) -> RunParts:
+    """What made the run. MuJoCo chooses how to draw when it is imported, and may fail then; arms do without it."""
+    if "mujoco" not in sys.modules and sys.platform == "linux":
+        os.environ.setdefault("MUJOCO_GL", "egl")  # draws without a display
+    problem: Exception | None = None
     try:
-        return from_settings(run.config)
-    except (TypeError, ValueError) as error:
-        raise RunError(f"{run.path}/config.json does not describe a run of this version: {error}") from error
+        import mujoco  # noqa: F401
+    except (ImportError, AttributeError, RuntimeError) as error:  # each kind of OpenGL fails in its own way
+        problem = error
+    try:
+        return build(config_of(run))
+    except (ImportError, AttributeError, RuntimeError) as error:
+        if problem is None:
+            raise
+        asked = os.environ.get("MUJOCO_GL")
+        slip = "set MUJOCO_GL=egl, or unset it"
+        raise ImportError(f"MUJOCO_GL={asked} does not work here ({problem}); {slip}") from error
+
+
+def _camera(robot: Any, scenes: Sequence[Sequence[Shot]], size: dict[str, int]) -> AbstractContextManager[Filming]:
+    """What draws these shots."""
+    shots = [shot for scene in scenes for shot in scene]
+    if isinstance(shots[0].recording, Sketch):
+        return nullcontext(Sketchbook(robot.outcomes, shots, **size))
+    from sgimd_torch.views.film.camera import Camera  # only the rod needs OpenGL
+
+    return Camera(robot.model, **size)
 
 
 def remember(run: Run, parts: RunParts, start: int, stop: int) -> None:
@@ -101,11 +112,10 @@ def remember(run: Run, parts: RunParts, start: int, stop: int) -> None:
             parts.model.refresh(memory, goal if np.isfinite(goal).all() else None)
 
 
-def _cast(
-    run: Run, parts: RunParts, robot: Any, goals: Array, stages: Sequence[int], *, say_movements: bool
-) -> list[list[Shot]]:
+def _cast(run: Run, parts: RunParts, goals: Array, stages: Sequence[int], *, say_movements: bool) -> list[list[Shot]]:
     """For each stage, the run's answer to each goal; a goal has the same motor noise at every stage."""
     shots = []
+    robot: Any = parts.environment
     context = (robot.contexts.low + robot.contexts.high) / 2
     title = f"{run.config['name'] or run.config['algorithm']}, seed {run.config['seed']}"
     for before, movements in zip((0, *stages), stages, strict=False):
@@ -117,14 +127,30 @@ def _cast(
         stage = []
         for k, goal in enumerate(goals):
             theta = parts.inverse(context, goal).theta
-            recording = robot.record(context, theta, stream(run.config["seed"], "film", k))
+            recording = _record(parts, context, theta, stream(run.config["seed"], "film", k))
             shown = f"after {movements} movements" if say_movements else f"{title}, after {movements} movements"
             stage.append(Shot(recording, goal, shown, past))
         shots.append(stage)
     return shots
 
 
-def _film(options: argparse.Namespace, camera: Camera, scenes: list[list[Shot]]) -> None:
+def _record(parts: RunParts, context: Array, theta: Array, rng: np.random.Generator) -> Recorded:
+    """A movement, to be drawn."""
+    assert parts.record is not None
+    name, dim = type(parts.environment).__name__, parts.environment.outcomes.dim
+    try:
+        found = parts.record(context, theta, rng)
+    except Exception as error:  # whatever a user's code does
+        raise RunError(f"record() of {name} failed: {type(error).__name__}: {error}") from error
+    if hasattr(found, "states"):  # of the rod in MuJoCo
+        return found
+    if not isinstance(found, Sketch) or len(found.outcome) != dim:
+        what = f"one of {len(found.outcome)}" if isinstance(found, Sketch) else type(found).__name__
+        raise RunError(f"record() of {name} must give a Sketch with an outcome of {dim} dimensions, got {what}")
+    return found
+
+
+def _film(options: argparse.Namespace, camera: Filming, scenes: list[list[Shot]]) -> None:
     # tqdm shows the time left; without a terminal it prints a line now and then
     interval = 0.2 if sys.stderr.isatty() else 10.0
     frames = shoot(camera, scenes)
@@ -147,11 +173,24 @@ def _stages(run: Run, options: argparse.Namespace) -> list[int]:
     return sorted(set(options.after))
 
 
+def _goals(given: list[list[float]] | None, parts: RunParts) -> Array:
+    """``(n, outcome_dim)`` those of the command line, in T; else six of the benchmark's."""
+    space = parts.environment.outcomes
+    wrong = next((goal for goal in given or () if len(goal) != space.dim), None)
+    if wrong is not None:
+        numbers = ",".join(f"{x:g}" for x in wrong)
+        raise ValueError(f"--goals must be {space.dim} number{'s' * (space.dim > 1)} each, got {numbers}")
+    return space.check("goals", given or _spread(parts.benchmark.goals), "in the unit of T")
+
+
 def _spread(goals: Array) -> Array:
-    """``(6, 2)`` the benchmark goals nearest to six places all around, alternately 1 m and 0.6 m away."""
+    """``(6, outcome_dim)`` the goals nearest to six places all around, alternately far from the middle and nearer."""
     angles = np.radians(np.arange(30, 390, 60))
     places = np.array([1.0, 0.6] * 3)[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    nearest = [int(np.linalg.norm(goals - place, axis=1).argmin()) for place in places]
+    points = in_picture(goals)
+    low, high = points.min(axis=0), points.max(axis=0)
+    around = (points - (low + high) / 2) / np.where(low < high, (high - low) / 2, 1.0)
+    nearest = [int(np.linalg.norm(around - place, axis=1).argmin()) for place in places]
     return goals[list(dict.fromkeys(nearest))]
 
 
@@ -164,7 +203,11 @@ def _options(argv: Sequence[str] | None) -> argparse.Namespace:
     )
     parser.add_argument("run", type=Path, help="a run's directory: OUT/NAME/seed-003")
     parser.add_argument(
-        "--goals", type=_goal, nargs="+", metavar="X,Y", help="in m; without it, six of the benchmark's, all around"
+        "--goals",
+        type=_goal,
+        nargs="+",
+        metavar="X,Y",
+        help="in the unit of T, m; without it, six of the benchmark's, all around",
     )
     parser.add_argument("--time-lapse", action="store_true", help="movements for each goal, early and late, tiled")
     parser.add_argument(
@@ -192,10 +235,10 @@ def _options(argv: Sequence[str] | None) -> argparse.Namespace:
 
 def _goal(text: str) -> list[float]:
     try:
-        x, y = map(float, text.split(","))
+        return [float(word) for word in text.split(",")]
     except ValueError:
-        raise argparse.ArgumentTypeError(f"must be x,y in metres such as 0.3,0.6, got {text.strip()!r}") from None
-    return [x, y]
+        wanted = "numbers such as 0.3,0.6, x and y in metres for the rod"
+        raise argparse.ArgumentTypeError(f"must be {wanted}, got {text.strip()!r}") from None
 
 
 def _counts(text: str) -> list[int]:

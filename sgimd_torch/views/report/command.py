@@ -15,6 +15,7 @@ from pathlib import Path
 from sgimd_torch.files import write_bytes
 from sgimd_torch.runs.log import RunError
 from sgimd_torch.runs.process import say
+from sgimd_torch.views.report.comparison import baseline_of
 from sgimd_torch.views.report.data import find, read
 from sgimd_torch.views.report.page import make_films, page
 
@@ -22,6 +23,7 @@ EXAMPLES = """examples:
   sgimd report runs/sgim-d/seed-003               one run, into runs/sgim-d/seed-003/report.html
   sgimd report runs/sgim-d                        all seeds of a variant
   sgimd report runs --out paper.html              every variant in runs, compared
+  sgimd report runs --baseline sagg-riac          the same; differences are those to sagg-riac
   sgimd report runs/sgim-d/seed-003 --film        the same with a film, made first if there is none
 """
 
@@ -41,9 +43,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         variants, unread = read(found)
         for line in unread:
             say(f"left out, damaged: {line}")
+        baseline_of(variants, options.baseline)
         if options.film:
             make_films(variants)
-        write_bytes(out, page(options.runs, variants, unread).encode())
+        write_bytes(out, page(options.runs, variants, unread, options.baseline).encode())
     except KeyboardInterrupt:
         say("stopped; no page was written")
         raise
@@ -70,5 +73,6 @@ def _options(argv: Sequence[str] | None) -> argparse.Namespace:
     )
     parser.add_argument("runs", type=Path, help="a run's directory, a variant's folder, or the --out of sgimd run")
     parser.add_argument("--out", type=Path, metavar="FILE", help="the page (default: RUNS/report.html)")
+    parser.add_argument("--baseline", metavar="NAME", help="variant that the others are compared with, seed by seed")
     parser.add_argument("--film", action="store_true", help="film the runs that are shown, if there is no film yet")
     return parser.parse_args(argv)

@@ -25,7 +25,15 @@ from sgimd_torch.runs.log import RunError
 from sgimd_torch.runs.read import NO_EVALUATION, Run, read_run
 from sgimd_torch.runs.tasks import demonstrations_of
 from sgimd_torch.spaces import Array
-from sgimd_torch.views.statistics import Interval, iqm_interval, mean_over_life, ratio_interval, rng
+from sgimd_torch.views.statistics import (
+    LEAST_SEEDS,
+    Interval,
+    interquartile_mean,
+    iqm_interval,
+    mean_over_life,
+    ratio_interval,
+    rng,
+)
 
 NOISELESS: Final = 1e-9  # m; a lower noise floor is rounding, so errors are not divided by it
 _NEEDED: Final = {"algorithm": str, "seed": int, "movements": int}
@@ -62,10 +70,8 @@ class Life(Run):
 
     @property
     def landed(self) -> Array:
-        """``(n, 2)`` m where movements ended; none if outcomes are not in the plane."""
-        return (
-            self.outcomes[np.isfinite(self.outcomes).all(axis=1)] if self.outcomes.shape[1] == 2 else np.empty((0, 2))
-        )
+        """``(n, outcome_dim)`` m where movements ended."""
+        return self.outcomes[np.isfinite(self.outcomes).all(axis=1)]
 
     @property
     def shown(self) -> NDArray[np.int64]:
@@ -74,16 +80,27 @@ class Life(Run):
 
     @property
     def has_map(self) -> bool:
-        """Whether there is an interest map of the plane to draw."""
-        if not self.regions or not len(self.regions["movements"]):
-            return False
-        return self.outcomes.shape[1] == 2 and "low_2" not in self.regions
+        """Whether there is an interest map to draw."""
+        sides = sum(name.startswith("low_") for name in self.regions or ())  # of contexts, then of outcomes
+        return bool(self.regions and len(self.regions["movements"])) and 0 < self.outcomes.shape[1] <= sides
 
     def at(self, movements: int, column: str = "mean_error_m", answer: str = OWN) -> float:
         """An entry of evaluation.csv, NaN if there is none."""
         evaluation = self.answers.get(answer, NO_EVALUATION)
         found = evaluation[column][evaluation["movements"] == movements]
         return float(found[0]) if len(found) else float("nan")
+
+    def in_contexts(self, movements: int) -> dict[str, float]:
+        """The mean error (m) of its own answers in each part of C, by the part in words; {} without contexts."""
+        if self.by_context is None:
+            return {}
+        names = ("movements", "answer", "context", "low", "high", "mean_error_m")
+        rows = zip(*(self.by_context[name].tolist() for name in names), strict=True)
+        return {
+            f"context {context}: {low:.3g} to {high:.3g}": error
+            for when, answer, context, low, high, error in rows
+            if (when, answer) == (movements, OWN)
+        }
 
     def seconds(self, part: str) -> float:
         """Spent on "physics", "learner" or "evaluation"; NaN if the summary does not have it."""
@@ -183,6 +200,11 @@ class Variant:
         """A column of evaluation.csv over its seeds; None where one of them has no value."""
         return over_seeds(np.array([life.at(movements, column, answer) for life in self.used]))
 
+    @property
+    def few(self) -> bool:
+        """Whether there are too few seeds for intervals."""
+        return len(self.used) < LEAST_SEEDS
+
     @cached_property
     def errors(self) -> Array:
         """``(n_seeds, n)`` m, at ``evaluated``."""
@@ -202,8 +224,9 @@ class Variant:
 
     @cached_property
     def landed(self) -> Array:
-        """``(n, 2)`` m where movements of all its runs ended."""
-        return np.concatenate([life.landed for life in self.lives])
+        """``(n, outcome_dim)`` m where movements of all its runs ended."""
+        dim = self.typical.landed.shape[1]
+        return np.concatenate([life.landed for life in self.lives if life.landed.shape[1] == dim])
 
     @property
     def ratio(self) -> Interval | None:
@@ -211,8 +234,8 @@ class Variant:
         floors = np.array([life.at(self.last, "noise_floor_m") for life in self.used])
         if not self.last_error or not over_seeds(floors) or floors.min() < NOISELESS:
             return None
-        if len(floors) == 1:
-            return over_seeds(self.errors[:, -1] / floors)
+        if self.few:
+            return _point(float(interquartile_mean(self.errors[:, -1]) / interquartile_mean(floors)))
         return ratio_interval(self.errors[:, -1], floors, rng=rng(), paired=True)
 
     @property
@@ -231,14 +254,19 @@ class Variant:
 
 
 def over_seeds(values: Array) -> Interval | None:
-    """Interquartile mean and its 95 % interval; for one seed its value; None if any is missing."""
+    """Interquartile mean and its 95 % interval, NaN with fewer than 5 seeds; None if any value is missing."""
     if not len(values) or not np.isfinite(values).all():
         return None
-    return iqm_interval(values, rng=rng()) if len(values) > 1 else Interval(*map(float, (*values,) * 3))
+    few = len(values) < LEAST_SEEDS
+    return _point(float(interquartile_mean(values))) if few else iqm_interval(values, rng=rng())
+
+
+def _point(value: float) -> Interval:
+    return Interval(value, np.nan, np.nan)
 
 
 def demonstrated(lives: Sequence[Life]) -> tuple[Array, str]:
-    """``(n, 2)`` m what the runs were shown, each demonstration once; and a message if that is not known."""
+    """``(n, outcome_dim)`` m what the runs were shown, each demonstration once; and a message if that is not known."""
     rows = {
         (life.environment, *(str(life.config.get(f"demonstrations{which}")) for which in ("", "_crc32")), row)
         for life in lives
@@ -249,7 +277,7 @@ def demonstrated(lives: Sequence[Life]) -> tuple[Array, str]:
         outcomes = [_recorded(environment, *file)[row] for environment, *file, row in sorted(rows)]
     except (OSError, ValueError, IndexError) as error:
         return np.empty((0, 2)), f"What they were shown is left out: {error}."
-    return np.array(outcomes, dtype=np.float64).reshape(-1, 2), ""
+    return np.array(outcomes, dtype=np.float64).reshape(len(outcomes), -1 if outcomes else 0), ""
 
 
 @cache

@@ -8,7 +8,7 @@ from __future__ import annotations
 import io
 from base64 import b64encode
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import wraps
 from typing import Any, Concatenate, Final, ParamSpec
 
@@ -18,16 +18,17 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from PIL import Image
 
-from sgimd_torch.figures.axes import over_movements
+from sgimd_torch.figures.axes import alike, limits, over_movements, rounded
 from sgimd_torch.figures.learning import COLOURS, interest_map, landing_points, map_after
 from sgimd_torch.figures.movements import interest_over_time
 from sgimd_torch.figures.results import Difference, forest
+from sgimd_torch.figures.sections import Section, of_regions, sections
 from sgimd_torch.spaces import Array, Box
+from sgimd_torch.views.report.comparison import Comparison
 from sgimd_torch.views.report.data import Life, Variant
-from sgimd_torch.views.statistics import difference_interval, paired_differences, rng
 
 P = ParamSpec("P")
-REACH: Final = 1.5  # m; a float or the end of an arm hardly ever lands farther from the base
+TILES: Final = 50  # along the longer side of a map, at most
 GOALS: Final = 100  # the last ones are shown
 MOST_CURVES: Final = 8
 STYLE: Final[Any] = {
@@ -41,6 +42,8 @@ STYLE: Final[Any] = {
 }
 _LINES: Final = ("-", (0, (5, 2)), (0, (1, 1.4)), (0, (6, 2, 1, 2)))  # of variants in one colour
 _MARKERS: Final = "osD^vPX*"
+# Of further variants of an algorithm: after Okabe & Ito and P. Tol, none that an algorithm of the paper has.
+_FURTHER: Final = ("#e69f00", "#56b4e9", "#000000", "#882255", "#999933", "#aa4499", "#44aa99", "#661100")
 _COLOURS_OF_PNG: Final = 256  # a palette; enough for maps on one colour scale and smooth letters
 
 
@@ -70,11 +73,27 @@ def png(draw: Callable[Concatenate[Figure, P], None]) -> Callable[P, str]:
     return address
 
 
+def colours_of(variants: Sequence[Variant]) -> dict[str, str]:
+    """A colour for each variant, by name: the first of each algorithm has the algorithm's, the others one of their own.
+
+    The first is the one with the algorithm's name, else the first by name: so the colours do not depend on results.
+    """
+    ordered = sorted(variants, key=lambda variant: (variant.name != variant.algorithm, variant.name))
+    firsts = {variant.algorithm: variant.name for variant in reversed(ordered)}
+    found = {name: COLOURS[algorithm] for algorithm, name in firsts.items() if algorithm in COLOURS}
+    free = [colour for colour in _FURTHER if colour not in found.values()]
+    others = [variant.name for variant in ordered if variant.name not in found]
+    return found | {name: free[k % len(free)] for k, name in enumerate(others)}
+
+
 @png
-def curves(figure: Figure, variants: Sequence[Variant], behind: Sequence[Variant] = ()) -> None:
+def curves(
+    figure: Figure, variants: Sequence[Variant], colours: Mapping[str, str], behind: Sequence[Variant] = ()
+) -> None:
     """Error against movements: interquartile means over seeds with their intervals, other variants in grey ``behind``.
 
-    A single variant is shown with its seeds, thin, and its noise floor.
+    With few seeds there are points instead of intervals. A single variant is shown with its seeds, thin, and its noise
+    floor.
     """
     if len(variants) > 1:
         figure.set_size_inches(6.8, 4.5)
@@ -83,8 +102,11 @@ def curves(figure: Figure, variants: Sequence[Variant], behind: Sequence[Variant
         ax.plot(other.evaluated, other.curve[0], color="0.8", linewidth=1.2)
     before: Counter[str] = Counter()
     for variant in variants:
-        n, colour, (centre, low, high) = len(variant.used), _colour(variant.algorithm), variant.curve
-        if n > 1:
+        n, colour, (centre, low, high) = len(variant.used), colours[variant.name], variant.curve
+        if n > 1 and variant.few:
+            when = np.broadcast_to(variant.evaluated, variant.errors.shape)
+            ax.scatter(when, variant.errors, s=12, color=colour, alpha=0.6, linewidths=0)
+        elif n > 1:
             ax.fill_between(variant.evaluated, low, high, color=colour, alpha=0.2, linewidth=0)
         if n > 1 and len(variants) == 1:
             ax.plot(variant.evaluated, variant.errors.T, color=colour, linewidth=0.7, alpha=0.4)
@@ -105,7 +127,7 @@ def curves(figure: Figure, variants: Sequence[Variant], behind: Sequence[Variant
 def one_curve(figure: Figure, life: Life) -> None:
     """Of one run: mean, median and 90th percentile of the distances to the benchmark's goals."""
     ax = figure.subplots()
-    columns, colour = life.evaluation, _colour(str(life.config["algorithm"]))
+    columns, colour = life.evaluation, COLOURS.get(str(life.config["algorithm"]), "black")
     when = columns["movements"]
     ax.fill_between(when, columns["median_error_m"], columns["p90_error_m"], color=colour, alpha=0.12, linewidth=0)
     ax.plot(when, columns["p90_error_m"], "^:", color=colour, linewidth=1.2, markersize=4, label="90th percentile")
@@ -115,33 +137,40 @@ def one_curve(figure: Figure, life: Life) -> None:
     _finish(ax, ylabel="distance to benchmark goals (m)")
 
 
-def differences(variants: Sequence[Variant], reference: Variant) -> str:
-    """How much larger last errors are than the reference's, seed by seed; "" without 2 common seeds."""
-    theirs = {life.seed: life.at(reference.last) for life in reference.used}
-    rows = []
+@png
+def differences(figure: Figure, compared: Sequence[Comparison], baseline: Variant) -> None:
+    """How much larger last errors are than the baseline's, seed by seed; without intervals where there are few seeds.
+
+    Args:
+        figure: drawn on.
+        compared: one or more.
+        baseline: what they are compared with.
+    """
+    figure.set_size_inches(6.8, 1.1 + 0.36 * len(compared))
+    rows = [Difference(_plain(each.variant.label), each.seeds, *each.found) for each in compared]
+    forest(figure.subplots(), rows, reference=_plain(baseline.label))
+
+
+def planes_of(variants: Sequence[Variant]) -> dict[tuple[str, int], Box]:
+    """For each environment and outcome_dim the part of T that maps show: where movements of all variants landed."""
+    found: dict[tuple[str, int], list[Array]] = {}
     for variant in variants:
-        ours = {life.seed: life.at(variant.last) for life in variant.used if life.seed in theirs}
-        if variant is reference or variant.last != reference.last or len(ours) < 2:
-            continue
-        pair = ours, {seed: theirs[seed] for seed in ours}
-        interval = difference_interval(*pair, rng=rng())
-        rows.append(Difference(_plain(variant.label), paired_differences(*pair), *interval))
-    return _forest(rows, _plain(reference.label)) if rows else ""
+        if len(variant.landed):
+            box = limits(variant.landed)
+            found.setdefault((variant.typical.environment, box.dim), []).extend([box.low, box.high])
+    return {name: Box(np.min(corners, axis=0), np.max(corners, axis=0)) for name, corners in found.items()}
 
 
 @png
-def _forest(figure: Figure, rows: Sequence[Difference], reference: str) -> None:
-    figure.set_size_inches(6.8, 1.1 + 0.36 * len(rows))
-    forest(figure.subplots(), rows, reference=reference)
-
-
-@png
-def landing(figure: Figure, landed: Array, shown: Array) -> None:
-    """Where movements landed, and the demonstrated outcomes; the plane is large enough for them."""
-    far = float(np.quantile(np.abs(landed).max(axis=1), 0.99))
-    reach = far if far > REACH or 0 < far < REACH / 10 else REACH
-    box, side = Box.cube(-reach, reach, 2), reach / 30
-    landing_points(figure.subplots(), landed, box, demonstrated=shown if len(shown) else None, side=side)
+def landing(figure: Figure, landed: Array, shown: Array, plane: Box) -> None:
+    """Where movements landed, and the demonstrated outcomes, on a part of T; the rest is marked at its edge."""
+    crosses = shown if len(shown) and shown.shape[1] == plane.dim else None
+    panels = sections(plane)
+    for ax, section in zip(_panels(figure, panels), panels, strict=True):
+        sides = section.box.sides
+        longest = float(sides[0] if section.is_strip or not alike(sides) else sides.max())
+        side = rounded(longest / TILES)
+        landing_points(ax, landed, plane, demonstrated=crosses, side=side, section=section)
 
 
 @png
@@ -149,7 +178,9 @@ def interest(figure: Figure, life: Life) -> None:
     """The interest map at the last evaluation, with the goals chosen before it."""
     assert life.regions is not None
     last = map_after(life.regions, life.regions["movements"].max())
-    interest_map(figure.subplots(), *last, goals=life.chosen_goals()[-GOALS:])
+    panels = of_regions(*last[:2], life.outcomes.shape[1])
+    for ax, section in zip(_panels(figure, panels), panels, strict=True):
+        interest_map(ax, *last, goals=life.chosen_goals()[-GOALS:], section=section)
 
 
 @png
@@ -158,11 +189,21 @@ def splitting(figure: Figure, life: Life) -> None:
     assert life.regions is not None
     n = min(4, len(np.unique(life.regions["movements"])))
     axes = figure.subplots(1 + (n > 2), min(2, n), squeeze=False)
-    interest_over_time(axes.flat, life.regions)
+    last = map_after(life.regions, life.regions["movements"].max())
+    interest_over_time(axes.flat, life.regions, of_regions(*last[:2], life.outcomes.shape[1])[0])
     for ax in axes.flat:  # the maps are small
         ax.set_title(ax.get_title().replace(": ", ":\n"), fontsize=10)
         ax.tick_params(labelsize=9)
         ax.label_outer()
+
+
+def _panels(figure: Figure, shown: Sequence[Section]) -> list[Axes]:
+    """An axis for each section, below each other; a strip is low."""
+    if len(shown) > 1:
+        figure.set_size_inches(6, 4.6 * len(shown))
+    elif shown[0].is_strip:
+        figure.set_size_inches(6, 3)
+    return list(figure.subplots(len(shown), 1, squeeze=False).flat)
 
 
 def _floor(ax: Axes, movements: Array, floors: Array) -> None:
@@ -177,10 +218,6 @@ def _finish(ax: Axes, *, ylabel: str = "mean distance to benchmark goals (m)", c
     over_movements(ax, ylabel)
     ax.set_ylim(bottom=0)
     ax.legend(handles=[line for line in ax.lines if not str(line.get_label()).startswith("_")], ncols=columns)
-
-
-def _colour(algorithm: str) -> str:
-    return COLOURS.get(algorithm, "black")
 
 
 def _plain(name: str) -> str:

@@ -18,30 +18,37 @@ from typing import Final
 import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from sgimd_torch.catalogue import ROD
+from sgimd_torch.catalogue import CATALOGUE
 from sgimd_torch.runs.log import RunError
-from sgimd_torch.views.report import figures, record
+from sgimd_torch.views.report import comparison, figures, model, record
 from sgimd_torch.views.report.data import Variant, counted, demonstrated
 from sgimd_torch.views.report.figures import data_uri
-from sgimd_torch.views.statistics import Interval, show
+from sgimd_torch.views.statistics import LEAST_SEEDS, Interval, show
 
 EARLY: Final = 1000  # movements, for the column next to the last error
 ORIGINS: Final = {"global": "global", "local": "local", "imitate": "imitation", "babble": "random", "": "at rest"}
 PARTS: Final = {"physics": "physics (s)", "learner": "learning (s)", "evaluation": "evaluation (s)"}
+FILMED: Final = [word for word, entry in CATALOGUE["environment"].items() if entry.filmed]
 MOST: Final = 3 * 2**20  # bytes of one film
 ROOM: Final = 5 * 2**20  # bytes of all films of a page
 
 
-def page(place: Path, variants: Sequence[Variant], unread: Sequence[str]) -> str:
+def page(place: Path, variants: Sequence[Variant], unread: Sequence[str], baseline: str | None = None) -> str:
     """The page.
 
     Args:
         place: where the runs were found.
         variants: the best first, not empty.
         unread: a line for each run that could not be read.
+        baseline: name of the variant that the others are compared with; see `comparison.baseline_of`.
+
+    Raises:
+        ValueError: the baseline is no variant with errors.
     """
+    reference = comparison.baseline_of(variants, baseline)
     films, notes = read_films(variants)
     lives = [life for variant in variants for life in variant.lives]
+    warnings = [*comparison.few_seeds(variants), *record.doubts(variants), *(f"Left out, damaged: {x}" for x in unread)]
     jinja = Environment(
         loader=FileSystemLoader(Path(__file__).parent), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
@@ -57,13 +64,19 @@ def page(place: Path, variants: Sequence[Variant], unread: Sequence[str]) -> str
         variants=variants,
         single=lives[0] if len(lives) == 1 else None,
         n_runs=len(lives),
-        warnings=[*record.doubts(variants), *(f"Left out, damaged: {line}" for line in unread), *notes],
+        warnings=[*warnings, *notes],
+        baseline=reference,
+        compared=comparison.compare(variants, reference) if reference else [],
+        colours=figures.colours_of(variants),
+        planes=figures.planes_of(variants),
         early=EARLY,
+        least_seeds=LEAST_SEEDS,
         lived=lived(variants),
         films=films,
-        rod=ROD,
+        filmed=FILMED,
         figures=figures,
         record=record,
+        model=model,
         counted=counted,
         demonstrated=demonstrated,
     )
@@ -97,12 +110,12 @@ def find_films(run: Path) -> list[Path]:
 
 
 def make_films(variants: Sequence[Variant]) -> None:
-    """Film the runs of the rod that the page shows, as ``sgimd film`` does, if there is no film yet.
+    """Film the runs that the page shows, as ``sgimd film`` does, if there is no film yet and our robot can be filmed.
 
     Raises:
         RunError: filming failed; the reason is on stderr.
     """
-    for run in [variant.typical.path for variant in variants if variant.typical.environment == ROD]:
+    for run in [variant.typical.path for variant in variants if variant.typical.environment in FILMED]:
         if find_films(run):
             continue
         command = [sys.executable, "-m", "sgimd_torch", "film", "--", str(run)]
@@ -146,10 +159,10 @@ def _still(path: Path) -> str:
 
 
 def _interval(found: Interval | None, form: str = ".3f") -> str:
-    """``0.060 [0.058, 0.062]``; without brackets for one seed, a dash for nothing."""
+    """``0.060 [0.058, 0.062]``; without brackets for few seeds, a dash for nothing."""
     if found is None:
         return "–"
-    return f"{found.value:{form}}" if found.low == found.value == found.high else show(found, form)
+    return f"{found.value:{form}}" if np.isnan(found.low) else show(found, form)
 
 
 def _number(value: float, digits: int) -> str:

@@ -11,7 +11,10 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import Any, Final, NamedTuple
 
+import numpy as np
+
 from sgimd_torch.runs.config import before_there_was_a_choice, having, options, words
+from sgimd_torch.runs.directory import FORWARD
 from sgimd_torch.views.report.data import Life, Variant
 
 AGAIN: Final = "runs/again"  # a folder that holds no run yet
@@ -29,7 +32,8 @@ def doubts(variants: Sequence[Variant]) -> Iterator[str]:
     lives = [(variant.label, life) for variant in variants for life in variant.lives]
     versions = [life.versions for _, life in lives]
     for name in dict.fromkeys(name for each in versions for name in each if name not in ("before", "platform")):
-        values = list(dict.fromkeys(str(each.get(name)) for each in versions))
+        having = [each for each in versions if name in each or name not in FORWARD]
+        values = list(dict.fromkeys(str(each.get(name)) for each in having))
         if len(values) > 1:
             yield f"The runs were made with different versions of {name}: {', '.join(values)}."
     if dirty := sum(str(each.get("commit")).endswith("-dirty") for each in versions):
@@ -62,6 +66,18 @@ def doubts(variants: Sequence[Variant]) -> Iterator[str]:
         some = any(variant.used and variant.used[0].state == "finished" for variant in variants)
         rest = "; maps show them, errors over seeds leave them out" if some else ""
         yield f"{count(len(cut), 'run')} not finished, stopped or still running{rest}: {'; '.join(cut)}."
+
+
+def by_context(variants: Sequence[Variant]) -> Table:
+    """The last error (m) in each part of C, the mean over seeds, of the variants that have contexts."""
+    found = [(v.label, [life.in_contexts(v.last) for life in v.used]) for v in variants]
+    parts = list(dict.fromkeys(part for _, lives in found for life in lives for part in life))
+    rows = []
+    for label, lives in found:
+        means = [np.mean([life.get(part, np.nan) for life in lives]) for part in parts]
+        if any(lives):
+            rows.append((label, [f"{mean:.3f}" if np.isfinite(mean) else "–" for mean in means]))
+    return Table(parts, rows)
 
 
 def versions(variants: Sequence[Variant]) -> Table:

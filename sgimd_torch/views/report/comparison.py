@@ -1,0 +1,78 @@
+"""Variants against a baseline, seed by seed: what can be said of the difference, and when nothing can.
+
+With fewer than `LEAST_SEEDS` common seeds there are points only: no interval and no verdict.
+    chosen = baseline_of(variants, "random"); [(row.variant.label, row.verdict) for row in compare(variants, chosen)]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from sgimd_torch.spaces import Array
+from sgimd_torch.views.report.data import Variant, over_seeds
+from sgimd_torch.views.statistics import LEAST_SEEDS, Interval, paired_differences
+from sgimd_torch.views.table import known
+
+USUAL: Final = "sgim-d"  # the baseline where nobody chose one
+BETTER: Final = "better"
+WORSE: Final = "worse"
+OPEN: Final = "not told apart"
+FEW: Final = f"fewer than {LEAST_SEEDS} common seeds"
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """The last error of a ``variant`` less that of the baseline: ``seeds`` ``(n_seeds,)`` m, one for each common seed,
+    and their interquartile mean ``found`` (m), whose interval is NaN where there are few."""
+
+    variant: Variant
+    seeds: Array
+    found: Interval
+
+    @property
+    def few(self) -> bool:
+        """Whether there are too few seeds for an interval."""
+        return len(self.seeds) < LEAST_SEEDS
+
+    @property
+    def verdict(self) -> str:
+        """What the interval says of the difference."""
+        if self.few:
+            return FEW
+        return BETTER if self.found.high < 0 else WORSE if self.found.low > 0 else OPEN
+
+
+def baseline_of(variants: Sequence[Variant], name: str | None = None) -> Variant | None:
+    """The variant of this ``name``, among those with errors; without a name SGIM-D, else the one with the smallest.
+
+    Raises:
+        ValueError: no variant has this name, or it has no errors to compare with.
+    """
+    evaluated = {variant.name: variant for variant in variants if variant.last_error}
+    if name is None:
+        return evaluated.get(USUAL) or next(iter(evaluated.values()), None)
+    return evaluated[known(name, evaluated)]
+
+
+def compare(variants: Sequence[Variant], baseline: Variant) -> list[Comparison]:
+    """The others against the baseline: those that have a seed in common, and the same number of movements."""
+    theirs = {life.seed: life.at(baseline.last) for life in baseline.used}
+    rows = []
+    for variant in variants:
+        ours = {life.seed: life.at(variant.last) for life in variant.used if life.seed in theirs}
+        if variant is baseline or variant.last != baseline.last:
+            continue
+        seeds = paired_differences(ours, {seed: theirs[seed] for seed in ours})
+        if found := over_seeds(seeds):
+            rows.append(Comparison(variant, seeds, found))
+    return rows
+
+
+def few_seeds(variants: Sequence[Variant]) -> list[str]:
+    """A sentence that names the variants with too few seeds; none where there is nothing to say."""
+    few = [f"{variant.label} ({len(variant.used)})" for variant in variants if 0 < len(variant.used) < LEAST_SEEDS]
+    if not few:
+        return []
+    return [f"Fewer than {LEAST_SEEDS} seeds: {', '.join(few)}. They have points, but no intervals and no verdict."]

@@ -1,0 +1,60 @@
+"""Environments that a user might bring, as a module in the working directory: outcomes of any dimension, a context."""
+
+MODULE = '''
+import numpy as np
+from sgimd_torch import Box
+from sgimd_torch.environments.protocol import Sketch, check_movement
+
+class Slider:
+    """theta: where it slides to, each in [0, 1]; a context, if there is one, shifts it."""
+    dim, context_dim = 1, 0
+    outcome_noise = 0.01
+
+    def __init__(self):
+        self.contexts = Box.cube(-0.1, 0.1, self.context_dim)
+        self.policies, self.outcomes = Box.cube(0, 1, self.dim), Box.cube(-1, 3, self.dim)
+        self.rest = np.zeros(self.dim)
+
+    def observe(self, rng):
+        return self.contexts.sample(rng)
+
+    def execute(self, context, theta, rng):
+        context, theta = check_movement(self, context, theta)
+        return theta + context.sum() + rng.normal(0, self.outcome_noise, self.dim)
+
+    def record(self, context, theta, rng):
+        outcome = self.execute(context, theta, rng)
+        x, y = np.linspace(0, 1, 11), np.sin(np.pi * np.linspace(0, 1, 11))
+        return Sketch(outcome, 0.1, np.stack([outcome[0] * x, y], axis=1)[:, None])
+
+class Slider2(Slider):
+    dim = 2
+
+class Slider3(Slider):
+    dim = 3
+
+class Slider6(Slider):
+    dim = 6
+
+class Shifted(Slider2):
+    context_dim = 2
+
+class NoPicture(Slider):
+    record = None
+
+class WrongPicture(Slider):
+    def record(self, context, theta, rng):
+        return [0.0, 1.0]
+
+class FlatPicture(Slider):
+    def record(self, context, theta, rng):
+        return Sketch(np.zeros(1), 0.1, np.zeros((5, 2)))
+
+class OtherPicture(Slider):
+    def record(self, context, theta, rng):
+        return Sketch(np.zeros(2), 0.1, np.zeros((5, 1, 2)))
+
+class LostPicture(Slider):
+    def record(self, context, theta, rng):
+        return {}["where"]
+'''

@@ -1,0 +1,64 @@
+"""Widening: global exploration as wide as its outcomes can be predicted."""
+
+import numpy as np
+import pytest
+
+from sgimd_torch.algorithms import practice
+from sgimd_torch.environments.fishing_rod import FishingRod
+from sgimd_torch.environments.toys import two_elbows
+from sgimd_torch.inverses.local import NearestNeighbour
+from sgimd_torch.memory import Memory
+from sgimd_torch.searches.widening import Widening
+from sgimd_torch.session import run
+from sgimd_torch.spaces import Box, stream
+
+POLICIES = Box(np.array([-1.0, 0.0]), np.array([3.0, 10.0]))
+
+
+class Oracle:
+    """Expects theta itself, plus an error."""
+
+    def __init__(self, error: float) -> None:
+        self.error = error
+
+    def predict(self, context, theta):
+        return theta + self.error
+
+
+def live(inverse, movements: int = 60, *, told: bool = True) -> tuple[Widening, np.ndarray]:
+    memory = Memory(0, 2, 2)
+    look = Widening(POLICIES, memory, inverse, stream(0, "look"))
+    thetas = []
+    for _ in range(movements):
+        thetas.append(look(np.empty(0)))
+        if told:
+            memory.add(np.empty(0), thetas[-1], thetas[-1])
+    return look, np.array(thetas)
+
+
+def test_it_begins_around_the_middle():
+    _, thetas = live(NearestNeighbour(Memory(0, 2, 2)), 4000)
+    assert thetas.mean(axis=0) == pytest.approx([1.0, 5.0], abs=0.05)
+    assert thetas.std(axis=0) / POLICIES.sides == pytest.approx([0.1, 0.1], rel=0.05)
+
+
+@pytest.mark.parametrize(("error", "width"), [(0.0, 0.3), (100.0, 0.03)])
+def test_good_predictions_widen_it_and_bad_ones_narrow_it(error, width):
+    look, thetas = live(Oracle(error))
+    assert look.width == width
+    spread = thetas[30:].std(axis=0) / POLICIES.sides
+    assert (spread > 0.15).all() if width > 0.1 else (spread < 0.05).all()
+    assert POLICIES.contains(thetas).all()
+
+
+def test_a_movement_that_was_never_made_says_nothing():
+    assert live(Oracle(0.0), told=False)[0].width == 0.1
+
+
+@pytest.mark.parametrize(("make", "least", "most"), [(two_elbows, 0.25, 0.3), (FishingRod, 0.03, 0.25)])
+def test_it_looks_wide_where_movements_are_alike_and_near_where_they_are_not(make, least, most):
+    robot = make()
+    learner = practice(robot, 0)
+    for _ in run(learner, robot, 0, movements=150):
+        pass
+    assert least <= learner.autonomous.look.width <= most

@@ -1,0 +1,130 @@
+"""Goals made from runs: near what they reached, from all of them together, for outcomes of any dimension."""
+
+import numpy as np
+import pytest
+
+from sgimd_torch.evaluation import SIDES, load_benchmark, tile_side
+from sgimd_torch.runs.command_line import main as live
+from sgimd_torch.runs.process import command
+from sgimd_torch.runs.read import read_run
+from sgimd_torch.spaces import Box, stream
+from sgimd_torch.views.benchmark import main
+
+
+def run(*options, movements=300, algorithm="random"):
+    words = f"--algorithm {algorithm} --movements {movements} --evaluate-at [] --out runs"
+    assert command(live, [*words.split(), *map(str, options)]) == 0
+
+
+def goals_of(*options):
+    assert command(main, [*map(str, options), "--out", "goals.npz"]) == 0
+    return load_benchmark("goals.npz")
+
+
+@pytest.mark.parametrize("dim", [1, 2, 3, 6])
+def test_goals_lie_on_tiles_that_were_reached_twice_and_a_run_uses_them(own, capsys, dim):
+    robot = ("--environment", f"sliders:Slider{dim if dim > 1 else ''}")
+    run(*robot, "--seed", 1)
+    run(*robot, "--seed", 2)
+    made = goals_of("runs", "--tiles", "20")
+    assert "600 movements of 2 runs: goals.npz" in capsys.readouterr().out
+    outcomes = np.concatenate([read_run(f"runs/random/seed-00{seed}").outcomes for seed in (1, 2)])
+    tiles, goals = (np.floor((points + 1) / made.side) for points in (outcomes, made.goals))
+    assert len(np.unique(goals, axis=0)) == len(goals)
+    counts = [(tiles == goal).all(axis=1).sum() for goal in goals]
+    assert min(counts) >= 2
+    _, all_counts = np.unique(tiles, axis=0, return_counts=True)
+    assert len(goals) == (all_counts >= 2).sum()  # none is left out
+    capsys.readouterr()
+    words = "--algorithm random --movements 40 --evaluate-at 20 --out judged --benchmark goals.npz"
+    assert command(live, [*robot, *words.split()]) == 0
+    assert "has no benchmark goals" not in capsys.readouterr().err
+    judged = read_run("judged/random/seed-000")
+    assert len(judged.config["benchmark_crc32"]) == 8
+    assert judged.evaluation["movements"].tolist() == [20, 40]
+
+
+def test_runs_are_named_one_by_one_by_variant_or_all_together(own):
+    for seed in (1, 2):
+        run("--environment", "sliders:Slider2", "--seed", seed)
+    files = []
+    for places in (["runs"], ["runs/random"], ["runs/random/seed-002", "runs/random/seed-001", "runs"]):
+        goals_of(*places, "--side", 0.2)
+        files.append((own / "goals.npz").read_bytes())
+    assert files[0] == files[1] == files[2]
+    both, one = (goals_of(place, "--side", 0.05) for place in ("runs", "runs/random/seed-001"))
+    assert len(both.goals) > len(one.goals) > 0
+
+
+def test_side_seed_and_reached_at_least_are_the_users(own):
+    run("--environment", "sliders:Slider2")
+    wide = goals_of("runs", "--side", 0.5, "--seed", 3)
+    assert wide.side == 0.5
+    other = goals_of("runs", "--side", 0.5, "--seed", 4)
+    assert (np.floor(wide.goals / 0.5) == np.floor(other.goals / 0.5)).all()
+    assert not (wide.goals == other.goals).any()
+    assert len(goals_of("runs", "--side", 0.1, "--at-least", 1).goals) > len(goals_of("runs", "--side", 0.1).goals)
+
+
+def test_the_sides_tried_in_the_plane_of_the_paper_are_five_to_twenty_centimetres():
+    """So the command makes the same benchmark of the rod as the script that it replaced."""
+    assert (np.linspace(0.05, 0.2, 301) == 2.0 * SIDES).all()
+    outcomes = stream(0, "test").uniform(-1, 1, (5000, 2))
+    assert tile_side(outcomes, Box.cube(-1, 1, 2), 400) in np.linspace(0.05, 0.2, 301)
+
+
+@pytest.mark.parametrize(("dim", "most"), [(1, 1.1), (2, 1.2), (3, 1.4), (6, 4)])  # 2, 3 or 4 tiles a side of 6
+def test_about_as_many_goals_as_wanted_are_made_also_where_little_of_a_large_space_was_reached(dim, most):
+    outcomes = stream(0, "test").uniform(-1, 1, (20_000, dim))
+    for reach in (1.0, 1.5, 100.0):
+        box = Box.cube(-reach, reach, dim)
+        side = tile_side(outcomes, box, 200)
+        _, counts = np.unique(np.floor((outcomes + reach) / side), axis=0, return_counts=True)
+        assert 1 / most <= (counts >= 2).sum() / 200 <= most
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ("nowhere --out g.npz", "nowhere does not exist; runs are in OUT/NAME/seed-000"),
+        ("sliders.py --out g.npz", "sliders.py is no folder"),
+        (". --out g.npz", ". holds no runs"),
+        ("runs --out g.csv", "--out must be a .npz file in a folder that exists, got g.csv"),
+        ("runs --out no/g.npz", "--out must be a .npz file in a folder that exists"),
+        ("runs --out g.npz --side 0", "--side must be a positive number, got 0"),
+        ("runs --out g.npz --side nan", "--side must be a positive number, got nan"),
+        ("runs --out g.npz --side 5", "--side must be at most 4, the longest side of T, got 5"),
+        ("runs --out g.npz --side 1e-9", "no tile of 1e-09 was reached 2 times: 60 of 60 movements ended in T"),
+        ("runs --out g.npz --tiles 0", "--tiles must be a whole number >= 1, got 0"),
+        ("runs --out g.npz --at-least 0", "--at-least must be a whole number >= 1"),
+        ("runs --out g.npz --seed -1", "--seed must be a whole number >= 0"),
+        ("runs more --out g.npz", "all runs must be of one environment with one T: runs/random/seed-000 is of Slider2"),
+        ("runs", "the following arguments are required: --out"),
+        ("runs --out g.npz --side 1 --tiles 9", "not allowed with argument"),
+    ],
+)
+def test_what_cannot_be_made_is_refused_in_a_line_and_nothing_is_written(own, capsys, options, message):
+    run("--environment", "sliders:Slider2", movements=60)
+    run("--environment", "sliders:Slider3", "--out", "more", movements=20)
+    before = sorted(path for path in own.rglob("*") if "__pycache__" not in str(path))
+    capsys.readouterr()
+    try:
+        code = command(main, options.split())
+    except SystemExit as end:
+        code = end.code
+    said = capsys.readouterr().err
+    assert code == 2
+    assert message in said
+    assert "Traceback" not in said
+    assert sorted(path for path in own.rglob("*") if "__pycache__" not in str(path)) == before
+
+
+def test_a_damaged_run_counts_up_to_its_first_bad_line(own, capsys):
+    run("--environment", "sliders:Slider2", movements=60)
+    log = own / "runs/random/seed-000/episodes.csv"
+    lines = log.read_bytes().splitlines(keepends=True)
+    log.write_bytes(b"".join([*lines[:31], b"torn\n", *lines[32:]]))
+    goals_of("runs", "--side", 1.0)
+    said = capsys.readouterr()
+    assert "30 movements of 1 run:" in said.out
+    assert "episodes.csv is damaged at line 32" in said.err
