@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sgimd_torch.files import checksum
-from sgimd_torch.runs.config import OWN, Config, before_there_was_a_choice, from_settings, having, options
+from sgimd_torch.runs.config import FILES, OWN, Config, before_there_was_a_choice, from_settings, having, options
 from sgimd_torch.runs.log import Columns, RunError, read_json
 from sgimd_torch.runs.tables import EVALUATION, SMALL, small_table
 from sgimd_torch.spaces import Array
@@ -175,7 +175,7 @@ def finished(config: Config) -> bool:
         evaluated = not config.evaluations or all(config.movements in movements for movements in last)
         found, place = from_settings({**before_there_was_a_choice(), **settings}), having("place")
         same = all(getattr(found, name) == getattr(config, name) for name in options() if name not in place)
-        files = [(name, getattr(config, name)) for name in ("benchmark", "demonstrations")]
+        files = [(name, getattr(config, name)) for name in FILES]
         return (whole and evaluated and same) and all(
             file is None or settings.get(f"{name}_crc32") in (None, checksum(file)) for name, file in files
         )

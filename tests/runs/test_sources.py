@@ -87,7 +87,7 @@ def test_processes_of_many_runs_find_the_working_directory(own, module):
     )
     program = "import sys; from sgimd_torch.__main__ import main; sys.exit(main())"
     words = {
-        "sweep": "sweep --environment sliders:Slider3 --vary algorithm=random,learners:mine",
+        "sweep": "sweep --environment sliders:Slider3 --vary algorithm=learners:mine",
         "views.suite": "suite --tasks crawler --algorithm learners:mine",
     }[module]
     done = subprocess.run(

@@ -288,7 +288,7 @@ def test_what_is_filmed_after_some_movements_does_not_know_what_came_later(run_p
     x, y = read_run(run_path).outcomes[-1]
     sheets = []
     for path in (tmp_path / "sgim-d" / "seed-003", run_path):
-        lapse = ("--goals", f"{x},{y}", "--time-lapse", "--after", "20", "--sheet", "sheet.png")
+        lapse = ("--goals", f"{x},{y}", "--time-lapse", "--after", "20", "--sheet", "sheet.png", "--width", "160")
         code, _, errors = filmed(path, tmp_path, "egl", *lapse)
         if "MUJOCO_GL" in errors:  # a machine without EGL
             return
