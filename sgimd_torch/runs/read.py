@@ -144,8 +144,7 @@ def runs_below(place: Path) -> list[Path]:
     patterns = ("config.json", "seed-*/config.json", "*/seed-*/config.json")
     found = [config.parent for pattern in patterns for config in sorted(place.glob(pattern))]
     if not found:
-        why = "holds no runs" if place.is_dir() else "is no folder" if place.exists() else "does not exist"
-        raise RunError(f"{place} {why}; runs are in OUT/NAME/seed-000")
+        raise _no_runs(place)
     return found
 
 
@@ -159,8 +158,13 @@ def find_runs(out: str | os.PathLike[str]) -> dict[str, list[Path]]:
     for config in sorted(Path(out).glob("*/seed-*/config.json")):
         found.setdefault(config.parent.parent.name, []).append(config.parent)
     if not found:
-        raise RunError(f"{out} holds no runs; they are in OUT/NAME/seed-000")
+        raise _no_runs(Path(out))
     return found
+
+
+def _no_runs(place: Path) -> RunError:
+    why = "holds no runs" if place.is_dir() else "is no folder" if place.exists() else "does not exist"
+    return RunError(f"{place} {why}; runs are in OUT/NAME/seed-000")
 
 
 def finished(config: Config) -> bool:
