@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import os
 import sys
 from collections.abc import Sequence
 from typing import Final, NamedTuple
@@ -57,6 +58,8 @@ sgimd COMMAND --help explains a command; sgimd --version prints the version."""
 
 def main() -> int:
     """Run the command that the first word names; the exit code."""
+    for library in ("OMP", "OPENBLAS", "MKL"):  # matrices are small here: their threads would only wait for each other
+        os.environ.setdefault(f"{library}_NUM_THREADS", "1")
     return command(_call)
 
 

@@ -33,6 +33,7 @@ class Entry:
         fixed: its parameter -> value; a text with a colon is an attribute, loaded like ``at``.
         also: options that matter with it, but are used by another part.
         ignores: options that have no effect with it, though others use them.
+        answers: of an algorithm: its learner's own answer stands in the place of the default of --inverse.
         learns_with: of an inverse: the one to use while learning, if it is another one.
         label, colour: what figures call it, and how they draw it.
         filmed: of an environment: whether `sgimd film` shows it.
@@ -44,6 +45,7 @@ class Entry:
     fixed: Mapping[str, object] = field(default_factory=dict)
     also: tuple[str, ...] = ()
     ignores: tuple[str, ...] = ()
+    answers: bool = False
     learns_with: str | None = None
     label: str = ""
     colour: str = "black"
@@ -130,7 +132,8 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
         "sagg-riac": _at("algorithms:sagg_riac", "goal babbling", uses=_PURSUES, label="SAGG-RIAC", colour="#0072b2"),
         "practice": _at(
             "algorithms:practice",
-            "one movement a goal, as a local process answers; evaluate it with --inverse process",
+            "one movement a goal, as a local process answers",
+            answers=True,
             label="Practice",
             colour="#332288",
         ),
@@ -139,6 +142,7 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
             "the same, and does once what it is shown; best with --teacher initial --every 1",
             uses=_SHOWN,
             also=_TAUGHT,
+            answers=True,
             label="Practice, taught",
             colour="#aa4499",
         ),

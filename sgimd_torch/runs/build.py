@@ -79,8 +79,11 @@ def build(config: Config) -> RunParts:
         teacher = parts["teacher"](demonstrations, stream(config.seed, "teacher"))
     learner = parts["algorithm"](task.environment, config.seed)
     words = {answer: config.inverse if answer == OWN else answer for answer in config.answered}
+    if config.entry("algorithm").answers and config.inverse == Config.inverse:
+        words[OWN] = OWN
     inverses = {
-        word: parts.maker("inverse", word, learning=False)(learner.memory) for word in dict.fromkeys(words.values())
+        word: learner.inverse if word == OWN else parts.maker("inverse", word, learning=False)(learner.memory)
+        for word in dict.fromkeys(words.values())
     }
     return RunParts(
         config=config,

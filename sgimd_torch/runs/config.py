@@ -151,7 +151,10 @@ class Config:
         before=-0.5,
     )
     inverse: str = option(
-        "linear", LEARNER, "Which movement is inferred for a goal, when learning and in evaluations.", leads=True
+        "linear",
+        LEARNER,
+        "Which movement is inferred for a goal, when learning and in evaluations; practice has one of its own.",
+        leads=True,
     )
     members: int = option(3, MODEL, "Number of networks.", least=1, most=100, slip="5 are many", before=3)
     noise_heads: bool = option(True, MODEL, "Whether its noise depends on the movement.", before=True)

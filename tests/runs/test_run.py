@@ -131,6 +131,7 @@ def test_a_run_has_the_answers_that_were_asked_for_and_its_log_does_not_depend_o
     ("answers", "message"),
     [
         ("linear", "answers must begin with own and name each once, got linear"),
+        ("process,own", "answers must begin with own and name each once, got process,own"),
         ("own,own", "answers must begin with own and name each once, got own,own"),
         ("own,liner", "unknown inverse 'liner', .*did you mean linear"),
     ],
@@ -420,10 +421,12 @@ def test_evaluate_at_may_be_joined_by_an_equals_sign(tmp_path, go):
     assert read_run(tmp_path / "sgim-d" / "seed-003").evaluation["movements"].tolist() == [5, 6, 8]
 
 
-def test_a_signal_waits_for_the_next_check_but_where_it_may_come_at_once():
+@pytest.mark.parametrize("after_another", [False, True])
+def test_a_signal_waits_for_the_next_check_but_where_it_may_come_at_once(after_another):
     with Stopping() as stopping:
-        with stopping.at_once():
-            pass
+        if after_another:
+            with stopping.at_once():
+                pass
         try:
             signal.raise_signal(signal.SIGTERM)
         except Stopped:
@@ -474,3 +477,26 @@ def test_a_run_finishes_whatever_happens_to_its_output(tmp_path, benchmark, redi
     assert "Traceback" not in done.stderr
     assert "Exception ignored" not in done.stderr
     assert read_run(tmp_path / "Å" / "seed-003").summary["finished"] is True
+
+
+@pytest.mark.parametrize(("chosen", "threads"), [({}, "1"), ({"OMP_NUM_THREADS": "3"}, "3")])
+def test_small_matrices_get_one_thread_unless_the_user_chose(chosen, threads):
+    program = "import os, sys; from sgimd_torch.__main__ import main; main(); print(os.environ['OMP_NUM_THREADS'])"
+    others = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
+    said = subprocess.run(
+        [sys.executable, "-c", program, "--version"], env=others | chosen, capture_output=True, text=True, check=True
+    ).stdout
+    assert said.split()[-1] == threads
+
+
+def test_practice_answers_by_its_own_inverse_unless_another_is_named(tmp_path):
+    learning = ["--algorithm", "practice", "--environment", "two-elbows", "--movements", "60", "--evaluate-at", "60"]
+    options = [*learning, "--repeats", "0", "--answers", "own,process,nearest", "--out", str(tmp_path)]
+    errors = {}
+    for name, more in (("default", []), ("named", ["--inverse", "nearest"])):
+        assert main([*options, "--name", name, *more]) == 0
+        answers = read_run(tmp_path / name / "seed-000").answers
+        errors[name] = {answer: float(table["mean_error_m"][-1]) for answer, table in answers.items()}
+    assert errors["default"]["own"] == errors["default"]["process"] != errors["default"]["nearest"]
+    assert errors["named"]["own"] == errors["named"]["nearest"]
+    assert errors["named"]["process"] == errors["default"]["process"]  # learning is the same

@@ -5,7 +5,6 @@ with Local(processes=4) as engine: failures = sweep(configs, engine)
 
 from __future__ import annotations
 
-import os
 import signal
 import subprocess
 import sys
@@ -136,14 +135,12 @@ class Job:
     def _process(self, stopped: Callable[[], bool]) -> tuple[int, bool]:
         """Start its process, wait for it, stop it where asked to; its exit code, and whether it was stopped."""
         command = [sys.executable, *self.program, "run", "--resume", *self.flags, *words(vars(self.config))]
-        one_thread = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL")}
         with self.log.open("wb") as log:
             process = subprocess.Popen(
                 command,
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=log,
-                env={**os.environ, **one_thread},
                 process_group=0,  # only we get Ctrl-C, and pass it on
             )
         try:
