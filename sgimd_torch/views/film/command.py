@@ -210,11 +210,11 @@ def _options(argv: Sequence[str] | None) -> argparse.Namespace:
     options = parser.parse_args(words)
     if options.after and not options.time_lapse:
         parser.error("--after belongs to --time-lapse")
-    if options.out is None:
-        options.out = Path(f"{options.run.resolve()}{'-time-lapse' if options.time_lapse else ''}.mp4")
     for path, suffix in ((options.out, ".mp4"), (options.sheet, ".png")):
         if path is not None and (path.suffix != suffix or path.is_dir() or not path.parent.is_dir()):
             parser.error(f"must be a {suffix} file in a folder that exists, got {path}")
+    if options.out is None:
+        options.out = Path(f"{options.run.resolve()}{'-time-lapse' if options.time_lapse else ''}.mp4")
     return options
 
 
