@@ -16,7 +16,7 @@ import numpy as np
 from sgimd_torch.competence import Competence
 from sgimd_torch.goals.protocol import Goals
 from sgimd_torch.memory import Memory
-from sgimd_torch.spaces import Array, Attempt, Box, Demonstration, Estimate, Move, Search, check_count
+from sgimd_torch.spaces import Array, AskingAttempt, Attempt, Box, Demonstration, Estimate, Move, Search, check_count
 
 Judge = Callable[[Array, Array, Array], float]
 """(context, goal, outcomes of the attempt) -> the competence at the goal when the attempt has ended, in [-1, 0]."""
@@ -27,9 +27,10 @@ Look = Callable[[Array], Array]
 
 
 class Strategy(Protocol):
-    """What a learner does on its own. An attempt stays in one context, and has to yield at least once."""
+    """What a learner does on its own. An attempt stays in one context, and has to yield at least one movement or rest,
+    also if its requests are not answered."""
 
-    def attempt(self, context: Array) -> Attempt:
+    def attempt(self, context: Array) -> AskingAttempt:
         """Movements for one goal, or one movement without a goal."""
         ...
 
