@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sgimd_torch.goals.regions import Progress, Region, between_interests, gained_progress, interest_of
 from sgimd_torch.goals.tiling import Tiling
-from sgimd_torch.spaces import Array, Box, check_count
+from sgimd_torch.spaces import Array, Box
 
 
 class InterestMap:
@@ -37,7 +37,6 @@ class InterestMap:
             a large space.
         progress: what counts as progress: `gained_progress`; `absolute_progress`, which is eq. (3); `signed_progress`;
             `paired_progress`; or a function of your own.
-        least: goals that a region needs before it has any interest.
         contrast: (region, which of its goals are below a cut) -> how much the cut tells apart.
 
     Raises:
@@ -58,7 +57,6 @@ class InterestMap:
         min_side: float = 1 / 15,
         max_aspect: float = 5.0,
         progress: Progress = gained_progress,
-        least: int = 4,
         contrast: Callable[[Region, NDArray[np.bool_]], float] = between_interests,
     ) -> None:
         if window % 2 or not 4 <= window <= g_max:
@@ -68,7 +66,7 @@ class InterestMap:
             raise ValueError(f"needs {wanted}, got {cuts}, {min_side}, {max_aspect}")
         self.g_max, self.cuts, self.min_side, self.max_aspect = g_max, cuts, min_side, max_aspect
         self.contrast = contrast
-        measure = partial(interest_of, window=window, progress=progress, least=check_count("least", least, 1))
+        measure = partial(interest_of, window=window, progress=progress)
         self._tiling = Tiling(contexts, outcomes, rng, measure, modes=modes, near=near)
 
     @property

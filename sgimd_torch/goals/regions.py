@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from sgimd_torch.spaces import Array
 
 Progress = Callable[[Array, Array, Array], float]
-"""(points, competences, gains) of a window of n goals, oldest first -> how much the robot progresses. Points
+"""(points, competences, gains) of a window of n >= 4 goals, oldest first -> how much the robot progresses. Points
 ``(n, dim)`` lie in C x T; competences ``(n,)`` were measured there when the attempts ended; gains ``(n,)`` say how much
 each attempt raised the competence at its own goal."""
 
@@ -61,14 +61,12 @@ def _rise(competences: Array) -> float:
     return float(newer.sum() - older.sum()) / (2 * half)
 
 
-def interest_of(
-    points: Array, competences: Array, gains: Array, *, window: int, progress: Progress, least: int = 4
-) -> float:
+def interest_of(points: Array, competences: Array, gains: Array, *, window: int, progress: Progress) -> float:
     """Progress over the last ``window`` goals, at ``points`` ``(n, dim)`` with ``competences`` and ``gains`` ``(n,)``.
 
-    Deviation: 0 for fewer than ``least`` goals; of 4, where the halves of eq. (3) have one value or none.
+    Deviation: 0 for fewer than 4 goals, where the halves of eq. (3) have one value or none.
     """
-    if len(competences) < least:
+    if len(competences) < 4:
         return 0.0
     return progress(points[-window:], competences[-window:], gains[-window:])
 

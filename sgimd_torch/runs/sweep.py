@@ -213,7 +213,7 @@ def variants_of(varied: Sequence[str], options: Sequence[str]) -> tuple[list[Con
 
 def _uses_working_directory(config: Config) -> bool:
     """Whether one of its parts comes from a module there, which was loaded when it was chosen."""
-    modules = [sys.modules.get(str(getattr(config, kind)).partition(":")[0]) for kind in CATALOGUE]
+    modules = [sys.modules.get(word.partition(":")[0]) for kind in CATALOGUE for word in config.choices(kind)]
     return any(Path(module.__file__ or "").is_relative_to(Path.cwd()) for module in modules if module)
 
 
