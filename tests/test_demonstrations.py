@@ -147,6 +147,8 @@ def test_a_file_written_by_hand_as_documented_is_read(tmp_path: Path) -> None:
         (changed("lengths", [[2, 3]]), "axes"),
         (changed("lengths", np.zeros(0, dtype=int)), "no demonstration"),
         (changed("lengths", [2, 2, 1]), "fewer than 2"),
+        (changed("lengths", np.ones(100_000, dtype=int)), "fewer than 2"),
+        (changed("lengths", np.ones(100_001, dtype=int)), "at most 100000 are read"),
         (changed("outcomes", np.zeros((3, 2))), "3 outcomes"),
         (changed("contexts", np.zeros((1, 0))), "1 contexts"),
         (changed("trajectories", np.zeros((4, 6))), "truncated"),

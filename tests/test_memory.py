@@ -257,6 +257,8 @@ def test_a_flipped_bit_in_the_arrays_is_noticed(tmp_path: Path) -> None:
         ({"outcomes": np.zeros((3, 2), dtype=np.float32)}, "float32"),
         ({"thetas": np.full((3, 1), np.nan)}, "finite"),
         ({"thetas": np.array([[{}]] * 3)}, "more than numbers"),
+        ({"thetas": np.full((3, 100_000), np.nan)}, "finite"),
+        ({"thetas": np.zeros((3, 100_001))}, "1 to 100000 dimensions"),
         ({"context_weight": -1.0}, "context_weight"),
         ({"context_weight": np.ones(2)}, "a number"),
     ],

@@ -5,7 +5,7 @@ import pytest
 
 from sgimd_torch.competence import Competence, absolute_performance
 from sgimd_torch.memory import Memory
-from sgimd_torch.memory.neighbours import EXACT_UP_TO, PolicyNeighbours, Table, TreeNeighbours
+from sgimd_torch.memory.neighbours import EXACT_UP_TO, PolicyNeighbours, Table, TreeNeighbours, _Flat
 from sgimd_torch.spaces import Array, stream
 
 
@@ -55,6 +55,17 @@ def test_many_copies_of_one_outcome_make_no_deep_tree() -> None:
     side = TreeNeighbours(table(rows))
     for query in (np.zeros(2), np.full(2, 0.25), np.ones(2)):
         assert side.nearest(query, 20).tolist() == nearest(rows, query, 20)
+
+
+def test_what_is_proposed_is_nearest_and_the_rest_lies_beyond_while_the_table_grows() -> None:
+    rows, query, keys = structured(3000, 25), stream(1, "query").random(25), Table(25)
+    proposing = _Flat(keys, 0)  # whose failures nobody would see: all rows are looked at where too few are proposed
+    for start, stop in ((0, 1000), (1000, 1001), (1001, 3000)):
+        keys.append(rows[start:stop])
+        (proposed,), beyond = proposing.propose(query[None], 40)
+        expected = nearest(rows[:stop], query, 40)
+        assert sorted(proposed.tolist()) == sorted(expected)
+        assert beyond == pytest.approx(np.square(rows[expected[-1]] - query).sum(), rel=1e-5)
 
 
 def test_policies_are_compared_with_all_up_to_the_stated_number() -> None:
@@ -134,15 +145,15 @@ def test_the_nearest_outcome_asked_again_stays_the_oldest_of_equals() -> None:
     assert rows == [0, 1, 1, 1, 4, 4, 6, 6]
 
 
-def test_the_range_of_thetas_is_that_of_all_of_them_whenever_it_is_asked_for() -> None:
+@pytest.mark.parametrize("moments", [(0, 1, 1, 7, 200), (7, 200)])
+def test_the_range_of_thetas_is_that_of_all_of_them_whenever_it_is_asked_for(moments: tuple[int, ...]) -> None:
     rng, memory = stream(0, "test"), Memory(0, 3, 1)
-    assert np.isinf(memory.theta_range).all()
-    for n in (1, 1, 7, 200):
+    for n in moments:
         for theta in rng.normal(size=(n, 3)):
             memory.add([], theta, [0.0])
         lowest, highest = memory.theta_range
-        assert np.array_equal(lowest, memory.thetas.min(axis=0))
-        assert np.array_equal(highest, memory.thetas.max(axis=0))
+        assert np.array_equal(lowest, memory.thetas.min(axis=0, initial=np.inf))
+        assert np.array_equal(highest, memory.thetas.max(axis=0, initial=-np.inf))
 
 
 def test_nothing_is_kept_twice_where_there_is_no_context() -> None:

@@ -608,6 +608,32 @@ def test_the_regions_of_any_goal_model_are_shown(tmp_path):
     assert {"competence/R0", "region_size/R1", "map/interest"} < curves.keys()
 
 
+def test_the_map_of_interest_shows_the_last_hundred_goals(tmp_path):
+    robot, made = Slider(2), []
+
+    def make(environment, seed):
+        made.append(sagg_riac(environment, seed, budget=1))
+        return made[0]
+
+    directory = live_as(tmp_path, robot, make)
+    goals = read_run(directory).goals
+    goals = goals[np.isfinite(goals).all(axis=1)]
+    assert len(np.unique(goals, axis=0)) == len(goals) > 100
+    drawn = pictures.draw(
+        made[0].autonomous.goals.regions,
+        robot.outcomes,
+        outcomes=goals,
+        goals=goals[-100:],
+        demonstrated=np.empty((0, 2)),
+        benchmark=goals,
+        errors=goals[:, 0],
+        cells=Grid(robot.outcomes),
+        shares={},
+        since={},
+    )
+    assert curves_of(directory)["map/interest"][120][2] == drawn["map/interest"]
+
+
 def test_the_cells_of_a_grid_are_shown_and_kept_by_a_resumed_run(tmp_path, go):
     options = (*OPTIONS, "--goals", "grid")
     assert go(tmp_path / "whole", *options) == go(tmp_path / "made_longer", *options, "--movements", 130) == 0

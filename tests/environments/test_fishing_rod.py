@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from sgimd_torch.environments.check import check_environment
-from sgimd_torch.environments.fishing_rod import HOLD, JOINTS, FishingRod
+from sgimd_torch.environments.fishing_rod import HOLD, JOINT_RANGES, JOINTS, MODEL, FishingRod
 from sgimd_torch.environments.protocol import SimulationError
+from sgimd_torch.environments.rod_physics import TOP_SPEED, Caster
 from sgimd_torch.learner import Learner
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, Box, stream
@@ -273,6 +274,16 @@ def test_a_divergence_is_an_error_that_names_its_theta() -> None:
         cast(unstable(), theta)
     assert np.array_equal(raised.value.theta, theta)
     assert str(theta[0]) in str(raised.value)
+
+
+@pytest.mark.usefixtures("mujoco_log")
+@pytest.mark.parametrize(("speed", "diverges"), [(2 * TOP_SPEED, False), (4 * TOP_SPEED, True)])
+def test_a_line_of_which_only_the_last_hinge_is_too_fast_has_diverged(speed: float, diverges: bool) -> None:
+    posture = JOINT_RANGES.low + JOINT_RANGES.sides / 2
+    caster = Caster(MODEL, posture, threads=1)
+    caster.home[caster.model.nq + caster.model.nv] = speed  # a third of it is left after a step
+    _, diverged = caster.cast([np.tile(posture, (3, 1))], np.array([2 * caster.timestep]))
+    assert diverged.tolist() == [diverges]
 
 
 @pytest.mark.usefixtures("mujoco_log")

@@ -59,6 +59,8 @@ def test_interest_over_time_shows_first_and_last_map_on_one_scale():
     axes = Figure().subplots(1, 2)
     drawn = interest_over_time(axes, history(100, 200, 300))
     assert [len(regions.get_paths()) for regions in drawn] == [1, 3]
+    extents = [path.get_extents().extents.tolist() for path in drawn[1].get_paths()]
+    assert extents == [[0, 0, 1, 1], [1, 0, 2, 1], [2, 0, 3, 1]]  # from x and y to x and y (m)
     assert [regions.get_clim() for regions in drawn] == [(0, 0.3), (0, 0.3)]
     assert [ax.get_title() for ax in axes] == ["after 100 movements: 1 region", "after 300 movements: 3 regions"]
 

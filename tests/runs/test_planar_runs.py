@@ -77,8 +77,9 @@ def test_goals_for_an_arm_lie_within_reach_one_a_tile_and_evenly(n_joints):
     assert np.array_equal(goals, arm_benchmark(PlanarArm(n_joints)).goals)
 
 
-def test_the_tiles_of_rod_and_arm_begin_at_one_corner():
+def test_rod_and_arm_have_one_task_space_so_that_their_tiles_begin_at_one_corner():
     assert FishingRod().outcomes.low.tolist() == PlanarArm().outcomes.low.tolist() == [-1, -1]
+    assert FishingRod().outcomes.high.tolist() == PlanarArm().outcomes.high.tolist() == [1, 1]
     benchmark = Benchmark("PlanarArm", np.array([[-0.95, 0.95], [0.95, 0.05]]), 0.1)
     assert tiles_reached(np.array([[-0.99, 0.91], [0.85, 0.05], [0.95, -0.05]]), benchmark) == 1
 

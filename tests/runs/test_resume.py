@@ -444,3 +444,15 @@ def test_a_line_of_evaluations_that_means_nothing_is_dropped(tmp_path, go, refer
     assert go(tmp_path, "--resume") == 0
     assert "evaluation.csv: dropped" in capsys.readouterr().err
     assert csv_of(directory) == reference
+
+
+def test_the_versions_of_each_part_of_a_run_are_kept(tmp_path, go):
+    path = tmp_path / "sgim-d" / "seed-003" / "versions.json"
+    short = ("--movements", 3, "--evaluate_at", "[]")
+    assert go(tmp_path, *short) == 0
+    for other in ("1.0", "2.0"):
+        path.write_text(json.dumps({**json.loads(path.read_text()), "numpy": other}))
+        assert go(tmp_path, *short, "--resume") == 0
+    now = json.loads(path.read_text())
+    assert now["numpy"] == np.__version__
+    assert [part["numpy"] for part in now["before"]] == ["1.0", "2.0"]

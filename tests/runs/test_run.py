@@ -131,6 +131,7 @@ def test_a_run_has_the_answers_that_were_asked_for_and_its_log_does_not_depend_o
     ("answers", "message"),
     [
         ("linear", "answers must begin with own and name each once, got linear"),
+        ("process,own", "answers must begin with own and name each once, got process,own"),
         ("own,own", "answers must begin with own and name each once, got own,own"),
         ("own,liner", "unknown inverse 'liner', .*did you mean linear"),
     ],
@@ -420,10 +421,12 @@ def test_evaluate_at_may_be_joined_by_an_equals_sign(tmp_path, go):
     assert read_run(tmp_path / "sgim-d" / "seed-003").evaluation["movements"].tolist() == [5, 6, 8]
 
 
-def test_a_signal_waits_for_the_next_check_but_where_it_may_come_at_once():
+@pytest.mark.parametrize("after_another", [False, True])
+def test_a_signal_waits_for_the_next_check_but_where_it_may_come_at_once(after_another):
     with Stopping() as stopping:
-        with stopping.at_once():
-            pass
+        if after_another:
+            with stopping.at_once():
+                pass
         try:
             signal.raise_signal(signal.SIGTERM)
         except Stopped:

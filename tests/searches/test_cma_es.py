@@ -98,6 +98,8 @@ def test_movements_come_from_the_stream_alone_and_nothing_is_written(tmp_path, m
     assert not np.isclose(first[1:], other[1:]).all(axis=1).any()
     assert str(np.random.get_state()) == numpy_state  # noqa: NPY002
     assert list(tmp_path.iterdir()) == []
+    (tmp_path / "cma_signals.in").write_text("{'maxfevals': 1}")  # by which the package would take orders
+    assert np.array_equal(world.run(cma_es(UNIT, stream(1, "search")), 40), first)
     assert capfd.readouterr() == ("", "")
 
 

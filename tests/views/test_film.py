@@ -279,6 +279,7 @@ def test_a_frame_shows_the_arm_as_it_was_and_rings_on_the_water_about_base_and_g
     assert ring[:, 0].max() > row + 5  # also between float and camera
     white = np.flatnonzero((seen["landed"][:420].min(axis=2) > 180).any(axis=0))  # above the caption
     assert np.ptp(white) > 640 / 2  # the ring one metre from the base; all else that is white stands near the middle
+    assert ((red > 200) & (abs(green - 150) < 40) & (blue < 140)).sum() > 300  # the path of the float, orange
     assert 0 < (np.abs(seen["past"] - seen["landed"]).max(axis=2) > 30).sum() < 200  # two small tiles
 
 

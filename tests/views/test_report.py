@@ -1,15 +1,19 @@
 """The report: one file that shows what the files of runs hold, for one run or many, finished or not."""
 
+import base64
+import io
 import json
 import re
 import shlex
 import shutil
 import signal
+from dataclasses import replace
 from html import escape
 
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from PIL import Image
 
 from pages import Page, rows_of
 from runs import start
@@ -23,9 +27,10 @@ from sgimd_torch.spaces import Episode, Move
 from sgimd_torch.views.report import command as report
 from sgimd_torch.views.report import figures
 from sgimd_torch.views.report import page as pages_of
+from sgimd_torch.views.report.comparison import Comparison, compare
 from sgimd_torch.views.report.data import Variant, read_life
 from sgimd_torch.views.report.record import AGAIN, doubts
-from sgimd_torch.views.statistics import interquartile_mean
+from sgimd_torch.views.statistics import Interval, interquartile_mean
 
 ODD = "<b>&'$x\" "
 
@@ -143,6 +148,7 @@ def test_the_numbers_of_a_variant_are_interquartile_means_over_its_seeds(pages, 
     errors = np.array([evaluation["mean_error_m"][-1] for evaluation in evaluations])
     floors = np.array([evaluation["noise_floor_m"][-1] for evaluation in evaluations])
     cells = page.all("td")
+    assert "error after 1000 (m)" in page.all("th")
     assert f"{interquartile_mean(errors):.3f}" in cells
     assert f"{errors.mean() / floors.mean():.2f}" in cells
     assert all(f"{error:.4f}" in cells for error in errors)
@@ -337,6 +343,44 @@ def test_variants_behind_a_curve_do_not_stretch_its_axis(runs):
     longer.evaluated = 100 * longer.evaluated
     figures.curves.__wrapped__(figure, [variant], {"sgim-d": "red"}, behind=[longer])
     assert 60 <= figure.axes[0].get_xlim()[1] < 70  # movements; the other went on to 6000
+
+
+@pytest.mark.parametrize(("moments", "rows", "columns"), [(1, 1, 1), (2, 1, 2), (3, 2, 2), (4, 2, 2), (9, 2, 2)])
+def test_at_most_four_maps_of_a_run_are_shown_in_rows_of_two(runs, moments, rows, columns):
+    life, figure = read_life(runs / "sgim-d" / "seed-003"), Figure()
+    last = life.regions["movements"] == 60
+    once = {name: column[last] for name, column in life.regions.items()}
+    regions = {name: np.tile(column, moments) for name, column in once.items()}
+    regions["movements"] = np.repeat(100 * np.arange(1, moments + 1), last.sum())
+    figures.splitting.__wrapped__(figure, replace(life, regions=regions))
+    maps = [ax for ax in figure.axes if ax.get_title()]
+    assert len(maps) == min(moments, 4)
+    assert {ax.get_subplotspec().get_geometry()[:2] for ax in maps} == {(rows, columns)}
+
+
+def test_the_rows_of_a_figure_of_differences_are_two_or_three_lines_of_text_high(runs):
+    variant, heights = Variant("sgim-d", [read_life(runs / "sgim-d" / "seed-003")]), []
+    for n in (2, 7):
+        figure = Figure()
+        compared = [Comparison(variant, np.array([0.1, 0.2]), Interval(0.15, 0.1, 0.2)) for _ in range(n)]
+        figures.differences.__wrapped__(figure, compared, variant)
+        heights.append(72 * figure.get_size_inches()[1])  # points
+    line = 1.2 * figures.STYLE["font.size"]
+    assert 1.5 * line < (heights[1] - heights[0]) / 5 < 3 * line
+
+
+def test_a_variant_is_not_compared_with_itself(runs):
+    lives = [read_life(runs / "sgim-d" / f"seed-00{seed}") for seed in (3, 4)]
+    baseline, other = Variant("sgim-d", lives), Variant("again", lives)
+    assert [each.variant for each in compare([baseline, other], baseline)] == [other]
+
+
+def test_no_picture_of_a_page_can_be_packed_smaller(pages):
+    source = next(given["src"] for name, given in Page(pages["one"]).elements if name == "img")
+    content, again = base64.b64decode(source.partition(",")[2]), io.BytesIO()
+    with Image.open(io.BytesIO(content)) as picture:
+        picture.save(again, "png", optimize=True)
+    assert len(content) <= len(again.getvalue())
 
 
 def test_of_options_that_differ_only_values_that_most_variants_share_are_pale(pages, copy):
