@@ -2,8 +2,8 @@
 
 Section 6 of Nguyen & Oudeyer (2014). Each row compares groups of movements: one-way analyses of variance, one for each
 dimension of theta, their p values adjusted by Holm's method for their number. A demonstrator's movements are the thetas
-that reproduce their recordings best, eq. (6); the same number of random ones is drawn
-from Pi. Movements of one run repeat and refine each other, so a run counts as one: the mean theta that it executed.
+that reproduce their recordings best, eq. (6); the same number of random ones is drawn from Pi. Movements of one run
+repeat and refine each other, so a run counts as one: the mean theta that it executed.
 
 The rows are kept in results/anova.csv, since run directories are not shipped:
     update_anova(Path("results/anova.csv"), Path("runs")); anova_cells(Path("results/anova.csv"))
@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 import numpy as np
+from scipy import stats
 
 from judging import NotRun
 from read_results import number, read_rows, read_seeds
@@ -23,7 +24,7 @@ from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.environments.fishing_rod import JOINTS, FishingRod
 from sgimd_torch.runs.process import say
 from sgimd_torch.spaces import Array, stream
-from sgimd_torch.views.statistics import SEED, Anova, anova
+from sgimd_torch.views.statistics import LEVEL, SEED
 from tables import Table
 from variants import shipped
 
@@ -33,6 +34,21 @@ TAUGHT: Final = {1: "sgim-d-teacher-1", 2: "sgim-d-teacher-2", 3: "sgim-d"}  # S
 
 
 Gather = Callable[[Path], Sequence[Array]]  # the groups of one comparison, from the folder of run directories
+
+
+class Anova(NamedTuple):
+    """One test for each dimension: ``p`` ``(dim,)``, and ``adjusted`` ``(dim,)`` for their number (Holm, 1979).
+
+    The smallest of ``adjusted`` is the p of "the groups have the same mean in all dimensions" (Bonferroni).
+    """
+
+    p: Array
+    adjusted: Array
+
+    @property
+    def rejected(self) -> int:
+        """In how many dimensions the means differ; the chance that any of them is wrong is at most 5 %."""
+        return int((self.adjusted <= 1 - LEVEL).sum())
 
 
 class Compared(NamedTuple):
@@ -60,6 +76,37 @@ def compare(runs: Path) -> tuple[list[Compared], dict[str, str]]:
     return found, missing
 
 
+def anova(*groups: Array) -> Anova:
+    """Do these sets of movements have different means? One-way analysis of variance in each dimension of theta.
+
+    Section 6 of Nguyen & Oudeyer (2014): demonstrations against random movements, and the movements that learners
+    executed against each other. Rows must be independent of each other. The movements of one run are not, because they
+    repeat and refine each other: there a row must be the mean theta of a run, else p is far too small.
+
+    Args:
+        groups: ``(n, theta_dim)`` each, two or more groups.
+
+    Raises:
+        ValueError: fewer than 2 groups, a group of fewer than 2 rows, unequal dimensions, values that are not finite,
+            or a dimension in which no group varies.
+    """
+    arrays = [np.asarray(group, dtype=np.float64) for group in groups]
+    shapes = [array.shape for array in arrays]
+    if len(shapes) < 2 or any(len(shape) != 2 or shape[0] < 2 for shape in shapes) or len({s[1] for s in shapes}) > 1:
+        raise ValueError(f"anova needs two or more groups (n, theta_dim) of 2 or more rows, got shapes {shapes}")
+    if not all(np.isfinite(array).all() for array in arrays):
+        raise ValueError("thetas must be finite; were movements at rest left in?")
+    still = np.flatnonzero(np.all([np.ptp(array, axis=0) == 0 for array in arrays], axis=0))
+    if len(still):
+        raise ValueError(f"dimensions {still.tolist()} vary in no group, so there is no variance to compare with")
+    p = np.asarray(stats.f_oneway(*arrays, axis=0).pvalue)
+    order = np.argsort(p)
+    steps = np.maximum.accumulate(p[order] * np.arange(len(p), 0, -1))  # Holm: the k-th smallest times those left
+    adjusted = np.empty_like(p)
+    adjusted[order] = np.minimum(steps, 1.0)
+    return Anova(p, adjusted)
+
+
 def update_anova(path: Path, runs: Path) -> None:
     """Compare again. A comparison that is not possible keeps its row, and a message says what is missing.
 
@@ -69,10 +116,9 @@ def update_anova(path: Path, runs: Path) -> None:
     """
     table = Table(path, HEADER, KEY)
     found, missing = compare(runs)
-    p = {each.groups: each.found.adjusted for each in found}
     table.merge(
         [
-            (groups, rows, each.rejected, len(p[groups]), float(p[groups].min()), float(p[groups].max()))
+            (groups, rows, each.rejected, len(each.p), float(each.adjusted.min()), float(each.adjusted.max()))
             for groups, rows, each in found
         ]
     )

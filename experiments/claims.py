@@ -1,16 +1,17 @@
-"""The pages results/RESULTS.md and results/FORWARD_MODEL.md: the claims, our numbers, and whether they hold.
+"""The pages results/RESULTS.md, FORWARD_MODEL.md and GYMNASIUM.md: claims, our numbers, and whether they hold.
 
 Each page is a template in experiments/pages/, which has the text; the tables are put in by name. Change the template,
 not the page. The tables come from the rows in --results, which compare.py writes:
 
   RESULTS         paper.csv, and goals.csv and anova.csv if they exist
   FORWARD_MODEL   forward_model.csv, and the table of model_figures.py (--table) if it exists
+  GYMNASIUM       gymnasium.csv
 
 Intervals are bootstrapped with a fixed seed, so the same rows give the same page. The analyses of variance need
 run directories: --runs makes them again and keeps their rows in anova.csv.
 
 Examples:
-  python experiments/claims.py --readme README.md               both pages, and the numbers of the README
+  python experiments/claims.py --readme README.md               all pages, and the numbers of the README
   python experiments/claims.py --runs runs --only RESULTS       and the analyses of variance again
 """
 
@@ -38,7 +39,7 @@ with loading():  # Ctrl-C shows no traceback
     from sgimd_torch.views.statistics import iqm_interval, metres, rng, show
     from variants import EXPERIMENTS, ladder
 
-PAGES: Final = ("RESULTS", "FORWARD_MODEL")
+PAGES: Final = ("RESULTS", "FORWARD_MODEL", "GYMNASIUM")
 ANOVA: Final = ("means compared", "of", "dimensions of theta in which they differ", "smallest p", "largest p")
 ON_ARMS: Final = (250, 500, 1000, 2000)
 # For the forward model's page: how names of variants end, and at which movements they are evaluated.
@@ -106,6 +107,31 @@ def model_page(folder: Path, table: Path) -> Page:
         names = [name for name in EXPERIMENTS[experiment] if name in results.variants]
         tables[experiment] = variants_table(names, columns)
     return Page(verdicts, tables, results)
+
+
+def gymnasium_page(folder: Path) -> Page:
+    """The page results/GYMNASIUM.md: each way to explore, answered in each way."""
+    path = folder / "gymnasium.csv"
+    by_answer = {answer: Results(read_results(path, answer)) for answer in ("nearest", "linear", "model", "own")}
+    rows = [(name, answer) for name in EXPERIMENTS["swimmer"] for answer in by_answer if _answers(name, answer)]
+    columns: dict[str, Callable[[str, str], str]] = {
+        "explored by": lambda name, _: f"`{name.removesuffix('-swimmer')}`",
+        "answered by": lambda _, answer: f"`{answer}`" if answer != "own" else "its own process",
+        "seeds": lambda name, answer: str(len(by_answer[answer].at(name, ON_ARMS[-1]))),
+        **{
+            f"error at {when} (m)": partial(
+                lambda when, name, answer: show(by_answer[answer].iqm(name, when), ".3f"), when
+            )
+            for when in ON_ARMS
+        },
+    }
+    cells = [[cell(name, answer) for cell in columns.values()] for name, answer in rows]
+    return Page([], {"swimmer": markdown([*columns], cells)}, by_answer["own"])
+
+
+def _answers(name: str, answer: str) -> bool:
+    """Whether a row says anything new: the own answer of a run with the model is the model's."""
+    return answer != ("own" if EXPERIMENTS["swimmer"][name].get("inverse") == "model" else "model")
 
 
 def _readme_table(own: Results) -> str:
@@ -230,7 +256,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--readme", type=Path, help="a README whose section of results is made again, too")
     options = parser.parse_args(argv)
     folder, table = options.results, options.table or options.results / "model" / "table.csv"
-    makers = {"RESULTS": lambda: paper_page(folder), "FORWARD_MODEL": lambda: model_page(folder, table)}
+    makers = {
+        "RESULTS": lambda: paper_page(folder),
+        "FORWARD_MODEL": lambda: model_page(folder, table),
+        "GYMNASIUM": lambda: gymnasium_page(folder),
+    }
     paths = {name: options.out / f"{name}.md" for name in PAGES if options.only in (None, name)}
     for path in paths.values():
         _check_place(path)
@@ -239,7 +269,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     pages = {name: makers[name]() for name in paths}
     texts = {name: render(name, page) for name, page in pages.items()}
     if options.readme is not None:
-        paper, model = (pages.get(name) or makers[name]() for name in PAGES)
+        paper, model = (pages.get(name) or makers[name]() for name in PAGES[:2])
         write_text(options.readme, into_readme(options.readme.read_text(encoding="utf-8"), paper, model))
     make_folder(options.out)
     for name, path in paths.items():

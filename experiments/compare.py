@@ -2,7 +2,7 @@
 
 variants.py says which variants there are. A run goes to OUT/VARIANT/seed-003. When it ends, each of its evaluations
 becomes lines of RESULTS/paper.csv, one for each inverse model that answers, or of RESULTS/forward_model.csv for
-forward-model and planar-arm-*; the goals that it chose in the large task space are counted in RESULTS/goals.csv. A
+forward-model and planar-arm-*, of RESULTS/gymnasium.csv for swimmer; the goals that it chose in the large task space are counted in RESULTS/goals.csv. A
 variant in two experiments is run once.
 
 Start the same command again after Ctrl-C or a power cut, or with more seeds: what is in the tables is not run again,

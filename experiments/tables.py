@@ -22,6 +22,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from read_results import GOALS_HEADER, HEADER
+from sgimd_torch.catalogue import ROD
 from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.files import lock, write_text
 from sgimd_torch.runs.build import task_of
@@ -30,7 +31,7 @@ from sgimd_torch.runs.log import RunError
 from sgimd_torch.runs.read import Run
 from sgimd_torch.runs.tasks import benchmark_of
 from sgimd_torch.spaces import Array
-from variants import teacher_of
+from variants import ARMS, teacher_of
 
 Key = tuple[str, ...]
 # Columns, and which of them identify a row.
@@ -106,7 +107,8 @@ def result_rows(experiment: str, config: Config, run: Run) -> list[list[object]]
     rows: list[list[object]] = []
     for movements in run.evaluation["movements"].tolist():
         landed = run.outcomes[:movements]
-        reached = tiles_reached(landed, benchmark), goals_claimed(landed, benchmark)
+        tiles = tiles_reached(landed, benchmark) if config.environment in (ROD, *ARMS) else math.nan
+        reached = tiles, goals_claimed(landed, benchmark)
         for answer in run.answers:
             error, floor, met = found[movements, answer]
             rows.append([*first, movements, answer, error, floor, *reached, met if math.isnan(met) else int(met)])

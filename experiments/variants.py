@@ -16,6 +16,7 @@ from sgimd_torch.runs.config import Config
 
 Variant = dict[str, Any]
 ARMS: Final = ("planar-arm-7", "planar-arm-50")
+SWIMMERS: Final = ("random", "sagg-riac", "sgim-d")
 SGIM_D: Final[Variant] = {"algorithm": "sgim-d"}
 SAGG_RIAC: Final[Variant] = {"algorithm": "sagg-riac"}
 # From the paper to our defaults, one change at a time: what each step is called, what it was and what it becomes. The
@@ -64,6 +65,12 @@ REFINING: Final[dict[str, Variant]] = {
     "model-1": {**MODEL, "members": 1},
     "model-5": {**MODEL, "members": 5},
 }
+# A robot that nobody here wrote. Evaluated by every answer, so that one run serves learners with and without a model.
+SWIMMER: Final[Variant] = {
+    "environment": "swimmer",
+    "movements": 2000,
+    "evaluate_at": (250, 500, 1000),
+}  # and at the end
 # Movements of an arm take no time, so training may take more.
 ON_ARMS: Final[Variant] = {"movements": 2000, "evaluate_at": (250, 500, 1000, 1500)}  # and at the end
 LONGER: Final[Variant] = {"training": 2.0}
@@ -152,6 +159,10 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
     },
     "forward-model": REFINING,
     **{arm: _on_arm(arm) for arm in ARMS},
+    "swimmer": {
+        **{f"{name}-swimmer": {"algorithm": name, "inverse": "model", **SWIMMER} for name in SWIMMERS},
+        "practice-swimmer": {"algorithm": "practice", **SWIMMER},
+    },
 }
 
 
@@ -159,6 +170,8 @@ def tables_of(experiment: str) -> list[str]:
     """The tables of results that its runs write rows to; the first has their evaluations."""
     if experiment in ("forward-model", *ARMS):
         return ["forward_model.csv"]
+    if experiment == "swimmer":
+        return ["gymnasium.csv"]
     return ["paper.csv", *(["goals.csv"] if experiment in ("large-space", "ladder-large") else [])]
 
 

@@ -53,7 +53,7 @@ class Benchmark:
             entry = first_entry(self.goals, ~((self.goals >= space.low) & (self.goals <= space.high)))  # NaN too
             raise ValueError(
                 f"goals of the benchmark must lie in the task space {space.low.tolist()} to {space.high.tolist()} m, "
-                f"but {entry}; were they in cm?"
+                f"but {entry}; were they in cm, or made for another T?"
             )
 
 

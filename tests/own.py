@@ -50,6 +50,10 @@ class FlatPicture(Slider):
     def record(self, context, theta, rng):
         return Sketch(np.zeros(1), 0.1, np.zeros((5, 2)))
 
+class StillPicture(Slider):
+    def record(self, context, theta, rng):
+        return Sketch(np.zeros(1), 0.1, np.zeros((5, 1, 2)))
+
 class OtherPicture(Slider):
     def record(self, context, theta, rng):
         return Sketch(np.zeros(2), 0.1, np.zeros((5, 1, 2)))

@@ -1,49 +1,155 @@
-"""What the README and CONTRIBUTING show is run as it stands."""
+"""What the README, CONTRIBUTING and the pages in docs/ show works as it stands.
 
+A block of a page says in its first line what is done with it:
+    ```python              runs, in the folder of its page, with names of its own
+    ```python toss.py      is saved there under that name
+    ```sh                  commands, carried out line by line
+    ```                    commands that take too long: those of sgimd are read, up to where the work would begin
+    ```text                is looked at only
+"""
+
+import importlib
 import re
+import runpy
+import shlex
+import sys
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
 import sgimd_torch
+from own import MODULE
+from sgimd_torch.__main__ import COMMANDS, _call
+from sgimd_torch.runs.command_line import parse
+from sgimd_torch.runs.process import command
 
 ROOT = Path(__file__).parent.parent
-BLOCK = re.compile(r"^```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+ALONE = ("README.md", "CONTRIBUTING.md")  # each block by itself
+HOW_TO = tuple(f"docs/{name}.md" for name in ("own-robot", "reading-runs", "own-demonstrations", "own-teacher"))
+PAGES = [
+    *ALONE,
+    "CHANGELOG.md",
+    "SECURITY.md",
+    "experiments/README.md",
+    "sgimd_torch/data/README.md",
+    *(path.relative_to(ROOT).as_posix() for path in sorted((ROOT / "docs").rglob("*.md"))),
+]
+# How-to pages are read one after the other in one folder; here with less to do: seconds, not minutes.
+SMALLER = {
+    "--movements 500": "--movements 60",
+    "--movements 800": "--movements 80",
+    "--movements 1000": "--movements 300",
+    "--seeds 0-4": "--seeds 0",
+    "--seeds 2000-2001": "--seeds 2000",
+    "--tiles 100": "--tiles 20",
+}
 
 
-def blocks():
-    for name in ("README.md", "CONTRIBUTING.md"):
-        text = (ROOT / name).read_text(encoding="utf-8")
-        for found in BLOCK.finditer(text):
-            line = text.count("\n", 0, found.start(1)) + 1
-            yield pytest.param(name, line, found[1], id=f"{name}:{line}")
+class Block(NamedTuple):
+    """A fenced block: the page and line where its text begins, the words after the fence, its text."""
+
+    page: str
+    line: int
+    kind: str
+    name: str
+    text: str
+
+    def __str__(self):
+        return f"{self.page}:{self.line}"
+
+    def carry_out(self):
+        """In the working directory."""
+        if self.name:
+            Path(self.name).write_text(self.text, encoding="utf-8")
+        elif self.kind == "python":
+            exec(compile("\n" * (self.line - 1) + self.text, ROOT / self.page, "exec"), {"__name__": "__main__"})
+        elif self.kind == "sh":
+            for line in self.lines():
+                program, *words = shlex.split(line, comments=True)
+                if program == "python":
+                    runpy.run_path(words[0], run_name="__main__")
+                else:
+                    assert (program, command(_call, words)) == ("sgimd", 0), f"{self}: {line}"
+
+    def lines(self):
+        """Each command as one line."""
+        return [line for line in self.text.replace("\\\n", " ").splitlines() if line.strip()]
 
 
-@pytest.mark.parametrize(("name", "line", "code"), [*blocks()])
-def test_a_python_block_runs_on_its_own(name, line, code, tmp_path, monkeypatch):
+def blocks(page, *kinds):
+    text = (ROOT / page).read_text(encoding="utf-8")
+    for found in re.finditer(r"^```(\w*) ?(.*)\n((?s:.*?))^```$", text, re.MULTILINE):
+        kind, name, body = found.groups()
+        if kind in kinds:
+            yield Block(page, text.count("\n", 0, found.start(3)) + 1, kind, name, body)
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """The working directory, from which modules can be imported, and are forgotten afterwards."""
+    before = set(sys.modules)
     monkeypatch.chdir(tmp_path)
-    exec(compile("\n" * (line - 1) + code, ROOT / name, "exec"), {"__name__": "__main__"})
-    assert not list(tmp_path.iterdir()), "an example leaves files behind"
+    monkeypatch.syspath_prepend(tmp_path)
+    yield tmp_path
+    for name in set(sys.modules) - before:
+        if (getattr(sys.modules[name], "__file__", None) or "").startswith(str(tmp_path)):
+            del sys.modules[name]
+
+
+@pytest.mark.parametrize("block", [block for page in ALONE for block in blocks(page, "python", "sh")], ids=str)
+def test_a_block_works_on_its_own(block, folder):
+    block.carry_out()
+    assert not list(folder.iterdir()), "an example leaves files behind"
+
+
+def test_how_to_pages_work_one_after_the_other(folder):
+    unused = set(SMALLER)
+    for page in HOW_TO:
+        for block in blocks(page, "python", "sh"):
+            for long, short in SMALLER.items():
+                unused -= {long} if long in block.text else set()
+                block = block._replace(text=block.text.replace(long, short))
+            block.carry_out()
+    assert not unused
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_commands_of_a_page_are_understood(page, folder):
+    """In a folder without runs they get as far as telling that there are none. Of many seeds, the first is enough."""
+    (folder / "mypackage").mkdir()
+    (folder / "mypackage" / "toss.py").write_text(f"{MODULE}\nmake = Slider2\n")
+    for block in [block for how_to in HOW_TO for block in blocks(how_to, "python") if block.name]:
+        block.carry_out()
+    for block in blocks(page, ""):
+        for line in block.lines():
+            shown = re.search(r"(?:^|[\s/])sgimd ([a-z]+.*?)(?: \|\| .*)?$", line)
+            if shown:
+                line = re.sub(r"(--seeds \d+)-\d+", r"\1", re.sub(r"\$\{?\w+(:\?)?\}?", "1", shown[1]))
+                name, *words = shlex.split(line, comments=True)
+                understand(name, words)
+
+
+def understand(name, words):
+    """Read the words of a command up to where it needs what earlier commands would have made."""
+    if name == "run":
+        parse(words)
+    elif name in ("sweep", "suite"):
+        assert command(_call, [name, *words, "--dry-run"]) == 0
+    elif name == "check":
+        assert command(_call, [name, *words]) == 0
+    else:  # a parser that refuses words raises SystemExit
+        with pytest.raises((ValueError, OSError), match=r"does not exist|there is no|is no run|No such"):
+            importlib.import_module(f"sgimd_torch.{COMMANDS[name].module}").main(words)
 
 
 def test_the_example_of_the_readme_is_short_enough_to_read():
-    first = BLOCK.search((ROOT / "README.md").read_text(encoding="utf-8"))
-    assert len([line for line in first[1].splitlines() if line.strip()]) <= 15
+    first = next(blocks("README.md", "python"))
+    assert len([line for line in first.text.splitlines() if line.strip()]) <= 15
     assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 120
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        "README.md",
-        "CONTRIBUTING.md",
-        "CHANGELOG.md",
-        "docs/clusters.md",
-        "docs/runs.md",
-        "experiments/README.md",
-        "sgimd_torch/data/README.md",
-    ],
-)
+@pytest.mark.parametrize("name", PAGES)
 def test_files_that_a_page_names_exist(name):
     page = ROOT / name
     text = page.read_text(encoding="utf-8")
@@ -52,6 +158,13 @@ def test_files_that_a_page_names_exist(name):
     missing = [link for link in links if not (page.parent / link).exists()]
     missing += [path for path in paths if not (ROOT / path).exists()]
     assert not missing
+
+
+def test_the_index_names_every_page_of_docs_once():
+    docs = ROOT / "docs"
+    listed = re.findall(r"^- \[.*?\]\((.*?)\): ", (docs / "README.md").read_text(encoding="utf-8"), re.MULTILINE)
+    there = {path.relative_to(docs).as_posix() for path in docs.rglob("*.md")} - {"README.md"}
+    assert sorted(link for link in listed if not link.startswith("../")) == sorted(there)
 
 
 def test_the_version_to_cite_is_that_of_the_package():

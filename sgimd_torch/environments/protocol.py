@@ -7,7 +7,7 @@ Section 2.1 of Nguyen & Oudeyer (2014): M(c, theta) = tau. An environment of you
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
@@ -118,6 +118,10 @@ class Sketch:
         return self.step * (len(self.chains) - 1)
 
 
+Record = Callable[[Array, Array, np.random.Generator], Recorded]
+"""(context, theta, rng) -> the movement, to be filmed."""
+
+
 class SimulationError(RuntimeError):
     """A simulation gave no usable outcome; ``theta`` ``(theta_dim,)`` is the movement that was executed."""
 
@@ -157,6 +161,28 @@ def execute_many(
     if isinstance(environment, BatchEnvironment):
         return environment.execute_many(contexts, thetas, rngs)
     return np.stack([environment.execute(*movement) for movement in zip(contexts, thetas, rngs, strict=True)])
+
+
+def recorded(
+    environment: Environment, record: Record, context: Array, theta: Array, rng: np.random.Generator
+) -> Recorded:
+    """What ``record``, of this environment or of a task in it, gives.
+
+    Raises:
+        ValueError: it fails, or gives something that cannot be drawn.
+    """
+    name, dim = type(environment).__name__, environment.outcomes.dim
+    try:
+        found = record(context, theta, rng)
+    except Exception as error:  # whatever a user's code does
+        raise ValueError(f"record() of {name} failed: {type(error).__name__}: {error}") from error
+    if hasattr(found, "states"):  # of the rod in MuJoCo
+        return found
+    if not isinstance(found, Sketch) or len(found.outcome) != dim:
+        what = f"one of {len(found.outcome)}" if isinstance(found, Sketch) else type(found).__name__
+        wanted = f"a Sketch with an outcome of {dim} dimension{'s' * (dim != 1)}"
+        raise ValueError(f"record() of {name} must give {wanted}, got {what}")
+    return found
 
 
 def check_movement(environment: Environment, context: ArrayLike, theta: ArrayLike) -> tuple[Array, Array]:

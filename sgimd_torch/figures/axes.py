@@ -1,4 +1,4 @@
-"""What figures share: the water plane, coloured regions on it, movements along the x axis, colour bars, notes.
+"""What figures share: the water plane, movements along the x axis, colour bars, notes.
 
 Each function draws on the axes it is given.   mesh = ax.pcolormesh(x, y, z); colour_bar([ax], mesh, "error (m)")
 """
@@ -11,9 +11,7 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.collections import PatchCollection
 from matplotlib.colorbar import Colorbar
-from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
 from sgimd_torch.spaces import Array, Box
@@ -73,30 +71,6 @@ def water_plane(ax: Axes, box: Box, *, legend: bool = True) -> None:
 def alike(sides: Array) -> bool:
     """Whether two sides have about one scale, so that a picture need not distort them."""
     return bool(np.max(sides) <= 8 * np.min(sides))
-
-
-def coloured_regions(
-    ax: Axes, lows: Array, highs: Array, values: Array, colours: str, limits: tuple[float, float]
-) -> PatchCollection:
-    """Rectangles from ``lows`` to ``highs``, ``(n_regions, 2)`` m, coloured by their ``values`` ``(n_regions,)``.
-
-    Returns:
-        One rectangle for each region, in their order; their array holds the values.
-
-    Raises:
-        ValueError: regions not in the plane, such as those that include contexts, or numbers that do not match.
-    """
-    if lows.shape != highs.shape or lows.shape != (len(values), 2):
-        raise ValueError(
-            f"regions must be (n, 2), (n, 2) and (n,), got {lows.shape}, {highs.shape}, {values.shape}; "
-            "a map that includes contexts must be cut at one context first"
-        )
-    patches = [Rectangle((low[0], low[1]), *(high - low)) for low, high in zip(lows, highs, strict=True)]
-    drawn = PatchCollection(patches, cmap=colours, edgecolor="0.35", linewidth=0.8)
-    drawn.set_array(values)
-    drawn.set_clim(*limits)
-    ax.add_collection(drawn)
-    return drawn
 
 
 def over_movements(ax: Axes, label: str) -> None:

@@ -14,10 +14,11 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PatchCollection, QuadMesh
 from matplotlib.colorbar import Colorbar
 from matplotlib.colors import ListedColormap, LogNorm
+from matplotlib.patches import Rectangle
 from matplotlib.ticker import LogLocator, NullLocator
 
 from sgimd_torch.catalogue import CATALOGUE
-from sgimd_torch.figures.axes import alike, colour_bar, coloured_regions, note
+from sgimd_torch.figures.axes import alike, colour_bar, note
 from sgimd_torch.figures.sections import Section, in_the_plane
 from sgimd_torch.spaces import Array, Box
 
@@ -128,16 +129,16 @@ def interest_map(
         One rectangle for each region that is shown, in their order; their array holds the interests.
 
     Raises:
-        ValueError: without a ``section``, regions not in the plane, such as those that include contexts, or numbers
-            that do not match.
+        ValueError: numbers that do not match; without a ``section``, regions not in the plane, such as those that
+            include contexts.
     """
     most = max(float(interests.max()), 1e-6)
     drawn = regions_in(ax, lows, highs, interests, "Oranges", (0, most), section)
     colour_bar([ax], drawn, "interest: recent change of competence")
     if goals is not None:
-        shown = goals if section is None else section.points(goals)
+        shown = _section_of(lows, highs, section).points(goals)
         ax.plot(*shown.T, ".", color="#0072b2", markersize=4, label=f"last {len(goals)} goals")
-    _frame(ax, lows, highs, section)
+    frame_regions(ax, lows, highs, section)
     return drawn
 
 
@@ -159,7 +160,7 @@ def competence_map(
     """
     drawn = regions_in(ax, lows, highs, np.ma.masked_invalid(competences), "viridis", (worst, 0.0), section)
     colour_bar([ax], drawn, "mean competence: 0 met, -1 not at all")
-    _frame(ax, lows, highs, section)
+    frame_regions(ax, lows, highs, section)
     return drawn
 
 
@@ -170,14 +171,29 @@ def regions_in(
     values: Array,
     colours: str,
     limits: tuple[float, float],
-    section: Section | None,
+    section: Section | None = None,
 ) -> PatchCollection:
-    """The regions that a ``section`` meets, None for all of the plane, coloured; nothing else. Arguments, result and
-    errors of ``coloured_regions``."""
-    if section is not None:
-        lows, highs, met = section.cut(lows, highs)
-        values = values[met]
-    return coloured_regions(ax, lows, highs, values, colours, limits)
+    """The regions that a ``section`` meets as rectangles, coloured by their ``values`` ``(n_regions,)``; nothing else.
+
+    Other arguments, result and errors as for ``interest_map``.
+    """
+    if lows.shape != highs.shape or len(lows) != len(values):
+        raise ValueError(f"regions need two corners and a value each, got {lows.shape}, {highs.shape}, {values.shape}")
+    lows, highs, met = _section_of(lows, highs, section).cut(lows, highs)
+    patches = [Rectangle((low[0], low[1]), *(high - low)) for low, high in zip(lows, highs, strict=True)]
+    drawn = PatchCollection(patches, cmap=colours, edgecolor="0.35", linewidth=0.8)
+    drawn.set_array(values[met])
+    drawn.set_clim(*limits)
+    ax.add_collection(drawn)
+    return drawn
+
+
+def frame_regions(ax: Axes, lows: Array, highs: Array, section: Section | None, *, legend: bool = True) -> None:
+    """Limits and names of the axes for ``regions_in``, and a note on where regions are cut."""
+    section = _section_of(lows, highs, section)
+    section.frame(ax, legend=legend)
+    if where := section.cut_at(lows, highs):
+        note(ax, f"at {where}")
 
 
 def map_after(regions: Mapping[str, np.ndarray], movements: int) -> tuple[Array, Array, Array]:
@@ -189,14 +205,12 @@ def map_after(regions: Mapping[str, np.ndarray], movements: int) -> tuple[Array,
     return lows, highs, regions["interest"][now]
 
 
-def _frame(ax: Axes, lows: Array, highs: Array, section: Section | None) -> None:
-    section = in_the_plane(Box(lows.min(axis=0), highs.max(axis=0))) if section is None else section
-    section.frame_cut(ax, lows, highs)
+def _section_of(lows: Array, highs: Array, section: Section | None) -> Section:
+    return in_the_plane(Box(lows.min(axis=0), highs.max(axis=0))) if section is None else section
 
 
 def _edges(box: Box, side: float | Array) -> tuple[Array, Array]:
-    if box.dim != 2:
-        raise ValueError(f"the water plane has 2 dimensions, got a box of {box.dim}")
+    box = in_the_plane(box).box
     x, y = (
         np.linspace(low, high, max(1, round((high - low) / each)) + 1)
         for low, high, each in zip(box.low, box.high, np.broadcast_to(side, 2), strict=True)

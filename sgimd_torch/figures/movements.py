@@ -14,9 +14,9 @@ from matplotlib.collections import PatchCollection
 from matplotlib.lines import Line2D
 
 from sgimd_torch.figures.axes import colour_bar
-from sgimd_torch.figures.learning import map_after, regions_in
-from sgimd_torch.figures.sections import Section, in_the_plane
-from sgimd_torch.spaces import Box, Demonstration
+from sgimd_torch.figures.learning import frame_regions, map_after, regions_in
+from sgimd_torch.figures.sections import Section
+from sgimd_torch.spaces import Demonstration
 
 _DEMONSTRATED = "0.55"
 
@@ -75,16 +75,15 @@ def interest_over_time(
         ValueError: there is no map, or its regions are not in the plane.
     """
     axes, moments = list(axes), np.unique(regions["movements"])
-    if not len(moments) or (section is None and "low_2" in regions):
-        raise ValueError("needs at least one interest map of the plane; was the run never evaluated?")
+    if not len(moments):
+        raise ValueError("needs at least one interest map; was the run never evaluated?")
     picked = moments[np.unique(np.linspace(len(moments) - 1, 0, len(axes)).round().astype(int))]
     most = max(float(regions["interest"][np.isin(regions["movements"], picked)].max()), 1e-6)
     drawn = []
     for ax, movements in zip(axes, picked, strict=False):
         lows, highs, interests = map_after(regions, movements)
         drawn.append(regions_in(ax, lows, highs, interests, "Oranges", (0.0, most), section))
-        shown = in_the_plane(Box(lows.min(axis=0), highs.max(axis=0))) if section is None else section
-        shown.frame_cut(ax, lows, highs, legend=False)
+        frame_regions(ax, lows, highs, section, legend=False)
         ax.set_title(f"after {movements} movements: {len(lows)} region{'s' * (len(lows) > 1)}", fontsize="medium")
     for ax in axes[len(drawn) :]:
         ax.set_visible(False)

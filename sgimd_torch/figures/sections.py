@@ -16,7 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from sgimd_torch.figures.axes import LEGEND, alike, note, plane, water_plane
+from sgimd_torch.figures.axes import LEGEND, alike, plane, water_plane
 from sgimd_torch.spaces import Array, Box
 
 _MOST_NAMED: Final = 2  # dimensions, in a note: more would not fit
@@ -85,12 +85,6 @@ class Section:
         if legend and ax.get_legend_handles_labels()[0]:
             ax.legend(**LEGEND)
 
-    def frame_cut(self, ax: Axes, lows: Array, highs: Array, *, legend: bool = True) -> None:
-        """The same for regions, with a note on where they are cut."""
-        self.frame(ax, legend=legend)
-        if where := self.cut_at(lows, highs):
-            note(ax, f"at {where}")
-
     def _flat(self, points: Array, height: float) -> Array:
         shown = np.asarray(points)[..., list(self.dims)]
         return shown if not self.is_strip else np.concatenate([shown, np.full_like(shown, height)], axis=-1)
@@ -122,5 +116,5 @@ def in_the_plane(box: Box) -> Section:
         ValueError: it has others.
     """
     if box.dim != 2:
-        raise ValueError(f"the water plane has 2 dimensions, got a box of {box.dim}")
+        raise ValueError(f"the water plane has 2 dimensions, got a box of {box.dim}; others need a section")
     return Section(box, (0, 1))

@@ -15,7 +15,7 @@ import numpy as np
 
 from sgimd_torch.board.scalars import EVERYWHERE, MOST_PLACES, Grid, layout_of
 from sgimd_torch.evaluation import Evaluation
-from sgimd_torch.runs import model_record as run_model
+from sgimd_torch.runs import model_record
 from sgimd_torch.runs.build import RunParts
 from sgimd_torch.runs.clock import Seconds
 from sgimd_torch.runs.config import OWN, having
@@ -56,7 +56,7 @@ class RunBoard:
         tolerance = getattr(parts.learner.autonomous, "tolerance", 0.02)
         cells = cells_of(parts.environment.outcomes, parts.benchmark.goals)
         near = parts.benchmark.side / 2
-        legend, charts = ({}, {}) if parts.model is None else (run_model.LEGEND, run_model.LAYOUT)
+        legend, charts = ({}, {}) if parts.model is None else (model_record.LEGEND, model_record.LAYOUT)
         self._board = Board(
             directory.path,
             cells,

@@ -10,10 +10,8 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
-import numpy as np
-
 from sgimd_torch.catalogue import CATALOGUE, SHARED, checked, find
-from sgimd_torch.environments.protocol import Environment, Recorded
+from sgimd_torch.environments.protocol import Environment, Record
 from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.goals.regions import Region
 from sgimd_torch.learner import Learner
@@ -50,7 +48,7 @@ class RunParts:
     model: ForwardModel | None
     trust: Trust | None
     notes: Sequence[str] = ()
-    record: Callable[[Array, Array, np.random.Generator], Recorded] | None = None
+    record: Record | None = None
     teachers: Mapping[str, Demonstrator] = field(default_factory=dict)
 
     @property

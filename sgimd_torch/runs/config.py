@@ -76,6 +76,7 @@ RUN, ROBOT, LEARNER, MODEL, TEACHER, EVALUATION = (
     "Evaluation",
 )
 OWN: Final = "own"  # the answer of the inverse model that a run chose
+FILES: Final = ("benchmark", "demonstrations")  # options that name a file
 _MOST_THREADS: Final = max(64, os.cpu_count() or 1)
 
 

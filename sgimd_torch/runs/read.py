@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sgimd_torch.files import checksum
-from sgimd_torch.runs.config import OWN, Config, before_there_was_a_choice, from_settings, having, options
+from sgimd_torch.runs.config import FILES, OWN, Config, before_there_was_a_choice, from_settings, having, options
 from sgimd_torch.runs.log import Columns, RunError, read_json
 from sgimd_torch.runs.tables import EVALUATION, SMALL, small_table
 from sgimd_torch.spaces import Array
@@ -63,6 +63,12 @@ class Run:
     def evaluation(self) -> dict[str, Array]:
         """The evaluations of the run's own answers."""
         return self.answers[OWN]
+
+    def at(self, movements: int, column: str = "mean_error_m", answer: str = OWN) -> float:
+        """An entry of evaluation.csv, NaN if there is none."""
+        evaluation = self.answers.get(answer, NO_EVALUATION)
+        found = evaluation[column][evaluation["movements"] == movements]
+        return float(found[0]) if len(found) else float("nan")
 
     def chosen_goals(self) -> Array:
         """``(n, outcome_dim)``, the goals that the learner chose itself, in order, each once even if it took several
@@ -135,32 +141,25 @@ def config_of(run: Run) -> Config:
         raise RunError(f"{run.path}/config.json does not describe a run of this version: {error}") from error
 
 
-def runs_below(place: Path) -> list[Path]:
-    """The run directories that ``place`` is or holds: a run, the folder of a variant, or one of variants.
+def find_runs(place: str | os.PathLike[str]) -> dict[str, list[Path]]:
+    """The runs of a run directory, of a variant's folder, or of a folder of variants, by variant, seeds in order.
 
     Raises:
-        RunError: there is none.
+        RunError: there is none, or no such folder.
     """
-    patterns = ("config.json", "seed-*/config.json", "*/seed-*/config.json")
-    found = [config.parent for pattern in patterns for config in sorted(place.glob(pattern))]
+    place, found = Path(place), dict[str, list[Path]]()
+    for pattern in ("", "seed-*/", "*/seed-*/"):
+        for config in sorted(place.glob(f"{pattern}config.json")):
+            found.setdefault(variant_of(config.parent), []).append(config.parent)
     if not found:
-        why = "holds no runs" if place.is_dir() else "is no folder" if place.exists() else "does not exist"
+        why = "holds no runs" if place.is_dir() else "is a file, not a folder" if place.exists() else "does not exist"
         raise RunError(f"{place} {why}; runs are in OUT/NAME/seed-000")
     return found
 
 
-def find_runs(out: str | os.PathLike[str]) -> dict[str, list[Path]]:
-    """Run directories below ``out``, by name, seeds in order.
-
-    Raises:
-        RunError: there is none.
-    """
-    found: dict[str, list[Path]] = {}
-    for config in sorted(Path(out).glob("*/seed-*/config.json")):
-        found.setdefault(config.parent.parent.name, []).append(config.parent)
-    if not found:
-        raise RunError(f"{out} holds no runs; they are in OUT/NAME/seed-000")
-    return found
+def variant_of(path: Path) -> str:
+    """The name of the folder that the run directory at ``path`` lies in."""
+    return Path(os.path.abspath(path)).parent.name
 
 
 def finished(config: Config) -> bool:
@@ -176,7 +175,7 @@ def finished(config: Config) -> bool:
         evaluated = not config.evaluations or all(config.movements in movements for movements in last)
         found, place = from_settings({**before_there_was_a_choice(), **settings}), having("place")
         same = all(getattr(found, name) == getattr(config, name) for name in options() if name not in place)
-        files = [(name, getattr(config, name)) for name in ("benchmark", "demonstrations")]
+        files = [(name, getattr(config, name)) for name in FILES]
         return (whole and evaluated and same) and all(
             file is None or settings.get(f"{name}_crc32") in (None, checksum(file)) for name, file in files
         )

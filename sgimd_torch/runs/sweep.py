@@ -147,7 +147,7 @@ def engine_of(options: argparse.Namespace, configs: Sequence[Config]) -> Engine:
     except ModuleNotFoundError as error:
         slip = "pip install 'sgimd-torch[ray]' installs it"
         raise ImportError(f"--engine ray needs {error.name}, which is not installed; {slip}") from error
-    return OnRay(options.address, processes, ships=any(map(_uses_working_directory, configs)), out=configs[0].out)
+    return OnRay(options.address, processes, ships=any(map(uses_working_directory, configs)), out=configs[0].out)
 
 
 @dataclass(frozen=True)
@@ -211,9 +211,10 @@ def variants_of(varied: Sequence[str], options: Sequence[str]) -> tuple[list[Con
     return found, [f"--{dashed(flag)}" for flag, on in flags.items() if on]
 
 
-def _uses_working_directory(config: Config) -> bool:
-    """Whether one of its parts comes from a module there, which was loaded when it was chosen."""
-    modules = [sys.modules.get(word.partition(":")[0]) for kind in CATALOGUE for word in config.choices(kind)]
+def uses_working_directory(config: Config) -> bool:
+    """Whether one of its parts or answers comes from a module there, which was loaded when it was chosen."""
+    chosen = [*(word for kind in CATALOGUE for word in config.choices(kind)), *config.answers]
+    modules = [sys.modules.get(word.partition(":")[0]) for word in chosen if ":" in word]
     return any(Path(module.__file__ or "").is_relative_to(Path.cwd()) for module in modules if module)
 
 

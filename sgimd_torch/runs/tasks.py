@@ -19,7 +19,7 @@ from sgimd_torch.algorithms import Correspondence
 from sgimd_torch.demonstrations import SHIPPED as SHIPPED_DEMONSTRATIONS
 from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.environments.protocol import Environment, Recorded
+from sgimd_torch.environments.protocol import Environment, Record, recorded
 from sgimd_torch.environments.toys import Toy
 from sgimd_torch.evaluation import SHIPPED as SHIPPED_BENCHMARK
 from sgimd_torch.evaluation import Benchmark, load_benchmark, tile_goals
@@ -61,13 +61,13 @@ class Task:
     correspondence: Correspondence | None = None
     misfit: Callable[[Demonstration], float] | None = None
     n_joints: int | None = None
-    record: Callable[[Array, Array, np.random.Generator], Recorded] | None = None
+    record: Record | None = None
 
     @property
-    def picture(self) -> Callable[[Array, Array, np.random.Generator], Recorded] | None:
-        """``record``, or that of the environment; None if neither has one that can be called."""
+    def picture(self) -> Record | None:
+        """``record``, or that of the environment, which is then checked; None if neither has one that can be called."""
         found = self.record or getattr(self.environment, "record", None)
-        return found if callable(found) else None
+        return partial(recorded, self.environment, found) if callable(found) else None
 
 
 def fishing_rod(*, noise: float, task_space: float, threads: int, max_yaw: float = 0.0, max_wind: float = 0.0) -> Task:

@@ -30,7 +30,7 @@ from sgimd_torch.evaluation import TILES, Benchmark, save_benchmark, tile_goals,
 from sgimd_torch.runs.build import task_of
 from sgimd_torch.runs.log import RunError
 from sgimd_torch.runs.process import say
-from sgimd_torch.runs.read import Run, config_of, read_run, runs_below
+from sgimd_torch.runs.read import Run, config_of, find_runs, read_run
 from sgimd_torch.spaces import Array, Box, check_count, stream
 
 
@@ -42,7 +42,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         OSError: a file cannot be read or written.
     """
     options = _options(argv)
-    runs = [read_run(path) for path in dict.fromkeys(path for place in options.runs for path in runs_below(place))]
+    paths = [path for place in options.runs for found in find_runs(place).values() for path in found]
+    runs = [read_run(path) for path in dict.fromkeys(paths)]
     name, box = _reached_by(runs)
     outcomes = np.concatenate([run.outcomes[np.isfinite(run.outcomes).all(axis=1)] for run in runs])
     benchmark = from_outcomes(

@@ -71,7 +71,7 @@ def _check_picture(task: Task) -> None:
     """One movement that is executed and recorded.
 
     Raises:
-        ValueError: it ends in two places, or cannot be recorded.
+        ValueError: it ends in two places, or cannot be recorded; see `recorded`.
     """
     robot, record = task.environment, task.picture
     if record is None:
@@ -79,10 +79,7 @@ def _check_picture(task: Task) -> None:
     context, theta = robot.observe(stream(0, "check")), robot.policies.sample(stream(1, "check"))
     outcome = robot.execute(context.copy(), theta.copy(), stream(2, "check"))
     name = type(robot).__name__
-    try:
-        drawn = np.asarray(record(context, theta, stream(2, "check")).outcome)
-    except Exception as error:  # whatever the user's code does
-        raise ValueError(f"record() of {name} fails: {type(error).__name__}: {error}") from error
+    drawn = record(context, theta, stream(2, "check")).outcome
     if not np.array_equal(drawn, outcome):
         raise ValueError(
             f"record() of {name} ends at {drawn.tolist()}, execute() with an equal stream at "

@@ -1,4 +1,4 @@
-"""Statistics over seeds: interquartile means, bootstrap intervals, improvement, Holm, and the paper's two ANOVAs.
+"""Statistics over seeds: interquartile means, bootstrap intervals, improvement, Holm.
 
 After Agarwal et al. (2021), "Deep reinforcement learning at the edge of the statistical precipice": few seeds, so every
 number comes with an interval. ``errors`` are mean benchmark errors (m), one for each seed; smaller is better.
@@ -18,33 +18,16 @@ from sgimd_torch.spaces import Array
 Key = TypeVar("Key", bound=Hashable)
 LEVEL = 0.95
 RESAMPLES = 9999
-LEAST_SEEDS: Final = 5  # with fewer, a report shows points: no interval, no verdict
+LEAST_SEEDS: Final = 5  # with fewer there are points: no interval, no verdict
 SEED: Final = 2014  # of the bootstrap: each number draws from its own default_rng(SEED)
 
 
 class Interval(NamedTuple):
-    """A statistic of the data, and its interval from ``low`` to ``high``, of 95 % unless said."""
+    """A statistic of the data, and its interval from ``low`` to ``high``, of 95 % unless said; NaN for few seeds."""
 
     value: float
     low: float
     high: float
-
-
-class Anova(NamedTuple):
-    """One test for each dimension: ``p`` ``(dim,)``, and ``adjusted`` ``(dim,)`` for their number (Holm, 1979)."""
-
-    p: Array
-    adjusted: Array
-
-    @property
-    def rejected(self) -> int:
-        """In how many dimensions the means differ; the chance that any of them is wrong is at most 5 %."""
-        return int((self.adjusted <= 1 - LEVEL).sum())
-
-    @property
-    def smallest(self) -> float:
-        """p of "the groups have the same mean in all dimensions": Bonferroni's, the smallest p times their number."""
-        return float(self.adjusted.min())
 
 
 def rng() -> np.random.Generator:
@@ -53,8 +36,9 @@ def rng() -> np.random.Generator:
 
 
 def show(found: Interval, form: str = ".2f", unit: str = "") -> str:
-    """``0.48 [0.45, 0.52]``, followed by a unit."""
-    return f"{found.value:{form}} [{found.low:{form}}, {found.high:{form}}]" + (f" {unit}" if unit else "")
+    """``0.48 [0.45, 0.52]``, followed by a unit; without brackets for few seeds."""
+    between = "" if np.isnan(found.low) else f" [{found.low:{form}}, {found.high:{form}}]"
+    return f"{found.value:{form}}{between}{f' {unit}' if unit else ''}"
 
 
 def metres(found: Interval, form: str = "+.4f") -> str:
@@ -126,6 +110,18 @@ def iqm_interval(*strata: Array, rng: np.random.Generator, level: float = LEVEL)
         ValueError: see ``interval``.
     """
     return interval(lambda *drawn: interquartile_mean(np.concatenate(drawn, axis=-1)), *strata, rng=rng, level=level)
+
+
+def point(value: float) -> Interval:
+    """A statistic of too few seeds for an interval."""
+    return Interval(value, np.nan, np.nan)
+
+
+def over_seeds(values: Array) -> Interval | None:
+    """Interquartile mean of ``(n_seeds,)``; its interval with ``LEAST_SEEDS`` or more; None if a value is missing."""
+    if not len(values) or not np.isfinite(values).all():
+        return None
+    return point(float(interquartile_mean(values))) if len(values) < LEAST_SEEDS else iqm_interval(values, rng=rng())
 
 
 def ratio_interval(
@@ -220,6 +216,12 @@ def paired_differences(ours: Mapping[int, float], theirs: Mapping[int, float]) -
     return np.array([ours[seed] - theirs[seed] for seed in sorted(ours)])
 
 
+def common_differences(ours: Mapping[int, float], theirs: Mapping[int, float]) -> Array:
+    """The same, of the seeds that both have."""
+    both = ours.keys() & theirs.keys()
+    return paired_differences({seed: ours[seed] for seed in both}, {seed: theirs[seed] for seed in both})
+
+
 def difference_interval(
     ours: Mapping[int, float], theirs: Mapping[int, float], *, rng: np.random.Generator, level: float = LEVEL
 ) -> Interval:
@@ -271,37 +273,6 @@ def movements_to_reach(movements: Array, errors: Array, level: Array | float) ->
     share = np.clip((high - level) / fall, 0, 1)  # 0 where the first evaluation is low enough already
     found = movements[after - 1] + share * (movements[after] - movements[after - 1])
     return np.where(reached.any(axis=-1), found[..., 0], np.inf)
-
-
-def anova(*groups: Array) -> Anova:
-    """Do these sets of movements have different means? One-way analysis of variance in each dimension of theta.
-
-    Section 6 of Nguyen & Oudeyer (2014): demonstrations against random movements, and the movements that learners
-    executed against each other. Rows must be independent of each other. The movements of one run are not, because they
-    repeat and refine each other: there a row must be the mean theta of a run, else p is far too small.
-
-    Args:
-        groups: ``(n, theta_dim)`` each, two or more groups.
-
-    Raises:
-        ValueError: fewer than 2 groups, a group of fewer than 2 rows, unequal dimensions, values that are not finite,
-            or a dimension in which no group varies.
-    """
-    arrays = [np.asarray(group, dtype=np.float64) for group in groups]
-    shapes = [array.shape for array in arrays]
-    if len(shapes) < 2 or any(len(shape) != 2 or shape[0] < 2 for shape in shapes) or len({s[1] for s in shapes}) > 1:
-        raise ValueError(f"anova needs two or more groups (n, theta_dim) of 2 or more rows, got shapes {shapes}")
-    if not all(np.isfinite(array).all() for array in arrays):
-        raise ValueError("thetas must be finite; were movements at rest left in?")
-    still = np.flatnonzero(np.all([np.ptp(array, axis=0) == 0 for array in arrays], axis=0))
-    if len(still):
-        raise ValueError(f"dimensions {still.tolist()} vary in no group, so there is no variance to compare with")
-    p = np.asarray(stats.f_oneway(*arrays, axis=0).pvalue)
-    order = np.argsort(p)
-    steps = np.maximum.accumulate(p[order] * np.arange(len(p), 0, -1))  # Holm: the k-th smallest times those left
-    adjusted = np.empty_like(p)
-    adjusted[order] = np.minimum(steps, 1.0)
-    return Anova(p, adjusted)
 
 
 def _checked_curves(movements: Array, errors: Array) -> tuple[Array, Array]:

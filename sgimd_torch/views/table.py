@@ -1,10 +1,11 @@
 """One table with the results of runs: error, noise floor and costs of each variant, over its seeds.
 
-It takes any folder with run directories, OUT/NAME/seed-000. Variants are compared after the last number of movements at
-which all finished runs were evaluated, or after --at. The worst comes first. Errors and noise floors are means over
-seeds in metres, ± the standard deviation; with fewer than 5 seeds there is none, and a note. "by linear" is the error
-if LocallyLinear answers, whatever inverse model the run has: compare learners by it. Costs are milliseconds for each
-movement. Runs that are damaged, not finished or not evaluated there are left out, and named below the table.
+It takes a folder with run directories, OUT/NAME/seed-000, or one variant's, OUT/NAME. Variants are compared after the
+last number of movements at which all finished runs were evaluated, or after --at. The worst comes first. Errors and
+noise floors are means over seeds in metres, ± the standard deviation; with fewer than 5 seeds there is none, and a
+note. "by linear" is the error if LocallyLinear answers, whatever inverse model the run has: compare learners by it.
+Costs are milliseconds for each movement. Runs that are damaged, not finished or not evaluated there are left out, and
+named below the table.
 
 With --baseline there is a column more: error minus that of the baseline, paired by seed, interquartile mean over the
 seeds that both have; with five seeds or more, its bootstrap interval of 95 % in brackets. Below 0 is better.
@@ -30,12 +31,11 @@ from sgimd_torch.catalogue import did_you_mean
 from sgimd_torch.runs.config import OWN
 from sgimd_torch.runs.log import RunError
 from sgimd_torch.runs.process import say
-from sgimd_torch.runs.read import NO_EVALUATION, Run, find_runs, read_run
+from sgimd_torch.runs.read import Run, find_runs, read_run, variant_of
 from sgimd_torch.spaces import Array
-from sgimd_torch.views.statistics import LEAST_SEEDS
+from sgimd_torch.views.statistics import LEAST_SEEDS, common_differences, over_seeds, show
 
 EARLY: Final = 1000  # movements, for a column of its own
-FEWEST: Final = 5  # seeds; of fewer, an interval would be too narrow
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -49,7 +49,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("runs", type=Path, metavar="OUT", help="folder of runs: the --out of sgimd run or sgimd sweep")
+    parser.add_argument("runs", type=Path, help="a run's directory, a variant's folder, or an --out of runs")
     parser.add_argument("--at", type=int, metavar="MOVEMENTS", help="compare after this number of movements")
     parser.add_argument("--baseline", metavar="NAME", help="variant that the others are compared with, seed by seed")
     options = parser.parse_args(argv)
@@ -66,12 +66,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     variants: dict[str, list[Run]] = {}
     for run in runs:
         if at in _evaluated(run):
-            variants.setdefault(run.path.parent.name, []).append(run)
+            variants.setdefault(variant_of(run.path), []).append(run)
     if not variants:
         raise RunError("\n".join(["there is nothing to compare; is --at another number of movements?", *left_out]))
     errors = (f"error at {EARLY}", f"at {at} (m)", "by linear (m)", "noise floor (m)")
     heads = ("variant", "seeds", *errors, "physics (ms)", "learning (ms)")
-    worst_first = sorted(variants.items(), key=lambda variant: -_at(variant[1], at, "mean_error_m").mean())
+    worst_first = sorted(variants.items(), key=lambda variant: -_at(variant[1], at).mean())
     table = [heads, *(_row(name, theirs, at) for name, theirs in worst_first)]
     if options.baseline is not None:
         baseline = variants[known(options.baseline, variants)]
@@ -115,11 +115,11 @@ def _readable(out: Path) -> tuple[list[Run], list[str]]:
 
 
 def _row(name: str, runs: Sequence[Run], at: int) -> tuple[str, ...]:
-    errors = _at(runs, at, "mean_error_m")
+    errors = _at(runs, at)
     return (
         name,
         str(len(runs)),
-        _metres(_at(runs, EARLY, "mean_error_m")),
+        _metres(_at(runs, EARLY)),
         f"{errors.mean():.3f}" + (f" ± {errors.std(ddof=1):.3f}" if len(runs) >= LEAST_SEEDS else ""),
         _metres(_at(runs, at, "mean_error_m", "linear")),
         _metres(_at(runs, at, "noise_floor_m")),
@@ -129,16 +129,9 @@ def _row(name: str, runs: Sequence[Run], at: int) -> tuple[str, ...]:
 
 def _minus(ours: Sequence[Run], theirs: Sequence[Run], at: int) -> str:
     """Our errors minus theirs, over the seeds that both have."""
-    from sgimd_torch.views.statistics import difference_interval, interquartile_mean, paired_differences, rng, show
-
-    errors = [{run.config["seed"]: float(_at([run], at, "mean_error_m")[0]) for run in runs} for runs in (ours, theirs)]
-    both = errors[0].keys() & errors[1].keys()
-    pair = [{seed: found[seed] for seed in both} for found in errors]
-    if ours is theirs or not both:
-        return "-"
-    if len(both) < FEWEST:
-        return f"{interquartile_mean(paired_differences(*pair)):+.4f}"
-    return show(difference_interval(*pair, rng=rng()), "+.4f")
+    errors = ({run.config["seed"]: run.at(at) for run in runs} for runs in (ours, theirs))
+    found = None if ours is theirs else over_seeds(common_differences(*errors))
+    return "-" if found is None else show(found, "+.4f")
 
 
 def _metres(lengths: Array) -> str:
@@ -150,11 +143,9 @@ def _evaluated(run: Run) -> set[int]:
     return set(run.evaluation["movements"].astype(int).tolist())
 
 
-def _at(runs: Sequence[Run], movements: int, column: str, answer: str = OWN) -> Array:
-    """``(n_runs,)``, NaN if a run was not evaluated by this ``answer`` after these ``movements``."""
-    found = [run.answers.get(answer, NO_EVALUATION) for run in runs]
-    values = [each[column][each["movements"] == movements] for each in found]
-    return np.array([value[0] if value.size else np.nan for value in values])
+def _at(runs: Sequence[Run], movements: int, column: str = "mean_error_m", answer: str = OWN) -> Array:
+    """``(n_runs,)`` see ``Run.at``."""
+    return np.array([run.at(movements, column, answer) for run in runs])
 
 
 def _milliseconds(run: Run, part: str) -> float:

@@ -114,7 +114,7 @@ def test_a_map_without_any_interest_can_be_drawn(ax):
 
 
 def test_an_interest_map_over_contexts_is_refused(ax):
-    with pytest.raises(ValueError, match="cut at one context"):
+    with pytest.raises(ValueError, match="2 dimensions, got a box of 3"):
         interest_map(ax, np.zeros((1, 3)), np.ones((1, 3)), np.zeros(1))
 
 
@@ -129,8 +129,14 @@ def test_competence_is_shown_from_minus_one_to_zero_and_unknown_regions_are_left
 
 
 def test_a_competence_map_over_contexts_is_refused(ax):
-    with pytest.raises(ValueError, match="regions must be"):
+    with pytest.raises(ValueError, match="2 dimensions, got a box of 3"):
         competence_map(ax, np.zeros((1, 3)), np.ones((1, 3)), np.zeros(1))
+
+
+def test_regions_whose_numbers_do_not_match_are_refused(ax):
+    for highs, values in ((HIGHS[:1], np.zeros(2)), (HIGHS, np.zeros(3))):
+        with pytest.raises(ValueError, match="two corners and a value each"):
+            competence_map(ax, LOWS, highs, values)
 
 
 def test_one_colour_bar_serves_histograms_that_share_a_scale():

@@ -73,7 +73,8 @@ def test_axes_without_a_map_are_hidden_and_a_single_one_shows_the_last():
     assert len(last.get_paths()) == 2
 
 
-@pytest.mark.parametrize("regions", [{"movements": np.zeros(0)}, {**history(100), "low_2": np.zeros(1)}])
-def test_a_run_without_a_map_of_the_plane_is_refused(ax, regions):
+def test_a_run_without_a_map_of_the_plane_is_refused(ax):
     with pytest.raises(ValueError, match="at least one interest map"):
-        interest_over_time([ax], regions)
+        interest_over_time([ax], {"movements": np.zeros(0)})
+    with pytest.raises(ValueError, match="2 dimensions, got a box of 3"):
+        interest_over_time([ax], {**history(100), "low_2": np.zeros(1), "high_2": np.ones(1)})

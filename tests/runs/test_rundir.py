@@ -285,3 +285,5 @@ def test_runs_are_found_by_name_and_seed(tmp_path):
     found = find_runs(tmp_path)
     assert list(found) == ["a", "b"]
     assert [path.name for path in found["b"]] == ["seed-002", "seed-010"]
+    assert find_runs(tmp_path / "b") == {"b": found["b"]}
+    assert find_runs(found["b"][1]) == {"b": [found["b"][1]]}

@@ -8,10 +8,10 @@ import shlex
 import shutil
 import signal
 from dataclasses import replace
-from html import escape
 
 import numpy as np
 import pytest
+from markupsafe import escape
 from matplotlib.figure import Figure
 from PIL import Image
 

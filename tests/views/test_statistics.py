@@ -9,7 +9,6 @@ from scipy import stats
 from sgimd_torch.spaces import stream
 from sgimd_torch.views import statistics
 from sgimd_torch.views.statistics import (
-    anova,
     difference_interval,
     holm,
     improvement,
@@ -157,41 +156,8 @@ def test_a_level_is_reached_where_the_line_between_evaluations_first_crosses_it(
         (lambda rng: mean_over_life(np.array([1.0]), np.ones(1)), "2 or more"),
         (lambda rng: mean_over_life(np.array([1.0, 2.0]), np.ones((2, 3))), "shape"),
         (lambda rng: movements_to_reach(np.array([1.0, 2.0]), np.array([1.0, np.nan]), 1.0), "finite"),
-        (lambda rng: anova(np.ones((3, 2))), "two or more groups"),
-        (lambda rng: anova(np.ones((3, 2)), np.ones((3, 4))), "two or more groups"),
-        (lambda rng: anova(np.ones((3, 2)), np.ones((1, 2))), "2 or more rows"),
-        (lambda rng: anova(np.eye(3), np.full((3, 3), np.nan)), "at rest"),
-        (lambda rng: anova(np.tile([0.0, 1, 2], (3, 1)) * np.arange(3)[:, None], np.zeros((3, 3))), r"\[0\]"),
     ],
 )
 def test_what_cannot_be_computed_is_refused_with_its_reason(rng, refused, message):
     with pytest.raises(ValueError, match=message):
         refused(rng)
-
-
-def test_anova_finds_the_dimensions_in_which_means_differ(rng):
-    shift = np.array([0, 0, 1.0, 0, 2.0])
-    found = anova(rng.normal(size=(40, 5)), rng.normal(size=(60, 5)) + shift)
-    assert (found.adjusted < 0.001).tolist() == [False, False, True, False, True]
-    assert found.rejected == 2
-    assert found.smallest == pytest.approx(5 * found.p.min())
-
-
-def test_anova_of_two_groups_is_the_t_test(rng):
-    a, b = rng.normal(size=(20, 3)), rng.normal(size=(30, 3))
-    np.testing.assert_allclose(anova(a, b).p, stats.ttest_ind(a, b).pvalue)
-
-
-def test_random_groups_are_seldom_told_apart_however_many_dimensions_there_are(rng):
-    """In 25 dimensions uncorrected tests would find a difference that is none in 72 % of cases."""
-    wrong = [anova(rng.random((30, 25)), rng.random((30, 25))).rejected > 0 for _ in range(200)]
-    assert np.mean(wrong) < 0.11  # .05 expected, standard error .015
-
-
-def test_the_adjusted_p_are_holms(rng):
-    """The smallest p times 3, the next times 2, the last times 1; never falling."""
-    found = anova(rng.normal(size=(30, 3)), rng.normal([0.9, 0.5, 0.2], size=(30, 3)))
-    a, b, c = np.sort(found.p)
-    expected = [3 * a, max(3 * a, 2 * b), max(3 * a, 2 * b, c)]
-    np.testing.assert_allclose(np.sort(found.adjusted), np.minimum(expected, 1))
-    assert found.adjusted[found.p.argmin()] == pytest.approx(3 * a)

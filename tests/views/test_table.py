@@ -97,6 +97,13 @@ def test_a_run_that_is_too_short_is_named(runs, capsys):
     assert "seed-000 was not evaluated after 5000 movements" in capsys.readouterr().err
 
 
+def test_a_table_of_one_variant_has_its_row_alone(runs, capsys, monkeypatch):
+    monkeypatch.chdir(runs / "random")
+    for place in (runs / "random", "."):
+        assert table(place) == 0
+        assert [line.split()[:2] for line in capsys.readouterr().out.splitlines()[1:]] == [["random", "5"]]
+
+
 def test_a_folder_without_runs_is_refused(tmp_path, capsys):
     assert table(tmp_path) == 2
     assert "holds no runs" in capsys.readouterr().err

@@ -19,11 +19,10 @@ from tempfile import TemporaryDirectory
 from typing import Any, Final, NamedTuple
 
 from sgimd_torch.files import lock, make_folder, write_bytes
-from sgimd_torch.runs.config import Config, plain
+from sgimd_torch.runs.config import FILES, Config, plain
 from sgimd_torch.runs.engines.local import LOOK_EVERY, Job
 from sgimd_torch.runs.process import Failed
 
-FILES: Final = ("benchmark", "demonstrations")  # options that name a file
 ORDER: Final = {"summary.json": 0, "episodes.csv": 2}  # in which the files of a run are read; 1: all others
 Parts = dict[str, tuple[int, bytes] | None]
 """By its path below --out: what is new in a file, and after how many bytes that comes; None: the file is gone."""

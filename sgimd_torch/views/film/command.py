@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
-from sgimd_torch.environments.protocol import Recorded, Sketch
+from sgimd_torch.environments.protocol import Sketch
 from sgimd_torch.runs.build import RunParts, build
 from sgimd_torch.runs.log import RunError
 from sgimd_torch.runs.read import Run, config_of, read_run
@@ -115,6 +115,7 @@ def remember(run: Run, parts: RunParts, start: int, stop: int) -> None:
 def _cast(run: Run, parts: RunParts, goals: Array, stages: Sequence[int], *, say_movements: bool) -> list[list[Shot]]:
     """For each stage, the run's answer to each goal; a goal has the same motor noise at every stage."""
     shots = []
+    assert parts.record is not None
     robot: Any = parts.environment
     context = (robot.contexts.low + robot.contexts.high) / 2
     title = f"{run.config['name'] or run.config['algorithm']}, seed {run.config['seed']}"
@@ -127,27 +128,11 @@ def _cast(run: Run, parts: RunParts, goals: Array, stages: Sequence[int], *, say
         stage = []
         for k, goal in enumerate(goals):
             theta = parts.inverse(context, goal).theta
-            recording = _record(parts, context, theta, stream(run.config["seed"], "film", k))
+            recording = parts.record(context, theta, stream(run.config["seed"], "film", k))
             shown = f"after {movements} movements" if say_movements else f"{title}, after {movements} movements"
             stage.append(Shot(recording, goal, shown, past))
         shots.append(stage)
     return shots
-
-
-def _record(parts: RunParts, context: Array, theta: Array, rng: np.random.Generator) -> Recorded:
-    """A movement, to be drawn."""
-    assert parts.record is not None
-    name, dim = type(parts.environment).__name__, parts.environment.outcomes.dim
-    try:
-        found = parts.record(context, theta, rng)
-    except Exception as error:  # whatever a user's code does
-        raise RunError(f"record() of {name} failed: {type(error).__name__}: {error}") from error
-    if hasattr(found, "states"):  # of the rod in MuJoCo
-        return found
-    if not isinstance(found, Sketch) or len(found.outcome) != dim:
-        what = f"one of {len(found.outcome)}" if isinstance(found, Sketch) else type(found).__name__
-        raise RunError(f"record() of {name} must give a Sketch with an outcome of {dim} dimensions, got {what}")
-    return found
 
 
 def _film(options: argparse.Namespace, camera: Filming, scenes: list[list[Shot]]) -> None:
@@ -225,11 +210,11 @@ def _options(argv: Sequence[str] | None) -> argparse.Namespace:
     options = parser.parse_args(words)
     if options.after and not options.time_lapse:
         parser.error("--after belongs to --time-lapse")
-    if options.out is None:
-        options.out = Path(f"{options.run.resolve()}{'-time-lapse' if options.time_lapse else ''}.mp4")
     for path, suffix in ((options.out, ".mp4"), (options.sheet, ".png")):
         if path is not None and (path.suffix != suffix or path.is_dir() or not path.parent.is_dir()):
             parser.error(f"must be a {suffix} file in a folder that exists, got {path}")
+    if options.out is None:
+        options.out = Path(f"{options.run.resolve()}{'-time-lapse' if options.time_lapse else ''}.mp4")
     return options
 
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from sgimd_torch.spaces import Array
-from sgimd_torch.views.report.data import Variant, over_seeds
-from sgimd_torch.views.statistics import LEAST_SEEDS, Interval, paired_differences
+from sgimd_torch.views.report.data import Variant
+from sgimd_torch.views.statistics import LEAST_SEEDS, Interval, common_differences, over_seeds
 from sgimd_torch.views.table import known
 
 USUAL: Final = "sgim-d"  # the baseline where nobody chose one
@@ -61,10 +61,9 @@ def compare(variants: Sequence[Variant], baseline: Variant) -> list[Comparison]:
     theirs = {life.seed: life.at(baseline.last) for life in baseline.used}
     rows = []
     for variant in variants:
-        ours = {life.seed: life.at(variant.last) for life in variant.used if life.seed in theirs}
         if variant is baseline or variant.last != baseline.last:
             continue
-        seeds = paired_differences(ours, {seed: theirs[seed] for seed in ours})
+        seeds = common_differences({life.seed: life.at(variant.last) for life in variant.used}, theirs)
         if found := over_seeds(seeds):
             rows.append(Comparison(variant, seeds, found))
     return rows

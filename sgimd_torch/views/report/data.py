@@ -5,7 +5,6 @@ variants, unread = read(find(Path("runs"))); variants[0].last_error    # interqu
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -22,15 +21,16 @@ from sgimd_torch.figures.learning import NAMES
 from sgimd_torch.runs.build import task_of
 from sgimd_torch.runs.config import OWN, Config
 from sgimd_torch.runs.log import RunError
-from sgimd_torch.runs.read import NO_EVALUATION, Run, read_run
+from sgimd_torch.runs.read import Run, find_runs, read_run
 from sgimd_torch.runs.tasks import demonstrations_of
 from sgimd_torch.spaces import Array
 from sgimd_torch.views.statistics import (
     LEAST_SEEDS,
     Interval,
     interquartile_mean,
-    iqm_interval,
     mean_over_life,
+    over_seeds,
+    point,
     ratio_interval,
     rng,
 )
@@ -84,12 +84,6 @@ class Life(Run):
         sides = sum(name.startswith("low_") for name in self.regions or ())  # of contexts, then of outcomes
         return bool(self.regions and len(self.regions["movements"])) and 0 < self.outcomes.shape[1] <= sides
 
-    def at(self, movements: int, column: str = "mean_error_m", answer: str = OWN) -> float:
-        """An entry of evaluation.csv, NaN if there is none."""
-        evaluation = self.answers.get(answer, NO_EVALUATION)
-        found = evaluation[column][evaluation["movements"] == movements]
-        return float(found[0]) if len(found) else float("nan")
-
     def in_contexts(self, movements: int) -> dict[str, float]:
         """The mean error (m) of its own answers in each part of C, by the part in words; {} without contexts."""
         if self.by_context is None:
@@ -129,22 +123,15 @@ def read_life(path: Path) -> Life:
 
 
 def find(place: Path) -> dict[str, list[Path]]:
-    """The runs of a run directory, of a variant's folder, or of a folder of variants, by variant, seeds in order.
-
-    Next to a run, every folder called seed-* counts as a run, so that damaged ones are named.
+    """As `find_runs`; next to a run, every folder called seed-* counts as a run, so that damaged ones are named.
 
     Raises:
-        RunError: there is none, or no such folder.
+        RunError: see `find_runs`.
     """
-    if not place.is_dir():
-        why = "is a file, not a folder" if place.exists() else "does not exist"
-        raise RunError(f"{place} {why}; wanted a run's directory, or the --out of sgimd run")
-    runs = [path.parent for pattern in ("", "seed-*/", "*/seed-*/") for path in place.glob(f"{pattern}config.json")]
-    if not runs:
-        raise RunError(f"{place} holds no runs; they are in OUT/NAME/seed-000")
-    if place in runs:
-        return {Path(os.path.abspath(place)).parent.name: [place]}
-    folders = {Path(os.path.abspath(run)).parent.name: run.parent for run in sorted(runs)}
+    found = find_runs(place)
+    if [place] in found.values():
+        return found
+    folders = {name: runs[0].parent for name, runs in found.items()}
     return {name: sorted(path for path in folder.glob("seed-*") if path.is_dir()) for name, folder in folders.items()}
 
 
@@ -235,7 +222,7 @@ class Variant:
         if not self.last_error or not over_seeds(floors) or floors.min() < NOISELESS:
             return None
         if self.few:
-            return _point(float(interquartile_mean(self.errors[:, -1]) / interquartile_mean(floors)))
+            return point(float(interquartile_mean(self.errors[:, -1]) / interquartile_mean(floors)))
         return ratio_interval(self.errors[:, -1], floors, rng=rng(), paired=True)
 
     @property
@@ -251,18 +238,6 @@ class Variant:
         if not self.last:
             return max(self.lives, key=lambda life: len(life.index))
         return sorted(self.used, key=lambda life: life.at(self.last))[(len(self.used) - 1) // 2]
-
-
-def over_seeds(values: Array) -> Interval | None:
-    """Interquartile mean and its 95 % interval, NaN with fewer than 5 seeds; None if any value is missing."""
-    if not len(values) or not np.isfinite(values).all():
-        return None
-    few = len(values) < LEAST_SEEDS
-    return _point(float(interquartile_mean(values))) if few else iqm_interval(values, rng=rng())
-
-
-def _point(value: float) -> Interval:
-    return Interval(value, np.nan, np.nan)
 
 
 def demonstrated(lives: Sequence[Life]) -> tuple[Array, str]:

@@ -176,9 +176,7 @@ def landing(figure: Figure, landed: Array, shown: Array, plane: Box) -> None:
 @png
 def interest(figure: Figure, life: Life) -> None:
     """The interest map at the last evaluation, with the goals chosen before it."""
-    assert life.regions is not None
-    last = map_after(life.regions, life.regions["movements"].max())
-    panels = of_regions(*last[:2], life.outcomes.shape[1])
+    last, panels = _last_map(life)
     for ax, section in zip(_panels(figure, panels), panels, strict=True):
         interest_map(ax, *last, goals=life.chosen_goals()[-GOALS:], section=section)
 
@@ -189,12 +187,18 @@ def splitting(figure: Figure, life: Life) -> None:
     assert life.regions is not None
     n = min(4, len(np.unique(life.regions["movements"])))
     axes = figure.subplots(1 + (n > 2), min(2, n), squeeze=False)
-    last = map_after(life.regions, life.regions["movements"].max())
-    interest_over_time(axes.flat, life.regions, of_regions(*last[:2], life.outcomes.shape[1])[0])
+    interest_over_time(axes.flat, life.regions, _last_map(life)[1][0])
     for ax in axes.flat:  # the maps are small
         ax.set_title(ax.get_title().replace(": ", ":\n"), fontsize=10)
         ax.tick_params(labelsize=9)
         ax.label_outer()
+
+
+def _last_map(life: Life) -> tuple[tuple[Array, Array, Array], list[Section]]:
+    """See ``map_after``; and the sections that show it."""
+    assert life.regions is not None
+    last = map_after(life.regions, life.regions["movements"].max())
+    return last, of_regions(*last[:2], life.outcomes.shape[1])
 
 
 def _panels(figure: Figure, shown: Sequence[Section]) -> list[Axes]:

@@ -44,11 +44,12 @@ def errors_of(variants: Sequence[Variant]) -> tuple[Table, list[str]]:
 
 
 def drawable(life: Life) -> bool:
-    """Whether it has a forward model that has predicted something."""
+    """Whether it has a forward model that can be shown."""
     try:
-        return life.predictions is not None and len(model_run(life).observed) > 0
+        model_run(life)
     except RunError:
         return False
+    return True
 
 
 @png

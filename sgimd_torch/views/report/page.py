@@ -159,10 +159,8 @@ def _still(path: Path) -> str:
 
 
 def _interval(found: Interval | None, form: str = ".3f") -> str:
-    """``0.060 [0.058, 0.062]``; without brackets for few seeds, a dash for nothing."""
-    if found is None:
-        return "–"
-    return f"{found.value:{form}}" if np.isnan(found.low) else show(found, form)
+    """``0.060 [0.058, 0.062]``, a dash for nothing."""
+    return "–" if found is None else show(found, form)
 
 
 def _number(value: float, digits: int) -> str:

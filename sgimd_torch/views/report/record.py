@@ -32,8 +32,8 @@ def doubts(variants: Sequence[Variant]) -> Iterator[str]:
     lives = [(variant.label, life) for variant in variants for life in variant.lives]
     versions = [life.versions for _, life in lives]
     for name in dict.fromkeys(name for each in versions for name in each if name not in ("before", "platform")):
-        having = [each for each in versions if name in each or name not in FORWARD]
-        values = list(dict.fromkeys(str(each.get(name)) for each in having))
+        asked = [each for each in versions if name in each or name not in FORWARD]
+        values = list(dict.fromkeys(str(each.get(name)) for each in asked))
         if len(values) > 1:
             yield f"The runs were made with different versions of {name}: {', '.join(values)}."
     if dirty := sum(str(each.get("commit")).endswith("-dirty") for each in versions):
