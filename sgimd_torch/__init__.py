@@ -12,6 +12,7 @@ Where each part of the paper lives:
     4.4    goal-directed policy optimisation               strategies, inverses (eqs. 8, 9), searches
     5.2    evaluation                                      evaluation (eq. 10)
     5.3    demonstrations and teachers                     demonstrations, teachers
+    -      asking teachers: SGIM-IM, SGIM-ACTS             learner.asking, goals.strategic, teachers.answering
     -      our addition: a forward model                   forward_model, inverses.through_model, searches.through_model
     -      robots of gymnasium, and ours as its            environments.from_gymnasium, environments.to_gymnasium
     -      rivals of other schools                         rivals, goals.alp_gmm, searches.cma_es

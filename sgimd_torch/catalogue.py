@@ -85,6 +85,12 @@ _PURSUES: Final = {
 }
 _TAUGHT: Final = ("teacher", "demonstrations")
 _SHOWN: Final = {"correspondence": "correspondence"}
+_ASKS: Final = {
+    **{name: option for name, option in _PURSUES.items() if name != "goals"},
+    **_SHOWN,
+    "teachers": "teachers",
+    "cost": "cost",
+}
 _PROGRESS: Final = {"window": "window", "progress": "progress"}
 _REGIONS: Final = {**_PROGRESS, "g_max": "g_max", "max_aspect": "max_aspect"}
 _MODEL: Final = {"model": "model", "trust": "trust"}
@@ -120,6 +126,10 @@ def _toy(name: str, side: float, about: str) -> Entry:
 def _rod(about: str, **fixed: object) -> Entry:
     uses = {"noise": "noise", "task_space": "task_space", "threads": "threads"}
     return _at("runs.tasks:fishing_rod", about, uses=uses, fixed=fixed, filmed=True)
+
+
+def _answering(about: str, **fixed: object) -> Entry:
+    return _at("teachers.answering:AnsweringTeacher", about, fixed=fixed)
 
 
 ROD: Final = "fishing-rod"  # the environment of all runs before there was a choice
@@ -170,6 +180,22 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
             also=_TAUGHT,
             label="SGIM-D",
             colour="#d55e00",
+        ),
+        "sgim-im": _at(
+            "algorithms:sgim_im",
+            "decides when to ask the one teacher of --teachers",
+            uses=_ASKS,
+            also=("demonstrations",),
+            label="SGIM-IM",
+            colour="#661100",
+        ),
+        "sgim-acts": _at(
+            "algorithms:sgim_acts",
+            "decides when to ask which of --teachers for what, and how to use the answer",
+            uses=_ASKS,
+            also=("demonstrations",),
+            label="SGIM-ACTS",
+            colour="#cc6677",
         ),
         **{
             f"{name}{ending}": _at(
@@ -281,6 +307,17 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
             "teachers:AskedTeacher", "when the learner stalls", uses={"patience": "every", "choose": "choice"}
         ),
     },
+    "teachers": {
+        "all": _answering("shows the nearest of all demonstrations"),
+        "low-half": _answering(
+            "has those of the lower half of the first outcome", knows="sgimd_torch.teachers.answering:low_half"
+        ),
+        "high-half": _answering("has those of the upper half", knows="sgimd_torch.teachers.answering:high_half"),
+        "mislabelling": _answering(
+            "shows something else than is said", knows="sgimd_torch.teachers.answering:mislabelled"
+        ),
+        "slow": _answering("the nearest of all, for which the learner rests 10 movements", takes=10),
+    },
     "choice": {
         "least-explored": _at("teachers:least_explored", "the one whose outcome the learner has reached least"),
         "random": _at("teachers:at_random", "any"),
@@ -309,6 +346,7 @@ _WANTED: Final[dict[str, tuple[str, tuple[str, ...]]]] = {
     "inverse": ("(memory) -> an inverse model", ("__call__",)),
     "social": ("(goal babbling, outcomes, rng) -> a social strategy", ("attempt",)),
     "teacher": ("(demonstrations, rng) -> a teacher", ("offer",)),
+    "teachers": ("(demonstrations, rng) -> a teacher who answers", ("demonstrate",)),
     "choice": ("(demonstrations, memory, rng) -> a demonstration", ()),
 }
 

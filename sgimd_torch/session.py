@@ -8,14 +8,16 @@ executes nothing, does not change the noise of the movements after it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.learner import Learner, ReplayError
 from sgimd_torch.learner.life import check_repeats
-from sgimd_torch.spaces import Array, Episode, check_count, read_only, stream
+from sgimd_torch.spaces import Array, Demonstration, Episode, Request, check_count, read_only, stream
 from sgimd_torch.teachers import Teacher
+from sgimd_torch.teachers.answering import Demonstrator
 
 __all__ = ["Execute", "Recorded", "ReplayError", "live", "replay", "run"]
 
@@ -38,6 +40,7 @@ def run(
     movements: int,
     first: int = 0,
     teacher: Teacher | None = None,
+    teachers: Mapping[str, Demonstrator] | None = None,
     execute: Execute | None = None,
 ) -> Iterator[Episode]:
     """Let ``learner`` make ``movements`` movements, counting those at rest.
@@ -52,13 +55,16 @@ def run(
         movements: in all, counting those before ``first``; at least 1.
         first: index of the first movement; to go on with an earlier run, the number of movements that it made.
         teacher: is asked before every movement whether it demonstrates.
+        teachers: by name, for a learner that asks for demonstrations. One that fails, or shows what this robot cannot
+            use, counts as one without an answer, with a `RuntimeWarning`.
         execute: is called instead of the environment's, see ``live`` and ``replay``.
 
     Yields:
         Every episode, after the learner was told its outcome.
 
     Raises (when iterated):
-        ValueError: ``movements`` or ``first`` is not such a number, or ``first`` comes after them all.
+        ValueError: ``movements`` or ``first`` is not such a number, or ``first`` comes after them all; or the learner
+            asks a teacher of another name.
     """
     if check_count("first", first, 0) > check_count("movements", movements, 1):
         raise ValueError(f"first must be at most movements, got {first} of {movements}; movements counts all of a run")
@@ -68,11 +74,42 @@ def run(
         if demonstration is not None:
             learner.watch(demonstration)
         context = read_only(environment.observe(stream(seed, "context", index))) if learner.idle else learner.context
+        request = learner.request(context) if teachers else None
+        if request is not None and teachers is not None:
+            answer = _asked(learner, environment, context, request, teachers)
+            if answer is not None:
+                learner.watch(answer)
+                demonstration = answer
         move, outcome = learner.ask(context), None
         if move is not None:
             outcome = execute(index, context, move.theta)
             learner.tell(outcome)
-        yield Episode(index, context, move, outcome, demonstration)
+        yield Episode(index, context, move, outcome, demonstration, request)
+
+
+def _asked(
+    learner: Learner, environment: Environment, context: Array, request: Request, teachers: Mapping[str, Demonstrator]
+) -> Demonstration | None:
+    """The answer to a request; None also if it is one that the learner cannot use.
+
+    The attempt stays in its own context: a demonstration of another one is a hint, as long as that lies in C.
+    """
+    name = request.teacher
+    if name not in teachers:
+        raise ValueError(f"the learner asks {name!r}, but teachers are {', '.join(teachers)}; are they those it knows?")
+    try:
+        shown = teachers[name].demonstrate(context.copy(), request.goal, learner.memory)
+        if shown is not None:
+            environment.contexts.check("context of the demonstration", shown.context)
+            environment.outcomes.check("outcome of the demonstration", shown.outcome)
+            learner.translate(shown)
+    except Exception as error:  # whatever a teacher does, it must not end the learner's life
+        said = (
+            f"teacher {name} gave no answer that can be used, so the learner goes on: {type(error).__name__}: {error}"
+        )
+        warnings.warn(said, RuntimeWarning, stacklevel=3)
+        return None
+    return shown
 
 
 def live(environment: Environment, seed: int) -> Execute:

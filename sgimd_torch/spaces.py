@@ -10,7 +10,7 @@ import reprlib
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -227,21 +227,42 @@ class Demonstration:
 
 
 @dataclass(frozen=True, eq=False)
+class Request:
+    """What a learner would like to be shown: ``goal`` ``(outcome_dim,)``, a read-only copy, by the ``teacher`` of this
+    name."""
+
+    teacher: str
+    goal: Array
+
+    def __post_init__(self) -> None:
+        _own(self, "goal")
+
+
+class Lesson(NamedTuple):
+    """The answer to a `Request`: a demonstration, and the ``theta_d`` ``(theta_dim,)`` that it corresponds to."""
+
+    theta_d: Array
+    demonstration: Demonstration
+
+
+@dataclass(frozen=True, eq=False)
 class Episode:
     """[context][policy][outcome] and why it happened. ``move`` and ``outcome`` are None when the learner rested;
-    ``demonstration`` is what the teacher showed just before, if anything. Arrays are read-only copies."""
+    ``demonstration`` is what a teacher showed just before, if anything, and ``request`` what the learner had asked for,
+    answered or not. Arrays are read-only copies."""
 
     index: int
     context: Array
     move: Move | None
     outcome: Array | None
     demonstration: Demonstration | None
+    request: Request | None = None
 
     def __post_init__(self) -> None:
         _own(self, "context", "outcome")
 
 
-def _own(record: Move | Demonstration | Episode, *names: str) -> None:
+def _own(record: Move | Demonstration | Request | Episode, *names: str) -> None:
     """Replace arrays of a new record by read-only copies, so that later changes elsewhere do not reach it."""
     for name in names:
         value = getattr(record, name)
@@ -257,8 +278,11 @@ def read_only(value: ArrayLike) -> Array:
 
 
 Attempt = Generator[Move | None, Array, None]
-"""Yields movements and is sent their outcomes. To yield None is to stay still, which ends the attempt; ``close()``
-interrupts it."""
+"""Yields movements and is sent their outcomes. To yield None is to stay still for one movement; ``close()`` interrupts
+it."""
+
+AskingAttempt = Generator[Move | Request | None, Any, None]
+"""An attempt that may also yield a `Request`: it is sent a `Lesson`, or None if nobody answers."""
 
 Search = Callable[[Estimate, Array], Generator[Array, Array, None]]
 """(start, goal) -> yields thetas to execute and is sent their outcomes ``(outcome_dim,)``."""

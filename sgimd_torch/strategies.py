@@ -16,7 +16,7 @@ import numpy as np
 from sgimd_torch.competence import Competence
 from sgimd_torch.goals.protocol import Goals
 from sgimd_torch.memory import Memory
-from sgimd_torch.spaces import Array, Attempt, Box, Demonstration, Estimate, Move, Search, check_count
+from sgimd_torch.spaces import Array, AskingAttempt, Attempt, Box, Demonstration, Estimate, Move, Search, check_count
 
 Judge = Callable[[Array, Array, Array], float]
 """(context, goal, outcomes of the attempt) -> the competence at the goal when the attempt has ended, in [-1, 0]."""
@@ -27,9 +27,10 @@ Look = Callable[[Array], Array]
 
 
 class Strategy(Protocol):
-    """What a learner does on its own. An attempt stays in one context, and has to yield at least once."""
+    """What a learner does on its own. An attempt stays in one context, and has to yield at least one movement or rest,
+    also if its requests are not answered."""
 
-    def attempt(self, context: Array) -> Attempt:
+    def attempt(self, context: Array) -> AskingAttempt:
         """Movements for one goal, or one movement without a goal."""
         ...
 
@@ -151,7 +152,7 @@ class GoalBabbling:
 
         Args:
             before: competence at the goal when the attempt began.
-            strategy: "autonomous" or "social", who had chosen the goal.
+            strategy: "autonomous", "social" or another name: who had chosen the goal, and how it was pursued.
         """
         if outcomes:
             # Where contexts vary, a new exemplar nearer in (context, outcome) may be farther in outcome alone.
@@ -197,6 +198,7 @@ class Imitate:
         babbling: its interest map is told the competence at the demonstrated outcome afterwards (emulate a goal,
             section 3.2.3); None to imitate only. A demonstrated outcome outside T is imitated, but never a goal.
         outcomes: T; needed with ``babbling``.
+        strategy: by what name the interest map is told of it.
 
     Raises:
         ValueError: a number out of its range, or ``babbling`` without ``outcomes``.
@@ -211,6 +213,7 @@ class Imitate:
         epsilon: float = 0.05,
         babbling: GoalBabbling | None = None,
         outcomes: Box | None = None,
+        strategy: str = "social",
     ) -> None:
         if (babbling is None) != (outcomes is None):
             raise ValueError("Imitate needs babbling and outcomes together, or neither of them")
@@ -224,6 +227,7 @@ class Imitate:
         self.epsilon = epsilon
         self.babbling = babbling
         self.outcomes = outcomes
+        self.strategy = strategy
 
     def attempt(self, context: Array, theta_d: Array, demonstration: Demonstration) -> Attempt:
         """theta_d, then its variations."""
@@ -236,7 +240,7 @@ class Imitate:
         try:
             yield from self._repeat(theta_d, goal, outcomes)
         finally:  # also when the next demonstration interrupts
-            self.babbling.conclude(context, goal, outcomes, before, "social")
+            self.babbling.conclude(context, goal, outcomes, before, self.strategy)
 
     def _repeat(self, theta_d: Array, goal: Array, outcomes: list[Array]) -> Attempt:
         """Movements; their outcomes are appended to ``outcomes``."""
@@ -252,14 +256,13 @@ class Imitate:
 class Emulate:
     """Take over the teacher's goal but not the movement: pursue the demonstrated outcome by goal babbling."""
 
-    def __init__(self, babbling: GoalBabbling, outcomes: Box) -> None:
-        self.babbling = babbling
-        self.outcomes = outcomes
+    def __init__(self, babbling: GoalBabbling, outcomes: Box, *, strategy: str = "social") -> None:
+        self.babbling, self.outcomes, self.strategy = babbling, outcomes, strategy
 
     def attempt(self, context: Array, theta_d: Array, demonstration: Demonstration) -> Attempt:
         """Movements towards the demonstrated outcome; none if it lies outside T."""
         if self.outcomes.contains(demonstration.outcome):
-            yield from self.babbling.pursue(context, demonstration.outcome, "social")
+            yield from self.babbling.pursue(context, demonstration.outcome, self.strategy)
 
 
 class Remember:

@@ -5,6 +5,7 @@ with it (results/, the README) has to be made anew.
 """
 
 import inspect
+import math
 
 import pytest
 
@@ -18,6 +19,7 @@ DEFAULTS = {
     "algorithms:goal_babbling": PURSUIT,
     "algorithms:imitation": {"epsilon": 0.05},
     "algorithms:imitating": {"repeats": 10, "epsilon": 0.05},
+    "algorithms:sgim_acts": {"cost": 1.0},
     "environments.fishing_rod:FishingRod": {"noise": 0.032, "max_yaw": 0.0, "max_wind": 0.0},
     "environments.motor_primitives:GaussianPrimitive": {"n_knots": 4, "sharpness": 9.0},
     "environments.planar_arm:PlanarArm": {"n_joints": 7, "length": 1.0, "noise": 0.0},
@@ -28,6 +30,7 @@ DEFAULTS = {
     "goals.alp_gmm:AlpGmm": {"refit": 50, "memory": 250, "components": 10, "uniform": 0.2},
     "goals.interest_map:InterestMap": {**TREE, "g_max": 30, "cuts": 20, "min_side": 1 / 15, "max_aspect": 5.0},
     "goals.progress_grid:ProgressGrid": TREE,
+    "goals.strategic:StrategicInterest": {"share": 0.2, "greatest": 10},
     "inverses.local:LocalInverse": {"h_max": 10, "k_max": 10, "alpha": 0.5, "width": 0.25},
     "inverses.local:NearestNeighbour": {"k": 10},
     "inverses.locally_linear:LocallyLinear": {"ridge": 0.001, "h_max": 10, "k_max": 20, "alpha": 0.5, "width": 1.0},
@@ -40,6 +43,7 @@ DEFAULTS = {
     "searches.through_model:gradient_search": {"noise": 0.05, "candidates": 5, "radius": 0.15},
     "searches.through_model:polished_simplex": {"candidates": 5, "radius": 0.15},
     "strategies:GoalBabbling": {**PURSUIT, "tolerance": 0.02},
+    "teachers.answering:AnsweringTeacher": {"within": math.inf, "takes": 0},
     "teachers:AskedTeacher": {"patience": 30, "threshold": 0.01},
     "teachers:InitialTeacher": {"every": 10},
     "teachers:PeriodicTeacher": {"every": 30},

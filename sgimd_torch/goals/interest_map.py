@@ -7,12 +7,13 @@ competence progress, eq. (3). Goals are drawn where progress is high, see `Tilin
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from sgimd_torch.goals.regions import Progress, Region, gained_progress, interest_of
+from sgimd_torch.goals.regions import Progress, Region, between_interests, gained_progress, interest_of
 from sgimd_torch.goals.tiling import Tiling
 from sgimd_torch.spaces import Array, Box
 
@@ -36,6 +37,7 @@ class InterestMap:
             a large space.
         progress: what counts as progress: `gained_progress`; `absolute_progress`, which is eq. (3); `signed_progress`;
             `paired_progress`; or a function of your own.
+        contrast: (region, which of its goals are below a cut) -> how much the cut tells apart.
 
     Raises:
         ValueError: a number out of its range.
@@ -55,6 +57,7 @@ class InterestMap:
         min_side: float = 1 / 15,
         max_aspect: float = 5.0,
         progress: Progress = gained_progress,
+        contrast: Callable[[Region, NDArray[np.bool_]], float] = between_interests,
     ) -> None:
         if window % 2 or not 4 <= window <= g_max:
             raise ValueError(f"window must be even, from 4 to g_max={g_max}, got {window}")
@@ -62,6 +65,7 @@ class InterestMap:
             wanted = "cuts >= 1, min_side in (0, .5], max_aspect >= 1"
             raise ValueError(f"needs {wanted}, got {cuts}, {min_side}, {max_aspect}")
         self.g_max, self.cuts, self.min_side, self.max_aspect = g_max, cuts, min_side, max_aspect
+        self.contrast = contrast
         measure = partial(interest_of, window=window, progress=progress)
         self._tiling = Tiling(contexts, outcomes, rng, measure, modes=modes, near=near)
 
@@ -69,6 +73,10 @@ class InterestMap:
     def regions(self) -> list[Region]:
         """The leaves, which tile C x T, in the order of the tree: a region's halves stand where it stood."""
         return list(self._tiling.regions)
+
+    def regions_at(self, context: Array) -> list[Region]:
+        """Those that contain a context ``(context_dim,)``; all of them where there are no contexts."""
+        return [self._tiling.regions[index] for index in np.flatnonzero(self._tiling.containing(context))]
 
     def sample(self, context: ArrayLike) -> Array:
         """Decide a goal, section 3.2.2: ``(outcome_dim,)`` in T.
@@ -98,7 +106,7 @@ class InterestMap:
             self._tiling.plant([*regions[:index], *region.split(*cut), *regions[index + 1 :]])
 
     def _best_cut(self, region: Region) -> tuple[int, float] | None:
-        """(axis, cut) with the largest n1 * n2 * |interest1 - interest2|; None when no cut is valid."""
+        """(axis, cut) with the largest n1 * n2 * contrast, of interests as in the paper; None when no cut is valid."""
         n, side = len(region.points), region.high - region.low
         cuts = np.quantile(region.points, np.arange(1, self.cuts + 1) / (self.cuts + 1), axis=0)  # (cuts, dim)
         is_below = region.points[:, None] < cuts  # (n, cuts, dim)
@@ -111,10 +119,9 @@ class InterestMap:
         def score(candidate: tuple[int, int]) -> tuple[float, float, int]:
             below = is_below[:, candidate[0], candidate[1]]
             balance = int(n_below[candidate]) * (n - int(n_below[candidate]))
-            difference = abs(region.interest_among(below) - region.interest_among(~below))
             # When all cuts score 0 (all competences are -1, say), the region is halved across its longest side rather
             # than kept: progress that begins in a small part of a large space is only seen in a small region.
-            return balance * difference, float(shares[candidate[1]]), balance
+            return balance * self.contrast(region, below), float(shares[candidate[1]]), balance
 
         candidates = [(int(row), int(axis)) for row, axis in np.argwhere(valid)]
         if not candidates:

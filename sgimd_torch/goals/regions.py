@@ -71,6 +71,11 @@ def interest_of(points: Array, competences: Array, gains: Array, *, window: int,
     return progress(points[-window:], competences[-window:], gains[-window:])
 
 
+def between_interests(region: Region, below: NDArray[np.bool_]) -> float:
+    """How far the interests on the two sides of a cut lie apart; ``below`` ``(n,)`` are the goals on one side."""
+    return abs(region.interest_among(below) - region.interest_among(~below))
+
+
 @dataclass(frozen=True, eq=False)
 class Region:
     """R_i, a leaf of the tree as it was when it was read: later goals make a new Region.

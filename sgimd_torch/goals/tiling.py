@@ -62,7 +62,7 @@ class Tiling:
     def add(self, context: ArrayLike, goal: ArrayLike, competence: float, strategy: str, gain: float) -> int:
         """Give a goal to the region in which it lies, and return the index of that region."""
         point = check_attempt(self.contexts, self.outcomes, context, goal, competence, gain)
-        index = int(self._contain(point).argmax())
+        index = int(self.containing(point).argmax())
         self.regions[index] = self.regions[index].extend(point, competence, gain, strategy)
         return index
 
@@ -81,7 +81,7 @@ class Tiling:
         step = self._near * (high - low)
         return Box(low, high).clip(region.goals[worst] + self._rng.uniform(-step, step))
 
-    def _contain(self, point: Array) -> NDArray[np.bool_]:
+    def containing(self, point: Array) -> NDArray[np.bool_]:
         """``(n_regions,)`` which contain a point of C, or of C x T: only the coordinates that it has count."""
         dim = len(point)
         inside = (self._lows[:, :dim] <= point) & (point < self._ends[:, :dim])  # (n_regions, dim)
@@ -90,7 +90,7 @@ class Tiling:
 
     def _choose(self, context: Array) -> Region:
         """A region with the probability of eq. (4), among those that contain the context."""
-        here = np.flatnonzero(self._contain(context))
+        here = np.flatnonzero(self.containing(context))
         interests = np.array([self.regions[index].interest() for index in here])
         weights = interests - interests.min()  # eq. (4)
         # Deviation: eq. (4) is 0/0 where no region stands out. Their shares of T then make goals uniform.

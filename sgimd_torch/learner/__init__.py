@@ -2,9 +2,9 @@
 
 Algorithm 1 of Nguyen & Oudeyer (2014), rebuilt. All five learners of the paper are this class with two slots, an
 autonomous and a social strategy. The caller owns the loop: ``move = learner.ask(context)``, execute it,
-``learner.tell(outcome)``; ``learner.watch(demonstration)`` whenever the teacher shows something. Which movement
-reaches a goal? ``learner.inverse(context, goal).theta``. ``learner.save(path)`` and ``learner.load(path)`` keep its
-life.
+``learner.tell(outcome)``; ``learner.watch(demonstration)`` whenever the teacher shows something. Some learners want to
+be shown a goal: ``learner.request(context)``, before ``ask``, says by whom. Which movement reaches a goal?
+``learner.inverse(context, goal).theta``. ``learner.save(path)`` and ``learner.load(path)`` keep its life.
 """
 
 from __future__ import annotations
@@ -27,7 +27,18 @@ from sgimd_torch.learner.life import (
     write_life,
 )
 from sgimd_torch.memory import Memory
-from sgimd_torch.spaces import Array, Attempt, Box, Demonstration, Estimate, Move, check_point, read_only
+from sgimd_torch.spaces import (
+    Array,
+    AskingAttempt,
+    Box,
+    Demonstration,
+    Estimate,
+    Lesson,
+    Move,
+    Request,
+    check_point,
+    read_only,
+)
 from sgimd_torch.strategies import SocialStrategy, Strategy
 from sgimd_torch.teachers import Teacher
 
@@ -68,9 +79,9 @@ class Learner:
         self.correspondence = correspondence
         self.inverse: Callable[[Array, Array], Estimate] = LocallyLinear(memory) if inverse is None else inverse
         self.policies = policies
-        self._attempt: Attempt | None = None
+        self._attempt: AskingAttempt | None = None
         self._context: Array = np.zeros(0)
-        self._move: Move | None = None  # the next movement of the attempt, not yet told
+        self._next: Move | Request | None = None  # of the attempt, not yet told or answered
         self._asked = False
         self._events: list[int | Event] = []  # a movement is the row of memory that keeps it
         self._begun = len(memory)
@@ -111,20 +122,39 @@ class Learner:
         context = check_point("context", context, self.memory.context_dim)
         if self._asked:
             raise RuntimeError("ask() again needs the outcome of the last movement; was tell() forgotten?")
+        self._go_unanswered()
         if self._attempt is None:
             context = read_only(context)
             self._begin(self.autonomous.attempt(context), context)
+            self._go_unanswered()
             if self._attempt is None:
                 raise RuntimeError(f"{type(self.autonomous).__name__}.attempt() has to yield at least once")
         elif context is not self._context and not np.array_equal(context, self._context):
             raise RuntimeError(f"the attempt under way began in context {self._context}, got {context}; see idle")
-        if self._move is None:
+        if not isinstance(self._next, Move):
             self._events.append(Event(Kind.RESTED, self._context))
             self._movements += 1
-            self._end()
+            self._advance(None)
             return None
         self._asked = True
-        return self._move
+        return self._next
+
+    def request(self, context: ArrayLike) -> Request | None:
+        """What it asks a teacher for before its next movement; None if nothing. `watch` answers, `ask` without an
+        answer goes on alone.
+
+        Args:
+            context: as for `ask`; an attempt begins in it if none is under way.
+
+        Raises:
+            ValueError: a context of another shape, or not finite.
+        """
+        context = check_point("context", context, self.memory.context_dim)
+        if self._attempt is None:
+            context = read_only(context)
+            self._begin(self.autonomous.attempt(context), context)
+            self._events.append(Event(Kind.BEGUN, self._context))
+        return self._next if isinstance(self._next, Request) else None
 
     def tell(self, outcome: ArrayLike) -> None:
         """Tell the outcome of the movement that was asked for; it enters memory.
@@ -137,43 +167,59 @@ class Learner:
             ValueError: an outcome of another shape, not finite or beyond 1e100; nothing is remembered and the learner
                 still waits.
         """
-        if not self._asked or self._attempt is None or self._move is None:
+        if not self._asked or not isinstance(self._next, Move):
             raise RuntimeError("tell() needs the outcome of a movement, but ask() has not proposed one")
-        self.memory.add(self._context, self._move.theta, outcome)
+        self.memory.add(self._context, self._next.theta, outcome)
         self._asked = False
         self._events.append(len(self.memory) - 1)
         self._movements += 1
-        try:
-            self._move = self._attempt.send(self.memory.outcomes[-1])
-        except StopIteration:
-            self._attempt = self._move = None
+        self._advance(self.memory.outcomes[-1])
 
     def watch(self, demonstration: Demonstration) -> None:
         """See a demonstration: the attempt under way ends, and the social strategy answers from the next ``ask`` on.
+        One that was requested goes to the attempt that had requested it.
 
         Raises:
             RuntimeError: this learner has no social strategy, or the last movement's outcome was not told.
             ValueError: a demonstration that does not fit the spaces or the correspondence, or whose theta_d leaves Pi;
                 nothing has happened then.
         """
-        if self.social is None or self.correspondence is None:
+        requested = isinstance(self._next, Request)
+        if self.social is None and not requested:
             raise RuntimeError("this learner has no social strategy, so it cannot be taught; use no teacher")
         if self._asked:
             raise RuntimeError("watch() needs the outcome of the last movement first; was tell() forgotten?")
-        context = check_point("context of the demonstration", demonstration.context, self.memory.context_dim)
+        theta_d = self.translate(demonstration)
+        if not requested:
+            self._end()
+        self._events.append(Event(Kind.SHOWN, lesson=demonstration))
+        if requested:
+            self._advance(Lesson(theta_d, demonstration))
+        elif self.social is not None:
+            context = np.asarray(demonstration.context, dtype=np.float64)
+            self._begin(self.social.attempt(context, theta_d, demonstration), context)
+
+    def translate(self, demonstration: Demonstration) -> Array:
+        """theta_d, eq. (6): the policy to which a demonstration corresponds.
+
+        Raises:
+            RuntimeError: this learner has no correspondence.
+            ValueError: see `watch`.
+        """
+        if self.correspondence is None:
+            raise RuntimeError("this learner has no correspondence, so it cannot be shown anything")
+        check_point("context of the demonstration", demonstration.context, self.memory.context_dim)
         check_point("outcome of the demonstration", demonstration.outcome, self.memory.outcome_dim)
         theta_d = self.correspondence(demonstration.times, demonstration.trajectory)
         theta_d = check_point("theta_d of the correspondence", theta_d, self.memory.theta_dim)
         if self.policies is not None:
             self.policies.check("theta_d of the correspondence", theta_d)
-        self._end()
-        self._events.append(Event(Kind.SHOWN, lesson=demonstration))
-        self._begin(self.social.attempt(context, theta_d, demonstration), context)
+        return theta_d
 
     def interrupt(self) -> None:
         """End the attempt under way; what it learnt so far counts. An outcome not yet told is no longer expected."""
-        if self._asked and self._move is not None:
-            self._events.append(Event(Kind.DROPPED, self._context, self._move.theta))
+        if self._asked and isinstance(self._next, Move):
+            self._events.append(Event(Kind.DROPPED, self._context, self._next.theta))
         elif self._attempt is not None:
             self._events.append(Event(Kind.INTERRUPTED))
         self._end()
@@ -229,10 +275,16 @@ class Learner:
 
     def _live_again(self, event: Event) -> Move | None:
         if event.lesson is not None:
+            if self.social is None and not isinstance(self._next, Request):
+                found = f"before movement {self.movements} it asked for a demonstration, the learner now does not"
+                raise ReplayError(f"{found}; is it built in the same way, with the same seed?")
             self.watch(event.lesson)
         if event.context is None:
             if event.kind == Kind.INTERRUPTED:
                 self.interrupt()
+            return None
+        if event.kind == Kind.BEGUN:
+            self.request(event.context)
             return None
         index, move = self.movements, self.ask(event.context)
         check_repeats(index, event.theta, None if move is None else move.theta)
@@ -245,12 +297,23 @@ class Learner:
     def _end(self) -> None:
         if self._attempt is not None:
             self._attempt.close()
-        self._attempt = self._move = None
+        self._attempt = self._next = None
         self._asked = False
 
-    def _begin(self, attempt: Attempt, context: Array) -> None:
-        self._context = context
+    def _begin(self, attempt: AskingAttempt, context: Array) -> None:
+        self._context, self._attempt = context, attempt
+        self._advance(None)
+
+    def _advance(self, sent: Array | Lesson | None) -> None:
+        """To the next movement, request or rest of the attempt; None begins one, or says that there was no answer."""
+        attempt, self._attempt, self._next = self._attempt, None, None
+        assert attempt is not None
         try:
-            self._attempt, self._move = attempt, next(attempt)
+            self._next = attempt.send(sent)
         except StopIteration:
-            self._attempt = self._move = None
+            return
+        self._attempt = attempt
+
+    def _go_unanswered(self) -> None:
+        while isinstance(self._next, Request):
+            self._advance(None)

@@ -7,8 +7,8 @@ memory come out the same, in the middle of an attempt, too. So nothing else has 
 The file is an npz without pickle:
     version          ()                   1
     kinds            (n,) integers        of the events: 0 moved, 1 rested, 2 asked and interrupted, 3 shown,
-                                          4 interrupted
-    contexts         (n_asked, c)         of the events 0, 1 and 2
+                                          4 interrupted, 5 begun
+    contexts         (n_asked, c)         of the events 0, 1, 2 and 5
     thetas           (n_proposed, p)      of the events 0 and 2
     outcomes         (n_moved, t)         of the events 0
     lesson_*                              of the events 3, end to end, as in a file of demonstrations
@@ -47,6 +47,7 @@ class Kind(IntEnum):
     DROPPED = 2  # asked for a movement, then interrupted before its outcome was told
     SHOWN = 3
     INTERRUPTED = 4
+    BEGUN = 5  # an attempt that may begin with a request; a demonstration shown next answers it
 
 
 class Event(NamedTuple):
@@ -192,7 +193,7 @@ def read_life(path: str | os.PathLike[str], memory: Memory) -> Life:
 
 
 _PROPOSED: Final = (Kind.MOVED, Kind.DROPPED)
-_ASKED: Final = (*_PROPOSED, Kind.RESTED)
+_ASKED: Final = (*_PROPOSED, Kind.RESTED, Kind.BEGUN)
 
 
 def _moved(memory: Memory, row: int) -> Event:

@@ -5,8 +5,8 @@ parts = build(Config(seed=3)); for episode in run(parts.learner, parts.environme
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
@@ -19,6 +19,7 @@ from sgimd_torch.runs.config import OWN, Config
 from sgimd_torch.runs.tasks import Task, benchmark_of, correspondence_of, demonstrations_of
 from sgimd_torch.spaces import Array, Demonstration, Estimate, stream
 from sgimd_torch.teachers import Teacher
+from sgimd_torch.teachers.answering import Demonstrator
 
 if TYPE_CHECKING:
     from sgimd_torch.forward_model.anchored import Trust
@@ -31,7 +32,8 @@ LEAST_NOISE: Final = 0.01  # m; predictions are not better than this, even if ou
 class RunParts:
     """What a run needs. ``config`` is what it was made from. ``answers`` are the inverses to evaluate by, the run's own
     first; they read the learner's memory. ``model`` is refreshed after each movement; it and its ``trust`` are None for
-    a run without a model. ``teacher`` is None, and ``demonstrations`` are empty, for a learner that learns alone.
+    a run without a model. ``teacher`` demonstrates, ``teachers`` are asked for it; without any of them there are no
+    ``demonstrations``.
     ``data`` holds checksums of the files that were read, ``notes`` messages for the user. ``record`` gives a movement
     to be filmed, None if the task has no picture of its own."""
 
@@ -47,6 +49,7 @@ class RunParts:
     trust: Trust | None
     notes: Sequence[str] = ()
     record: Record | None = None
+    teachers: Mapping[str, Demonstrator] = field(default_factory=dict)
 
     @property
     def inverse(self) -> Callable[[Array, Array], Estimate]:
@@ -71,10 +74,12 @@ def build(config: Config) -> RunParts:
     benchmark, notes, benchmark_crc32 = benchmark_of(task, config.benchmark)
     demonstrations: Sequence[Demonstration] = []
     teacher, demonstrations_crc32 = None, None
-    if "teacher" in parts.used:
+    if parts.used & {"teacher", "teachers"}:
         demonstrations, about_them, demonstrations_crc32 = demonstrations_of(task, config.demonstrations)
         notes += about_them
+    if "teacher" in parts.used:
         teacher = parts["teacher"](demonstrations, stream(config.seed, "teacher"))
+    teachers = parts.asked(demonstrations) if "teachers" in parts.used else {}
     learner = parts["algorithm"](task.environment, config.seed)
     words = {answer: config.inverse if answer == OWN else answer for answer in config.answered}
     if config.entry("algorithm").answers and config.inverse == Config.inverse:
@@ -96,6 +101,7 @@ def build(config: Config) -> RunParts:
         trust=parts["trust"] if "model" in parts.used else None,
         notes=[*config.without_effect, *notes],
         record=task.picture,
+        teachers=teachers,
     )
 
 
@@ -123,6 +129,15 @@ class _Parts:
         if name not in self._made:
             self._made[name] = self._make(name)
         return self._made[name]
+
+    def asked(self, demonstrations: Sequence[Demonstration]) -> dict[str, Demonstrator]:
+        """The teachers by name; an algorithm is told of the same ones."""
+        made: dict[str, Demonstrator] = {}
+        for word in self._config.teachers:
+            rng = stream(self._config.seed, f"teacher {word}")
+            made[word] = self.maker("teachers", word)(demonstrations, rng)
+        self._made["teachers"] = made
+        return made
 
     def maker(self, kind: str, word: str | None = None, *, learning: bool = True) -> Callable[..., Any]:
         """The choice of a kind, or another ``word`` of it, with its options. ``learning`` False: for evaluations, where

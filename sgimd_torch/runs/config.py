@@ -200,6 +200,21 @@ class Config:
         least=1,
     )
     choice: str = option("least-explored", TEACHER, "Which demonstration comes (periodic, asked).")
+    teachers: tuple[str, ...] = option(
+        ("all",),
+        TEACHER,
+        "Who can be asked to show a goal (sgim-im: one, sgim-acts: several), such as low-half,high-half.",
+        before=["all"],  # as json has it
+    )
+    cost: float = option(
+        1.0,
+        TEACHER,
+        "Cost of a demonstration that was asked for; the learner's interest in asking is divided by it.",
+        above=0,
+        most=1e6,
+        slip="an attempt of its own costs 1",
+        before=1.0,
+    )
     demonstrations: Path | None = option(
         None, TEACHER, "File of recorded demonstrations; null is the environment's own.", on_resume=True
     )
@@ -243,14 +258,17 @@ class Config:
     def __post_init__(self) -> None:
         for each in fields(self):
             value = getattr(self, each.name)
-            if each.name in CATALOGUE:
-                find(each.name, value)
+            for word in value if isinstance(value, tuple) else (value,):
+                if each.name in CATALOGUE:
+                    find(each.name, word)
             each.metadata["option"].check(each.name, value)
         for answer in self.answers:
             if answer != OWN:
                 find("inverse", answer)
         if self.answers[:1] != (OWN,) or len({*self.answers}) < len(self.answers):
             raise ValueError(f"answers must begin with {OWN} and name each once, got {','.join(self.answers)}")
+        if not self.teachers or len({*self.teachers}) < len(self.teachers):
+            raise ValueError(f"teachers must name at least one, and each once, got {','.join(self.teachers)}")
         if self.repeats == 1:
             raise ValueError("repeats must be 0 or at least 2, got 1; one landing point does not scatter")
         if self.board and importlib.util.find_spec("tensorboard") is None:
@@ -291,7 +309,16 @@ class Config:
 
     def entry(self, kind: str) -> Entry:
         """The record of the choice of a kind, or of a shared part."""
-        return SHARED[kind] if kind in SHARED else find(kind, getattr(self, kind))
+        return self.entries(kind)[0]
+
+    def entries(self, kind: str) -> list[Entry]:
+        """The same where several may be chosen."""
+        return [SHARED[kind]] if kind in SHARED else [find(kind, word) for word in self.choices(kind)]
+
+    def choices(self, kind: str) -> tuple[str, ...]:
+        """The choices of a kind: several teachers, one of everything else."""
+        value = getattr(self, kind)
+        return value if isinstance(value, tuple) else (value,)
 
     @property
     def used(self) -> set[str]:
@@ -300,8 +327,7 @@ class Config:
         while waiting:
             name = waiting.pop()
             used.add(name)
-            if name in CATALOGUE or name in SHARED:
-                entry = self.entry(name)
+            for entry in self.entries(name) if name in CATALOGUE or name in SHARED else ():
                 ignored |= {*entry.ignores}
                 waiting += [each for each in entry.options if each not in used]
         entries = [*SHARED.values(), *(entry for entries in CATALOGUE.values() for entry in entries.values())]
@@ -311,7 +337,7 @@ class Config:
     @property
     def own(self) -> list[str]:
         """The things of a user's own in this run, ``package.module:attribute``."""
-        used = [getattr(self, name) for name in CATALOGUE if name in self.used]
+        used = [word for kind in CATALOGUE if kind in self.used for word in self.choices(kind)]
         return sorted({word for word in (*used, *self.answered) if ":" in word})
 
     @property

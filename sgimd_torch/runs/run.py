@@ -20,7 +20,7 @@ from sgimd_torch.runs.log import RunError
 from sgimd_torch.runs.model_record import RunModel
 from sgimd_torch.runs.process import Failed, Progress, Stopped, Stopping, say
 from sgimd_torch.session import ReplayError, live, replay, run
-from sgimd_torch.spaces import Episode
+from sgimd_torch.spaces import Demonstration, Episode
 
 FLUSH_EVERY = 1.0  # s, what a killed run loses at most
 
@@ -89,6 +89,7 @@ class _Life:
         self.movements, self.recorded = 0, len(directory.lines)
         self._wanted = set(parts.config.evaluations)
         self._rows = {id(demonstration): row for row, demonstration in enumerate(parts.demonstrations)}
+        self._played = {shown.trajectory.tobytes(): row for row, shown in enumerate(parts.demonstrations)}
         self._flushed = time.monotonic()
 
     @property
@@ -101,7 +102,15 @@ class _Life:
         parts, total, seed = self.parts, self.parts.config.movements, self.parts.config.seed
         recorded = self.directory.columns.recorded(self.directory.lines)
         execute = replay(recorded, self.seconds.of("physics")(live(parts.environment, seed)))
-        episodes = run(parts.learner, parts.environment, seed, movements=total, teacher=parts.teacher, execute=execute)
+        episodes = run(
+            parts.learner,
+            parts.environment,
+            seed,
+            movements=total,
+            teacher=parts.teacher,
+            teachers=parts.teachers,
+            execute=execute,
+        )
         with Progress("replaying" if recorded else parts.config.title, self.recorded or total) as progress:
             if not recorded:
                 self._begin()
@@ -149,11 +158,15 @@ class _Life:
     def _write(self, episode: Episode) -> None:
         """A line for the log; one that is there already must be the same."""
         shown, columns = episode.demonstration, self.directory.columns
-        line = columns.line(episode, None if shown is None else self._rows[id(shown)])
+        line = columns.line(episode, None if shown is None else self._row(shown))
         if episode.index >= self.recorded:
             self.directory.log.append(line)
         elif line != self.directory.lines[episode.index]:
             raise ReplayError(columns.difference(self.directory.lines[episode.index], line))
+
+    def _row(self, shown: Demonstration) -> int | None:
+        """In the file; also of one with another label, None of one that is not there."""
+        return self._rows.get(id(shown), self._played.get(shown.trajectory.tobytes()))
 
     def _evaluate(self) -> None:
         """Evaluate the learner as it is now by each of its answers, with streams that the run does not use; unless it

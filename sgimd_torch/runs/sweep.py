@@ -213,7 +213,7 @@ def variants_of(varied: Sequence[str], options: Sequence[str]) -> tuple[list[Con
 
 def uses_working_directory(config: Config) -> bool:
     """Whether one of its parts or answers comes from a module there, which was loaded when it was chosen."""
-    chosen = [*(str(getattr(config, kind)) for kind in CATALOGUE), *config.answers]
+    chosen = [*(word for kind in CATALOGUE for word in config.choices(kind)), *config.answers]
     modules = [sys.modules.get(word.partition(":")[0]) for word in chosen if ":" in word]
     return any(Path(module.__file__ or "").is_relative_to(Path.cwd()) for module in modules if module)
 

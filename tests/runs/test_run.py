@@ -36,7 +36,7 @@ def test_every_algorithm_writes_a_whole_run_directory(tmp_path, go, capsys, algo
     run = read_run(directory)
     assert run.index.tolist() == list(range(MOVEMENTS))
     assert run.thetas.shape == (MOVEMENTS, 25)
-    assert (run.regions is not None) == (algorithm in ("sagg-riac", "sgim-d"))
+    assert (run.regions is not None) == (algorithm in ("sagg-riac", "sgim-d", "sgim-im", "sgim-acts"))
     header = (directory / "evaluation.csv").read_text().splitlines()[0]
     assert header == "movements,answer,mean_error_m,median_error_m,p90_error_m,noise_floor_m,goals_met,crc32"
     # Observation has seen nothing before movement 30, so it has nothing to be evaluated by after 30 movements.

@@ -97,7 +97,7 @@ class PeriodicTeacher:
         every: int = 30,
         choose: Choose = least_explored,
     ) -> None:
-        self.demonstrations = _checked(demonstrations)
+        self.demonstrations = check_demonstrations(demonstrations)
         self.rng = rng
         self.every = check_count("every", every, 1)
         self.choose = choose
@@ -113,7 +113,7 @@ class InitialTeacher:
     """Gives each demonstration once, at the start, in random order: one before the movements 0, ``every``, ..."""
 
     def __init__(self, demonstrations: Sequence[Demonstration], rng: np.random.Generator, *, every: int = 10) -> None:
-        self.demonstrations = _checked(demonstrations)
+        self.demonstrations = check_demonstrations(demonstrations)
         self.every = check_count("every", every, 1)
         self._order = rng.permutation(len(demonstrations))
 
@@ -141,7 +141,7 @@ class AskedTeacher:
         threshold: float = 0.01,
         choose: Choose = least_explored,
     ) -> None:
-        self.demonstrations = _checked(demonstrations)
+        self.demonstrations = check_demonstrations(demonstrations)
         self.rng = rng
         self.patience = check_count("patience", patience, 1)
         self.threshold = threshold
@@ -167,7 +167,12 @@ class AskedTeacher:
         return float(np.mean(distances))
 
 
-def _checked(demonstrations: Sequence[Demonstration]) -> Sequence[Demonstration]:
+def check_demonstrations(demonstrations: Sequence[Demonstration]) -> Sequence[Demonstration]:
+    """The same.
+
+    Raises:
+        ValueError: there are none, or their contexts or outcomes differ in shape.
+    """
     if not demonstrations:
         raise ValueError("a teacher needs at least one demonstration; use no teacher to learn alone")
     shapes = {(np.shape(shown.context), np.shape(shown.outcome)) for shown in demonstrations}

@@ -1,0 +1,96 @@
+"""Teachers who are asked for a demonstration of a goal, and answer with what they have nearest, or with nothing.
+
+Nguyen & Oudeyer (2012), "Active choice of teachers, learning strategies and goals for a socially guided intrinsic
+motivation learner". The learner asks, see `sgimd_torch.learner.asking`; `run` hands its requests to the teachers.
+    teachers = {"left": AnsweringTeacher(shown, stream(seed, "left"), knows=low_half)}
+    teachers["left"].demonstrate(context, goal, memory)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Protocol
+
+import numpy as np
+
+from sgimd_torch.memory import Memory
+from sgimd_torch.spaces import Array, Demonstration, check_count, check_point
+from sgimd_torch.teachers import check_demonstrations
+
+
+class Demonstrator(Protocol):
+    """Answers requests. A member ``takes``, if there is one, is the number of movements that an answer counts as."""
+
+    def demonstrate(self, context: Array, goal: Array, memory: Memory) -> Demonstration | None:
+        """What it can show of ``goal`` ``(outcome_dim,)`` in ``context`` ``(context_dim,)``, or None. It must answer
+        the same in a replay, so what it draws may depend on its seed and on its arguments only."""
+        ...
+
+
+Knows = Callable[[Sequence[Demonstration], np.random.Generator], Sequence[Demonstration]]
+"""(demonstrations, rng) -> those that a teacher has, as they take them to be."""
+
+
+def everything(demonstrations: Sequence[Demonstration], rng: np.random.Generator) -> Sequence[Demonstration]:
+    """All of them, as they are."""
+    return demonstrations
+
+
+def low_half(demonstrations: Sequence[Demonstration], rng: np.random.Generator) -> Sequence[Demonstration]:
+    """Those whose first outcome coordinate is below the median: half the plane."""
+    return [shown for shown in demonstrations if shown.outcome[0] < _middle(demonstrations)]
+
+
+def high_half(demonstrations: Sequence[Demonstration], rng: np.random.Generator) -> Sequence[Demonstration]:
+    """The others."""
+    return [shown for shown in demonstrations if shown.outcome[0] >= _middle(demonstrations)]
+
+
+def mislabelled(demonstrations: Sequence[Demonstration], rng: np.random.Generator) -> Sequence[Demonstration]:
+    """All of them, each with the outcome of another one: what it is said to show it does not show."""
+    shift = 1 + int(rng.integers(max(1, len(demonstrations) - 1)))
+    order = rng.permutation(len(demonstrations))
+    labels = {int(row): demonstrations[label].outcome for row, label in zip(order, np.roll(order, shift), strict=True)}
+    return [replace(shown, outcome=labels[row]) for row, shown in enumerate(demonstrations)]
+
+
+class AnsweringTeacher:
+    """Shows the demonstration nearest to the goal; of equally near ones the first.
+
+    Args:
+        demonstrations: that are there.
+        rng: draws what ``knows`` draws, and nothing later.
+        knows: which of them this teacher has: `everything`, `low_half`, `high_half`, `mislabelled` or your own.
+        within: distance in C x T beyond which they have no answer.
+        takes: movements that an answer counts as, at which the learner rests: a slow teacher.
+
+    Raises:
+        ValueError: no demonstration, or a number out of its range.
+    """
+
+    def __init__(
+        self,
+        demonstrations: Sequence[Demonstration],
+        rng: np.random.Generator,
+        *,
+        knows: Knows = everything,
+        within: float = np.inf,
+        takes: int = 0,
+    ) -> None:
+        self.demonstrations = check_demonstrations(knows(check_demonstrations(demonstrations), rng))
+        if not within > 0:
+            raise ValueError(f"within must be a distance above 0, got {within}")
+        self.within, self.takes = within, check_count("takes", takes, 0)
+        self._points = np.stack([np.concatenate((shown.context, shown.outcome)) for shown in self.demonstrations])
+
+    def demonstrate(self, context: Array, goal: Array, memory: Memory) -> Demonstration | None:
+        """See `Demonstrator`."""
+        point = check_point("context and goal asked for", np.concatenate((context, goal)), self._points.shape[1])
+        distances = np.linalg.norm(self._points - point, axis=1)
+        nearest = int(distances.argmin())
+        return self.demonstrations[nearest] if distances[nearest] <= self.within else None
+
+
+def _middle(demonstrations: Sequence[Demonstration]) -> float:
+    return float(np.median([shown.outcome[0] for shown in demonstrations]))
