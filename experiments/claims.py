@@ -113,7 +113,12 @@ def gymnasium_page(folder: Path) -> Page:
     """The page results/GYMNASIUM.md: each way to explore, answered in each way."""
     path = folder / "gymnasium.csv"
     by_answer = {answer: Results(read_results(path, answer)) for answer in ("nearest", "linear", "model", "own")}
-    rows = [(name, answer) for name in EXPERIMENTS["swimmer"] for answer in by_answer if _answers(name, answer)]
+    rows = [
+        (name, answer)
+        for name in EXPERIMENTS["swimmer"]
+        for answer in by_answer
+        if name in by_answer[answer].variants and _answers(name, answer)
+    ]
     columns: dict[str, Callable[[str, str], str]] = {
         "explored by": lambda name, _: f"`{name.removesuffix('-swimmer')}`",
         "answered by": lambda _, answer: f"`{answer}`" if answer != "own" else "its own process",

@@ -96,7 +96,8 @@ class Table:
 
 def result_rows(experiment: str, config: Config, run: Run) -> list[list[object]]:
     """A row of ``RESULTS`` for each evaluation of a finished run and each of its answers."""
-    benchmark = _benchmark(config.environment, config.benchmark)
+    benchmark, low = _benchmark(config.environment, config.benchmark)
+    corner = CORNER if config.environment in (ROD, *ARMS) else low
     columns = ("movements", "mean_error_m", "noise_floor_m", "goals_met")
     found = {
         (int(movements), answer): (float(error), float(floor), float(met))
@@ -107,8 +108,7 @@ def result_rows(experiment: str, config: Config, run: Run) -> list[list[object]]
     rows: list[list[object]] = []
     for movements in run.evaluation["movements"].tolist():
         landed = run.outcomes[:movements]
-        tiles = tiles_reached(landed, benchmark) if config.environment in (ROD, *ARMS) else math.nan
-        reached = tiles, goals_claimed(landed, benchmark)
+        reached = tiles_reached(landed, benchmark, corner), goals_claimed(landed, benchmark)
         for answer in run.answers:
             error, floor, met = found[movements, answer]
             rows.append([*first, movements, answer, error, floor, *reached, met if math.isnan(met) else int(met)])
@@ -123,16 +123,16 @@ def goal_rows(config: Config, run: Run) -> list[list[object]]:
     return [[config.variant, config.seed, len(goals), near]] if len(goals) else []
 
 
-def tiles_reached(outcomes: Array, benchmark: Benchmark) -> int:
+def tiles_reached(outcomes: Array, benchmark: Benchmark, corner: Array | float = CORNER) -> int:
     """How many of the benchmark's tiles, one for each of its goals, hold one or more of the ``outcomes``.
 
     Args:
         outcomes: ``(n, 2)`` m, NaN where the robot was at rest.
-        benchmark: its tiles were laid out from ``CORNER``, whatever the T of these goals.
+        benchmark: its tiles were laid out from ``corner``, those of rod and arms from -1 m, whatever their T.
     """
     landed = outcomes[np.isfinite(outcomes).all(axis=1)]
     reached, wanted = (
-        {tuple(tile) for tile in np.floor((points - CORNER) / benchmark.side).tolist()}
+        {tuple(tile) for tile in np.floor((points - corner) / benchmark.side).tolist()}
         for points in (landed, benchmark.goals)
     )
     return len(reached & wanted)
@@ -156,8 +156,10 @@ def goals_claimed(outcomes: Array, benchmark: Benchmark) -> int:
 
 
 @cache
-def _benchmark(environment: str, path: Path | None) -> Benchmark:
-    return benchmark_of(task_of(Config(environment=environment)), path)[0]
+def _benchmark(environment: str, path: Path | None) -> tuple[Benchmark, Array]:
+    """With the lower corner of T."""
+    task = task_of(Config(environment=environment))
+    return benchmark_of(task, path)[0], task.environment.outcomes.low
 
 
 @contextmanager

@@ -92,9 +92,10 @@ def test_which_movement_reaches_a_goal_is_one_call_for_all_of_them(name):
     learner = build(seed=2)
     for _ in run(learner, arm, 2, movements=60, teacher=teacher_for(name)):
         pass
-    goal, context = np.array([0.3, 0.4]), np.zeros(arm.contexts.dim)
-    assert arm.policies.contains(learner.inverse(context, goal).theta)
+    goal = np.array([0.3, 0.4])
     found = evaluate(learner.inverse, arm, goal[None], seed=2, movements=60)
+    context = found.contexts[0]
+    assert arm.policies.contains(learner.inverse(context, goal).theta)
     assert np.array_equal(found.thetas[0], LocallyLinear(learner.memory)(context, goal).theta)
 
 
