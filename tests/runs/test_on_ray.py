@@ -53,6 +53,7 @@ sys.exit(process.command(sweep.main))
 """
 LIVES = ["--environment", "slow:make", "--algorithm", "sagg-riac", "--movements", "250", "--evaluate-at", "100"]
 LIVES += ["--repeats", "0", "--seeds", "0-1"]
+pytestmark = pytest.mark.skipif(" " in sys.executable, reason="Ray cannot start Python from a path with a space")
 FRESH = "holds no run yet"  # what a run says that does not go on from somewhere
 
 
@@ -143,6 +144,7 @@ def test_when_the_sweep_is_killed_the_same_command_goes_on_with_the_same_results
         assert FRESH not in directory.with_suffix(".log").read_text()
 
 
+@pytest.mark.slow
 def test_stopped_it_leaves_no_run_behind_and_goes_on_as_if_nothing_had_happened(slowly, place, alone, monkeypatch):
     directories = directories_in(place / "stopped")
     log = directories[0] / "episodes.csv"
@@ -159,6 +161,17 @@ def test_stopped_it_leaves_no_run_behind_and_goes_on_as_if_nothing_had_happened(
     assert command(main, [*LIVES, "--out", "stopped"]) == 0  # now without Ray
     assert [csv_of(directory) for directory in directories] == alone
     assert FRESH not in directories[0].with_suffix(".log").read_text()
+
+
+def test_a_python_that_ray_cannot_start_is_refused(monkeypatch):
+    from sgimd_torch.runs.engines.on_ray import OnRay
+
+    monkeypatch.setattr(sys, "executable", "/a place/bin/python")
+    with pytest.raises(
+        ValueError, match="from a path with a space, /a place/bin/python, for runs with parts of your own"
+    ):
+        OnRay(None, ships=True)
+    OnRay(None)
 
 
 @pytest.mark.parametrize(

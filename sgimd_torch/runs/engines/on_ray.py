@@ -49,10 +49,18 @@ class OnRay:
         processes: how many run at a time, of a cluster that is started here.
         ships: send a copy of the working directory along, which the runs import from.
         out: a folder that is not sent; neither is what .gitignore names.
+
+    Raises:
+        ValueError: the working directory is to be sent, and the path of Python has a space: Ray would wait for ever.
     """
 
     def __init__(self, address: str | None, processes: int = 1, *, ships: bool = False, out: Path = Path()) -> None:
         self._address, self._processes = address, processes
+        if ships and " " in sys.executable:
+            raise ValueError(
+                f"Ray cannot start Python from a path with a space, {sys.executable}, for runs with parts of your own; "
+                "put the virtual environment elsewhere, or leave --engine ray out"
+            )
         sent = {"working_dir": os.getcwd(), "excludes": [f"/{os.path.relpath(out)}"]}
         self._options: dict[str, Any] = {"runtime_env": sent} if ships else {}
         self._jobs: dict[Path, Job] = {}
