@@ -11,6 +11,7 @@ Each is written as png and svg. A figure without its data is left out, and a mes
   large_space    error where the task space is 10^4 times larger   (e)
   goals          the goals chosen there                            (f, needs RUNS)
   variants       what each change of SGIM-D, and each rival, makes
+  swimmer        error on a robot of gymnasium, by who explored and who answered (from results/gymnasium.csv)
 
 Example:
   python experiments/figures.py --results results --runs runs --out results/figures
@@ -20,8 +21,8 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
@@ -35,6 +36,7 @@ with loading():  # Ctrl-C shows no traceback
 
     from judging import NotRun, Results
     from read_results import LAST, LEARNERS, read_results, read_seeds
+    from sgimd_torch.catalogue import label
     from sgimd_torch.demonstrations import SHIPPED, load_demonstrations
     from sgimd_torch.environments.fishing_rod import JOINTS
     from sgimd_torch.figures import movements as plots_of_movements
@@ -45,7 +47,7 @@ with loading():  # Ctrl-C shows no traceback
     from sgimd_torch.runs.read import Run
     from sgimd_torch.spaces import Array, Box
     from sgimd_torch.views.statistics import Interval, iqm_interval, paired_differences, rng
-    from variants import shipped
+    from variants import SWIMMERS, shipped
 
 BAND = "thick: interquartile mean, band: its 95 % interval, thin: seeds"
 DEMONSTRATORS = {
@@ -67,10 +69,11 @@ REACH = 1.5  # m; the float hardly ever lands farther from the base
 
 @dataclass(frozen=True, eq=False)
 class Data:
-    """The data of figures: the results, and the folder of run directories."""
+    """The data of figures: the results, the folder of run directories, and what came of the swimmer."""
 
     results: Results
     folder: Path
+    swimmer: Mapping[str, Results] = field(default_factory=dict)  # by answer
 
     def curves(self, variant: str, algorithm: str, label: str, *, dashed: bool = False) -> SeedCurves:
         """Error curves up to the paper's 5000 movements; raises ``NotRun`` if no seed has a whole one."""
@@ -234,8 +237,37 @@ def variants(data: Data) -> Figure:
     return figure
 
 
+def swimmer(data: Data) -> Figure:
+    """A robot that nobody here wrote: the same movements, answered in three ways."""
+    if not data.swimmer:
+        raise NotRun("the swimmer")
+    figure = _figure(13, 4.6)
+    answers = {
+        "nearest": "the nearest neighbour",
+        "linear": "LocallyLinear",
+        "model": "the model; practice by its process",
+    }
+    axes = figure.subplots(1, 3, sharey=True)
+    for ax, (answer, title) in zip(axes, answers.items(), strict=True):
+        own = "own" if answer == "model" else answer
+        explored = [*((name, answer) for name in SWIMMERS), ("practice", own)]
+        seed_curves(
+            ax,
+            [
+                replace(data, results=data.swimmer[by]).curves(f"{name}-swimmer", name, label(name))
+                for name, by in explored
+            ],
+        )
+        ax.set_title(f"answered by {title}", fontsize=11)
+        ax.label_outer()
+    axes[0].set_ylim(0, 1.05 * max(line.get_ydata().max() for ax in axes for line in ax.lines))
+    figure.suptitle(f"Swimmer-v5 ({BAND})", fontsize=11)
+    return figure
+
+
 FIGURES: dict[str, Callable[[Data], Figure]] = {
-    figure.__name__: figure for figure in (errors, demonstrators, landing, trajectories, large_space, goals, variants)
+    figure.__name__: figure
+    for figure in (errors, demonstrators, landing, trajectories, large_space, goals, variants, swimmer)
 }
 
 
@@ -278,7 +310,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, default=Path("results/figures"), help="default: %(default)s")
     parser.add_argument("--only", choices=FIGURES, help="only this figure")
     options = parser.parse_args(argv)
-    data = Data(Results(read_results(options.results / "paper.csv", "linear")), options.runs)
+    path = options.results / "gymnasium.csv"
+    answers = ("nearest", "linear", "model", "own") if path.exists() else ()
+    swimmer = {answer: Results(read_results(path, answer)) for answer in answers}
+    data = Data(Results(read_results(options.results / "paper.csv", "linear")), options.runs, swimmer)
     make_folder(options.out)
     for name in FIGURES if options.only is None else [options.only]:
         try:
