@@ -266,8 +266,9 @@ def test_every_choice_runs_and_differs_from_the_others(tmp_path, go, option, tab
     # Short attempts and a short window, so that the map is split, and has its say, before the run is over.
     common = ("--every", 20, "--budget", 3, "--imitations", 3, "--window", 4, "--movements", 240, "--evaluate_at", "[]")
     choices = [choice for choice in table if choice not in (*MODEL_SEARCHES, "model")]  # see the next two tests
+    learner = ("--algorithm", "sgim-im") if option == "teachers" else ()  # the one that asks them
     for choice in choices:
-        assert go(tmp_path, "--name", choice, f"--{option}", choice, *common) == 0
+        assert go(tmp_path, "--name", choice, f"--{option}", choice, *common, *learner) == 0
         logs.add((tmp_path / choice / "seed-003" / "episodes.csv").read_bytes())
     assert len(logs) == len(choices)
 
