@@ -2,9 +2,9 @@ from .algorithms import imitation as imitation
 from .algorithms import observation as observation
 from .algorithms import random_exploration as random_exploration
 from .algorithms import sagg_riac as sagg_riac
-from .algorithms import sgim_acts as sgim_acts
 from .algorithms import sgim_d as sgim_d
-from .algorithms import sgim_im as sgim_im
+from .algorithms.asking import sgim_acts as sgim_acts
+from .algorithms.asking import sgim_im as sgim_im
 from .competence import absolute_performance as absolute_performance
 from .competence import performance as performance
 from .demonstrations import load_demonstrations as load_demonstrations

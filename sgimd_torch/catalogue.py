@@ -86,9 +86,9 @@ _PURSUES: Final = {
 _TAUGHT: Final = ("teacher", "demonstrations")
 _SHOWN: Final = {"correspondence": "correspondence"}
 _ASKS: Final = {
-    **{name: option for name, option in _PURSUES.items() if name != "goals"},
     **_SHOWN,
     "teachers": "teachers",
+    "base": "base",
     "cost": "cost",
 }
 _PROGRESS: Final = {"window": "window", "progress": "progress"}
@@ -118,9 +118,9 @@ def _at(place: str, about: str, **more: Any) -> Entry:
     return Entry(f"{_IN_THE_PACKAGE}.{place}", about, **more)
 
 
-def _toy(name: str, side: float, about: str) -> Entry:
+def _toy(name: str, side: float, about: str, **more: object) -> Entry:
     make = f"{_IN_THE_PACKAGE}.environments.toys:{name}"
-    return _at("runs.tasks:toy", about, fixed={"make": make, "side": side})
+    return _at("runs.tasks:toy", about, fixed={"make": make, "side": side, **more})
 
 
 def _rod(about: str, **fixed: object) -> Entry:
@@ -182,18 +182,20 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
             colour="#d55e00",
         ),
         "sgim-im": _at(
-            "algorithms:sgim_im",
+            "algorithms.asking:sgim_im",
             "decides when to ask the one teacher of --teachers",
             uses=_ASKS,
             also=("demonstrations",),
+            answers=True,
             label="SGIM-IM",
             colour="#661100",
         ),
         "sgim-acts": _at(
-            "algorithms:sgim_acts",
+            "algorithms.asking:sgim_acts",
             "decides when to ask which of --teachers for what, and how to use the answer",
             uses=_ASKS,
             also=("demonstrations",),
+            answers=True,
             label="SGIM-ACTS",
             colour="#cc6677",
         ),
@@ -222,7 +224,7 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
         "half-reached": _at(
             "runs.tasks:half_reached", "7 joints, and a T of which less than half can be reached", filmed=True
         ),
-        "toss": _toy("toss", 0.4, "a ball in the wind, which is the context"),
+        "toss": _toy("toss", 0.4, "a ball in the wind, which is the context", taught=True),
         "crawler": _toy("crawler", 0.1, "four legs, whose phases are periodic parameters"),
         "two-elbows": _toy("two_elbows", 0.1, "an arm with two separate families of postures"),
         "spatial-arm": _toy("spatial_arm", 25.0, "six joints, three outcomes, in cm"),
@@ -292,6 +294,18 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
             learns_with="linear",
         ),
     },
+    "base": {
+        "practice": _at("algorithms.asking:practised", "one movement a goal, and once what is shown"),
+        "search": _at(
+            "algorithms.asking:searched",
+            "a search at each goal and short imitations, as in the papers",
+            uses={
+                **{name: option for name, option in _PURSUES.items() if name not in ("goals", "judge")},
+                "repeats": "imitations",
+                "epsilon": "epsilon",
+            },
+        ),
+    },
     "social": {
         "imitate": _at(
             "algorithms:imitating", "repeat it a few times", uses={"repeats": "imitations", "epsilon": "epsilon"}
@@ -309,6 +323,13 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
     },
     "teachers": {
         "all": _answering("shows the nearest of all demonstrations"),
+        **{
+            f"demonstrator-{number}": _answering(
+                f"has the recordings of the rod's demonstrator {number}",
+                knows=f"sgimd_torch.teachers.answering:demonstrator_{number}",
+            )
+            for number in (1, 2, 3)
+        },
         "low-half": _answering(
             "has those of the lower half of the first outcome", knows="sgimd_torch.teachers.answering:low_half"
         ),
@@ -344,6 +365,7 @@ _WANTED: Final[dict[str, tuple[str, tuple[str, ...]]]] = {
     "competence": ("(memory, measure) -> a judge of competence", ("__call__",)),
     "search": ("(policies, rng) -> a search", ("__call__",)),
     "inverse": ("(memory) -> an inverse model", ("__call__",)),
+    "base": ("(environment) -> what a learner that asks does on its own, and how it answers", ("parts", "ways")),
     "social": ("(goal babbling, outcomes, rng) -> a social strategy", ("attempt",)),
     "teacher": ("(demonstrations, rng) -> a teacher", ("offer",)),
     "teachers": ("(demonstrations, rng) -> a teacher who answers", ("demonstrate",)),

@@ -74,9 +74,9 @@ def run(
         if demonstration is not None:
             learner.watch(demonstration)
         context = read_only(environment.observe(stream(seed, "context", index))) if learner.idle else learner.context
-        request = learner.request(context) if teachers else None
+        request, reply = learner.request(context) if teachers else None, ""
         if request is not None and teachers is not None:
-            answer = _asked(learner, environment, context, request, teachers)
+            answer, reply = _asked(learner, environment, context, request, teachers)
             if answer is not None:
                 learner.watch(answer)
                 demonstration = answer
@@ -84,13 +84,13 @@ def run(
         if move is not None:
             outcome = execute(index, context, move.theta)
             learner.tell(outcome)
-        yield Episode(index, context, move, outcome, demonstration, request)
+        yield Episode(index, context, move, outcome, demonstration, request, reply)
 
 
 def _asked(
     learner: Learner, environment: Environment, context: Array, request: Request, teachers: Mapping[str, Demonstrator]
-) -> Demonstration | None:
-    """The answer to a request; None also if it is one that the learner cannot use.
+) -> tuple[Demonstration | None, str]:
+    """The answer to a request, None if there is none that is new and that the learner can use; and ``Episode.reply``.
 
     The attempt stays in its own context: a demonstration of another one is a hint, as long as that lies in C.
     """
@@ -99,17 +99,17 @@ def _asked(
         raise ValueError(f"the learner asks {name!r}, but teachers are {', '.join(teachers)}; are they those it knows?")
     try:
         shown = teachers[name].demonstrate(context.copy(), request.goal, learner.memory)
-        if shown is not None:
-            environment.contexts.check("context of the demonstration", shown.context)
-            environment.outcomes.check("outcome of the demonstration", shown.outcome)
-            learner.translate(shown)
+        if shown is None:
+            return None, "nothing"
+        environment.contexts.check("context of the demonstration", shown.context)
+        environment.outcomes.check("outcome of the demonstration", shown.outcome)
+        return (None, "again") if learner.was_shown(shown) else (shown, "shown")
     except Exception as error:  # whatever a teacher does, it must not end the learner's life
         said = (
             f"teacher {name} gave no answer that can be used, so the learner goes on: {type(error).__name__}: {error}"
         )
         warnings.warn(said, RuntimeWarning, stacklevel=3)
-        return None
-    return shown
+        return None, "failed"
 
 
 def live(environment: Environment, seed: int) -> Execute:

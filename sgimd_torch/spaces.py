@@ -229,10 +229,11 @@ class Demonstration:
 @dataclass(frozen=True, eq=False)
 class Request:
     """What a learner would like to be shown: ``goal`` ``(outcome_dim,)``, a read-only copy, by the ``teacher`` of this
-    name."""
+    name. ``strategy`` is what it would do with the answer, for analysis."""
 
     teacher: str
     goal: Array
+    strategy: str = ""
 
     def __post_init__(self) -> None:
         _own(self, "goal")
@@ -249,7 +250,8 @@ class Lesson(NamedTuple):
 class Episode:
     """[context][policy][outcome] and why it happened. ``move`` and ``outcome`` are None when the learner rested;
     ``demonstration`` is what a teacher showed just before, if anything, and ``request`` what the learner had asked for,
-    answered or not. Arrays are read-only copies."""
+    answered or not; then ``reply`` says "shown", or why not: "nothing", "again" (it was shown this before), "failed" or
+    "timed out". Arrays are read-only copies."""
 
     index: int
     context: Array
@@ -257,6 +259,7 @@ class Episode:
     outcome: Array | None
     demonstration: Demonstration | None
     request: Request | None = None
+    reply: str = ""
 
     def __post_init__(self) -> None:
         _own(self, "context", "outcome")

@@ -155,9 +155,10 @@ class GoalBabbling:
             strategy: "autonomous", "social" or another name: who had chosen the goal, and how it was pursued.
         """
         if outcomes:
+            judged = self.judge(context, goal, np.stack(outcomes))
+            rise = self.competence(context, goal) - before
             # Where contexts vary, a new exemplar nearer in (context, outcome) may be farther in outcome alone.
-            gain = max(0.0, self.competence(context, goal) - before)
-            self.goals.add(context, goal, self.judge(context, goal, np.stack(outcomes)), strategy, gain)
+            self.goals.add(context, goal, judged, strategy, rise if rise > 0 else min(0.0, judged - before))
 
     def _explore(self, context: Array, goal: Array) -> Attempt:
         """Endless movements, in the global exploration or the local optimisation regime."""

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from runs import EAGER, signal_after, start
-from sgimd_torch.algorithms import sagg_riac, sgim_acts, sgim_im
+from sgimd_torch.algorithms import sagg_riac
+from sgimd_torch.algorithms.asking import sgim_acts, sgim_im
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.goals.uniform import UniformGoals
 from sgimd_torch.learner import ReplayError

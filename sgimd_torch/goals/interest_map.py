@@ -74,9 +74,15 @@ class InterestMap:
         """The leaves, which tile C x T, in the order of the tree: a region's halves stand where it stood."""
         return list(self._tiling.regions)
 
-    def regions_at(self, context: Array) -> list[Region]:
-        """Those that contain a context ``(context_dim,)``; all of them where there are no contexts."""
-        return [self._tiling.regions[index] for index in np.flatnonzero(self._tiling.containing(context))]
+    @property
+    def sides(self) -> Array:
+        """``(dim,)`` lengths of the sides of C x T."""
+        return self._tiling.box.sides
+
+    def regions_at(self, point: Array) -> list[Region]:
+        """Those that contain a context ``(context_dim,)``, all of them where there are no contexts; or the one that
+        contains a point of C x T."""
+        return [self._tiling.regions[index] for index in np.flatnonzero(self._tiling.containing(point))]
 
     def sample(self, context: ArrayLike) -> Array:
         """Decide a goal, section 3.2.2: ``(outcome_dim,)`` in T.

@@ -36,7 +36,8 @@ class Goals(Protocol):
             goal: ``(outcome_dim,)`` in T.
             competence: at this goal now, in [-1, 0].
             strategy: who had chosen the goal.
-            gain: how much the best competence remembered at this goal rose during the attempt, in [0, 1].
+            gain: how much the best competence remembered at this goal rose during the attempt; if it did not rise, how
+                much less the attempt came to, by the judge of the learner; in [-1, 1].
 
         Raises:
             ValueError: see `check_attempt`.
@@ -62,13 +63,13 @@ def check_attempt(
     """The point (context, goal) of C x T, ``(context_dim + outcome_dim,)``.
 
     Raises:
-        ValueError: ``context`` is not one point of C, ``competence`` not in [-1, 0], ``gain`` not in [0, 1], or
+        ValueError: ``context`` is not one point of C, ``competence`` not in [-1, 0], ``gain`` not in [-1, 1], or
             ``goal`` not one point of T. A demonstrated outcome may lie outside, so ask ``outcomes.contains`` first.
     """
     point = check_in(contexts, "context", context)
     goal = check_in(outcomes, "goal", goal, "ask outcomes.contains before a demonstrated outcome becomes a goal")
     if not -1 <= competence <= 0:  # NaN too
         raise ValueError(f"competence must lie in [-1, 0], got {competence}; was a distance passed instead?")
-    if not 0 <= gain <= 1:
-        raise ValueError(f"gain must lie in [0, 1], got {gain}; it is how much competence rose, and memory only grows")
+    if not -1 <= gain <= 1:
+        raise ValueError(f"gain must lie in [-1, 1], got {gain}; it is a difference of two competences")
     return np.concatenate((point, goal))

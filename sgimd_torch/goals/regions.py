@@ -27,7 +27,7 @@ def gained_progress(points: Array, competences: Array, gains: Array) -> float:
     Deviation: eq. (3) compares the competences of older and newer goals, which also differ because the goals differ. In
     most regions of a large task space some goals can be reached and others cannot, and eq. (3) sees little else.
     """
-    return float(gains.mean())
+    return float(np.maximum(gains, 0).mean())
 
 
 def absolute_progress(points: Array, competences: Array, gains: Array) -> float:

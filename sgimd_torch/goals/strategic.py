@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Final, Protocol, runtime_checkable
+from typing import Final, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,25 +23,32 @@ from sgimd_torch.goals.regions import Region
 from sgimd_torch.spaces import Array, Box
 
 AUTONOMOUS: Final = "autonomous"
+_FEWEST, _LAST = 4, 10  # attempts that say something, and that progress is measured over
+_UNTRIED: Final = 1.0  # progress that is hoped for: the most that there can be
 
 
-def exemplar_progress(points: Array, competences: Array, gains: Array) -> float:
-    """Mean of (after - before) * max(after, before)^2 without its least and its greatest, of competences in [0, 1].
+def progresses(competences: Array, gains: Array) -> Array:
+    """(after - before) * max(after, before)^2 of each attempt, of competences in [0, 1]; ours lie in [-1, 0].
 
-    Ours lie in [-1, 0], so 1 is added. A gain is after - before and never negative, so the greater one is ``after``.
-    Without the greatest, since one exemplar in a new place says nothing of the next one there, but a cut that tells
-    means apart puts it into a small region with few others.
+    Deviation: ``after`` is what the attempt itself came to, so progress is negative where it came to less than what
+    memory holds. Somebody who mislabels is told from somebody who has nothing new only by this.
     """
-    return float(np.sort(gains * (1 + competences) ** 2)[1:-1].mean())
+    return gains * (1 + competences + np.maximum(-gains, 0)) ** 2
+
+
+def strategic_progress(points: Array, competences: Array, gains: Array) -> float:
+    """The mean of these without its least and its greatest: one exemplar in a new place says nothing of the next one
+    there, but a cut that tells means apart puts it into a small region with few others."""
+    return float(np.sort(progresses(competences, gains))[1:-1].mean())
 
 
 def between_means(region: Region, below: NDArray[np.bool_]) -> float:
     """Squared difference of the mean progresses on the two sides of a cut."""
-    progresses = region.gains * (1 + region.competences) ** 2
-    return float((progresses[below].mean() - progresses[~below].mean()) ** 2)
+    found = progresses(region.competences, region.gains)
+    return float((found[below].mean() - found[~below].mean()) ** 2)
 
 
-EXEMPLARS: Final = partial(InterestMap, g_max=50, window=10, progress=exemplar_progress, contrast=between_means)
+BY_STRATEGY: Final = partial(InterestMap, g_max=50, window=_LAST, progress=strategic_progress, contrast=between_means)
 
 
 @runtime_checkable
@@ -54,12 +61,19 @@ class StrategicGoals(Goals, Protocol):
 
 
 class StrategicInterest:
-    """Interest of each (region, strategy): its progress over the cost of the strategy. See `StrategicGoals`.
+    """Interest of each (region, strategy): e^(progress / temperature), over the cost of the strategy. See
+    `StrategicGoals`.
+
+    The papers draw in proportion to progress, and try strategies by chance where they were not tried. Ours: progress
+    can be negative, hence e; and where a strategy was hardly tried, its progress is that of where it was tried nearest.
+    So no share of the choices is spent on strategies drawn at random.
 
     Args:
         contexts, outcomes, rng: as in `InterestMap`.
-        share: of the choices in which strategy and goal are drawn uniformly.
-        greatest: so many (region, strategy) of the greatest interest are drawn from, in proportion to it.
+        anywhere: share of the choices whose goal is drawn from all of T, and whose strategy by its interest there.
+        greatest: in the other choices, so many (region, strategy) of the greatest interest are drawn from, in
+            proportion to it.
+        temperature: the difference of progress that makes interest e times as large.
         make: (contexts, outcomes, rng) -> the map of regions; interest is its progress.
 
     Raises:
@@ -72,20 +86,42 @@ class StrategicInterest:
         outcomes: Box,
         rng: np.random.Generator,
         *,
-        share: float = 0.2,
+        anywhere: float = 0.5,
         greatest: int = 10,
-        make: Callable[[Box, Box, np.random.Generator], InterestMap] = EXEMPLARS,
+        temperature: float = 0.03,
+        make: Callable[[Box, Box, np.random.Generator], InterestMap] = BY_STRATEGY,
     ) -> None:
-        if not 0 <= share <= 1 or greatest < 1:
-            raise ValueError(f"share must lie in [0, 1] and greatest be at least 1, got {share} and {greatest}")
-        self.contexts, self.outcomes, self.share, self.greatest = contexts, outcomes, share, greatest
+        if not (0 <= anywhere <= 1 and greatest >= 1 and 0 < temperature < np.inf):
+            wanted = "anywhere must lie in [0, 1], greatest be at least 1 and temperature above 0"
+            raise ValueError(f"{wanted}, got {anywhere}, {greatest} and {temperature}")
+        self.contexts, self.outcomes = contexts, outcomes
+        self.anywhere, self.greatest, self.temperature = anywhere, greatest, temperature
         self._rng = rng
         self._map = make(contexts, outcomes, rng)
+        self._tried: dict[str, _Tried] = {}
 
     @property
     def regions(self) -> list[Region]:
         """The leaves of the map, which tile C x T."""
         return self._map.regions
+
+    def progress(self, region: Region, strategy: str) -> float:
+        """Of a strategy in a region, over its last ten attempts there; or, where it made fewer than 4, over the ten
+        that were nearest to the middle of the region. 1, which is the most, if it made fewer than 4 at all."""
+        tried = self._tried.get(strategy)
+        if tried is None or len(tried.points) < _FEWEST:
+            return _UNTRIED
+        now = region, len(tried.points)
+        known = tried.known.get(region.path)
+        if known is not None and known[:2] == now:
+            return known[2]
+        here = region.strategies == strategy
+        if here.sum() >= _FEWEST:
+            found = region.interest_among(here)
+        else:
+            found = tried.progress_near((region.low + region.high) / 2, self._map.sides)
+        tried.known[region.path] = *now, found
+        return found
 
     def choose(self, context: ArrayLike, costs: Mapping[str, float]) -> tuple[str, Array]:
         """A strategy of those that have ``costs``, and a goal ``(outcome_dim,)`` for it.
@@ -93,17 +129,18 @@ class StrategicInterest:
         Raises:
             ValueError: ``context`` is not one point of C.
         """
-        context, names = check_in(self.contexts, "context", context), list(costs)
-        if self._rng.random() >= self.share:
-            pairs = [(region, name) for region in self._map.regions_at(context) for name in names]
-            interests = np.array([region.interest(name) / costs[name] for region, name in pairs])
-            best = np.argsort(-interests, kind="stable")[: self.greatest]
-            if interests[best].any():
-                shares = interests[best] / interests[best].sum()
-                region, name = pairs[int(self._rng.choice(best, p=shares))]
-                dim = self.contexts.dim
-                return name, self._rng.uniform(region.low[dim:], region.high[dim:])
-        return names[int(self._rng.integers(len(names)))], self.outcomes.sample(self._rng)
+        context, goal = check_in(self.contexts, "context", context), self.outcomes.sample(self._rng)
+        given = self._rng.random() < self.anywhere
+        regions = self._map.regions_at(np.concatenate((context, goal)) if given else context)
+        pairs = [(region, name) for region in regions for name in costs]
+        progress = np.array([self.progress(region, name) for region, name in pairs])
+        cost = np.array([costs[name] for _, name in pairs])
+        logarithms = np.minimum(progress, progress / cost) / self.temperature - np.log(cost)
+        best = np.argsort(-logarithms, kind="stable")[: self.greatest]
+        interests = np.exp(logarithms[best] - logarithms[best[0]])
+        region, name = pairs[int(self._rng.choice(best, p=interests / interests.sum()))]
+        dim = len(context)
+        return name, goal if given else self._rng.uniform(region.low[dim:], region.high[dim:])
 
     def sample(self, context: ArrayLike) -> Array:
         """A goal for a learner that has no other strategy than the autonomous one."""
@@ -112,9 +149,29 @@ class StrategicInterest:
     def add(
         self, context: ArrayLike, goal: ArrayLike, competence: float, strategy: str = AUTONOMOUS, gain: float = 0.0
     ) -> None:
-        """What ``strategy`` has gained at a goal, or at an outcome that it led to.
+        """What ``strategy`` came to at the goal that it was chosen for.
 
         Raises:
             ValueError: see `Goals.add`.
         """
         self._map.add(context, goal, competence, strategy, gain)
+        tried = self._tried.setdefault(strategy, _Tried([], [], [], {}))
+        tried.points.append(np.concatenate((np.asarray(context, dtype=np.float64), np.asarray(goal, dtype=np.float64))))
+        tried.competences.append(competence)
+        tried.gains.append(gain)
+
+
+class _Tried(NamedTuple):
+    """All attempts of a strategy. ``known``: by the path of a region, its progress there, and for which region and
+    number of attempts that is right."""
+
+    points: list[Array]
+    competences: list[float]
+    gains: list[float]
+    known: dict[str, tuple[Region, int, float]]
+
+    def progress_near(self, point: Array, sides: Array) -> float:
+        """Of the ten attempts that were nearest to a point of C x T with these ``sides``."""
+        points = np.array(self.points)
+        nearest = np.argsort(np.square((points - point) / sides).sum(axis=1), kind="stable")[:_LAST]
+        return strategic_progress(points[nearest], np.array(self.competences)[nearest], np.array(self.gains)[nearest])

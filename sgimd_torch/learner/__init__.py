@@ -86,6 +86,7 @@ class Learner:
         self._events: list[int | Event] = []  # a movement is the row of memory that keeps it
         self._begun = len(memory)
         self._movements = 0
+        self._lessons: set[tuple[bytes, bytes]] = set()
 
     @property
     def movements(self) -> int:
@@ -193,6 +194,7 @@ class Learner:
         if not requested:
             self._end()
         self._events.append(Event(Kind.SHOWN, lesson=demonstration))
+        self._lessons.add(_lesson(demonstration, theta_d))
         if requested:
             self._advance(Lesson(theta_d, demonstration))
         elif self.social is not None:
@@ -215,6 +217,14 @@ class Learner:
         if self.policies is not None:
             self.policies.check("theta_d of the correspondence", theta_d)
         return theta_d
+
+    def was_shown(self, demonstration: Demonstration) -> bool:
+        """Whether it was shown the same movement in the same context before.
+
+        Raises:
+            RuntimeError, ValueError: as `translate`.
+        """
+        return _lesson(demonstration, self.translate(demonstration)) in self._lessons
 
     def interrupt(self) -> None:
         """End the attempt under way; what it learnt so far counts. An outcome not yet told is no longer expected."""
@@ -317,3 +327,7 @@ class Learner:
     def _go_unanswered(self) -> None:
         while isinstance(self._next, Request):
             self._advance(None)
+
+
+def _lesson(demonstration: Demonstration, theta_d: Array) -> tuple[bytes, bytes]:
+    return np.asarray(demonstration.context, dtype=np.float64).tobytes(), theta_d.tobytes()

@@ -3,8 +3,8 @@
 SGIM-IM and SGIM-ACTS, Nguyen & Oudeyer (2012): "Interactive learning gives the tempo to an intrinsically motivated
 robot learner", and "Active choice of teachers, learning strategies and goals for a socially guided intrinsic motivation
 learner". An attempt chooses a strategy and a goal together, asks for a demonstration of the goal if the strategy needs
-one, and tells the goal model what the strategy brought: at the goal, and at each outcome on the way.
-    StrategicBabbling(babbling, outcomes, {"imitate left": Asking("left", Imitate(...), cost=2.0)})
+one, and tells the goal model what the strategy came to at the goal.
+    StrategicBabbling(babbling, {"imitate left": Asking("left", Imitate(...), cost=2.0)})
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sgimd_torch.goals.strategic import AUTONOMOUS, StrategicGoals
-from sgimd_torch.spaces import Array, AskingAttempt, Box, Request
+from sgimd_torch.spaces import Array, AskingAttempt, Request
 from sgimd_torch.strategies import GoalBabbling, SocialStrategy
 
 
@@ -32,57 +32,50 @@ class Asking(NamedTuple):
 class StrategicBabbling:
     """Goal babbling, or asking a teacher: whatever brings most progress for its cost.
 
+    ``brought``: of each request so far, by how much the best competence at its goal rose, 0 without an answer; the last
+    one is missing while the answer is still being used.
+
     Args:
         babbling: the autonomous strategy; its goal model chooses among the strategies.
-        outcomes: T.
         asking: by name, the strategies with a teacher.
 
     Raises:
         ValueError: a cost is not positive, or the goal model does not choose strategies.
     """
 
-    def __init__(self, babbling: GoalBabbling, outcomes: Box, asking: Mapping[str, Asking]) -> None:
+    def __init__(self, babbling: GoalBabbling, asking: Mapping[str, Asking]) -> None:
         if not isinstance(babbling.goals, StrategicGoals):
             raise ValueError(f"goals must have choose(context, costs), got a {type(babbling.goals).__name__}")
         self.costs = {AUTONOMOUS: 1.0, **{name: each.cost for name, each in asking.items()}}
         if not all(0 < cost < np.inf for cost in self.costs.values()):
             raise ValueError(f"costs must be positive and finite, got {self.costs}")
-        self.babbling, self.outcomes, self.asking = babbling, outcomes, asking
+        self.babbling, self.asking = babbling, asking
         self.goals: StrategicGoals = babbling.goals
+        self.brought: list[float] = []
 
     def attempt(self, context: Array) -> AskingAttempt:
-        """Movements by one strategy for one goal; alone if the teacher has no answer."""
+        """Movements by one strategy for one goal; alone if the teacher has no answer.
+
+        Deviation: what it came to is measured at the goal alone, not at all outcomes on the way. Somebody who mislabels
+        has movements as good as any, only not for what they are asked for.
+        """
         strategy, goal = self.goals.choose(context, self.costs)
         if strategy == AUTONOMOUS:
-            yield from self._credited(context, strategy, self.babbling.pursue(context, goal))
+            yield from self.babbling.pursue(context, goal)
             return
         teacher, answer, _, takes = self.asking[strategy]
-        lesson = yield Request(teacher, goal)
+        lesson = yield Request(teacher, goal, strategy)
         before = self.babbling.competence(context, goal)
-        if lesson is None:
-            self.goals.add(context, goal, before, strategy)  # it brought nothing
-            yield from self._credited(context, AUTONOMOUS, self.babbling.pursue(context, goal))
+        if lesson is None:  # whatever there was to hope for, it came to nothing
+            self.goals.add(context, goal, -1.0, strategy, -1.0)
+            yield from self.babbling.pursue(context, goal)
             return
         for _ in range(takes):
             yield None
-        try:
-            yield from self._credited(context, strategy, answer.attempt(context, *lesson))
-        finally:  # also when another demonstration interrupts
-            after = self.babbling.competence(context, goal)
-            self.goals.add(context, goal, after, strategy, max(0.0, after - before))
-
-    def _credited(self, context: Array, strategy: str, movements: AskingAttempt) -> AskingAttempt:
-        """The ``movements``; at their end, the progress of each exemplar at its own outcome."""
         memory = self.babbling.memory
         first = len(memory)
         try:
-            yield from movements
-        finally:
-            for row in range(first, len(memory)):
-                outcome = memory.outcomes[row]
-                if self.outcomes.contains(outcome):
-                    # Reached now, as the exemplar itself shows; before, as nearly as the nearest earlier one came.
-                    near = memory.near_outcomes(context, outcome, len(memory) - first + 1)
-                    nearest = memory.outcomes[near[near < row][:1]]
-                    before = np.max(self.babbling.competence.performance(outcome, nearest), initial=-1.0)
-                    self.goals.add(context, outcome, 0.0, strategy, float(-before))
+            yield from answer.attempt(context, *lesson)
+        finally:  # also when another demonstration interrupts
+            self.babbling.conclude(context, goal, list(memory.outcomes[first:]), before, strategy)
+            self.brought.append(max(0.0, self.babbling.competence(context, goal) - before))

@@ -33,7 +33,7 @@ class RunParts:
     """What a run needs. ``config`` is what it was made from. ``answers`` are the inverses to evaluate by, the run's own
     first; they read the learner's memory. ``model`` is refreshed after each movement; it and its ``trust`` are None for
     a run without a model. ``teacher`` demonstrates, ``teachers`` are asked for it; without any of them there are no
-    ``demonstrations``.
+    ``demonstrations``, which are those of the file, then what teachers have besides.
     ``data`` holds checksums of the files that were read, ``notes`` messages for the user. ``record`` gives a movement
     to be filmed, None if the task has no picture of its own."""
 
@@ -80,6 +80,7 @@ def build(config: Config) -> RunParts:
     if "teacher" in parts.used:
         teacher = parts["teacher"](demonstrations, stream(config.seed, "teacher"))
     teachers = parts.asked(demonstrations) if "teachers" in parts.used else {}
+    demonstrations = [*demonstrations, *_others(demonstrations, teachers)]
     learner = parts["algorithm"](task.environment, config.seed)
     words = {answer: config.inverse if answer == OWN else answer for answer in config.answered}
     if config.entry("algorithm").answers and config.inverse == Config.inverse:
@@ -103,6 +104,15 @@ def build(config: Config) -> RunParts:
         record=task.picture,
         teachers=teachers,
     )
+
+
+def _others(demonstrations: Sequence[Demonstration], teachers: Mapping[str, Demonstrator]) -> list[Demonstration]:
+    """What teachers can show besides, each movement once."""
+    known = {
+        shown.trajectory.tobytes(): shown for each in teachers.values() for shown in getattr(each, "demonstrations", ())
+    }
+    played = {shown.trajectory.tobytes() for shown in demonstrations}
+    return [shown for trajectory, shown in known.items() if trajectory not in played]
 
 
 def task_of(config: Config) -> Task:

@@ -206,6 +206,12 @@ class Config:
         "Who can be asked to show a goal (sgim-im: one, sgim-acts: several), such as low-half,high-half.",
         before=["all"],  # as json has it
     )
+    base: str = option(
+        "practice",
+        TEACHER,
+        "What those who ask do on their own, and how they imitate (sgim-im, sgim-acts).",
+        before="search",
+    )
     cost: float = option(
         1.0,
         TEACHER,

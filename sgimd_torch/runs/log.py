@@ -9,6 +9,10 @@
                          each inverse model that answered
     by_context.csv   where there are contexts: the mean error in each third of each of them
     regions.csv      the regions of the goal model at each evaluation, a line for each, corners in C x T
+    requests.csv     of a learner that asks, a line for each request: index of the movement that came next, teacher,
+                         strategy, reply (see ``Episode``), shown (row of the demonstration, -1 without one), wanted_*
+                         and got_*, the points of C x T that it asked for and that it was shown, apart_m, how far their
+                         outcomes are from each other, and brought: by how much the best competence at the goal rose
     predictions.csv  with a forward model: what it predicted of each exemplar before learning it, and what happened
     refreshes.csv    with a forward model: a line each time that it has learnt
     summary.json     movements so far, the last evaluation, seconds spent on physics, learning and evaluating
@@ -34,7 +38,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from sgimd_torch.runs.tables import Rows, Table, numbers, sealed
+from sgimd_torch.runs.tables import Rows, Table, numbers, sealed, small_table
 from sgimd_torch.session import Recorded
 from sgimd_torch.spaces import Array, Episode
 
@@ -133,6 +137,34 @@ class Columns:
             _, thetas, _, outcomes = self.split([line.decode().split(",")[:-1] for line in lines[k : k + 1000]])
             found += [rest if np.isnan(o).any() else Recorded(t, o) for t, o in zip(thetas, outcomes, strict=True)]
         return found
+
+
+class Requests:
+    """The table of what a learner asked for; a run without requests has no file."""
+
+    def __init__(self, directory: Path, dims: int) -> None:
+        self.table, self.dims = small_table(directory / "requests.csv", dims), dims
+        self._rows: Rows = []
+        self._written: tuple[int, int] = 0, 0
+
+    def add(self, episode: Episode, row: int | None) -> None:
+        """Any episode; ``row`` is that of its demonstration, None if it is not known or there was none."""
+        if episode.request is None:
+            return
+        asked, shown = episode.request, episode.demonstration
+        wanted = np.concatenate((episode.context, asked.goal))
+        got = np.full(self.dims, np.nan) if shown is None else np.concatenate((shown.context, shown.outcome))
+        apart = np.nan if shown is None else float(np.linalg.norm(shown.outcome - asked.goal))
+        first = [str(episode.index), asked.teacher, asked.strategy, episode.reply, str(-1 if row is None else row)]
+        self._rows.append([*first, *numbers(wanted, self.dims), *numbers(got, self.dims), repr(apart)])
+
+    def write(self, brought: Sequence[float]) -> None:
+        """Replace the file, if there is anything new; what the requests ``brought``, as far as it is known."""
+        now = len(self._rows), len(brought)
+        if now != self._written:
+            known = [*map(repr, brought), *["nan"] * len(self._rows)]
+            self.table.replace([*row, value] for row, value in zip(self._rows, known, strict=False))
+            self._written = now
 
 
 def read_json(path: Path, *, missing: Any) -> Any:

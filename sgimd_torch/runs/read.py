@@ -32,8 +32,8 @@ class Run:
     none. ``answers`` has, for each answer, an array for each column of evaluation.csv, an entry for each evaluation;
     ``by_context`` likewise, with an entry for each part of C and each answer, None without contexts; ``regions``
     likewise, with an entry for each region at each evaluation, None for a goal model without regions;
-    ``predictions`` and ``refreshes`` likewise, None without a forward model. ``config``, ``versions``,
-    ``summary``: as in their files.
+    ``predictions`` and ``refreshes`` likewise, None without a forward model; ``requests`` with an entry for each
+    request, None if there was none. ``config``, ``versions``, ``summary``: as in their files.
 
     ``damage``: file name -> number of its first bad line, where reading ended, such as ``{"evaluation.csv": 3}``; the
     names of the columns are line 1. ``unchecked``: names of the files without checksums, which an earlier version
@@ -56,6 +56,7 @@ class Run:
     predictions: dict[str, np.ndarray] | None = None
     refreshes: dict[str, np.ndarray] | None = None
     by_context: dict[str, np.ndarray] | None = None
+    requests: dict[str, np.ndarray] | None = None
     damage: dict[str, int] = field(default_factory=dict)
     unchecked: tuple[str, ...] = ()
 
@@ -124,6 +125,7 @@ def read_run(path: str | os.PathLike[str]) -> Run:
         predictions=arrays.get("predictions.csv"),
         refreshes=arrays.get("refreshes.csv"),
         by_context=arrays.get("by_context.csv"),
+        requests=arrays.get("requests.csv"),
         damage={name: table.damage for name, table in found.items() if table.damage is not None},
         unchecked=tuple(name for name, table in found.items() if not table.checked),
     )

@@ -16,7 +16,7 @@ from sgimd_torch.runs.build import RunParts
 from sgimd_torch.runs.clock import Seconds
 from sgimd_torch.runs.config import OWN
 from sgimd_torch.runs.directory import RunDirectory
-from sgimd_torch.runs.log import RunError
+from sgimd_torch.runs.log import Requests, RunError
 from sgimd_torch.runs.model_record import RunModel
 from sgimd_torch.runs.process import Failed, Progress, Stopped, Stopping, say
 from sgimd_torch.session import ReplayError, live, replay, run
@@ -86,6 +86,8 @@ class _Life:
         self.directory, self.parts, self.stopping, self.seconds, self.board = directory, parts, stopping, seconds, board
         model, trust = parts.model, parts.trust
         self.model = RunModel(directory.path, model, trust.error) if model and trust else None
+        robot = parts.environment
+        self.requests = Requests(directory.path, robot.contexts.dim + robot.outcomes.dim)
         self.movements, self.recorded = 0, len(directory.lines)
         self._wanted = set(parts.config.evaluations)
         self._rows = {id(demonstration): row for row, demonstration in enumerate(parts.demonstrations)}
@@ -158,7 +160,9 @@ class _Life:
     def _write(self, episode: Episode) -> None:
         """A line for the log; one that is there already must be the same."""
         shown, columns = episode.demonstration, self.directory.columns
-        line = columns.line(episode, None if shown is None else self._row(shown))
+        row = None if shown is None else self._row(shown)
+        line = columns.line(episode, row)
+        self.requests.add(episode, row)
         if episode.index >= self.recorded:
             self.directory.log.append(line)
         elif line != self.directory.lines[episode.index]:
@@ -203,3 +207,5 @@ class _Life:
         for each in (self.board, self.directory.log, self.model):
             if each is not None:
                 each.flush()
+        if not self.replaying:
+            self.requests.write(getattr(self.parts.learner.autonomous, "brought", ()))

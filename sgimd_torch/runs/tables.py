@@ -24,7 +24,8 @@ from sgimd_torch.files import write_bytes
 from sgimd_torch.runs.config import OWN
 from sgimd_torch.spaces import Array
 
-SMALL: Final = ("evaluation.csv", "by_context.csv", "regions.csv", "predictions.csv", "refreshes.csv")
+SMALL: Final = ("evaluation.csv", "by_context.csv", "regions.csv", "requests.csv", "predictions.csv", "refreshes.csv")
+_WORDS: Final = ("path", "answer", "teacher", "strategy", "reply")
 EVALUATION: Final = (
     *("movements", "answer", "mean_error_m", "median_error_m", "p90_error_m", "noise_floor_m", "goals_met"),
 )
@@ -32,7 +33,18 @@ BY_CONTEXT: Final = ("movements", "answer", "context", "low", "high", "goals", "
 _LATER: Final = {"answer": OWN, "goals_met": "nan"}  # columns that earlier versions lacked, and what they mean there
 REFRESHES: Final = ("movements", "exemplars", "steps", "held_out", "relative_error", "diverged")
 Rows = list[list[str]]
-WHOLE: Final = ("movements", "attempts", "goals", "exemplar", "exemplars", "steps", "diverged", "context")
+WHOLE: Final = (
+    "movements",
+    "attempts",
+    "goals",
+    "exemplar",
+    "exemplars",
+    "steps",
+    "diverged",
+    "context",
+    "index",
+    "shown",
+)
 _CELL: Final = r"R(\.[0-9]{1,6})+"  # the path of a cell of a grid
 _PART_OF_A_HEADER: Final = re.compile(rb"[a-z0-9_,]*")
 _MAY_BE_NAN: Final = ("noise_floor_m", "goals_met", "competence")  # not measured; no goals
@@ -147,7 +159,7 @@ class Table:
     def arrays(self, found: Found) -> dict[str, np.ndarray]:
         """The columns of a small table: integers, words such as the paths of regions, or numbers."""
         rows = np.array(found.rows, dtype=np.str_).reshape(len(found.lines), len(self.names))
-        kinds = {**dict.fromkeys(("path", "answer"), np.str_), **dict.fromkeys(WHOLE, np.int64)}
+        kinds = {**dict.fromkeys(_WORDS, np.str_), **dict.fromkeys(WHOLE, np.int64)}
         return {name: rows[:, k].astype(kinds.get(name, np.float64)) for k, name in enumerate(self.names)}
 
     def begin(self, size: int = 0) -> None:
@@ -201,13 +213,13 @@ def small_table(path: Path, dims: int | None = None) -> Table:
     """One of the small tables, by the name of its file.
 
     Args:
-        path: of evaluation.csv, by_context.csv, regions.csv, predictions.csv or refreshes.csv.
-        dims: of C x T for regions, of outcomes for predictions; None for those that the file names.
+        path: of one of ``SMALL``.
+        dims: of C x T for regions and requests, of outcomes for predictions; None for those that the file names.
     """
     if dims is None:
         with path.open("rb") as file:
             header = file.readline()
-        dims = header.count(b"low_") + header.count(b"predicted_")
+        dims = sum(header.count(name) for name in (b"low_", b"predicted_", b"wanted_"))
     match path.name:
         case "evaluation.csv":
             return Table(path, EVALUATION)
@@ -217,6 +229,9 @@ def small_table(path: Path, dims: int | None = None) -> Table:
             corners = (f"{corner}_{k}" for corner in ("low", "high") for k in range(dims))
             names = ("movements", "path", *corners, "attempts", "goals", "competence", "interest")
             return Table(path, names, standing=_whole_maps)
+        case "requests.csv":
+            points = (f"{part}_{k}" for part in ("wanted", "got") for k in range(dims))
+            return Table(path, ("index", "teacher", "strategy", "reply", "shown", *points, "apart_m", "brought"))
         case "predictions.csv":
             parts = ("outcome", "predicted", "epistemic", "aleatoric")
             return Table(path, ("exemplar", *(f"{part}_{k}" for part in parts for k in range(dims))), grows=True)

@@ -110,10 +110,11 @@ def half_reached() -> Task:
     return Task(arm, partial(arm_benchmark, arm))
 
 
-def toy(*, make: Callable[[], Toy], side: float) -> Task:
-    """A toy robot; its goals lie on tiles of ``side``, in the unit of T."""
+def toy(*, make: Callable[[], Toy], side: float, taught: bool = False) -> Task:
+    """A toy robot; its goals lie on tiles of ``side``, in the unit of T. ``taught``: it has a teacher, too."""
     robot = make()
-    return Task(robot, partial(toy_benchmark, robot, side))
+    shown = partial(toy_demonstrations, robot) if taught else None
+    return Task(robot, partial(toy_benchmark, robot, side), shown, last_row if taught else None)
 
 
 def toy_benchmark(robot: Toy, side: float) -> Benchmark:
@@ -123,6 +124,24 @@ def toy_benchmark(robot: Toy, side: float) -> Benchmark:
     context = (robot.contexts.low + robot.contexts.high) / 2
     reached = robot.effect(np.tile(context, (REACHING, 1)), thetas)
     return Benchmark(type(robot).__name__, tile_goals(reached, robot.outcomes, side, rng), side)
+
+
+def last_row(times: Array, trajectory: Array) -> Array:
+    """The correspondence of a toy: a demonstration of it is theta itself."""
+    return trajectory[-1]
+
+
+def toy_demonstrations(robot: Toy) -> list[Demonstration]:
+    """Movements in contexts all over C, each to another place that uniform movements reach; always the same ones."""
+    rng = stream(0, "demonstrations by a toy")
+    thetas = robot.policies.low + robot.policies.sides * rng.random((REACHING, robot.policies.dim))
+    found = []
+    for place in rng.integers(REACHING, size=SHOWN):
+        context = robot.contexts.sample(rng)
+        outcomes = robot.effect(np.tile(context, (REACHING, 1)), thetas)
+        if robot.outcomes.contains(outcomes[place]):
+            found.append(Demonstration(context, np.array([0.0, 1.0]), np.tile(thetas[place], (2, 1)), outcomes[place]))
+    return found
 
 
 def arm_benchmark(arm: PlanarArm) -> Benchmark:

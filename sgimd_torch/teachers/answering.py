@@ -10,10 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Protocol
 
 import numpy as np
 
+from sgimd_torch.demonstrations import SHIPPED, load_demonstrations
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, Demonstration, check_count, check_point
 from sgimd_torch.teachers import check_demonstrations
@@ -53,6 +55,18 @@ def mislabelled(demonstrations: Sequence[Demonstration], rng: np.random.Generato
     order = rng.permutation(len(demonstrations))
     labels = {int(row): demonstrations[label].outcome for row, label in zip(order, np.roll(order, shift), strict=True)}
     return [replace(shown, outcome=labels[row]) for row, shown in enumerate(demonstrations)]
+
+
+def _recorded(number: int, demonstrations: Sequence[Demonstration], rng: np.random.Generator) -> list[Demonstration]:
+    here = demonstrations[0]
+    theirs = load_demonstrations(SHIPPED.with_name(f"demonstrator_{number}.npz"))
+    if theirs[0].trajectory.shape[1] != here.trajectory.shape[1]:
+        raise ValueError(f"demonstrator {number} has shown the fishing rod, and nothing that this robot could do")
+    return [replace(shown, context=np.zeros_like(here.context)) for shown in theirs]
+
+
+# The recordings of a demonstrator of section 5.3, whatever demonstrations there are.
+demonstrator_1, demonstrator_2, demonstrator_3 = (partial(_recorded, number) for number in (1, 2, 3))
 
 
 class AnsweringTeacher:

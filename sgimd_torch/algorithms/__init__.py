@@ -1,4 +1,4 @@
-"""The five learners of the paper and those that ask, a few lines each: which strategy is in which slot?
+"""The five learners of the paper and practice, a few lines each: which strategy is in which slot?
 
 Section 5.1 of Nguyen & Oudeyer (2014). Every part is a keyword, so an ablation changes one word:
     learner = sgim_d(environment, seed, correspondence=environment.primitive.correspondence, goals=UniformGoals)
@@ -10,9 +10,9 @@ demonstrations, such as the memory of an ``observation`` learner that has watche
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import partial
-from typing import Any, Final, TypedDict, Unpack
+from typing import Any, TypedDict, Unpack
 
 import numpy as np
 
@@ -20,19 +20,16 @@ from sgimd_torch.competence import AttemptCompetence, Competence, Performance, p
 from sgimd_torch.environments.protocol import Environment, check_rest
 from sgimd_torch.goals.interest_map import InterestMap
 from sgimd_torch.goals.protocol import Goals
-from sgimd_torch.goals.strategic import StrategicInterest
 from sgimd_torch.goals.uniform import UniformGoals
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.inverses.locally_linear import LocallyLinear
 from sgimd_torch.learner import Learner
-from sgimd_torch.learner.asking import Asking, StrategicBabbling
 from sgimd_torch.memory import Memory
 from sgimd_torch.searches.perturb import practise
 from sgimd_torch.searches.simplex import nelder_mead
 from sgimd_torch.searches.widening import Widening
 from sgimd_torch.spaces import Array, Box, Estimate, Search, stream
 from sgimd_torch.strategies import Babble, Emulate, GoalBabbling, Imitate, Judge, Look, Remember, Rest, SocialStrategy
-from sgimd_torch.teachers.answering import Demonstrator
 
 Correspondence = Callable[[Array, Array], Array]
 MakeGoals = Callable[[Box, Box, np.random.Generator], Goals]
@@ -41,8 +38,6 @@ MakeSearch = Callable[[Box, np.random.Generator], Search]
 MakeJudge = Callable[[Memory, Performance], Judge]
 MakeLook = Callable[[Box, Memory, Any, np.random.Generator], Look]
 MakeSocial = Callable[[GoalBabbling, Box, np.random.Generator], SocialStrategy]
-MakeAnswer = Callable[..., SocialStrategy]
-"""As ``MakeSocial``, with the keyword ``strategy``: the name by which goals are told of it."""
 
 
 class Parts(TypedDict, total=False):
@@ -80,7 +75,7 @@ def practice(environment: Environment, seed: int, *, memory: Memory | None = Non
 
     It has no teacher, and nothing in it knows a unit or a robot. What the answer gets wrong is what it learns next.
     """
-    return sagg_riac(environment, seed, memory=memory, **_practising(environment, parts))
+    return sagg_riac(environment, seed, memory=memory, **practising(environment, parts))
 
 
 def practice_taught(
@@ -98,11 +93,12 @@ def practice_taught(
         correspondence=correspondence,
         social=partial(imitating, repeats=1),
         memory=memory,
-        **_practising(environment, parts),
+        **practising(environment, parts),
     )
 
 
-def _practising(environment: Environment, changed: Parts) -> Parts:
+def practising(environment: Environment, changed: Parts) -> Parts:
+    """The parts of `practice`, some of them ``changed``."""
     parts: Parts = {
         "goals": UniformGoals,
         "inverse": partial(LocalProcess, noise=environment.outcome_noise),
@@ -209,75 +205,6 @@ def sgim_d(
         correspondence=correspondence,
         inverse=babbling.inverse,
         policies=environment.policies,
-    )
-
-
-IMITATE: Final[Mapping[str, MakeAnswer]] = {"imitate": imitating}
-IMITATE_OR_EMULATE: Final[Mapping[str, MakeAnswer]] = {**IMITATE, "emulate": emulating}
-
-
-def sgim_im(
-    environment: Environment,
-    seed: int,
-    *,
-    correspondence: Correspondence,
-    teachers: Mapping[str, Demonstrator],
-    cost: float = 1.0,
-    memory: Memory | None = None,
-    **parts: Unpack[Parts],
-) -> Learner:
-    """SGIM-IM: SAGG-RIAC that decides when to ask its teacher, and imitates what it is shown.
-
-    Raises:
-        ValueError: not exactly one teacher.
-    """
-    if len(teachers) != 1:
-        raise ValueError(f"sgim_im asks one teacher, got {len(teachers)}; is sgim_acts meant?")
-    return sgim_acts(
-        environment,
-        seed,
-        correspondence=correspondence,
-        teachers=teachers,
-        cost=cost,
-        ways=IMITATE,
-        memory=memory,
-        **parts,
-    )
-
-
-def sgim_acts(
-    environment: Environment,
-    seed: int,
-    *,
-    correspondence: Correspondence,
-    teachers: Mapping[str, Demonstrator],
-    cost: float = 1.0,
-    ways: Mapping[str, MakeAnswer] = IMITATE_OR_EMULATE,
-    memory: Memory | None = None,
-    **parts: Unpack[Parts],
-) -> Learner:
-    """SGIM-ACTS: it decides when to ask, whom, what for, and whether to imitate or to emulate what it is shown.
-
-    Args:
-        environment, seed, parts: as ``goal_babbling``; ``goals`` have to choose strategies, too.
-        correspondence: (times, trajectory) -> theta_d, eq. (6).
-        teachers: by name, the same that ``run`` is given.
-        cost: of a demonstration; interest in asking is divided by it, interest in an attempt of its own by 1.
-        ways: by name, how it can answer a demonstration.
-        memory: to start from; None for an empty one.
-    """
-    memory = start_memory(environment, memory)
-    parts = {"goals": StrategicInterest, **parts}
-    babbling = goal_babbling(environment, seed, memory, **parts)
-    outcomes, asking = environment.outcomes, dict[str, Asking]()
-    for teacher, demonstrator in teachers.items():
-        for way, make in ways.items():
-            name = f"{way} {teacher}"
-            answer = make(babbling, outcomes, stream(seed, name), strategy=name)
-            asking[name] = Asking(teacher, answer, cost, getattr(demonstrator, "takes", 0))
-    strategy = StrategicBabbling(babbling, outcomes, asking)
-    return Learner(
-        memory, strategy, correspondence=correspondence, inverse=babbling.inverse, policies=environment.policies
     )
 
 

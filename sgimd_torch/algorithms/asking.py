@@ -1,0 +1,132 @@
+"""Learners that ask, a few lines each: SGIM-IM when, SGIM-ACTS whom, how and what for.
+
+learner = sgim_acts(environment, seed, correspondence=..., teachers={"ann": ann, "ben": ben}, cost=3)
+learner = sgim_im(environment, seed, correspondence=..., teachers={"ann": ann}, base=exploring)     # as in the papers
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import NamedTuple, Unpack
+
+import numpy as np
+
+from sgimd_torch.algorithms import (
+    Correspondence,
+    MakeSocial,
+    Parts,
+    attempted,
+    emulating,
+    goal_babbling,
+    practising,
+    start_memory,
+)
+from sgimd_torch.environments.protocol import Environment
+from sgimd_torch.goals.strategic import AUTONOMOUS, StrategicInterest
+from sgimd_torch.learner import Learner
+from sgimd_torch.learner.asking import Asking, StrategicBabbling
+from sgimd_torch.memory import Memory
+from sgimd_torch.spaces import Box, stream
+from sgimd_torch.strategies import GoalBabbling, Imitate
+from sgimd_torch.teachers.answering import Demonstrator
+
+
+class Base(NamedTuple):
+    """What a learner that asks does on its own, as keywords of ``goal_babbling``; and by name, how it can answer a
+    demonstration, imitation first."""
+
+    parts: Parts
+    ways: Mapping[str, MakeSocial]
+
+
+MakeBase = Callable[[Environment], Base]
+
+
+def repeating(
+    babbling: GoalBabbling, outcomes: Box, rng: np.random.Generator, *, repeats: int, epsilon: float
+) -> Imitate:
+    """Imitation alone: what comes of it is told to the goal model by whoever has asked."""
+    return Imitate(babbling.policies, rng, repeats=repeats, epsilon=epsilon)
+
+
+def practised(environment: Environment) -> Base:
+    """As ``practice``: one movement at each goal, and what is shown is executed once, exactly. To emulate would be
+    one movement at a goal, as always, so there is no other way to answer."""
+    return Base(practising(environment, {}), {"imitate": partial(repeating, repeats=1, epsilon=0.0)})
+
+
+def searched(environment: Environment, *, repeats: int = 10, epsilon: float = 0.05, **parts: Unpack[Parts]) -> Base:
+    """As in the papers: a search at each goal, and short imitations with variations, or emulation."""
+    imitate = partial(repeating, repeats=repeats, epsilon=epsilon)
+    return Base(parts, {"imitate": imitate, "emulate": partial(emulating, strategy=AUTONOMOUS)})
+
+
+def sgim_im(
+    environment: Environment,
+    seed: int,
+    *,
+    correspondence: Correspondence,
+    teachers: Mapping[str, Demonstrator],
+    cost: float = 1.0,
+    base: MakeBase = practised,
+    memory: Memory | None = None,
+    **parts: Unpack[Parts],
+) -> Learner:
+    """SGIM-IM: it decides when to ask its one teacher, and imitates what it is shown.
+
+    Raises:
+        ValueError: not exactly one teacher.
+    """
+    if len(teachers) != 1:
+        raise ValueError(f"sgim_im asks one teacher, got {len(teachers)}; is sgim_acts meant?")
+    own, ways = base(environment)
+    imitates = Base(own, {"imitate": ways["imitate"]})
+    return sgim_acts(
+        environment,
+        seed,
+        correspondence=correspondence,
+        teachers=teachers,
+        cost=cost,
+        base=lambda _: imitates,
+        memory=memory,
+        **parts,
+    )
+
+
+def sgim_acts(
+    environment: Environment,
+    seed: int,
+    *,
+    correspondence: Correspondence,
+    teachers: Mapping[str, Demonstrator],
+    cost: float = 1.0,
+    base: MakeBase = practised,
+    memory: Memory | None = None,
+    **parts: Unpack[Parts],
+) -> Learner:
+    """SGIM-ACTS: it decides when to ask, whom, what for, and how to answer what it is shown.
+
+    Args:
+        environment, seed, parts: as ``goal_babbling``; ``goals`` have to choose strategies, too.
+        correspondence: (times, trajectory) -> theta_d, eq. (6).
+        teachers: by name, the same that ``run`` is given.
+        cost: of a demonstration, in attempts of its own.
+        base: (environment) -> what it does on its own, and how it can answer: `practised`, or, as in the paper,
+            `searched`.
+        memory: to start from; None for an empty one.
+    """
+    memory = start_memory(environment, memory)
+    own, ways = base(environment)
+    chosen: Parts = {**own, "goals": StrategicInterest, "judge": attempted, **parts}
+    babbling = goal_babbling(environment, seed, memory, **chosen)
+    asking = dict[str, Asking]()
+    for teacher, demonstrator in teachers.items():
+        for way, make in ways.items():
+            name = f"{way} {teacher}"
+            answer = make(babbling, environment.outcomes, stream(seed, name))
+            asking[name] = Asking(teacher, answer, cost, getattr(demonstrator, "takes", 0))
+    strategy = StrategicBabbling(babbling, asking)
+    return Learner(
+        memory, strategy, correspondence=correspondence, inverse=babbling.inverse, policies=environment.policies
+    )
