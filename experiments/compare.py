@@ -2,7 +2,8 @@
 
 variants.py says which variants there are. A run goes to OUT/VARIANT/seed-003. When it ends, each of its evaluations
 becomes lines of RESULTS/paper.csv, one for each inverse model that answers; of RESULTS/forward_model.csv for
-forward-model and planar-arm-*, of RESULTS/gymnasium.csv for swimmer. The goals that it chose in the large task space
+forward-model and planar-arm-*, of RESULTS/gymnasium.csv for swimmer, of RESULTS/asking.csv for asking, whose requests
+are counted in RESULTS/asked.csv. The goals that it chose in the large task space
 are counted in RESULTS/goals.csv. A variant in two experiments is run once.
 
 Start the same command again after Ctrl-C or a power cut, or with more seeds: what is in the tables is not run again,
@@ -31,8 +32,8 @@ with loading():  # Ctrl-C shows no traceback
     from sgimd_torch.runs.log import RunError
     from sgimd_torch.runs.read import finished, read_run
     from sgimd_torch.runs.sweep import add_engines, add_options, engine_of
-    from tables import GOALS, RESULTS, Key, Table, as_text, goal_rows, result_rows
-    from variants import EXPERIMENTS, FEW, HALF, make_subsets, tables_of
+    from tables import COLUMNS, RESULTS, Key, Table, as_text, asked_rows, goal_rows, result_rows
+    from variants import EXPERIMENTS, FEW, HALF, MANY, make_subsets, tables_of
 
 EXAMPLES: Final = f"""experiments: {", ".join(EXPERIMENTS)}
 
@@ -169,7 +170,7 @@ def runs_of(
                 if only and variant not in only:
                     continue
                 changes = dict(line)
-                if changes.get("demonstrations") in (Path(FEW), Path(HALF)):
+                if changes.get("demonstrations") in (Path(FEW), Path(HALF), Path(MANY)):
                     changes["demonstrations"] = out / "demonstrations" / changes["demonstrations"]
                 floor_at = FLOOR_AT if experiment in FLOORS else ()
                 fixed = {"answers": ANSWERS, "floor_at": floor_at}
@@ -185,7 +186,7 @@ def last_rows(config: Config) -> set[Key]:
 
 def table_in(results: Path, name: str) -> Table:
     """A table of results, by the name of its file."""
-    return Table(results / name, *(GOALS if name == "goals.csv" else RESULTS))
+    return Table(results / name, *COLUMNS.get(name, RESULTS))
 
 
 def collect(experiment: str, config: Config, results: Path) -> None:
@@ -200,7 +201,7 @@ def collect(experiment: str, config: Config, results: Path) -> None:
         raise RunError(f"{run.path} has no evaluation after {config.movements} movements, though it ended")
     evaluations, *others = tables_of(experiment)
     for name in others:
-        table_in(results, name).merge(goal_rows(config, run))
+        table_in(results, name).merge((asked_rows if name == "asked.csv" else goal_rows)(config, run))
     table_in(results, evaluations).merge(result_rows(experiment, config, run))  # last: now the run counts as done
 
 

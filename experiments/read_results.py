@@ -26,6 +26,7 @@ HEADER = (
     *("mean_error_m", "noise_floor_m", "tiles_reached", "goals_claimed", "goals_met"),
 )
 GOALS_HEADER = ("variant", "seed", "n_goals", "n_near")
+ASKED_HEADER = ("variant", "seed", "teacher", "requests", "shown", "late", "late_own", "strong", "weak")
 MODEL_HEADER = (
     *("run", "predicted", "error_m", "inside_50_last", "inside_80_last", "inside_95_last"),
     *("inside_50_late", "inside_80_late", "inside_95_late", "improved", "refreshes", "diverged", "ms_per_refresh"),
@@ -117,6 +118,31 @@ def read_goals(path: str | os.PathLike[str]) -> dict[str, Array]:
             raise ResultsError(f"{where}: n_near must be at most n_goals, and n_goals above 0, got {near} and {goals}")
         found.setdefault(row["variant"], []).append((goals, near))
     return {variant: np.array(counts, dtype=np.float64) for variant, counts in found.items()}
+
+
+class Asked(NamedTuple):
+    """Requests of one run to one teacher: all, those that were answered, those late in life and of these those in the
+    teacher's own half (meant for teachers of a half), those in a strong and in a weak wind."""
+
+    requests: float
+    shown: float
+    late: float
+    late_own: float
+    strong: float
+    weak: float
+
+
+def read_asked(path: str | os.PathLike[str]) -> dict[str, dict[int, dict[str, Asked]]]:
+    """Variant -> seed -> teacher -> requests; {} without file.
+
+    Raises:
+        ResultsError: a line makes no sense.
+    """
+    found: dict[str, dict[int, dict[str, Asked]]] = {}
+    for where, row in read_rows(path, ASKED_HEADER, optional=True):
+        counts = Asked(*(number(row, name, where) if row[name] not in UNKNOWN else math.nan for name in Asked._fields))
+        found.setdefault(row["variant"], {}).setdefault(_count(row, "seed", where), {})[row["teacher"]] = counts
+    return found
 
 
 def read_coverages(path: str | os.PathLike[str]) -> dict[str, dict[int, Array]]:

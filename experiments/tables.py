@@ -21,7 +21,7 @@ from typing import Final
 import numpy as np
 from scipy.spatial import KDTree
 
-from read_results import GOALS_HEADER, HEADER
+from read_results import ASKED_HEADER, GOALS_HEADER, HEADER
 from sgimd_torch.catalogue import ROD
 from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.files import lock, write_text
@@ -29,14 +29,17 @@ from sgimd_torch.runs.build import task_of
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.log import RunError
 from sgimd_torch.runs.read import Run
-from sgimd_torch.runs.tasks import benchmark_of
+from sgimd_torch.runs.tasks import benchmark_of, demonstrations_of
 from sgimd_torch.spaces import Array
+from sgimd_torch.teachers.answering import middle
 from variants import ARMS, teacher_of
 
 Key = tuple[str, ...]
 # Columns, and which of them identify a row.
 RESULTS: Final = (HEADER, ("variant", "seed", "movements", "answer"))
 GOALS: Final = (GOALS_HEADER, ("variant", "seed"))
+COLUMNS: Final = {"goals.csv": GOALS, "asked.csv": (ASKED_HEADER, ("variant", "seed", "teacher"))}
+LATE: Final = 1000  # movements; from then on a learner should know whom to ask
 CORNER = -1.0  # m, where the tiles of a benchmark begin in x and y: the corner of T, of rod and arms
 NEAR = 1.5  # m from the base: goals farther away cannot be reached
 
@@ -121,6 +124,31 @@ def goal_rows(config: Config, run: Run) -> list[list[object]]:
     goals = run.chosen_goals()
     near = int((np.linalg.norm(goals, axis=1) <= NEAR).sum())
     return [[config.variant, config.seed, len(goals), near]] if len(goals) else []
+
+
+def asked_rows(config: Config, run: Run) -> list[list[object]]:
+    """A row for each teacher that could be asked: how often, and where; none for a learner that does not ask."""
+    if "teachers" not in config.used:
+        return []
+    task = task_of(config)
+    dim, contexts = task.environment.contexts.dim, task.environment.contexts
+    asked = run.requests or {"teacher": np.empty(0, dtype=np.str_)}
+    rows: list[list[object]] = []
+    for teacher in config.teachers:
+        mine = asked["teacher"] == teacher
+        if not mine.any():
+            rows.append([config.variant, config.seed, teacher, 0, 0, 0, 0, 0, 0])
+            continue
+        late = mine & (asked["index"] >= LATE)
+        own = asked[f"wanted_{dim}"] < middle(demonstrations_of(task, config.demonstrations)[0])
+        own = own if teacher == "low-half" else ~own
+        near_border = np.zeros(len(mine))
+        if dim:
+            near_border = np.abs(2 * (asked["wanted_0"] - contexts.low[0]) / contexts.sides[0] - 1)
+        strong, weak = mine & (near_border > 2 / 3), mine & (near_border < 1 / 3)
+        counts = [mine, mine & (asked["reply"] == "shown"), late, late & own, strong, weak]
+        rows.append([config.variant, config.seed, teacher, *(int(each.sum()) for each in counts)])
+    return rows
 
 
 def tiles_reached(outcomes: Array, benchmark: Benchmark, corner: Array | float = CORNER) -> int:

@@ -34,7 +34,7 @@ INVERSE: Final[Variant] = {"inverse": "paper"}  # all that the letter changes in
 LARGE: Final[Variant] = {"task_space": 100.0}
 BASELINE: Final[Variant] = {"goals": "uniform", "inverse": "nearest", "search": "perturb"}  # the field's standard one
 SCHOOL: Final = ("map-elites", "isoline", "isoline-again", "cma-me", "cma-mae")  # quality diversity
-FEW, HALF = "few.npz", "half.npz"  # made from the shipped demonstrations by ``make_subsets``
+FEW, HALF, MANY = "few.npz", "half.npz", "many.npz"  # made from the shipped demonstrations by ``make_subsets``
 # Ways to refine a movement for a goal, and to answer in evaluations. Each line is a variant on the rod and, with a
 # longer name, on every arm.
 MODEL: Final[Variant] = {**SGIM_D, "inverse": "model"}
@@ -74,6 +74,30 @@ SWIMMER: Final[Variant] = {
 # Movements of an arm take no time, so training may take more.
 ON_ARMS: Final[Variant] = {"movements": 2000, "evaluate_at": (250, 500, 1000, 1500)}  # and at the end
 LONGER: Final[Variant] = {"training": 2.0}
+
+
+# Learners that ask. All are answered by ``process``, too, the answer of those that practise.
+IM: Final[Variant] = {"algorithm": "sgim-im"}
+ACTS: Final[Variant] = {"algorithm": "sgim-acts"}
+FOUR: Final = ("demonstrator-1", "demonstrator-2", "demonstrator-3", "mislabelling")
+HALVES: Final = ("low-half", "high-half")
+TOSS: Final[Variant] = {"environment": "toss", "movements": 2000, "evaluate_at": (250, 500, 1000)}
+ASKING: Final[dict[str, Variant]] = {
+    "taught-every-30": SGIM_D,
+    "taught-at-start": {**SGIM_D, "teacher": "initial"},
+    "taught-at-start-once": {"algorithm": "practice-taught", "teacher": "initial", "every": 1},
+    "alone": {"algorithm": "practice"},
+    "sgim-im": IM,
+    "sgim-im-83": {**IM, "demonstrations": Path(MANY)},
+    "sgim-im-cost-10": {**IM, "cost": 10.0},
+    "sgim-im-search": {**IM, "base": "search"},
+    **{f"sgim-acts-{number}": {**ACTS, "teachers": (f"demonstrator-{number}",)} for number in (1, 2, 3)},
+    "sgim-acts-four": {**ACTS, "teachers": FOUR},
+    "sgim-acts-four-search": {**ACTS, "teachers": FOUR, "base": "search"},
+    "sgim-acts-halves": {**ACTS, "teachers": HALVES},
+    "alone-toss": {"algorithm": "practice", **TOSS},
+    "sgim-im-toss": {**IM, **TOSS},
+}
 
 
 def shipped(teacher: int) -> Path:
@@ -157,6 +181,7 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
         "few-demonstrations": {**SGIM_D, "demonstrations": Path(FEW)},
         "half-plane": {**SGIM_D, "demonstrations": Path(HALF)},
     },
+    "asking": {name: {**line, "answers": ("own", "nearest", "linear", "process")} for name, line in ASKING.items()},
     "forward-model": REFINING,
     **{arm: _on_arm(arm) for arm in ARMS},
     "swimmer": {
@@ -172,11 +197,13 @@ def tables_of(experiment: str) -> list[str]:
         return ["forward_model.csv"]
     if experiment == "swimmer":
         return ["gymnasium.csv"]
+    if experiment == "asking":
+        return ["asking.csv", "asked.csv"]
     return ["paper.csv", *(["goals.csv"] if experiment in ("large-space", "ladder-large") else [])]
 
 
 def make_subsets(folder: Path) -> None:
-    """Write two subsets of the demonstrations: a few, 13 of 127, and those in the right half of the plane.
+    """Write subsets of the demonstrations: a few, 13 of 127, many, 83, and those in the right half of the plane.
 
     Raises:
         RunError, OSError: it cannot be written.
@@ -184,13 +211,16 @@ def make_subsets(folder: Path) -> None:
     everything = load_demonstrations()
     make_folder(folder)
     save_demonstrations(folder / FEW, everything[:13])  # they are ordered so that the first ones are spread
+    save_demonstrations(folder / MANY, everything[:83])
     right = [demonstration for demonstration in everything if demonstration.outcome[0] > 0]
     save_demonstrations(folder / HALF, right)
 
 
 def teacher_of(config: Config) -> str:
     """Who demonstrates: the number of the demonstrator, the file's name, or "structured" for the postures that an arm
-    is shown; "" for a learner without a teacher."""
+    is shown; who can be asked; "" for a learner without a teacher."""
+    if "teachers" in config.used:
+        return "+".join(config.teachers)
     if "teacher" not in config.used:
         return ""
     if config.environment in ARMS and config.demonstrations is None:

@@ -41,12 +41,12 @@ def everything(demonstrations: Sequence[Demonstration], rng: np.random.Generator
 
 def low_half(demonstrations: Sequence[Demonstration], rng: np.random.Generator) -> Sequence[Demonstration]:
     """Those whose first outcome coordinate is below the median: half the plane."""
-    return [shown for shown in demonstrations if shown.outcome[0] < _middle(demonstrations)]
+    return [shown for shown in demonstrations if shown.outcome[0] < middle(demonstrations)]
 
 
 def high_half(demonstrations: Sequence[Demonstration], rng: np.random.Generator) -> Sequence[Demonstration]:
     """The others."""
-    return [shown for shown in demonstrations if shown.outcome[0] >= _middle(demonstrations)]
+    return [shown for shown in demonstrations if shown.outcome[0] >= middle(demonstrations)]
 
 
 def mislabelled(demonstrations: Sequence[Demonstration], rng: np.random.Generator) -> Sequence[Demonstration]:
@@ -106,5 +106,6 @@ class AnsweringTeacher:
         return self.demonstrations[nearest] if distances[nearest] <= self.within else None
 
 
-def _middle(demonstrations: Sequence[Demonstration]) -> float:
+def middle(demonstrations: Sequence[Demonstration]) -> float:
+    """The median of the first outcome coordinate, where the halves meet."""
     return float(np.median([shown.outcome[0] for shown in demonstrations]))
