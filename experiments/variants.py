@@ -95,6 +95,8 @@ ASKING: Final[dict[str, Variant]] = {
     "sgim-acts-four": {**ACTS, "teachers": FOUR},
     "sgim-acts-four-search": {**ACTS, "teachers": FOUR, "base": "search"},
     "sgim-acts-halves": {**ACTS, "teachers": HALVES},
+    "sgim-eer": {"algorithm": "sgim-eer"},
+    "sgim-eer-mixture": {"algorithm": "sgim-eer", "doubt": "mixture"},
     "alone-toss": {"algorithm": "practice", **TOSS},
     "sgim-im-toss": {**IM, **TOSS},
 }

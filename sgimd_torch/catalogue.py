@@ -199,6 +199,15 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
             label="SGIM-ACTS",
             colour="#cc6677",
         ),
+        "sgim-eer": _at(
+            "rivals.entropy:sgim_eer",
+            "asks the one teacher of --teachers when that should take away more doubt",
+            uses={**_ASKS, "doubt": "doubt"},
+            also=("demonstrations",),
+            answers=True,
+            label="By entropy",
+            colour="#117733",
+        ),
         **{
             f"{name}{ending}": _at(
                 f"rivals.quality_diversity:{place}",
@@ -306,6 +315,10 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
             },
         ),
     },
+    "doubt": {
+        "process": _at("rivals.entropy:ByProcess", "of a Gaussian process"),
+        "mixture": _at("rivals.entropy:ByMixture", "of a Bayesian mixture of Gaussians (extra rivals)"),
+    },
     "social": {
         "imitate": _at(
             "algorithms:imitating", "repeat it a few times", uses={"repeats": "imitations", "epsilon": "epsilon"}
@@ -366,6 +379,7 @@ _WANTED: Final[dict[str, tuple[str, tuple[str, ...]]]] = {
     "search": ("(policies, rng) -> a search", ("__call__",)),
     "inverse": ("(memory) -> an inverse model", ("__call__",)),
     "base": ("(environment) -> what a learner that asks does on its own, and how it answers", ("parts", "ways")),
+    "doubt": ("() -> what is not known about the policies for goals", ("__call__",)),
     "social": ("(goal babbling, outcomes, rng) -> a social strategy", ("attempt",)),
     "teacher": ("(demonstrations, rng) -> a teacher", ("offer",)),
     "teachers": ("(demonstrations, rng) -> a teacher who answers", ("demonstrate",)),

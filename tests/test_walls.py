@@ -43,7 +43,7 @@ LIBRARIES = {  # library: the only rooms that may import it; of a folder, where 
     "jsonargparse": {"runs/command_line"},
     "tqdm": {"runs/process", "views"},
     "cma": {"searches/cma_es"},
-    "sklearn": {"goals/alp_gmm"},
+    "sklearn": {"goals/alp_gmm", "rivals/entropy"},
     "ribs": {"rivals"},
     "pyarrow": {"demonstrations/lerobot"},
     "ray": {"runs/engines/on_ray"},

@@ -62,6 +62,12 @@ def searched(environment: Environment, *, repeats: int = 10, epsilon: float = 0.
     return Base(parts, {"imitate": imitate, "emulate": partial(emulating, strategy=AUTONOMOUS)})
 
 
+def imitating_only(base: MakeBase, environment: Environment) -> Base:
+    """A base whose only answer to a demonstration is to imitate it."""
+    parts, ways = base(environment)
+    return Base(parts, {"imitate": ways["imitate"]})
+
+
 def sgim_im(
     environment: Environment,
     seed: int,
@@ -80,18 +86,8 @@ def sgim_im(
     """
     if len(teachers) != 1:
         raise ValueError(f"sgim_im asks one teacher, got {len(teachers)}; is sgim_acts meant?")
-    own, ways = base(environment)
-    imitates = Base(own, {"imitate": ways["imitate"]})
-    return sgim_acts(
-        environment,
-        seed,
-        correspondence=correspondence,
-        teachers=teachers,
-        cost=cost,
-        base=lambda _: imitates,
-        memory=memory,
-        **parts,
-    )
+    memory, base = start_memory(environment, memory), partial(imitating_only, base)
+    return strategic(environment, seed, memory, correspondence, teachers, cost, base, **parts)
 
 
 def sgim_acts(
@@ -116,7 +112,22 @@ def sgim_acts(
             `searched`.
         memory: to start from; None for an empty one.
     """
-    memory = start_memory(environment, memory)
+    return strategic(
+        environment, seed, start_memory(environment, memory), correspondence, teachers, cost, base, **parts
+    )
+
+
+def strategic(
+    environment: Environment,
+    seed: int,
+    memory: Memory,
+    correspondence: Correspondence,
+    teachers: Mapping[str, Demonstrator],
+    cost: float,
+    base: MakeBase,
+    **parts: Unpack[Parts],
+) -> Learner:
+    """The same with this very ``memory``."""
     own, ways = base(environment)
     chosen: Parts = {**own, "goals": StrategicInterest, "judge": attempted, **parts}
     babbling = goal_babbling(environment, seed, memory, **chosen)
@@ -126,7 +137,7 @@ def sgim_acts(
             name = f"{way} {teacher}"
             answer = make(babbling, environment.outcomes, stream(seed, name))
             asking[name] = Asking(teacher, answer, cost, getattr(demonstrator, "takes", 0))
-    strategy = StrategicBabbling(babbling, asking)
+    strategy = StrategicBabbling(babbling, environment.outcomes, asking)
     return Learner(
         memory, strategy, correspondence=correspondence, inverse=babbling.inverse, policies=environment.policies
     )

@@ -3,8 +3,8 @@
 SGIM-IM and SGIM-ACTS, Nguyen & Oudeyer (2012): "Interactive learning gives the tempo to an intrinsically motivated
 robot learner", and "Active choice of teachers, learning strategies and goals for a socially guided intrinsic motivation
 learner". An attempt chooses a strategy and a goal together, asks for a demonstration of the goal if the strategy needs
-one, and tells the goal model what the strategy came to at the goal.
-    StrategicBabbling(babbling, {"imitate left": Asking("left", Imitate(...), cost=2.0)})
+one, and tells the goal model what the strategy came to, at the goal and at what was shown.
+    StrategicBabbling(babbling, outcomes, {"imitate left": Asking("left", Imitate(...), cost=2.0)})
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sgimd_torch.goals.strategic import AUTONOMOUS, StrategicGoals
-from sgimd_torch.spaces import Array, AskingAttempt, Request
+from sgimd_torch.spaces import Array, AskingAttempt, Box, Request
 from sgimd_torch.strategies import GoalBabbling, SocialStrategy
 
 
@@ -37,27 +37,28 @@ class StrategicBabbling:
 
     Args:
         babbling: the autonomous strategy; its goal model chooses among the strategies.
+        outcomes: T.
         asking: by name, the strategies with a teacher.
 
     Raises:
         ValueError: a cost is not positive, or the goal model does not choose strategies.
     """
 
-    def __init__(self, babbling: GoalBabbling, asking: Mapping[str, Asking]) -> None:
+    def __init__(self, babbling: GoalBabbling, outcomes: Box, asking: Mapping[str, Asking]) -> None:
         if not isinstance(babbling.goals, StrategicGoals):
             raise ValueError(f"goals must have choose(context, costs), got a {type(babbling.goals).__name__}")
         self.costs = {AUTONOMOUS: 1.0, **{name: each.cost for name, each in asking.items()}}
         if not all(0 < cost < np.inf for cost in self.costs.values()):
             raise ValueError(f"costs must be positive and finite, got {self.costs}")
-        self.babbling, self.asking = babbling, asking
+        self.babbling, self.outcomes, self.asking = babbling, outcomes, asking
         self.goals: StrategicGoals = babbling.goals
         self.brought: list[float] = []
 
     def attempt(self, context: Array) -> AskingAttempt:
         """Movements by one strategy for one goal; alone if the teacher has no answer.
 
-        Deviation: what it came to is measured at the goal alone, not at all outcomes on the way. Somebody who mislabels
-        has movements as good as any, only not for what they are asked for.
+        Deviation: what it came to is measured at the goal and at what was shown, not at all outcomes on the way.
+        Somebody who mislabels has movements as good as any, only not for what they are asked for.
         """
         strategy, goal = self.goals.choose(context, self.costs)
         if strategy == AUTONOMOUS:
@@ -72,10 +73,14 @@ class StrategicBabbling:
             return
         for _ in range(takes):
             yield None
-        memory = self.babbling.memory
+        memory, shown = self.babbling.memory, lesson.demonstration.outcome
         first = len(memory)
+        there = self.babbling.competence(context, shown)
         try:
             yield from answer.attempt(context, *lesson)
         finally:  # also when another demonstration interrupts
-            self.babbling.conclude(context, goal, list(memory.outcomes[first:]), before, strategy)
+            outcomes = list(memory.outcomes[first:])
+            self.babbling.conclude(context, goal, outcomes, before, strategy)
+            if self.outcomes.contains(shown):
+                self.babbling.conclude(context, shown, outcomes, there, strategy)
             self.brought.append(max(0.0, self.babbling.competence(context, goal) - before))

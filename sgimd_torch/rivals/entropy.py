@@ -1,0 +1,195 @@
+"""The rival by information: ask when a demonstration should take away more doubt than a movement of one's own.
+
+After Kulak & Calinon (2023), "Combining social and intrinsically-motivated learning for multi-task robot skill
+acquisition": the expected epistemic entropy over goals, and how much each mode should reduce it; a demonstration is
+asked for where the epistemic entropy is greatest.
+    learner = sgim_eer(environment, seed, correspondence=..., teachers={"ann": ann})              # by a process
+    learner = sgim_eer(environment, seed, correspondence=..., teachers={"ann": ann}, doubt=ByMixture)
+Ours: what is known of the policy for a goal is linear in features of the goal, so that reductions have a closed form;
+and where a movement of one's own would land is told by the earlier attempt that was nearest.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any, Final, Unpack
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sgimd_torch.algorithms import Correspondence, Parts, start_memory
+from sgimd_torch.algorithms.asking import MakeBase, imitating_only, practised, strategic
+from sgimd_torch.environments.protocol import Environment
+from sgimd_torch.goals.protocol import check_attempt, check_in
+from sgimd_torch.goals.strategic import AUTONOMOUS
+from sgimd_torch.inverses.gaussian_process import Kernel, squared_distances
+from sgimd_torch.learner import Learner
+from sgimd_torch.memory import Memory
+from sgimd_torch.spaces import Array, Box
+from sgimd_torch.teachers.answering import Demonstrator
+
+_GOALS: Final = 30  # over which the expected entropy is measured
+_KNOWN: Final = 400  # exemplars that a doubt is made from, spread over the memory
+_NOISE: Final = 0.1  # variance of what one exemplar says, in units of the doubt before there was any
+_LENGTH: Final = 0.1  # of the sides of C x T: how far an exemplar says something
+
+Doubt = Callable[[Array, Array], Array]
+"""(known, points): exemplars ``(n, dim)`` and points ``(m, dim)`` of C x T in its sides -> ``(m, m)`` covariances of
+the policies for the points, given the exemplars. 1 on the diagonal: nothing is known."""
+
+
+class ByProcess:
+    """The doubt of a Gaussian process from outcomes to policies."""
+
+    def __call__(self, known: Array, points: Array) -> Array:
+        """See ``Doubt``."""
+        known, kernel = _thinned(known), Kernel(1 / _LENGTH, 1.0, 0.0, _NOISE)
+        across = kernel(squared_distances(points, known))
+        inner = kernel(squared_distances(known, known)) + _NOISE * np.eye(len(known))
+        found: Array = kernel(squared_distances(points, points)) - across @ np.linalg.solve(inner, across.T)
+        return found
+
+
+class ByMixture:
+    """The doubt of a Bayesian mixture of Gaussians, scikit-learn's (extra rivals): the policy of a component is known
+    the better, the more exemplars the component has; far from all of them nothing is known. It is fitted anew when
+    there are a tenth more exemplars."""
+
+    def __init__(self, components: int = 20) -> None:
+        self.components, self._fitted = components, 0
+        self._mixture: Any = None
+
+    def __call__(self, known: Array, points: Array) -> Array:
+        """See ``Doubt``."""
+        if len(known) < 2 * self.components:
+            return np.eye(len(points))
+        if len(known) >= 1.1 * self._fitted:
+            from sklearn.mixture import BayesianGaussianMixture
+
+            self._fitted = len(known)
+            self._mixture = BayesianGaussianMixture(n_components=self.components, random_state=0, reg_covar=_LENGTH**2)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # that it has not converged
+                self._mixture.fit(_thinned(known))
+        mixture = self._mixture
+        apart = points[:, None] - mixture.means_  # (m, components, dim)
+        squared = np.einsum("mki,kij,mkj->mk", apart, mixture.precisions_, apart).min(axis=1)
+        features = mixture.predict_proba(points) * np.exp(-squared / 4)[:, None]
+        found: Array = (features / mixture.mean_precision_) @ features.T + np.diag(1 - np.exp(-squared / 2))
+        return found
+
+
+class EntropyGoals:
+    """Chooses mode and goal by the expected reduction of the epistemic entropy; see `StrategicGoals`.
+
+    Args:
+        contexts, outcomes, rng: as in `InterestMap`.
+        memory: of the learner; only read.
+        doubt: what is not known about the policies for goals.
+    """
+
+    def __init__(self, contexts: Box, outcomes: Box, rng: np.random.Generator, *, memory: Memory, doubt: Doubt) -> None:
+        self.contexts, self.outcomes, self.memory, self.doubt, self._rng = contexts, outcomes, memory, doubt, rng
+        self._box = Box(np.concatenate((contexts.low, outcomes.low)), np.concatenate((contexts.high, outcomes.high)))
+        self._tried: dict[str, list[tuple[Array, Array]]] = {}  # goals, and by how much they were missed, in sides
+
+    def choose(self, context: ArrayLike, costs: Mapping[str, float]) -> tuple[str, Array]:
+        """The mode with the greatest expected reduction over its cost, and a goal ``(outcome_dim,)`` for it.
+
+        Raises:
+            ValueError: ``context`` is not one point of C.
+        """
+        context = check_in(self.contexts, "context", context)
+        goals = np.stack([self.outcomes.sample(self._rng) for _ in range(_GOALS)])
+        points = self._scaled(np.tile(context, (_GOALS, 1)), goals)
+        places = [points, *(self._landing(points, name) for name in costs)]
+        known = self._scaled(self.memory.contexts, self.memory.outcomes)
+        covariance = self.doubt(known, np.concatenate(places))
+        entropies = _entropy(np.diag(covariance)[:_GOALS])
+        found = []
+        for number, (name, cost) in enumerate(costs.items(), 1):
+            first = number * _GOALS
+            candidates = np.arange(_GOALS) if name == AUTONOMOUS else np.array([entropies.argmax()])
+            reductions = [_reduction(covariance, entropies, first + int(goal)) / cost for goal in candidates]
+            best = int(np.argmax(reductions))
+            found.append((reductions[best], name, goals[candidates[best]]))
+        _, name, goal = max(found, key=lambda each: each[0])
+        return name, goal
+
+    def sample(self, context: ArrayLike) -> Array:
+        """A goal for a learner that has no other mode than the autonomous one."""
+        return self.choose(context, {AUTONOMOUS: 1.0})[1]
+
+    def add(
+        self, context: ArrayLike, goal: ArrayLike, competence: float, strategy: str = AUTONOMOUS, gain: float = 0.0
+    ) -> None:
+        """Where an attempt at a goal has landed is read from memory.
+
+        Raises:
+            ValueError: see `Goals.add`.
+        """
+        point = check_attempt(self.contexts, self.outcomes, context, goal, competence, gain)
+        goals, last = (
+            (point - self._box.low) / self._box.sides,
+            self._scaled(self.memory.contexts, self.memory.outcomes),
+        )
+        # Without an answer nothing is learnt: as if it had landed where something has landed before.
+        missed = np.full(len(point), np.nan) if gain == -1.0 else last[-1] - goals
+        self._tried.setdefault(strategy, []).append((goals, missed))
+
+    def _landing(self, points: Array, strategy: str) -> Array:
+        """Where attempts at ``points`` should end: they miss as the nearest earlier one did; at first not at all."""
+        tried = self._tried.get(strategy)
+        if not tried:
+            return points
+        goals, missed = (np.array(each) for each in zip(*tried, strict=True))
+        landed = points + missed[squared_distances(points, goals).argmin(axis=1)]
+        known = self._scaled(self.memory.contexts[:1], self.memory.outcomes[:1])
+        found: Array = np.where(np.isnan(landed), known if len(known) else points, landed)
+        return found
+
+    def _scaled(self, contexts: Array, outcomes: Array) -> Array:
+        scaled: Array = (np.concatenate((contexts, outcomes), axis=1) - self._box.low) / self._box.sides
+        return scaled
+
+
+def sgim_eer(
+    environment: Environment,
+    seed: int,
+    *,
+    correspondence: Correspondence,
+    teachers: Mapping[str, Demonstrator],
+    cost: float = 1.0,
+    base: MakeBase = practised,
+    doubt: Callable[[], Doubt] = ByProcess,
+    memory: Memory | None = None,
+    **parts: Unpack[Parts],
+) -> Learner:
+    """SGIM-IM with the choice of Kulak & Calinon.
+
+    Args:
+        environment, seed, correspondence, teachers, cost, base, parts: as in `sgim_im`.
+        doubt: what the entropy is measured by: `ByProcess`, or `ByMixture` as in the paper.
+        memory: to start from; None for an empty one.
+    """
+    memory, base = start_memory(environment, memory), partial(imitating_only, base)
+    chosen: Parts = {"goals": partial(EntropyGoals, memory=memory, doubt=doubt()), **parts}
+    return strategic(environment, seed, memory, correspondence, teachers, cost, base, **chosen)
+
+
+def _thinned(known: Array) -> Array:
+    return known[:: 1 + len(known) // _KNOWN]
+
+
+def _entropy(variances: Array) -> Array:
+    """Of Gaussians, but for a constant."""
+    return 0.5 * np.log(np.maximum(variances, 0) + _NOISE)
+
+
+def _reduction(covariance: Array, entropies: Array, place: int) -> float:
+    """Of the mean entropy of the goals, the first of the points, if there were one more exemplar at a ``place``."""
+    n, variances = len(entropies), np.diag(covariance)
+    after = variances[:n] - covariance[:n, place] ** 2 / (variances[place] + _NOISE)
+    return float((entropies - _entropy(after)).mean())
