@@ -34,6 +34,7 @@ _GOALS: Final = 30  # over which the expected entropy is measured
 _KNOWN: Final = 400  # exemplars that a doubt is made from, spread over the memory
 _NOISE: Final = 0.1  # variance of what one exemplar says, in units of the doubt before there was any
 _LENGTH: Final = 0.1  # of the sides of C x T: how far an exemplar says something
+_KERNEL: Final = Kernel(1 / _LENGTH, 1.0, 0.0, _NOISE)
 
 Doubt = Callable[[Array, Array], Array]
 """(known, points): exemplars ``(n, dim)`` and points ``(m, dim)`` of C x T in its sides -> ``(m, m)`` covariances of
@@ -45,10 +46,10 @@ class ByProcess:
 
     def __call__(self, known: Array, points: Array) -> Array:
         """See ``Doubt``."""
-        known, kernel = _thinned(known), Kernel(1 / _LENGTH, 1.0, 0.0, _NOISE)
-        across = kernel(squared_distances(points, known))
-        inner = kernel(squared_distances(known, known)) + _NOISE * np.eye(len(known))
-        found: Array = kernel(squared_distances(points, points)) - across @ np.linalg.solve(inner, across.T)
+        known = _thinned(known)
+        across = _KERNEL(squared_distances(points, known))
+        inner = _KERNEL(squared_distances(known, known)) + _NOISE * np.eye(len(known))
+        found: Array = _KERNEL(squared_distances(points, points)) - across @ np.linalg.solve(inner, across.T)
         return found
 
 
@@ -63,8 +64,9 @@ class ByMixture:
 
     def __call__(self, known: Array, points: Array) -> Array:
         """See ``Doubt``."""
+        prior = _KERNEL(squared_distances(points, points))
         if len(known) < 2 * self.components:
-            return np.eye(len(points))
+            return prior
         if len(known) >= 1.1 * self._fitted:
             from sklearn.mixture import BayesianGaussianMixture
 
@@ -76,8 +78,10 @@ class ByMixture:
         mixture = self._mixture
         apart = points[:, None] - mixture.means_  # (m, components, dim)
         squared = np.einsum("mki,kij,mkj->mk", apart, mixture.precisions_, apart).min(axis=1)
-        features = mixture.predict_proba(points) * np.exp(-squared / 4)[:, None]
-        found: Array = (features / mixture.mean_precision_) @ features.T + np.diag(1 - np.exp(-squared / 2))
+        within = np.exp(-squared / 2)
+        features = mixture.predict_proba(points) * np.sqrt(within)[:, None]
+        outside = np.sqrt(1 - within)
+        found: Array = (features / mixture.mean_precision_) @ features.T + np.outer(outside, outside) * prior
         return found
 
 
@@ -108,15 +112,14 @@ class EntropyGoals:
         known = self._scaled(self.memory.contexts, self.memory.outcomes)
         covariance = self.doubt(known, np.concatenate(places))
         entropies = _entropy(np.diag(covariance)[:_GOALS])
-        found = []
+        doubtful = int(entropies.argmax())
+        found = dict[str, float]()
         for number, (name, cost) in enumerate(costs.items(), 1):
-            first = number * _GOALS
-            candidates = np.arange(_GOALS) if name == AUTONOMOUS else np.array([entropies.argmax()])
-            reductions = [_reduction(covariance, entropies, first + int(goal)) / cost for goal in candidates]
-            best = int(np.argmax(reductions))
-            found.append((reductions[best], name, goals[candidates[best]]))
-        _, name, goal = max(found, key=lambda each: each[0])
-        return name, goal
+            aimed = range(_GOALS) if name == AUTONOMOUS else [doubtful]  # alone, it pursues any goal
+            reductions = [_reduction(covariance, entropies, number * _GOALS + goal) for goal in aimed]
+            found[name] = float(np.mean(reductions)) / cost
+        name = max(found, key=lambda each: found[each])
+        return name, goals[0 if name == AUTONOMOUS else doubtful]
 
     def sample(self, context: ArrayLike) -> Array:
         """A goal for a learner that has no other mode than the autonomous one."""
