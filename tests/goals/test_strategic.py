@@ -1,11 +1,11 @@
-"""Strategic interest: progress by hand, the draw among the greatest, the cut, costs and the random share."""
+"""Strategic interest: progress by hand, hope for the untried, the draw among the greatest, the cut, costs."""
 
 from collections import Counter
 
 import numpy as np
 import pytest
 
-from sgimd_torch.goals.strategic import StrategicInterest, between_means, exemplar_progress
+from sgimd_torch.goals.strategic import StrategicInterest, between_means, progresses, strategic_progress
 from sgimd_torch.spaces import Box, stream
 
 NONE = np.zeros(0)
@@ -16,21 +16,49 @@ def interest(seed=0, **options):
     return StrategicInterest(Box.cube(0, 1, 0), SQUARE, stream(seed, "goals"), **options)
 
 
+def told(goals, strategy, gain, n=10, goal=(0.5, 0.5)):
+    """Attempts that made all of their gain up to, or from, the greatest competence: a progress of ``gain``."""
+    for _ in range(n):
+        goals.add(NONE, goal, min(0.0, gain), strategy, gain)
+
+
 def test_progress_by_hand():
-    # Competences in [0, 1]: from .3 to .5, from .6 to 1, from 0 to 1, and twice nothing.
-    competences, gains = np.array([-0.5, 0.0, 0.0, -1.0, 0.0]), np.array([0.2, 0.4, 1.0, 0.0, 0.0])
-    # .2 * .25 = .05; .4 * 1; 1 * 1; 0; 0. Without the least, 0, and the greatest, 1: (.05 + .4 + 0) / 3.
-    assert exemplar_progress(np.zeros((5, 2)), competences, gains) == pytest.approx(0.15)
+    # Competences in [0, 1]: from .3 to .5, from .6 to 1, from .8 down to .5; nothing where all is known.
+    competences, gains = np.array([-0.5, 0.0, -0.5, 0.0]), np.array([0.2, 0.4, -0.3, 0.0])
+    # .2 * .5^2; .4 * 1; -.3 * .8^2; 0
+    assert progresses(competences, gains) == pytest.approx([0.05, 0.4, -0.192, 0.0])
+    assert strategic_progress(np.zeros((4, 2)), competences, gains) == pytest.approx(0.025)  # (.05 + 0) / 2
 
 
-def test_interest_is_of_the_last_ten_of_a_strategy():
+def test_progress_is_of_the_last_ten_of_a_strategy():
     goals = interest()
     for gain in [1.0] * 4 + [0.1] * 8 + [0.0, 0.9]:
-        goals.add(NONE, [0.5, 0.5], 0.0, "imitate", gain)
-    goals.add(NONE, [0.5, 0.5], 0.0, "autonomous", 1.0)
+        told(goals, "imitate", gain, 1)
     (region,) = goals.regions
-    assert region.interest("imitate") == pytest.approx(0.1)
-    assert region.interest("emulate") == region.interest("autonomous") == 0.0
+    assert goals.progress(region, "imitate") == pytest.approx(0.1)
+
+
+def test_of_a_strategy_that_was_hardly_tried_the_most_is_hoped_for():
+    goals = interest()
+    told(goals, "imitate", -0.5, 3)
+    assert [goals.progress(goals.regions[0], name) for name in ("imitate", "emulate")] == [1.0, 1.0]
+    told(goals, "imitate", -0.5, 1)
+    assert goals.progress(goals.regions[0], "imitate") == pytest.approx(-0.5)
+
+
+def test_where_a_strategy_was_hardly_tried_it_counts_as_where_it_was_tried_nearest():
+    goals, rng = interest(), stream(1, "points")
+    for k in range(51):  # cut in the middle, by what is gained alone
+        x, y = rng.uniform(0.1, 0.9) * (-1) ** k, rng.uniform(-1, 1)
+        goals.add(NONE, [x, y], 0.0, "autonomous", 0.8 if x < 0 else 0.0)
+    left, right = goals.regions
+    told(goals, "imitate", 0.3, 10, goal=(-0.5, 0.0))
+    left, right = goals.regions
+    assert goals.progress(right, "imitate") == pytest.approx(0.3)  # it was never tried there
+    told(goals, "imitate", -0.2, 4, goal=(0.5, 0.0))
+    left, right = goals.regions
+    assert goals.progress(right, "imitate") == pytest.approx(-0.2)
+    assert goals.progress(left, "imitate") == pytest.approx(0.3)
 
 
 def test_above_fifty_points_a_region_is_cut_where_the_means_differ_most():
@@ -42,7 +70,7 @@ def test_above_fifty_points_a_region_is_cut_where_the_means_differ_most():
     left, right = goals.regions
     assert left.high[0] == right.low[0]
     assert abs(left.high[0]) < 0.15
-    assert left.interest("autonomous") == pytest.approx(0.8)
+    assert goals.progress(left, "autonomous") == pytest.approx(0.8)
 
 
 def test_the_means_of_a_cut_by_hand():
@@ -57,35 +85,35 @@ def choices(goals, costs, n=2000):
     return Counter(goals.choose(NONE, costs)[0] for _ in range(n))
 
 
-def test_strategies_are_drawn_in_proportion_to_interest_over_cost():
-    goals = interest(share=0.0)
-    for _ in range(10):
-        goals.add(NONE, [0.0, 0.0], 0.0, "autonomous", 0.3)
-        goals.add(NONE, [0.0, 0.0], 0.0, "imitate", 0.6)
-    # Interests .3 and .6 / 2, then .6 / 8: 1/2 and 1/5. Standard errors .011 and .009.
-    assert choices(goals, {"autonomous": 1.0, "imitate": 2.0})["imitate"] / 2000 == pytest.approx(1 / 2, abs=0.05)
-    assert choices(goals, {"autonomous": 1.0, "imitate": 8.0})["imitate"] / 2000 == pytest.approx(1 / 5, abs=0.045)
+@pytest.mark.parametrize("anywhere", [0.0, 1.0])
+def test_strategies_are_drawn_in_proportion_to_their_interest(anywhere):
+    goals = interest(anywhere=anywhere, temperature=0.1)
+    told(goals, "autonomous", 0.3)
+    told(goals, "imitate", 0.4)
+    # e^4 / (e^3 + e^4) = .73, and e^(4/2) / 2 / (e^3 + e^(4/2) / 2) = .16. Standard errors .010 and .008.
+    assert choices(goals, {"autonomous": 1.0, "imitate": 1.0})["imitate"] / 2000 == pytest.approx(0.731, abs=0.045)
+    assert choices(goals, {"autonomous": 1.0, "imitate": 2.0})["imitate"] / 2000 == pytest.approx(0.155, abs=0.035)
 
 
-def test_only_the_greatest_are_drawn_from_and_a_share_is_random():
-    costs = {"autonomous": 1.0, "imitate": 1.0, "emulate": 1.0}
-    for share, others in ((0.0, 0.0), (0.3, 0.2)):
-        goals = interest(share=share, greatest=1)
-        for _ in range(10):
-            goals.add(NONE, [0.0, 0.0], 0.0, "imitate", 0.6)
-            goals.add(NONE, [0.0, 0.0], 0.0, "emulate", 0.5)
-        found = choices(goals, costs)
-        assert (found["autonomous"] + found["emulate"]) / 2000 == pytest.approx(others, abs=0.045)  # error .009
+def test_a_cost_makes_no_loss_smaller():
+    goals = interest(temperature=0.1)
+    told(goals, "autonomous", -0.1)
+    told(goals, "imitate", -0.2)
+    # e^-2 / 4 / (e^-1 + e^-2 / 4) = .084; divided by the cost, the loss would be -.05 and the share .29.
+    assert choices(goals, {"autonomous": 1.0, "imitate": 4.0})["imitate"] / 2000 == pytest.approx(0.084, abs=0.03)
 
 
-def test_without_any_progress_all_strategies_are_equally_likely():
-    found = choices(interest(share=0.0), {"autonomous": 1.0, "imitate": 100.0})
-    assert found["imitate"] / 2000 == pytest.approx(1 / 2, abs=0.055)
+def test_only_the_greatest_are_drawn_from():
+    goals = interest(greatest=1, anywhere=0.0)
+    told(goals, "imitate", 0.6)
+    told(goals, "emulate", 0.59)
+    told(goals, "autonomous", 0.1)
+    assert choices(goals, {"autonomous": 1.0, "imitate": 1.0, "emulate": 1.0}) == {"imitate": 2000}
 
 
 def test_goals_come_from_the_region_that_was_drawn_and_contains_the_context():
     contexts = Box.cube(0, 1, 1)
-    goals = StrategicInterest(contexts, SQUARE, stream(0, "goals"), share=0.0)
+    goals = StrategicInterest(contexts, SQUARE, stream(0, "goals"), anywhere=0.0)
     rng = stream(1, "points")
     for _ in range(400):  # progress at low contexts on the left, at high ones on the right
         context, x, y = rng.uniform(0, 1), rng.uniform(-1, 1), rng.uniform(-1, 1)
@@ -95,7 +123,9 @@ def test_goals_come_from_the_region_that_was_drawn_and_contains_the_context():
         assert np.mean(drawn) > 0.8
 
 
-@pytest.mark.parametrize("options", [{"share": 1.1}, {"share": -0.1}, {"greatest": 0}])
+@pytest.mark.parametrize("options", [{"anywhere": 1.1}, {"anywhere": -0.1}, {"greatest": 0}, {"temperature": 0.0}])
 def test_numbers_out_of_range_are_refused(options):
-    with pytest.raises(ValueError, match=r"share must lie in \[0, 1\] and greatest be at least 1"):
+    with pytest.raises(
+        ValueError, match=r"anywhere must lie in \[0, 1\], greatest be at least 1 and temperature above 0"
+    ):
         interest(**options)
