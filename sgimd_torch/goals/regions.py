@@ -18,7 +18,7 @@ from sgimd_torch.spaces import Array
 Progress = Callable[[Array, Array, Array], float]
 """(points, competences, gains) of a window of n >= 4 goals, oldest first -> how much the robot progresses. Points
 ``(n, dim)`` lie in C x T; competences ``(n,)`` were measured there when the attempts ended; gains ``(n,)`` say how much
-each attempt raised the competence at its own goal."""
+each attempt raised the competence at its own goal; below 0, how far it stayed behind, see `Goals.add`."""
 
 
 def gained_progress(points: Array, competences: Array, gains: Array) -> float:
