@@ -29,7 +29,7 @@ from sgimd_torch.learner.asking import Asking, StrategicBabbling
 from sgimd_torch.memory import Memory
 from sgimd_torch.searches.perturb import practise
 from sgimd_torch.searches.simplex import nelder_mead
-from sgimd_torch.searches.widening import Widening
+from sgimd_torch.searches.widening import Widening, Width
 from sgimd_torch.spaces import Array, Box, Estimate, Search, stream
 from sgimd_torch.strategies import Babble, Emulate, GoalBabbling, Imitate, Judge, Look, Remember, Rest, SocialStrategy
 from sgimd_torch.teachers.answering import Demonstrator
@@ -103,12 +103,13 @@ def practice_taught(
 
 
 def _practising(environment: Environment, changed: Parts) -> Parts:
+    width = Width()
     parts: Parts = {
         "goals": UniformGoals,
         "inverse": partial(LocalProcess, noise=environment.outcome_noise),
-        "search": practise,
+        "search": partial(practise, width=width),
         "budget": 1,
-        "look": Widening,
+        "look": partial(Widening, width=width),
         "global_range": (0.02, 0.3),
     }
     parts.update(changed)
