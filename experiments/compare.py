@@ -33,7 +33,7 @@ with loading():  # Ctrl-C shows no traceback
     from sgimd_torch.runs.read import finished, read_run
     from sgimd_torch.runs.sweep import add_engines, add_options, engine_of
     from tables import COLUMNS, RESULTS, Key, Table, as_text, asked_rows, goal_rows, result_rows
-    from variants import EXPERIMENTS, FEW, HALF, MANY, make_subsets, tables_of
+    from variants import CORNER, EARLIER, EXPERIMENTS, FEW, HALF, MANY, SHUFFLED, Variant, make_subsets, tables_of
 
 EXAMPLES: Final = f"""experiments: {", ".join(EXPERIMENTS)}
 
@@ -170,10 +170,13 @@ def runs_of(
                 if only and variant not in only:
                     continue
                 changes = dict(line)
-                if changes.get("demonstrations") in (Path(FEW), Path(HALF), Path(MANY)):
-                    changes["demonstrations"] = out / "demonstrations" / changes["demonstrations"]
+                shown = changes.get("demonstrations")
+                if shown in (FEW, HALF, MANY, CORNER, SHUFFLED):
+                    changes["demonstrations"] = out / "demonstrations" / shown
                 floor_at = FLOOR_AT if experiment in FLOORS else ()
-                fixed = {"answers": ANSWERS, "floor_at": floor_at}
+                fixed: Variant = {"answers": ANSWERS, "floor_at": floor_at}
+                if experiment in EARLIER:
+                    fixed["inverse"] = "linear"
                 whole = {"seed": seed, "out": out, "name": variant, **fixed, **changes}
                 found.append((experiment, Config(**whole)))
     return found

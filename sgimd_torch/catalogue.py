@@ -33,7 +33,7 @@ class Entry:
         fixed: its parameter -> value; a text with a colon is an attribute, loaded like ``at``.
         also: options that matter with it, but are used by another part.
         ignores: options that have no effect with it, though others use them.
-        answers: of an algorithm: its learner's own answer stands in the place of the default of --inverse.
+        own: of an algorithm: what options are that nobody set, where it is not their ``standard`` (see ``Option``).
         learns_with: of an inverse: the one to use while learning, if it is another one.
         label, colour: what figures call it, and how they draw it.
         filmed: of an environment: whether `sgimd film` shows it.
@@ -45,7 +45,7 @@ class Entry:
     fixed: Mapping[str, object] = field(default_factory=dict)
     also: tuple[str, ...] = ()
     ignores: tuple[str, ...] = ()
-    answers: bool = False
+    own: Mapping[str, object] = field(default_factory=dict)
     learns_with: str | None = None
     label: str = ""
     colour: str = "black"
@@ -83,12 +83,14 @@ _PURSUES: Final = {
     "budget": "budget",
     "give_up": "give_up",
 }
+_PRACTISED: Final = {"goals": "uniform", "search": "practice", "budget": 1}
 _TAUGHT: Final = ("teacher", "demonstrations")
 _SHOWN: Final = {"correspondence": "correspondence"}
 _ASKS: Final = {
     **_SHOWN,
     "teachers": "teachers",
     "base": "base",
+    "inverse": "inverse",
     "cost": "cost",
 }
 _PROGRESS: Final = {"window": "window", "progress": "progress"}
@@ -143,16 +145,17 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
         "practice": _at(
             "algorithms:practice",
             "one movement a goal, as a local process answers",
-            answers=True,
+            uses=_PURSUES,
+            own=_PRACTISED,
             label="Practice",
             colour="#332288",
         ),
         "practice-taught": _at(
             "algorithms:practice_taught",
-            "the same, and does once what it is shown; best with --teacher initial --every 1",
-            uses=_SHOWN,
+            "the same, and does once what it is shown",
+            uses={**_PURSUES, **_SHOWN},
             also=_TAUGHT,
-            answers=True,
+            own={**_PRACTISED, "teacher": "at-once"},
             label="Practice, taught",
             colour="#aa4499",
         ),
@@ -186,7 +189,6 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
             "decides when to ask the one teacher of --teachers",
             uses=_ASKS,
             also=("demonstrations",),
-            answers=True,
             label="SGIM-IM",
             colour="#661100",
         ),
@@ -195,7 +197,6 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
             "decides when to ask which of --teachers for what, and how to use the answer",
             uses=_ASKS,
             also=("demonstrations",),
-            answers=True,
             label="SGIM-ACTS",
             colour="#cc6677",
         ),
@@ -204,7 +205,6 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
             "asks the one teacher of --teachers when that should take away more doubt",
             uses={**_ASKS, "doubt": "doubt"},
             also=("demonstrations",),
-            answers=True,
             label="By entropy",
             colour="#117733",
         ),
@@ -309,7 +309,7 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
             "algorithms.asking:searched",
             "a search at each goal and short imitations, as in the papers",
             uses={
-                **{name: option for name, option in _PURSUES.items() if name not in ("goals", "judge")},
+                **{name: option for name, option in _PURSUES.items() if name not in ("goals", "judge", "inverse")},
                 "repeats": "imitations",
                 "epsilon": "epsilon",
             },
@@ -329,7 +329,10 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
         "periodic": _at(
             "teachers:PeriodicTeacher", "one every so many movements", uses={"every": "every", "choose": "choice"}
         ),
-        "initial": _at("teachers:InitialTeacher", "all at the start", uses={"every": "every"}),
+        "initial": _at(
+            "teachers:InitialTeacher", "all at the start, one every so many movements", uses={"every": "every"}
+        ),
+        "at-once": _at("teachers:InitialTeacher", "all at the start, one for each movement", fixed={"every": 1}),
         "asked": _at(
             "teachers:AskedTeacher", "when the learner stalls", uses={"patience": "every", "choose": "choice"}
         ),

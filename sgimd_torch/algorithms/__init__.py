@@ -22,12 +22,11 @@ from sgimd_torch.goals.interest_map import InterestMap
 from sgimd_torch.goals.protocol import Goals
 from sgimd_torch.goals.uniform import UniformGoals
 from sgimd_torch.inverses.local_process import LocalProcess
-from sgimd_torch.inverses.locally_linear import LocallyLinear
 from sgimd_torch.learner import Learner
 from sgimd_torch.memory import Memory
 from sgimd_torch.searches.perturb import practise
 from sgimd_torch.searches.simplex import nelder_mead
-from sgimd_torch.searches.widening import Widening
+from sgimd_torch.searches.widening import Widening, Width
 from sgimd_torch.spaces import Array, Box, Estimate, Search, stream
 from sgimd_torch.strategies import Babble, Emulate, GoalBabbling, Imitate, Judge, Look, Remember, Rest, SocialStrategy
 
@@ -44,7 +43,7 @@ class Parts(TypedDict, total=False):
     """The keywords of ``goal_babbling``, which explains them."""
 
     goals: MakeGoals
-    inverse: MakeInverse
+    inverse: MakeInverse | None
     search: MakeSearch
     judge: MakeJudge
     measure: Performance | None
@@ -56,11 +55,13 @@ class Parts(TypedDict, total=False):
 
 
 def random_exploration(
-    environment: Environment, seed: int, *, inverse: MakeInverse = LocallyLinear, memory: Memory | None = None
+    environment: Environment, seed: int, *, inverse: MakeInverse | None = None, memory: Memory | None = None
 ) -> Learner:
     """Random: uniform movements."""
     memory = start_memory(environment, memory)
-    return Learner(memory, Babble(environment.policies, stream(seed, "babble")), inverse=inverse(memory))
+    return Learner(
+        memory, Babble(environment.policies, stream(seed, "babble")), inverse=answering(environment, memory, inverse)
+    )
 
 
 def sagg_riac(environment: Environment, seed: int, *, memory: Memory | None = None, **parts: Unpack[Parts]) -> Learner:
@@ -75,7 +76,7 @@ def practice(environment: Environment, seed: int, *, memory: Memory | None = Non
 
     It has no teacher, and nothing in it knows a unit or a robot. What the answer gets wrong is what it learns next.
     """
-    return sagg_riac(environment, seed, memory=memory, **practising(environment, parts))
+    return sagg_riac(environment, seed, memory=memory, **practising(parts))
 
 
 def practice_taught(
@@ -93,18 +94,18 @@ def practice_taught(
         correspondence=correspondence,
         social=partial(imitating, repeats=1),
         memory=memory,
-        **practising(environment, parts),
+        **practising(parts),
     )
 
 
-def practising(environment: Environment, changed: Parts) -> Parts:
+def practising(changed: Parts) -> Parts:
     """The parts of `practice`, some of them ``changed``."""
+    width = Width()
     parts: Parts = {
         "goals": UniformGoals,
-        "inverse": partial(LocalProcess, noise=environment.outcome_noise),
-        "search": practise,
+        "search": partial(practise, width=width),
         "budget": 1,
-        "look": Widening,
+        "look": partial(Widening, width=width),
         "global_range": (0.02, 0.3),
     }
     parts.update(changed)
@@ -116,7 +117,7 @@ def observation(
     seed: int,
     *,
     correspondence: Correspondence,
-    inverse: MakeInverse = LocallyLinear,
+    inverse: MakeInverse | None = None,
     memory: Memory | None = None,
 ) -> Learner:
     """Observation: watches and remembers, never moves."""
@@ -126,7 +127,7 @@ def observation(
         Rest(),
         social=Remember(memory),
         correspondence=correspondence,
-        inverse=inverse(memory),
+        inverse=answering(environment, memory, inverse),
         policies=environment.policies,
     )
 
@@ -137,7 +138,7 @@ def imitation(
     *,
     correspondence: Correspondence,
     epsilon: float = 0.05,
-    inverse: MakeInverse = LocallyLinear,
+    inverse: MakeInverse | None = None,
     memory: Memory | None = None,
 ) -> Learner:
     """Imitation: repeats the last demonstration with small variations until the next one."""
@@ -147,7 +148,7 @@ def imitation(
         Rest(),
         social=Imitate(environment.policies, stream(seed, "imitate"), repeats=None, epsilon=epsilon),
         correspondence=correspondence,
-        inverse=inverse(memory),
+        inverse=answering(environment, memory, inverse),
         policies=environment.policies,
     )
 
@@ -224,7 +225,7 @@ def goal_babbling(
     memory: Memory,
     *,
     goals: MakeGoals = InterestMap,
-    inverse: MakeInverse = LocallyLinear,
+    inverse: MakeInverse | None = None,
     search: MakeSearch = nelder_mead,
     judge: MakeJudge = remembered,
     measure: Performance | None = None,
@@ -241,7 +242,8 @@ def goal_babbling(
         seed: of all streams of this learner.
         memory: of the learner.
         goals: (contexts, outcomes, rng) -> the goal model.
-        inverse: (memory) -> the inverse model, where searches begin and by which the learner answers.
+        inverse: (memory) -> the inverse model, where searches begin and by which the learner answers; None for a
+            `LocalProcess`, whose answers have to prove themselves.
         search: (policies, rng) -> the refinement of its estimate.
         judge: (memory, measure) -> the competence that the goal model is told.
         measure: J; None for eq. (7), relative to the distance from rest.
@@ -257,7 +259,7 @@ def goal_babbling(
     noise = max(environment.outcome_noise, 0.02)
     if measure is None:
         measure = partial(performance, rest=environment.rest, d_min=noise)
-    made = inverse(memory)
+    made = answering(environment, memory, inverse)
     return GoalBabbling(
         environment.policies,
         memory,
@@ -273,6 +275,13 @@ def goal_babbling(
         global_range=global_range,
         give_up=give_up,
     )
+
+
+def answering(
+    environment: Environment, memory: Memory, inverse: MakeInverse | None
+) -> Callable[[Array, Array], Estimate]:
+    """The inverse model of a learner; without a choice one whose answers have to prove themselves."""
+    return LocalProcess(memory, noise=environment.outcome_noise) if inverse is None else inverse(memory)
 
 
 def start_memory(environment: Environment, start: Memory | None) -> Memory:

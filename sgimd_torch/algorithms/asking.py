@@ -53,7 +53,7 @@ def repeating(
 def practised(environment: Environment) -> Base:
     """As ``practice``: one movement at each goal, and what is shown is executed once, exactly. To emulate would be
     one movement at a goal, as always, so there is no other way to answer."""
-    return Base(practising(environment, {}), {"imitate": partial(repeating, repeats=1, epsilon=0.0)})
+    return Base(practising({}), {"imitate": partial(repeating, repeats=1, epsilon=0.0)})
 
 
 def searched(environment: Environment, *, repeats: int = 10, epsilon: float = 0.05, **parts: Unpack[Parts]) -> Base:

@@ -83,8 +83,8 @@ def build(config: Config) -> RunParts:
     demonstrations = [*demonstrations, *_others(demonstrations, teachers)]
     learner = parts["algorithm"](task.environment, config.seed)
     words = {answer: config.inverse if answer == OWN else answer for answer in config.answered}
-    if config.entry("algorithm").answers and config.inverse == Config.inverse:
-        words[OWN] = OWN
+    if "inverse" in config.entry("algorithm").options and config.entry("inverse").learns_with is None:
+        words[OWN] = OWN  # the one that it learns with
     inverses = {
         word: learner.inverse if word == OWN else parts.maker("inverse", word, learning=False)(learner.memory)
         for word in dict.fromkeys(words.values())
@@ -160,7 +160,9 @@ class _Parts:
         return made if word in CATALOGUE[kind] else checked(kind, word, made)
 
     def _make(self, name: str) -> Any:
-        robot = self._task.environment
+        robot, algorithm = self._task.environment, self._config.entry("algorithm")
+        if name in algorithm.uses.values() and algorithm.own.get(name) == getattr(self._config, name, None) is not None:
+            return None  # the algorithm makes its own
         match name:
             case "policies" | "outcome_noise":
                 return getattr(robot, name)
