@@ -312,6 +312,19 @@ def test_few_are_a_tenth_of_the_demonstrations_and_half_are_those_to_the_right(t
     assert len(half) == sum(shown.outcome[0] > 0 for shown in everything) > 40
 
 
+def test_a_corner_is_twenty_neighbours_and_shuffled_ones_only_say_something_else(tmp_path):
+    make_subsets(tmp_path / "new")
+    everything = load_demonstrations()
+    corner, shuffled = (load_demonstrations(tmp_path / "new" / name) for name in ("corner.npz", "shuffled.npz"))
+    assert len(corner) == 20
+    assert np.ptp([shown.outcome for shown in corner], axis=0).max() < 1
+    assert [shown.trajectory.tobytes() for shown in shuffled] == [shown.trajectory.tobytes() for shown in everything]
+    said, done = (sorted(tuple(shown.outcome) for shown in each) for each in (shuffled, everything))
+    assert said == done
+    same = sum((a.outcome == b.outcome).all() for a, b in zip(shuffled, everything, strict=True))
+    assert same < 10
+
+
 def test_tiles_of_the_benchmark_that_were_reached_are_counted_once():
     """Tiles of 0.5 m from (-1, -1); goals on two of them."""
     benchmark = Benchmark("FishingRod", np.array([[0.1, 0.1], [-0.9, 0.4]]), 0.5)
