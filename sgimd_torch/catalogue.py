@@ -85,6 +85,7 @@ _PURSUES: Final = {
 }
 _PRACTISED: Final = {"goals": "uniform", "search": "practice", "budget": 1}
 _TAUGHT: Final = ("teacher", "demonstrations")
+_ANSWERED: Final = ("demonstrations", "patience")
 _SHOWN: Final = {"correspondence": "correspondence"}
 _ASKS: Final = {
     **_SHOWN,
@@ -188,7 +189,7 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
             "algorithms.asking:sgim_im",
             "decides when to ask the one teacher of --teachers",
             uses=_ASKS,
-            also=("demonstrations",),
+            also=_ANSWERED,
             label="SGIM-IM",
             colour="#661100",
         ),
@@ -196,7 +197,7 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
             "algorithms.asking:sgim_acts",
             "decides when to ask which of --teachers for what, and how to use the answer",
             uses=_ASKS,
-            also=("demonstrations",),
+            also=_ANSWERED,
             label="SGIM-ACTS",
             colour="#cc6677",
         ),
@@ -204,7 +205,7 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
             "rivals.entropy:sgim_eer",
             "asks the one teacher of --teachers when that should take away more doubt",
             uses={**_ASKS, "doubt": "doubt"},
-            also=("demonstrations",),
+            also=_ANSWERED,
             label="By entropy",
             colour="#117733",
         ),

@@ -19,10 +19,13 @@ from sgimd_torch.spaces import Array, Demonstration, Episode, Request, check_cou
 from sgimd_torch.teachers import Teacher
 from sgimd_torch.teachers.answering import Demonstrator
 
-__all__ = ["Execute", "Recorded", "ReplayError", "live", "replay", "run"]
+__all__ = ["Answers", "Execute", "Recorded", "ReplayError", "live", "replay", "run"]
 
 Execute = Callable[[int, Array, Array], Array]
 """(index, context, theta) -> outcome of movement ``index``."""
+
+Answers = Mapping[tuple[int, str], tuple[Demonstration | None, str]]
+"""Requests on record: (index of the movement that came next, teacher) -> what was shown, and ``Episode.reply``."""
 
 
 class Recorded(NamedTuple):
@@ -42,6 +45,7 @@ def run(
     teacher: Teacher | None = None,
     teachers: Mapping[str, Demonstrator] | None = None,
     execute: Execute | None = None,
+    answers: Answers | None = None,
 ) -> Iterator[Episode]:
     """Let ``learner`` make ``movements`` movements, counting those at rest.
 
@@ -56,8 +60,10 @@ def run(
         first: index of the first movement; to go on with an earlier run, the number of movements that it made.
         teacher: is asked before every movement whether it demonstrates.
         teachers: by name, for a learner that asks for demonstrations. One that fails, or shows what this robot cannot
-            use, counts as one without an answer, with a `RuntimeWarning`.
+            use, counts as one without an answer, with a `RuntimeWarning`; so does one that raises TimeoutError, see
+            `sgimd_torch.teachers.awaited`.
         execute: is called instead of the environment's, see ``live`` and ``replay``.
+        answers: of an earlier part of this life; these teachers are not asked again.
 
     Yields:
         Every episode, after the learner was told its outcome.
@@ -76,7 +82,8 @@ def run(
         context = read_only(environment.observe(stream(seed, "context", index))) if learner.idle else learner.context
         request, reply = learner.request(context) if teachers else None, ""
         if request is not None and teachers is not None:
-            answer, reply = _asked(learner, environment, context, request, teachers)
+            known = (answers or {}).get((index, request.teacher))
+            answer, reply = known or _asked(learner, environment, context, request, teachers)
             if answer is not None:
                 learner.watch(answer)
                 demonstration = answer
@@ -104,12 +111,13 @@ def _asked(
         environment.contexts.check("context of the demonstration", shown.context)
         environment.outcomes.check("outcome of the demonstration", shown.outcome)
         return (None, "again") if learner.was_shown(shown) else (shown, "shown")
+    except TimeoutError as error:
+        said, reply = f"did not answer in time, so the learner goes on: {error}", "timed out"
     except Exception as error:  # whatever a teacher does, it must not end the learner's life
-        said = (
-            f"teacher {name} gave no answer that can be used, so the learner goes on: {type(error).__name__}: {error}"
-        )
-        warnings.warn(said, RuntimeWarning, stacklevel=3)
-        return None, "failed"
+        said = f"gave no answer that can be used, so the learner goes on: {type(error).__name__}: {error}"
+        reply = "failed"
+    warnings.warn(f"teacher {name} {said}", RuntimeWarning, stacklevel=3)
+    return None, reply
 
 
 def live(environment: Environment, seed: int) -> Execute:

@@ -69,6 +69,7 @@ class StrategicBabbling:
         before = self.babbling.competence(context, goal)
         if lesson is None:  # whatever there was to hope for, it came to nothing
             self.goals.add(context, goal, -1.0, strategy, -1.0)
+            self.brought.append(0.0)
             yield from self.babbling.pursue(context, goal)
             return
         for _ in range(takes):

@@ -230,6 +230,14 @@ class Config:
         slip="an attempt of its own costs 1",
         before=1.0,
     )
+    patience: float | None = option(
+        None,
+        TEACHER,
+        "Seconds to wait for the answer of a teacher who is asked; null waits for as long as it takes.",
+        above=0,
+        on_resume=True,
+        before=None,
+    )
     demonstrations: Path | None = option(
         None, TEACHER, "File of recorded demonstrations; null is the environment's own.", on_resume=True
     )
@@ -379,9 +387,12 @@ class Config:
         users = [kind for kind, entries in CATALOGUE.items() if any(name in each.options for each in entries.values())]
         users += [kind for kind, entry in SHARED.items() if name in entry.options]
         chosen = [kind for kind in users if kind in used]
+        others = [kind for kind in chosen if kind != "algorithm"]
         if "algorithm" in chosen and name not in self.entry("algorithm").options:
-            return f"on {self.algorithm}"
-        if "algorithm" in chosen:  # it would be used, if another choice did not ignore it
+            if not others:
+                return f"on {self.algorithm}"
+            chosen = others
+        elif "algorithm" in chosen:  # it would be used, if another choice did not ignore it
             chosen = [kind for kind in used & CATALOGUE.keys() if name in self.entry(kind).ignores]
         if chosen:
             return f"with --{dashed(chosen[0])} {getattr(self, chosen[0])}"

@@ -30,7 +30,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import takewhile
 from pathlib import Path
@@ -39,8 +39,9 @@ from typing import Any, Final
 import numpy as np
 
 from sgimd_torch.runs.tables import Rows, Table, numbers, sealed, small_table
-from sgimd_torch.session import Recorded
-from sgimd_torch.spaces import Array, Episode
+from sgimd_torch.session import Answers, Recorded
+from sgimd_torch.spaces import Array, Demonstration, Episode
+from sgimd_torch.teachers.answering import Demonstrator
 
 _LARGEST_JSON: Final = 16 * 2**20  # bytes
 
@@ -146,6 +147,25 @@ class Requests:
         self.table, self.dims = small_table(directory / "requests.csv", dims), dims
         self._rows: Rows = []
         self._written: tuple[int, int] = 0, 0
+
+    def answers(self, teachers: Mapping[str, Demonstrator], row_of: Callable[[Demonstration], int | None]) -> Answers:
+        """What an earlier part of the run has written, so that a replay agrees with it and waits for nobody.
+
+        Args:
+            teachers: by name. What they have is taken from their ``demonstrations``; who has no such list is asked.
+            row_of: of a demonstration, as in the table.
+        """
+        found: dict[tuple[int, str], tuple[Demonstration | None, str]] = {}
+        for index, name, _, reply, *shown in (row[: 5 + 2 * self.dims] for row in self.table.read().rows):
+            if reply != "shown":
+                found[int(index), name] = None, reply
+                continue
+            for each in getattr(teachers.get(name), "demonstrations", ()):
+                got = numbers(np.concatenate((each.context, each.outcome)), self.dims)
+                if [str(row_of(each)), *got] == [shown[0], *shown[1 + self.dims :]]:
+                    found[int(index), name] = each, reply
+                    break
+        return found
 
     def add(self, episode: Episode, row: int | None) -> None:
         """Any episode; ``row`` is that of its demonstration, None if it is not known or there was none."""

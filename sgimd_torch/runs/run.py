@@ -21,6 +21,7 @@ from sgimd_torch.runs.model_record import RunModel
 from sgimd_torch.runs.process import Failed, Progress, Stopped, Stopping, say
 from sgimd_torch.session import ReplayError, live, replay, run
 from sgimd_torch.spaces import Demonstration, Episode
+from sgimd_torch.teachers.awaited import Awaited
 
 FLUSH_EVERY = 1.0  # s, what a killed run loses at most
 
@@ -104,14 +105,20 @@ class _Life:
         parts, total, seed = self.parts, self.parts.config.movements, self.parts.config.seed
         recorded = self.directory.columns.recorded(self.directory.lines)
         execute = replay(recorded, self.seconds.of("physics")(live(parts.environment, seed)))
+        awaited = {
+            name: Awaited(name, each, patience=parts.config.patience, say=say, waiting=self.stopping.at_once)
+            for name, each in parts.teachers.items()
+        }
+        on_record = self.requests.answers(parts.teachers, self._row)
         episodes = run(
             parts.learner,
             parts.environment,
             seed,
             movements=total,
             teacher=parts.teacher,
-            teachers=parts.teachers,
+            teachers=awaited,
             execute=execute,
+            answers={request: found for request, found in on_record.items() if request[0] < self.recorded},
         )
         with Progress("replaying" if recorded else parts.config.title, self.recorded or total) as progress:
             if not recorded:
@@ -203,9 +210,10 @@ class _Life:
                 each.begin()
 
     def _flush(self) -> None:
-        """The board first: of a movement that the log holds, a replay does not know again when it was."""
+        """The board and requests first: of a movement that the log holds, a replay does not know again when it was,
+        nor who did not answer in time."""
+        if not self.replaying:
+            self.requests.write(getattr(self.parts.learner.autonomous, "brought", ()))
         for each in (self.board, self.directory.log, self.model):
             if each is not None:
                 each.flush()
-        if not self.replaying:
-            self.requests.write(getattr(self.parts.learner.autonomous, "brought", ()))

@@ -68,7 +68,7 @@ def test_what_is_varied_gives_a_learner_for_each_value():
         ("--task_space=2", "--task-space cannot be given here"),
         ("--vary environment=toss,crawler", "--environment cannot be given here"),
         ("--tasks tos", "invalid choice: 'tos'"),
-        ("--tasks toss --algorithm imitation", "comes without demonstrations"),
+        ("--tasks crawler --algorithm imitation", "comes without demonstrations"),
         ("--tasks toss --vary seed=1,2", "--seed cannot be given here: --seeds takes them"),
     ],
 )

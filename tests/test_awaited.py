@@ -1,0 +1,191 @@
+"""Slow teachers: waited for with a message, given up in the end; a replay agrees with what was and waits for nobody."""
+
+import re
+import signal
+import sys
+import time
+from threading import Event
+
+import numpy as np
+import pytest
+
+from runs import EAGER, signal_after, start
+from sgimd_torch.algorithms.asking import sgim_im
+from sgimd_torch.environments.planar_arm import PlanarArm
+from sgimd_torch.runs.command_line import main
+from sgimd_torch.runs.process import command
+from sgimd_torch.runs.read import read_run
+from sgimd_torch.session import run
+from sgimd_torch.spaces import stream
+from sgimd_torch.teachers.answering import AnsweringTeacher
+from sgimd_torch.teachers.awaited import Awaited
+from worlds import NO_CONTEXT, demonstrations, last_posture
+
+ARM = PlanarArm(4, noise=0.02)
+SHOWN = demonstrations(PlanarArm(4))
+GOAL = SHOWN[3].outcome
+STUCK = '''
+import os, threading
+from sgimd_torch import AnsweringTeacher
+
+class Stuck(AnsweringTeacher):
+    """Notes every request; from the fourth one on it never answers, unless there is a file "awake"."""
+    asked = 0
+
+    def demonstrate(self, context, goal, memory):
+        self.asked += 1
+        with open("asked.txt", "a") as file:
+            print(*goal, file=file)
+        if self.asked > 3 and not os.path.exists("awake"):
+            threading.Event().wait()
+        return super().demonstrate(context, goal, memory)
+'''
+
+
+class Slow:
+    """Answers when it is let, and counts the requests that it has begun."""
+
+    def __init__(self):
+        self.let, self.begun = Event(), 0
+
+    def demonstrate(self, context, goal, memory):
+        self.begun += 1
+        self.let.wait()
+        return SHOWN[3]
+
+
+def awaited(teacher, said=None, **options):
+    return Awaited("ann", teacher, say=[].append if said is None else said.append, **options)
+
+
+def ask(teacher):
+    return teacher.demonstrate(NO_CONTEXT, GOAL, None)
+
+
+def test_who_answers_at_once_is_not_waited_for_and_answers_the_same():
+    said, teacher = [], AnsweringTeacher(SHOWN, stream(0, "t"), takes=7)
+    assert ask(awaited(teacher, said)) is ask(teacher) is SHOWN[3]
+    assert awaited(teacher).takes == 7
+    assert said == []
+
+
+def test_while_it_waits_it_says_for_whom_and_in_the_end_how_long_it_was():
+    said, slow = [], Slow()
+
+    def say(message):
+        said.append(message)
+        slow.let.set()  # now, so that the test need not sleep
+
+    assert ask(Awaited("ann", slow, say=say, silent_for=0.01)) is SHOWN[3]
+    assert said == ["waiting for teacher ann, for as long as it takes", "teacher ann answered after 0 s"]
+
+
+def test_it_gives_up_when_its_patience_ends():
+    said, slow = [], Slow()
+    begun = time.monotonic()
+    with pytest.raises(TimeoutError, match=r"it took longer than 0\.1 s"):
+        ask(awaited(slow, said, patience=0.1, silent_for=0.01))
+    assert time.monotonic() - begun >= 0.1
+    assert said == ["waiting for teacher ann, for 0.1 s at most"]
+    slow.let.set()
+
+
+def test_a_teacher_has_one_request_at_a_time_and_never_sees_one_that_was_given_up_before():
+    slow = Slow()
+    impatient = awaited(slow, patience=0.1)
+    for _ in range(3):
+        with pytest.raises(TimeoutError):
+            ask(impatient)
+    assert slow.begun == 1
+    slow.let.set()
+    impatient.patience = np.inf
+    assert ask(impatient) is SHOWN[3]
+    assert slow.begun == 2
+
+
+def test_what_a_teacher_raises_arrives():
+    class Fails:
+        def demonstrate(self, context, goal, memory):
+            raise OSError("the camera is off")
+
+    with pytest.raises(OSError, match="the camera is off"):
+        ask(awaited(Fails()))
+
+
+@pytest.mark.parametrize("patience", [0, -1.0, float("nan")])
+def test_no_patience_at_all_is_refused(patience):
+    with pytest.raises(ValueError, match="patience must be above 0 s, got"):
+        awaited(Slow(), patience=patience)
+
+
+def test_without_an_answer_in_time_the_learner_goes_on_alone():
+    slow = Slow()
+    teachers = {"ann": awaited(slow, patience=0.01)}
+    learner = sgim_im(ARM, 0, correspondence=last_posture, teachers=teachers)
+    with pytest.warns(RuntimeWarning, match=r"teacher ann did not answer in time, .*: it took longer than 0\.01 s"):
+        episodes = list(run(learner, ARM, 0, movements=20, teachers=teachers))
+    slow.let.set()
+    assert {e.reply for e in episodes} == {"", "timed out"}
+    assert all(e.move is not None and e.move.origin != "imitate" for e in episodes)
+
+
+def test_answers_on_record_are_given_again_and_nobody_is_asked():
+    teachers = {"ann": AnsweringTeacher(SHOWN, stream(0, "t"))}
+    first = list(
+        run(sgim_im(ARM, 0, correspondence=last_posture, teachers=teachers), ARM, 0, movements=30, teachers=teachers)
+    )
+    answers = {(e.index, "ann"): (e.demonstration, e.reply) for e in first if e.request}
+    assert answers
+    again = sgim_im(ARM, 0, correspondence=last_posture, teachers=teachers)
+    second = list(run(again, ARM, 0, movements=30, teachers={"ann": None}, answers=answers))
+    assert [e.move.theta.tolist() for e in second] == [e.move.theta.tolist() for e in first]
+    assert [e.reply for e in second] == [e.reply for e in first]
+
+
+@pytest.fixture
+def stuck(tmp_path, monkeypatch):
+    """The options of a run with a teacher who is stuck after three answers; its directory."""
+    (tmp_path / "mine.py").write_text(STUCK)
+    monkeypatch.chdir(tmp_path)
+    options = "--environment planar-arm-7 --algorithm sgim-im --teachers mine:Stuck --evaluate-at [] --answers own"
+    yield [*options.split(), "--repeats", "0", "--out", str(tmp_path)], tmp_path / "sgim-im" / "seed-000"
+    sys.path[:] = [place for place in sys.path if place != str(tmp_path)]
+    sys.modules.pop("mine", None)
+
+
+def test_a_resumed_run_agrees_on_who_was_given_up_and_asks_only_what_is_new(stuck, tmp_path):
+    options, directory = stuck
+    with pytest.warns(RuntimeWarning, match="teacher mine:Stuck did not answer in time"):
+        assert command(main, [*options, "--movements", "15", "--patience", "0.5"]) == 0
+    before = read_run(directory)
+    log = (directory / "episodes.csv").read_bytes()
+    replies = before.requests["reply"].tolist()
+    assert replies[:3] == ["shown"] * 3
+    assert {*replies[3:]} == {"timed out"}
+    (tmp_path / "awake").touch()
+    (tmp_path / "asked.txt").unlink()
+    assert command(main, [*options, "--movements", "20", "--resume"]) == 0
+    after = read_run(directory)
+    assert (directory / "episodes.csv").read_bytes().startswith(log)
+    n = len(replies)
+    for name, column in before.requests.items():
+        assert column[: n - 1].tolist() == pytest.approx(after.requests[name][: n - 1].tolist(), nan_ok=True)
+    asked = (tmp_path / "asked.txt").read_text().splitlines()
+    assert len(asked) == len(after.requests["index"]) - n > 0
+    assert after.requests["index"][n] >= 15
+
+
+def test_ctrl_c_ends_the_wait_for_a_teacher(stuck):
+    options, directory = stuck
+    process = start(EAGER, *options, "--movements", "15")
+    code, errors = signal_after(process, directory / "episodes.csv", 4, signal.SIGINT)
+    assert code == 130
+    assert "Traceback" not in errors
+    assert re.search(r"stopped after \d+ movements; to go on", errors)
+
+
+def test_no_time_to_answer_is_refused_on_the_command_line(stuck, capsys):
+    options, directory = stuck
+    assert command(main, [*options, "--patience", "0"]) == 2
+    assert "patience must be above 0, got 0" in capsys.readouterr().err
+    assert not directory.exists()
