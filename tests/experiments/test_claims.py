@@ -271,7 +271,8 @@ def test_a_readme_without_a_section_of_results_is_refused_and_nothing_is_written
     readme = tmp_path / "README.md"
     readme.write_text("# Mine\n")
     out = tmp_path / "out"
-    (tmp_path / "forward_model.csv").write_bytes((SHIPPED / "forward_model.csv").read_bytes())
+    for name in ("forward_model.csv", "learning.csv", "suite.csv"):
+        (tmp_path / name).write_bytes((SHIPPED / name).read_bytes())
     options = ["--results", str(results.parent), "--out", str(out), "--only", "RESULTS", "--readme", str(readme)]
     assert command(main, options) == 2
     assert "the README must have a section from <!-- results: made by" in capsys.readouterr().err
