@@ -26,7 +26,7 @@ from sgimd_torch.runs.process import command
 
 ROOT = Path(__file__).parent.parent
 ALONE = ("README.md", "CONTRIBUTING.md")  # each block by itself
-HOW_TO = tuple(f"docs/{name}.md" for name in ("own-robot", "reading-runs", "own-demonstrations", "own-teacher"))
+HOW_TO = tuple(f"docs/{name}.md" for name in ("own-robot", "reading-runs", "own-demonstrations", "own-teacher", "asking"))
 PAGES = [
     *ALONE,
     "CHANGELOG.md",

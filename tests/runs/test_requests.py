@@ -97,9 +97,12 @@ def test_demonstrators_have_their_own_recordings_whatever_is_there(environment):
         assert all(np.array_equal(each.context, context) for each in shown)
         answer = parts.teachers[f"demonstrator-{number}"].demonstrate(context, theirs[5].outcome, parts.learner.memory)
         assert answer is shown[5]
-    # The log counts what the file has, then what the others have besides.
+    # The log counts what the file has, then what the others have besides, each movement once.
     trajectories = [each.trajectory.tobytes() for each in parts.demonstrations]
-    assert len({*trajectories}) == len(trajectories) == 3 * 127
+    assert trajectories[:127] == [each.trajectory.tobytes() for each in load_demonstrations()]
+    assert len({*trajectories}) == len(trajectories)
+    theirs = [each for teacher in parts.teachers.values() for each in teacher.demonstrations]
+    assert {*trajectories} == {each.trajectory.tobytes() for each in theirs}
 
 
 def test_a_demonstrator_of_the_rod_teaches_no_other_robot():
