@@ -13,12 +13,14 @@ import time
 import traceback
 from collections import deque
 from concurrent.futures import Future
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from threading import Thread
 from typing import Any, Final, Self
 
 import numpy as np
 
+from sgimd_torch.demonstrations.lessons import HandLesson, lesson_by_hand
+from sgimd_torch.demonstrations.recording import Recording
 from sgimd_torch.environments.protocol import Recorded, SimulationError
 from sgimd_torch.memory import Memory
 from sgimd_torch.runs.build import RunParts, build
@@ -27,11 +29,13 @@ from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.directory import RunDirectory
 from sgimd_torch.runs.process import Stopping, say
 from sgimd_torch.runs.run import Life
+from sgimd_torch.runs.tasks import correspondence_of, hand_led_of
 from sgimd_torch.session import ReplayError
 from sgimd_torch.spaces import Array, Demonstration, Episode, stream
 from sgimd_torch.teachers.by_hand import FOLDER, ByHand, GivenLesson, keep_lesson
 from sgimd_torch.views.teach.chart import Chart, chart_of
 from sgimd_torch.views.teach.errands import Errands
+from sgimd_torch.views.teach.state import State
 from sgimd_torch.views.teach.taking_back import take_back
 from sgimd_torch.views.teach.trial import Trial, try_goal
 
@@ -47,31 +51,6 @@ class _Ended(BaseException):
 
 class _GoBack(BaseException):
     """The run is to go back to the state before its last lesson."""
-
-
-@dataclass(frozen=True, eq=False)
-class State:
-    """How it stands: after how many ``movements`` of ``total``, and ``lessons``.
-
-    ``busy`` says what it does if it neither learns nor pauses; ``problem`` what ended it. ``asked`` ``(outcome_dim,)``
-    is a goal that the learner would like to be shown, ``best`` the recorded movement by which it came nearest so far,
-    and ``waiting`` whether it waits for an answer. ``latest`` are the last episodes. ``chart`` is the newest map,
-    ``before`` that from before the last lesson, ``curve`` movements and mean predicted error (m) of all maps.
-    """
-
-    total: int
-    movements: int = 0
-    lessons: int = 0
-    paused: bool = False
-    busy: str = "starting"
-    problem: str = ""
-    asked: Array | None = None
-    best: Recorded | None = None
-    waiting: bool = False
-    latest: tuple[Episode, ...] = ()
-    chart: Chart | None = None
-    before: Chart | None = None
-    curve: tuple[tuple[int, float], ...] = ()
 
 
 class Session:
@@ -134,6 +113,14 @@ class Session:
         """Stop after the movement under way, or go on."""
         self._tell(paused=paused)
         self._errands.wake()
+
+    def lesson_of(self, recording: Recording) -> Future[HandLesson]:
+        """What a recording would teach: nobody is shown it yet.
+
+        Raises (as its result):
+            ValueError: the robot cannot make this movement.
+        """
+        return self._errands.ask(lambda: self._lesson(recording))
 
     def show(self, demonstration: Demonstration) -> Future[None]:
         """Show the learner a lesson. It answers at once; the new map is there when this is done.
@@ -268,6 +255,12 @@ class Session:
         self._drawn = time.monotonic()
         self._tell(chart=chart, curve=(*curve, (chart.movements, chart.mean_error)))
         return chart
+
+    def _lesson(self, recording: Recording) -> HandLesson:
+        task, robot = self.parts.task, self.parts.environment
+        assert task is not None
+        rng = stream(self.config.seed, "lessons", len(self.hand.lessons))
+        return lesson_by_hand(recording, robot, correspondence_of(task), hand_led_of(task), rng, context=self.context)
 
     def _show(self, demonstration: Demonstration) -> Future[None]:
         made, total = self.life.movements, self.config.movements

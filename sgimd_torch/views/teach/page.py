@@ -1,0 +1,303 @@
+"""The page: one loop that moves the led arm, plays movements and shows how the session stands; nobody waits for it.
+
+    with Session(config) as session: Page(server, session).run()
+What viewers do comes in as errands for this loop, in order. One viewer teaches at a time: whoever begins, until they
+leave, hand over, or do nothing for a while.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Any, Final
+
+import numpy as np
+import viser
+
+from sgimd_torch.demonstrations.leading import Leading
+from sgimd_torch.environments.protocol import Recorded
+from sgimd_torch.runs.tasks import hand_led_of
+from sgimd_torch.spaces import Array
+from sgimd_torch.views.teach.chart import Colours, by_change, by_competence, by_error
+from sgimd_torch.views.teach.desk import Desk
+from sgimd_torch.views.teach.errands import Errands
+from sgimd_torch.views.teach.hanging import Hanging
+from sgimd_torch.views.teach.panel import MAPS, SPEEDS, Panel
+from sgimd_torch.views.teach.playing import Outline, Playing
+from sgimd_torch.views.teach.scene import Grip, Scene
+from sgimd_torch.views.teach.seat import Seat
+from sgimd_torch.views.teach.session import Session
+from sgimd_torch.views.teach.state import State
+from sgimd_torch.views.teach.trial import Trial
+
+TICK: Final = 1 / 30  # s, from one picture to the next
+SHOWS_CHANGE: Final = 6.0  # s, how long what a lesson changed is shown on the map
+MOVEMENT: Final = 2.0  # s, from one movement of the learner to the next in real time
+
+
+class Page:
+    """What viewers see and do.
+
+    Args:
+        server: that serves it.
+        session: that is taught.
+
+    Raises:
+        ValueError: nothing in this task can be led by the hand.
+    """
+
+    def __init__(self, server: viser.ViserServer, session: Session) -> None:
+        self.server, self.session = server, session
+        parts = session.parts
+        assert parts.task is not None
+        led = hand_led_of(parts.task)
+        self.leading = Leading.of(led)
+        self.hanging = Hanging(led.model, led.joints, led.hand, self.leading.q)
+        self.errands = Errands()
+        self.seat = Seat()
+        self.scene = Scene(server, led, parts.environment.outcomes, parts.benchmark.goals)
+        self.outline = Outline(led.model, self.scene.chain)
+        self.panel = Panel(server, led, self._act, lambda client: self._as_teacher(client, self._joints))
+        self.desk = Desk(session, self.leading, self.panel, self.scene)
+        self._trial: Future[Trial] | None = None
+        self._wanted: Future[Recorded | None] | None = None
+        self._ghost: Playing | None = None
+        self._best: Playing | None = None
+        self._seen: State | None = None
+        self._drawn: tuple[Any, ...] = ()
+        self._changed = -np.inf  # when the last lesson's change came
+        self._shown = -1  # index of the last movement that was played
+        self._speed = 1.0
+        self._listen()
+        self._set_speed("real time")
+
+    def run(self, stopped: Callable[[], bool] = lambda: False) -> None:
+        """Until the session ends."""
+        last = time.monotonic()
+        while not stopped():
+            self.errands.wait(max(0.0, last + TICK - time.monotonic()))
+            self.errands.carry_out()
+            now = time.monotonic()
+            with self.server.atomic():
+                self._move(now - last)
+                self._play(now)
+                self._tell(now)
+            self.server.flush()
+            last = now
+            if self.session.state.problem:
+                return
+
+    def _listen(self) -> None:
+        for grip in self.scene.grips:
+            self._listen_to(grip)
+        errands, server = self.errands, self.server
+
+        @self.scene.map.on_click
+        async def _(event: Any) -> None:
+            place = self.scene.place(np.array(event.ray_origin), np.array(event.ray_direction))
+            if place is not None:
+                errands.ask(lambda: self._try(place))
+
+        @self.panel.speed.on_click
+        async def _(event: Any) -> None:
+            self._as_teacher(event.client, lambda: self._set_speed(event.target.value))
+
+        @self.panel.maps.on_update
+        async def _(event: Any) -> None:
+            self._drawn = ()
+
+        for slider in (self.panel.start, self.panel.end):
+
+            @slider.on_update
+            async def _(event: Any) -> None:
+                if event.client is not None:
+                    errands.ask(self.desk.trim)
+
+        @server.on_client_connect
+        async def _(client: viser.ClientHandle) -> None:
+            errands.ask(lambda: self._count())
+
+        @server.on_client_disconnect
+        async def _(client: viser.ClientHandle) -> None:
+            errands.ask(lambda: self._left(client.client_id))
+
+    def _listen_to(self, grip: Grip) -> None:
+        """Drag callbacks have to be coroutines: others run out of order."""
+
+        @grip.handle.on_drag("left")
+        async def _(event: Any) -> None:
+            client, phase = event.client, event.phase
+            start, end = np.array(event.start_position), np.array(event.end_position)
+            self.errands.ask(lambda: self._drag(client, phase, grip, start, end))
+
+    def _drag(self, client: viser.ClientHandle, phase: str, grip: Grip, start: Array, end: Array) -> None:
+        if phase == "start" and self._may(client):
+            self.desk.grab(grip, start)
+        if not self.leading.held or not self.seat.is_held_by(client.client_id):
+            return
+        if phase == "end":
+            self.leading.release()
+        else:
+            self.seat.busy(time.monotonic())
+            self.leading.drag(end + self.desk.offset)
+
+    def _act(self, name: str, client: viser.ClientHandle) -> None:
+        actions: dict[str, Callable[[], object]] = {
+            "record": self.desk.record,
+            "home": self.desk.home,
+            "play": self.desk.play,
+            "show": lambda: self.desk.show(lambda error: self._after_lesson(client, error)),
+            "save": lambda: self.desk.save(client),
+            "discard": self.desk.discard,
+            "undo": lambda: self._undo(client),
+            "alone": self.session.decline,
+            "pause": lambda: self.session.pause(not self.session.state.paused),
+            "map": self._next_map,
+            "seat": lambda: self.seat.leave(client.client_id),
+        }
+        self._as_teacher(client, actions[name])
+
+    def _as_teacher(self, client: viser.ClientHandle, what: Callable[[], object]) -> None:
+        """Do something that one viewer at a time may do."""
+
+        def carefully() -> None:
+            if self._may(client):
+                try:
+                    what()
+                except (ValueError, RuntimeError, OSError) as error:
+                    self._complain(client, str(error))
+
+        self.errands.ask(carefully)
+
+    def _may(self, client: viser.ClientHandle) -> bool:
+        if self.seat.take(client.client_id, time.monotonic()):
+            return True
+        self._complain(client, "Someone else is teaching now. You can watch; they hand over with key L.")
+        return False
+
+    def _complain(self, client: viser.ClientHandle, why: str) -> None:
+        client.add_notification("That did not work", why, color="red", auto_close_seconds=8.0)
+
+    def _count(self) -> None:
+        self.session.answered = bool(self.server.get_clients()) and bool(self.panel.wait.value)
+
+    def _left(self, client_id: int) -> None:
+        """A viewer has gone: what they held is let go."""
+        if self.seat.is_held_by(client_id):
+            self.leading.release()
+            self.seat.leave(client_id)
+        self._count()
+
+    def _joints(self) -> None:
+        self.desk.set_joints(np.array([slider.value for slider in self.panel.joints]))
+
+    def _set_speed(self, word: str) -> None:
+        self._speed = SPEEDS[word] or 4.0
+        self.session.interval = MOVEMENT / self._speed if SPEEDS[word] else 0.0
+
+    def _next_map(self) -> None:
+        self.panel.maps.value = MAPS[(MAPS.index(self.panel.maps.value) + 1) % len(MAPS)]
+        self._drawn = ()
+
+    def _try(self, place: Array) -> None:
+        if self._trial is None:
+            self._trial = self.session.try_goal(place)
+
+    def _undo(self, client: viser.ClientHandle) -> None:
+        def told(done: Future[None]) -> None:
+            error = done.exception()
+            if error is not None:
+                self._complain(client, str(error))
+                return
+            text = f"{self.session.directory.path} is as it was before; what was taken back is kept in it."
+            client.add_notification("The last lesson is taken back", text, auto_close_seconds=8.0)
+
+        self.session.take_back().add_done_callback(told)
+
+    def _after_lesson(self, client: viser.ClientHandle, error: BaseException | None) -> None:
+        """Called by the learner's thread, once it has answered a lesson."""
+        if error is not None:
+            self._complain(client, str(error))
+            return
+        before, after = self.session.state.before, self.session.state.chart
+        if before is not None and after is not None:
+            text = f"Predicted error **{before.mean_error:.3f} m → {after.mean_error:.3f} m**, "
+            text += f"{int(after.met.sum() - before.met.sum()):+d} goals within reach. The map shows where it changed."
+            self.panel.effect.content = text
+        self._changed = time.monotonic()
+        self.errands.wake()
+
+    def _move(self, seconds: float) -> None:
+        """The led arm, and what hangs on it."""
+        self.leading.step(seconds)
+        q = self.desk.posture(time.monotonic())
+        self.hanging.follow(q, seconds)
+        self.scene.draw_arm(self.hanging.data, self.hanging.hand)
+        self.desk.look_again()
+        if not (self.leading.held or self.desk.by_joints):
+            for slider, angle in zip(self.panel.joints, np.round(q, 2), strict=True):
+                if abs(slider.value - angle) > 0.02:
+                    slider.value = float(angle)
+
+    def _play(self, now: float) -> None:
+        """The learner's movements, one after the other; a trial comes first."""
+        if self._trial is not None and self._trial.done():
+            trial, self._trial = self._trial, None
+            self._tried(trial, now)
+        if self._ghost is not None:
+            self.scene.draw_ghost(*self.outline.at(self._ghost.recorded, self._ghost.seconds(now)))
+            if self._ghost.over(now):
+                self._ghost = None
+        elif self._wanted is not None and self._wanted.done():
+            wanted, self._wanted = self._wanted, None
+            recorded = None if wanted.exception() else wanted.result()
+            self._ghost = None if recorded is None else Playing(recorded, now, self._speed)
+        elif self._wanted is None and self.server.get_clients():
+            latest = self.session.state.latest[-1:]
+            if latest and latest[0].index != self._shown:
+                self._shown = latest[0].index
+                self._wanted = self.session.recorded(latest[0])
+        if self._best is not None:
+            self.scene.draw_best(self.outline.at(self._best.recorded, self._best.seconds(now))[0])
+            if self._best.over(now):
+                self._best = Playing(self._best.recorded, now)
+
+    def _tried(self, done: Future[Trial], now: float) -> None:
+        if done.exception() is not None:
+            self.panel.trial.content = f"**No trial:** {done.exception()}"
+            return
+        trial = done.result()
+        self.panel.say_trial(trial)
+        for name, place in (("goal", trial.goal), ("expected", trial.expected), ("landed", trial.outcome)):
+            self.scene.mark(name, place, f"missed by {trial.missed:.2f} m" if name == "landed" else "")
+        self._ghost = None if trial.recorded is None else Playing(trial.recorded, now)
+
+    def _tell(self, now: float) -> None:
+        """Whatever has changed since the last picture."""
+        state = self.session.state
+        if state is not self._seen:
+            self.panel.say_state(state, self.session.cannot_be_taught)
+            if self._seen is None or state.curve is not self._seen.curve:
+                self.panel.say_curve(state, sorted(self.session.hand.lessons))
+            if self._seen is None or state.asked is not self._seen.asked:
+                self.scene.mark("asked", state.asked, "show me how to get here")
+                self._best = None if state.best is None else Playing(state.best, now)
+                self.scene.draw_best(None)
+            landed = [episode.outcome for episode in state.latest if episode.outcome is not None]
+            self.scene.draw_landings(np.array(landed[-60:]).reshape(-1, self.session.parts.environment.outcomes.dim))
+            self._seen = state
+        self._count()
+        which = MAPS[2] if now < self._changed + SHOWS_CHANGE else self.panel.maps.value
+        if state.chart is not None and self._drawn != (state.chart, which):
+            self._drawn = state.chart, which
+            self.scene.draw_map(self._colours(which, state))
+            self.scene.draw_goals(state.chart.met)
+            self.panel.say_map(which)
+
+    def _colours(self, which: str, state: State) -> Colours:
+        outcomes = self.session.parts.environment.outcomes
+        assert state.chart is not None
+        if which == MAPS[2]:
+            return by_change(state.before or state.chart, state.chart, outcomes)
+        return by_competence(state.chart) if which == MAPS[1] else by_error(state.chart, outcomes)

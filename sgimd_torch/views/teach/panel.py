@@ -1,0 +1,236 @@
+"""The controls of the page: four numbered steps, what the learner does meanwhile, and a key for every action.
+
+    panel = Panel(server, led, act); panel.say_lesson(lesson); panel.say_state(state)
+``act(name, client)`` is called with the name of an action of ``ACTIONS`` and the viewer who wants it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+import viser
+from viser import uplot
+
+from sgimd_torch.demonstrations.lessons import HandLesson
+from sgimd_torch.environments.protocol import HandLed
+from sgimd_torch.views.teach.chart import CHANGE, SKILL
+from sgimd_torch.views.teach.state import State
+from sgimd_torch.views.teach.trial import Trial
+
+Act = Callable[[str, viser.ClientHandle], None]
+
+
+class Action(NamedTuple):
+    """A button: what it says, its picture, the key that does the same, and its colour."""
+
+    label: str
+    icon: Any
+    key: str
+    colour: Any = None
+
+
+ICON: Final = viser.Icon
+ACTIONS: Final = {
+    "record": Action("Record", ICON.PLAYER_RECORD, "R", "red"),
+    "home": Action("Arm back to its start", ICON.HOME, "H", "gray"),
+    "play": Action("Play it back", ICON.PLAYER_PLAY, "P", "gray"),
+    "show": Action("Show it to the learner", ICON.SCHOOL, "S", "green"),
+    "save": Action("Save it to a file", ICON.DEVICE_FLOPPY, "W", "gray"),
+    "discard": Action("Throw it away", ICON.TRASH, "X", "gray"),
+    "undo": Action("Take back the last lesson", ICON.ARROW_BACK_UP, "U", "gray"),
+    "alone": Action("Let it go on alone", ICON.WALK, "G", "gray"),
+    "pause": Action("Pause the learner", ICON.PLAYER_PAUSE, "space", "blue"),
+    "map": Action("Next map", ICON.MAP, "M", "gray"),
+    "seat": Action("Let someone else teach", ICON.USERS, "L", "gray"),
+}
+MAPS: Final = ("error", "competence", "last lesson")
+SPEEDS: Final = {"slow": 0.5, "real time": 1.0, "4 x": 4.0, "flat out": 0.0}
+STEPS: Final = (
+    "1 · Lead the arm",
+    "2 · Look at what you recorded",
+    "3 · Teach it",
+    "4 · Try what it has learnt",
+)
+LEAD: Final = "**Drag the orange ball**, or any part of the arm. Press **Record** first; **Stop** when the throw is over."
+LOOK: Final = "Nothing recorded yet."
+CLICK: Final = "**Click anywhere on the map**: the learner does its best to land there."
+
+
+class Panel:
+    """What viewers see beside the scene; all of them see the same."""
+
+    def __init__(self, server: viser.ViserServer, led: HandLed, act: Act, joints: Callable[[Any], None]) -> None:
+        self._server, self._act = server, act
+        self.buttons: dict[str, Any] = {}
+        gui = server.gui
+        gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium", brand_color=(34, 110, 160))
+        gui.set_panel_label("Teach it by hand")
+        gui.main_panel.dock_right()
+        gui.main_panel.set_width(350)
+        self.who = gui.add_markdown("", visible=False)
+        with gui.add_folder(STEPS[0]):
+            gui.add_markdown(LEAD)
+            self._button("record")
+            self._button("home")
+            with gui.add_folder("Joints one by one", expand_by_default=False):
+                self.joints = self._sliders(led, joints)
+        with gui.add_folder(STEPS[1]):
+            self.lesson = gui.add_markdown(LOOK)
+            self.start = gui.add_slider("From (s)", 0.0, 1.0, 0.01, 0.0, visible=False)
+            self.end = gui.add_slider("To (s)", 0.0, 1.0, 0.01, 1.0, visible=False)
+            for name in ("play", "save", "discard"):
+                self._button(name)
+        with gui.add_folder(STEPS[2]):
+            self._button("show")
+            self._button("undo")
+            self._button("alone")
+            self.effect = gui.add_markdown("Teach it something, and see here what changed.")
+        with gui.add_folder(STEPS[3]):
+            self.trial = gui.add_markdown(CLICK)
+        self._learner()
+        for name in ("play", "save", "discard", "alone"):
+            self.buttons[name].visible = False
+        for name in ("show", "undo"):
+            self.buttons[name].disabled = True
+
+    def _learner(self) -> None:
+        gui = self._server.gui
+        panel = gui.add_panel()
+        with panel.add_tab("The learner"):
+            self.status = gui.add_html("")
+            self._button("pause")
+            self.speed = gui.add_button_group("Speed", tuple(SPEEDS))
+            self.maps = gui.add_dropdown("Map shows", MAPS, initial_value=MAPS[0], hint="key M")
+            self.legend = gui.add_html(_legend(MAPS[0]))
+            nothing = np.array([0.0, 1.0])
+            self.curve = gui.add_uplot(
+                (nothing, np.full(2, np.nan), np.full(2, np.nan)),
+                (
+                    uplot.Series(label="movements"),
+                    uplot.Series(label="error (m)", stroke="#226ea0", width=2),
+                    uplot.Series(label="lesson", stroke="#f0781e", width=0, points={"show": True, "size": 8}),
+                ),
+                scales={"x": uplot.Scale(time=False), "y": uplot.Scale(range=(0.0, None))},  # type: ignore[typeddict-item]
+                title="Predicted error (m) over movements",
+                height=180,
+            )
+            self.wait = gui.add_checkbox("Wait for me when it asks", True)
+            self._button("seat")
+            with gui.add_folder("Keys", expand_by_default=False):
+                gui.add_markdown("\n".join(f"- **{each.key}** {each.label}" for each in ACTIONS.values()))
+        panel.dock_left()
+        panel.set_width(300)
+
+    def _button(self, name: str) -> None:
+        action = ACTIONS[name]
+        button = self._server.gui.add_button(
+            action.label, icon=action.icon, color=action.colour, hint=f"key {action.key}"
+        )
+        command = self._server.gui.add_command(action.label, hotkey=action.key, icon=action.icon)  # type: ignore[arg-type]
+        self.buttons[name] = button
+
+        @button.on_click
+        async def _(event: Any) -> None:
+            self._act(name, event.client)
+
+        @command.on_trigger
+        async def _(event: Any) -> None:
+            if not button.disabled and button.visible:
+                self._act(name, event.client)
+
+    def _sliders(self, led: HandLed, moved: Callable[[Any], None]) -> list[Any]:
+        assert led.ranges is not None and led.start is not None
+        sliders = []
+        for name, low, high, start in zip(led.joints, led.ranges.low, led.ranges.high, led.start, strict=True):
+            slider = self._server.gui.add_slider(name, float(low), float(high), 0.01, float(start))
+
+            @slider.on_update
+            async def _(event: Any) -> None:
+                if event.client is not None:
+                    moved(event.client)
+
+            sliders.append(slider)
+        return sliders
+
+    def say_recording(self, recording: bool) -> None:
+        """The button that begins a recording ends it."""
+        button = self.buttons["record"]
+        button.label, button.icon = ("Stop", ICON.PLAYER_STOP) if recording else ("Record", ICON.PLAYER_RECORD)
+
+    def say_lesson(self, lesson: HandLesson | None, problem: str = "") -> None:
+        """What was recorded, or why it is no lesson."""
+        there = lesson is not None or bool(problem)
+        for handle in (self.start, self.end, *(self.buttons[name] for name in ("play", "save", "discard"))):
+            handle.visible = there
+        self.buttons["show"].disabled = lesson is None
+        self.buttons["save"].disabled = lesson is None
+        if lesson is None:
+            self.lesson.content = f"**This is no lesson:** {problem}" if problem else LOOK
+            return
+        lands = ", ".join(f"{x:.2f}" for x in lesson.demonstration.outcome)
+        lines = [f"It lands at **({lands}) m**, the orange ring."]
+        if np.isfinite(lesson.misfit):
+            lines.append(f"The robot plays it within **{lesson.misfit:.3f} rad** of what you did.")
+        lines += [f"- {remark}" for remark in lesson.remarks] or ["Everything could be followed."]
+        self.lesson.content = "\n\n".join(lines[:2]) + "\n\n" + "\n".join(lines[2:])
+
+    def set_trim(self, duration: float) -> None:
+        """Both sliders at the ends of a new recording."""
+        for slider, value in ((self.start, 0.0), (self.end, duration)):
+            slider.max = max(duration, 0.02)
+            slider.value = value
+
+    def say_trial(self, trial: Trial) -> None:
+        """How a trial went."""
+        x = ", ".join(f"{x:.2f}" for x in trial.goal)
+        expected = float(np.linalg.norm(trial.expected - trial.goal))
+        self.trial.content = (
+            f"{CLICK}\n\nGoal ({x}) m, the pink ring: **missed by {trial.missed:.2f} m** (blue ring); "
+            f"it expected to miss by {expected:.2f} m (white ring)."
+        )
+
+    def say_state(self, state: State, cannot: str) -> None:
+        """How the session stands."""
+        self.buttons["pause"].label = "Let the learner go on" if state.paused else ACTIONS["pause"].label
+        self.buttons["pause"].icon = ICON.PLAYER_PLAY if state.paused else ICON.PLAYER_PAUSE
+        self.buttons["undo"].disabled = not state.lessons
+        self.buttons["alone"].visible = state.waiting
+        doing = state.problem or state.busy or ("asks you" if state.waiting else "paused" if state.paused else "practises")
+        error = "–" if state.chart is None else f"{state.chart.mean_error:.3f} m"
+        met = "" if state.chart is None else f"{int(state.chart.met.sum())} of {len(state.chart.met)} goals within reach"
+        lessons = f"{state.lessons} lesson{'s' * (state.lessons != 1)} by you"
+        self.status.content = _STATUS.format(doing, state.movements, state.total, lessons, error, met) + (
+            f'<p style="color:#a33">{cannot}</p>' if cannot else ""
+        )
+
+    def say_curve(self, state: State, lessons: list[int]) -> None:
+        """The error over movements, with the lessons on it."""
+        if len(state.curve) < 2:
+            return
+        movements, errors = np.array(state.curve, dtype=np.float64).T
+        places = np.searchsorted(movements, lessons).clip(0, len(movements) - 1)
+        marks = np.full(len(movements), np.nan)
+        marks[places] = errors[places]
+        self.curve.data = (movements, errors, marks)
+
+    def say_map(self, which: str) -> None:
+        """The colours of the map that is shown."""
+        self.legend.content = _legend(which)
+
+
+_STATUS: Final = (
+    '<div style="padding:0 .6em;line-height:1.5"><b style="font-size:1.1em">{0}</b><br>{1} of {2} movements, {3}<br>'
+    "predicted error <b>{4}</b><br>{5}</div>"
+)
+
+
+def _legend(which: str) -> str:
+    colours = CHANGE if which == MAPS[2] else SKILL
+    ends = {"error": ("cannot", "can"), "competence": ("-1", "0"), "last lesson": ("worse", "better")}[which]
+    stops = ",".join(f"rgb({r:.0f},{g:.0f},{b:.0f})" for r, g, b in colours)
+    return (
+        f'<div style="display:flex;gap:.5em;align-items:center;padding:0 .6em;font-size:.85em">{ends[0]}'
+        f'<div style="flex:1;height:.8em;border-radius:.3em;background:linear-gradient(90deg,{stops})"></div>{ends[1]}</div>'
+    )
