@@ -94,7 +94,7 @@ def cells_of(outcomes: Box) -> Array:
 
 def by_error(chart: Chart, outcomes: Box) -> Colours:
     """The predicted error as a picture: light where it can, dark where it cannot."""
-    return _painted(1 - chart.error / (FAR * outcomes.sides[:2].max()), SKILL)
+    return _painted(_skill(chart, outcomes), SKILL)
 
 
 def by_competence(chart: Chart) -> Colours:
@@ -104,8 +104,12 @@ def by_competence(chart: Chart) -> Colours:
 
 def by_change(before: Chart, after: Chart, outcomes: Box) -> Colours:
     """What changed in the predicted error: green where it fell, purple where it rose."""
-    fell = (before.error - after.error) / (FAR * outcomes.sides[:2].max())
-    return _painted(0.5 + 2 * fell, CHANGE)
+    return _painted(0.5 + _skill(after, outcomes) - _skill(before, outcomes), CHANGE)
+
+
+def _skill(chart: Chart, outcomes: Box) -> Array:
+    """The predicted error as a share, 1 for none and 0 where it is hopeless."""
+    return np.clip(1 - chart.error / (FAR * outcomes.sides[:2].max()), 0, 1)
 
 
 def _painted(shares: Array, colours: Array) -> Colours:

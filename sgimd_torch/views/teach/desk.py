@@ -144,16 +144,8 @@ class Desk:
         """
         if self.lesson is None:
             raise ValueError("there is no lesson to show yet; record one first")
-        lesson = self.lesson
-
-        def shown(done: Future[None]) -> None:
-            error = done.exception()
-            if error is None:
-                self._draft.unlink(missing_ok=True)
-            then(error)
-
         self._panel.buttons["show"].disabled = True
-        self._session.show(lesson.demonstration).add_done_callback(shown)
+        self._session.show(self.lesson.demonstration).add_done_callback(lambda done: then(done.exception()))
 
     def save(self, client: Any) -> None:
         """Write the lesson to a file in the run directory, and hand it to the browser."""

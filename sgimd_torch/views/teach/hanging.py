@@ -16,6 +16,7 @@ import numpy as np
 from sgimd_torch.spaces import Array
 
 FASTEST: Final = 200.0  # rad/s: faster means that the swinging has diverged, and it begins again at rest
+RESTING: Final = 0.02  # rad/s: slower than this nobody sees it swing
 LONGEST: Final = 0.1  # s, that is simulated at once; a page that was away does not make up for it
 
 
@@ -38,6 +39,7 @@ class Hanging:
         self._site = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, hand)
         self._body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, hand)
         self._step = float(model.opt.timestep)
+        self._still = False
         self.rest(start)
 
     @property
@@ -58,6 +60,10 @@ class Hanging:
     def follow(self, q: Array, seconds: float) -> None:
         """The led joints go to ``q`` ``(n_joints,)`` evenly within ``seconds``; the others swing along."""
         n = max(1, round(min(seconds, LONGEST) / self._step))
+        resting = np.abs(self.data.qvel).max() < RESTING and np.array_equal(q, self._q)
+        if resting and self._still:
+            return
+        self._still = resting
         if not self._free.size:
             self._q = np.array(q)
             self.data.qpos[self._led] = q

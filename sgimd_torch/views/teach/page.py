@@ -70,7 +70,7 @@ class Page:
         self._shown = -1  # index of the last movement that was played
         self._speed = 1.0
         self._listen()
-        self._set_speed("real time")
+        self._set_speed("1 x")
 
     def run(self, stopped: Callable[[], bool] = lambda: False) -> None:
         """Until the session ends."""
@@ -93,7 +93,7 @@ class Page:
             self._listen_to(grip)
         errands, server = self.errands, self.server
 
-        @self.scene.map.on_click
+        @server.scene.on_click()
         async def _(event: Any) -> None:
             place = self.scene.place(np.array(event.ray_origin), np.array(event.ray_direction))
             if place is not None:
@@ -102,6 +102,10 @@ class Page:
         @self.panel.speed.on_click
         async def _(event: Any) -> None:
             self._as_teacher(event.client, lambda: self._set_speed(event.target.value))
+
+        @self.panel.more.on_click
+        async def _(event: Any) -> None:
+            self._act({"Play": "play", "Save": "save", "Throw away": "discard"}[event.target.value], event.client)
 
         @self.panel.maps.on_update
         async def _(event: Any) -> None:
@@ -133,6 +137,7 @@ class Page:
 
     def _drag(self, client: viser.ClientHandle, phase: str, grip: Grip, start: Array, end: Array) -> None:
         if phase == "start" and self._may(client):
+            self.scene.hide_hint()
             self.desk.grab(grip, start)
         if not self.leading.held or not self.seat.is_held_by(client.client_id):
             return
@@ -147,7 +152,7 @@ class Page:
             "record": self.desk.record,
             "home": self.desk.home,
             "play": self.desk.play,
-            "show": lambda: self.desk.show(lambda error: self._after_lesson(client, error)),
+            "show": lambda: self.desk.show(lambda error: self.errands.ask(lambda: self._after_lesson(client, error))),
             "save": lambda: self.desk.save(client),
             "discard": self.desk.discard,
             "undo": lambda: self._undo(client),
@@ -216,17 +221,15 @@ class Page:
         self.session.take_back().add_done_callback(told)
 
     def _after_lesson(self, client: viser.ClientHandle, error: BaseException | None) -> None:
-        """Called by the learner's thread, once it has answered a lesson."""
+        """What a lesson changed, now that the learner has answered it."""
         if error is not None:
             self._complain(client, str(error))
             return
         before, after = self.session.state.before, self.session.state.chart
         if before is not None and after is not None:
-            text = f"Predicted error **{before.mean_error:.3f} m → {after.mean_error:.3f} m**, "
-            text += f"{int(after.met.sum() - before.met.sum()):+d} goals within reach. The map shows where it changed."
-            self.panel.effect.content = text
+            self.panel.say_effect(before, after)
         self._changed = time.monotonic()
-        self.errands.wake()
+        self.desk.discard()
 
     def _move(self, seconds: float) -> None:
         """The led arm, and what hangs on it."""
@@ -291,8 +294,7 @@ class Page:
         which = MAPS[2] if now < self._changed + SHOWS_CHANGE else self.panel.maps.value
         if state.chart is not None and self._drawn != (state.chart, which):
             self._drawn = state.chart, which
-            self.scene.draw_map(self._colours(which, state))
-            self.scene.draw_goals(state.chart.met)
+            self.scene.draw_map(self._colours(which, state), state.chart.met)
             self.panel.say_map(which)
 
     def _colours(self, which: str, state: State) -> Colours:

@@ -15,7 +15,7 @@ from viser import uplot
 
 from sgimd_torch.demonstrations.lessons import HandLesson
 from sgimd_torch.environments.protocol import HandLed
-from sgimd_torch.views.teach.chart import CHANGE, SKILL
+from sgimd_torch.views.teach.chart import CHANGE, SKILL, Chart
 from sgimd_torch.views.teach.state import State
 from sgimd_torch.views.teach.trial import Trial
 
@@ -46,14 +46,16 @@ ACTIONS: Final = {
     "seat": Action("Let someone else teach", ICON.USERS, "L", "gray"),
 }
 MAPS: Final = ("error", "competence", "last lesson")
-SPEEDS: Final = {"slow": 0.5, "real time": 1.0, "4 x": 4.0, "flat out": 0.0}
+SPEEDS: Final = {"½ x": 0.5, "1 x": 1.0, "4 x": 4.0, "max": 0.0}
 STEPS: Final = (
     "1 · Lead the arm",
     "2 · Look at what you recorded",
     "3 · Teach it",
     "4 · Try what it has learnt",
 )
-LEAD: Final = "**Drag the orange ball**, or any part of the arm. Press **Record** first; **Stop** when the throw is over."
+LEAD: Final = "Press **Record**, **drag the orange ball** (or any part of the arm) as if you threw, press **Stop**."
+MORE: Final = ("Play", "Save", "Throw away")
+REMARKS: Final = 3  # that are shown
 LOOK: Final = "Nothing recorded yet."
 CLICK: Final = "**Click anywhere on the map**: the learner does its best to land there."
 
@@ -80,18 +82,18 @@ class Panel:
             self.lesson = gui.add_markdown(LOOK)
             self.start = gui.add_slider("From (s)", 0.0, 1.0, 0.01, 0.0, visible=False)
             self.end = gui.add_slider("To (s)", 0.0, 1.0, 0.01, 1.0, visible=False)
+            self.more = gui.add_button_group("", MORE, visible=False)
             for name in ("play", "save", "discard"):
-                self._button(name)
+                self._command(name)
         with gui.add_folder(STEPS[2]):
             self._button("show")
-            self._button("undo")
             self._button("alone")
-            self.effect = gui.add_markdown("Teach it something, and see here what changed.")
+            self.effect = gui.add_markdown("It answers at once, and the map shows what changed.")
+            self._button("undo")
         with gui.add_folder(STEPS[3]):
             self.trial = gui.add_markdown(CLICK)
         self._learner()
-        for name in ("play", "save", "discard", "alone"):
-            self.buttons[name].visible = False
+        self.buttons["alone"].visible = False
         for name in ("show", "undo"):
             self.buttons[name].disabled = True
 
@@ -112,7 +114,7 @@ class Panel:
                     uplot.Series(label="error (m)", stroke="#226ea0", width=2),
                     uplot.Series(label="lesson", stroke="#f0781e", width=0, points={"show": True, "size": 8}),
                 ),
-                scales={"x": uplot.Scale(time=False), "y": uplot.Scale(range=(0.0, None))},  # type: ignore[typeddict-item]
+                scales={"x": uplot.Scale(time=False), "y": uplot.Scale(auto=True)},
                 title="Predicted error (m) over movements",
                 height=180,
             )
@@ -128,16 +130,22 @@ class Panel:
         button = self._server.gui.add_button(
             action.label, icon=action.icon, color=action.colour, hint=f"key {action.key}"
         )
-        command = self._server.gui.add_command(action.label, hotkey=action.key, icon=action.icon)  # type: ignore[arg-type]
         self.buttons[name] = button
+        self._command(name)
 
         @button.on_click
         async def _(event: Any) -> None:
             self._act(name, event.client)
 
+    def _command(self, name: str) -> None:
+        """The key that does the same, as long as the button can be pressed."""
+        action = ACTIONS[name]
+        command = self._server.gui.add_command(action.label, hotkey=action.key, icon=action.icon)
+
         @command.on_trigger
         async def _(event: Any) -> None:
-            if not button.disabled and button.visible:
+            button = self.buttons.get(name)
+            if button is None or (button.visible and not button.disabled):
                 self._act(name, event.client)
 
     def _sliders(self, led: HandLed, moved: Callable[[Any], None]) -> list[Any]:
@@ -161,11 +169,9 @@ class Panel:
 
     def say_lesson(self, lesson: HandLesson | None, problem: str = "") -> None:
         """What was recorded, or why it is no lesson."""
-        there = lesson is not None or bool(problem)
-        for handle in (self.start, self.end, *(self.buttons[name] for name in ("play", "save", "discard"))):
-            handle.visible = there
+        for handle in (self.start, self.end, self.more):
+            handle.visible = lesson is not None or bool(problem)
         self.buttons["show"].disabled = lesson is None
-        self.buttons["save"].disabled = lesson is None
         if lesson is None:
             self.lesson.content = f"**This is no lesson:** {problem}" if problem else LOOK
             return
@@ -173,8 +179,18 @@ class Panel:
         lines = [f"It lands at **({lands}) m**, the orange ring."]
         if np.isfinite(lesson.misfit):
             lines.append(f"The robot plays it within **{lesson.misfit:.3f} rad** of what you did.")
-        lines += [f"- {remark}" for remark in lesson.remarks] or ["Everything could be followed."]
-        self.lesson.content = "\n\n".join(lines[:2]) + "\n\n" + "\n".join(lines[2:])
+        remarks = list(lesson.remarks[:REMARKS]) or ["everything could be followed"]
+        if len(lesson.remarks) > REMARKS:
+            remarks[-1] += f" (and {len(lesson.remarks) - REMARKS} more)"
+        self.lesson.content = " ".join(lines) + "\n\n" + "\n".join(f"- {remark}" for remark in remarks)
+
+    def say_effect(self, before: Chart, after: Chart) -> None:
+        """What a lesson changed."""
+        more = int(after.met.sum() - before.met.sum())
+        self.effect.content = (
+            f"**Taught.** Predicted error {before.mean_error:.3f} → **{after.mean_error:.3f} m**, "
+            f"{more:+d} goals within reach. The map shows where it changed."
+        )
 
     def set_trim(self, duration: float) -> None:
         """Both sliders at the ends of a new recording."""

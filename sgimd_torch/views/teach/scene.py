@@ -1,4 +1,4 @@
-"""The scene: the robot that a hand leads, the learner's movements as a pale outline, and the map on the water below.
+"""The scene: the robot that a hand leads, the learner's movements as an outline, and the map of T on the ground.
 
     scene = Scene(server, led, outcomes, goals); scene.draw_arm(hanging.data); scene.draw_map(by_error(chart, outcomes))
 Places in T are places in the model's plane z = 0: what lands there lands on the map.
@@ -13,16 +13,18 @@ import mujoco
 import numpy as np
 import trimesh
 import viser
+from numpy.typing import NDArray
 
 from sgimd_torch.environments.protocol import HandLed
 from sgimd_torch.spaces import Array, Box
-from sgimd_torch.views.teach.chart import CELLS, Colours
+from sgimd_torch.views.teach.chart import CELLS, SKILL, Colours
 
 THIN: Final = 0.003  # m: geoms with a smaller radius are drawn as lines
-WATER: Final = (176, 205, 220)
-HAND, LEARNER, GOAL, MET, UNMET = (240, 120, 30), (70, 90, 200), (230, 60, 120), (20, 120, 60), (150, 165, 175)
+HAND, LEARNER, GOAL, MET, UNMET = (240, 120, 30), (60, 70, 190), (230, 60, 120), (10, 110, 50), (120, 140, 160)
+PIXELS: Final = 8  # of the map's picture, for each cell
+DOT: Final = 2  # pixels, radius of a goal
+_DISC: Final = np.hypot(*np.mgrid[-DOT : DOT + 1, -DOT : DOT + 1]) <= DOT + 0.3
 ABOVE: Final = 0.002  # m, from one layer of the map to the next
-_ROUND: Final = {"subdivisions": 2}
 
 
 @dataclass(frozen=True)
@@ -50,22 +52,23 @@ class Scene:
         self._model = model = led.model
         self.size = float(outcomes.sides[:2].max())
         middle = self.ground((outcomes.low + outcomes.high) / 2)
-        self._water(middle)
-        blank = np.full((CELLS, CELLS, 3), WATER, dtype=np.uint8)
+        blank = np.full((CELLS, CELLS, 3), SKILL[0], dtype=np.uint8)
         width, height = self._sides()
+        self._places = self._pixels(goals, outcomes)
         self.map = self._scene.add_image(
-            "/map", _smooth(blank), width, height, format="png", receive_shadow=0.35, wxyz=(0, 1, 0, 0), position=middle
+            "/map", _smooth(blank, 1), width, height, format="png", wxyz=(0, 1, 0, 0), position=middle
         )
-        self._goals = self._points("/goals", self.ground(goals, 1), UNMET, 0.011)
-        self._landings = self._points("/landings", self.ground(goals[:0], 2), LEARNER, 0.018)
+        self._landings = self._points("/landings", self.ground(goals[:1], 2), LEARNER, 0.01)
+        self._landings.visible = False
         thick = [k for k in range(model.ngeom) if model.geom_bodyid[k] and model.geom_size[k, 0] > THIN]
         thin = [k for k in range(model.ngeom) if model.geom_bodyid[k] and model.geom_size[k, 0] <= THIN]
+        self._drawn = np.empty(0)
         self._geoms = {k: self._add_geom(k) for k in thick}
         self._thin = np.array(thin, dtype=np.int64)
         self._line = self._lines("/line", len(thin), (30, 30, 30), 0.005)
         self._hand = self._ball("/hand", HAND, 0.026 * self.size)
         self.chain = np.array([(model.body_parentid[k], k) for k in range(1, model.nbody) if model.body_parentid[k]])
-        self._ghost = self._lines("/ghost", len(self.chain), LEARNER, 0.009 * self.size)
+        self._ghost = self._lines("/ghost", len(self.chain), LEARNER, 0.005 * self.size)
         self._ghost_end = self._ball("/ghost_end", LEARNER, 0.014 * self.size)
         self._best = self._lines("/best", len(self.chain), GOAL, 0.006 * self.size)
         self._trace = self._lines("/trace", 1, HAND, 0.006 * self.size)
@@ -79,6 +82,11 @@ class Scene:
         self._labels = {name: self._label(name) for name in self._marks}
         for mark in self._marks.values():
             mark.visible = False
+        self._hint = self._scene.add_label("/hint", "drag me", anchor="bottom-center")
+        # Browsers without a GPU draw every pixel on the processor: an environment map, shadows, a sky or a large sheet of
+        # water would leave 2 pictures a second instead of 25.
+        self._scene.configure_environment_map(None)
+        self._scene.configure_default_lights(cast_shadow=False)
         self._look(server, middle)
 
     @property
@@ -106,6 +114,9 @@ class Scene:
 
     def draw_arm(self, data: Any, hand: Array) -> None:
         """The led robot in the posture of ``data``, its hand at ``(3,)`` m."""
+        if np.array_equal(data.geom_xpos, self._drawn):
+            return
+        self._drawn = data.geom_xpos.copy()
         for k, handle in self._geoms.items():
             handle.position, handle.wxyz = data.geom_xpos[k], _quaternion(data.geom_xmat[k])
         if self._thin.size:
@@ -113,6 +124,13 @@ class Scene:
             middles = data.geom_xpos[self._thin]
             self._line.points = np.stack([middles - axes, middles + axes], axis=1).astype(np.float32)
         self._hand.position = hand
+        if self._hint.visible:
+            self._hint.position = hand + [0, 0, 0.04 * self.size]
+
+    def hide_hint(self) -> None:
+        """Nobody has to be told any more what can be dragged."""
+        if self._hint.visible:
+            self._hint.visible = False
 
     def draw_ghost(self, chain: Array | None, end: Array | None) -> None:
         """The learner's robot: ``(n, 2, 3)`` m lines and where its end or float is; None hides it."""
@@ -129,17 +147,20 @@ class Scene:
         """The way ``(n, 3)`` m of the hand in a recording; None hides it."""
         _put(self._trace, None if path is None or len(path) < 2 else np.stack([path[:-1], path[1:]], axis=1))
 
-    def draw_map(self, colours: Colours) -> None:
-        """Another picture on the ground."""
-        self.map.image = _smooth(colours)
-
-    def draw_goals(self, met: Array) -> None:
-        """Which goals of the benchmark count as reached."""
-        self._goals.colors = np.where(met[:, None], MET, UNMET).astype(np.uint8)
+    def draw_map(self, colours: Colours, met: NDArray[np.bool_]) -> None:
+        """Another picture on the ground, and on it the goals of the benchmark; ``met`` ``(n,)`` are within reach."""
+        picture = _smooth(colours, PIXELS)
+        for (row, column), reached in zip(self._places, met, strict=True):
+            here = slice(row - DOT, row + DOT + 1), slice(column - DOT, column + DOT + 1)
+            picture[here][_DISC[: picture[here].shape[0], : picture[here].shape[1]]] = MET if reached else UNMET
+        self.map.image = picture
 
     def draw_landings(self, outcomes: Array) -> None:
         """Where the last movements ended, ``(n, outcome_dim)``."""
-        self._landings.points = self.ground(outcomes, 2).astype(np.float16)
+        self._landings.visible = len(outcomes) > 0
+        if len(outcomes):
+            self._landings.points = self.ground(outcomes, 5).astype(np.float16)
+            self._landings.colors = np.tile(np.array(LEARNER, dtype=np.uint8), (len(outcomes), 1))
 
     def mark(self, name: str, place: Array | None, text: str = "") -> None:
         """Put "goal", "landed", "expected", "asked" or "lesson" at a place of T, or hide it; with a text beside it."""
@@ -150,16 +171,17 @@ class Scene:
             mark.position = self.ground(place, 3)
             label.position, label.text = self.ground(place, 3), text or " "
 
-    def _water(self, middle: Array) -> None:
-        far = 3 * self.size
-        deep = middle - [0, 0, 2 * ABOVE * self.size]
-        self._scene.add_box(
-            "/water", color=WATER, dimensions=(far, far, ABOVE * self.size), position=deep, cast_shadow=False
-        )
-
     def _sides(self) -> tuple[float, float]:
         sides = self._outcomes.sides
         return float(sides[0]), float(sides[1] if len(sides) > 1 else sides[0] / 10)
+
+    def _pixels(self, goals: Array, outcomes: Box) -> NDArray[np.int64]:
+        """``(n, 2)`` rows and columns of the map's picture at which goals lie."""
+        shares = np.full((len(goals), 2), 0.5)
+        k = min(2, outcomes.dim)
+        shares[:, :k] = (goals[:, :k] - outcomes.low[:k]) / outcomes.sides[:k]
+        n = CELLS * PIXELS
+        return np.stack([(1 - shares[:, 1]) * n, shares[:, 0] * n], axis=1).astype(np.int64).clip(DOT, n - DOT - 1)
 
     def _points(self, name: str, points: Array, colour: tuple[int, int, int], size: float) -> Any:
         colours = np.tile(np.array(colour, dtype=np.uint8), (len(points), 1))
@@ -182,7 +204,7 @@ class Scene:
 
     def _add_geom(self, k: int) -> Any:
         shape = _shape(self._model, k)
-        colour = tuple(int(255 * channel) for channel in _rgba(self._model, k)[:3])
+        colour = np.round(255 * _rgba(self._model, k)[:3]).astype(np.uint8)
         return self._scene.add_mesh_simple(f"/arm/{k}", shape.vertices, shape.faces, color=colour)
 
     def _look(self, server: viser.ViserServer, middle: Array) -> None:
@@ -190,9 +212,9 @@ class Scene:
         data = mujoco.MjData(self._model)
         mujoco.mj_kinematics(self._model, data)
         flat = float(np.ptp(data.xpos[1:, 2])) < 1e-6 and abs(float(data.xpos[1, 2])) < 1e-6
-        away = np.array([0.0, -0.01, 1.25]) if flat else np.array([0.42, -0.95, 0.85])
+        away = np.array([0.0, -0.01, 1.25]) if flat else np.array([0.30, -0.80, 0.62])
         server.initial_camera.position = tuple(middle + away * self.size)
-        server.initial_camera.look_at = tuple(middle + [0, 0.02 * self.size, 0])
+        server.initial_camera.look_at = tuple(middle + np.array([0.0, 0.0 if flat else 0.06, 0.0]) * self.size)
         server.scene.set_up_direction("+z" if not flat else "+y")
 
 
@@ -201,7 +223,7 @@ def _shape(model: Any, k: int) -> Any:
     kind, size, make = mujoco.mjtGeom(model.geom_type[k]), model.geom_size[k], trimesh.creation
     match kind:
         case mujoco.mjtGeom.mjGEOM_CAPSULE:
-            return make.capsule(radius=size[0], height=2 * size[1], count=[16, 16], transform=_down(size[1]))
+            return make.capsule(radius=size[0], height=2 * size[1], count=[16, 16], transform=None)
         case mujoco.mjtGeom.mjGEOM_CYLINDER:
             return make.cylinder(radius=size[0], height=2 * size[1], sections=32)
         case mujoco.mjtGeom.mjGEOM_BOX:
@@ -211,16 +233,9 @@ def _shape(model: Any, k: int) -> Any:
             first, n = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
             face, m = model.mesh_faceadr[mesh], model.mesh_facenum[mesh]
             return trimesh.Trimesh(model.mesh_vert[first : first + n], model.mesh_face[face : face + m], process=False)
-    ball = make.icosphere(**_ROUND)
+    ball = make.icosphere(subdivisions=2)
     ball.apply_scale(size if kind == mujoco.mjtGeom.mjGEOM_ELLIPSOID else size[0])
     return ball
-
-
-def _down(half: float) -> Array:
-    """trimesh's capsule begins at the middle of its lower ball; MuJoCo's has the origin in the middle."""
-    placed = np.eye(4)
-    placed[2, 3] = 0.0 * half
-    return placed
 
 
 def _rgba(model: Any, k: int) -> Array:
@@ -240,6 +255,14 @@ def _put(lines: Any, segments: Array | None) -> None:
         lines.points = np.asarray(segments, dtype=np.float32)
 
 
-def _smooth(colours: Colours) -> Colours:
-    """Cells as squares, with room between them that the browser does not blur."""
-    return np.repeat(np.repeat(colours, 6, axis=0), 6, axis=1)
+def _smooth(colours: Colours, times: int) -> Colours:
+    """A picture so many times as large, without steps between its cells."""
+    n = len(colours)
+    if times == 1:
+        return colours.copy()
+    places = np.clip((np.arange(n * times) + 0.5) / times - 0.5, 0, n - 1)
+    low = np.minimum(places.astype(np.int64), n - 2)
+    share = (places - low)[:, None, None]
+    tall = (1 - share) * colours[low] + share * colours[low + 1]
+    share = share.reshape(1, -1, 1)
+    return ((1 - share) * tall[:, low] + share * tall[:, low + 1]).astype(np.uint8)
