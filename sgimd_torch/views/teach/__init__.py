@@ -1,4 +1,4 @@
-"""Teach a learner by hand, in a browser: lead the arm, show it, and see at once what changed. Only this machine sees it.
+"""Teach a learner by hand, in a browser: lead the arm, show it, see at once what changed. Only this machine sees it.
 
 Examples:
   sgimd teach                                           a new learner on the fishing rod, into runs/taught/seed-000

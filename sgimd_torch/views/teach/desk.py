@@ -1,13 +1,12 @@
 """The teacher's desk: the recording at hand, from the first posture to the lesson that the learner is shown.
 
-    desk.record(); ...; desk.record(); desk.trim(); desk.show(then)
+    desk.record(); ...; desk.record(); desk.trim(); desk.show()
 What was recorded is kept on disk until it is shown or thrown away, so that a killed page loses nothing but a drag.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from concurrent.futures import Future
 from itertools import count
 from typing import Any, Final
@@ -136,8 +135,8 @@ class Desk:
             return self._leading.q
         return np.array([np.interp(seconds, recording.times, column) for column in recording.joints.T])
 
-    def show(self, then: Callable[[BaseException | None], None]) -> None:
-        """Show the lesson to the learner; ``then`` is called with what went wrong, or None.
+    def show(self) -> Future[None]:
+        """Show the lesson to the learner; done when it has answered.
 
         Raises:
             ValueError: there is none.
@@ -145,7 +144,7 @@ class Desk:
         if self.lesson is None:
             raise ValueError("there is no lesson to show yet; record one first")
         self._panel.buttons["show"].disabled = True
-        self._session.show(self.lesson.demonstration).add_done_callback(lambda done: then(done.exception()))
+        return self._session.show(self.lesson.demonstration)
 
     def save(self, client: Any) -> None:
         """Write the lesson to a file in the run directory, and hand it to the browser."""

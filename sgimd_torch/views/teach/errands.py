@@ -1,7 +1,7 @@
 """Errands: what other threads want done in this one, in order, when it has time.
 
-    found = errands.ask(lambda: memory.outcomes.mean())        # any thread; found.result() waits
-    errands.carry_out(); errands.wait(0.25)                    # the thread that does them
+found = errands.ask(lambda: memory.outcomes.mean())        # any thread; found.result() waits
+errands.carry_out(); errands.wait(0.25)                    # the thread that does them
 """
 
 from __future__ import annotations

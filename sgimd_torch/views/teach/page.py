@@ -21,9 +21,10 @@ from sgimd_torch.runs.tasks import hand_led_of
 from sgimd_torch.spaces import Array
 from sgimd_torch.views.teach.chart import Colours, by_change, by_competence, by_error
 from sgimd_torch.views.teach.desk import Desk
+from sgimd_torch.views.teach.drawing import MAPS
 from sgimd_torch.views.teach.errands import Errands
 from sgimd_torch.views.teach.hanging import Hanging
-from sgimd_torch.views.teach.panel import MAPS, SPEEDS, Panel
+from sgimd_torch.views.teach.panel import SPEEDS, Panel, put
 from sgimd_torch.views.teach.playing import Outline, Playing
 from sgimd_torch.views.teach.scene import Grip, Scene
 from sgimd_torch.views.teach.seat import Seat
@@ -58,7 +59,7 @@ class Page:
         self.seat = Seat()
         self.scene = Scene(server, led, parts.environment.outcomes, parts.benchmark.goals)
         self.outline = Outline(led.model, self.scene.chain)
-        self.panel = Panel(server, led, self._act, lambda client: self._as_teacher(client, self._joints))
+        self.panel = Panel(server, self.leading, self._act, lambda client: self._as_teacher(client, self._joints))
         self.desk = Desk(session, self.leading, self.panel, self.scene)
         self._trial: Future[Trial] | None = None
         self._wanted: Future[Recorded | None] | None = None
@@ -93,7 +94,7 @@ class Page:
             self._listen_to(grip)
         errands, server = self.errands, self.server
 
-        @server.scene.on_click()
+        @server.scene.on_click()  # type: ignore[arg-type]
         async def _(event: Any) -> None:
             place = self.scene.place(np.array(event.ray_origin), np.array(event.ray_direction))
             if place is not None:
@@ -129,7 +130,7 @@ class Page:
     def _listen_to(self, grip: Grip) -> None:
         """Drag callbacks have to be coroutines: others run out of order."""
 
-        @grip.handle.on_drag("left")
+        @grip.handle.on_drag("left")  # type: ignore[untyped-decorator]
         async def _(event: Any) -> None:
             client, phase = event.client, event.phase
             start, end = np.array(event.start_position), np.array(event.end_position)
@@ -152,7 +153,7 @@ class Page:
             "record": self.desk.record,
             "home": self.desk.home,
             "play": self.desk.play,
-            "show": lambda: self.desk.show(lambda error: self.errands.ask(lambda: self._after_lesson(client, error))),
+            "show": lambda: self._show(client),
             "save": lambda: self.desk.save(client),
             "discard": self.desk.discard,
             "undo": lambda: self._undo(client),
@@ -202,7 +203,7 @@ class Page:
         self.session.interval = MOVEMENT / self._speed if SPEEDS[word] else 0.0
 
     def _next_map(self) -> None:
-        self.panel.maps.value = MAPS[(MAPS.index(self.panel.maps.value) + 1) % len(MAPS)]
+        put(self.panel.maps, MAPS[(MAPS.index(self.panel.maps.value) + 1) % len(MAPS)])
         self._drawn = ()
 
     def _try(self, place: Array) -> None:
@@ -219,6 +220,13 @@ class Page:
             client.add_notification("The last lesson is taken back", text, auto_close_seconds=8.0)
 
         self.session.take_back().add_done_callback(told)
+
+    def _show(self, client: viser.ClientHandle) -> None:
+        def told(done: Future[None]) -> None:
+            error = done.exception()
+            self.errands.ask(lambda: self._after_lesson(client, error))
+
+        self.desk.show().add_done_callback(told)
 
     def _after_lesson(self, client: viser.ClientHandle, error: BaseException | None) -> None:
         """What a lesson changed, now that the learner has answered it."""
@@ -241,7 +249,7 @@ class Page:
         if not (self.leading.held or self.desk.by_joints):
             for slider, angle in zip(self.panel.joints, np.round(q, 2), strict=True):
                 if abs(slider.value - angle) > 0.02:
-                    slider.value = float(angle)
+                    put(slider, float(angle))
 
     def _play(self, now: float) -> None:
         """The learner's movements, one after the other; a trial comes first."""

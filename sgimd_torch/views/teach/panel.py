@@ -1,6 +1,6 @@
 """The controls of the page: four numbered steps, what the learner does meanwhile, and a key for every action.
 
-    panel = Panel(server, led, act); panel.say_lesson(lesson); panel.say_state(state)
+    panel = Panel(server, leading, act, joints); panel.say_lesson(lesson); panel.say_state(state)
 ``act(name, client)`` is called with the name of an action of ``ACTIONS`` and the viewer who wants it.
 """
 
@@ -11,11 +11,11 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 import viser
-from viser import uplot
 
+from sgimd_torch.demonstrations.leading import Leading
 from sgimd_torch.demonstrations.lessons import HandLesson
-from sgimd_torch.environments.protocol import HandLed
-from sgimd_torch.views.teach.chart import CHANGE, SKILL, Chart
+from sgimd_torch.views.teach.chart import Chart
+from sgimd_torch.views.teach.drawing import MAPS, curve, legend, status
 from sgimd_torch.views.teach.state import State
 from sgimd_torch.views.teach.trial import Trial
 
@@ -27,17 +27,18 @@ class Action(NamedTuple):
 
     label: str
     icon: Any
-    key: str
+    key: Any
     colour: Any = None
 
 
 ICON: Final = viser.Icon
+# The browser moves the camera with W, A, S, D, Q, E and the arrows.
 ACTIONS: Final = {
     "record": Action("Record", ICON.PLAYER_RECORD, "R", "red"),
     "home": Action("Arm back to its start", ICON.HOME, "H", "gray"),
     "play": Action("Play it back", ICON.PLAYER_PLAY, "P", "gray"),
-    "show": Action("Show it to the learner", ICON.SCHOOL, "S", "green"),
-    "save": Action("Save it to a file", ICON.DEVICE_FLOPPY, "W", "gray"),
+    "show": Action("Show it to the learner", ICON.SCHOOL, "T", "green"),
+    "save": Action("Save it to a file", ICON.DEVICE_FLOPPY, "F", "gray"),
     "discard": Action("Throw it away", ICON.TRASH, "X", "gray"),
     "undo": Action("Take back the last lesson", ICON.ARROW_BACK_UP, "U", "gray"),
     "alone": Action("Let it go on alone", ICON.WALK, "G", "gray"),
@@ -45,7 +46,6 @@ ACTIONS: Final = {
     "map": Action("Next map", ICON.MAP, "M", "gray"),
     "seat": Action("Let someone else teach", ICON.USERS, "L", "gray"),
 }
-MAPS: Final = ("error", "competence", "last lesson")
 SPEEDS: Final = {"½ x": 0.5, "1 x": 1.0, "4 x": 4.0, "max": 0.0}
 STEPS: Final = (
     "1 · Lead the arm",
@@ -63,11 +63,13 @@ CLICK: Final = "**Click anywhere on the map**: the learner does its best to land
 class Panel:
     """What viewers see beside the scene; all of them see the same."""
 
-    def __init__(self, server: viser.ViserServer, led: HandLed, act: Act, joints: Callable[[Any], None]) -> None:
+    def __init__(self, server: viser.ViserServer, leading: Leading, act: Act, joints: Callable[[Any], None]) -> None:
         self._server, self._act = server, act
         self.buttons: dict[str, Any] = {}
         gui = server.gui
-        gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium", brand_color=(34, 110, 160))
+        gui.configure_theme(
+            show_logo=False, show_share_button=False, control_width="medium", brand_color=(34, 110, 160)
+        )
         gui.set_panel_label("Teach it by hand")
         gui.main_panel.dock_right()
         gui.main_panel.set_width(350)
@@ -77,7 +79,7 @@ class Panel:
             self._button("record")
             self._button("home")
             with gui.add_folder("Joints one by one", expand_by_default=False):
-                self.joints = self._sliders(led, joints)
+                self.joints = self._sliders(leading, joints)
         with gui.add_folder(STEPS[1]):
             self.lesson = gui.add_markdown(LOOK)
             self.start = gui.add_slider("From (s)", 0.0, 1.0, 0.01, 0.0, visible=False)
@@ -105,19 +107,8 @@ class Panel:
             self._button("pause")
             self.speed = gui.add_button_group("Speed", tuple(SPEEDS))
             self.maps = gui.add_dropdown("Map shows", MAPS, initial_value=MAPS[0], hint="key M")
-            self.legend = gui.add_html(_legend(MAPS[0]))
-            nothing = np.array([0.0, 1.0])
-            self.curve = gui.add_uplot(
-                (nothing, np.full(2, np.nan), np.full(2, np.nan)),
-                (
-                    uplot.Series(label="movements"),
-                    uplot.Series(label="error (m)", stroke="#226ea0", width=2),
-                    uplot.Series(label="lesson", stroke="#f0781e", width=0, points={"show": True, "size": 8}),
-                ),
-                scales={"x": uplot.Scale(time=False), "y": uplot.Scale(auto=True)},
-                title="Predicted error (m) over movements",
-                height=180,
-            )
+            self.legend = gui.add_html(legend(MAPS[0]))
+            self.curve = gui.add_html(curve((), []))
             self.wait = gui.add_checkbox("Wait for me when it asks", True)
             self._button("seat")
             with gui.add_folder("Keys", expand_by_default=False):
@@ -148,10 +139,11 @@ class Panel:
             if button is None or (button.visible and not button.disabled):
                 self._act(name, event.client)
 
-    def _sliders(self, led: HandLed, moved: Callable[[Any], None]) -> list[Any]:
-        assert led.ranges is not None and led.start is not None
+    def _sliders(self, leading: Leading, moved: Callable[[Any], None]) -> list[Any]:
         sliders = []
-        for name, low, high, start in zip(led.joints, led.ranges.low, led.ranges.high, led.start, strict=True):
+        for name, low, high, start in zip(
+            leading.joints, leading.ranges.low, leading.ranges.high, leading.start, strict=True
+        ):
             slider = self._server.gui.add_slider(name, float(low), float(high), 0.01, float(start))
 
             @slider.on_update
@@ -196,7 +188,7 @@ class Panel:
         """Both sliders at the ends of a new recording."""
         for slider, value in ((self.start, 0.0), (self.end, duration)):
             slider.max = max(duration, 0.02)
-            slider.value = value
+            put(slider, value)
 
     def say_trial(self, trial: Trial) -> None:
         """How a trial went."""
@@ -213,40 +205,17 @@ class Panel:
         self.buttons["pause"].icon = ICON.PLAYER_PLAY if state.paused else ICON.PLAYER_PAUSE
         self.buttons["undo"].disabled = not state.lessons
         self.buttons["alone"].visible = state.waiting
-        doing = state.problem or state.busy or ("asks you" if state.waiting else "paused" if state.paused else "practises")
-        error = "–" if state.chart is None else f"{state.chart.mean_error:.3f} m"
-        met = "" if state.chart is None else f"{int(state.chart.met.sum())} of {len(state.chart.met)} goals within reach"
-        lessons = f"{state.lessons} lesson{'s' * (state.lessons != 1)} by you"
-        self.status.content = _STATUS.format(doing, state.movements, state.total, lessons, error, met) + (
-            f'<p style="color:#a33">{cannot}</p>' if cannot else ""
-        )
+        self.status.content = status(state, cannot)
 
     def say_curve(self, state: State, lessons: list[int]) -> None:
         """The error over movements, with the lessons on it."""
-        if len(state.curve) < 2:
-            return
-        movements, errors = np.array(state.curve, dtype=np.float64).T
-        places = np.searchsorted(movements, lessons).clip(0, len(movements) - 1)
-        marks = np.full(len(movements), np.nan)
-        marks[places] = errors[places]
-        self.curve.data = (movements, errors, marks)
+        self.curve.content = curve(state.curve, lessons)
 
     def say_map(self, which: str) -> None:
         """The colours of the map that is shown."""
-        self.legend.content = _legend(which)
+        self.legend.content = legend(which)
 
 
-_STATUS: Final = (
-    '<div style="padding:0 .6em;line-height:1.5"><b style="font-size:1.1em">{0}</b><br>{1} of {2} movements, {3}<br>'
-    "predicted error <b>{4}</b><br>{5}</div>"
-)
-
-
-def _legend(which: str) -> str:
-    colours = CHANGE if which == MAPS[2] else SKILL
-    ends = {"error": ("cannot", "can"), "competence": ("-1", "0"), "last lesson": ("worse", "better")}[which]
-    stops = ",".join(f"rgb({r:.0f},{g:.0f},{b:.0f})" for r, g, b in colours)
-    return (
-        f'<div style="display:flex;gap:.5em;align-items:center;padding:0 .6em;font-size:.85em">{ends[0]}'
-        f'<div style="flex:1;height:.8em;border-radius:.3em;background:linear-gradient(90deg,{stops})"></div>{ends[1]}</div>'
-    )
+def put(control: Any, value: object) -> None:
+    """Set the value of a control; its type says that it cannot be set, but it can."""
+    control.value = value

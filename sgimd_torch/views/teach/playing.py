@@ -1,7 +1,7 @@
 """Movements that are played: those of the learner as a pale outline, trials, and a recording on the led arm.
 
-    outline = Outline(model, chain); lines, end = outline.at(recorded, seconds)
-    playing = Playing(recorded, speed=4.0); playing.seconds(now), playing.over(now)
+outline = Outline(model, chain); lines, end = outline.at(recorded, seconds)
+playing = Playing(recorded, speed=4.0); playing.seconds(now), playing.over(now)
 """
 
 from __future__ import annotations

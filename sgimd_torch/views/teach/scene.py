@@ -29,8 +29,8 @@ ABOVE: Final = 0.002  # m, from one layer of the map to the next
 
 @dataclass(frozen=True)
 class Grip:
-    """A part of the robot that can be dragged: the ``body`` that it belongs to, its ``handle`` in the scene, and whether
-    it is the hand itself."""
+    """A part of the robot that can be dragged: the ``body`` that it belongs to, its ``handle`` in the scene, and
+    whether it is the hand itself."""
 
     body: str
     handle: Any
@@ -83,17 +83,21 @@ class Scene:
         for mark in self._marks.values():
             mark.visible = False
         self._hint = self._scene.add_label("/hint", "drag me", anchor="bottom-center")
-        # Browsers without a GPU draw every pixel on the processor: an environment map, shadows, a sky or a large sheet of
+        # Browsers without a GPU draw every pixel on the processor: an environment map, shadows, a sky or a sheet of
         # water would leave 2 pictures a second instead of 25.
         self._scene.configure_environment_map(None)
         self._scene.configure_default_lights(cast_shadow=False)
+        self._scene.add_light_ambient("/light", intensity=0.6)
         self._look(server, middle)
 
     @property
     def grips(self) -> list[Grip]:
         """What can be dragged; the first one is the hand."""
         names = {k: self._model.body(self._model.geom_bodyid[k]).name for k in self._geoms}
-        return [Grip(self._led.hand, self._hand, is_hand=True), *(Grip(names[k], handle) for k, handle in self._geoms.items())]
+        return [
+            Grip(self._led.hand, self._hand, is_hand=True),
+            *(Grip(names[k], handle) for k, handle in self._geoms.items()),
+        ]
 
     def ground(self, points: Array, layer: int = 0) -> Array:
         """``(..., 3)`` m, where places ``(..., outcome_dim)`` of T are in the scene."""
@@ -125,7 +129,7 @@ class Scene:
             self._line.points = np.stack([middles - axes, middles + axes], axis=1).astype(np.float32)
         self._hand.position = hand
         if self._hint.visible:
-            self._hint.position = hand + [0, 0, 0.04 * self.size]
+            self._hint.position = hand + np.array([0, 0, 0.04 * self.size])
 
     def hide_hint(self) -> None:
         """Nobody has to be told any more what can be dragged."""
@@ -212,7 +216,7 @@ class Scene:
         data = mujoco.MjData(self._model)
         mujoco.mj_kinematics(self._model, data)
         flat = float(np.ptp(data.xpos[1:, 2])) < 1e-6 and abs(float(data.xpos[1, 2])) < 1e-6
-        away = np.array([0.0, -0.01, 1.25]) if flat else np.array([0.30, -0.80, 0.62])
+        away = np.array([0.0, -0.01, 1.05]) if flat else np.array([0.30, -0.80, 0.62])
         server.initial_camera.position = tuple(middle + away * self.size)
         server.initial_camera.look_at = tuple(middle + np.array([0.0, 0.0 if flat else 0.06, 0.0]) * self.size)
         server.scene.set_up_direction("+z" if not flat else "+y")

@@ -1,6 +1,6 @@
 """Who teaches: one viewer at a time. The others watch, and take over when the seat is free.
 
-    seat = Seat(); seat.take(client_id, now)    # True: this viewer may act
+seat = Seat(); seat.take(client_id, now)    # True: this viewer may act
 """
 
 from __future__ import annotations

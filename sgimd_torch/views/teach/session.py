@@ -296,9 +296,12 @@ class Session:
             if not self._is_drawn:
                 self._draw()
             self._do_errands()
-            if self._answer is None:
-                self._errands.wait(0.25)
+            self._errands.wait(0.05)
         self._tell(waiting=False)
+        return self._answer_to(index)
+
+    def _answer_to(self, index: int) -> Demonstration | None:
+        """What was shown while the learner waited before movement ``index``; it is kept."""
         if self._answer is not None:
             self._tell(asked=None, best=None)
             self._keep(GivenLesson(index, self._answer, asked=True))

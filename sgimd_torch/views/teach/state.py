@@ -1,6 +1,6 @@
 """How a session stands: one record, replaced whole, so that any thread can read it at any time.
 
-    state = session.state; state.movements, state.chart.mean_error
+state = session.state; state.movements, state.chart.mean_error
 """
 
 from __future__ import annotations

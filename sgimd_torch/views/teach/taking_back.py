@@ -1,6 +1,6 @@
 """Taking back the last lesson: the run directory goes back to the state before it; what is taken back is kept.
 
-    take_back(directory, lesson)    # runs/taught/seed-003/taken-back-0 has all as it was
+take_back(directory, lesson)    # runs/taught/seed-003/taken-back-0 has all as it was
 """
 
 from __future__ import annotations

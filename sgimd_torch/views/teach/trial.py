@@ -1,6 +1,6 @@
 """A trial: the learner does its best at a goal, and says what it expects; it learns nothing from it.
 
-    trial = try_goal(parts, context, goal, stream(seed, "trials", 0)); trial.missed, trial.expected
+trial = try_goal(parts, context, goal, stream(seed, "trials", 0)); trial.missed, trial.expected
 """
 
 from __future__ import annotations
