@@ -34,7 +34,8 @@ INVERSE: Final[Variant] = {"inverse": "paper"}  # all that the letter changes in
 LARGE: Final[Variant] = {"task_space": 100.0}
 BASELINE: Final[Variant] = {"goals": "uniform", "inverse": "nearest", "search": "perturb"}  # the field's standard one
 SCHOOL: Final = ("map-elites", "isoline", "isoline-again", "cma-me", "cma-mae")  # quality diversity
-FEW, HALF = "few.npz", "half.npz"  # made from the shipped demonstrations by ``make_subsets``
+FEW, HALF, TEN, HAND = "few.npz", "half.npz", "ten.npz", "hand.npz"  # files that ``make_files`` makes
+MADE: Final = tuple(map(Path, (FEW, HALF, TEN, HAND)))
 # Ways to refine a movement for a goal, and to answer in evaluations. Each line is a variant on the rod and, with a
 # longer name, on every arm.
 MODEL: Final[Variant] = {**SGIM_D, "inverse": "model"}
@@ -71,6 +72,12 @@ SWIMMER: Final[Variant] = {
     "movements": 2000,
     "evaluate_at": (250, 500, 1000),
 }  # and at the end
+# Ten lessons, as a person gives them in a session: all of them early, in a short life.
+SHORT: Final[Variant] = {"inverse": "process", "movements": 1000, "evaluate_at": (300, 500)}  # and at the end
+TAUGHT: Final[dict[str, Variant]] = {
+    "goals": {**SGIM_D, **SHORT, "teacher": "initial"},
+    "practice": {"algorithm": "practice-taught", **SHORT, "teacher": "initial", "every": 1},
+}
 # Movements of an arm take no time, so training may take more.
 ON_ARMS: Final[Variant] = {"movements": 2000, "evaluate_at": (250, 500, 1000, 1500)}  # and at the end
 LONGER: Final[Variant] = {"training": 2.0}
@@ -163,6 +170,12 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
         **{f"{name}-swimmer": {"algorithm": name, "inverse": "model", **SWIMMER} for name in SWIMMERS},
         "practice-swimmer": {"algorithm": "practice", **SWIMMER},
     },
+    "by-hand": {
+        "goals-alone": {**SAGG_RIAC, **SHORT},
+        "practice-alone": {"algorithm": "practice", **SHORT},
+        **{f"{name}-by-hand": {**line, "demonstrations": Path(HAND)} for name, line in TAUGHT.items()},
+        **{f"{name}-ten-shipped": {**line, "demonstrations": Path(TEN)} for name, line in TAUGHT.items()},
+    },
 }
 
 
@@ -170,22 +183,26 @@ def tables_of(experiment: str) -> list[str]:
     """The tables of results that its runs write rows to; the first has their evaluations."""
     if experiment in ("forward-model", *ARMS):
         return ["forward_model.csv"]
-    if experiment == "swimmer":
-        return ["gymnasium.csv"]
+    if experiment in ("swimmer", "by-hand"):
+        return ["gymnasium.csv" if experiment == "swimmer" else "by_hand.csv"]
     return ["paper.csv", *(["goals.csv"] if experiment in ("large-space", "ladder-large") else [])]
 
 
-def make_subsets(folder: Path) -> None:
-    """Write two subsets of the demonstrations: a few, 13 of 127, and those in the right half of the plane.
+def make_files(folder: Path) -> None:
+    """Write the files of demonstrations that variants name: a few, 13 of 127, those in the right half of the
+    plane, ten, or ten that are led by hand.
 
     Raises:
         RunError, OSError: it cannot be written.
     """
-    everything = load_demonstrations()
-    make_folder(folder)
-    save_demonstrations(folder / FEW, everything[:13])  # they are ordered so that the first ones are spread
+    from by_hand import save_lessons  # MuJoCo is loaded only when it is needed
+
+    everything = load_demonstrations()  # they are ordered so that the first ones are spread
     right = [demonstration for demonstration in everything if demonstration.outcome[0] > 0]
-    save_demonstrations(folder / HALF, right)
+    make_folder(folder)
+    for name, shown in ((FEW, everything[:13]), (HALF, right), (TEN, everything[:10])):
+        save_demonstrations(folder / name, shown)
+    save_lessons(folder / HAND)
 
 
 def teacher_of(config: Config) -> str:

@@ -27,7 +27,7 @@ STEP = 0.01  # s, from one posture to the next; a recording has them all
 FOLLOW = 15.0  # 1/s, how quickly the led point follows the hand: nearly all of a jump within 5 / FOLLOW
 SUPPLE = 0.03  # s, in which a joint takes up a speed: a hand's trembling does not become the arm's
 DAMPING = 0.1  # of the least squares, relative to the arm's levers: near a stretched posture joints stay slow
-BRAKES = 0.9  # of the acceleration, to stop before a range ends
+BRAKES = 0.88  # of the acceleration, to stop before a range ends: the last step takes up to 9/8 of what is planned
 REACH = 0.4  # s: how long ago a hand may have been where the led point is now
 CROSSING = 1.0  # s, in which a joint of unknown speed crosses its range
 

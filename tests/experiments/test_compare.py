@@ -22,7 +22,7 @@ from sgimd_torch.runs.log import RunError
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import Run, read_run
 from tables import RESULTS, Table, goal_rows, goals_claimed, result_rows, tiles_reached
-from variants import ARMS, EXPERIMENTS, make_subsets, shipped, tables_of, teacher_of
+from variants import ARMS, EXPERIMENTS, make_files, shipped, tables_of, teacher_of
 
 # Two variants that live for 40 movements, and one, of an experiment of its own, whose demonstrations are missing.
 TINY = """
@@ -303,7 +303,7 @@ def test_teachers_have_the_number_of_the_demonstrator_or_the_name_of_the_file(tm
 
 
 def test_few_are_a_tenth_of_the_demonstrations_and_half_are_those_to_the_right(tmp_path):
-    make_subsets(tmp_path / "new")
+    make_files(tmp_path / "new")
     everything = load_demonstrations()
     few, half = (load_demonstrations(tmp_path / "new" / name) for name in ("few.npz", "half.npz"))
     assert len(few) == 13
