@@ -12,7 +12,7 @@ Joints can be moved one by one, too: ``leading.set_joints(q)``.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,9 +25,7 @@ from sgimd_torch.spaces import Array, Box, check_point, read_only
 
 SUPPLE: Final = 0.03  # s, in which a joint takes up a speed: a hand's trembling does not become the arm's
 DAMPING: Final = 0.1  # of the least squares, relative to the arm's levers: near a stretched posture joints stay slow
-BRAKES: Final = (
-    0.88  # of the acceleration, to stop before a range ends: the last step takes up to 9/8 of what is planned
-)
+BRAKES: Final = 0.88  # of the acceleration, to stop before a range ends: the last step may take 9/8 of it
 CROSSING: Final = 1.0  # s, in which a joint of unknown speed crosses its range
 
 
