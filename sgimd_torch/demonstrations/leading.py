@@ -220,16 +220,20 @@ class Leading:
     def _towards(self, velocity: Array, body: int) -> Array:
         """``(n_joints,)`` rad/s that move the held point with this ``velocity`` ``(3,)`` m/s, by damped least squares.
 
-        A joint that would leave its range is fixed at its end, and the others do what it does not.
+        If that is too fast, all is slowed down, so that the direction stays. A joint that would leave its range stops
+        in time, and the others do what it does not.
         """
         levers = self._arm.levers(body, self.point)
-        damping = DAMPING**2 * np.square(levers).sum() / 3 + 1e-12
+        damping = (DAMPING**2 * np.square(levers).sum() / 3 + 1e-12) * np.eye(3)
+
+        def solve(columns: Array, velocity: Array) -> Array:
+            return np.asarray(columns.T @ np.linalg.solve(columns @ columns.T + damping, velocity))
+
+        velocity = velocity * self._slower(solve(levers, velocity))
         speed, free = np.zeros(len(self.joints)), np.ones(len(self.joints), dtype=bool)
         low, high = self._brakes()
         while free.any():
-            rest = velocity - levers[:, ~free] @ speed[~free]
-            moved = levers[:, free]
-            speed[free] = moved.T @ np.linalg.solve(moved @ moved.T + damping * np.eye(3), rest)
+            speed[free] = solve(levers[:, free], velocity - levers[:, ~free] @ speed[~free])
             beyond = free & ((speed < low) | (speed > high))
             if not beyond.any():
                 break
@@ -237,10 +241,13 @@ class Leading:
             free &= ~beyond
         return speed
 
+    def _slower(self, wish: Array) -> float:
+        """The share of the wished speeds, 1 at most, at which no joint exceeds its own."""
+        return min(1.0, float((self.speeds / np.maximum(np.abs(wish), 1e-12)).min()))
+
     def _within(self, wish: Array) -> Array:
         """The speeds of the next step: towards the wished ones, in their direction, within all limits."""
-        slower = min(1.0, float((self.speeds / np.maximum(np.abs(wish), 1e-12)).min()))
-        change = (slower * wish - self._speed) * min(1.0, STEP / SUPPLE)
+        change = (self._slower(wish) * wish - self._speed) * min(1.0, STEP / SUPPLE)
         most = self.accelerations * STEP
         low, high = self._brakes()
         return np.clip(np.clip(self._speed + np.clip(change, -most, most), -self.speeds, self.speeds), low, high)

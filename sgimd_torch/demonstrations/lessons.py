@@ -132,7 +132,7 @@ def _as_led(recording: Recording, led: HandLed, longest: float) -> list[str]:
     remarks = []
     if recording.duration > longest:
         faster = recording.duration / longest
-        remarks.append(f"it is played {faster:.2g} times faster: movements last {longest:g} s at most")
+        remarks.append(f"it is played {faster:.3g} times faster: movements last {longest:g} s at most")
     if recording.gaps is not None and recording.gaps.max() > BEYOND:
         far = f"up to {recording.gaps.max():.2g} m"
         remarks.append(f"the arm stayed {far} behind the hand, which went too far or too fast for it")
