@@ -63,8 +63,9 @@ def lead(leading: Leading, end: Array, rng: np.random.Generator) -> Recording:
     return leading.stop().without_pauses()
 
 
-def lessons(rod: FishingRod, n: int = LESSONS, seed: int = SEED) -> list[HandLesson]:
-    """``n`` lessons whose sweeps end all around the base, nearer and farther."""
+def lessons_of_a_script(n: int = LESSONS, seed: int = SEED) -> list[HandLesson]:
+    """``n`` lessons on the rod; their sweeps end all around the base, nearer and farther."""
+    rod = FishingRod()
     leading, found = Leading.of(rod.hand_led), list[HandLesson]()
     for number in range(n):
         rng = stream(seed, "hand", number)
@@ -78,21 +79,12 @@ def lessons(rod: FishingRod, n: int = LESSONS, seed: int = SEED) -> list[HandLes
     return found
 
 
-def save_lessons(path: Path) -> None:
-    """Write ten lessons as a demonstration file.
-
-    Raises:
-        OSError: it cannot be written.
-    """
-    save_demonstrations(path, [lesson.demonstration for lesson in lessons(FishingRod())])
-
-
 def main(argv: Sequence[str] | None = None) -> int:
     """Write the lessons, and say how they went; returns 0."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, required=True, metavar="FILE.npz")
     options = parser.parse_args(argv)
-    found = lessons(FishingRod())
+    found = lessons_of_a_script()
     print("lesson  lasts (s)  lands            misfit (rad)  remarks")
     for number, lesson in enumerate(found):
         shown = lesson.demonstration

@@ -77,7 +77,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         print("".join(f"{name}: {config.title}\n" for name, config in left), end="")
         return 0
     make_folder(options.results)
-    make_files(options.out / "demonstrations")
+    make_files(config.demonstrations for _, config in left)
     homes: dict[Config, list[str]] = {}  # the experiments that a run belongs to
     for name, config in left:
         homes.setdefault(config, []).append(name)
@@ -118,8 +118,8 @@ def verify(wanted: Sequence[tuple[str, Config]], options: argparse.Namespace) ->
     if options.dry_run:
         print("".join(f"{config.title} at {config.movements}\n" for config in again.values()), end="")
         return 0
-    make_files(options.out / "demonstrations")
     configs = list(dict.fromkeys(again.values()))
+    make_files(config.demonstrations for config in configs)
     with engine_of(options, configs) as engine:
         failures = sweep(configs, engine)
     found_now = {

@@ -7,12 +7,14 @@ A variant in two experiments has the same line in both; it is run once, and has 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Final
 
 from sgimd_torch.demonstrations import SHIPPED, load_demonstrations, save_demonstrations
 from sgimd_torch.files import make_folder
 from sgimd_torch.runs.config import Config
+from sgimd_torch.spaces import Demonstration
 
 Variant = dict[str, Any]
 ARMS: Final = ("planar-arm-7", "planar-arm-50")
@@ -188,21 +190,27 @@ def tables_of(experiment: str) -> list[str]:
     return ["paper.csv", *(["goals.csv"] if experiment in ("large-space", "ladder-large") else [])]
 
 
-def make_files(folder: Path) -> None:
-    """Write the files of demonstrations that variants name: a few, 13 of 127, those in the right half of the
-    plane, ten, or ten that are led by hand.
+def make_files(wanted: Iterable[Path | None]) -> None:
+    """Write those of the ``wanted`` files of demonstrations that ``MADE`` names.
+
+    They are a few of the shipped ones, 13 of 127, those in the right half of the plane, ten, and ten led by hand.
 
     Raises:
-        RunError, OSError: it cannot be written.
+        RunError, OSError: one cannot be written.
     """
-    from by_hand import save_lessons  # MuJoCo is loaded only when it is needed
+    for path in {path for path in wanted if path is not None and Path(path.name) in MADE}:
+        make_folder(path.parent)
+        save_demonstrations(path, _made(path.name))
 
+
+def _made(name: str) -> list[Demonstration]:
+    if name == HAND:
+        from by_hand import lessons_of_a_script  # MuJoCo is loaded only when it is needed
+
+        return [lesson.demonstration for lesson in lessons_of_a_script()]
     everything = load_demonstrations()  # they are ordered so that the first ones are spread
     right = [demonstration for demonstration in everything if demonstration.outcome[0] > 0]
-    make_folder(folder)
-    for name, shown in ((FEW, everything[:13]), (HALF, right), (TEN, everything[:10])):
-        save_demonstrations(folder / name, shown)
-    save_lessons(folder / HAND)
+    return {FEW: everything[:13], HALF: right, TEN: everything[:10]}[name]
 
 
 def teacher_of(config: Config) -> str:
