@@ -18,13 +18,13 @@ from typing import Final
 
 import numpy as np
 
-from sgimd_torch.demonstrations import save_demonstrations
+from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
 from sgimd_torch.demonstrations.leading import Leading
 from sgimd_torch.demonstrations.lessons import HandLesson, lesson_by_hand
 from sgimd_torch.demonstrations.recording import Recording
 from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.runs.process import command
-from sgimd_torch.spaces import Array, stream
+from sgimd_torch.spaces import Array, Demonstration, stream
 
 LESSONS: Final = 10
 SEED: Final = 2014  # of the hand, which is the same for every learner
@@ -85,14 +85,28 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, required=True, metavar="FILE.npz")
     options = parser.parse_args(argv)
     found = lessons_of_a_script()
-    print("lesson  lasts (s)  lands            misfit (rad)  remarks")
+    made = [lesson.demonstration for lesson in found]
+    print("lesson  lasts (s)  lands            misfit (rad)  jerk (rad/s^3)  remarks")
     for number, lesson in enumerate(found):
         shown = lesson.demonstration
         x, y = shown.outcome
         remarks = "; ".join(lesson.remarks) or "-"
-        print(f"{number:<6}  {shown.times[-1]:<9.2f}  ({x:5.2f}, {y:5.2f})   {lesson.misfit:<12.3f}  {remarks}")
-    save_demonstrations(options.out, [lesson.demonstration for lesson in found])
+        says = f"{number:<6}  {shown.times[-1]:<9.2f}  ({x:5.2f}, {y:5.2f})   {lesson.misfit:<12.3f}"
+        print(f"{says}  {jerk(shown):<14.0f}  {remarks}")
+    shipped, ours = (np.array([jerk(shown) for shown in each]) for each in (load_demonstrations(), made))
+    print(f"jerk: {_range(ours)}, of the shipped demonstrations {_range(shipped)}")
+    save_demonstrations(options.out, made)
     return 0
+
+
+def jerk(shown: Demonstration) -> float:
+    """Root mean square over time and joints (rad/s^3) of a recording's third derivative, at 50 samples a second."""
+    even = Recording(shown.times, shown.trajectory).resampled()
+    return float(np.sqrt(np.mean((np.diff(even.joints, 3, axis=0) / even.times[1] ** 3) ** 2)))
+
+
+def _range(values: Array) -> str:
+    return f"{np.median(values):.0f} (median), {values.min():.0f} to {values.max():.0f} rad/s^3"
 
 
 def _around(place: Array) -> Array:

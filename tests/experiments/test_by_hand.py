@@ -6,7 +6,7 @@ import pytest
 import by_hand
 from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.environments.fishing_rod import JOINT_RANGES
-from sgimd_torch.spaces import stream
+from sgimd_torch.spaces import Demonstration, stream
 
 
 @pytest.fixture(scope="module")
@@ -46,4 +46,13 @@ def test_the_same_lessons_are_made_again(lessons, tmp_path, capsys):
     for lesson, again in zip(lessons, load_demonstrations(tmp_path / "again.npz"), strict=True):
         np.testing.assert_array_equal(again.trajectory, lesson.demonstration.trajectory)
         np.testing.assert_array_equal(again.outcome, lesson.demonstration.outcome)
-    assert len(capsys.readouterr().out.splitlines()) == 11
+    said = capsys.readouterr().out.splitlines()
+    assert len(said) == 1 + 10 + 1
+    assert said[-1].startswith("jerk: ")
+
+
+def test_jerk_is_that_of_a_cubic():
+    """The third derivative of 2 t^3 is 12; of two joints one does not move."""
+    times = np.arange(51) / 50
+    cubic = Demonstration(np.zeros(0), times, np.stack([2 * times**3, 0 * times], axis=1), np.zeros(2))
+    assert by_hand.jerk(cubic) == pytest.approx(12 / np.sqrt(2))

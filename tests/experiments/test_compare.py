@@ -388,4 +388,4 @@ def test_rows_are_drawn_by_lot_and_made_again_in_a_folder_of_their_own(tmp_path,
     assert code == 1
     assert [line.split()[0] for line in lines] == ["DIFFERS", "equal"]  # the second row was made up
     assert "1 equal, 0 equal but for rounding" in said.err
-    assert {path.name for path in (tmp_path / "runs").iterdir()} == {"demonstrations", "verify-0"}
+    assert {path.name for path in (tmp_path / "runs").iterdir()} == {"verify-0"}
