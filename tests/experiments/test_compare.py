@@ -22,7 +22,7 @@ from sgimd_torch.runs.log import RunError
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import Run, read_run
 from tables import RESULTS, Table, goal_rows, goals_claimed, result_rows, tiles_reached
-from variants import ARMS, EXPERIMENTS, make_files, shipped, tables_of, teacher_of
+from variants import ARMS, EXPERIMENTS, make_subsets, shipped, tables_of, teacher_of
 
 # Two variants that live for 40 movements, and one, of an experiment of its own, whose demonstrations are missing.
 TINY = """
@@ -305,8 +305,7 @@ def test_teachers_have_the_number_of_the_demonstrator_or_the_name_of_the_file(tm
 
 
 def test_few_are_a_tenth_of_the_demonstrations_and_half_are_those_to_the_right(tmp_path):
-    make_files([tmp_path / "new" / "few.npz", tmp_path / "new" / "half.npz", None, tmp_path / "shown.npz"])
-    assert not (tmp_path / "shown.npz").exists()
+    make_subsets(tmp_path / "new")
     everything = load_demonstrations()
     few, half = (load_demonstrations(tmp_path / "new" / name) for name in ("few.npz", "half.npz"))
     assert len(few) == 13
@@ -316,7 +315,7 @@ def test_few_are_a_tenth_of_the_demonstrations_and_half_are_those_to_the_right(t
 
 
 def test_ten_lessons_by_hand_are_set_against_the_first_ten_that_are_shipped(tmp_path):
-    make_files([tmp_path / "ten.npz", tmp_path / "hand.npz"])
+    make_subsets(tmp_path, by_hand=True)
     ten, hand = (load_demonstrations(tmp_path / name, n_joints=6, outcome_dim=2) for name in ("ten.npz", "hand.npz"))
     assert len(ten) == len(hand) == 10
     for shown, shipped_one in zip(ten, load_demonstrations(), strict=False):
@@ -388,4 +387,4 @@ def test_rows_are_drawn_by_lot_and_made_again_in_a_folder_of_their_own(tmp_path,
     assert code == 1
     assert [line.split()[0] for line in lines] == ["DIFFERS", "equal"]  # the second row was made up
     assert "1 equal, 0 equal but for rounding" in said.err
-    assert {path.name for path in (tmp_path / "runs").iterdir()} == {"verify-0"}
+    assert {path.name for path in (tmp_path / "runs").iterdir()} == {"demonstrations", "verify-0"}
