@@ -1,4 +1,4 @@
-"""The pages results/RESULTS.md, FORWARD_MODEL.md and GYMNASIUM.md: claims, our numbers, and whether they hold.
+"""The pages of results/, RESULTS.md, FORWARD_MODEL.md, GYMNASIUM.md and BY_HAND.md: claims, our numbers, verdicts.
 
 Each page is a template in experiments/pages/, which has the text; the tables are put in by name. Change the template,
 not the page. The tables come from the rows in --results, which compare.py writes:
@@ -6,6 +6,7 @@ not the page. The tables come from the rows in --results, which compare.py write
   RESULTS         paper.csv, and goals.csv and anova.csv if they exist
   FORWARD_MODEL   forward_model.csv, and the table of model_figures.py (--table) if it exists
   GYMNASIUM       gymnasium.csv
+  BY_HAND         by_hand.csv
 
 Intervals are bootstrapped with a fixed seed, so the same rows give the same page. The analyses of variance need
 run directories: --runs makes them again and keeps their rows in anova.csv.
@@ -39,9 +40,10 @@ with loading():  # Ctrl-C shows no traceback
     from sgimd_torch.views.statistics import iqm_interval, metres, rng, show
     from variants import EXPERIMENTS, ladder
 
-PAGES: Final = ("RESULTS", "FORWARD_MODEL", "GYMNASIUM")
+PAGES: Final = ("RESULTS", "FORWARD_MODEL", "GYMNASIUM", "BY_HAND")
 ANOVA: Final = ("means compared", "of", "dimensions of theta in which they differ", "smallest p", "largest p")
 ON_ARMS: Final = (250, 500, 1000, 2000)
+EARLY: Final = (300, 500, 1000)
 # For the forward model's page: how names of variants end, and at which movements they are evaluated.
 MODEL_TABLES: Final = {
     "forward-model": ("", (500, 1000, 2000, LAST)),
@@ -132,6 +134,20 @@ def gymnasium_page(folder: Path) -> Page:
     }
     cells = [[cell(name, answer) for cell in columns.values()] for name, answer in rows]
     return Page([], {"swimmer": markdown([*columns], cells)}, by_answer["own"])
+
+
+def hand_page(folder: Path) -> Page:
+    """The page results/BY_HAND.md: each learner alone, with ten lessons by hand, and with ten shipped ones."""
+    results = Results(read_results(folder / "by_hand.csv"))
+    columns = _errors(results, EARLY, ".3f")
+    for when in (EARLY[0], EARLY[-1]):
+        _, columns[f"difference to the same learner alone at {when} (m)"] = _against(results, _alone, when)
+    return Page([], {"by-hand": variants_table([*EXPERIMENTS["by-hand"]], columns)}, results)
+
+
+def _alone(name: str) -> str:
+    """The same learner without a teacher."""
+    return f"{name.partition('-')[0]}-alone"
 
 
 def _answers(name: str, answer: str) -> bool:
@@ -265,6 +281,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         "RESULTS": lambda: paper_page(folder),
         "FORWARD_MODEL": lambda: model_page(folder, table),
         "GYMNASIUM": lambda: gymnasium_page(folder),
+        "BY_HAND": lambda: hand_page(folder),
     }
     paths = {name: options.out / f"{name}.md" for name in PAGES if options.only in (None, name)}
     for path in paths.values():

@@ -32,7 +32,7 @@ with loading():  # Ctrl-C shows no traceback
     from sgimd_torch.runs.read import finished, read_run
     from sgimd_torch.runs.sweep import add_engines, add_options, engine_of
     from tables import GOALS, RESULTS, Key, Table, as_text, goal_rows, result_rows
-    from variants import EXPERIMENTS, FEW, HALF, make_subsets, tables_of
+    from variants import EARLIER, EXPERIMENTS, MADE, Variant, make_subsets, tables_of
 
 EXAMPLES: Final = f"""experiments: {", ".join(EXPERIMENTS)}
 
@@ -77,7 +77,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         print("".join(f"{name}: {config.title}\n" for name, config in left), end="")
         return 0
     make_folder(options.results)
-    make_subsets(options.out / "demonstrations")
+    make_subsets(options.out / "demonstrations", by_hand="by-hand" in options.experiments)
     homes: dict[Config, list[str]] = {}  # the experiments that a run belongs to
     for name, config in left:
         homes.setdefault(config, []).append(name)
@@ -118,7 +118,7 @@ def verify(wanted: Sequence[tuple[str, Config]], options: argparse.Namespace) ->
     if options.dry_run:
         print("".join(f"{config.title} at {config.movements}\n" for config in again.values()), end="")
         return 0
-    make_subsets(options.out / "demonstrations")
+    make_subsets(options.out / "demonstrations", by_hand="by-hand" in options.experiments)
     configs = list(dict.fromkeys(again.values()))
     with engine_of(options, configs) as engine:
         failures = sweep(configs, engine)
@@ -169,10 +169,13 @@ def runs_of(
                 if only and variant not in only:
                     continue
                 changes = dict(line)
-                if changes.get("demonstrations") in (Path(FEW), Path(HALF)):
-                    changes["demonstrations"] = out / "demonstrations" / changes["demonstrations"]
+                shown = changes.get("demonstrations")
+                if shown in MADE:
+                    changes["demonstrations"] = out / "demonstrations" / shown
                 floor_at = FLOOR_AT if experiment in FLOORS else ()
-                fixed = {"answers": ANSWERS, "floor_at": floor_at}
+                fixed: Variant = {"answers": ANSWERS, "floor_at": floor_at}
+                if experiment in EARLIER:
+                    fixed["inverse"] = "linear"
                 whole = {"seed": seed, "out": out, "name": variant, **fixed, **changes}
                 found.append((experiment, Config(**whole)))
     return found

@@ -7,12 +7,17 @@ A variant in two experiments has the same line in both; it is run once, and has 
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
+
+import numpy as np
 
 from sgimd_torch.demonstrations import SHIPPED, load_demonstrations, save_demonstrations
 from sgimd_torch.files import make_folder
 from sgimd_torch.runs.config import Config
+from sgimd_torch.spaces import stream
+from sgimd_torch.views.suite import REFERENCES, TASKS
 
 Variant = dict[str, Any]
 ARMS: Final = ("planar-arm-7", "planar-arm-50")
@@ -31,10 +36,14 @@ STEPS: Final[tuple[tuple[str, Variant, Variant], ...]] = (
 )
 LETTER: Final[Variant] = {option: value for _, was, _ in STEPS for option, value in was.items()}
 INVERSE: Final[Variant] = {"inverse": "paper"}  # all that the letter changes in a learner without goals
+PROVED: Final = ("own", "nearest", "linear", "process")  # the answers of experiments on learning from few movements
 LARGE: Final[Variant] = {"task_space": 100.0}
 BASELINE: Final[Variant] = {"goals": "uniform", "inverse": "nearest", "search": "perturb"}  # the field's standard one
 SCHOOL: Final = ("map-elites", "isoline", "isoline-again", "cma-me", "cma-mae")  # quality diversity
-FEW, HALF = "few.npz", "half.npz"  # made from the shipped demonstrations by ``make_subsets``
+# Made by ``make_subsets``: from the shipped demonstrations, and lessons by hand.
+FEW, HALF, CORNER, SHUFFLED, TEN, HAND = MADE = tuple(
+    Path(f"{name}.npz") for name in ("few", "half", "corner", "shuffled", "ten", "hand")
+)
 # Ways to refine a movement for a goal, and to answer in evaluations. Each line is a variant on the rod and, with a
 # longer name, on every arm.
 MODEL: Final[Variant] = {**SGIM_D, "inverse": "model"}
@@ -71,6 +80,36 @@ SWIMMER: Final[Variant] = {
     "movements": 2000,
     "evaluate_at": (250, 500, 1000),
 }  # and at the end
+# What a learner of the suite has to beat, and the rivals there.
+SUITED: Final[dict[str, Variant]] = {
+    **REFERENCES,
+    "practice": {"algorithm": "practice"},
+    "cma-mae": {"algorithm": "cma-mae"},
+    "map-elites": {"algorithm": "map-elites"},
+}
+IN_SUITE: Final[Variant] = {"movements": 2000, "evaluate_at": (250, 500, 1000), "answers": PROVED}
+ONCE: Final[Variant] = {"teacher": "initial", "every": 1}  # all demonstrations at the start, one for each movement
+TAUGHT: Final[Variant] = {"algorithm": "practice-taught", **ONCE}
+# The rod, by the inverse model whose answers prove themselves; rivals with and without the demonstrations.
+LEARNING: Final[dict[str, Variant]] = {
+    f"{name}.rod": {**line, "evaluate_at": (250, 500, 1000, 2000), "answers": PROVED, "floor_at": (5000,)}
+    for name, line in {
+        **SUITED,
+        "practice-taught": TAUGHT,
+        "practice-corner": {**TAUGHT, "demonstrations": CORNER},
+        "practice-shuffled": {**TAUGHT, "demonstrations": SHUFFLED},
+        "sagg-riac": SAGG_RIAC,
+        "sgim-d": SGIM_D,
+        "sgim-d-uniform": {**SGIM_D, "goals": "uniform"},
+        "uniform-nearest-taught": {**SGIM_D, **BASELINE},
+        "cma-mae-taught": {"algorithm": "cma-mae-taught"},
+        "cma-mae-taught-once": {"algorithm": "cma-mae-taught", "imitations": 1, **ONCE},
+        "map-elites-taught": {"algorithm": "map-elites-taught"},
+    }.items()
+}
+# Ten lessons, as a person gives them in a session: all of them early, in a short life.
+SESSION: Final[Variant] = {"movements": 1000, "evaluate_at": (300, 500), "answers": PROVED}  # and at the end
+SHOWN: Final[dict[str, Variant]] = {"goals": {**SGIM_D, "teacher": "initial"}, "practice": TAUGHT}
 # Movements of an arm take no time, so training may take more.
 ON_ARMS: Final[Variant] = {"movements": 2000, "evaluate_at": (250, 500, 1000, 1500)}  # and at the end
 LONGER: Final[Variant] = {"training": 2.0}
@@ -154,8 +193,8 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
         "every-100": {**SGIM_D, "every": 100},
         "initial": {**SGIM_D, "teacher": "initial"},
         "asked": {**SGIM_D, "teacher": "asked"},
-        "few-demonstrations": {**SGIM_D, "demonstrations": Path(FEW)},
-        "half-plane": {**SGIM_D, "demonstrations": Path(HALF)},
+        "few-demonstrations": {**SGIM_D, "demonstrations": FEW},
+        "half-plane": {**SGIM_D, "demonstrations": HALF},
     },
     "forward-model": REFINING,
     **{arm: _on_arm(arm) for arm in ARMS},
@@ -163,11 +202,30 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
         **{f"{name}-swimmer": {"algorithm": name, "inverse": "model", **SWIMMER} for name in SWIMMERS},
         "practice-swimmer": {"algorithm": "practice", **SWIMMER},
     },
+    "by-hand": {
+        "goals-alone": {**SAGG_RIAC, **SESSION},
+        "practice-alone": {"algorithm": "practice", **SESSION},
+        **{f"{name}-by-hand": {**line, **SESSION, "demonstrations": HAND} for name, line in SHOWN.items()},
+        **{f"{name}-ten-shipped": {**line, **SESSION, "demonstrations": TEN} for name, line in SHOWN.items()},
+    },
+    "learning": LEARNING,
+    "suite": {
+        f"{name}.{task}": LEARNING.get(f"{name}.{task}", {**line, **suited.options, **IN_SUITE})
+        for task, suited in TASKS.items()
+        for name, line in SUITED.items()
+        if not (name in SCHOOL and task == "toss")  # quality diversity knows one context only
+    },
 }
+
+
+# Earlier rows were made when `LocallyLinear` was the default.
+EARLIER: Final = [name for name in EXPERIMENTS if name not in ("by-hand", "learning", "suite")]
 
 
 def tables_of(experiment: str) -> list[str]:
     """The tables of results that its runs write rows to; the first has their evaluations."""
+    if experiment in ("by-hand", "learning", "suite"):
+        return [f"{experiment.replace('-', '_')}.csv"]
     if experiment in ("forward-model", *ARMS):
         return ["forward_model.csv"]
     if experiment == "swimmer":
@@ -175,17 +233,29 @@ def tables_of(experiment: str) -> list[str]:
     return ["paper.csv", *(["goals.csv"] if experiment in ("large-space", "ladder-large") else [])]
 
 
-def make_subsets(folder: Path) -> None:
-    """Write two subsets of the demonstrations: a few, 13 of 127, and those in the right half of the plane.
+def make_subsets(folder: Path, *, by_hand: bool = False) -> None:
+    """Write what is made of the demonstrations: a few, 13 of 127, and ten; those in the right half of the plane; the 20
+    nearest to one corner; all with their outcomes dealt out anew, so that what is shown is not what is said. And, if
+    asked, ten lessons by hand.
 
     Raises:
         RunError, OSError: it cannot be written.
     """
     everything = load_demonstrations()
+    outcomes = np.array([each.outcome for each in everything])
+    right = [each for each in everything if each.outcome[0] > 0]
+    corner = [everything[k] for k in np.linalg.norm(outcomes - outcomes.max(axis=0), axis=1).argsort()[:20]]
+    dealt = stream(0, "shuffled").permutation(outcomes)
+    shuffled = [replace(each, outcome=outcome) for each, outcome in zip(everything, dealt, strict=True)]
     make_folder(folder)
-    save_demonstrations(folder / FEW, everything[:13])  # they are ordered so that the first ones are spread
-    right = [demonstration for demonstration in everything if demonstration.outcome[0] > 0]
-    save_demonstrations(folder / HALF, right)
+    # The shipped ones are ordered so that the first ones are spread.
+    first = ((FEW, everything[:13]), (TEN, everything[:10]))
+    for name, chosen in (*first, (HALF, right), (CORNER, corner), (SHUFFLED, shuffled)):
+        save_demonstrations(folder / name, chosen)
+    if by_hand:
+        from by_hand import lessons_of_a_script  # MuJoCo is loaded only when it is needed
+
+        save_demonstrations(folder / HAND, [lesson.demonstration for lesson in lessons_of_a_script()])
 
 
 def teacher_of(config: Config) -> str:

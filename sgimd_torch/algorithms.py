@@ -23,13 +23,12 @@ from sgimd_torch.goals.protocol import Goals
 from sgimd_torch.goals.strategic import StrategicInterest
 from sgimd_torch.goals.uniform import UniformGoals
 from sgimd_torch.inverses.local_process import LocalProcess
-from sgimd_torch.inverses.locally_linear import LocallyLinear
 from sgimd_torch.learner import Learner
 from sgimd_torch.learner.asking import Asking, StrategicBabbling
 from sgimd_torch.memory import Memory
 from sgimd_torch.searches.perturb import practise
 from sgimd_torch.searches.simplex import nelder_mead
-from sgimd_torch.searches.widening import Widening
+from sgimd_torch.searches.widening import Widening, Width
 from sgimd_torch.spaces import Array, Box, Estimate, Search, stream
 from sgimd_torch.strategies import Babble, Emulate, GoalBabbling, Imitate, Judge, Look, Remember, Rest, SocialStrategy
 from sgimd_torch.teachers.answering import Demonstrator
@@ -49,7 +48,7 @@ class Parts(TypedDict, total=False):
     """The keywords of ``goal_babbling``, which explains them."""
 
     goals: MakeGoals
-    inverse: MakeInverse
+    inverse: MakeInverse | None
     search: MakeSearch
     judge: MakeJudge
     measure: Performance | None
@@ -61,11 +60,13 @@ class Parts(TypedDict, total=False):
 
 
 def random_exploration(
-    environment: Environment, seed: int, *, inverse: MakeInverse = LocallyLinear, memory: Memory | None = None
+    environment: Environment, seed: int, *, inverse: MakeInverse | None = None, memory: Memory | None = None
 ) -> Learner:
     """Random: uniform movements."""
     memory = start_memory(environment, memory)
-    return Learner(memory, Babble(environment.policies, stream(seed, "babble")), inverse=inverse(memory))
+    return Learner(
+        memory, Babble(environment.policies, stream(seed, "babble")), inverse=answering(environment, memory, inverse)
+    )
 
 
 def sagg_riac(environment: Environment, seed: int, *, memory: Memory | None = None, **parts: Unpack[Parts]) -> Learner:
@@ -80,7 +81,7 @@ def practice(environment: Environment, seed: int, *, memory: Memory | None = Non
 
     It has no teacher, and nothing in it knows a unit or a robot. What the answer gets wrong is what it learns next.
     """
-    return sagg_riac(environment, seed, memory=memory, **_practising(environment, parts))
+    return sagg_riac(environment, seed, memory=memory, **_practising(parts))
 
 
 def practice_taught(
@@ -98,17 +99,17 @@ def practice_taught(
         correspondence=correspondence,
         social=partial(imitating, repeats=1),
         memory=memory,
-        **_practising(environment, parts),
+        **_practising(parts),
     )
 
 
-def _practising(environment: Environment, changed: Parts) -> Parts:
+def _practising(changed: Parts) -> Parts:
+    width = Width()
     parts: Parts = {
         "goals": UniformGoals,
-        "inverse": partial(LocalProcess, noise=environment.outcome_noise),
-        "search": practise,
+        "search": partial(practise, width=width),
         "budget": 1,
-        "look": Widening,
+        "look": partial(Widening, width=width),
         "global_range": (0.02, 0.3),
     }
     parts.update(changed)
@@ -120,7 +121,7 @@ def observation(
     seed: int,
     *,
     correspondence: Correspondence,
-    inverse: MakeInverse = LocallyLinear,
+    inverse: MakeInverse | None = None,
     memory: Memory | None = None,
 ) -> Learner:
     """Observation: watches and remembers, never moves."""
@@ -130,7 +131,7 @@ def observation(
         Rest(),
         social=Remember(memory),
         correspondence=correspondence,
-        inverse=inverse(memory),
+        inverse=answering(environment, memory, inverse),
         policies=environment.policies,
     )
 
@@ -141,7 +142,7 @@ def imitation(
     *,
     correspondence: Correspondence,
     epsilon: float = 0.05,
-    inverse: MakeInverse = LocallyLinear,
+    inverse: MakeInverse | None = None,
     memory: Memory | None = None,
 ) -> Learner:
     """Imitation: repeats the last demonstration with small variations until the next one."""
@@ -151,7 +152,7 @@ def imitation(
         Rest(),
         social=Imitate(environment.policies, stream(seed, "imitate"), repeats=None, epsilon=epsilon),
         correspondence=correspondence,
-        inverse=inverse(memory),
+        inverse=answering(environment, memory, inverse),
         policies=environment.policies,
     )
 
@@ -297,7 +298,7 @@ def goal_babbling(
     memory: Memory,
     *,
     goals: MakeGoals = InterestMap,
-    inverse: MakeInverse = LocallyLinear,
+    inverse: MakeInverse | None = None,
     search: MakeSearch = nelder_mead,
     judge: MakeJudge = remembered,
     measure: Performance | None = None,
@@ -314,7 +315,8 @@ def goal_babbling(
         seed: of all streams of this learner.
         memory: of the learner.
         goals: (contexts, outcomes, rng) -> the goal model.
-        inverse: (memory) -> the inverse model, where searches begin and by which the learner answers.
+        inverse: (memory) -> the inverse model, where searches begin and by which the learner answers; None for a
+            `LocalProcess`, whose answers have to prove themselves.
         search: (policies, rng) -> the refinement of its estimate.
         judge: (memory, measure) -> the competence that the goal model is told.
         measure: J; None for eq. (7), relative to the distance from rest.
@@ -330,7 +332,7 @@ def goal_babbling(
     noise = max(environment.outcome_noise, 0.02)
     if measure is None:
         measure = partial(performance, rest=environment.rest, d_min=noise)
-    made = inverse(memory)
+    made = answering(environment, memory, inverse)
     return GoalBabbling(
         environment.policies,
         memory,
@@ -346,6 +348,13 @@ def goal_babbling(
         global_range=global_range,
         give_up=give_up,
     )
+
+
+def answering(
+    environment: Environment, memory: Memory, inverse: MakeInverse | None
+) -> Callable[[Array, Array], Estimate]:
+    """The inverse model of a learner; without a choice one whose answers have to prove themselves."""
+    return LocalProcess(memory, noise=environment.outcome_noise) if inverse is None else inverse(memory)
 
 
 def start_memory(environment: Environment, start: Memory | None) -> Memory:

@@ -33,7 +33,6 @@ class Entry:
         fixed: its parameter -> value; a text with a colon is an attribute, loaded like ``at``.
         also: options that matter with it, but are used by another part.
         ignores: options that have no effect with it, though others use them.
-        answers: of an algorithm: its learner's own answer stands in the place of the default of --inverse.
         learns_with: of an inverse: the one to use while learning, if it is another one.
         label, colour: what figures call it, and how they draw it.
         filmed: of an environment: whether `sgimd film` shows it.
@@ -45,7 +44,6 @@ class Entry:
     fixed: Mapping[str, object] = field(default_factory=dict)
     also: tuple[str, ...] = ()
     ignores: tuple[str, ...] = ()
-    answers: bool = False
     learns_with: str | None = None
     label: str = ""
     colour: str = "black"
@@ -143,16 +141,15 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
         "practice": _at(
             "algorithms:practice",
             "one movement a goal, as a local process answers",
-            answers=True,
+            uses={"inverse": "inverse"},
             label="Practice",
             colour="#332288",
         ),
         "practice-taught": _at(
             "algorithms:practice_taught",
             "the same, and does once what it is shown; best with --teacher initial --every 1",
-            uses=_SHOWN,
+            uses={**_SHOWN, "inverse": "inverse"},
             also=_TAUGHT,
-            answers=True,
             label="Practice, taught",
             colour="#aa4499",
         ),

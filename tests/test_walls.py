@@ -32,7 +32,7 @@ LIBRARIES = {  # library: the only rooms that may import it; of a folder, where 
     "scipy": ROW.keys() - {"spaces"},
     "lazy_loader": {"__init__"},
     "faiss": {"memory/neighbours"},
-    "mujoco": {"environments/rod_physics", "environments/planar_model", "demonstrations/leading", "views/film"},
+    "mujoco": {"environments/rod_physics", "environments/planar_model", "demonstrations/arm", "views/film"},
     "torch": {"forward_model", "inverses/through_model", "searches/through_model"},
     "lightning": {"forward_model"},
     "safetensors": {"forward_model"},

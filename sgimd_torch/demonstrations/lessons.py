@@ -21,6 +21,7 @@ from sgimd_torch.environments.protocol import Environment, HandLed
 from sgimd_torch.spaces import Array, Demonstration, read_only
 
 BEYOND: Final = 0.03  # m: what a hand asked for and did not get is told from here on
+FASTER: Final = 1.02  # so is a joint that would be so many times faster than the robot's movements
 AWAY: Final = 0.05  # rad: so is a start that is this far from where movements start
 
 
@@ -132,13 +133,13 @@ def _as_led(recording: Recording, led: HandLed, longest: float) -> list[str]:
     remarks = []
     if recording.duration > longest:
         faster = recording.duration / longest
-        remarks.append(f"it is played {faster:.2g} times faster: movements last {longest:g} s at most")
+        remarks.append(f"it is played {faster:.3g} times faster: movements last {longest:g} s at most")
     if recording.gaps is not None and recording.gaps.max() > BEYOND:
         far = f"up to {recording.gaps.max():.2g} m"
         remarks.append(f"the arm stayed {far} behind the hand, which went too far or too fast for it")
     speeds = recording.within(longest).speeds
     for name, speed, most in zip(led.joints, speeds, speeds if led.speeds is None else led.speeds, strict=True):
-        if speed > most * (1 + 1e-6):
+        if speed > most * FASTER:
             remarks.append(f"{name} would turn at {speed:.2g} rad/s, its movements at {most:.2g} rad/s at most")
     away = 0.0 if led.start is None else float(np.abs(recording.joints[0] - led.start).max())
     if away > AWAY:

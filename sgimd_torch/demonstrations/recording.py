@@ -16,7 +16,7 @@ from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
 from sgimd_torch.spaces import Array, Demonstration, check_vector, read_only
 
 RATE = 50.0  # Hz, of the shipped demonstrations and of motor primitives
-STILL = 0.05  # rad/s: all joints slower than this is a pause
+STILL = 0.05  # of the largest speed: all joints slower than this is a pause
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,8 +78,8 @@ class Recording:
 
     def without_pauses(self) -> Recording:
         """Without the time before the first motion and after the last one; all of it if nothing moves."""
-        moving = (np.abs(np.diff(self.joints, axis=0)) > STILL * np.diff(self.times)[:, None]).any(axis=1)
-        rows = np.flatnonzero(moving)
+        speeds = np.abs(np.diff(self.joints, axis=0) / np.diff(self.times)[:, None]).max(axis=1)
+        rows = np.flatnonzero(speeds > STILL * speeds.max())
         return self.trim(self.times[rows[0]], self.times[rows[-1] + 1]) if len(rows) else self
 
     def within(self, longest: float) -> Recording:

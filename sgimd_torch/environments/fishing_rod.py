@@ -86,9 +86,9 @@ class FishingRod:
 
     @property
     def hand_led(self) -> HandLed:
-        """The arm, led no faster than its motor primitive moves; the line hangs on it."""
+        """The arm, led by the tip of its rod, no faster than its motor primitive moves it."""
         middle = (JOINT_RANGES.low + JOINT_RANGES.high) / 2
-        return HandLed(self.model, JOINTS, "hand", JOINT_RANGES, middle, *self.primitive.fastest())
+        return HandLed(self.model, JOINTS, "tip", JOINT_RANGES, middle, *self.primitive.fastest())
 
     def observe(self, rng: np.random.Generator) -> Array:
         """``(context_dim,)`` the context of the next movement, uniform over ``contexts``; empty in the fishing task."""

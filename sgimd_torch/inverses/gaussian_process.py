@@ -77,6 +77,11 @@ class Process:
         known = across @ self._root
         return across @ self._weights + self.mean, self.variance * np.maximum(1 - (known * known).sum(axis=1), 0)
 
+    def expect(self, inputs: Array) -> Array:
+        """The expected outcomes alone."""
+        expected: Array = self.kernel(squared_distances(inputs, self.inputs)) @ self._weights + self.mean
+        return expected
+
     def without_noise(self, rows: Rows) -> tuple[Array, Array]:
         """What the movements in ``rows`` lead to but for their noise, and the variance of that: as `predict`."""
         noise = self.kernel.noise
@@ -89,11 +94,12 @@ class Process:
         squared = (self._weights[rows] ** 2).mean(axis=1)
         return float((squared / self._precisions[rows]).mean()) / self.variance
 
-    def jacobian(self, point: Array) -> Array:
-        """``(outcome_dim, dim)`` of the expected outcome at ``(dim,)``."""
-        differences = point - self.inputs
-        slopes = self.kernel.slope((differences * differences).sum(axis=1))
-        return self._weights.T @ (slopes[:, None] * differences)
+    def jacobians(self, points: Array) -> Array:
+        """``(m, outcome_dim, dim)`` of the expected outcomes at ``(m, dim)``."""
+        differences = points[:, None] - self.inputs  # (m, n, dim)
+        slopes = self.kernel.slope((differences * differences).sum(axis=2))
+        found: Array = self._weights.T @ (slopes[..., None] * differences)
+        return found
 
 
 def fit_lengths(inputs: Array, outcomes: Array) -> Array:

@@ -26,7 +26,7 @@ _GROUPS, _GROUP = 8, 60  # groups of neighbours that the kernel is chosen by, an
 _NEAR: Final = 20  # outcomes near the goal that the process learns from, and that its surprise is measured on
 _LEARNT: Final = 100  # exemplars that the process learns from
 _STARTS, _STEPS = 3, 4  # exemplars that steps begin at, and steps from each
-_DAMPINGS: Final = (1e-3, 0.1, 1.0, 10.0)
+_DAMPINGS: Final = np.array([1e-3, 0.1, 1.0, 10.0])
 _CLEARLY: Final = 0.8  # of the squared error expected of the nearest exemplar: what a candidate has to be below
 
 
@@ -78,13 +78,13 @@ class LocalProcess:
         exemplars = ((expected - goal) ** 2).sum(axis=1) + doubt * variances
         best = int(exemplars.argmin())
         linear = self._linear(context, goal).theta[None]
-        candidates = [
-            (float(exemplars[best]), estimate.thetas[best]),
-            (float(self._expected_error(process, context, goal, doubt, linear)[0]), linear[0]),
-            *(self._descend(process, context, goal, doubt, theta) for theta in estimate.thetas[:_STARTS]),
-        ]
-        error, theta = min(candidates, key=lambda candidate: candidate[0])
-        return estimate._replace(theta=theta) if error < _CLEARLY * exemplars[0] else estimate
+        linear_error = self._expected_errors(process, context, goal, doubt, linear)
+        errors, found = self._descend(process, context, goal, doubt, estimate.thetas[:_STARTS])
+        errors = np.concatenate((exemplars[[best]], linear_error, errors))
+        candidates = np.concatenate((estimate.thetas[[best]], linear, found))
+        chosen_one = int(errors.argmin())
+        clearly = errors[chosen_one] < _CLEARLY * exemplars[0]
+        return estimate._replace(theta=candidates[chosen_one]) if clearly else estimate
 
     def predict(self, context: Array, theta: Array) -> Array | None:
         """``(outcome_dim,)`` what ``theta`` should lead to, judging by the movements most like it; None while there are
@@ -95,31 +95,39 @@ class LocalProcess:
         here = self._in_lengths(context, theta[None])
         rows = self._inputs.nearest(here, min(_LEARNT, len(self.memory)))[0]
         process = Process(self._inputs.keys.rows[rows], self.memory.outcomes[rows], self._kernel)
-        expected: Array = process.predict(here)[0][0]
+        expected: Array = process.expect(here)[0]
         return expected
 
     def _descend(
-        self, process: Process, context: Array, goal: Array, doubt: float, theta: Array
-    ) -> tuple[float, Array]:
-        """Damped Gauss-Newton steps from ``theta``: the least expected squared error, and where. They are as short as
-        possible in theta, so what hardly matters hardly changes."""
-        least = np.inf
+        self, process: Process, context: Array, goal: Array, doubt: float, starts: Array
+    ) -> tuple[Array, Array]:
+        """Damped Gauss-Newton steps from each of ``starts`` ``(m, theta_dim)``, as long as they help: the least squared
+        errors expected ``(m,)``, and where. They are as short as possible in theta, so what hardly matters hardly
+        changes."""
+        least, found = np.full(len(starts), np.inf), starts.copy()
+        going = np.arange(len(starts))
+        dim, spreads, lengths = starts.shape[1], self._spreads[: starts.shape[1]], self._lengths[: starts.shape[1]]
         for _ in range(_STEPS):
-            here = self._in_lengths(context, theta[None])
-            ahead = goal - process.predict(here)[0][0]
-            jacobian = process.jacobian(here[0])[:, : len(theta)] / self._lengths[: len(theta)]
-            square = jacobian @ jacobian.T
-            size = np.trace(square) / len(goal) + 1e-300
-            steps = [jacobian.T @ np.linalg.solve(square + d * size * np.eye(len(goal)), ahead) for d in _DAMPINGS]
-            spread = self._spreads[: len(theta)]
-            tried = np.clip(theta + spread * np.array(steps), *self.memory.theta_range)
-            errors = self._expected_error(process, context, goal, doubt, tried)
-            if not errors.min() < least:
+            here = self._in_lengths(context, found[going])
+            ahead = goal - process.expect(here)
+            jacobians = process.jacobians(here)[:, :, :dim] / lengths  # (m, outcome_dim, theta_dim)
+            transposed = jacobians.transpose(0, 2, 1)
+            squares = jacobians @ transposed
+            sizes = np.trace(squares, axis1=1, axis2=2) / len(goal) + 1e-300
+            damped = squares[:, None] + (sizes[:, None] * _DAMPINGS)[..., None, None] * np.eye(len(goal))
+            steps = (transposed[:, None] @ np.linalg.solve(damped, ahead[:, None, :, None]))[..., 0]
+            tried = np.clip(found[going, None] + spreads * steps, *self.memory.theta_range)
+            errors = self._expected_errors(process, context, goal, doubt, tried.reshape(-1, dim))
+            errors = errors.reshape(tried.shape[:2])
+            best = errors.argmin(axis=1), errors.min(axis=1)
+            better = np.flatnonzero(best[1] < least[going])
+            going = going[better]
+            if not len(going):
                 break
-            least, theta = float(errors.min()), tried[errors.argmin()]
-        return least, theta
+            least[going], found[going] = best[1][better], tried[better, best[0][better]]
+        return least, found
 
-    def _expected_error(self, process: Process, context: Array, goal: Array, doubt: float, thetas: Array) -> Array:
+    def _expected_errors(self, process: Process, context: Array, goal: Array, doubt: float, thetas: Array) -> Array:
         """``(m,)`` squared errors that the process expects of ``thetas`` ``(m, theta_dim)``, noise aside."""
         expected, variances = process.predict(self._in_lengths(context, thetas))
         errors: Array = ((expected - goal) ** 2).sum(axis=1) + doubt * variances

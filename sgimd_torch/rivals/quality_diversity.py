@@ -13,7 +13,7 @@ from typing import Any, TypedDict, Unpack
 
 import numpy as np
 
-from sgimd_torch.algorithms import Correspondence, start_memory
+from sgimd_torch.algorithms import Correspondence, answering, start_memory
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.learner import Learner
 from sgimd_torch.memory import Memory
@@ -230,14 +230,16 @@ def _learner(
     )
     scheduler = Scheduler(archive, emitters(archive, rng))
     explorer = QualityDiversity(environment.policies, scheduler, origin, again, memory)
+    inverse = answering(environment, memory, None)
     if correspondence is None:
-        return Learner(memory, explorer)
+        return Learner(memory, explorer, inverse=inverse)
     imitate = Imitate(environment.policies, stream(seed, "imitate"), repeats=imitations, epsilon=epsilon)
     return Learner(
         memory,
         explorer,
         social=Shown(explorer, imitate),
         correspondence=correspondence,
+        inverse=inverse,
         policies=environment.policies,
     )
 

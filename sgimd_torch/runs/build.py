@@ -94,8 +94,8 @@ def build(config: Config, directory: Path | None = None) -> RunParts:
         hand.add(lesson)
     learner = parts["algorithm"](task.environment, config.seed)
     words = {answer: config.inverse if answer == OWN else answer for answer in config.answered}
-    if config.entry("algorithm").answers and config.inverse == Config.inverse:
-        words[OWN] = OWN
+    if "inverse" in config.entry("algorithm").options and config.entry("inverse").learns_with is None:
+        words[OWN] = OWN  # the one that it learns with
     inverses = {
         word: learner.inverse if word == OWN else parts.maker("inverse", word, learning=False)(learner.memory)
         for word in dict.fromkeys(words.values())

@@ -152,9 +152,9 @@ class Config:
         before=-0.5,
     )
     inverse: str = option(
-        "linear",
+        "process",
         LEARNER,
-        "Which movement is inferred for a goal, when learning and in evaluations; practice has one of its own.",
+        "Which movement is inferred for a goal, when learning and in evaluations.",
         leads=True,
     )
     members: int = option(3, MODEL, "Number of networks.", least=1, most=100, slip="5 are many", before=3)

@@ -10,6 +10,7 @@ from collections.abc import Callable, Generator
 
 import numpy as np
 
+from sgimd_torch.searches.widening import Width
 from sgimd_torch.spaces import Array, Box, Estimate, Search
 
 
@@ -41,7 +42,7 @@ def perturb(policies: Box, rng: np.random.Generator, *, sd: float = 0.05) -> Sea
     return search
 
 
-def practise(policies: Box, rng: np.random.Generator, *, sd: float = 0.02, unsure: float = 0.05) -> Search:
+def practise(policies: Box, rng: np.random.Generator, *, sd: float = 0.02, width: Width | None = None) -> Search:
     """Gaussian noise around theta_g, whatever came of it, clipped to ``policies``; never ends.
 
     So the inverse model is corrected where it errs, and sees in which directions the outcome changes. It is meant for
@@ -51,18 +52,19 @@ def practise(policies: Box, rng: np.random.Generator, *, sd: float = 0.02, unsur
     Args:
         policies, rng: as in `perturb`.
         sd: standard deviation of the noise, in sides of ``policies``.
-        unsure: the same around a copy.
+        width: of a search for what is far from the goal; around a copy the noise is half as wide. None: one that stays
+            as it begins.
 
     Raises:
-        ValueError: one of the two is not positive.
+        ValueError: ``sd`` is not positive.
     """
-    vary, look_around = _variation(policies, rng, sd), _variation(policies, rng, unsure)
+    vary = _variation(policies, rng, sd)
+    width = width if width is not None else Width()
 
     def search(start: Estimate, goal: Array) -> Generator[Array, Array, None]:
         theta = policies.check("theta of the estimate", start.theta)
-        next_one = look_around if _remembered(start) else vary
         while True:
-            yield next_one(theta)
+            yield (_variation(policies, rng, width.sd / 2) if _remembered(start) else vary)(theta)
 
     return search
 

@@ -53,7 +53,7 @@ def test_its_jacobian_is_the_slope_of_what_it_predicts(kernel: Kernel) -> None:
     process = Process(*waves(), kernel)
     point, step = np.array([1.3, 0.9]), 1e-5
     ahead, back = (process.predict(point + sign * step * np.eye(2))[0] for sign in (1, -1))
-    assert process.jacobian(point) == pytest.approx(((ahead - back) / (2 * step)).T, rel=1e-4, abs=1e-5)
+    assert process.jacobians(point[None])[0] == pytest.approx(((ahead - back) / (2 * step)).T, rel=1e-4, abs=1e-5)
 
 
 def test_a_remembered_outcome_without_its_noise_is_what_the_process_predicts_there() -> None:

@@ -10,7 +10,7 @@ from sgimd_torch.inverses.local import NearestNeighbour
 from sgimd_torch.memory import Memory
 from sgimd_torch.searches.widening import Widening
 from sgimd_torch.session import run
-from sgimd_torch.spaces import Box, stream
+from sgimd_torch.spaces import Box, Estimate, stream
 
 POLICIES = Box(np.array([-1.0, 0.0]), np.array([3.0, 10.0]))
 
@@ -45,14 +45,14 @@ def test_it_begins_around_the_middle():
 @pytest.mark.parametrize(("error", "width"), [(0.0, 0.3), (100.0, 0.03)])
 def test_good_predictions_widen_it_and_bad_ones_narrow_it(error, width):
     look, thetas = live(Oracle(error))
-    assert look.width == width
+    assert look.width.sd == width
     spread = thetas[30:].std(axis=0) / POLICIES.sides
     assert (spread > 0.15).all() if width > 0.1 else (spread < 0.05).all()
     assert POLICIES.contains(thetas).all()
 
 
 def test_a_movement_that_was_never_made_says_nothing():
-    assert live(Oracle(0.0), told=False)[0].width == 0.1
+    assert live(Oracle(0.0), told=False)[0].width.sd == 0.1
 
 
 @pytest.mark.parametrize(("make", "least", "most"), [(two_elbows, 0.25, 0.3), (FishingRod, 0.03, 0.25)])
@@ -61,4 +61,19 @@ def test_it_looks_wide_where_movements_are_alike_and_near_where_they_are_not(mak
     learner = practice(robot, 0)
     for _ in run(learner, robot, 0, movements=150):
         pass
-    assert least <= learner.autonomous.look.width <= most
+    assert least <= learner.autonomous.look.width.sd <= most
+
+
+def test_around_a_copied_movement_practice_looks_half_as_wide():
+    robot = two_elbows()
+    learner = practice(robot, 0)
+    for _ in run(learner, robot, 0, movements=150):
+        pass
+    babbling = learner.autonomous
+    known = learner.memory.thetas[:1]
+    search = babbling.search(Estimate(known[0], known, learner.memory.outcomes[:1]), np.zeros(2))
+    executed = np.array([next(search), *(search.send(np.zeros(2)) for _ in range(1999))])
+    inside = np.abs(known[0] - 0.5) < 0.2  # where the bounds cut nothing off
+    assert inside.any()
+    assert babbling.look.width.sd > 0.25
+    assert executed[:, inside].std(axis=0) == pytest.approx(babbling.look.width.sd / 2, rel=0.1)
