@@ -36,14 +36,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     config, port = _options(sys.argv[1:] if argv is None else argv)
     with loading():
+        from sgimd_torch.runs.build import task_of
         from sgimd_torch.runs.process import Failed
         from sgimd_torch.runs.tasks import hand_led_of
         from sgimd_torch.views.teach.page import Page
         from sgimd_torch.views.teach.serving import serving
         from sgimd_torch.views.teach.session import Session
+    hand_led_of(task_of(config))  # what cannot be led is refused before anything is made
     session = Session(config)
-    assert session.parts.task is not None
-    hand_led_of(session.parts.task)
     with serving(port) as server:
         page = Page(server, session)
         print(WHERE.format(port=server.get_port(), path=config.directory), flush=True)

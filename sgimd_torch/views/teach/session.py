@@ -217,6 +217,7 @@ class Session:
             return
         self._hurry = 0
         for done in filter(None, (self._shown, self._going_back)):
+            self.life.summarise()
             self._draw()
             done.set_result(None)
         self._shown = self._going_back = None
