@@ -10,6 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from concurrent.futures import Future
+from html import escape
 from typing import Any, Final
 
 import numpy as np
@@ -19,7 +20,7 @@ from sgimd_torch.demonstrations.leading import Leading
 from sgimd_torch.environments.protocol import Recorded
 from sgimd_torch.runs.tasks import hand_led_of
 from sgimd_torch.spaces import Array
-from sgimd_torch.views.teach.chart import Colours, by_change, by_competence, by_error
+from sgimd_torch.views.teach.chart import Chart, Colours, by_change, by_competence, by_error
 from sgimd_torch.views.teach.desk import Desk
 from sgimd_torch.views.teach.drawing import MAPS
 from sgimd_torch.views.teach.errands import Errands
@@ -34,6 +35,11 @@ from sgimd_torch.views.teach.trial import Trial
 
 TICK: Final = 1 / 30  # s, from one picture to the next
 SHOWS_CHANGE: Final = 6.0  # s, how long what a lesson changed is shown on the map
+FAREWELL: Final = 0.3  # s, in which the last words reach the viewers
+ENDED: Final = (
+    '<div style="padding:0 .6em;color:#a33"><b>This session has ended.</b> All of it is kept; to go on: <code>{0}</code>'
+    "</div>"
+)
 MOVEMENT: Final = 2.0  # s, from one movement of the learner to the next in real time
 
 
@@ -66,7 +72,9 @@ class Page:
         self._ghost: Playing | None = None
         self._best: Playing | None = None
         self._seen: State | None = None
-        self._drawn: tuple[Any, ...] = ()
+        self.drawn: Chart | None = None
+        """What the map shows."""
+        self._which = ""
         self._changed = -np.inf  # when the last lesson's change came
         self._shown = -1  # index of the last movement that was played
         self._speed = 1.0
@@ -74,7 +82,15 @@ class Page:
         self._set_speed("1 x")
 
     def run(self, stopped: Callable[[], bool] = lambda: False) -> None:
-        """Until the session ends."""
+        """Until the session ends; whoever still looks is told."""
+        try:
+            self._run(stopped)
+        finally:
+            self.panel.status.content = ENDED.format(escape(f"sgimd teach {self.session.directory.path}"))
+            self.server.flush()
+            time.sleep(FAREWELL)
+
+    def _run(self, stopped: Callable[[], bool]) -> None:
         last = time.monotonic()
         while not stopped():
             self.errands.wait(max(0.0, last + TICK - time.monotonic()))
@@ -110,7 +126,7 @@ class Page:
 
         @self.panel.maps.on_update
         async def _(event: Any) -> None:
-            self._drawn = ()
+            errands.wake()
 
         for slider in (self.panel.start, self.panel.end):
 
@@ -204,7 +220,6 @@ class Page:
 
     def _next_map(self) -> None:
         put(self.panel.maps, MAPS[(MAPS.index(self.panel.maps.value) + 1) % len(MAPS)])
-        self._drawn = ()
 
     def _try(self, place: Array) -> None:
         if self._trial is None:
@@ -300,8 +315,8 @@ class Page:
             self._seen = state
         self._count()
         which = MAPS[2] if now < self._changed + SHOWS_CHANGE else self.panel.maps.value
-        if state.chart is not None and self._drawn != (state.chart, which):
-            self._drawn = state.chart, which
+        if state.chart is not None and (self.drawn is not state.chart or self._which != which):
+            self.drawn, self._which = state.chart, which
             self.scene.draw_map(self._colours(which, state), state.chart.met)
             self.panel.say_map(which)
 
