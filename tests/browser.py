@@ -20,13 +20,17 @@ SIZE = {"width": 1150, "height": 640}
 # After each frame: where the middle of all orange pixels is, the ball that is dragged, and when.
 WATCH = """
 (() => {
+  const make = HTMLCanvasElement.prototype.getContext;  // else a picture that was shown cannot be read any more
+  HTMLCanvasElement.prototype.getContext = function (kind, options) {
+    return make.call(this, kind, kind.startsWith("webgl") ? {...options, preserveDrawingBuffer: true} : options);
+  };
   const small = document.createElement("canvas"), at = [];
   const pen = small.getContext("2d", {willReadFrequently: true});
   window.watched = at;
   window.moved = [];
   window.addEventListener("pointermove", () => window.moved.push(performance.now()), true);
   const look = () => {
-    const canvas = document.querySelector("canvas");
+    const canvas = [...document.querySelectorAll("canvas")].find((each) => each.width);
     if (!window.watching || !canvas) return;
     const [x, y, side] = window.watching;
     small.width = small.height = side;
@@ -134,7 +138,7 @@ class Tab:
     def watch(self, side=240):
         """Note where the hand is drawn, in a square around it, from now on."""
         x, y = self.hand()
-        corner = [x - self.box["x"] - side / 2, y - self.box["y"] - side / 2, side]
+        corner = [float(x - self.box["x"] - side / 2), float(y - self.box["y"] - side / 2), side]
         self.tab.evaluate(f"() => {{ window.watching = {corner}; watched.length = moved.length = 0; }}")
 
     def seen(self):

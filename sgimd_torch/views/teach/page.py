@@ -37,8 +37,8 @@ TICK: Final = 1 / 30  # s, from one picture to the next
 SHOWS_CHANGE: Final = 6.0  # s, how long what a lesson changed is shown on the map
 FAREWELL: Final = 0.3  # s, in which the last words reach the viewers
 ENDED: Final = (
-    '<div style="padding:0 .6em;color:#a33"><b>This session has ended.</b> All of it is kept; to go on: <code>{0}</code>'
-    "</div>"
+    '<div style="padding:0 .6em;color:#a33"><b>This session has ended.</b> '
+    "All of it is kept; to go on: <code>{0}</code></div>"
 )
 MOVEMENT: Final = 2.0  # s, from one movement of the learner to the next in real time
 
