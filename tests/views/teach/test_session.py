@@ -23,6 +23,8 @@ from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.tasks import arm_demonstrations
 from sgimd_torch.teachers.by_hand import ByHand, GivenLesson, keep_lesson, read_lessons
+from sgimd_torch.views.report.command import main as report
+from sgimd_torch.views.report.data import demonstrated, read_life
 from sgimd_torch.views.teach import _options, main
 from sgimd_torch.views.teach.session import Session
 
@@ -230,6 +232,22 @@ def test_a_learner_that_asks_waits_for_the_answer_and_repeats_it_alone(going, tm
     assert lesson.index == made
     log = (session.directory.path / "episodes.csv").read_bytes()
     assert again(session.config, tmp_path / "alone", session.state.movements) == log
+
+
+def test_a_report_shows_lessons_that_were_given_by_hand(going, tmp_path):
+    session = going(40, teacher="periodic")
+    for row in (3, 4):
+        session.show(SHOWN[row]).result()
+    made = session.state.movements
+    session.__exit__()
+    (life,) = [read_life(session.directory.path)]
+    outcomes, missing = demonstrated([life])
+    assert missing == ""
+    assert {tuple(each) for each in outcomes} >= {tuple(SHOWN[row].outcome) for row in (3, 4)}
+    assert len(outcomes) == len(life.shown)  # one of the teacher's own, and two by hand
+    assert command(report, [str(session.directory.path), "--out", str(tmp_path / "report.html")]) == 0
+    told = f"Seed 0 was given 2 lessons by hand, before movements {made - 20}, {made - 10}."
+    assert told in (tmp_path / "report.html").read_text()
 
 
 def test_a_killed_session_loses_nothing(tmp_path):
