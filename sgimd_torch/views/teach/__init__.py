@@ -34,7 +34,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     Raises:
         ValueError: the request is wrong, or this task cannot be led by the hand.
     """
-    config, port = _options(sys.argv[1:] if argv is None else argv)
+    config, port = options_of(sys.argv[1:] if argv is None else argv)
     with loading():
         from sgimd_torch.runs.build import task_of
         from sgimd_torch.runs.process import Failed
@@ -54,7 +54,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     return 0
 
 
-def _options(argv: Sequence[str]) -> tuple[Config, int]:
+def options_of(argv: Sequence[str]) -> tuple[Config, int]:
     """The run that is taught, and the first port to try."""
     parser = argparse.ArgumentParser(
         prog="sgimd teach",

@@ -216,7 +216,7 @@ class Scene:
         data = mujoco.MjData(self._model)
         mujoco.mj_kinematics(self._model, data)
         flat = float(np.ptp(data.xpos[1:, 2])) < 1e-6 and abs(float(data.xpos[1, 2])) < 1e-6
-        away = np.array([0.0, -0.01, 1.05]) if flat else np.array([0.30, -0.80, 0.62])
+        away = np.array([0.0, -0.01, 1.05]) if flat else np.array([0.32, -0.92, 0.66])
         server.initial_camera.position = tuple(middle + away * self.size)
         server.initial_camera.look_at = tuple(middle + np.array([0.0, 0.0 if flat else 0.06, 0.0]) * self.size)
         server.scene.set_up_direction("+z" if not flat else "+y")

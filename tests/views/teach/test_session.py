@@ -25,7 +25,7 @@ from sgimd_torch.runs.tasks import arm_demonstrations
 from sgimd_torch.teachers.by_hand import ByHand, GivenLesson, keep_lesson, read_lessons
 from sgimd_torch.views.report.command import main as report
 from sgimd_torch.views.report.data import demonstrated, read_life
-from sgimd_torch.views.teach import _options, main
+from sgimd_torch.views.teach import options_of, main
 from sgimd_torch.views.teach.session import Session
 
 SHOWN = arm_demonstrations(PlanarArm())
@@ -301,13 +301,13 @@ def test_a_task_without_anything_to_lead_says_why(capsys):
 
 
 def test_a_run_that_is_taught_has_a_person_as_its_teacher(tmp_path, going):
-    config, port = _options(["--seed", "4", "--port", "9000", "--out", str(tmp_path)])
+    config, port = options_of(["--seed", "4", "--port", "9000", "--out", str(tmp_path)])
     assert (config.directory, config.teacher, port) == (tmp_path / "taught" / "seed-004", "by-hand", 9000)
-    config, _ = _options(["--algorithm", "sgim-im"])
+    config, _ = options_of(["--algorithm", "sgim-im"])
     assert config.teachers == ("by-hand",)
     session = going()
     session.__exit__()
-    config, _ = _options([str(session.directory.path)])
+    config, _ = options_of([str(session.directory.path)])
     assert config == session.config
     with pytest.raises(RunError, match="no run directory"):
-        _options([str(tmp_path)])
+        options_of([str(tmp_path)])
