@@ -31,7 +31,10 @@ SEED: Final = 2014  # of the hand, which is the same for every learner
 HEARD: Final = 0.05  # s, from one word of the hand to the next, as from a browser
 LASTS: Final = (0.9, 1.4)  # s, of a sweep
 WAITS: Final = 0.3  # s, before and after it
-MEANT: Final = ((0.25, 0.7), (0.4, 0.6))  # m, from and to: how far from the base, and how high, a sweep ends
+MEANT: Final = (
+    (0.25, 0.7),
+    (0.6, 0.8),
+)  # m: how far from the base, and how high, a sweep ends; it begins at .85
 BESIDE: Final = 0.03  # m, standard deviation of where it ends
 ARCH: Final = 0.05  # m, the same of how far the middle of a sweep lies off the way
 TREMBLE: Final = 0.004  # m, the same of the hand's trembling where it is fastest; a mouse at rest does not tremble

@@ -33,6 +33,7 @@ class Entry:
         fixed: its parameter -> value; a text with a colon is an attribute, loaded like ``at``.
         also: options that matter with it, but are used by another part.
         ignores: options that have no effect with it, though others use them.
+        own: of an algorithm: what options are that nobody set, where it is not their ``standard`` (see ``Option``).
         learns_with: of an inverse: the one to use while learning, if it is another one.
         label, colour: what figures call it, and how they draw it.
         filmed: of an environment: whether `sgimd film` shows it.
@@ -44,6 +45,7 @@ class Entry:
     fixed: Mapping[str, object] = field(default_factory=dict)
     also: tuple[str, ...] = ()
     ignores: tuple[str, ...] = ()
+    own: Mapping[str, object] = field(default_factory=dict)
     learns_with: str | None = None
     label: str = ""
     colour: str = "black"
@@ -81,6 +83,7 @@ _PURSUES: Final = {
     "budget": "budget",
     "give_up": "give_up",
 }
+_PRACTISED: Final = {"goals": "uniform", "search": "practice", "budget": 1}
 _TAUGHT: Final = ("teacher", "demonstrations")
 _SHOWN: Final = {"correspondence": "correspondence"}
 _ASKS: Final = {
@@ -141,15 +144,17 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
         "practice": _at(
             "algorithms:practice",
             "one movement a goal, as a local process answers",
-            uses={"inverse": "inverse"},
+            uses=_PURSUES,
+            own=_PRACTISED,
             label="Practice",
             colour="#332288",
         ),
         "practice-taught": _at(
             "algorithms:practice_taught",
-            "the same, and does once what it is shown; best with --teacher initial --every 1",
-            uses={**_SHOWN, "inverse": "inverse"},
+            "the same, and does once what it is shown",
+            uses={**_PURSUES, **_SHOWN},
             also=_TAUGHT,
+            own={**_PRACTISED, "teacher": "at-once"},
             label="Practice, taught",
             colour="#aa4499",
         ),
@@ -299,7 +304,10 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
         "periodic": _at(
             "teachers:PeriodicTeacher", "one every so many movements", uses={"every": "every", "choose": "choice"}
         ),
-        "initial": _at("teachers:InitialTeacher", "all at the start", uses={"every": "every"}),
+        "initial": _at(
+            "teachers:InitialTeacher", "all at the start, one every so many movements", uses={"every": "every"}
+        ),
+        "at-once": _at("teachers:InitialTeacher", "all at the start, one for each movement", fixed={"every": 1}),
         "asked": _at(
             "teachers:AskedTeacher", "when the learner stalls", uses={"patience": "every", "choose": "choice"}
         ),

@@ -164,7 +164,9 @@ class _Parts:
         return made if word in CATALOGUE[kind] else checked(kind, word, made)
 
     def _make(self, name: str) -> Any:
-        robot = self._task.environment
+        robot, algorithm = self._task.environment, self._config.entry("algorithm")
+        if name in algorithm.uses.values() and algorithm.own.get(name) == getattr(self._config, name, None) is not None:
+            return None  # the algorithm makes its own
         match name:
             case "policies" | "outcome_noise":
                 return getattr(robot, name)

@@ -23,7 +23,7 @@ from typing import Any, Final, NoReturn, get_type_hints
 import jsonargparse
 
 from sgimd_torch.catalogue import CATALOGUE, did_you_mean
-from sgimd_torch.runs.config import Config, dashed, options
+from sgimd_torch.runs.config import Config, dashed, default, options
 from sgimd_torch.runs.process import Stopping, loading
 
 FLAGS: Final = {
@@ -74,7 +74,7 @@ def parse(argv: Sequence[str], description: str | None = None) -> tuple[Config, 
         about = options()[each.name]
         group = groups.get(about.group) or groups.setdefault(about.group, parser.add_argument_group(about.group))
         wanted = _WANTED.get(str(each.type), "")
-        text = f"{about.about} ({wanted}{wanted and '; '}default: {_typed(each.default)}){_choices(each.name)}"
+        text = f"{about.about} ({wanted}{wanted and '; '}default: {_default(each)}){_choices(each.name)}"
         metavar = f"{{{','.join(_BOOL)}}}" if each.type == "bool" else each.name.upper()
         group.add_argument(
             f"--{dashed(each.name)}", type=hints[each.name], default=each.default, metavar=metavar, help=text
@@ -87,6 +87,13 @@ def parse(argv: Sequence[str], description: str | None = None) -> tuple[Config, 
         return Config(**values), flags
     except ValueError as error:
         parser.error(str(error))
+
+
+def _default(each: Field[Any]) -> str:
+    """Of all algorithms, and of those that have one of their own."""
+    standard = default(each, "")
+    own = {word: entry.own[each.name] for word, entry in CATALOGUE["algorithm"].items() if each.name in entry.own}
+    return "; ".join([_typed(standard), *(f"{word}: {_typed(value)}" for word, value in own.items())])
 
 
 def _typed(value: Any) -> str:

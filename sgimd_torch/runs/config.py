@@ -12,7 +12,7 @@ import json
 import math
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import Field, dataclass, field, fields
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -26,6 +26,7 @@ class Option(NamedTuple):
     greater than ``above``; ``slip`` ends the error. ``on_resume``: it may change when a run is resumed, because it only
     says how long the run lasts, where it is or how it is shown. ``place``: it does not change the learner.
     ``evaluates``: all evaluations of a run share it. ``leads``: one of the few that a comparison shows first.
+    ``standard``: what null becomes, unless the algorithm has a value of its own, see ``Entry``.
     """
 
     about: str
@@ -38,6 +39,7 @@ class Option(NamedTuple):
     place: bool = False
     evaluates: bool = False
     leads: bool = False
+    standard: Any = None
 
     def check(self, name: str, value: Any) -> None:
         """Refuse the first number that is out of bounds.
@@ -127,7 +129,9 @@ class Config:
         on_resume=True,
         place=True,
     )
-    goals: str = option("interest-map", LEARNER, "Where goals come from (sagg-riac, sgim-d).", leads=True)
+    goals: str | None = option(
+        None, LEARNER, "Where goals come from (learners that pursue goals).", leads=True, standard="interest-map"
+    )
     window: int = option(
         24, LEARNER, "Competences of a region that its interest is measured over, the paper's zeta; even."
     )
@@ -141,8 +145,10 @@ class Config:
         before=5.0,
     )
     competence: str = option("memory", LEARNER, "What the competence at a goal is judged by.")
-    search: str = option("nelder-mead", LEARNER, "How a movement is refined (sagg-riac, sgim-d).", leads=True)
-    budget: int = option(15, LEARNER, "Movements for one goal, at most.", least=1)
+    search: str | None = option(
+        None, LEARNER, "How a movement is refined (learners that pursue goals).", leads=True, standard="nelder-mead"
+    )
+    budget: int | None = option(None, LEARNER, "Movements for one goal, at most.", least=1, standard=15)
     give_up: float = option(
         -0.5,
         LEARNER,
@@ -191,7 +197,9 @@ class Config:
         most=1,
         slip="the box of theta is 1 wide",
     )
-    teacher: str = option("periodic", TEACHER, "When demonstrations come (imitation, observation, sgim-d).")
+    teacher: str | None = option(
+        None, TEACHER, "When demonstrations come (learners that are shown something).", standard="periodic"
+    )
     every: int | None = option(
         None,
         TEACHER,
@@ -256,7 +264,10 @@ class Config:
     )
 
     def __post_init__(self) -> None:
+        find("algorithm", self.algorithm)
         for each in fields(self):
+            if getattr(self, each.name) is None:  # now, so that config.json holds what was run
+                object.__setattr__(self, each.name, default(each, self.algorithm))
             value = getattr(self, each.name)
             for word in value if isinstance(value, tuple) else (value,):
                 if each.name in CATALOGUE:
@@ -350,7 +361,7 @@ class Config:
     def without_effect(self) -> list[str]:
         """A note for each option that is not at its default but changes nothing in this run."""
         used = self.used
-        changed = [each.name for each in fields(self) if getattr(self, each.name) != each.default]
+        changed = [each.name for each in fields(self) if getattr(self, each.name) != default(each, self.algorithm)]
         return [f"--{dashed(name)} has no effect {self._why_not(name, used)}" for name in changed if name not in used]
 
     def _why_not(self, name: str, used: set[str]) -> str:
@@ -371,6 +382,13 @@ class Config:
         return self._why_not(users[0], used)
 
 
+def default(each: Field[Any], algorithm: str) -> Any:
+    """What an option is when nobody sets it, with this algorithm."""
+    standard = each.metadata["option"].standard if each.default is None else each.default
+    entry = CATALOGUE["algorithm"].get(algorithm)
+    return standard if entry is None else entry.own.get(each.name, standard)
+
+
 def words(settings: Mapping[str, Any]) -> list[str]:
     """The command line of ``sgimd run`` for these settings, of ``vars(config)`` or of a config.json.
 
@@ -378,8 +396,9 @@ def words(settings: Mapping[str, Any]) -> list[str]:
     """
     found = []
     for each in fields(Config):
-        value = plain(settings.get(each.name, each.default))
-        if value != plain(each.default):
+        standard = plain(default(each, settings.get("algorithm", Config.algorithm)))
+        value = plain(settings.get(each.name, standard))
+        if value not in (standard, plain(each.default)):
             text = value if isinstance(value, str) else json.dumps(value, separators=(",", ":"))
             found.append(f"--{dashed(each.name)}={text}")
     return found

@@ -1,17 +1,18 @@
-"""SGIM-D and random exploration: both learn to fish, then one figure and one table show the results.
+"""Three learners learn to fish, then one figure and one table show the results.
 
-Two runs with the same seed, side by side. Both move the same simulated arm with the same motor noise. One has curiosity
-and a teacher, the other moves at random. They write to --out:
+Three runs with the same seed, two at a time. All move the same simulated arm with the same motor noise. One moves at
+random. SGIM-D has curiosity and a teacher. The third, practice-taught, is this library's best: it is shown everything
+at the start, then it practises, one movement for each goal. They write to --out:
 
-  sgim-d/seed-000/, random/seed-000/   everything that happened (docs/runs.md explains the files)
-  demo.png                             how the error falls; where the float landed; where competence is changing
+  random/seed-000/ and so on   everything that happened (docs/runs.md explains the files)
+  demo.png                     how the error falls; where the float landed; where SGIM-D's competence is changing
 
 Start it again after Ctrl-C or a power cut, and it goes on where it stopped; finished runs are used as they are.
 
   sgimd demo                                       the paper's 5000 movements, seed 0
   sgimd demo --movements 1000                      a first look, in less than a minute
   sgimd demo --seed 1                              another seed
-  sgimd demo --out runs/quiet -- --noise 0         options after -- go to both runs; sgimd run --help lists them
+  sgimd demo --out runs/quiet -- --noise 0         options after -- go to all runs; sgimd run --help lists them
 """
 
 from __future__ import annotations
@@ -22,7 +23,6 @@ import shutil
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Final
@@ -33,15 +33,15 @@ from sgimd_torch.runs.engines.local import Local
 from sgimd_torch.runs.engines.loop import sweep
 from sgimd_torch.runs.process import loading, say
 
-ALGORITHMS: Final = ("sgim-d", "random")
+ALGORITHMS: Final = ("random", "sgim-d", "practice-taught")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run both learners, draw the figure, print the table; returns the exit code."""
+    """Run the learners, draw the figure, print the table; returns the exit code."""
     options = _options(argv)
-    base, _ = parse(
-        [f"--seed={options.seed}", f"--movements={options.movements}", f"--out={options.out}", *options.more]
-    )
+    place = [f"--seed={options.seed}", f"--movements={options.movements}", f"--out={options.out}"]
+    configs = {algorithm: parse([*place, f"--algorithm={algorithm}", *options.more])[0] for algorithm in ALGORITHMS}
+    base = configs["sgim-d"]
     if base.environment != ROD:
         raise ValueError("--environment cannot be given here: the demo shows the fishing rod")
     if not base.evaluations:
@@ -51,8 +51,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         from sgimd_torch.views.demo_figure import draw, table
         from sgimd_torch.views.report.data import read_life
     began = time.monotonic()
-    configs = {algorithm: replace(base, algorithm=algorithm) for algorithm in ALGORITHMS}
-    say(f"SGIM-D and Random, {base.movements} movements each, seed {base.seed}: {base.out}")
+    say(f"{len(configs)} learners, {base.movements} movements each, seed {base.seed}: {base.out}")
     with Local(processes=2) as engine:
         sweep(list(configs.values()), engine, keep_going=False)
     runs = {algorithm: read_life(config.directory) for algorithm, config in configs.items()}
@@ -72,7 +71,7 @@ def _options(argv: Sequence[str] | None) -> argparse.Namespace:
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--seed", type=int, default=0, help="of both runs (default: %(default)s)")
+    parser.add_argument("--seed", type=int, default=0, help="of all runs (default: %(default)s)")
     parser.add_argument(
         "--movements", type=int, default=5000, help="of each run; more than last time extends it (default: %(default)s)"
     )
@@ -84,7 +83,7 @@ def _options(argv: Sequence[str] | None) -> argparse.Namespace:
         if name in ("--seed", "--movements", "--out"):
             raise ValueError(f"{name} is the demo's own; it goes before --")
         if name in ("--algorithm", "--name"):
-            raise ValueError(f"{name} cannot be given here: the demo compares sgim-d and random by their own names")
+            raise ValueError(f"{name} cannot be given here: the demo compares learners by their own names")
     return options
 
 
@@ -94,9 +93,9 @@ def _next_steps(options: argparse.Namespace) -> str:
     longer = [*sgimd, "demo", *place, "--movements", str(2 * options.movements), *(["--", *more] if more else [])]
     run = [*sgimd, "run", *place, "--movements", str(options.movements), *more]
     steps = {
-        "both learn on": longer,
-        "without a teacher": [*run, "--algorithm", "sagg-riac"],
-        "without curiosity": [*run, "--goals", "uniform", "--name", "uniform-goals"],
+        "all learn on": longer,
+        "without a teacher": [*run, "--algorithm", "practice"],
+        "with curiosity": [*run, "--goals", "interest-map", "--name", "interest-map"],
         "their results": [*sgimd, "table", str(options.out)],
     }
     return "\n".join(f"  {shlex.join(words)}    # {why}" for why, words in steps.items())

@@ -1,4 +1,4 @@
-"""The demo's figure and table: the results of two runs next to each other, made from their directories alone."""
+"""The demo's figure and table: the results of its runs next to each other, made from their directories alone."""
 
 from __future__ import annotations
 
@@ -34,35 +34,39 @@ def draw(runs: Mapping[str, Life]) -> Figure:
     task_space = Box.cube(-half_side, half_side, 2)
     tile = 0.05 * half_side
     most = max(float(tile_counts(run.landed, task_space, tile).max()) for run in runs.values())
-    figure = Figure(figsize=(14, 12.6), layout="constrained")
-    (curves, interest), landed_axes = figure.subplots(2, 2)
-    seed_curves(curves, [_curve(algorithm, run) for algorithm, run in runs.items()])
-    curves.set_title("How far from its goals the float lands")
-    _draw_interest(interest, sgim_d)
-    for ax, (algorithm, run) in zip(landed_axes, runs.items(), strict=True):
+    figure = Figure(figsize=(7 * len(runs), 12.6), layout="constrained")
+    axes: dict[str, Axes] = figure.subplot_mosaic([[*["curves"] * (len(runs) - 1), "interest"], [*runs]])
+    seed_curves(axes["curves"], [_curve(algorithm, run) for algorithm, run in runs.items()])
+    axes["curves"].set_title("How far from its goals the float lands")
+    _draw_interest(axes["interest"], sgim_d)
+    for algorithm, run in runs.items():
+        ax = axes[algorithm]
         shown, _ = demonstrated([run])
         landing_points(ax, run.landed, task_space, demonstrated=shown if len(shown) else None, side=tile, most=most)
         ax.set_title(f"Where the float landed: {NAMES[algorithm]}", pad=32)
     n = " and ".join(dict.fromkeys(str(len(run.index)) for run in runs.values()))
     seed = sgim_d.config["seed"]
-    figure.suptitle(f"A simulated arm learns to place its float: SGIM-D and Random, {n} movements each, seed {seed}")
+    figure.suptitle(f"A simulated arm learns to place its float: {n} movements each, seed {seed}")
     return figure
 
 
 def table(runs: Mapping[str, Life]) -> str:
-    """Errors and costs of the runs, and the ratio of the last errors."""
+    """Errors and costs of the runs, and the ratios of the last errors."""
     evaluated = runs["sgim-d"].evaluation["movements"].astype(int).tolist()
     columns = [movements for movements in (1000, 2000, 5000) if movements in evaluated[:-1]] + evaluated[-1:]
     heads = [*(f"error {movements}" for movements in columns), "noise floor", "physics", "learning", "evaluation"]
-    lines = [f"{'':10}" + "".join(f"{head:>13}" for head in heads)]
+    width = max(len(NAMES[algorithm]) for algorithm in runs)
+    lines = [" " * width + "".join(f"{head:>13}" for head in heads)]
     for algorithm, run in runs.items():
         cells = [_shown(run.at(movements), ".3f", "m") for movements in columns]
         cells.append(_shown(run.evaluation["noise_floor_m"][-1], ".3f", "m"))
         cells += [_shown(run.seconds(part), ".0f", "s") for part in ("physics", "learner", "evaluation")]
-        lines.append(f"{NAMES[algorithm]:10}" + "".join(f"{cell:>13}" for cell in cells))
+        lines.append(f"{NAMES[algorithm]:{width}}" + "".join(f"{cell:>13}" for cell in cells))
     last = {algorithm: run.evaluation["mean_error_m"][-1] for algorithm, run in runs.items()}
-    ratio = last["sgim-d"] / last["random"]
-    lines.append(f"After {columns[-1]} movements SGIM-D's error is {ratio:.2f} times Random's.")
+    ratios = " and ".join(
+        f"{NAMES[algorithm]} {error / last['random']:.2f}" for algorithm, error in last.items() if algorithm != "random"
+    )
+    lines.append(f"After {columns[-1]} movements the error, in Random's: {ratios}.")
     return "\n".join(lines)
 
 

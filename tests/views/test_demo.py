@@ -25,6 +25,7 @@ def benchmark_file(tmp_path_factory):
     return path
 
 
+LEARNERS = ("random", "sgim-d", "practice-taught")
 DEMO = [sys.executable, "-m", "sgimd_torch", "demo"]
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
 
@@ -50,7 +51,7 @@ def finished(tmp_path_factory, benchmark_file):
 
 @pytest.fixture(scope="module")
 def runs(finished):
-    return {algorithm: read_life(finished[0] / algorithm / "seed-000") for algorithm in ("sgim-d", "random")}
+    return {algorithm: read_life(finished[0] / algorithm / "seed-000") for algorithm in LEARNERS}
 
 
 def is_whole_png(path):
@@ -58,33 +59,34 @@ def is_whole_png(path):
     return content.startswith(b"\x89PNG\r\n\x1a\n") and content.endswith(b"IEND\xaeB`\x82")
 
 
-def test_the_demo_ends_well_with_both_runs_and_a_figure(finished, runs):
+def test_the_demo_ends_well_with_all_runs_and_a_figure(finished, runs):
     out, code, said, errors = finished
     assert code == 0, errors
-    assert [len(run.index) for run in runs.values()] == [60, 60]
+    assert [len(run.index) for run in runs.values()] == [60, 60, 60]
     assert is_whole_png(out / "demo.png")
     assert (out / "demo.png").stat().st_size > 50_000  # an empty figure of this size has a tenth of that
     assert not list(out.glob("*.part"))
     assert str(out / "demo.png") in said
 
 
-def test_the_table_compares_both_algorithms_in_error_noise_and_seconds(runs):
-    head, sgim_d, random, ratio = table(runs).splitlines()
+def test_the_table_compares_the_algorithms_in_error_noise_and_seconds(runs):
+    head, *lines, ratios = table(runs).splitlines()
     assert head.split() == ["error", "60", "noise", "floor", "physics", "learning", "evaluation"]
-    for line, name in ((sgim_d, "sgim-d"), (random, "random")):
-        error, floor = runs[name].evaluation["mean_error_m"][-1], runs[name].evaluation["noise_floor_m"][-1]
-        assert line.lower().split()[:5] == [name, f"{error:.3f}", "m", f"{floor:.3f}", "m"]
-    last = [run.evaluation["mean_error_m"][-1] for run in runs.values()]
-    assert f"{last[0] / last[1]:.2f} times" in ratio
+    for line, name, run in zip(lines, ("Random", "SGIM-D", "Practice, taught"), runs.values(), strict=True):
+        error, floor = run.evaluation["mean_error_m"][-1], run.evaluation["noise_floor_m"][-1]
+        assert line.startswith(name)
+        assert line.removeprefix(name).split()[:4] == [f"{error:.3f}", "m", f"{floor:.3f}", "m"]
+    random, *others = (run.evaluation["mean_error_m"][-1] for run in runs.values())
+    assert f"SGIM-D {others[0] / random:.2f} and Practice, taught {others[1] / random:.2f}." in ratios
 
 
 def test_the_table_of_long_runs_has_columns_on_the_way_too(runs):
     when = np.array([500, 1000, 2000, 3000])
     columns = {"movements": when, "mean_error_m": 100.0 / when, "noise_floor_m": np.full(4, 0.01)}
     longer = {algorithm: replace(run, answers=dict.fromkeys(run.answers, columns)) for algorithm, run in runs.items()}
-    head, sgim_d, *_ = table(longer).splitlines()
+    head, random, *_ = table(longer).splitlines()
     assert re.findall(r"error (\d+)", head) == ["1000", "2000", "3000"]
-    assert sgim_d.split()[1:7:2] == ["0.100", "0.050", "0.033"]
+    assert random.split()[1:7:2] == ["0.100", "0.050", "0.033"]
 
 
 def test_the_table_is_shown(finished, runs):
@@ -92,23 +94,22 @@ def test_the_table_is_shown(finished, runs):
 
 
 def test_the_figure_shows_the_data_of_the_runs(runs):
-    curves, interest, sgim_d, random = draw(runs).axes[:4]
+    curves, interest, *landed = draw(runs).axes[:5]
     for line, run in zip(curves.lines[::2], runs.values(), strict=True):
         np.testing.assert_array_equal(line.get_xdata(), [30, 60])
         np.testing.assert_array_equal(line.get_ydata(), run.evaluation["mean_error_m"])
     assert len(interest.collections[0].get_paths()) == (runs["sgim-d"].regions["movements"] == 60).sum()
-    for ax, run in ((sgim_d, runs["sgim-d"]), (random, runs["random"])):
+    for ax, run in zip(landed, runs.values(), strict=True):
         assert ax.collections[0].get_array().sum() == (np.abs(run.outcomes) <= 1).all(axis=1).sum()
-    assert sgim_d.collections[0].norm.vmax == random.collections[0].norm.vmax
-    assert len(sgim_d.lines) == 2  # demonstrated outcomes and the base
-    assert len(random.lines) == 1
+    assert len({ax.collections[0].norm.vmax for ax in landed}) == 1
+    assert [len(ax.lines) for ax in landed] == [1, 2, 2]  # the base, and demonstrated outcomes
 
 
 def test_a_second_start_uses_what_is_there(finished, benchmark_file, tmp_path):
     out = tmp_path / "again"
     shutil.copytree(finished[0], out)
     logs = {path: path.read_bytes() for path in out.glob("*/*/e*.csv")}
-    assert len(logs) == 4
+    assert len(logs) == 6
     figure = (out / "demo.png").read_bytes()
     (out / "demo.png").unlink()
     code, _, errors = ended(start(out, benchmark_file, 60))
