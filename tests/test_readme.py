@@ -27,7 +27,9 @@ from sgimd_torch.views.teach import options_of
 
 ROOT = Path(__file__).parent.parent
 ALONE = ("README.md", "CONTRIBUTING.md")  # each block by itself
-HOW_TO = tuple(f"docs/{name}.md" for name in ("own-robot", "reading-runs", "own-demonstrations", "teaching-by-hand", "own-teacher"))
+HOW_TO = tuple(
+    f"docs/{name}.md" for name in ("own-robot", "reading-runs", "own-demonstrations", "teaching-by-hand", "own-teacher")
+)
 PAGES = [
     *ALONE,
     "CHANGELOG.md",

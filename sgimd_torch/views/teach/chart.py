@@ -1,6 +1,6 @@
 """What a learner can do by now, as a map of T: how near it has come to each place, and what a lesson changed there.
 
-    before = chart_of(session.parts); ...; after = chart_of(session.parts); picture(after.error - before.error, CHANGE)
+    before = run.chart(lessons=0); ...; after = run.chart(lessons=1); by_change(before, after, outcomes)
 Competence is that of section 4.3 of Nguyen & Oudeyer (2014), by memory; the predicted error at a goal is the distance
 from it to the nearest place where a movement landed. Nothing is executed, so a map takes milliseconds.
 """

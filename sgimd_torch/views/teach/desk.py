@@ -42,7 +42,7 @@ class Desk:
         self._judged: Future[HandLesson] | None = None
         self._look_at = np.inf
         self._played: tuple[Recording, float] | None = None
-        self._draft = session.directory.path / FOLDER / DRAFT
+        self._draft = session.run.directory.path / FOLDER / DRAFT
         if self._draft.exists():
             self._take(Recording.load(self._draft))
 
@@ -176,6 +176,6 @@ class Desk:
         self._scene.mark("lesson", None if lesson is None else lesson.demonstration.outcome, "your throw lands here")
 
     def _folder(self) -> Any:
-        folder = self._session.directory.path / FOLDER
+        folder = self._session.run.directory.path / FOLDER
         make_folder(folder)
         return folder

@@ -17,7 +17,6 @@ import numpy as np
 import viser
 
 from sgimd_torch.demonstrations.leading import Leading
-from sgimd_torch.environments.protocol import Recorded
 from sgimd_torch.runs.tasks import hand_led_of
 from sgimd_torch.spaces import Array
 from sgimd_torch.views.teach.chart import Chart, Colours, by_change, by_competence, by_error
@@ -25,22 +24,22 @@ from sgimd_torch.views.teach.desk import Desk
 from sgimd_torch.views.teach.drawing import MAPS
 from sgimd_torch.views.teach.errands import Errands
 from sgimd_torch.views.teach.hanging import Hanging
-from sgimd_torch.views.teach.panel import SPEEDS, Panel, put
-from sgimd_torch.views.teach.playing import Outline, Playing
+from sgimd_torch.views.teach.panel import Panel, put
+from sgimd_torch.views.teach.playing import Outline
 from sgimd_torch.views.teach.scene import Grip, Scene
-from sgimd_torch.views.teach.seat import Seat
+from sgimd_torch.views.teach.serving import Seat
 from sgimd_torch.views.teach.session import Session
+from sgimd_torch.views.teach.stage import Stage
 from sgimd_torch.views.teach.state import State
-from sgimd_torch.views.teach.trial import Trial
 
 TICK: Final = 1 / 30  # s, from one picture to the next
 SHOWS_CHANGE: Final = 6.0  # s, how long what a lesson changed is shown on the map
+LANDINGS: Final = 60  # of the last movements, that are shown
 FAREWELL: Final = 0.3  # s, in which the last words reach the viewers
 ENDED: Final = (
     '<div style="padding:0 .6em;color:#a33"><b>This session has ended.</b> '
     "All of it is kept; to go on: <code>{0}</code></div>"
 )
-MOVEMENT: Final = 2.0  # s, from one movement of the learner to the next in real time
 
 
 class Page:
@@ -56,37 +55,31 @@ class Page:
 
     def __init__(self, server: viser.ViserServer, session: Session) -> None:
         self.server, self.session = server, session
-        parts = session.parts
+        parts = session.run.parts
         assert parts.task is not None
         led = hand_led_of(parts.task)
+        self._outcomes = parts.environment.outcomes
         self.leading = Leading.of(led)
         self.hanging = Hanging(led.model, led.joints, led.hand, self.leading.q)
         self.errands = Errands()
         self.seat = Seat()
-        self.scene = Scene(server, led, parts.environment.outcomes, parts.benchmark.goals)
-        self.outline = Outline(led.model, self.scene.chain)
+        self.scene = Scene(server, led, self._outcomes, parts.benchmark.goals)
         self.panel = Panel(server, self.leading, self._act, lambda client: self._as_teacher(client, self._joints))
         self.desk = Desk(session, self.leading, self.panel, self.scene)
-        self._trial: Future[Trial] | None = None
-        self._wanted: Future[Recorded | None] | None = None
-        self._ghost: Playing | None = None
-        self._best: Playing | None = None
+        self.stage = Stage(session, self.scene, self.panel, Outline(led.model, self.scene.chain))
         self._seen: State | None = None
         self.drawn: Chart | None = None
         """What the map shows."""
         self._which = ""
         self._changed = -np.inf  # when the last lesson's change came
-        self._shown = -1  # index of the last movement that was played
-        self._speed = 1.0
         self._listen()
-        self._set_speed("1 x")
 
     def run(self, stopped: Callable[[], bool] = lambda: False) -> None:
         """Until the session ends; whoever still looks is told."""
         try:
             self._run(stopped)
         finally:
-            self.panel.status.content = ENDED.format(escape(f"sgimd teach {self.session.directory.path}"))
+            self.panel.status.content = ENDED.format(escape(f"sgimd teach {self.session.run.directory.path}"))
             self.server.flush()
             time.sleep(FAREWELL)
 
@@ -98,7 +91,7 @@ class Page:
             now = time.monotonic()
             with self.server.atomic():
                 self._move(now - last)
-                self._play(now)
+                self.stage.play(now, watched=bool(self.server.get_clients()))
                 self._tell(now)
             self.server.flush()
             last = now
@@ -114,11 +107,11 @@ class Page:
         async def _(event: Any) -> None:
             place = self.scene.place(np.array(event.ray_origin), np.array(event.ray_direction))
             if place is not None:
-                errands.ask(lambda: self._try(place))
+                errands.ask(lambda: self.stage.try_goal(place))
 
         @self.panel.speed.on_click
         async def _(event: Any) -> None:
-            self._as_teacher(event.client, lambda: self._set_speed(event.target.value))
+            self._as_teacher(event.client, lambda: self.stage.set_speed(event.target.value))
 
         @self.panel.more.on_click
         async def _(event: Any) -> None:
@@ -214,16 +207,8 @@ class Page:
     def _joints(self) -> None:
         self.desk.set_joints(np.array([slider.value for slider in self.panel.joints]))
 
-    def _set_speed(self, word: str) -> None:
-        self._speed = SPEEDS[word] or 4.0
-        self.session.interval = MOVEMENT / self._speed if SPEEDS[word] else 0.0
-
     def _next_map(self) -> None:
         put(self.panel.maps, MAPS[(MAPS.index(self.panel.maps.value) + 1) % len(MAPS)])
-
-    def _try(self, place: Array) -> None:
-        if self._trial is None:
-            self._trial = self.session.try_goal(place)
 
     def _undo(self, client: viser.ClientHandle) -> None:
         def told(done: Future[None]) -> None:
@@ -231,7 +216,7 @@ class Page:
             if error is not None:
                 self._complain(client, str(error))
                 return
-            text = f"{self.session.directory.path} is as it was before; what was taken back is kept in it."
+            text = f"{self.session.run.directory.path} is as it was before; what was taken back is kept in it."
             client.add_notification("The last lesson is taken back", text, auto_close_seconds=8.0)
 
         self.session.take_back().add_done_callback(told)
@@ -266,52 +251,20 @@ class Page:
                 if abs(slider.value - angle) > 0.02:
                     put(slider, float(angle))
 
-    def _play(self, now: float) -> None:
-        """The learner's movements, one after the other; a trial comes first."""
-        if self._trial is not None and self._trial.done():
-            trial, self._trial = self._trial, None
-            self._tried(trial, now)
-        if self._ghost is not None:
-            self.scene.draw_ghost(*self.outline.at(self._ghost.recorded, self._ghost.seconds(now)))
-            if self._ghost.over(now):
-                self._ghost = None
-        elif self._wanted is not None and self._wanted.done():
-            wanted, self._wanted = self._wanted, None
-            recorded = None if wanted.exception() else wanted.result()
-            self._ghost = None if recorded is None else Playing(recorded, now, self._speed)
-        elif self._wanted is None and self.server.get_clients():
-            latest = self.session.state.latest[-1:]
-            if latest and latest[0].index != self._shown:
-                self._shown = latest[0].index
-                self._wanted = self.session.recorded(latest[0])
-        if self._best is not None:
-            self.scene.draw_best(self.outline.at(self._best.recorded, self._best.seconds(now))[0])
-            if self._best.over(now):
-                self._best = Playing(self._best.recorded, now)
-
-    def _tried(self, done: Future[Trial], now: float) -> None:
-        if done.exception() is not None:
-            self.panel.trial.content = f"**No trial:** {done.exception()}"
-            return
-        trial = done.result()
-        self.panel.say_trial(trial)
-        for name, place in (("goal", trial.goal), ("expected", trial.expected), ("landed", trial.outcome)):
-            self.scene.mark(name, place, f"missed by {trial.missed:.2f} m" if name == "landed" else "")
-        self._ghost = None if trial.recorded is None else Playing(trial.recorded, now)
-
     def _tell(self, now: float) -> None:
         """Whatever has changed since the last picture."""
         state = self.session.state
         if state is not self._seen:
-            self.panel.say_state(state, self.session.cannot_be_taught)
+            self.panel.say_state(state, self.session.run.cannot_be_taught)
             if self._seen is None or state.curve is not self._seen.curve:
-                self.panel.say_curve(state, sorted(self.session.hand.lessons))
+                self.panel.say_curve(state, sorted(self.session.run.hand.lessons))
             if self._seen is None or state.asked is not self._seen.asked:
                 self.scene.mark("asked", state.asked, "show me how to get here")
-                self._best = None if state.best is None else Playing(state.best, now)
-                self.scene.draw_best(None)
+                self.stage.show_best(state.best, now)
             landed = [episode.outcome for episode in state.latest if episode.outcome is not None]
-            self.scene.draw_landings(np.array(landed[-60:]).reshape(-1, self.session.parts.environment.outcomes.dim))
+            self.scene.draw_landings(
+                np.array(landed[-60:]).reshape(-1, self.session.run.parts.environment.outcomes.dim)
+            )
             self._seen = state
         self._count()
         which = MAPS[2] if now < self._changed + SHOWS_CHANGE else self.panel.maps.value
@@ -321,7 +274,7 @@ class Page:
             self.panel.say_map(which)
 
     def _colours(self, which: str, state: State) -> Colours:
-        outcomes = self.session.parts.environment.outcomes
+        outcomes = self._outcomes
         assert state.chart is not None
         if which == MAPS[2]:
             return by_change(state.before or state.chart, state.chart, outcomes)

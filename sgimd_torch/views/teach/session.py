@@ -14,35 +14,25 @@ import traceback
 from collections import deque
 from concurrent.futures import Future
 from dataclasses import replace
-from threading import Thread
+from threading import Lock, Thread
 from typing import Any, Final, Self
 
-import numpy as np
-
-from sgimd_torch.demonstrations.lessons import HandLesson, lesson_by_hand
+from sgimd_torch.demonstrations.lessons import HandLesson
 from sgimd_torch.demonstrations.recording import Recording
 from sgimd_torch.environments.protocol import Recorded, SimulationError
 from sgimd_torch.memory import Memory
-from sgimd_torch.runs.build import RunParts, build
-from sgimd_torch.runs.clock import Seconds
 from sgimd_torch.runs.config import Config
-from sgimd_torch.runs.directory import RunDirectory
-from sgimd_torch.runs.process import Stopping, say
-from sgimd_torch.runs.run import Life
-from sgimd_torch.runs.tasks import correspondence_of, hand_led_of
 from sgimd_torch.session import ReplayError
-from sgimd_torch.spaces import Array, Demonstration, Episode, stream
-from sgimd_torch.teachers.by_hand import FOLDER, ByHand, GivenLesson, keep_lesson
-from sgimd_torch.views.teach.chart import Chart, chart_of
+from sgimd_torch.spaces import Array, Demonstration, Episode
+from sgimd_torch.teachers.by_hand import GivenLesson
 from sgimd_torch.views.teach.errands import Errands
 from sgimd_torch.views.teach.state import State
-from sgimd_torch.views.teach.taking_back import take_back
-from sgimd_torch.views.teach.trial import Trial, try_goal
+from sgimd_torch.views.teach.taught import TaughtRun
+from sgimd_torch.views.teach.trial import Trial
 
 LATEST: Final = 200  # movements that a page can show
 CHART_EVERY: Final = 1.0  # s, from one map to the next while the learner moves by itself
 ANSWERS: Final = 10  # movements after a lesson that are made at once, at most: as many as an imitation takes
-NO_MORE: Final = "it has made all its {0} movements; end this session, and go on with --movements {1}"
 
 
 class _Ended(BaseException):
@@ -70,15 +60,17 @@ class Session:
         """s from one movement to the next, at least."""
         self.answered = False
         """Whether someone is there to answer, so that a learner that asks waits for it."""
-        self._state = State(config.movements)
+        self.run = TaughtRun(config, self._asked)
+        """The run itself; it belongs to the learner's thread, others may look at what does not change."""
+        self._state, self._told = State(config.movements), Lock()
+        self._latest: deque[Episode] = deque(maxlen=LATEST)
         self._errands = Errands()
         self._closing = False
         self._hurry = 0  # movements that are still made at once, after a lesson
         self._shown: Future[None] | None = None
         self._going_back: Future[None] | None = None
         self._answer: Demonstration | None = None
-        self._made, self._drawn, self._trials = 0.0, 0.0, 0
-        self._open()
+        self._made, self._drawn = 0.0, 0.0
         self._thread = Thread(target=self._work, name="learner", daemon=True)
 
     def __enter__(self) -> Self:
@@ -95,20 +87,6 @@ class Session:
         """How it stands now; it does not change afterwards."""
         return self._state
 
-    @property
-    def context(self) -> Array:
-        """``(context_dim,)`` of maps, lessons and trials: the middle of C."""
-        contexts = self.parts.environment.contexts
-        return np.asarray((contexts.low + contexts.high) / 2)
-
-    @property
-    def cannot_be_taught(self) -> str:
-        """Why the learner cannot be shown anything, "" if it can."""
-        if self.parts.learner.social is not None or self.parts.teachers:
-            return ""
-        can = "sgim-d, practice-taught, imitation, observation and sgim-im can"
-        return f"{self.config.algorithm} learns alone and cannot be shown anything; {can}: --algorithm sgim-d"
-
     def pause(self, paused: bool) -> None:
         """Stop after the movement under way, or go on."""
         self._tell(paused=paused)
@@ -120,7 +98,7 @@ class Session:
         Raises (as its result):
             ValueError: the robot cannot make this movement.
         """
-        return self._errands.ask(lambda: self._lesson(recording))
+        return self._errands.ask(lambda: self.run.lesson_of(recording))
 
     def show(self, demonstration: Demonstration) -> Future[None]:
         """Show the learner a lesson. It answers at once; the new map is there when this is done.
@@ -148,25 +126,15 @@ class Session:
         Raises (as its result):
             ValueError: it remembers nothing yet, or the goal is not one of T.
         """
-        return self._errands.ask(lambda: self._try(goal))
+        return self._errands.ask(lambda: self.run.try_goal(goal))
 
     def recorded(self, episode: Episode) -> Future[Recorded | None]:
         """A movement that was made, to be shown; None if the task has no picture, or the learner rested."""
-        return self._errands.ask(lambda: self._recorded(episode))
+        return self._errands.ask(lambda: self.run.recorded(episode))
 
     def _tell(self, **news: Any) -> None:
-        self._state = replace(self._state, **news)
-
-    def _open(self) -> None:
-        parts = build(self.config)
-        assert parts.hand is not None
-        self.hand: ByHand = parts.hand
-        self.hand.ask = self._asked
-        self.parts: RunParts = replace(parts, teacher=self.hand)
-        self.directory = RunDirectory(self.parts, resume=(self.config.directory / "config.json").exists())
-        say(*parts.notes, *self.directory.notes)
-        self.life = Life(self.directory, self.parts, Stopping(), Seconds(self.directory.summary), None)
-        self._latest: deque[Episode] = deque(maxlen=LATEST)
+        with self._told:
+            self._state = replace(self._state, **news)
 
     def _work(self) -> None:
         """All that happens in the learner's thread."""
@@ -186,24 +154,20 @@ class Session:
             problem = f"{type(error).__name__}: {error}"
         finally:
             self._tell(problem=problem, busy="", waiting=False)
+            for waiting in filter(None, (self._shown, self._going_back)):
+                waiting.set_exception(ValueError(problem))
             self._errands.close(problem)
-            self._close()
-
-    def _close(self) -> None:
-        try:
-            if not self.life.replaying:
-                self.life.summarise(finished=self.life.movements == self.config.movements)
-        finally:
-            self.directory.__exit__()
+            self.run.close()
 
     def _live(self) -> None:
         """The run from where it is to its end, and then whatever is wanted."""
-        self._tell(busy="replaying" if self.life.recorded else "", asked=None, best=None, before=None)
-        for episode in self.life.episodes():
+        life = self.run.life
+        self._tell(busy="replaying" if life.recorded else "", asked=None, best=None, before=None)
+        for episode in life.episodes():
             self._latest.append(episode)
-            if not self.life.replaying:
-                lessons = sum(index < self.life.movements for index in self.hand.lessons)
-                self._tell(movements=self.life.movements, lessons=lessons, latest=tuple(self._latest), busy="")
+            if not life.replaying:
+                lessons = sum(index < life.movements for index in self.run.hand.lessons)
+                self._tell(movements=life.movements, lessons=lessons, latest=tuple(self._latest), busy="")
                 self._between()
             elif self._closing:
                 raise _Ended
@@ -213,11 +177,11 @@ class Session:
     def _between(self, *, ended: bool = False) -> None:
         """Between two movements: do what is wanted, draw the map now and then, wait until the next one is due."""
         self._hurry = max(0, self._hurry - 1)
-        if self._hurry and not self.parts.learner.idle and not ended:
+        if self._hurry and not self.run.parts.learner.idle and not ended:
             return
         self._hurry = 0
         for done in filter(None, (self._shown, self._going_back)):
-            self.life.summarise()
+            self.run.flush()
             self._draw()
             done.set_result(None)
         self._shown = self._going_back = None
@@ -231,8 +195,8 @@ class Session:
                 self._draw()
             if left <= 0 and not still:
                 break
-            if self.directory.summary.get("movements") != self.life.movements and (still or left > CHART_EVERY):
-                self.life.summarise()  # a killed process loses nothing
+            if still or left > CHART_EVERY:
+                self.run.flush()  # a killed process loses nothing
             self._errands.wait(0.25 if still else min(left, 0.25))
         self._made = time.monotonic()
 
@@ -248,54 +212,31 @@ class Session:
         chart = self._state.chart
         return chart is not None and (chart.movements, chart.lessons) == (self._state.movements, self._state.lessons)
 
-    def _draw(self) -> Chart:
-        memory, robot = self.parts.learner.memory, self.parts.environment
-        so_far = {"movements": self._state.movements, "lessons": self._state.lessons}
-        chart = chart_of(memory, robot.outcomes, robot.rest, self.parts.benchmark, self.context, **so_far)
+    def _draw(self) -> None:
+        chart = self.run.chart(self._state.lessons)
         curve = [point for point in self._state.curve if point[0] < chart.movements]
         self._drawn = time.monotonic()
         self._tell(chart=chart, curve=(*curve, (chart.movements, chart.mean_error)))
-        return chart
-
-    def _lesson(self, recording: Recording) -> HandLesson:
-        task, robot = self.parts.task, self.parts.environment
-        assert task is not None
-        rng = stream(self.config.seed, "lessons", len(self.hand.lessons))
-        return lesson_by_hand(recording, robot, correspondence_of(task), hand_led_of(task), rng, context=self.context)
 
     def _show(self, demonstration: Demonstration) -> Future[None]:
-        made, total = self.life.movements, self.config.movements
-        if self.cannot_be_taught:
-            raise ValueError(self.cannot_be_taught)
-        if made >= total:
-            raise ValueError(NO_MORE.format(total, 2 * total))
-        self.parts.environment.contexts.check("context of the lesson", demonstration.context)
-        self.parts.learner.translate(demonstration)
-        if self.parts.teachers and not self._state.waiting:
-            raise ValueError("this learner takes a lesson only when it asks for one; wait until it asks, or save it")
-        self._tell(before=self._draw())
+        self.run.check(demonstration, asked=self._state.waiting)
+        self._draw()
+        self._tell(before=self._state.chart)
         self._shown, self._hurry = Future(), ANSWERS + 1
-        if self.parts.teachers:
-            self.parts.environment.outcomes.check("outcome of the lesson", demonstration.outcome)
+        if self._state.waiting:
             self._answer = demonstration
         else:
-            self._keep(GivenLesson(made, demonstration))
+            self.run.keep(GivenLesson(self.run.life.movements, demonstration))
         return self._shown
-
-    def _keep(self, lesson: GivenLesson) -> None:
-        """On disk first: a process that is killed now shows it when it goes on."""
-        keep_lesson(self.directory.path / FOLDER, lesson)
-        self.hand.add(lesson)
-        self.life.add_demonstration(lesson.demonstration)
-        self.life.summarise()
 
     def _asked(self, index: int, context: Array, goal: Array, memory: Memory) -> Demonstration | None:
         """The answer of whoever is there; None at once if nobody is."""
         self._answer = None
-        self._tell(asked=goal, best=self._best(context, goal, memory), waiting=self.answered)
+        self._tell(asked=goal, best=self.run.best_try(context, goal, memory), waiting=self.answered)
         while self._state.waiting and self._answer is None:
             if not self._is_drawn:
                 self._draw()
+            self.run.flush()
             self._do_errands()
             self._errands.wait(0.05)
         self._tell(waiting=False)
@@ -305,35 +246,17 @@ class Session:
         """What was shown while the learner waited before movement ``index``; it is kept."""
         if self._answer is not None:
             self._tell(asked=None, best=None)
-            self._keep(GivenLesson(index, self._answer, asked=True))
+            self.run.keep(GivenLesson(index, self._answer, asked=True))
         return self._answer
 
-    def _best(self, context: Array, goal: Array, memory: Memory) -> Recorded | None:
-        if not len(memory) or self.parts.record is None:
-            return None
-        row = int(memory.near_outcomes(context, goal, 1)[0])
-        return self.parts.record(memory.contexts[row], memory.thetas[row], stream(self.config.seed, "best try", row))
-
     def _take_back(self) -> Future[None]:
-        if not self.hand.lessons:
+        if not self.run.hand.lessons:
             raise ValueError("there is no lesson to take back")
         self._going_back = Future()
         return self._going_back
 
     def _go_back(self) -> None:
-        last = self.hand.lessons[max(self.hand.lessons)]
         self._tell(busy="going back", waiting=False)
-        self._close()
-        take_back(self.directory, last)
-        self._tell(curve=tuple(point for point in self._state.curve if point[0] <= last.index))
-        self._open()
-
-    def _try(self, goal: Array) -> Trial:
-        self._trials += 1
-        return try_goal(self.parts, self.context, goal, stream(self.config.seed, "trials", self._trials))
-
-    def _recorded(self, episode: Episode) -> Recorded | None:
-        if episode.move is None or self.parts.record is None:
-            return None
-        rng = stream(self.config.seed, "environment", episode.index)
-        return self.parts.record(episode.context, episode.move.theta, rng)
+        left = self.run.go_back()
+        self._latest.clear()
+        self._tell(curve=tuple(point for point in self._state.curve if point[0] <= left))

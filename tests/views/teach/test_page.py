@@ -87,10 +87,10 @@ def test_a_person_leads_the_arm_teaches_it_and_sees_what_changed(open_tab, rod):
     print(f"\nfrom the click on 'show' to a screenshot with the new map: {time.monotonic() - begun:.2f} s", end=" ")
     print(f"({clicked - begun:.2f} s of it for the click)")
 
-    (kept,) = read_lessons(rod.session.directory.path / "lessons")
-    theta = rod.session.parts.learner.translate(kept.demonstration)
+    (kept,) = read_lessons(rod.session.run.directory.path / "lessons")
+    theta = rod.session.run.parts.learner.translate(kept.demonstration)
     assert np.array_equal(theta, lesson.theta_d)  # through the file, bit for bit
-    (loaded,) = load_demonstrations(rod.session.directory.path / "lessons" / f"before-{kept.index:06d}.npz")
+    (loaded,) = load_demonstrations(rod.session.run.directory.path / "lessons" / f"before-{kept.index:06d}.npz")
     assert np.array_equal(FishingRod().primitive.correspondence(loaded.times, loaded.trajectory), theta)
 
     time.sleep(6.5)  # what changed is no longer shown

@@ -25,7 +25,7 @@ from sgimd_torch.runs.tasks import arm_demonstrations
 from sgimd_torch.teachers.by_hand import ByHand, GivenLesson, keep_lesson, read_lessons
 from sgimd_torch.views.report.command import main as report
 from sgimd_torch.views.report.data import demonstrated, read_life
-from sgimd_torch.views.teach import options_of, main
+from sgimd_torch.views.teach import main, options_of
 from sgimd_torch.views.teach.session import Session
 
 SHOWN = arm_demonstrations(PlanarArm())
@@ -91,7 +91,7 @@ def test_a_lesson_is_answered_at_once_also_while_the_learner_is_paused(going):
 def test_the_map_after_a_lesson_is_better_where_the_lesson_landed(going):
     session = going(5)
     session.show(SHOWN[120]).result()
-    state, box = session.state, session.parts.environment.outcomes
+    state, box = session.state, session.run.parts.environment.outcomes
     column, row = ((SHOWN[120].outcome - box.low) / box.sides * state.chart.error.shape[0]).astype(int)
     assert state.chart.error[row, column] < 0.05 < state.before.error[row, column]
     assert (state.chart.movements, state.chart.lessons) == (state.movements, 1)
@@ -104,7 +104,7 @@ def test_the_run_repeats_byte_for_byte_without_a_page(going, tmp_path):
     session.pause(False)
     until(lambda: session.state.movements > 100)
     session.__exit__()
-    log = (session.directory.path / "episodes.csv").read_bytes()
+    log = (session.run.directory.path / "episodes.csv").read_bytes()
     assert again(session.config, tmp_path / "alone", session.state.movements) == log
 
 
@@ -113,7 +113,7 @@ def test_the_log_names_lessons_by_rows_after_those_of_the_file(going):
     session.show(SHOWN[3]).result()
     session.show(SHOWN[4]).result()
     session.__exit__()
-    rows = read_run(session.directory.path).demonstration
+    rows = read_run(session.run.directory.path).demonstration
     assert rows[rows >= 127].tolist() == [127, 128]
     assert (rows[rows >= 0] < 127).sum() >= 1
     parts = build(session.config)
@@ -133,18 +133,18 @@ def test_a_session_goes_on_where_it_was_stopped(going, tmp_path):
     session = going()
     session.show(SHOWN[7]).result()
     session.__exit__()
-    log = (session.directory.path / "episodes.csv").read_bytes()
+    log = (session.run.directory.path / "episodes.csv").read_bytes()
     with Session(session.config) as other:
         other.pause(True)
         until(lambda: not other.state.busy)
         assert other.state.lessons == 1
-        assert len(other.parts.learner.memory) == other.state.movements
-    assert (session.directory.path / "episodes.csv").read_bytes().startswith(log)
+        assert len(other.run.parts.learner.memory) == other.state.movements
+    assert (session.run.directory.path / "episodes.csv").read_bytes().startswith(log)
 
 
 def test_taking_back_a_lesson_leaves_the_run_as_it_was_before_and_keeps_what_is_taken_back(going):
     session = going(25)
-    path = session.directory.path
+    path = session.run.directory.path
     session.show(SHOWN[7]).result()
     names = ("episodes.csv", "evaluation.csv", "regions.csv")
     before = {name: (path / name).read_bytes() for name in names}
@@ -168,21 +168,21 @@ def test_taking_back_a_lesson_leaves_the_run_as_it_was_before_and_keeps_what_is_
 def test_the_same_lesson_after_taking_it_back_leads_to_the_same_run(going):
     session = going()
     session.show(SHOWN[7]).result()
-    log = (session.directory.path / "episodes.csv").read_bytes()
+    log = (session.run.directory.path / "episodes.csv").read_bytes()
     session.take_back().result()
     session.show(SHOWN[7]).result()
-    assert (session.directory.path / "episodes.csv").read_bytes() == log
+    assert (session.run.directory.path / "episodes.csv").read_bytes() == log
 
 
 def test_a_trial_changes_nothing_and_lands_where_the_arm_without_noise_does(going):
     session = going()
-    memory, log = len(session.parts.learner.memory), (session.directory.path / "episodes.csv").read_bytes()
+    memory, log = len(session.run.parts.learner.memory), (session.run.directory.path / "episodes.csv").read_bytes()
     trial = session.try_goal(np.array([0.3, 0.4])).result()
     arm = PlanarArm()
     assert np.allclose(arm.execute(np.empty(0), trial.theta, np.random.default_rng(0)), trial.outcome)
     assert trial.missed == pytest.approx(np.linalg.norm(trial.outcome - [0.3, 0.4]))
-    assert len(session.parts.learner.memory) == memory
-    assert (session.directory.path / "episodes.csv").read_bytes() == log
+    assert len(session.run.parts.learner.memory) == memory
+    assert (session.run.directory.path / "episodes.csv").read_bytes() == log
     with pytest.raises(ValueError, match="must lie in its box"):
         session.try_goal(np.array([3.0, 0.4])).result()
 
@@ -193,7 +193,7 @@ def test_what_the_robot_cannot_use_is_refused_and_nothing_happens(going):
     with pytest.raises(ValueError, match="first joint turns within"):
         session.show(replace(SHOWN[0], trajectory=100 * SHOWN[0].trajectory)).result()
     assert (session.state.movements, session.state.lessons) == (made, 0)
-    assert not (session.directory.path / "lessons").exists()
+    assert not (session.run.directory.path / "lessons").exists()
 
 
 def test_a_learner_that_learns_alone_says_so(going):
@@ -227,10 +227,10 @@ def test_a_learner_that_asks_waits_for_the_answer_and_repeats_it_alone(going, tm
     session.answered = False
     until(lambda: session.state.movements > made + 60)
     session.__exit__()
-    (lesson,) = read_lessons(session.directory.path / "lessons")
+    (lesson,) = read_lessons(session.run.directory.path / "lessons")
     assert lesson.asked
     assert lesson.index == made
-    log = (session.directory.path / "episodes.csv").read_bytes()
+    log = (session.run.directory.path / "episodes.csv").read_bytes()
     assert again(session.config, tmp_path / "alone", session.state.movements) == log
 
 
@@ -238,15 +238,15 @@ def test_a_report_shows_lessons_that_were_given_by_hand(going, tmp_path):
     session = going(40, teacher="periodic")
     for row in (3, 4):
         session.show(SHOWN[row]).result()
-    made = session.state.movements
+    before = ", ".join(map(str, session.run.hand.lessons))
     session.__exit__()
-    (life,) = [read_life(session.directory.path)]
+    (life,) = [read_life(session.run.directory.path)]
     outcomes, missing = demonstrated([life])
     assert missing == ""
     assert {tuple(each) for each in outcomes} >= {tuple(SHOWN[row].outcome) for row in (3, 4)}
     assert len(outcomes) == len(life.shown)  # one of the teacher's own, and two by hand
-    assert command(report, [str(session.directory.path), "--out", str(tmp_path / "report.html")]) == 0
-    told = f"Seed 0 was given 2 lessons by hand, before movements {made - 20}, {made - 10}."
+    assert command(report, [str(session.run.directory.path), "--out", str(tmp_path / "report.html")]) == 0
+    told = f"Seed 0 was given 2 lessons by hand, before movements {before}."
     assert told in (tmp_path / "report.html").read_text()
 
 
@@ -307,7 +307,7 @@ def test_a_run_that_is_taught_has_a_person_as_its_teacher(tmp_path, going):
     assert config.teachers == ("by-hand",)
     session = going()
     session.__exit__()
-    config, _ = options_of([str(session.directory.path)])
+    config, _ = options_of([str(session.run.directory.path)])
     assert config == session.config
     with pytest.raises(RunError, match="no run directory"):
         options_of([str(tmp_path)])
