@@ -2,8 +2,8 @@
 
 variants.py says which variants there are. A run goes to OUT/VARIANT/seed-003. When it ends, each of its evaluations
 becomes lines of RESULTS/paper.csv, one for each inverse model that answers; of RESULTS/forward_model.csv for
-forward-model and planar-arm-*, of RESULTS/gymnasium.csv for swimmer. The goals that it chose in the large task space
-are counted in RESULTS/goals.csv. A variant in two experiments is run once.
+forward-model and planar-arm-*, of RESULTS/gymnasium.csv for swimmer, of RESULTS/by_hand.csv for by-hand. The goals that
+it chose in the large task space are counted in RESULTS/goals.csv. A variant in two experiments is run once.
 
 Start the same command again after Ctrl-C or a power cut, or with more seeds: what is in the tables is not run again,
 and a run that was stopped goes on. If a run fails, the others go on.
