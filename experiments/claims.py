@@ -1,4 +1,4 @@
-"""The pages in results/: RESULTS, FORWARD_MODEL, GYMNASIUM, LEARNING: claims, our numbers, and whether they hold.
+"""The pages in results/, such as RESULTS.md and LEARNING.md: claims, our numbers, and whether they hold.
 
 Each page is a template in experiments/pages/, which has the text; the tables are put in by name. Change the template,
 not the page. The tables come from the rows in --results, which compare.py writes:
@@ -7,6 +7,7 @@ not the page. The tables come from the rows in --results, which compare.py write
   FORWARD_MODEL   forward_model.csv, and the table of model_figures.py (--table) if it exists
   GYMNASIUM       gymnasium.csv
   LEARNING        learning.csv and suite.csv
+  BY_HAND         by_hand.csv
 
 Intervals are bootstrapped with a fixed seed, so the same rows give the same page. The analyses of variance need
 run directories: --runs makes them again and keeps their rows in anova.csv.
@@ -42,9 +43,10 @@ with loading():  # Ctrl-C shows no traceback
     from sgimd_torch.views.suite import RANDOM
     from variants import EXPERIMENTS, LEARNING, SUITED, ladder
 
-PAGES: Final = ("RESULTS", "FORWARD_MODEL", "GYMNASIUM", "LEARNING")
+PAGES: Final = ("RESULTS", "FORWARD_MODEL", "GYMNASIUM", "LEARNING", "BY_HAND")
 ANOVA: Final = ("means compared", "of", "dimensions of theta in which they differ", "smallest p", "largest p")
 ON_ARMS: Final = (250, 500, 1000, 2000)
+EARLY: Final = (300, 500, 1000)
 # For the forward model's page: how names of variants end, and at which movements they are evaluated.
 MODEL_TABLES: Final = {
     "forward-model": ("", (500, 1000, 2000, LAST)),
@@ -157,6 +159,20 @@ def learning_page(folder: Path) -> Page:
         **{f"suite_{when}": markdown(["task", "random, nearest", *others], suite_rows(suite, when)) for when in TIMES},
     }
     return Page(verdicts, tables, rod["judged"])
+
+
+def hand_page(folder: Path) -> Page:
+    """The page results/BY_HAND.md: each learner alone, with ten lessons by hand, and with ten shipped ones."""
+    results = Results(read_results(folder / "by_hand.csv"))
+    columns = _errors(results, EARLY, ".3f")
+    for when in (EARLY[0], EARLY[-1]):
+        _, columns[f"difference to the same learner alone at {when} (m)"] = _against(results, _alone, when)
+    return Page([], {"by-hand": variants_table([*EXPERIMENTS["by-hand"]], columns)}, results)
+
+
+def _alone(name: str) -> str:
+    """The same learner without a teacher."""
+    return f"{name.partition('-')[0]}-alone"
 
 
 def _answers(name: str, answer: str) -> bool:
@@ -291,6 +307,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         "FORWARD_MODEL": lambda: model_page(folder, table),
         "GYMNASIUM": lambda: gymnasium_page(folder),
         "LEARNING": lambda: learning_page(folder),
+        "BY_HAND": lambda: hand_page(folder),
     }
     paths = {name: options.out / f"{name}.md" for name in PAGES if options.only in (None, name)}
     for path in paths.values():

@@ -2,9 +2,9 @@
 
 variants.py says which variants there are. A run goes to OUT/VARIANT/seed-003. When it ends, each of its evaluations
 becomes lines of RESULTS/paper.csv, one for each inverse model that answers; of RESULTS/forward_model.csv for
-forward-model and planar-arm-*, of RESULTS/gymnasium.csv for swimmer, of RESULTS/asking.csv for asking, whose requests
-are counted in RESULTS/asked.csv. The goals that it chose in the large task space
-are counted in RESULTS/goals.csv. A variant in two experiments is run once.
+forward-model and planar-arm-*, of RESULTS/gymnasium.csv for swimmer, of RESULTS/by_hand.csv for by-hand, of
+RESULTS/asking.csv for asking, whose requests are counted in RESULTS/asked.csv. The goals that it chose in the large
+task space are counted in RESULTS/goals.csv. A variant in two experiments is run once.
 
 Start the same command again after Ctrl-C or a power cut, or with more seeds: what is in the tables is not run again,
 and a run that was stopped goes on. If a run fails, the others go on.
@@ -33,7 +33,7 @@ with loading():  # Ctrl-C shows no traceback
     from sgimd_torch.runs.read import finished, read_run
     from sgimd_torch.runs.sweep import add_engines, add_options, engine_of
     from tables import COLUMNS, RESULTS, Key, Table, as_text, asked_rows, goal_rows, result_rows
-    from variants import CORNER, EARLIER, EXPERIMENTS, FEW, HALF, MANY, SHUFFLED, Variant, make_subsets, tables_of
+    from variants import EARLIER, EXPERIMENTS, MADE, Variant, make_subsets, tables_of
 
 EXAMPLES: Final = f"""experiments: {", ".join(EXPERIMENTS)}
 
@@ -78,7 +78,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         print("".join(f"{name}: {config.title}\n" for name, config in left), end="")
         return 0
     make_folder(options.results)
-    make_subsets(options.out / "demonstrations")
+    make_subsets(options.out / "demonstrations", by_hand="by-hand" in options.experiments)
     homes: dict[Config, list[str]] = {}  # the experiments that a run belongs to
     for name, config in left:
         homes.setdefault(config, []).append(name)
@@ -119,7 +119,7 @@ def verify(wanted: Sequence[tuple[str, Config]], options: argparse.Namespace) ->
     if options.dry_run:
         print("".join(f"{config.title} at {config.movements}\n" for config in again.values()), end="")
         return 0
-    make_subsets(options.out / "demonstrations")
+    make_subsets(options.out / "demonstrations", by_hand="by-hand" in options.experiments)
     configs = list(dict.fromkeys(again.values()))
     with engine_of(options, configs) as engine:
         failures = sweep(configs, engine)
@@ -171,7 +171,7 @@ def runs_of(
                     continue
                 changes = dict(line)
                 shown = changes.get("demonstrations")
-                if shown in (FEW, HALF, MANY, CORNER, SHUFFLED):
+                if shown in MADE:
                     changes["demonstrations"] = out / "demonstrations" / shown
                 floor_at = FLOOR_AT if experiment in FLOORS else ()
                 fixed: Variant = {"answers": ANSWERS, "floor_at": floor_at}

@@ -40,8 +40,10 @@ PROVED: Final = ("own", "nearest", "linear", "process")  # the answers of experi
 LARGE: Final[Variant] = {"task_space": 100.0}
 BASELINE: Final[Variant] = {"goals": "uniform", "inverse": "nearest", "search": "perturb"}  # the field's standard one
 SCHOOL: Final = ("map-elites", "isoline", "isoline-again", "cma-me", "cma-mae")  # quality diversity
-# Made from the shipped demonstrations by ``make_subsets``.
-FEW, HALF, MANY, CORNER, SHUFFLED = (Path(f"{name}.npz") for name in ("few", "half", "many", "corner", "shuffled"))
+# Made by ``make_subsets``: from the shipped demonstrations, and lessons by hand.
+FEW, MANY, HALF, CORNER, SHUFFLED, TEN, HAND = MADE = tuple(
+    Path(f"{name}.npz") for name in ("few", "many", "half", "corner", "shuffled", "ten", "hand")
+)
 # Ways to refine a movement for a goal, and to answer in evaluations. Each line is a variant on the rod and, with a
 # longer name, on every arm.
 MODEL: Final[Variant] = {**SGIM_D, "inverse": "model"}
@@ -105,6 +107,9 @@ LEARNING: Final[dict[str, Variant]] = {
         "map-elites-taught": {"algorithm": "map-elites-taught"},
     }.items()
 }
+# Ten lessons, as a person gives them in a session: all of them early, in a short life.
+SESSION: Final[Variant] = {"movements": 1000, "evaluate_at": (300, 500), "answers": PROVED}  # and at the end
+SHOWN: Final[dict[str, Variant]] = {"goals": {**SGIM_D, "teacher": "initial"}, "practice": TAUGHT}
 # Movements of an arm take no time, so training may take more.
 ON_ARMS: Final[Variant] = {"movements": 2000, "evaluate_at": (250, 500, 1000, 1500)}  # and at the end
 LONGER: Final[Variant] = {"training": 2.0}
@@ -224,6 +229,12 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
         **{f"{name}-swimmer": {"algorithm": name, "inverse": "model", **SWIMMER} for name in SWIMMERS},
         "practice-swimmer": {"algorithm": "practice", **SWIMMER},
     },
+    "by-hand": {
+        "goals-alone": {**SAGG_RIAC, **SESSION},
+        "practice-alone": {"algorithm": "practice", **SESSION},
+        **{f"{name}-by-hand": {**line, **SESSION, "demonstrations": HAND} for name, line in SHOWN.items()},
+        **{f"{name}-ten-shipped": {**line, **SESSION, "demonstrations": TEN} for name, line in SHOWN.items()},
+    },
     "learning": LEARNING,
     "suite": {
         f"{name}.{task}": LEARNING.get(f"{name}.{task}", {**line, **suited.options, **IN_SUITE})
@@ -235,13 +246,13 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
 
 
 # Earlier rows were made when `LocallyLinear` was the default.
-EARLIER: Final = [name for name in EXPERIMENTS if name not in ("learning", "suite", "asking")]
+EARLIER: Final = [name for name in EXPERIMENTS if name not in ("asking", "by-hand", "learning", "suite")]
 
 
 def tables_of(experiment: str) -> list[str]:
     """The tables of results that its runs write rows to; the first has their evaluations."""
-    if experiment in ("learning", "suite"):
-        return [f"{experiment}.csv"]
+    if experiment in ("by-hand", "learning", "suite"):
+        return [f"{experiment.replace('-', '_')}.csv"]
     if experiment in ("forward-model", *ARMS):
         return ["forward_model.csv"]
     if experiment == "swimmer":
@@ -251,9 +262,10 @@ def tables_of(experiment: str) -> list[str]:
     return ["paper.csv", *(["goals.csv"] if experiment in ("large-space", "ladder-large") else [])]
 
 
-def make_subsets(folder: Path) -> None:
-    """Write what is made of the demonstrations: a few, 13 of 127, and many, 83; those in the right half of the plane;
-    the 20 nearest to one corner; all with their outcomes dealt out anew, so that what is shown is not what is said.
+def make_subsets(folder: Path, *, by_hand: bool = False) -> None:
+    """Write what is made of the demonstrations: a few, 13 of 127, many, 83, and ten; those in the right half of the
+    plane; the 20 nearest to one corner; all with their outcomes dealt out anew, so that what is shown is not what is
+    said. And, if asked, ten lessons by hand.
 
     Raises:
         RunError, OSError: it cannot be written.
@@ -266,9 +278,13 @@ def make_subsets(folder: Path) -> None:
     shuffled = [replace(each, outcome=outcome) for each, outcome in zip(everything, dealt, strict=True)]
     make_folder(folder)
     # The shipped ones are ordered so that the first ones are spread.
-    few, many = everything[:13], everything[:83]
-    for name, chosen in ((FEW, few), (MANY, many), (HALF, right), (CORNER, corner), (SHUFFLED, shuffled)):
+    first = ((FEW, everything[:13]), (MANY, everything[:83]), (TEN, everything[:10]))
+    for name, chosen in (*first, (HALF, right), (CORNER, corner), (SHUFFLED, shuffled)):
         save_demonstrations(folder / name, chosen)
+    if by_hand:
+        from by_hand import lessons_of_a_script  # MuJoCo is loaded only when it is needed
+
+        save_demonstrations(folder / HAND, [lesson.demonstration for lesson in lessons_of_a_script()])
 
 
 def teacher_of(config: Config) -> str:

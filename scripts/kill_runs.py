@@ -80,8 +80,8 @@ def child(descriptor: int, words: Sequence[str]) -> int:
         setattr(owner, name, call)
 
     telling(run, "RunDirectory", "replay" if "--resume" in words else "start")
-    telling(run._Life, "_begin", "", "movements")
-    telling(run._Life, "_evaluate", "evaluation", "movements")
+    telling(run.Life, "_begin", "", "movements")
+    telling(run.Life, "_evaluate", "evaluation", "movements")
     telling(process.Progress, "__exit__", "end")
     if "model" in words:
         from sgimd_torch.forward_model.training import OnlineTrainer

@@ -337,6 +337,9 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
         "asked": _at(
             "teachers:AskedTeacher", "when the learner stalls", uses={"patience": "every", "choose": "choice"}
         ),
+        "by-hand": _at(
+            "teachers.by_hand:nobody", "a person, whenever they like: sgimd teach", ignores=("demonstrations",)
+        ),
     },
     "teachers": {
         "all": _answering("shows the nearest of all demonstrations"),
@@ -355,6 +358,9 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
             "shows something else than is said", knows="sgimd_torch.teachers.answering:mislabelled"
         ),
         "slow": _answering("the nearest of all, for which the learner rests 10 movements", takes=10),
+        "by-hand": _at(
+            "teachers.by_hand:nobody", "a person, if there is one: sgimd teach", ignores=("demonstrations",)
+        ),
     },
     "choice": {
         "least-explored": _at("teachers:least_explored", "the one whose outcome the learner has reached least"),

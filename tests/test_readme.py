@@ -23,10 +23,14 @@ from own import MODULE
 from sgimd_torch.__main__ import COMMANDS, _call
 from sgimd_torch.runs.command_line import parse
 from sgimd_torch.runs.process import command
+from sgimd_torch.views.teach import options_of
 
 ROOT = Path(__file__).parent.parent
 ALONE = ("README.md", "CONTRIBUTING.md")  # each block by itself
-HOW_TO = tuple(f"docs/{name}.md" for name in ("own-robot", "reading-runs", "own-demonstrations", "own-teacher", "asking"))
+HOW_TO = tuple(
+    f"docs/{name}.md"
+    for name in ("own-robot", "reading-runs", "own-demonstrations", "teaching-by-hand", "own-teacher", "asking")
+)
 PAGES = [
     *ALONE,
     "CHANGELOG.md",
@@ -136,6 +140,8 @@ def understand(name, words):
         parse(words)
     elif name in ("sweep", "suite"):
         assert command(_call, [name, *words, "--dry-run"]) == 0
+    elif name == "teach" and not (words and words[0].startswith("runs/")):  # it would serve until Ctrl-C
+        options_of(words)
     elif name == "check":
         assert command(_call, [name, *words]) == 0
     else:  # a parser that refuses words raises SystemExit

@@ -15,7 +15,8 @@ import sgimd_torch
 PACKAGE = "sgimd_torch"
 ROWS = [  # a room imports only from the rows before its own
     {"spaces", "files", "catalogue"},
-    {"memory", "environments", "demonstrations", "goals"},
+    {"memory", "environments", "goals"},
+    {"demonstrations"},
     {"competence", "teachers", "evaluation", "forward_model"},
     {"strategies", "inverses", "searches", "figures"},
     {"learner", "board"},
@@ -31,7 +32,13 @@ LIBRARIES = {  # library: the only rooms that may import it; of a folder, where 
     "scipy": ROW.keys() - {"spaces"},
     "lazy_loader": {"__init__"},
     "faiss": {"memory/neighbours"},
-    "mujoco": {"environments/rod_physics", "views/film"},
+    "mujoco": {
+        "environments/rod_physics",
+        "environments/planar_model",
+        "demonstrations/arm",
+        "views/film",
+        "views/teach",
+    },
     "torch": {"forward_model", "inverses/through_model", "searches/through_model"},
     "lightning": {"forward_model"},
     "safetensors": {"forward_model"},
@@ -39,6 +46,8 @@ LIBRARIES = {  # library: the only rooms that may import it; of a folder, where 
     "matplotlib": {"figures", "board/pictures", "views"},
     "PIL": {"views/film", "views/report"},
     "imageio_ffmpeg": {"views/film", "views/report"},
+    "viser": {"views/teach"},
+    "trimesh": {"views/teach"},
     "jinja2": {"views/report"},
     "jsonargparse": {"runs/command_line"},
     "tqdm": {"runs/process", "views"},
@@ -229,6 +238,7 @@ HEAVY = {
     "ribs",
     "jinja2",
     "gymnasium",
+    "viser",
 }
 
 

@@ -69,6 +69,21 @@ class GaussianPrimitive:
         times = np.linspace(0.0, duration, max(2, int(np.ceil(duration * rate)) + 1))
         return times, self.at(theta, times)
 
+    def fastest(self) -> tuple[Array, Array]:
+        """``(n_joints,)`` rad/s and rad/s^2: the largest speeds and accelerations that any theta commands.
+
+        They are those of the shortest duration, with each knot at that end of its range which adds to them.
+        """
+        phases = np.linspace(0.0, 1.0, 1001)
+        weights = self._weights(phases)
+        slopes = -2 * self.sharpness * (phases[:, None] - self._centres)  # of the logarithms of eq. (5)'s weights
+        apart = slopes - (weights * slopes).sum(axis=1, keepdims=True)
+        first = weights * apart
+        second = weights * (apart**2 - (first * slopes).sum(axis=1, keepdims=True))
+        # The weights always add up to 1, so what some gain the others lose: half of all change is the positive part.
+        speed, acceleration = (np.abs(each).sum(axis=1).max() / 2 for each in (first, second))
+        return self.joints.sides * speed / self.durations[0], self.joints.sides * acceleration / self.durations[0] ** 2
+
     def correspondence(self, times: ArrayLike, trajectory: ArrayLike) -> Array:
         """theta_d, the policy that reproduces a demonstrated trajectory most closely, eq. (6).
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -116,6 +116,31 @@ class Sketch:
     def landed(self) -> float:
         """How long (s) the movement takes."""
         return self.step * (len(self.chains) - 1)
+
+
+@dataclass(frozen=True, eq=False)
+class HandLed:
+    """A robot that a person can lead by the hand: the optional attribute ``hand_led`` of an environment.
+
+    ``Leading`` in demonstrations/leading.py moves it and checks what is said here.
+
+    Args:
+        model: a ``mujoco.MjModel``, where the robot stands at its start, or can be put there by its joints.
+        joints: names of its joints that a policy moves, in the order of a recording's columns.
+        hand: name of the body or site by which it is led if nothing else is grabbed.
+        ranges: ``(n_joints,)`` rad, or m of a slide joint; None for those of the model.
+        start: ``(n_joints,)`` where every movement starts, in the context 0; None for the model's own posture.
+        speeds, accelerations: ``(n_joints,)`` rad/s and rad/s^2, the largest that the robot's own movements have, so
+            that it can do again what it was led through; None for an arm that crosses its ranges in about a second.
+    """
+
+    model: Any
+    joints: tuple[str, ...]
+    hand: str
+    ranges: Box | None = None
+    start: Array | None = None
+    speeds: Array | None = None
+    accelerations: Array | None = None
 
 
 Record = Callable[[Array, Array, np.random.Generator], Recorded]

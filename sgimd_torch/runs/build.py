@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from sgimd_torch.catalogue import CATALOGUE, SHARED, checked, find
@@ -20,6 +21,7 @@ from sgimd_torch.runs.tasks import Task, benchmark_of, correspondence_of, demons
 from sgimd_torch.spaces import Array, Demonstration, Estimate, stream
 from sgimd_torch.teachers import Teacher
 from sgimd_torch.teachers.answering import Demonstrator
+from sgimd_torch.teachers.by_hand import FOLDER, ByHand, read_lessons
 
 if TYPE_CHECKING:
     from sgimd_torch.forward_model.anchored import Trust
@@ -33,7 +35,7 @@ class RunParts:
     """What a run needs. ``config`` is what it was made from. ``answers`` are the inverses to evaluate by, the run's own
     first; they read the learner's memory. ``model`` is refreshed after each movement; it and its ``trust`` are None for
     a run without a model. ``teacher`` demonstrates, ``teachers`` are asked for it; without any of them there are no
-    ``demonstrations``, which are those of the file, then what teachers have besides.
+    ``demonstrations``: those of the file, what teachers have besides, then a person's lessons, which ``hand`` gives.
     ``data`` holds checksums of the files that were read, ``notes`` messages for the user. ``record`` gives a movement
     to be filmed, None if the task has no picture of its own."""
 
@@ -50,6 +52,8 @@ class RunParts:
     notes: Sequence[str] = ()
     record: Record | None = None
     teachers: Mapping[str, Demonstrator] = field(default_factory=dict)
+    task: Task | None = None
+    hand: ByHand | None = None
 
     @property
     def inverse(self) -> Callable[[Array, Array], Estimate]:
@@ -62,8 +66,12 @@ class RunParts:
         return list(getattr(getattr(self.learner.autonomous, "goals", None), "regions", ()))
 
 
-def build(config: Config) -> RunParts:
+def build(config: Config, directory: Path | None = None) -> RunParts:
     """Put a run together; nothing is executed yet.
+
+    Args:
+        config: its choices.
+        directory: where the lessons of a person are, if there are any; None for where the run is written.
 
     Raises:
         ValueError: a part refuses its option, or a file does not fit the robot.
@@ -74,13 +82,17 @@ def build(config: Config) -> RunParts:
     benchmark, notes, benchmark_crc32 = benchmark_of(task, config.benchmark)
     demonstrations: Sequence[Demonstration] = []
     teacher, demonstrations_crc32 = None, None
-    if parts.used & {"teacher", "teachers"}:
+    if parts.used & {"teacher", "teachers"} and "demonstrations" in parts.used:
         demonstrations, about_them, demonstrations_crc32 = demonstrations_of(task, config.demonstrations)
         notes += about_them
     if "teacher" in parts.used:
         teacher = parts["teacher"](demonstrations, stream(config.seed, "teacher"))
     teachers = parts.asked(demonstrations) if "teachers" in parts.used else {}
     demonstrations = [*demonstrations, *_others(demonstrations, teachers)]
+    lessons = read_lessons((directory or config.directory) / FOLDER)
+    hand = next((each for each in teachers.values() if isinstance(each, ByHand)), ByHand(teacher=teacher))
+    for lesson in lessons:
+        hand.add(lesson)
     learner = parts["algorithm"](task.environment, config.seed)
     words = {answer: config.inverse if answer == OWN else answer for answer in config.answered}
     if "inverse" in config.entry("algorithm").options and config.entry("inverse").learns_with is None:
@@ -93,8 +105,8 @@ def build(config: Config) -> RunParts:
         config=config,
         environment=task.environment,
         learner=learner,
-        teacher=teacher,
-        demonstrations=demonstrations,
+        teacher=hand if lessons or "by-hand" in (config.teacher, *config.teachers) else teacher,
+        demonstrations=[*demonstrations, *(lesson.demonstration for lesson in lessons)],
         answers={answer: inverses[word] for answer, word in words.items()},
         benchmark=benchmark,
         data={"demonstrations_crc32": demonstrations_crc32, "benchmark_crc32": benchmark_crc32},
@@ -103,6 +115,8 @@ def build(config: Config) -> RunParts:
         notes=[*config.without_effect, *notes],
         record=task.picture,
         teachers=teachers,
+        task=task,
+        hand=hand,
     )
 
 

@@ -353,8 +353,9 @@ class Config:
         while waiting:
             name = waiting.pop()
             used.add(name)
-            for entry in self.entries(name) if name in CATALOGUE or name in SHARED else ():
-                ignored |= {*entry.ignores}
+            entries = self.entries(name) if name in CATALOGUE or name in SHARED else []
+            for entry in entries:
+                ignored |= {option for option in entry.ignores if all(option in each.ignores for each in entries)}
                 waiting += [each for each in entry.options if each not in used]
         entries = [*SHARED.values(), *(entry for entries in CATALOGUE.values() for entry in entries.values())]
         named = {each for entry in entries for each in entry.options}

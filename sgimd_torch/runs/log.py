@@ -16,6 +16,7 @@
     predictions.csv  with a forward model: what it predicted of each exemplar before learning it, and what happened
     refreshes.csv    with a forward model: a line each time that it has learnt
     summary.json     movements so far, the last evaluation, seconds spent on physics, learning and evaluating
+    lessons/         what a person has shown, see teachers/by_hand.py
     lock             held by the process that writes
     *.lost-0         a log as it was found, where movements of it were missing or damaged
 

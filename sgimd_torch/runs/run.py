@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Iterator
 from contextlib import nullcontext
 
 from sgimd_torch.environments.protocol import SimulationError
@@ -21,7 +22,9 @@ from sgimd_torch.runs.model_record import RunModel
 from sgimd_torch.runs.process import Failed, Progress, Stopped, Stopping, say
 from sgimd_torch.session import ReplayError, live, replay, run
 from sgimd_torch.spaces import Demonstration, Episode
+from sgimd_torch.teachers.answering import Demonstrator
 from sgimd_torch.teachers.awaited import Awaited
+from sgimd_torch.teachers.by_hand import ByHand
 
 FLUSH_EVERY = 1.0  # s, what a killed run loses at most
 
@@ -64,7 +67,7 @@ def live_in(directory: RunDirectory, parts: RunParts, stopping: Stopping) -> str
     """
     seconds = Seconds(directory.summary)
     with RunBoard(directory, parts, seconds) if parts.config.board else nullcontext() as board:
-        life = _Life(directory, parts, stopping, seconds, board)
+        life = Life(directory, parts, stopping, seconds, board)
         finished = False
         try:
             life.go_on()
@@ -78,7 +81,7 @@ def live_in(directory: RunDirectory, parts: RunParts, stopping: Stopping) -> str
     return f"{directory.path}: {life.movements} movements, {found}"
 
 
-class _Life:
+class Life:
     """A run under way: after each movement it is written, shown, learnt from and evaluated, in this order."""
 
     def __init__(
@@ -102,13 +105,24 @@ class _Life:
 
     def go_on(self) -> None:
         """From the first movement to the last."""
+        total, title = self.parts.config.movements, self.parts.config.title
+        with Progress("replaying" if self.recorded else title, self.recorded or total) as progress:
+            for _ in self.episodes():
+                error = self.directory.evaluations.last.get("mean_error_m")
+                progress.show(self.movements, "" if error is None else f"error {error:.4f} m")
+                if self.movements == self.recorded < total:
+                    progress.begin(title, total, self.movements)
+                self.stopping.check()
+        if self.model is not None:
+            say(*self.model.news(ended=True))
+        if self.board is not None:
+            self.board.finish()
+
+    def episodes(self) -> Iterator[Episode]:
+        """The same, one movement after the other; each is written, shown and learnt from when it comes."""
         parts, total, seed = self.parts, self.parts.config.movements, self.parts.config.seed
         recorded = self.directory.columns.recorded(self.directory.lines)
         execute = replay(recorded, self.seconds.of("physics")(live(parts.environment, seed)))
-        awaited = {
-            name: Awaited(name, each, patience=parts.config.patience, say=say, waiting=self.stopping.at_once)
-            for name, each in parts.teachers.items()
-        }
         on_record = self.requests.answers(parts.teachers, self._row)
         episodes = run(
             parts.learner,
@@ -116,24 +130,25 @@ class _Life:
             seed,
             movements=total,
             teacher=parts.teacher,
-            teachers=awaited,
+            teachers={name: self._awaited(name, each) for name, each in parts.teachers.items()},
             execute=execute,
             answers={request: found for request, found in on_record.items() if request[0] < self.recorded},
         )
-        with Progress("replaying" if recorded else parts.config.title, self.recorded or total) as progress:
-            if not recorded:
-                self._begin()
-            for episode in self.seconds.of_learner(episodes):
-                self._after(episode)
-                error = self.directory.evaluations.last.get("mean_error_m")
-                progress.show(self.movements, "" if error is None else f"error {error:.4f} m")
-                if self.movements == self.recorded < total:
-                    progress.begin(parts.config.title, total, self.movements)
-                self.stopping.check()
-        if self.model is not None:
-            say(*self.model.news(ended=True))
-        if self.board is not None:
-            self.board.finish()
+        if not recorded:
+            self._begin()
+        for episode in self.seconds.of_learner(episodes):
+            self._after(episode)
+            yield episode
+
+    def _awaited(self, name: str, teacher: Demonstrator) -> Demonstrator:
+        """A person who teaches by hand is waited for by the page that they see."""
+        if isinstance(teacher, ByHand):
+            return teacher
+        return Awaited(name, teacher, patience=self.parts.config.patience, say=say, waiting=self.stopping.at_once)
+
+    def add_demonstration(self, shown: Demonstration) -> None:
+        """One more that the learner may be shown: the log knows it by the next row."""
+        self._rows[id(shown)] = len(self._rows)
 
     def summarise(self, *, finished: bool = False) -> None:
         """Hand everything to the operating system, and say how far it is."""

@@ -19,7 +19,7 @@ from sgimd_torch.algorithms import Correspondence
 from sgimd_torch.demonstrations import SHIPPED as SHIPPED_DEMONSTRATIONS
 from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.environments.protocol import Environment, Record, recorded
+from sgimd_torch.environments.protocol import Environment, HandLed, Record, recorded
 from sgimd_torch.environments.toys import Toy
 from sgimd_torch.evaluation import SHIPPED as SHIPPED_BENCHMARK
 from sgimd_torch.evaluation import Benchmark, load_benchmark, tile_goals
@@ -53,6 +53,7 @@ class Task:
         n_joints: columns of a demonstrated trajectory; None for any.
         record: (context, theta, rng) -> a movement that `sgimd film` shows, see ``Sketch`` in environments/protocol.py;
             None for the environment's own, if it has one.
+        hand_led: what a person can lead by the hand to teach it; None for the environment's own, if it has one.
     """
 
     environment: Environment
@@ -62,6 +63,7 @@ class Task:
     misfit: Callable[[Demonstration], float] | None = None
     n_joints: int | None = None
     record: Record | None = None
+    hand_led: HandLed | None = None
 
     @property
     def picture(self) -> Record | None:
@@ -262,6 +264,23 @@ def correspondence_of(task: Task) -> Correspondence:
             f"{type(task.environment).__name__} has no correspondence, so demonstrations cannot be translated; give it "
             "a method correspondence(times, trajectory) -> theta, or return Task(environment, correspondence=...)"
         )
+    return found
+
+
+def hand_led_of(task: Task) -> HandLed:
+    """What a person can lead by the hand to teach this task.
+
+    Raises:
+        ValueError: neither the task nor its environment has it, or nothing translates what is led.
+    """
+    found = task.hand_led or getattr(task.environment, "hand_led", None)
+    if not isinstance(found, HandLed):
+        raise ValueError(
+            f"{type(task.environment).__name__} cannot be led by the hand: it does not say which joints of which model "
+            "a hand moves; give it an attribute hand_led, a HandLed(model, joints, hand) with a MuJoCo model (see "
+            "sgimd_torch.environments.protocol), or return Task(environment, hand_led=...)"
+        )
+    correspondence_of(task)
     return found
 
 

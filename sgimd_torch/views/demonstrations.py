@@ -24,13 +24,12 @@ import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
 from sgimd_torch.demonstrations.columns import Columns, read_csv
-from sgimd_torch.environments.protocol import Environment
+from sgimd_torch.demonstrations.lessons import beyond_limits, played
 from sgimd_torch.runs.build import task_of
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.tasks import Task, correspondence_of
@@ -99,10 +98,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 
         if options.figure.suffix not in (".png", ".svg", ".pdf"):
             raise ValueError(f"--figure must end in .png, .svg or .pdf, got {options.figure}")
-        played = [None if each.theta is None else playing(task.environment, each) for each in found]
+        instead = [None if each.theta is None else played(task.environment, each.theta, each.shown) for each in found]
         places = [each.lands for each in found]
         stem = options.figure.with_suffix("")
-        save_figure(lambda: draw(shown, played, places), stem, options.figure.suffix[1:])
+        save_figure(lambda: draw(shown, instead, places), stem, options.figure.suffix[1:])
     refused = [row for row, each in enumerate(found) if each.refused]
     if refused:
         first = f"the first is recording {refused[0]}: {found[refused[0]].refused}"
@@ -143,7 +142,7 @@ def read(options: argparse.Namespace) -> list[Demonstration]:
 def check(task: Task, shown: Demonstration, row: int) -> Checked:
     """One recording, translated and executed on the task's robot with a noise of its own."""
     robot = task.environment
-    remarks = _remarks(robot, shown)
+    remarks = beyond_limits(robot, shown)
     try:
         for name, box, point in (
             ("context", robot.contexts, shown.context),
@@ -185,42 +184,6 @@ def table(found: Sequence[Checked]) -> list[str]:
             f"{apart_by.max():.3f} (most) from where they say; {remarked} have remarks"
         )
     return lines
-
-
-def playing(robot: Environment, each: Checked) -> Array | None:
-    """``(n_times, n_joints)`` that the robot plays in the place of a recording; None for one that cannot tell."""
-    player = _player(robot)
-    if player is None or each.theta is None:
-        return None
-    played: Array = player.at(each.theta, np.asarray(each.shown.times - each.shown.times[0]))
-    return played if played.shape == each.shown.trajectory.shape else None
-
-
-def _player(robot: Environment) -> Any:
-    """What turns theta into joint angles or commands: ``primitive`` or ``controller`` of a robot that has one."""
-    player = getattr(robot, "primitive", None) or getattr(robot, "controller", None)
-    return player if hasattr(player, "at") else None
-
-
-def _remarks(robot: Environment, shown: Demonstration) -> list[str]:
-    """What lies outside the limits of the robot, as far as it tells them."""
-    remarks, player = [], _player(robot)
-    box = getattr(player, "joints", getattr(player, "commands", None))
-    if box is not None and shown.trajectory.ndim == 2 and shown.trajectory.shape[1] == box.dim:
-        outside = (shown.trajectory < box.low) | (shown.trajectory > box.high)
-        for joint in np.flatnonzero(outside.any(axis=0)):
-            sample = int(outside[:, joint].argmax())
-            remarks.append(
-                f"joint {joint} is {shown.trajectory[sample, joint]:.3g} at sample {sample}, its range "
-                f"[{box.low[joint]:g}, {box.high[joint]:g}]"
-            )
-    shortest, longest = getattr(player, "durations", (0.0, getattr(player, "duration", np.inf)))
-    lasts = float(shown.times[-1] - shown.times[0])
-    if not shortest * (1 - 1e-9) <= lasts <= longest * (1 + 1e-9):
-        remarks.append(f"too {'fast' if lasts < shortest else 'long'}: movements last {shortest:g} to {longest:g} s")
-    if shown.outcome.shape == (robot.outcomes.dim,) and not robot.outcomes.contains(shown.outcome):
-        remarks.append("its outcome is outside T: it is imitated, but never a goal")
-    return remarks
 
 
 def _point(point: Array) -> str:

@@ -300,6 +300,8 @@ def test_teachers_have_the_number_of_the_demonstrator_or_the_name_of_the_file(tm
     ((_, few),) = runs_of(["teaching"], ["few-demonstrations"], range(1), tmp_path)
     assert teacher_of(few) == "few"
     assert few.demonstrations == tmp_path / "demonstrations/few.npz"
+    taught = dict.fromkeys(teacher_of(config) for _, config in runs_of(["by-hand"], [], range(1), tmp_path))
+    assert list(taught) == ["", "hand", "ten"]
 
 
 def test_few_are_a_tenth_of_the_demonstrations_and_half_are_those_to_the_right(tmp_path):
@@ -323,6 +325,14 @@ def test_a_corner_is_twenty_neighbours_and_shuffled_ones_only_say_something_else
     assert said == done
     same = sum((a.outcome == b.outcome).all() for a, b in zip(shuffled, everything, strict=True))
     assert same < 10
+
+
+def test_ten_lessons_by_hand_are_set_against_the_first_ten_that_are_shipped(tmp_path):
+    make_subsets(tmp_path, by_hand=True)
+    ten, hand = (load_demonstrations(tmp_path / name, n_joints=6, outcome_dim=2) for name in ("ten.npz", "hand.npz"))
+    assert len(ten) == len(hand) == 10
+    for shown, shipped_one in zip(ten, load_demonstrations(), strict=False):
+        np.testing.assert_array_equal(shown.trajectory, shipped_one.trajectory)
 
 
 def test_tiles_of_the_benchmark_that_were_reached_are_counted_once():

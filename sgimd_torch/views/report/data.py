@@ -24,6 +24,7 @@ from sgimd_torch.runs.log import RunError
 from sgimd_torch.runs.read import Run, find_runs, read_run
 from sgimd_torch.runs.tasks import demonstrations_of
 from sgimd_torch.spaces import Array
+from sgimd_torch.teachers.by_hand import FOLDER, read_lessons
 from sgimd_torch.views.statistics import (
     LEAST_SEEDS,
     Interval,
@@ -77,6 +78,16 @@ class Life(Run):
     def shown(self) -> NDArray[np.int64]:
         """``(n,)`` the rows of the demonstrations it was given, in order."""
         return self.demonstration[self.demonstration >= 0]
+
+    @cached_property
+    def by_hand(self) -> dict[int, Array]:
+        """``(outcome_dim,)`` m of each lesson that a person gave, by the movement that it came before.
+
+        Raises:
+            ValueError, OSError: the file of one is damaged, or cannot be read.
+        """
+        lessons = read_lessons(self.path / FOLDER)
+        return {each.index: each.demonstration.outcome for each in lessons if each.index < len(self.index)}
 
     @property
     def has_map(self) -> bool:
@@ -242,17 +253,36 @@ class Variant:
 
 def demonstrated(lives: Sequence[Life]) -> tuple[Array, str]:
     """``(n, outcome_dim)`` m what the runs were shown, each demonstration once; and a message if that is not known."""
+    try:
+        by_hand = {id(life): life.by_hand for life in lives if len(life.landed)}
+    except (OSError, ValueError) as error:
+        return np.empty((0, 2)), f"What they were shown is left out: {error}."
     rows = {
         (life.environment, *(str(life.config.get(f"demonstrations{which}")) for which in ("", "_crc32")), row)
         for life in lives
-        for row in life.shown.tolist()
-        if len(life.landed)
+        for index, row in enumerate(life.demonstration.tolist())
+        if row >= 0 and index not in by_hand.get(id(life), {index: None})
     }
     try:
         outcomes = [_recorded(environment, *file)[row] for environment, *file, row in sorted(rows)]
+        outcomes += [outcome for lessons in by_hand.values() for outcome in lessons.values()]
     except (OSError, ValueError, IndexError) as error:
         return np.empty((0, 2)), f"What they were shown is left out: {error}."
     return np.array(outcomes, dtype=np.float64).reshape(len(outcomes), -1 if outcomes else 0), ""
+
+
+def taught_by_hand(lives: Sequence[Life]) -> list[str]:
+    """A sentence for each run that a person taught."""
+    found = []
+    for life in lives:
+        try:
+            before = ", ".join(map(str, life.by_hand))
+        except (OSError, ValueError) as error:
+            before = f"unknown ones: {error}"
+        if before:
+            n = before.count(",") + 1
+            found.append(f"Seed {life.seed} was given {n} lesson{'s' * (n > 1)} by hand, before movements {before}.")
+    return found
 
 
 @cache

@@ -1,0 +1,81 @@
+"""Teach a learner by hand, in a browser: lead the arm, show it, see at once what changed. Only this machine sees it.
+
+Examples:
+  sgimd teach                                           a new learner on the fishing rod, into runs/taught/seed-000
+  sgimd teach runs/taught/seed-000                      go on with a run, taught or not
+  sgimd teach --environment planar-arm-7 --seed 3       other options are those of sgimd run
+  sgimd teach --algorithm sgim-im                       a learner that asks you
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+from sgimd_torch.runs.command_line import parse
+from sgimd_torch.runs.config import Config
+from sgimd_torch.runs.process import loading
+from sgimd_torch.runs.read import config_of, read_run
+
+NAME: Final = "taught"  # of the run, if no other is given
+WHERE: Final = """
+Teach it here:  http://127.0.0.1:{port}   (Ctrl-C ends it; {path} keeps everything)
+      From another machine:  ssh -L {port}:127.0.0.1:{port} THIS-MACHINE   and open the same address there.
+"""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """The command ``sgimd teach``; it serves until Ctrl-C.
+
+    Raises:
+        ValueError: the request is wrong, or this task cannot be led by the hand.
+    """
+    config, port = options_of(sys.argv[1:] if argv is None else argv)
+    with loading():
+        from sgimd_torch.runs.build import task_of
+        from sgimd_torch.runs.process import Failed
+        from sgimd_torch.runs.tasks import hand_led_of
+        from sgimd_torch.views.teach.page import Page
+        from sgimd_torch.views.teach.serving import serving
+        from sgimd_torch.views.teach.session import Session
+    hand_led_of(task_of(config))  # what cannot be led is refused before anything is made
+    session = Session(config)
+    with serving(port) as server:
+        page = Page(server, session)
+        print(WHERE.format(port=server.get_port(), path=config.directory), flush=True)
+        with session:
+            page.run()
+    if session.state.problem:
+        raise Failed(session.state.problem)
+    return 0
+
+
+def options_of(argv: Sequence[str]) -> tuple[Config, int]:
+    """The run that is taught, and the first port to try."""
+    parser = argparse.ArgumentParser(
+        prog="sgimd teach",
+        usage="sgimd teach [RUN | options of sgimd run] [--port N]",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    parser.add_argument("--port", type=int, default=8080, help="the first port to try (8080)")
+    options, words = parser.parse_known_args(argv)
+    if words and not words[0].startswith("-"):
+        path = Path(words[0])
+        config = config_of(read_run(path))
+        if len(words) > 1:
+            parser.error(f"{path} has its own options; {' '.join(words[1:])} cannot change them")
+        config = replace(config, out=path.parent.parent, name=path.parent.name)
+        if config.directory.resolve() != path.resolve():
+            raise ValueError(f"{path} must be called {config.directory.name}, as sgimd run calls it; was it renamed?")
+        return config, options.port
+    config, _ = parse([f"--name={NAME}", "--repeats=0", *words])
+    asked = ["--teachers=by-hand"] if "teachers" in config.used else []
+    shown = ["--teacher=by-hand"] if "teacher" in config.used else []
+    config, _ = parse([f"--name={NAME}", "--repeats=0", *asked, *shown, *words])
+    return config, options.port

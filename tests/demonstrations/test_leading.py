@@ -1,0 +1,314 @@
+"""An arm that is led by the hand follows, within its limits, and stays where it is let go."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from sgimd_torch.demonstrations import load_demonstrations
+from sgimd_torch.demonstrations.hand import STEP
+from sgimd_torch.demonstrations.leading import Leading
+from sgimd_torch.demonstrations.recording import Recording
+from sgimd_torch.environments.fishing_rod import JOINTS, FishingRod
+from sgimd_torch.environments.planar_arm import PlanarArm
+from sgimd_torch.environments.planar_model import planar_model
+from sgimd_torch.environments.toys import toss
+from sgimd_torch.runs.tasks import Task, hand_led_of
+from sgimd_torch.spaces import Box, stream
+
+ROUNDING = 1e-6  # relative: a speed is a difference of angles, an acceleration one of speeds
+
+
+@pytest.fixture(scope="module")
+def rod():
+    return FishingRod(noise=0.0)
+
+
+@pytest.fixture
+def leading(rod):
+    return Leading.of(rod.hand_led)
+
+
+@pytest.fixture
+def flat():
+    """Two links of 1 m that start stretched along x, and can turn by a radian either way."""
+    return Leading(planar_model([1.0, 1.0]), ("joint_0", "joint_1"), "end", ranges=Box.cube(-1, 1, 2))
+
+
+def swing(leading, end, *, every=5, lasts=1.0):
+    """A hand with a bell-shaped speed, heard of 20 times a second."""
+    leading.home()
+    leading.grab()
+    leading.record()
+    start = leading.point
+    for step in range(round(lasts / STEP) + 20):
+        if step % every == 0:
+            t = min(step * STEP / lasts, 1.0)
+            leading.drag(start + t**3 * (10 - 15 * t + 6 * t**2) * (np.asarray(end) - start))
+        leading.step(STEP)
+    leading.release()
+    leading.step(0.2)
+    return leading.stop()
+
+
+def model_of(body):
+    return mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
+
+
+def jerk(times, trajectory):
+    """Root mean square (rad/s^3) over time and joints, of 50 samples a second."""
+    recording = Recording(times, trajectory).resampled(50)
+    return float(np.sqrt(np.mean((np.diff(recording.joints, 3, axis=0) / np.diff(recording.times)[0] ** 3) ** 2)))
+
+
+def test_the_held_point_comes_to_the_hand(leading):
+    goal = leading.point + np.array([0.1, -0.1, -0.2])
+    leading.grab()
+    leading.drag(goal)
+    leading.step(3)
+    np.testing.assert_allclose(leading.point, goal, atol=1e-3)
+    assert leading.gap < 1e-3
+
+
+def test_of_a_planar_arm_the_end_is_where_the_arm_itself_says_it_is():
+    arm = PlanarArm()
+    leading = Leading.of(arm.hand_led)
+    np.testing.assert_allclose(leading.point[:2], arm.rest)
+    leading.grab()
+    leading.drag([0.3, 0.6, 0.0])
+    leading.step(3)
+    np.testing.assert_allclose(leading.point[:2], [0.3, 0.6], atol=1e-3)
+    theta = arm.correspondence([0.0], leading.q[None])
+    np.testing.assert_allclose(arm.execute(np.zeros(0), theta, stream(0, "test")), leading.point[:2], atol=1e-9)
+
+
+def test_where_it_is_let_go_it_stays(leading):
+    leading.grab()
+    leading.drag([0.4, 0.3, 0.6])
+    leading.step(0.3)
+    leading.release()
+    leading.step(0.5)
+    rested = leading.q
+    leading.step(5)
+    np.testing.assert_allclose(leading.q, rested, atol=1e-9)
+    assert (leading.held, leading.target, leading.gap) == (False, None, 0.0)
+
+
+@pytest.mark.parametrize("grabbed", ["tip", "hand", "wrist", "forearm"])
+def test_a_hand_that_tears_cannot_exceed_ranges_speeds_and_accelerations(leading, grabbed):
+    rng = stream(0, "a wild hand")
+    for _ in range(10):
+        leading.home()
+        leading.grab(grabbed)
+        leading.record()
+        for _ in range(40):
+            leading.drag(rng.normal(0, 1, 3))
+            leading.step(0.05)
+        leading.release()
+        leading.step(0.5)
+        led = leading.stop()
+        speeds = np.diff(led.joints, axis=0) / STEP
+        starts = np.diff(np.concatenate([np.zeros((1, 6)), speeds]), axis=0) / STEP
+        assert leading.ranges.contains(led.joints).all()
+        assert (np.abs(speeds) <= leading.speeds * (1 + ROUNDING)).all()
+        assert (np.abs(starts) <= leading.accelerations * (1 + ROUNDING)).all()
+    assert np.abs(speeds / leading.speeds).max() > 0.9  # it was torn hard enough for the limits to count
+
+
+def test_a_joint_at_the_end_of_its_range_leaves_the_rest_to_the_others(flat):
+    flat.grab()
+    goal = [np.cos(1.0) + np.cos(1.4), np.sin(1.0) + np.sin(1.4), 0.0]  # only with the first joint at its end
+    flat.drag(goal)
+    flat.step(5)
+    np.testing.assert_allclose(flat.q, [1.0, 0.4], atol=5e-3)
+    np.testing.assert_allclose(flat.point, goal, atol=5e-3)
+
+
+def test_what_the_arm_cannot_reach_is_told_as_a_gap(flat):
+    flat.grab()
+    flat.drag([2.5, 0, 0])
+    flat.step(2)
+    np.testing.assert_allclose(flat.point, [2, 0, 0], atol=1e-6)
+    assert flat.gap == pytest.approx(0.5, abs=1e-6)
+
+
+def test_following_late_is_no_gap(flat):
+    """A slow hand is followed with a delay, on the way that it took."""
+    flat.set_joints([0.0, 0.8])
+    flat.step(3)
+    flat.grab()
+    start, most = flat.point, 0.0
+    for step in range(100):
+        flat.drag(start + np.array([0.0, 0.002 * step, 0.0]))  # .2 m/s
+        flat.step(STEP)
+        most = max(most, flat.gap)
+    assert np.linalg.norm(flat.target - flat.point) > 0.01
+    assert most < 0.005
+
+
+def test_any_link_can_be_grabbed_at_any_place(leading):
+    assert leading.links == ("base", "upper_arm", "forearm", "roll", "wrist", "hand", "rod", "tip")
+    touched = leading.data.body("forearm").xpos + np.array([0.0, 0.02, 0.01])
+    leading.grab("forearm", touched)
+    np.testing.assert_allclose(leading.point, touched, atol=1e-12)
+    x, y, z = touched
+    turned = [x * np.cos(0.3) - y * np.sin(0.3), x * np.sin(0.3) + y * np.cos(0.3), z]
+    leading.drag(turned)
+    leading.step(3)
+    np.testing.assert_allclose(leading.point, turned, atol=1e-3)
+    np.testing.assert_allclose(leading.q - leading.start, [0.3, 0, 0, 0, 0, 0], atol=0.02)  # the yaw does it
+
+
+def test_joints_move_one_by_one_to_where_they_are_set(leading):
+    wanted = leading.start + np.array([0.5, 0, -0.3, 0, 0, 0.2])
+    leading.set_joints(wanted)
+    leading.step(0.02)
+    assert np.abs(leading.q - leading.start).max() < 0.1  # it does not jump
+    leading.step(3)
+    np.testing.assert_allclose(leading.q, wanted, atol=1e-3)
+
+
+def test_time_may_come_in_pieces_of_any_size(leading, rod):
+    other = Leading.of(rod.hand_led)
+    for each, pieces in ((leading, [0.3]), (other, [0.004] * 75)):
+        each.grab()
+        each.drag([0.3, 0.3, 0.5])
+        for piece in pieces:
+            each.step(piece)
+    np.testing.assert_array_equal(leading.q, other.q)
+
+
+@pytest.mark.parametrize("goal", [[-0.2, 0.7], [0.1, 0.1], [0.3, -0.8]])
+def test_a_hand_that_jumps_takes_the_arm_to_where_one_that_moves_slowly_takes_it(goal):
+    leading = Leading.of(PlanarArm().hand_led)
+    for seconds in (0.0, 1.0):
+        leading.home()
+        leading.grab()
+        start = leading.point
+        for time in np.arange(0, 5, 0.05):
+            leading.drag(start + min(1.0, time / max(seconds, 0.01)) * ([*goal, 0.0] - start))
+            leading.step(0.05)
+        assert leading.gap < 1e-3
+
+
+def test_a_recording_begins_where_the_arm_was_and_has_every_step(leading):
+    leading.grab()
+    leading.record()
+    leading.drag([0.2, 0.3, 0.6])
+    leading.step(0.5)
+    assert leading.recording
+    led = leading.stop()
+    np.testing.assert_allclose(led.times, np.arange(51) * STEP)
+    np.testing.assert_array_equal(led.joints[0], leading.start)
+    np.testing.assert_array_equal(led.joints[-1], leading.q)
+    assert not leading.recording
+
+
+def test_led_movements_are_about_as_smooth_as_the_shipped_demonstrations(leading):
+    """Their jerk is between the lowest and the highest of the shipped ones, and in the middle within a factor of 3."""
+    shipped = [jerk(shown.times, shown.trajectory) for shown in load_demonstrations()]
+    ends = [[0.6, 0.2, 0.5], [-0.6, 0.1, 0.5], [0.1, 0.65, 0.5], [0.4, -0.4, 0.5], [-0.3, 0.4, 0.6]]
+    led = [swing(leading, end).without_pauses() for end in ends]
+    ours = [jerk(each.times, each.joints) for each in led]
+    assert np.median(shipped) / 3 < np.median(ours) < np.median(shipped) * 3
+    assert min(shipped) < min(ours)
+    assert max(ours) < max(shipped)
+
+
+def test_limits_of_the_rod_are_those_of_its_motor_primitive(rod):
+    """Random movements come near to the largest speeds and accelerations, none exceeds them."""
+    speeds, accelerations = rod.hand_led.speeds, rod.hand_led.accelerations
+    rng, fastest, hardest = stream(0, "movements"), np.zeros(6), np.zeros(6)
+    for _ in range(500):
+        theta = np.append(rng.integers(0, 2, 24).astype(float), 0.0)  # corners of Pi, of the shortest duration
+        times, joints = rod.primitive.trajectory(theta, rate=1000)
+        speed = np.diff(joints, axis=0) / np.diff(times)[:, None]
+        fastest = np.maximum(fastest, np.abs(speed).max(axis=0))
+        hardest = np.maximum(hardest, np.abs(np.diff(speed, axis=0) / times[1]).max(axis=0))
+    for most, found in ((speeds, fastest), (accelerations, hardest)):
+        assert (found <= most * (1 + ROUNDING)).all()
+        assert (found >= 0.99 * most).all()
+
+
+def test_without_limits_of_its_own_a_joint_crosses_its_range_in_about_a_second(flat):
+    np.testing.assert_allclose(flat.speeds, [3.0, 3.0])
+    flat.set_joints([-1.0, -1.0])
+    flat.step(3)
+    flat.set_joints([1.0, 1.0])
+    flat.step(0.3)
+    assert (flat.q < 0.5).all()
+    flat.step(1.2)
+    assert (flat.q > 0.95).all()
+
+
+def test_ranges_are_those_of_the_model_if_none_are_given():
+    body = '<body name="arm"><joint name="a" axis="0 0 1" range="-30 90"/><geom size="1"/></body>'
+    leading = Leading(model_of(body), ("a",), "arm")
+    np.testing.assert_allclose([leading.ranges.low, leading.ranges.high], [[-np.pi / 6], [np.pi / 2]])
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"joints": ("yaw", "elbo")}, "no joint 'elbo'; is it spelt"),
+        ({"hand": "hnad"}, "no body or site 'hnad'"),
+        ({"hand": "float"}, "float cannot be grabbed, other joints move it, too; links that can are base, upper_arm"),
+        ({"ranges": None}, "joint yaw has no range in the model; give ranges"),
+        ({"ranges": Box.cube(-1, 1, 5)}, "a range for each of 6 joints, got 5"),
+        ({"start": [9.0] * 6}, "start must lie in its box"),
+        ({"speeds": [1, 1, 1, 1, 1, 0]}, "speeds must be above 0"),
+        ({"accelerations": [1.0]}, "accelerations must have shape"),
+    ],
+)
+def test_an_arm_that_cannot_be_led_is_refused(rod, change, message):
+    led = {**vars(rod.hand_led), **change}
+    with pytest.raises(ValueError, match=message):
+        Leading(led.pop("model"), led.pop("joints"), led.pop("hand"), **led)
+
+
+def test_a_ball_joint_cannot_be_led():
+    body = '<body name="arm"><joint name="a" type="ball"/><geom size="1"/></body>'
+    with pytest.raises(ValueError, match="joint a is neither a hinge nor a slide"):
+        Leading(model_of(body), ("a",), "arm")
+
+
+def test_what_is_out_of_order_is_refused(leading):
+    with pytest.raises(RuntimeError, match=r"grab\(\) it first"):
+        leading.drag([0, 0, 0])
+    with pytest.raises(RuntimeError, match=r"record\(\) comes first"):
+        leading.stop()
+    leading.record()
+    with pytest.raises(RuntimeError, match="a recording is under way"):
+        leading.record()
+    with pytest.raises(RuntimeError, match="cannot jump home during a recording"):
+        leading.home()
+    with pytest.raises(ValueError, match="was it too short"):
+        leading.stop()
+    leading.record()  # the short one is gone
+
+
+@pytest.mark.parametrize("dt", [-0.1, float("nan"), float("inf")])
+def test_time_that_is_none_is_refused(leading, dt):
+    with pytest.raises(ValueError, match="dt must be a time in s"):
+        leading.step(dt)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("grab", "water"), ("grab", "pillar"), ("drag", [0, 0]), ("set_joints", [9.0] * 6)]
+)
+def test_nonsense_is_refused_and_changes_nothing(leading, name, value):
+    leading.grab()
+    before = leading.target
+    with pytest.raises(ValueError):  # noqa: PT011, each message has a test where it is made
+        getattr(leading, name)(value)
+    np.testing.assert_array_equal(leading.target, before)
+
+
+def test_tasks_say_what_can_be_led(rod):
+    assert hand_led_of(Task(rod, correspondence=rod.primitive.correspondence)).joints == JOINTS
+    assert hand_led_of(Task(PlanarArm(3))).joints == ("joint_0", "joint_1", "joint_2")
+    ball = toss()
+    with pytest.raises(ValueError, match=r"Toy cannot be led by the hand.*give it an attribute hand_led"):
+        hand_led_of(Task(ball))
+    with pytest.raises(ValueError, match="Toy has no correspondence"):
+        hand_led_of(Task(ball, hand_led=rod.hand_led))
+    assert hand_led_of(Task(ball, correspondence=lambda t, q: q[-1], hand_led=rod.hand_led)).hand == "tip"

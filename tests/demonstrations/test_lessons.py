@@ -1,0 +1,133 @@
+"""A lesson by hand: the file says exactly what the learner was shown, and what could not be followed is told."""
+
+import numpy as np
+import pytest
+
+from sgimd_torch.algorithms import observation
+from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
+from sgimd_torch.demonstrations.leading import Leading
+from sgimd_torch.demonstrations.lessons import lesson_by_hand
+from sgimd_torch.demonstrations.recording import Recording
+from sgimd_torch.environments.fishing_rod import FishingRod
+from sgimd_torch.environments.planar_arm import PlanarArm
+from sgimd_torch.spaces import stream
+
+
+@pytest.fixture(scope="module")
+def rod():
+    return FishingRod()
+
+
+def give(robot, recording, **options):
+    translate = robot.primitive.correspondence if hasattr(robot, "primitive") else robot.correspondence
+    return lesson_by_hand(recording, robot, translate, robot.hand_led, stream(3, "lessons", 0), **options)
+
+
+def swung(rod, goal=(0.4, 0.3, 0.6), seconds=1.0):
+    leading = Leading.of(rod.hand_led)
+    leading.grab()
+    leading.record()
+    leading.drag(goal)
+    leading.step(seconds)
+    return leading.stop()
+
+
+def played(rod, theta, rate=200.0):
+    """A recording that the robot can play exactly, as it did."""
+    return Recording(*rod.primitive.trajectory(theta, rate=rate))
+
+
+def test_the_file_gives_the_theta_that_the_learner_was_shown_bit_for_bit(rod, tmp_path):
+    lesson = give(rod, swung(rod))
+    save_demonstrations(tmp_path / "mine.npz", [lesson.demonstration])
+    (loaded,) = load_demonstrations(tmp_path / "mine.npz", n_joints=6, outcome_dim=2, context_dim=0)
+    translated = rod.primitive.correspondence(loaded.times, loaded.trajectory)
+    np.testing.assert_array_equal(translated, lesson.theta_d)
+    learner = observation(rod, 0, correspondence=rod.primitive.correspondence)
+    learner.watch(loaded)
+    assert learner.ask(np.zeros(0)) is None  # it rests, and remembers
+    np.testing.assert_array_equal(learner.memory.thetas, [lesson.theta_d])
+    np.testing.assert_array_equal(learner.memory.outcomes, [lesson.demonstration.outcome])
+
+
+def test_the_outcome_is_that_of_theta_executed_with_the_lessons_own_noise(rod):
+    lesson = give(rod, swung(rod))
+    again = rod.execute(np.zeros(0), lesson.theta_d, stream(3, "lessons", 0))
+    np.testing.assert_array_equal(lesson.demonstration.outcome, again)
+
+
+def test_what_the_robot_can_play_has_no_misfit_and_no_remark(rod):
+    theta = rod.policies.sample(stream(0, "theta"))
+    knots = theta[:-1].reshape(6, 4)
+    knots[:, 0] = knots[:, 1] = 0.5  # begins where movements begin
+    knots[:, 2:] = 0.3 + 0.4 * knots[:, 2:]
+    lesson = give(rod, played(rod, theta))
+    assert lesson.misfits == pytest.approx(np.zeros(6), abs=2e-3)  # resampled by straight lines
+    np.testing.assert_allclose(lesson.theta_d, theta, atol=0.02)
+    assert [remark for remark in lesson.remarks if "starts" not in remark] == []
+
+
+def test_the_misfit_is_that_of_eq_6_and_counts_joint_by_joint(rod):
+    lesson = give(rod, swung(rod))
+    shown = lesson.demonstration
+    whole = rod.primitive.residual(lesson.theta_d, shown.times, shown.trajectory)
+    assert lesson.misfit == pytest.approx(whole, rel=1e-9)
+    shaken = shown.trajectory.copy()
+    shaken[:, 2] += 0.1 * np.sin(60 * shown.times)  # the elbow trembles faster than four knots can
+    misfits = give(rod, Recording(shown.times, shaken)).misfits
+    assert misfits[2] == pytest.approx(0.1 / np.sqrt(2), rel=0.3)
+    np.testing.assert_allclose(np.delete(misfits, 2), np.delete(lesson.misfits, 2), atol=1e-9)
+
+
+def test_a_slow_hand_is_played_in_the_longest_movement_and_told(rod):
+    slow = Recording(swung(rod).times * 3.2, swung(rod).joints)  # 3.2 s
+    lesson = give(rod, slow)
+    assert lesson.demonstration.times[-1] == 1.6
+    assert lesson.theta_d[-1] == 1.0
+    assert "it is played 2 times faster: movements last 1.6 s at most" in lesson.remarks
+
+
+def test_what_could_not_be_followed_is_told(rod):
+    start = (rod.primitive.joints.low + rod.primitive.joints.high) / 2
+    times = np.linspace(0, 1.0, 51)
+    yaw = np.outer(np.clip(times / 0.1, 0, 1), [1.4, 0, 0, 0, 0, 0])  # 14 rad/s
+    remarks = give(rod, Recording(times, start + yaw, np.full(51, 0.25))).remarks
+    assert "the arm stayed up to 0.25 m behind the hand, which went too far or too fast for it" in remarks
+    assert "yaw would turn at 14 rad/s, its movements at 5.7 rad/s at most" in remarks
+    assert len(remarks) == 2
+    elsewhere = np.tile(start + np.array([0.5, 0, 0, 0, 0, 0]), (51, 1))
+    (remark,) = give(rod, Recording(times, elsewhere)).remarks
+    assert remark == "it starts 0.5 rad from where movements start, so the robot begins with a jerk"
+    beyond = start + np.outer(times, [2.0, 0, 0, 0, 0, 0])
+    assert any(
+        "joint 0 is" in each and "its range [-1.6, 1.6]" in each for each in give(rod, Recording(times, beyond)).remarks
+    )
+
+
+def test_a_planar_arm_is_taught_by_its_last_posture():
+    arm = PlanarArm()
+    leading = Leading.of(arm.hand_led)
+    leading.grab()
+    leading.record()
+    leading.drag([-0.2, 0.7, 0.0])
+    leading.step(3.0)
+    lesson = give(arm, leading.stop())
+    np.testing.assert_allclose(lesson.demonstration.outcome, [-0.2, 0.7], atol=1e-3)
+    assert lesson.played is None  # its movements are not angles over time
+    assert np.isnan(lesson.misfit)
+
+
+def test_a_lesson_may_have_a_context():
+    arm = PlanarArm(context=True)
+    recording = Recording(np.linspace(0, 1, 11), np.zeros((11, 7)))
+    lesson = give(arm, recording, context=[0.5])
+    np.testing.assert_allclose(lesson.demonstration.context, [0.5])
+    np.testing.assert_allclose(lesson.demonstration.outcome, [np.cos(0.5), np.sin(0.5)], atol=1e-9)
+    np.testing.assert_allclose(give(arm, recording).demonstration.context, [0.0])
+    with pytest.raises(ValueError, match="context must lie in its box"):
+        give(arm, recording, context=[2.0])
+
+
+def test_a_recording_of_another_robot_is_refused(rod):
+    with pytest.raises(ValueError, match="one column for each joint, in rad"):
+        give(rod, Recording(np.linspace(0, 1, 11), np.zeros((11, 7))))
