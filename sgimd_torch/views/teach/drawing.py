@@ -29,6 +29,8 @@ _KEY: Final = (
 def status(state: State, cannot: str) -> str:
     """What it does and how well, in four lines; ``cannot`` says why it cannot be taught."""
     doing = state.busy or ("it asks you" if state.waiting else "paused" if state.paused else "it practises")
+    if state.movements == state.total:
+        doing = "it has made all its movements"
     doing = state.problem or doing
     chart = state.chart
     error = "–" if chart is None else f"{chart.mean_error:.3f} m"

@@ -14,6 +14,7 @@ import pytest
 
 from runs import ROOT
 from sgimd_torch.demonstrations import save_demonstrations
+from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.runs.build import build
 from sgimd_torch.runs.command_line import main as run
@@ -26,6 +27,8 @@ from sgimd_torch.teachers.by_hand import ByHand, GivenLesson, keep_lesson, read_
 from sgimd_torch.views.report.command import main as report
 from sgimd_torch.views.report.data import demonstrated, read_life
 from sgimd_torch.views.teach import main, options_of
+from sgimd_torch.views.teach.hanging import Hanging
+from sgimd_torch.views.teach.serving import PATIENCE, Seat
 from sgimd_torch.views.teach.session import Session
 
 SHOWN = arm_demonstrations(PlanarArm())
@@ -259,6 +262,8 @@ import os, time
 from pathlib import Path
 from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.runs.config import from_settings
+from sgimd_torch.views.teach.hanging import Hanging
+from sgimd_torch.views.teach.serving import PATIENCE, Seat
 from sgimd_torch.views.teach.session import Session
 import json
 session = Session(from_settings(json.loads(sys.argv[1])))
@@ -293,6 +298,33 @@ def test_a_file_of_lessons_that_was_tampered_with_is_refused(tmp_path):
     save_demonstrations(path, SHOWN[:2])
     with pytest.raises(ValueError, match="one lesson, got 2"):
         read_lessons(folder)
+
+
+def test_the_seat_is_free_after_a_while_or_when_its_holder_leaves():
+    seat = Seat()
+    assert seat.take(1, now=0.0)
+    assert not seat.take(2, now=PATIENCE - 1)
+    assert seat.take(2, now=PATIENCE + 1)
+    assert not seat.take(1, now=PATIENCE + 2)
+    seat.leave(1)  # does not hold it
+    assert seat.is_held_by(2)
+    seat.leave(2)
+    assert seat.take(1, now=PATIENCE + 3)
+
+
+def test_a_line_that_hangs_on_the_arm_comes_to_rest_plumb_and_lags_behind_when_the_arm_turns():
+    led = FishingRod().hand_led
+    hanging = Hanging(led.model, led.joints, led.hand, led.start)
+    end = led.model.body("float").id
+    for _ in range(60):
+        hanging.follow(led.start, 0.1)
+    assert np.allclose(hanging.data.xpos[end][:2], hanging.hand[:2], atol=0.005)
+    behind = []
+    for turn in np.linspace(0, 0.6, 20):
+        hanging.follow(led.start + np.array([turn, 0, 0, 0, 0, 0]), 0.03)
+        behind.append(hanging.data.xpos[end][0] - hanging.hand[0])
+    assert max(behind) > 0.02  # it turns to the left, where x falls; the float comes later
+    assert np.isfinite(hanging.data.qpos).all()
 
 
 def test_a_task_without_anything_to_lead_says_why(capsys):
