@@ -8,6 +8,7 @@ not the page. The tables come from the rows in --results, which compare.py write
   GYMNASIUM       gymnasium.csv
   LEARNING        learning.csv and suite.csv
   BY_HAND         by_hand.csv
+  ASKING          asking.csv, asked.csv and contexts.csv; the page is left out while there is no asking.csv
 
 Intervals are bootstrapped with a fixed seed, so the same rows give the same page. The analyses of variance need
 run directories: --runs makes them again and keeps their rows in anova.csv.
@@ -26,12 +27,13 @@ from functools import partial
 from pathlib import Path
 from typing import Final
 
-from sgimd_torch.runs.process import command, loading
+from sgimd_torch.runs.process import command, loading, say
 
 with loading():  # Ctrl-C shows no traceback
     import numpy as np
 
     from anova import anova_cells, update_anova
+    from asking_claims import ASKING_CLAIMS, ON_TOSS, contexts_rows, counts, read_asking, teachers_rows
     from judging import NotRun, Results, Verdict, judge
     from learning_claims import LEARNING_CLAIMS, TIMES, answers_rows, read_learning, suite_rows
     from model_claims import MODEL_CLAIMS, SIMPLEX
@@ -43,7 +45,8 @@ with loading():  # Ctrl-C shows no traceback
     from sgimd_torch.views.suite import RANDOM
     from variants import EXPERIMENTS, LEARNING, SUITED, ladder
 
-PAGES: Final = ("RESULTS", "FORWARD_MODEL", "GYMNASIUM", "LEARNING", "BY_HAND")
+PAGES: Final = ("RESULTS", "FORWARD_MODEL", "GYMNASIUM", "LEARNING", "BY_HAND", "ASKING")
+OPTIONAL: Final = {"ASKING": "asking.csv"}  # pages that are left out without their rows
 ANOVA: Final = ("means compared", "of", "dimensions of theta in which they differ", "smallest p", "largest p")
 ON_ARMS: Final = (250, 500, 1000, 2000)
 EARLY: Final = (300, 500, 1000)
@@ -168,6 +171,33 @@ def hand_page(folder: Path) -> Page:
     for when in (EARLY[0], EARLY[-1]):
         _, columns[f"difference to the same learner alone at {when} (m)"] = _against(results, _alone, when)
     return Page([], {"by-hand": variants_table([*EXPERIMENTS["by-hand"]], columns)}, results)
+
+
+def asking_page(folder: Path) -> Page:
+    """The page results/ASKING.md: when to ask, whom and what for."""
+    results = read_asking(folder)
+    alike, verdicts = results.alike, judge(ASKING_CLAIMS, results)
+
+    def requests(what: str) -> Cell:
+        def cell(name: str) -> str:
+            found = np.array([*counts(results, name, what).values()])
+            return show(iqm_interval(found, rng=rng()), ".0f")
+
+        return cell
+
+    asked = {"demonstrations": requests("shown"), "requests": requests("requests")}
+    wind = {"in a strong wind": requests("strong"), "in a weak one": requests("weak")}
+    names = [name for name in EXPERIMENTS["asking"] if name not in ON_TOSS]
+    names.sort(key=lambda name: _last_error(alike.variants.get(name, NOBODY)))
+    asked_whom = ["variant", "teacher", "requests", "answered", "late", "late, in their half"]
+    tables = {
+        "claims": verdicts_table("what", verdicts),
+        "rod": variants_table(names, {**_errors(alike, (*TIMES, LAST), ".4f"), **asked}),
+        "teachers": markdown(asked_whom, teachers_rows(results)),
+        "toss": variants_table(ON_TOSS, {**_errors(alike, TIMES, ".4f"), **asked, **wind}),
+        "contexts": markdown(["variant", "wind (m/s²)", "error (m)"], contexts_rows(folder)),
+    }
+    return Page(verdicts, tables, results)
 
 
 def _alone(name: str) -> str:
@@ -308,8 +338,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         "GYMNASIUM": lambda: gymnasium_page(folder),
         "LEARNING": lambda: learning_page(folder),
         "BY_HAND": lambda: hand_page(folder),
+        "ASKING": lambda: asking_page(folder),
     }
-    paths = {name: options.out / f"{name}.md" for name in PAGES if options.only in (None, name)}
+    missing = {name: file for name, file in OPTIONAL.items() if not (options.only or (folder / file).exists())}
+    say(*(f"{name} is left out: there is no {folder / file} yet" for name, file in missing.items()))
+    wanted = [name for name in PAGES if options.only in (None, name) and name not in missing]
+    paths = {name: options.out / f"{name}.md" for name in wanted}
     for path in paths.values():
         _check_place(path)
     if options.runs is not None:

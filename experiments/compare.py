@@ -3,8 +3,9 @@
 variants.py says which variants there are. A run goes to OUT/VARIANT/seed-003. When it ends, each of its evaluations
 becomes lines of RESULTS/paper.csv, one for each inverse model that answers; of RESULTS/forward_model.csv for
 forward-model and planar-arm-*, of RESULTS/gymnasium.csv for swimmer, of RESULTS/by_hand.csv for by-hand, of
-RESULTS/asking.csv for asking, whose requests are counted in RESULTS/asked.csv. The goals that it chose in the large
-task space are counted in RESULTS/goals.csv. A variant in two experiments is run once.
+RESULTS/asking.csv for asking, whose requests are counted in RESULTS/asked.csv and whose errors by context are in
+RESULTS/contexts.csv. The goals that it chose in the large task space are counted in RESULTS/goals.csv. A variant in two
+experiments is run once.
 
 Start the same command again after Ctrl-C or a power cut, or with more seeds: what is in the tables is not run again,
 and a run that was stopped goes on. If a run fails, the others go on.
@@ -32,7 +33,7 @@ with loading():  # Ctrl-C shows no traceback
     from sgimd_torch.runs.log import RunError
     from sgimd_torch.runs.read import finished, read_run
     from sgimd_torch.runs.sweep import add_engines, add_options, engine_of
-    from tables import COLUMNS, RESULTS, Key, Table, as_text, asked_rows, goal_rows, result_rows
+    from tables import COLUMNS, RESULTS, ROWS, Key, Table, as_text, result_rows
     from variants import EARLIER, EXPERIMENTS, MADE, Variant, make_subsets, tables_of
 
 EXAMPLES: Final = f"""experiments: {", ".join(EXPERIMENTS)}
@@ -204,7 +205,7 @@ def collect(experiment: str, config: Config, results: Path) -> None:
         raise RunError(f"{run.path} has no evaluation after {config.movements} movements, though it ended")
     evaluations, *others = tables_of(experiment)
     for name in others:
-        table_in(results, name).merge((asked_rows if name == "asked.csv" else goal_rows)(config, run))
+        table_in(results, name).merge(ROWS[name](config, run))
     table_in(results, evaluations).merge(result_rows(experiment, config, run))  # last: now the run counts as done
 
 

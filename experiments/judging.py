@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from read_results import FIRST, LAST, Evaluated
+from read_results import FIRST, LAST, Asked, Evaluated
 from sgimd_torch.spaces import Array
 from sgimd_torch.views.statistics import (
     LEVEL,
@@ -48,7 +48,7 @@ class Results:
     """The data that claims are judged on.
 
     ``variants`` from ``read_results``, with their own answers, and ``same``, with those of one inverse for all; for
-    some claims ``goals`` from ``read_goals`` and ``coverages`` from ``read_coverages``.
+    some claims ``goals`` from ``read_goals``, ``coverages`` from ``read_coverages`` and ``asked`` from ``read_asked``.
 
     Errors are in metres; intervals are over seeds, of confidence ``level``. All methods raise ``NotRun`` if fewer than
     2 seeds have what they need.
@@ -59,6 +59,7 @@ class Results:
     coverages: Mapping[str, Mapping[int, Array]] = field(default_factory=dict)
     same: Mapping[str, Evaluated] = field(default_factory=dict)
     level: float = LEVEL
+    asked: Mapping[str, Mapping[int, Mapping[str, Asked]]] = field(default_factory=dict)
 
     @property
     def alike(self) -> Results:

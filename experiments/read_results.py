@@ -26,6 +26,7 @@ HEADER = (
     *("mean_error_m", "noise_floor_m", "tiles_reached", "goals_claimed", "goals_met"),
 )
 GOALS_HEADER = ("variant", "seed", "n_goals", "n_near")
+CONTEXTS_HEADER = ("variant", "seed", "movements", "answer", "low", "high", "mean_error_m")
 ASKED_HEADER = ("variant", "seed", "teacher", "requests", "shown", "late", "late_own", "strong", "weak")
 MODEL_HEADER = (
     *("run", "predicted", "error_m", "inside_50_last", "inside_80_last", "inside_95_last"),
@@ -142,6 +143,27 @@ def read_asked(path: str | os.PathLike[str]) -> dict[str, dict[int, dict[str, As
     for where, row in read_rows(path, ASKED_HEADER, optional=True):
         counts = Asked(*(number(row, name, where) if row[name] not in UNKNOWN else math.nan for name in Asked._fields))
         found.setdefault(row["variant"], {}).setdefault(_count(row, "seed", where), {})[row["teacher"]] = counts
+    return found
+
+
+ByPart = dict[tuple[str, int, str, tuple[float, float]], dict[int, float]]
+"""(variant, movements, answer, (low, high) of a part of C) -> seed -> mean error (m)."""
+
+
+def read_contexts(path: str | os.PathLike[str]) -> ByPart:
+    """Errors by part of C; {} without file.
+
+    Raises:
+        ResultsError: a line makes no sense.
+    """
+    found: ByPart = {}
+    for where, row in read_rows(path, CONTEXTS_HEADER, optional=True):
+        try:
+            part = float(row["low"]), float(row["high"])
+        except ValueError:
+            raise ResultsError(f"{where}: low and high must be numbers, got {row['low']!r}, {row['high']!r}") from None
+        key = row["variant"], _count(row, "movements", where), row["answer"], part
+        found.setdefault(key, {})[_count(row, "seed", where)] = number(row, "mean_error_m", where)
     return found
 
 

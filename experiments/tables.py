@@ -21,7 +21,7 @@ from typing import Final
 import numpy as np
 from scipy.spatial import KDTree
 
-from read_results import ASKED_HEADER, GOALS_HEADER, HEADER
+from read_results import ASKED_HEADER, CONTEXTS_HEADER, GOALS_HEADER, HEADER
 from sgimd_torch.catalogue import ROD
 from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.files import lock, write_text
@@ -38,7 +38,11 @@ Key = tuple[str, ...]
 # Columns, and which of them identify a row.
 RESULTS: Final = (HEADER, ("variant", "seed", "movements", "answer"))
 GOALS: Final = (GOALS_HEADER, ("variant", "seed"))
-COLUMNS: Final = {"goals.csv": GOALS, "asked.csv": (ASKED_HEADER, ("variant", "seed", "teacher"))}
+COLUMNS: Final = {
+    "goals.csv": GOALS,
+    "asked.csv": (ASKED_HEADER, ("variant", "seed", "teacher")),
+    "contexts.csv": (CONTEXTS_HEADER, ("variant", "seed", "movements", "answer", "low")),
+}
 LATE: Final = 1000  # movements; from then on a learner should know whom to ask
 CORNER = -1.0  # m, where the tiles of a benchmark begin in x and y: the corner of T, of rod and arms
 NEAR = 1.5  # m from the base: goals farther away cannot be reached
@@ -149,6 +153,18 @@ def asked_rows(config: Config, run: Run) -> list[list[object]]:
         counts = [mine, mine & (asked["reply"] == "shown"), late, late & own, strong, weak]
         rows.append([config.variant, config.seed, teacher, *(int(each.sum()) for each in counts)])
     return rows
+
+
+def context_rows(config: Config, run: Run) -> list[list[object]]:
+    """A row for each evaluation, answer and part of C that had goals; none where there is no context, or several."""
+    if run.by_context is None or run.contexts.shape[1] != 1:
+        return []
+    names = ("movements", "answer", "low", "high", "mean_error_m")
+    rows = zip(*(run.by_context[name].tolist() for name in names), strict=True)
+    return [[config.variant, config.seed, *row] for row in rows if not math.isnan(row[-1])]
+
+
+ROWS: Final = {"goals.csv": goal_rows, "asked.csv": asked_rows, "contexts.csv": context_rows}
 
 
 def tiles_reached(outcomes: Array, benchmark: Benchmark, corner: Array | float = CORNER) -> int:

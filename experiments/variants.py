@@ -258,7 +258,7 @@ def tables_of(experiment: str) -> list[str]:
     if experiment == "swimmer":
         return ["gymnasium.csv"]
     if experiment == "asking":
-        return ["asking.csv", "asked.csv"]
+        return ["asking.csv", "asked.csv", "contexts.csv"]
     return ["paper.csv", *(["goals.csv"] if experiment in ("large-space", "ladder-large") else [])]
 
 
