@@ -1,4 +1,4 @@
-"""The pages of results/, RESULTS.md, FORWARD_MODEL.md, GYMNASIUM.md and BY_HAND.md: claims, our numbers, verdicts.
+"""The pages in results/, such as RESULTS.md and LEARNING.md: claims, our numbers, and whether they hold.
 
 Each page is a template in experiments/pages/, which has the text; the tables are put in by name. Change the template,
 not the page. The tables come from the rows in --results, which compare.py writes:
@@ -6,6 +6,7 @@ not the page. The tables come from the rows in --results, which compare.py write
   RESULTS         paper.csv, and goals.csv and anova.csv if they exist
   FORWARD_MODEL   forward_model.csv, and the table of model_figures.py (--table) if it exists
   GYMNASIUM       gymnasium.csv
+  LEARNING        learning.csv and suite.csv
   BY_HAND         by_hand.csv
 
 Intervals are bootstrapped with a fixed seed, so the same rows give the same page. The analyses of variance need
@@ -32,15 +33,17 @@ with loading():  # Ctrl-C shows no traceback
 
     from anova import anova_cells, update_anova
     from judging import NotRun, Results, Verdict, judge
+    from learning_claims import LEARNING_CLAIMS, TIMES, answers_rows, read_learning, suite_rows
     from model_claims import MODEL_CLAIMS, SIMPLEX
     from paper_claims import PAPER_CLAIMS
     from quoted import MADE, Page, into_readme, render
     from read_results import LAST, Evaluated, ResultsError, read_coverages, read_goals, read_results
     from sgimd_torch.files import make_folder, write_text
     from sgimd_torch.views.statistics import iqm_interval, metres, rng, show
-    from variants import EXPERIMENTS, ladder
+    from sgimd_torch.views.suite import RANDOM
+    from variants import EXPERIMENTS, LEARNING, SUITED, ladder
 
-PAGES: Final = ("RESULTS", "FORWARD_MODEL", "GYMNASIUM", "BY_HAND")
+PAGES: Final = ("RESULTS", "FORWARD_MODEL", "GYMNASIUM", "LEARNING", "BY_HAND")
 ANOVA: Final = ("means compared", "of", "dimensions of theta in which they differ", "smallest p", "largest p")
 ON_ARMS: Final = (250, 500, 1000, 2000)
 EARLY: Final = (300, 500, 1000)
@@ -60,14 +63,15 @@ IN_README: Final = {
     "random-goals-demonstrations": "uniform goals, demonstrations, noise around the nearest movement",
     "cma-mae": "CMA-MAE that saves effort, no teacher",
 }
+NOBODY: Final = Evaluated("", "", {})
 Cell = Callable[[str], str]  # the text of a variant in a column of a table; raises NotRun if there is none
 
 
 def paper_page(folder: Path) -> Page:
     """The page results/RESULTS.md; learners from the worst to the best, other variants in the order of their rows."""
     path = folder / "paper.csv"
-    own = Results(read_results(path), read_goals(folder / "goals.csv"), linear=read_results(path, "linear"))
-    verdicts, results, variants = judge(PAPER_CLAIMS, own), own.alike, own.linear
+    own = Results(read_results(path), read_goals(folder / "goals.csv"), same=read_results(path, "linear"))
+    verdicts, results, variants = judge(PAPER_CLAIMS, own), own.alike, own.same
     learners = sorted((v for v in variants.values() if v.experiment == "learners"), key=lambda v: -_last_error(v))
     others = [variant for variant in variants.values() if variant.experiment != "learners"]
     better, difference = _against(results, lambda _: "sgim-d", LAST)
@@ -134,6 +138,27 @@ def gymnasium_page(folder: Path) -> Page:
     }
     cells = [[cell(name, answer) for cell in columns.values()] for name, answer in rows]
     return Page([], {"swimmer": markdown([*columns], cells)}, by_answer["own"])
+
+
+def learning_page(folder: Path) -> Page:
+    """The page results/LEARNING.md: few movements, on the rod and on the suite."""
+    rod, suite = (read_learning(folder / f"{name}.csv") for name in ("learning", "suite"))
+    verdicts, times = judge(LEARNING_CLAIMS, rod["judged"]), (*TIMES, LAST)
+    names = sorted(LEARNING, key=lambda name: _last_error(rod["process"].variants.get(name, NOBODY)))
+    columns = {
+        **_errors(rod["process"], times, ".4f"),
+        "by its own": lambda name: show(rod["own"].iqm(name), ".4f"),
+        "by `linear`": lambda name: show(rod["linear"].iqm(name), ".4f"),
+        "times its noise floor": lambda name: show(rod["own"].floor_ratio(name, name)),
+    }
+    others = [name for name in SUITED if name != RANDOM]
+    tables = {
+        "claims": verdicts_table("what", verdicts),
+        "rod": variants_table(names, columns),
+        "answers": markdown(["memory of", "over", *map(str, times)], answers_rows(rod)),
+        **{f"suite_{when}": markdown(["task", "random, nearest", *others], suite_rows(suite, when)) for when in TIMES},
+    }
+    return Page(verdicts, tables, rod["judged"])
 
 
 def hand_page(folder: Path) -> Page:
@@ -281,6 +306,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         "RESULTS": lambda: paper_page(folder),
         "FORWARD_MODEL": lambda: model_page(folder, table),
         "GYMNASIUM": lambda: gymnasium_page(folder),
+        "LEARNING": lambda: learning_page(folder),
         "BY_HAND": lambda: hand_page(folder),
     }
     paths = {name: options.out / f"{name}.md" for name in PAGES if options.only in (None, name)}
@@ -291,8 +317,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     pages = {name: makers[name]() for name in paths}
     texts = {name: render(name, page) for name, page in pages.items()}
     if options.readme is not None:
-        paper, model = (pages.get(name) or makers[name]() for name in PAGES[:2])
-        write_text(options.readme, into_readme(options.readme.read_text(encoding="utf-8"), paper, model))
+        paper, model, learning = (
+            pages.get(name) or makers[name]() for name in ("RESULTS", "FORWARD_MODEL", "LEARNING")
+        )
+        text = options.readme.read_text(encoding="utf-8")
+        write_text(options.readme, into_readme(text, paper, model=model, learning=learning))
     make_folder(options.out)
     for name, path in paths.items():
         write_text(path, texts[name])

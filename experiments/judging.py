@@ -47,7 +47,7 @@ class NotRun(LookupError):
 class Results:
     """The data that claims are judged on.
 
-    ``variants`` from ``read_results``, with their own answers, and ``linear``, with those of ``LocallyLinear``; for
+    ``variants`` from ``read_results``, with their own answers, and ``same``, with those of one inverse for all; for
     some claims ``goals`` from ``read_goals`` and ``coverages`` from ``read_coverages``.
 
     Errors are in metres; intervals are over seeds, of confidence ``level``. All methods raise ``NotRun`` if fewer than
@@ -57,13 +57,13 @@ class Results:
     variants: Mapping[str, Evaluated]
     goals: Mapping[str, Array] = field(default_factory=dict)
     coverages: Mapping[str, Mapping[int, Array]] = field(default_factory=dict)
-    linear: Mapping[str, Evaluated] = field(default_factory=dict)
+    same: Mapping[str, Evaluated] = field(default_factory=dict)
     level: float = LEVEL
 
     @property
     def alike(self) -> Results:
-        """The same with all variants answered by ``LocallyLinear``, for a comparison of what they have explored."""
-        return replace(self, variants=self.linear)
+        """The same with all variants answered by the same inverse, for a comparison of what they have explored."""
+        return replace(self, variants=self.same)
 
     def at(self, variant: str, movements: int = LAST, values: str = "errors") -> dict[int, float]:
         """Seed -> value of "errors", "floors", "tiles", "claimed" or "met"."""
@@ -146,7 +146,7 @@ class Claim(NamedTuple):
 
     ``text`` and its ``bar`` in words; ``judged`` returns our number in words and the verdict; ``pairs`` of variants
     whose difference at ``movements`` is its effect in metres; ``own``: each variant answers by its own inverse model,
-    otherwise all by ``LocallyLinear``.
+    otherwise all by the same one.
     """
 
     text: str

@@ -116,8 +116,8 @@ def render(name: str, page: Page) -> str:
     return f"{made}\n\n{_filled(name, page)}"
 
 
-def into_readme(text: str, paper: Page, model: Page) -> str:
-    """A README with its section of results made again from those of both pages.
+def into_readme(text: str, paper: Page, **more: Page) -> str:
+    """A README with its section of results made again from those of these pages.
 
     Raises:
         ResultsError: it has no such section.
@@ -126,7 +126,8 @@ def into_readme(text: str, paper: Page, model: Page) -> str:
     _, end, after = rest.partition(END)
     if not begin or not end:
         raise ResultsError(f"the README must have a section from {BEGIN} to {END}; was it edited?")
-    return f"{before}{BEGIN}\n{_filled('README', paper, model=model.results)}{END}{after}"
+    results = {name: page.results for name, page in more.items()}
+    return f"{before}{BEGIN}\n{_filled('README', paper, **results)}{END}{after}"
 
 
 def _filled(name: str, page: Page, **more: Results) -> str:

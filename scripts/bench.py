@@ -59,12 +59,12 @@ class Life:
     """A learner on a planar arm, with a teacher for SGIM-D; its overhead can be measured at any time."""
 
     def __init__(self, algorithm: str, joints: int) -> None:
-        from sgimd_torch import Demonstration, PeriodicTeacher, PlanarArm, sagg_riac, sgim_d, stream
+        from sgimd_torch import Demonstration, LocallyLinear, PeriodicTeacher, PlanarArm, sagg_riac, sgim_d, stream
 
         self.arm = arm = PlanarArm(joints, noise=0.02)
         self.movements, self.crc, self.teacher = 0, 0, None
         if algorithm == "sagg-riac":
-            self.learner = sagg_riac(arm, 0)
+            self.learner = sagg_riac(arm, 0, inverse=LocallyLinear)  # the default of earlier commits, for --against
         else:
             rng = stream(0, "bench")
             thetas = rng.random((100, joints))
@@ -72,7 +72,9 @@ class Life:
                 Demonstration(np.zeros(0), np.arange(2.0), np.stack((t, t)), arm.execute(np.zeros(0), t, rng))
                 for t in thetas
             ]
-            self.learner = sgim_d(arm, 0, correspondence=lambda times, trajectory: trajectory[-1])
+            self.learner = sgim_d(
+                arm, 0, correspondence=lambda times, trajectory: trajectory[-1], inverse=LocallyLinear
+            )
             self.teacher = PeriodicTeacher(shown, stream(0, "teacher"))
         self._clock: Any = Clock(arm.execute)
         vars(arm)["execute"] = self._clock

@@ -1,5 +1,7 @@
 from .algorithms import imitation as imitation
 from .algorithms import observation as observation
+from .algorithms import practice as practice
+from .algorithms import practice_taught as practice_taught
 from .algorithms import random_exploration as random_exploration
 from .algorithms import sagg_riac as sagg_riac
 from .algorithms import sgim_acts as sgim_acts

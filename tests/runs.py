@@ -26,7 +26,7 @@ EAGER = LIVE.replace("process;", "process, run; run.FLUSH_EVERY = 0;")
 
 
 def arguments(out, benchmark):
-    fixed = f"--seed 3 --movements {MOVEMENTS} --evaluate_at 30,60 --repeats 2".split()
+    fixed = f"--algorithm sgim-d --seed 3 --movements {MOVEMENTS} --evaluate_at 30,60 --repeats 2".split()
     return [*fixed, "--benchmark", str(benchmark), "--out", str(out)]
 
 

@@ -12,7 +12,7 @@ from sgimd_torch.files import write_npz
 from sgimd_torch.forward_model.model import ForwardModel
 from sgimd_torch.goals.alp_gmm import AlpGmm
 from sgimd_torch.inverses.local import NearestNeighbour
-from sgimd_torch.inverses.locally_linear import LocallyLinear
+from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Learner, ReplayError
 from sgimd_torch.learner.life import Kind, read_life
 from sgimd_torch.memory import Memory
@@ -96,7 +96,7 @@ def test_which_movement_reaches_a_goal_is_one_call_for_all_of_them(name):
     found = evaluate(learner.inverse, arm, goal[None], seed=2, movements=60)
     context = found.contexts[0]
     assert arm.policies.contains(learner.inverse(context, goal).theta)
-    assert np.array_equal(found.thetas[0], LocallyLinear(learner.memory)(context, goal).theta)
+    assert np.array_equal(found.thetas[0], LocalProcess(learner.memory, noise=arm.outcome_noise)(context, goal).theta)
 
 
 def test_the_builders_inverse_is_the_one_that_it_is_given():

@@ -179,7 +179,9 @@ def test_the_bench_compares_two_copies_of_the_library(capsys, monkeypatch):
 def watched(tmp_path_factory):
     """A short run of the arm, with a board, and its contents."""
     place = tmp_path_factory.mktemp("watched")
-    words = f"{kill_runs.FIXED} --environment planar-arm-7 --movements 120 --evaluate-at 60 --repeats 0"
+    words = (
+        f"{kill_runs.FIXED} --algorithm sgim-d --environment planar-arm-7 --movements 120 --evaluate-at 60 --repeats 0"
+    )
     code, parts, said = kill_runs.live(place, words)
     assert code == 0, said
     assert [part.name for part in parts] == [

@@ -86,7 +86,7 @@ _MOST_THREADS: Final = max(64, os.cpu_count() or 1)
 class Config:
     """One run. ``options()`` explains each field; wrong values raise ValueError."""
 
-    algorithm: str = option("sgim-d", RUN, "Which algorithm learns.", leads=True)
+    algorithm: str = option("practice-taught", RUN, "Which algorithm learns.", leads=True)
     seed: int = option(0, RUN, "Seed of all random streams; the same seed gives the same files.", least=0, place=True)
     movements: int = option(
         5000, RUN, "Number of movements, those at rest included.", least=1, on_resume=True, leads=True

@@ -199,7 +199,7 @@ def demonstrations_of(task: Task, file: Path | None) -> tuple[Sequence[Demonstra
     if source is None:
         raise ValueError(
             f"{type(robot).__name__} comes without demonstrations, and this algorithm needs a teacher; "
-            "give --demonstrations FILE, or choose one that learns alone: --algorithm sagg-riac"
+            "give --demonstrations FILE, or choose one that learns alone: --algorithm practice"
         )
     if not isinstance(source, Path):
         made = source()

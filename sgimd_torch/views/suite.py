@@ -74,7 +74,7 @@ REFERENCES: Final[dict[str, dict[str, Any]]] = {
         "budget": 1,
     },
 }
-DEFAULTS: Final = {"algorithm": "sagg-riac", "movements": "1000", "repeats": "0", "answers": "own", "out": "runs/suite"}
+DEFAULTS: Final = {"algorithm": "practice", "movements": "1000", "repeats": "0", "answers": "own", "out": "runs/suite"}
 OWN: Final = ("environment", "task-space", "benchmark", "demonstrations", "name")
 
 

@@ -35,7 +35,7 @@ def results(tmp_path):
 
 def judged(results):
     goals = read_goals(results.with_name("goals.csv"))
-    return judge(PAPER_CLAIMS, Results(read_results(results), goals, linear=read_results(results, "linear")))
+    return judge(PAPER_CLAIMS, Results(read_results(results), goals, same=read_results(results, "linear")))
 
 
 def make_page(results, out):
@@ -124,8 +124,8 @@ def test_a_claim_among_many_needs_more_certainty_than_one_alone(results):
     }
     claim = Claim("ours err less", "difference < 0", errs_less("ours", "theirs"), [("ours", "theirs")])
     others = [Claim(f"not run {k}", "", errs_less("ours", f"missing {k}")) for k in range(20)]
-    (alone,) = judge([claim], Results({}, linear=made))
-    among, *_ = judge([claim, *others], Results({}, linear=made))
+    (alone,) = judge([claim], Results({}, same=made))
+    among, *_ = judge([claim, *others], Results({}, same=made))
     assert (alone.verdict, alone.alone) == ("holds", "holds")
     assert (among.verdict, among.alone) == ("cannot say", "holds")
     assert among.number == alone.number
@@ -253,7 +253,7 @@ def test_no_figure_is_written_by_hand_into_the_text_of_a_template(name):
 
 
 def test_a_figure_in_prose_is_that_of_the_rows(results):
-    made = Quoted(Results(read_results(results), linear=read_results(results, "linear")))
+    made = Quoted(Results(read_results(results), same=read_results(results, "linear")))
     assert made.error("sgim-d") == f"{0.08 * np.mean([spread(seed) for seed in range(5, 15)]):.3f}"
     assert made.interval("sgim-d", values="tiles", form=".0f").startswith("310 [3")
     assert made.less("sgim-d", "random").startswith("0.120 [0.1")
@@ -271,7 +271,8 @@ def test_a_readme_without_a_section_of_results_is_refused_and_nothing_is_written
     readme = tmp_path / "README.md"
     readme.write_text("# Mine\n")
     out = tmp_path / "out"
-    (tmp_path / "forward_model.csv").write_bytes((SHIPPED / "forward_model.csv").read_bytes())
+    for name in ("forward_model.csv", "learning.csv", "suite.csv"):
+        (tmp_path / name).write_bytes((SHIPPED / name).read_bytes())
     options = ["--results", str(results.parent), "--out", str(out), "--only", "RESULTS", "--readme", str(readme)]
     assert command(main, options) == 2
     assert "the README must have a section from <!-- results: made by" in capsys.readouterr().err

@@ -191,7 +191,7 @@ def test_killed_it_leaves_a_run_that_the_next_start_waits_for_and_collects_once(
 
 def test_a_run_that_lost_its_rows_is_collected_again_and_no_goal_is_counted_twice(go, benchmark, tmp_path):
     name = "sgim-d-large"
-    config = Config(seed=3, movements=30, name=name, task_space=100.0, benchmark=benchmark, out=tmp_path)
+    config = Config("sgim-d", seed=3, movements=30, name=name, task_space=100.0, benchmark=benchmark, out=tmp_path)
     assert go(tmp_path, "--movements", 30, "--evaluate_at", "20", "--name", name, "--task_space", 100) == 0
     paths = [tmp_path / "paper.csv", tmp_path / "goals.csv"]
 
@@ -221,7 +221,7 @@ def test_a_run_that_is_whole_on_disk_is_collected_without_being_run_again(compar
 
 def test_a_run_that_ended_without_its_last_evaluation_is_no_result(go, benchmark, tmp_path):
     assert go(tmp_path, "--movements", 30, "--evaluate_at", "[]") == 0
-    config = Config(seed=3, movements=30, benchmark=benchmark, out=tmp_path)
+    config = Config("sgim-d", seed=3, movements=30, benchmark=benchmark, out=tmp_path)
     with pytest.raises(RunError, match="seed-003 has no evaluation after 30 movements, though it ended"):
         collect("learners", config, tmp_path / "results")
     assert not (tmp_path / "results").exists()
@@ -314,6 +314,19 @@ def test_few_are_a_tenth_of_the_demonstrations_and_half_are_those_to_the_right(t
     assert len(half) == sum(shown.outcome[0] > 0 for shown in everything) > 40
 
 
+def test_a_corner_is_twenty_neighbours_and_shuffled_ones_only_say_something_else(tmp_path):
+    make_subsets(tmp_path / "new")
+    everything = load_demonstrations()
+    corner, shuffled = (load_demonstrations(tmp_path / "new" / name) for name in ("corner.npz", "shuffled.npz"))
+    assert len(corner) == 20
+    assert np.ptp([shown.outcome for shown in corner], axis=0).max() < 1
+    assert [shown.trajectory.tobytes() for shown in shuffled] == [shown.trajectory.tobytes() for shown in everything]
+    said, done = (sorted(tuple(shown.outcome) for shown in each) for each in (shuffled, everything))
+    assert said == done
+    same = sum((a.outcome == b.outcome).all() for a, b in zip(shuffled, everything, strict=True))
+    assert same < 10
+
+
 def test_ten_lessons_by_hand_are_set_against_the_first_ten_that_are_shipped(tmp_path):
     make_subsets(tmp_path, by_hand=True)
     ten, hand = (load_demonstrations(tmp_path / name, n_joints=6, outcome_dim=2) for name in ("ten.npz", "hand.npz"))
@@ -375,7 +388,7 @@ def test_rows_made_again_are_equal_but_for_rounding_or_differ():
 def test_rows_are_drawn_by_lot_and_made_again_in_a_folder_of_their_own(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     results = table_in(tmp_path, "forward_model.csv")
-    config = Config(algorithm="sgim-d", environment="planar-arm-7", name="sgim-d-arm-7", movements=20)
+    config = Config(algorithm="sgim-d", environment="planar-arm-7", name="sgim-d-arm-7", movements=20, inverse="linear")
     again = replace(config, evaluate_at=(20,), floor_at=(), answers=("own", "nearest"), out=tmp_path / "first")
     assert sweep_here([again]) == []
     _, row = result_rows("planar-arm-7", again, read_run(again.directory))

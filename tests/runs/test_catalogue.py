@@ -5,19 +5,24 @@ import re
 import subprocess
 import sys
 import typing
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 
 from runs import ROOT
 from sgimd_torch.catalogue import CATALOGUE, SHARED, Entry, checked, colour, find, label, load
+from sgimd_torch.goals.interest_map import InterestMap
+from sgimd_torch.goals.uniform import UniformGoals
+from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.runs.build import build, task_of
 from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.config import Config, dashed, from_settings, words
+from sgimd_torch.runs.config import default as default_of
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.tasks import MOST_GOALS, goals_all_over
+from sgimd_torch.searches.widening import Widening
 
 ENTRIES = [(kind, word, entry) for kind, entries in CATALOGUE.items() for word, entry in entries.items()]
 TOSS = '''
@@ -87,16 +92,16 @@ def test_what_an_entry_takes_its_parameters_are(kind, word, entry):
 
 def test_defaults_of_options_are_those_of_the_library():
     """So that help need not load what it explains."""
-    compared = set()
+    compared, standards = set(), {each.name: default_of(each, "") for each in fields(Config)}
     for word, entry in [*((word, entry) for _, word, entry in ENTRIES), *SHARED.items()]:
         parameters = dict(inspect.signature(entry.load()).parameters)
         if word in ("sgim-d", "sagg-riac"):  # they hand their parts on
             parameters |= inspect.signature(load("sgimd_torch.algorithms:goal_babbling")).parameters
         for parameter, option in entry.uses.items():
-            given, ours = parameters.get(parameter), getattr(Config, option, None)
+            given, ours = parameters.get(parameter), standards.get(option)
             if given is None or given.default is given.empty or ours is None:
                 continue
-            default = given.default
+            default = LocalProcess if option == "inverse" and given.default is None else given.default
             compared.add(option)
             assert default is (find(option, ours).load() if option in CATALOGUE else ours) or default == ours, option
     assert compared >= {"goals", "inverse", "search", "competence", "budget", "social", "window", "progress", "choice"}
@@ -127,7 +132,7 @@ def test_algorithms_have_a_name_and_a_colour_and_unknown_ones_their_word():
             "--environment toss:Half",
             "gave a Half without contexts, rest, outcome_noise, observe, execute; wanted .* which has contexts",
         ),
-        ("--environment toss:Toss", "Toss comes without demonstrations, .* --algorithm sagg-riac"),
+        ("--environment toss:Toss", "Toss comes without demonstrations, .* --algorithm practice"),
         (
             "--goals toss:Toss",
             r"goals toss:Toss cannot be called as \(contexts, .* a goal model: too many",
@@ -160,7 +165,7 @@ def test_a_users_environment_is_run_evaluated_and_resumed(toss, capsys):
 
 
 def test_a_users_task_comes_with_its_teacher(toss, capsys):
-    taught = ("--environment", "toss:taught", "--out", "runs", *SHORT)
+    taught = ("--algorithm", "sgim-d", "--environment", "toss:taught", "--out", "runs", *SHORT)
     assert command(main, taught) == 0
     run = read_run(toss / "runs/sgim-d/seed-000")
     assert np.flatnonzero(run.demonstration >= 0).tolist() == [30]
@@ -222,9 +227,30 @@ def test_the_words_of_a_config_make_it_again():
     assert parse(words(vars(config)))[0] == config
     assert all(word.startswith("--") and "_" not in word.partition("=")[0] for word in words(vars(config)))
     assert words(vars(Config())) == []
-    assert words({"algorithm": "sgim-d", "no-such-option": 3}) == []
+    assert words({"algorithm": "practice-taught", "no-such-option": 3}) == []
     assert from_settings({"goals": "grid", "evaluate_at": [5], "out": "x", "commit": "abc"}).goals == "grid"
     assert dashed("task_space") == "task-space"
+
+
+def test_an_option_that_nobody_set_is_what_the_algorithm_has_for_it():
+    plain, own = Config(algorithm="sagg-riac"), Config(algorithm="practice-taught")
+    assert (plain.goals, plain.search, plain.budget, plain.teacher) == ("interest-map", "nelder-mead", 15, "periodic")
+    assert (own.goals, own.search, own.budget, own.teacher) == ("uniform", "practice", 1, "at-once")
+    assert words(vars(own)) == own.without_effect == []
+    assert words(vars(plain)) == ["--algorithm=sagg-riac"]
+    assert Config(algorithm="practice-taught", goals="uniform", budget=1) == own
+    assert words(vars(replace(own, goals="interest-map"))) == ["--goals=interest-map"]
+    assert from_settings(vars(own)) == own
+
+
+def test_practice_is_made_of_options_that_can_be_changed_one_by_one():
+    learner = build(Config(algorithm="practice", environment="two-elbows")).learner
+    other = build(Config(algorithm="practice", environment="two-elbows", goals="interest-map", budget=3)).learner
+    assert isinstance(learner.autonomous.goals, UniformGoals)
+    assert isinstance(other.autonomous.goals, InterestMap)
+    assert (learner.autonomous.budget, other.autonomous.budget) == (1, 3)
+    assert isinstance(other.autonomous.look, Widening)
+    assert learner.autonomous.search.__qualname__ == other.autonomous.search.__qualname__
 
 
 def test_an_entry_that_is_not_installed_names_its_extra(monkeypatch):

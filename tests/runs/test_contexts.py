@@ -101,7 +101,7 @@ def test_the_contexts_of_the_rod_are_tasks(word, reach):
 
 
 def test_the_rod_in_the_wind_is_run_taught_and_resumed(tmp_path, benchmark):
-    words = "--environment rod-wind --movements 45 --evaluate-at 35 --repeats 2"
+    words = "--algorithm sgim-d --environment rod-wind --movements 45 --evaluate-at 35 --repeats 2"
     both = [*words.split(), "--benchmark", str(benchmark)]
     assert command(main, [*both, "--out", str(tmp_path / "whole")]) == 0
     assert command(main, [*both, "--out", str(tmp_path / "cut"), "--movements", "36"]) == 0

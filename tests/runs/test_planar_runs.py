@@ -33,7 +33,20 @@ ARMS = {"planar-arm-7": 7, "planar-arm-50": 50}
 
 def live(out, *options):
     """The exit code of a short run; later options win."""
-    short = ("--environment", "planar-arm-7", "--seed", 3, "--movements", 70, "--evaluate_at", 40, "--repeats", 2)
+    short = (
+        "--algorithm",
+        "sgim-d",
+        "--environment",
+        "planar-arm-7",
+        "--seed",
+        3,
+        "--movements",
+        70,
+        "--evaluate_at",
+        40,
+        "--repeats",
+        2,
+    )
     return command(main, [str(word) for word in (*short, "--out", out, *options)])
 
 

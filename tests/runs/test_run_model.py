@@ -37,7 +37,8 @@ def arguments(tmp_path_factory):
     """Those of a short run on an arm, with three goals to evaluate it on; later options win."""
     path = tmp_path_factory.mktemp("benchmark") / "arm.npz"
     save_benchmark(path, Benchmark("PlanarArm", np.array([[0.0, 0.6], [0.3, -0.5], [-0.4, 0.4]]), 0.1))
-    short = f"--environment planar-arm-7 --seed 3 --movements {MOVEMENTS} --evaluate_at 120 --repeats 0 --training 2"
+    short = f"--algorithm sgim-d --environment planar-arm-7 --seed 3 --movements {MOVEMENTS}"
+    short = f"{short} --evaluate_at 120 --repeats 0 --training 2"
 
     def arguments(out, *options):
         return [str(word) for word in (*short.split(), "--benchmark", path, "--out", out, *options)]

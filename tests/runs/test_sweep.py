@@ -77,7 +77,7 @@ def test_values_and_further_options_become_those_of_the_runs():
     [
         ("--vary gaols=uniform", "unknown option --gaols=uniform; did you mean --goals?"),
         ("--vary goals=unifrom,grid", "unknown goals 'unifrom', known are .*; did you mean uniform?"),
-        ("--vary budget=5,x", "--budget must be a whole number, got x"),
+        ("--vary budget=5,x", "--budget must be a whole number, or null, got x"),
         ("--vary budget=5,0", "budget must be .*at least 1, got 0"),
         ("--vary goals", "--vary must be like goals=interest-map,uniform, got 'goals'"),
         ("--vary goals=", "--vary must be like"),
@@ -126,7 +126,7 @@ def test_seeds_are_one_or_a_range_or_a_list(tmp_path, monkeypatch, capsys):
     for seeds, wanted in (("5", [5]), ("0-2", [0, 1, 2]), ("0,3,7-9", [0, 3, 7, 8, 9]), ("1,0-1", [1, 0])):
         assert swept("--seeds", seeds, "--dry-run") == 0
         lines = capsys.readouterr().out.splitlines()
-        assert lines == [f"sgim-d seed {seed}: 0 of 5000 movements" for seed in wanted]
+        assert lines == [f"practice-taught seed {seed}: 0 of 5000 movements" for seed in wanted]
     assert not list(tmp_path.iterdir())
 
 

@@ -46,11 +46,11 @@ def test_a_task_states_its_noise_and_has_goals_of_its_own(name):
 def test_each_task_is_run_with_the_learner_and_with_the_two_that_it_has_to_beat():
     configs = configs_of("--tasks", "toss", "rod-large", "--seeds", "3,4", "--budget", "7", "--out", "here", *SHORT)
     assert len({config.directory for config in configs}) == 2 * 2 * 3
-    ours = [config for config in configs if config.variant == "sagg-riac"]
+    ours = [config for config in configs if config.variant == "practice"]
     assert {(config.environment, config.task_space, config.seed) for config in ours} == {
         (word, side, seed) for word, side in (("toss", 1.0), ("fishing-rod", 100.0)) for seed in (3, 4)
     }
-    assert {(config.variant, config.budget) for config in configs} == {(RANDOM, 15), (UNIFORM, 1), ("sagg-riac", 7)}
+    assert {(config.variant, config.budget) for config in configs} == {(RANDOM, 15), (UNIFORM, 1), ("practice", 7)}
     assert {config.movements for config in configs} == {40}
     assert {config.evaluate_at for config in configs} == {(20,)}
 
@@ -93,7 +93,7 @@ def test_a_suite_is_run_shown_and_gone_on_with(tmp_path, capsys):
     assert suite(*words, "--dry-run") == 0
     assert capsys.readouterr().out == ""
     assert suite(*words, "--seeds", "0-1", "--dry-run") == 0
-    assert "toss: sagg-riac seed 1: 0 of 40 movements" in capsys.readouterr().out
+    assert "toss: practice seed 1: 0 of 40 movements" in capsys.readouterr().out
     assert suite(*words, "--seeds", "0-1", "--shard", "1/2", "--dry-run") == 0
     assert capsys.readouterr().out == ""  # the first half of the list is seed 0
 
@@ -130,5 +130,5 @@ def test_runs_that_are_there_are_read_by_task_and_learner(tmp_path):
     found = errors_of(configs_of(*words))
     assert list(found) == ["toss"]
     assert {name: sorted(curve) for name, curve in found["toss"].items()} == {
-        name: [20, 40] for name in (RANDOM, UNIFORM, "sagg-riac")
+        name: [20, 40] for name in (RANDOM, UNIFORM, "practice")
     }

@@ -109,11 +109,10 @@ def commands(lives: Sequence[Life]) -> list[str]:
     groups: dict[str, list[int]] = {}
     for life in lives:
         config = {**before_there_was_a_choice(), **life.config}
-        algorithm = config.pop("algorithm")
-        if config.get("name") == algorithm:
+        if config.get("name") == config["algorithm"]:
             del config["name"]  # a run is named after its algorithm anyway
         own = {name: value for name, value in config.items() if name == "name" or name not in having("place")}
-        groups.setdefault(shlex.join([f"--algorithm={algorithm}", *words(own)]), []).append(life.seed)
+        groups.setdefault(shlex.join(words(own)), []).append(life.seed)
     lines = []
     for given, seeds in groups.items():
         line = f"sgimd run {given} --seed={'$seed' if len(seeds) > 1 else seeds[0]} --out={AGAIN}"
