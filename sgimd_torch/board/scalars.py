@@ -45,6 +45,10 @@ LEGEND: Final = {
     "goals/reached_share": "Of the last 50 goals, the share that a movement came within the tolerance of.",
     "goals/missed_by": "Distance (m) from a goal to where its best movement landed, median over the last 50 goals.",
     "teacher/demonstrations": "Demonstrations that the teacher has given so far.",
+    "strategy": "Share of the last movements before which the learner asked by this strategy; before the others it did "
+    "not ask.",
+    "asked": "Of its last requests, the share for a goal in this place.",
+    "asked/answered": "Requests so far that were answered with a demonstration.",
     "teacher/missed_by": "Distance (m) from a demonstrated outcome to where its imitations landed, mean over the last "
     "movements.",
 }
@@ -63,6 +67,7 @@ _LAYOUT: Final[Charts] = {
         ("goals", "share of movements: searches for its own goals"): "regime/local",
         ("imitates", "share of movements: imitations"): "regime/imitate",
         ("teacher", "demonstrations so far"): "teacher/demonstrations",
+        ("asks", "share of movements before which it asked, by strategy"): "strategy/.*",
         ("imitates", "imitations miss what was shown by (m)"): "teacher/missed_by",
     },
 }
@@ -136,6 +141,9 @@ class Curves:
         self._origins: dict[str, int] = {}  # since the last point
         self._imitated: list[float] = []  # m, since the last point
         self._demonstrations = 0
+        self._strategies: dict[str, int] = {}  # requests by each, since the last point
+        self._wanted: list[Array] = []  # goals asked for, since the last point
+        self._answered = 0
         self._goal: Array | None = None
         self._missed_by: list[float] = []  # m, one for each goal pursued
         self._reached: dict[bytes, bool] = {}  # by goal
@@ -146,6 +154,10 @@ class Curves:
         """Count a movement."""
         move = episode.move
         self._demonstrations += episode.demonstration is not None
+        if episode.request is not None:
+            self._wanted.append(episode.request.goal)
+            self._answered += episode.reply == "shown"
+            self._strategies[episode.request.strategy] = self._strategies.get(episode.request.strategy, 0) + 1
         origin = "rest" if move is None else move.origin
         self._origins[origin] = self._origins.get(origin, 0) + 1
         if move is None or move.goal is None or episode.outcome is None:
@@ -166,6 +178,13 @@ class Curves:
         total = sum(self._origins.values())
         values = {f"regime/{origin}": n / total for origin, n in self._origins.items()}
         self._origins = dict.fromkeys(self._origins, 0)  # a regime that was seen once keeps its curve
+        values |= {f"strategy/{strategy}": n / total for strategy, n in self._strategies.items()}
+        self._strategies = dict.fromkeys(self._strategies, 0)
+        if self._wanted:
+            counts, _ = self.places.sums(np.array(self._wanted), np.zeros(len(self._wanted)))
+            values |= {f"asked/{self.places.names[k]}": n / len(self._wanted) for k, n in enumerate(counts.tolist())}
+            values["asked/answered"] = self._answered
+            self._wanted.clear()
         values["teacher/demonstrations"] = self._demonstrations
         if self._imitated:
             values["teacher/missed_by"] = float(np.mean(self._imitated))
@@ -260,7 +279,7 @@ def layout_of(
     Args:
         places: those that have goals of the benchmark, by name.
         near: distance (m) at which these count as met.
-        has: what the run has, of ``ALL``; charts that would stay empty are left out.
+        has: what the run has, of ``ALL``, and "asks"; charts that would stay empty are left out.
         more: charts of your own.
     """
     met = {f"share of goals met {EVERYWHERE}": f"met/{EVERYWHERE}"}

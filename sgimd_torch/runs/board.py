@@ -188,8 +188,9 @@ def _has(parts: RunParts) -> set[str]:
         "repeats": parts.config.repeats > 0,
         "goals": getattr(parts.learner.autonomous, "goals", None) is not None,
         "regions": len(parts.regions) > 0,
-        "teacher": parts.teacher is not None,
-        "imitates": parts.teacher is not None and "epsilon" in parts.config.used,
+        "teacher": parts.teacher is not None or len(parts.teachers) > 0,
+        "imitates": (parts.teacher is not None and "epsilon" in parts.config.used) or len(parts.teachers) > 0,
+        "asks": len(parts.teachers) > 0,
     }
     return {name for name, there in found.items() if there}
 

@@ -31,7 +31,7 @@ from sgimd_torch.runs.directory import RunDirectory
 from sgimd_torch.runs.process import Stopping
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.run import live_in
-from sgimd_torch.spaces import Box, Demonstration, Episode, Move
+from sgimd_torch.spaces import Box, Demonstration, Episode, Move, Request
 from worlds import demonstrations, make
 
 LIFE = 1500  # movements
@@ -98,6 +98,24 @@ def test_shares_of_regimes_sum_to_one_and_a_regime_that_was_seen_keeps_its_curve
     curves.episode(Episode(4, np.zeros(0), None, None, None))
     values = {tag: value for tag, value in curves.of_behaviour().items() if tag.startswith("regime/")}
     assert values == {"regime/global": 0, "regime/local": 0, "regime/imitate": 0, "regime/rest": 1}
+
+
+def test_requests_are_counted_by_strategy_and_by_the_place_of_their_goals():
+    curves = Curves(PLANE)
+    wanted = [("imitate ann", (-0.5, -0.5), "shown"), ("imitate ben", (0.5, 0.5), "again"), None, None]
+    for index, each in enumerate(wanted * 2):
+        request = each and Request(each[0].partition(" ")[2], np.array(each[1]), each[0])
+        move = Move(np.zeros(1), GOAL, "local")
+        curves.episode(Episode(index, np.zeros(0), move, FAR, None, request, each[2] if each else ""))
+    values = curves.of_behaviour()
+    assert (values["strategy/imitate ann"], values["strategy/imitate ben"]) == (0.25, 0.25)
+    assert values["asked/answered"] == 2
+    places = {tag: value for tag, value in values.items() if tag.startswith("asked/") and tag != "asked/answered"}
+    assert sorted(places.values()) == [0, 0, 0.5, 0.5]
+    curves.episode(movement(8, GOAL, FAR))
+    later = curves.of_behaviour()
+    assert later["strategy/imitate ann"] == 0
+    assert not any(tag.startswith("asked/") for tag in later)  # no requests, no shares of them
 
 
 def test_a_region_that_was_cut_goes_on_as_the_mean_over_the_goals_of_its_parts():
@@ -270,6 +288,7 @@ def test_the_page_of_charts_begins_with_where_it_is_competent_by_places_with_goa
         ("--algorithm", "observation", "--repeats", 0),
         ("--algorithm", "imitation"),
         ("--algorithm", "sagg-riac"),
+        ("--algorithm", "sgim-im"),
         ("--social", "emulate", "--goals", "uniform"),
         ("--goals", "grid", "--search", "perturb"),
     ],

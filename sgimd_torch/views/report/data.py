@@ -90,6 +90,16 @@ class Life(Run):
         return {each.index: each.demonstration.outcome for each in lessons if each.index < len(self.index)}
 
     @property
+    def answered(self) -> dict[int, Array]:
+        """Movement -> the outcome ``(outcome_dim,)`` m of the demonstration that it had asked for."""
+        found: dict[int, Array] = {}
+        for k, reply in enumerate(self.requests["reply"].tolist() if self.requests else ()):
+            if self.requests and reply == "shown":
+                got = [self.requests[name][k] for name in self.requests if name.startswith("got_")]
+                found[int(self.requests["index"][k])] = np.array(got[-self.outcomes.shape[1] :])
+        return found
+
+    @property
     def has_map(self) -> bool:
         """Whether there is an interest map to draw."""
         sides = sum(name.startswith("low_") for name in self.regions or ())  # of contexts, then of outcomes
@@ -257,6 +267,8 @@ def demonstrated(lives: Sequence[Life]) -> tuple[Array, str]:
         by_hand = {id(life): life.by_hand for life in lives if len(life.landed)}
     except (OSError, ValueError) as error:
         return np.empty((0, 2)), f"What they were shown is left out: {error}."
+    for life in lives:
+        by_hand.setdefault(id(life), {}).update(life.answered)
     rows = {
         (life.environment, *(str(life.config.get(f"demonstrations{which}")) for which in ("", "_crc32")), row)
         for life in lives

@@ -20,7 +20,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from sgimd_torch.catalogue import CATALOGUE
 from sgimd_torch.runs.log import RunError
-from sgimd_torch.views.report import comparison, figures, model, record
+from sgimd_torch.views.report import asking, comparison, figures, model, record
 from sgimd_torch.views.report.data import Variant, counted, demonstrated, taught_by_hand
 from sgimd_torch.views.report.figures import data_uri
 from sgimd_torch.views.statistics import LEAST_SEEDS, Interval, show
@@ -77,6 +77,7 @@ def page(place: Path, variants: Sequence[Variant], unread: Sequence[str], baseli
         figures=figures,
         record=record,
         model=model,
+        asking=asking,
         counted=counted,
         demonstrated=demonstrated,
         taught_by_hand=taught_by_hand,
