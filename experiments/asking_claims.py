@@ -122,10 +122,11 @@ def _less_at_equal_cost(results: Results) -> Judged:
     curve = results.variants[SGIM_D] if results.at(SGIM_D) else None
     theirs: dict[int, float] = {}
     for seed, demonstrations in shown.items():
-        points = sorted((when, row.errors) for (each, when), row in curve.rows.items() if each == seed) if curve else []
+        points = sorted((at, row.errors) for (each, at), row in curve.rows.items() if each == seed) if curve else []
         if points:
             same = (LAST + COST * demonstrations) / (1 + COST / EVERY)
-            theirs[seed] = float(np.interp(same, *map(list, zip(*points, strict=True))))
+            when, errors = np.array(points).T
+            theirs[seed] = float(np.interp(same, when, errors))
     found = _paired(results, *shared(ours, theirs))
     return _metres(found), below_zero(found)
 
