@@ -155,10 +155,12 @@ class GoalBabbling:
             strategy: "autonomous", "social" or another name: who had chosen the goal, and how it was pursued.
         """
         if outcomes:
-            judged = self.judge(context, goal, np.stack(outcomes))
-            rise = self.competence(context, goal) - before
-            # Where contexts vary, a new exemplar nearer in (context, outcome) may be farther in outcome alone.
-            self.goals.add(context, goal, judged, strategy, rise if rise > 0 else min(0.0, judged - before))
+            judged, after = self.judge(context, goal, np.stack(outcomes)), self.competence(context, goal)
+            # Where contexts vary, a new exemplar nearer in (context, outcome) may be farther in outcome alone: no loss.
+            gain = max(0.0, after - before)
+            if gain == 0 and judged != after:  # an attempt judged by itself, which may be worse than what was known
+                gain = min(0.0, judged - before)
+            self.goals.add(context, goal, judged, strategy, gain)
 
     def _explore(self, context: Array, goal: Array) -> Attempt:
         """Endless movements, in the global exploration or the local optimisation regime."""

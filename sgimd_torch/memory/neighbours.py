@@ -217,8 +217,13 @@ def _check_k(k: int) -> None:
 
 
 def _float32(array: Array) -> NDArray[np.float32]:
-    with np.errstate(over="ignore"):  # infinite is right for what is too large
-        return array.astype(np.float32)
+    """What is too large becomes infinite.
+
+    Not by ``np.errstate``: it sets a context variable. In Python 3.11 the garbage collector may run meanwhile and end
+    the attempt of a learner that was dropped, which asks a memory, too; to set the variable twice at once is a crash.
+    """
+    large = np.abs(array) > _LARGEST32
+    return np.where(large, np.copysign(np.inf, array), array).astype(np.float32)
 
 
 def _surely_proposed(query: Array, reach: float, beyond: float) -> bool:

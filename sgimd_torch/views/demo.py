@@ -39,7 +39,7 @@ ALGORITHMS: Final = ("random", "sgim-d", "practice-taught")
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the learners, draw the figure, print the table; returns the exit code."""
     options = _options(argv)
-    place = [f"--seed={options.seed}", f"--movements={options.movements}", f"--out={options.out}"]
+    place = [f"--seed={options.seed}", f"--movements={options.movements}", f"--out={options.out}", "--answers=own"]
     configs = {algorithm: parse([*place, f"--algorithm={algorithm}", *options.more])[0] for algorithm in ALGORITHMS}
     base = configs["sgim-d"]
     if base.environment != ROD:

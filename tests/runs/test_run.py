@@ -265,9 +265,10 @@ def test_every_choice_runs_and_differs_from_the_others(tmp_path, go, option, tab
     logs = set()
     # Short attempts and a short window, so that the map is split, and has its say, before the run is over.
     common = ("--every", 20, "--budget", 3, "--imitations", 3, "--window", 4, "--movements", 240, "--evaluate_at", "[]")
-    # See the next two tests; and a person who is not there is like no teacher.
-    choices = [choice for choice in table if choice not in (*MODEL_SEARCHES, "model", "by-hand")]
-    learner = ("--algorithm", "sgim-im") if option == "teachers" else ()  # the one that asks them
+    # See the next two tests; a person who is not there is like no teacher, and demonstrator 3 is all there are.
+    choices = [choice for choice in table if choice not in (*MODEL_SEARCHES, "model", "by-hand", "demonstrator-3")]
+    asking = {"teachers": "sgim-im", "base": "sgim-im", "doubt": "sgim-eer"}  # the others ask nobody
+    learner = ("--algorithm", asking[option]) if option in asking else ()
     for choice in choices:
         assert go(tmp_path, "--name", choice, f"--{option}", choice, *common, *learner) == 0
         logs.add((tmp_path / choice / "seed-003" / "episodes.csv").read_bytes())

@@ -398,9 +398,9 @@ def test_of_options_that_differ_only_values_that_most_variants_share_are_pale(pa
 def test_options_that_this_version_lacks_are_named_beside_the_command(pages, copy):
     assert "does not have" not in pages["one"]
     path = copy / "sgim-d" / "seed-003" / "config.json"
-    path.write_text(json.dumps({**json.loads(path.read_text()), "patience": 3}))
+    path.write_text(json.dumps({**json.loads(path.read_text()), "boredom": 3}))
     assert report.main([str(path.parent)]) == 0
-    assert "this version does not have are missing here: patience." in (path.parent / "report.html").read_text()
+    assert "this version does not have are missing here: boredom." in (path.parent / "report.html").read_text()
 
 
 def test_without_motor_noise_nothing_is_divided_by_the_floor(copy):

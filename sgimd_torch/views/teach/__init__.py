@@ -51,6 +51,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     with serving(port) as server:
         page = Page(server, session)
         print(WHERE.format(port=server.get_port(), path=config.directory), flush=True)
+        session.pause("teachers" in config.used)  # who asks in vain soon asks no more: it waits for somebody
         with session:
             page.run()
     if session.state.problem:

@@ -213,20 +213,20 @@ def test_a_run_that_is_over_takes_no_lesson_but_still_tries(going):
 
 
 def test_a_learner_that_asks_waits_for_the_answer_and_repeats_it_alone(going, tmp_path):
-    session = going(10, algorithm="sgim-im", teachers=("by-hand",), teacher="periodic")
+    session = going(1, algorithm="sgim-im", teachers=("by-hand",), teacher="periodic")
     with pytest.raises(ValueError, match="only when it asks"):
         session.show(SHOWN[0]).result()
     session.answered = True
     session.pause(False)
     until(lambda: session.state.waiting)
+    declined = session.state.movements
+    session.decline().result()
+    until(lambda: session.state.waiting and session.state.movements > declined)
     made, goal = session.state.movements, session.state.asked
     time.sleep(0.1)
     assert session.state.movements == made
     nearest = min(SHOWN, key=lambda shown: np.linalg.norm(shown.outcome - goal))
     session.show(nearest).result()
-    until(lambda: session.state.waiting)
-    session.decline().result()
-    until(lambda: session.state.movements > made + 15)
     session.answered = False
     until(lambda: session.state.movements > made + 60)
     session.__exit__()
