@@ -342,10 +342,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     }
     missing = {name: file for name, file in OPTIONAL.items() if not (options.only or (folder / file).exists())}
     say(*(f"{name} is left out: there is no {folder / file} yet" for name, file in missing.items()))
-    wanted = [name for name in PAGES if options.only in (None, name) and name not in missing]
-    paths = {name: options.out / f"{name}.md" for name in wanted}
+    paths = {name: options.out / f"{name}.md" for name in PAGES if options.only in (None, name)}
     for path in paths.values():
         _check_place(path)
+    paths = {name: path for name, path in paths.items() if name not in missing}
     if options.runs is not None:
         update_anova(folder / "anova.csv", options.runs)
     pages = {name: makers[name]() for name in paths}

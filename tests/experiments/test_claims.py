@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from claims import PAGES, main
+from claims import OPTIONAL, PAGES, main
 from judging import Claim, Results, at_least, at_most, errs_less, judge
 from paper import SEEDS, TRUE, error, rows, spread, write_paper
 from paper_claims import PAPER_CLAIMS
@@ -234,11 +234,15 @@ def test_the_shipped_pages_are_what_the_shipped_rows_and_templates_make(tmp_path
     assert readme.read_text(encoding="utf-8") != shipped_readme
     assert command(main, ["--results", str(SHIPPED), "--out", str(tmp_path), "--readme", str(readme)]) == 0
     assert readme.read_text(encoding="utf-8") == shipped_readme
+    said = capsys.readouterr()
+    for name in {*PAGES} - {*SHIPPED_PAGES}:
+        assert f"{name} is left out: there is no {SHIPPED / OPTIONAL[name]} yet" in said.err
+        assert not any((folder / f"{name}.md").exists() for folder in (tmp_path, SHIPPED))
     for name in SHIPPED_PAGES:
         made, shipped = ((folder / f"{name}.md").read_text(encoding="utf-8") for folder in (tmp_path, SHIPPED))
         assert made == shipped
         assert f"experiments/pages/{name}.md.j2" in made.splitlines()[0]
-    assert "22 claims:" in capsys.readouterr().out
+    assert "22 claims:" in said.out
 
 
 @pytest.mark.parametrize("name", [*PAGES, "README"])
