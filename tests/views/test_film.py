@@ -10,8 +10,10 @@ import mujoco
 import numpy as np
 import pytest
 from imageio_ffmpeg import get_ffmpeg_exe
+from PIL import Image, ImageSequence
 
 from runs import ROOT
+from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.environments.fishing_rod import HOLD, FishingRod
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import evaluate
@@ -23,9 +25,11 @@ from sgimd_torch.spaces import stream
 from sgimd_torch.views import check
 from sgimd_torch.views.film import command as film
 from sgimd_torch.views.film.camera import caption
-from sgimd_torch.views.film.reel import PAUSE, RATE, Shot, count_frames, tiled, write_film, write_sheet
+from sgimd_torch.views.film.panel import Panel, Stage
+from sgimd_torch.views.film.reel import PAUSE, POUR, RATES, Shot, count_frames, tiled, write_film, write_sheet
 
 THETAS = stream(0, "film").random((100, 25))[40:]  # some reach the water before the line is let out
+RATE = RATES[".mp4"]
 FRAMES = [np.full((48, 64, 3), 4 * k, np.uint8) for k in range(30)]
 
 
@@ -111,10 +115,49 @@ def test_states_and_floats_of_a_recording_belong_together_and_the_line_bends(rod
     assert max(bent) > 0.02  # m off the straight line
 
 
-def test_a_film_lasts_until_the_last_float_has_landed_and_a_pause(recordings):
-    early, late = sorted(recordings[:2], key=lambda recording: recording.landed)
-    scenes = [[Shot(early, np.zeros(2)), Shot(late, np.zeros(2))], [Shot(early, np.zeros(2))]]
-    assert count_frames(scenes) == sum(np.ceil((r.landed + PAUSE) * RATE) for r in (late, early))
+def test_a_film_lasts_from_where_the_float_starts_to_swing_until_it_has_landed_and_a_pause(rod, recordings):
+    shown = load_demonstrations()[0]
+    theta = rod.primitive.correspondence(shown.times, shown.trajectory)  # a person starts slowly
+    patient = rod.record([], theta, stream(1, "noise"))
+    shots = [Shot(recording, np.zeros(2)) for recording in (*recordings[:6], patient)]
+    for shot in shots:
+        start, begins, soon = positions_along(shot.recording, [0, shot.begins, shot.begins + 0.2])
+        assert np.linalg.norm(begins - start) < 0.02 < np.linalg.norm(soon - start)  # m
+    assert shots[-1].begins > 0.2  # s that nobody has to wait
+    assert count_frames(shots) == sum(np.ceil((shot.recording.landed + PAUSE - shot.begins) * RATE) for shot in shots)
+
+
+def test_landings_since_the_last_shot_appear_before_the_movement(recordings):
+    past = stream(0, "past").random((100, 2))
+    shot = Shot(recordings[0], np.zeros(2), past=past, new=60)
+    shown = [len(part.past) for part, _ in shot.moments(RATE)]
+    pouring = round(POUR * RATE)
+    assert shown[:pouring] == sorted(shown[:pouring])
+    assert 40 < shown[0] < 50
+    assert set(shown[pouring - 1 :]) == {100}
+    assert {time for _, time in shot.moments(RATE)[:pouring]} == {shot.begins}
+
+
+def test_the_panel_counts_the_goals_that_are_met_and_marks_the_landing():
+    goals = np.stack(np.meshgrid(np.linspace(-1, 1, 5), np.linspace(-1, 1, 5)), axis=-1).reshape(-1, 2)
+    stages = [Stage(10, np.full(25, 0.5)), Stage(100, np.linspace(0, 0.1, 25))]
+    panel = Panel(goals, stages, "#d55e00", height=480)
+    assert panel.near == 0.05
+    (early, _), (late, landed) = (panel.beside(k, goals[0], goals[-1]) for k in (0, 1))
+    assert early.shape == late.shape == landed.shape == (480, 360, 3)
+    blue = [((p[..., 2].astype(int) - p[..., 0]) > 60).sum() for p in (early, late)]
+    assert 20 * blue[0] < blue[1]  # the map fills
+    rows, columns = np.nonzero(np.abs(late.astype(int) - landed).max(axis=2) > 30)
+    assert rows.max() < 60  # the cross, at the upper right
+    assert columns.min() > 240
+
+
+def test_the_sides_of_a_panel_are_even_as_a_film_needs():
+    for width in range(160, 1288, 8):
+        panel = Panel(np.eye(2), [Stage(1, np.ones(2))], "black", height=width * 3 // 4)
+        height, beside = (int(side) for side in reversed(panel._size))
+        assert height == width * 3 // 4
+        assert beside % 2 == 0
 
 
 def test_the_caption_says_when_the_line_is_let_out_and_how_far_the_goal_was_missed(recordings):
@@ -135,10 +178,18 @@ def test_a_film_holds_every_frame_in_a_format_that_all_players_know(tmp_path):
     write_film(tmp_path / "film.mp4", iter(FRAMES))
     pictures, about = decoded(tmp_path / "film.mp4", 48, 64)
     assert pictures.mean(axis=(1, 2, 3)) == pytest.approx([frame.mean() for frame in FRAMES], abs=3)  # it is lossy
-    for words in ("Video: h264", "yuv420p", "64x48", f"{RATE} fps"):
+    for words in ("Video: h264", "yuv420p", "64x48", f"{RATE:g} fps"):
         assert words in about
     write_sheet(tmp_path / "sheet.png", FRAMES[:4], columns=2, width=32)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["film.mp4", "sheet.png"]
+    write_film(tmp_path / "film.webp", iter(FRAMES))
+    with Image.open(tmp_path / "film.webp") as moving:  # for a page
+        assert (moving.format, moving.size) == ("WEBP", (64, 48))
+        lasts = [
+            each.load() and each.info["duration"] for each in ImageSequence.Iterator(moving)
+        ]  # ms; equal frames are one
+        assert sum(lasts) == pytest.approx(1000 * len(FRAMES) / RATES[".webp"], abs=100)
+        assert moving.info["loop"] == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["film.mp4", "film.webp", "sheet.png"]
 
 
 def test_an_interrupted_film_leaves_the_old_one_and_nothing_else(tmp_path):
@@ -188,7 +239,7 @@ def test_a_forward_model_learns_again_what_it_learnt_in_the_run(tmp_path, go):
         ("--after 20", "belongs to --time-lapse"),
         ("--time-lapse --after 0,20", "whole numbers above 0"),
         ("--time-lapse --after 41", "must be at most 40"),
-        ("--out film.avi", "must be a .mp4 file"),
+        ("--out film.avi", "must be a .mp4 or .webp file"),
         ("--out nowhere/film.mp4", "in a folder that exists"),
         ("--sheet sheet.jpg", "must be a .png file"),
         ("--width 100", "from 160 to 1280"),
@@ -234,7 +285,8 @@ def test_a_film_is_made_without_a_display_or_the_lack_of_opengl_is_explained(run
         return
     assert "after 40 movements" in said
     assert sorted(path.name for path in tmp_path.iterdir()) == ["film.mp4", "sheet.png"]
-    pictures, _ = decoded(tmp_path / "film.mp4", 240, 320)
+    pictures, _ = decoded(tmp_path / "film.mp4", 240, 320 + 180)
+    pictures = pictures[:, :, :320]
     red = (pictures[..., 0] - pictures[..., 1] > 60).sum(axis=(1, 2))
     assert 0 < red[0] < red[-1]  # the float, then also the path that it has taken
     assert np.abs(pictures[-1] - pictures[-10]).mean() < 2  # the landing stands still
@@ -349,14 +401,15 @@ def test_an_arm_is_filmed_without_opengl(tmp_path, monkeypatch, gl):
     )
     assert process.returncode == 0, process.stderr
     assert "after 60 movements: mean distance to the goal" in process.stdout
-    pictures, _ = decoded(tmp_path / "runs/sagg-riac/seed-000.mp4", 240, 320)
-    assert len(pictures) == 2 * np.ceil((1.0 + PAUSE) * RATE)
+    pictures, _ = decoded(tmp_path / "runs/sagg-riac/seed-000.mp4", 240, 320 + 180)
+    pictures, half = pictures[:, :, :320], len(pictures) // 2
+    assert 0.9 < len(pictures) / (2 * (1.0 + PAUSE) * RATE) <= 1
     goal = [(p[..., 0] > 180) & (p[..., 2] < 90) & (p[..., 1] > 110) for p in pictures[[0, -1]]]  # the ring, in yellow
     first, last = (np.argwhere(ring).mean(axis=0) for ring in goal)
     assert first[1] > last[1]  # right, then left
     assert first[0] < last[0]  # above, then below
-    assert np.abs(pictures[0] - pictures[60]).max() > 100
-    assert np.abs(pictures[40] - pictures[60]).mean() < 2  # it has arrived
+    assert np.abs(pictures[0] - pictures[half - 2]).max() > 100
+    assert np.abs(pictures[half - 15] - pictures[half - 2]).mean() < 2  # it has arrived
 
 
 @pytest.mark.parametrize(("word", "goal"), [("Slider", "0.4"), ("Slider3", "0.4,0.2,0.9"), ("Slider6", "0,0,0,0,0,1")])
@@ -365,7 +418,7 @@ def test_a_picture_of_ones_own_is_filmed_for_outcomes_of_any_dimension(own, caps
     run = "runs/random/seed-000"
     assert command(film.main, f"{run} --width 160 --out one.mp4 --goals {goal}".split()) == 0
     assert command(film.main, f"{run} --width 160 --out six.mp4".split()) == 0
-    one, six = (len(decoded(own / name, 120, 160)[0]) for name in ("one.mp4", "six.mp4"))
+    one, six = (len(decoded(own / name, 120, 160 + 90)[0]) for name in ("one.mp4", "six.mp4"))
     assert one == np.ceil((1.0 + PAUSE) * RATE)
     assert six == (5 if word == "Slider" else 6) * one  # two of the six places have one x
     assert command(film.main, f"{run} --goals 0.1,0.2,0.3,0.4".split()) == 2

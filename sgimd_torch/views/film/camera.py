@@ -1,8 +1,9 @@
 """Films of the fishing rod: the arm casts, the line swings, the float lands near its goal.
 
 Section 4 of Nguyen & Oudeyer (2014). A film shows what ``FishingRod.record`` has simulated, in real time. Line and
-float are drawn thicker than they are, so that they can be seen.
-    with Camera(rod.model) as camera: write_film("film.mp4", shoot(camera, [[Shot(recording, goal)]]))
+float are drawn thicker than they are, so that they can be seen. Light, shadow and reflection are those of
+``fishing_rod.xml``; the ripples of the water, and the rings around a float that has landed, are drawn only here.
+    with Camera(rod.model) as camera: write_film("film.mp4", shoot(camera, [Shot(recording, goal)]))
 
 Needs the extra ``film``, and OpenGL: without a display, set MUJOCO_GL=egl before anything imports mujoco.
 """
@@ -21,14 +22,16 @@ import numpy as np
 from PIL import Image
 
 from sgimd_torch.environments.rod_physics import Recording
-from sgimd_torch.spaces import Array
+from sgimd_torch.spaces import Array, stream
 from sgimd_torch.views.film.reel import Frame, Shot, captioned, place
 
-MOST_PAST: Final = 300  # landings that are drawn: this many take as much time as all the rest
+MOST_PAST: Final = 250  # landings that are drawn: this many take as much time as all the rest
 
 _Colour = tuple[float, float, float, float]
-_INK, _FLOAT, _GOAL, _PATH = (0.06, 0.06, 0.08, 1), (0.92, 0.18, 0.06, 1), (1, 0.88, 0.1, 1), (1, 0.6, 0.4, 1)
-_PAST, _RING, _SHADOW = (0.95, 0.97, 1, 0.8), (0.85, 0.92, 0.97, 0.8), (0.05, 0.15, 0.25, 0.6)
+_INK, _FLOAT, _GOAL, _PATH = (0.06, 0.06, 0.08, 1), (0.92, 0.24, 0.02, 1), (0.94, 0.89, 0.26, 1), (0.6, 0.28, 0.12, 1)
+_PAST, _RING, _STONE = (0.92, 0.96, 1, 0.7), (0.85, 0.93, 0.97, 0.45), (0.52, 0.52, 0.50, 1)
+_DEEP, _SHALLOW = np.array([16.0, 78.0, 108.0]), np.array([52.0, 128.0, 150.0])  # red, green, blue of the water
+_WAVES: Final = 60  # that a texture of the water is the sum of
 
 
 class NoGraphics(ImportError):
@@ -51,6 +54,7 @@ class Camera:
         self._model = copy.copy(model)
         for name in ("line", "float"):  # _draw_line does it
             self._model.material(name).rgba[3] = 0.0
+        _paint_water(self._model)
         self._data = mujoco.MjData(self._model)
         self._tip = self._model.site("tip").id
         self._line = [self._model.body(f"line_{k:02}").id for k in range(2, 31)]
@@ -74,7 +78,7 @@ class Camera:
         """The scene at ``time`` (s); from the landing on, the landing."""
         recording = shot.recording
         assert isinstance(recording, Recording)
-        time = min(time, recording.landed)
+        since, time = max(0.0, time - recording.landed), min(time, recording.landed)
         row = min(round(time / recording.step), len(recording.states) - 1)
         mujoco.mj_setState(self._model, self._data, recording.states[row], mujoco.mjtState.mjSTATE_FULLPHYSICS)
         mujoco.mj_forward(self._model, self._data)
@@ -84,6 +88,7 @@ class Camera:
         self._draw_line(scene, recording, time)
         if time == recording.landed:
             _draw_chain(scene, [np.append(shot.goal, 0.006), np.append(recording.outcome, 0.006)], 0.005, _GOAL)
+            _draw_splash(scene, recording.outcome, since)
         return captioned(Image.fromarray(self._renderer.render()), shot.title, caption(shot, time))
 
     def _draw_line(self, scene: mujoco.MjvScene, recording: Recording, time: float) -> None:
@@ -93,10 +98,8 @@ class Camera:
         line = [self._data.site_xpos[self._tip], *self._data.xpos[self._line], here]
         if recording.let_out is not None and time > recording.let_out:
             line = [line[0], here]
-        _draw_chain(scene, line, 0.004, _INK)
-        _draw(scene, mujoco.mjtGeom.mjGEOM_SPHERE, (0.024, 0, 0), here, _FLOAT)
-        if here[2] > 0.03:
-            _draw(scene, mujoco.mjtGeom.mjGEOM_CYLINDER, (0.024, 0.001, 0), np.append(here[:2], 0.008), _SHADOW)
+        _draw_chain(scene, line, 0.003, _INK)
+        _draw(scene, mujoco.mjtGeom.mjGEOM_SPHERE, (0.026, 0, 0), here, _FLOAT).emission = 0.4
 
 
 def caption(shot: Shot, time: float) -> str:
@@ -118,16 +121,39 @@ def no_graphics(error: Exception) -> str:
     )
 
 
+def _paint_water(model: mujoco.MjModel) -> None:
+    """Ripples in place of the plain texture of the water: waves in all directions that meet at its edges."""
+    texture = model.texture("water")
+    height, width, channels = int(texture.height[0]), int(texture.width[0]), int(texture.nchannel[0])
+    rng = stream(0, "water")
+    y, x = np.meshgrid(*(2 * np.pi * np.arange(n) / n for n in (height, width)), indexing="ij")
+    surface = np.zeros((height, width))
+    for along, across in rng.integers(-14, 15, (_WAVES, 2)):
+        length = math.hypot(along, across)
+        if length > 2:  # a longer wave would show that the texture repeats
+            surface += np.sin(along * x + across * y + rng.uniform(0, 2 * np.pi)) / length
+    shallow = 1 / (1 + np.exp(-1.2 * surface / surface.std()))
+    colour = _DEEP + (_SHALLOW - _DEEP) * shallow[..., None]
+    start = int(model.tex_adr[texture.id])
+    model.tex_data[start : start + height * width * channels] = colour.astype(np.uint8).ravel()
+
+
 def _draw_plane(scene: mujoco.MjvScene, shot: Shot) -> None:
-    """On the water: circles of half a metre and of a metre around the base, past landings, the goal."""
+    """On the water: the arm's stone, circles of half a metre and of a metre around it, past landings, the goal."""
+    _draw(scene, mujoco.mjtGeom.mjGEOM_CYLINDER, (0.11, 0.012, 0), np.array([0.0, 0.0, 0.012]), _STONE)
     for radius in (0.5, 1.0):
         _draw_chain(scene, _circle(np.zeros(2), radius), 0, _RING)
-        _draw(
-            scene, mujoco.mjtGeom.mjGEOM_LABEL, (0.1, 0.1, 0.1), np.array([0.0, -radius, 0.01]), _RING, f"{radius:g} m"
-        )
     for landing in shot.past[:: max(1, math.ceil(len(shot.past) / MOST_PAST))]:
         _draw(scene, mujoco.mjtGeom.mjGEOM_BOX, (0.007, 0.007, 0.001), np.append(landing, 0.001), _PAST)
     _draw_chain(scene, _circle(shot.goal, 0.06), 0.008, _GOAL)
+
+
+def _draw_splash(scene: mujoco.MjvScene, landing: Array, since: float) -> None:
+    """Two rings that grow from where the float has met the water ``since`` (s) ago, and fade."""
+    for late in (0.0, 0.15):
+        if 0 < since - late < 0.6:
+            faded = (*_PAST[:3], 0.8 * (1 - (since - late) / 0.6))
+            _draw_chain(scene, _circle(landing, 0.03 + 0.3 * (since - late)), 0, faded)
 
 
 def _circle(centre: Array, radius: float) -> Array:
@@ -142,12 +168,9 @@ def _draw_chain(scene: mujoco.MjvScene, points: Sequence[Array] | Array, radius:
         mujoco.mjv_connector(_draw(scene, kind, (width, 0, 0), start, colour), kind, width, start, stop)
 
 
-def _draw(
-    scene: mujoco.MjvScene, kind: int, size: Sequence[float], place: Array, colour: _Colour, label: str = ""
-) -> Any:
+def _draw(scene: mujoco.MjvScene, kind: int, size: Sequence[float], place: Array, colour: _Colour) -> Any:
     """Add a body to the scene; ``size`` in m, as MuJoCo defines it for this ``kind``."""
     geom = scene.geoms[scene.ngeom]
     mujoco.mjv_initGeom(geom, kind, np.array(size), place, np.eye(3).ravel(), np.array(colour, np.float32))
-    geom.label = label
     scene.ngeom += 1
     return geom

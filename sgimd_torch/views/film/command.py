@@ -1,10 +1,10 @@
 """Film what a run has learnt: the robot moves for chosen goals, with the movements that the run's own memory infers.
 
 Each goal is answered by the run's inverse model, its memory rebuilt from the log, in the middle of C, and executed once
-with noise. Of the rod: a yellow ring is the goal, white dots are past landings, circles are half a metre and a metre
+with noise. A yellow ring is the goal, white dots are past landings; of the rod, circles are half a metre and a metre
 around the base. If the float has not met the water after the movement, the line is let out and the float falls; the
-film says so. Planar arms, and environments of your own with record(context, theta, rng) -> Sketch, are drawn in the
-plane.
+film says so. Beside it: each goal of the benchmark, the bluer the nearer its answer lands, and how the mean error has
+fallen. Planar arms, and environments of your own with record(context, theta, rng) -> Sketch, are drawn in the plane.
 """
 
 from __future__ import annotations
@@ -15,27 +15,32 @@ import re
 import sys
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from tqdm import tqdm
 
+from sgimd_torch.catalogue import colour
 from sgimd_torch.environments.protocol import Sketch
+from sgimd_torch.evaluation import evaluate
 from sgimd_torch.runs.build import RunParts, build
 from sgimd_torch.runs.log import RunError
 from sgimd_torch.runs.read import Run, config_of, read_run
 from sgimd_torch.spaces import Array, stream
 from sgimd_torch.strategies import Remember
-from sgimd_torch.views.film.reel import Filming, Shot, count_frames, landed, shoot, write_film, write_sheet
+from sgimd_torch.views.film.panel import Panel, Stage
+from sgimd_torch.views.film.reel import RATES, Filming, Shot, count_frames, shoot, write_film, write_sheet
 from sgimd_torch.views.film.sketch import Sketchbook, in_picture
 
-AFTER = (100, 500, 1000, 5000)
+AFTER = (30, 100, 300, 1000, 3000)
 EXAMPLES = """examples:
   sgimd film runs/sgim-d/seed-003                               six goals all around, into runs/sgim-d/seed-003.mp4
   sgimd film runs/sgim-d/seed-003 --goals 0.3,0.6 -0.5,0.4      these two
-  sgimd film runs/sgim-d/seed-003 --time-lapse                  each goal after 100, 500, 1000 and 5000 movements
-  sgimd film runs/sgim-d/seed-003 --time-lapse --after 50,200   after 50 and 200
+  sgimd film runs/sgim-d/seed-003 --time-lapse                  how it learns: two goals, early and late
+  sgimd film runs/sgim-d/seed-003 --time-lapse --after 50,200   after 50 and 200 movements
+  sgimd film runs/sgim-d/seed-003 --time-lapse --out film.webp  a moving picture, for a page
 """
 
 
@@ -54,15 +59,19 @@ def main(argv: Sequence[str] | None = None) -> int:
             "movements, a method record(context, theta, rng) -> Sketch"
         )
     goals = _goals(options.goals, parts)
+    if options.time_lapse and options.goals is None:
+        goals = goals[::3]
     stages = _stages(run, options)
-    width = options.width or (480 if len(stages) > 1 else 640)
-    size = {"width": width, "height": width * 3 // 4}
-    shots = _cast(run, parts, goals, stages, say_movements=len(stages) > 1)
+    size = {"width": options.width, "height": options.width * 3 // 4}
+    shots, found = _cast(run, parts, goals, stages)
     with _camera(parts.environment, shots, size) as camera:
-        _film(options, camera, [[stage[k] for stage in shots] for k in range(len(goals))])
-    for movements, stage in zip(stages, shots, strict=True):
-        missed = np.array([shot.missed for shot in stage])
-        print(f"after {movements} movements: mean distance to the goal {missed.mean():.3f}, at most {missed.max():.3f}")
+        _film(options, camera, _with_panels(run, parts, shots, found, size["height"]))
+    for k, stage in enumerate(found):
+        missed = np.array([shot.missed for shot in shots[k * len(goals) : (k + 1) * len(goals)]])
+        print(
+            f"after {stage.movements} movements: mean distance to the goal {missed.mean():.3f}, at most "
+            f"{missed.max():.3f}; to {len(stage.errors)} goals of the benchmark {stage.errors.mean():.3f}"
+        )
     print(f"Film {options.out}" + (f", sheet {options.sheet}" if options.sheet else ""))
     return 0
 
@@ -86,9 +95,8 @@ def _parts(run: Run) -> RunParts:
         raise ImportError(f"MUJOCO_GL={asked} does not work here ({problem}); {slip}") from error
 
 
-def _camera(robot: Any, scenes: Sequence[Sequence[Shot]], size: dict[str, int]) -> AbstractContextManager[Filming]:
+def _camera(robot: Any, shots: Sequence[Shot], size: dict[str, int]) -> AbstractContextManager[Filming]:
     """What draws these shots."""
-    shots = [shot for scene in scenes for shot in scene]
     if isinstance(shots[0].recording, Sketch):
         return nullcontext(Sketchbook(robot.outcomes, shots, **size))
     from sgimd_torch.views.film.camera import Camera  # only the rod needs OpenGL
@@ -112,12 +120,14 @@ def remember(run: Run, parts: RunParts, start: int, stop: int) -> None:
             parts.model.refresh(memory, goal if np.isfinite(goal).all() else None)
 
 
-def _cast(run: Run, parts: RunParts, goals: Array, stages: Sequence[int], *, say_movements: bool) -> list[list[Shot]]:
-    """For each stage, the run's answer to each goal; a goal has the same motor noise at every stage."""
-    shots = []
+def _cast(run: Run, parts: RunParts, goals: Array, stages: Sequence[int]) -> tuple[list[Shot], list[Stage]]:
+    """For each stage, the run's answer to each goal, which has the same motor noise at every stage; and how far it
+    misses the goals of the benchmark, in the same context."""
+    shots, found = [], []
     assert parts.record is not None
     robot: Any = parts.environment
     context = (robot.contexts.low + robot.contexts.high) / 2
+    known = np.empty((0, 2))
     title = f"{run.config['name'] or run.config['algorithm']}, seed {run.config['seed']}"
     for before, movements in zip((0, *stages), stages, strict=False):
         remember(run, parts, before, movements)
@@ -125,23 +135,41 @@ def _cast(run: Run, parts: RunParts, goals: Array, stages: Sequence[int], *, say
             raise RunError(f"{run.path} remembers nothing after {movements} movements, so no movement can be inferred")
         past = run.outcomes[:movements]
         past = past[np.isfinite(past[:, 0])]
-        stage = []
         for k, goal in enumerate(goals):
             theta = parts.inverse(context, goal).theta
             recording = parts.record(context, theta, stream(run.config["seed"], "film", k))
-            shown = f"after {movements} movements" if say_movements else f"{title}, after {movements} movements"
-            stage.append(Shot(recording, goal, shown, past))
-        shots.append(stage)
-    return shots
+            shots.append(Shot(recording, goal, f"{title}, after {movements} movements", past))
+        if len(stages) > 1:  # the first shot of a stage begins with what was learnt since the last one
+            shots[-len(goals)] = replace(shots[-len(goals)], new=int(len(past) - len(known)))
+        known = past
+        judged = evaluate(
+            parts.inverse, robot, parts.benchmark.goals, run.config["seed"], movements, context=context, repeats=0
+        )
+        found.append(Stage(movements, judged.errors))
+    return shots, found
 
 
-def _film(options: argparse.Namespace, camera: Filming, scenes: list[list[Shot]]) -> None:
+def _with_panels(run: Run, parts: RunParts, shots: list[Shot], found: list[Stage], height: int) -> list[Shot]:
+    """The shots with map and curve beside them. A film of one stage shows the curve of the run's own evaluations."""
+    seen = run.evaluation["movements"], run.evaluation["mean_error_m"]
+    curve = np.array(seen) if len(found) == 1 and len(seen[0]) else None
+    shade = colour(run.config["algorithm"])
+    panel = Panel(parts.benchmark.goals, found, shade, curve=curve, height=height)
+    each = len(shots) // len(found)
+    return [
+        replace(shot, beside=panel.beside(row // each, shot.goal, shot.recording.outcome))
+        for row, shot in enumerate(shots)
+    ]
+
+
+def _film(options: argparse.Namespace, camera: Filming, shots: list[Shot]) -> None:
     # tqdm shows the time left; without a terminal it prints a line now and then
     interval = 0.2 if sys.stderr.isatty() else 10.0
-    frames = shoot(camera, scenes)
-    write_film(options.out, tqdm(frames, "filming", count_frames(scenes), unit=" frames", mininterval=interval))
+    rate = RATES[options.out.suffix]
+    frames, n = shoot(camera, shots, rate), count_frames(shots, rate)
+    write_film(options.out, tqdm(frames, "filming", n, unit=" frames", mininterval=interval))
     if options.sheet is not None:
-        write_sheet(options.sheet, [landed(camera, shots) for shots in scenes])
+        write_sheet(options.sheet, [camera.frame(shot, shot.recording.landed) for shot in shots])
 
 
 def _stages(run: Run, options: argparse.Namespace) -> list[int]:
@@ -152,7 +180,7 @@ def _stages(run: Run, options: argparse.Namespace) -> list[int]:
     if not options.time_lapse:
         return [lived]
     if options.after is None:
-        return [*(movements for movements in AFTER if movements < lived), lived][: len(AFTER)]
+        return [*(movements for movements in AFTER if movements < lived), lived]
     if max(options.after) > lived:
         raise RunError(f"--after must be at most {lived}, the movements of {run.path}, got {max(options.after)}")
     return sorted(set(options.after))
@@ -192,27 +220,29 @@ def _options(argv: Sequence[str] | None) -> argparse.Namespace:
         type=_goal,
         nargs="+",
         metavar="X,Y",
-        help="in the unit of T, m; without it, six of the benchmark's, all around",
+        help="in the unit of T, m; without it, six of the benchmark's, all around, of which a time lapse shows two",
     )
-    parser.add_argument("--time-lapse", action="store_true", help="movements for each goal, early and late, tiled")
+    parser.add_argument("--time-lapse", action="store_true", help="the goals again and again, early and late")
     parser.add_argument(
         "--after",
         type=_counts,
         metavar="N,N",
         help=f"movements, of a time lapse (default: {','.join(map(str, AFTER))})",
     )
-    parser.add_argument("--width", type=_width, help="of a picture, pixels (default: 640; in a time lapse 480)")
-    parser.add_argument("--out", type=Path, help="the film, .mp4 (default: next to the run's directory)")
-    parser.add_argument("--sheet", type=Path, help="also an image of how each scene ends, .png")
+    parser.add_argument(
+        "--width", type=_width, default=640, help="of the robot's picture, pixels (default: %(default)s)"
+    )
+    parser.add_argument("--out", type=Path, help="the film, .mp4 or .webp (default: .mp4 next to the run's directory)")
+    parser.add_argument("--sheet", type=Path, help="also an image of how each movement ends, .png")
     # A minus with a number after it begins a goal, not an option.
     given = sys.argv[1:] if argv is None else argv
     words = [f" {word}" if re.match(r"-[.\d]", word) else word for word in given]
     options = parser.parse_args(words)
     if options.after and not options.time_lapse:
         parser.error("--after belongs to --time-lapse")
-    for path, suffix in ((options.out, ".mp4"), (options.sheet, ".png")):
-        if path is not None and (path.suffix != suffix or path.is_dir() or not path.parent.is_dir()):
-            parser.error(f"must be a {suffix} file in a folder that exists, got {path}")
+    for path, suffixes in ((options.out, tuple(RATES)), (options.sheet, (".png",))):
+        if path is not None and (path.suffix not in suffixes or path.is_dir() or not path.parent.is_dir()):
+            parser.error(f"must be a {' or '.join(suffixes)} file in a folder that exists, got {path}")
     if options.out is None:
         options.out = Path(f"{options.run.resolve()}{'-time-lapse' if options.time_lapse else ''}.mp4")
     return options

@@ -1,7 +1,8 @@
-"""What every film is made of: shots side by side, frame by frame, captions, an mp4 file, a sheet of pictures.
+"""What every film is made of: shots one after the other, frame by frame, captions, a file, a sheet of pictures.
 
 A camera draws ``frame(shot, time)``: ``camera.py`` those of the rod in MuJoCo, ``sketch.py`` robots in the plane.
-    write_film("film.mp4", shoot(camera, [[Shot(recording, goal)]]))
+``panel.py`` draws what stands beside it.
+    write_film("film.mp4", shoot(camera, [Shot(recording, goal)]))
 
 Needs the extra ``film``.
 """
@@ -13,14 +14,15 @@ import os
 import subprocess
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import chain
-from typing import Final, Protocol
+from pathlib import Path
+from typing import Any, Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sgimd_torch.environments.protocol import Recorded
+from sgimd_torch.environments.protocol import Recorded, Sketch
 from sgimd_torch.files import replacing
 from sgimd_torch.spaces import Array
 
@@ -32,24 +34,55 @@ except ImportError as error:
 
 Frame = NDArray[np.uint8]  # (height, width, 3)
 
-RATE: Final = 25  # frames a second
-PAUSE: Final = 1.6  # s, the landing is shown
+PAUSE: Final = 0.8  # s, the landing is shown
+POUR: Final = 0.6  # s, in which the landings since the last shot appear
+RATES: Final = {".mp4": 25.0, ".webp": 12.5}
+"""Frames a second of each kind of film: every player opens the first, every browser shows the second in a page."""
+
+_CODECS: Final = {
+    ".mp4": ["-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "23", "-movflags", "+faststart", "-f", "mp4"],
+    ".webp": ["-c:v", "libwebp_anim", "-quality", "60", "-loop", "0", "-f", "webp"],
+}
+_STILL: Final = 0.01  # of the longest way: the end of the robot has not moved yet
 
 
 @dataclass(frozen=True, eq=False)
 class Shot:
-    """One movement to film: the ``goal`` ``(outcome_dim,)`` that it is for, a ``title``, and ``past`` outcomes
-    ``(n, outcome_dim)``."""
+    """One movement to film: the ``goal`` ``(outcome_dim,)`` that it is for, a ``title``, ``past`` outcomes
+    ``(n, outcome_dim)``, the last ``new`` of them since the shot before, and pictures to stand ``beside`` it, before
+    and after the landing."""
 
     recording: Recorded
     goal: Array
     title: str = ""
     past: Array = field(default_factory=lambda: np.empty((0, 2)))
+    new: int = 0
+    beside: tuple[Frame, Frame] | None = None
 
     @property
     def missed(self) -> float:
         """Distance between goal and outcome, in the unit of T."""
         return float(np.linalg.norm(self.recording.outcome - self.goal))
+
+    @property
+    def begins(self) -> float:
+        """When the robot starts to move, s: nobody wants to see it wait."""
+        recorded: Any = self.recording
+        if isinstance(recorded, Sketch):
+            places, step = recorded.chains.reshape(len(recorded.chains), -1), recorded.step
+        else:
+            places, step = recorded.floats[:, :3], recorded.step
+        moved = np.linalg.norm(places - places[0], axis=1)
+        return float(step * max(0, int((moved > _STILL * moved.max()).argmax()) - 1))
+
+    def moments(self, rate: float) -> list[tuple[Shot, float]]:
+        """What is shown, frame by frame, ``rate`` of them a second, and at which time (s) of the movement."""
+        n = round(POUR * rate) if self.new else 0
+        known = len(self.past) - self.new
+        counts = [known + round(self.new * (k + 1) / n) for k in range(n)]
+        pouring = [(replace(self, past=self.past[:count]), self.begins) for count in counts]
+        times = np.arange(self.begins, self.recording.landed + PAUSE, 1 / rate).tolist()
+        return pouring + [(self, time) for time in times]
 
 
 class Filming(Protocol):
@@ -60,21 +93,18 @@ class Filming(Protocol):
         ...
 
 
-def shoot(camera: Filming, scenes: Iterable[Sequence[Shot]], *, columns: int = 2) -> Iterator[Frame]:
-    """The frames of a film: scene after scene, the shots of each side by side until all have landed, then a pause."""
-    for shots in scenes:
-        for k in range(_length(shots)):
-            yield tiled([camera.frame(shot, k / RATE) for shot in shots], columns)
+def shoot(camera: Filming, shots: Iterable[Shot], rate: float = RATES[".mp4"]) -> Iterator[Frame]:
+    """The frames of a film: of each shot the landings since the last one, the movement, its end for a moment."""
+    for shot in shots:
+        for part, time in shot.moments(rate):
+            frame = camera.frame(part, time)
+            beside = shot.beside[time >= shot.recording.landed] if shot.beside else frame[:, :0]
+            yield np.concatenate([frame, beside], axis=1)
 
 
-def landed(camera: Filming, shots: Sequence[Shot], *, columns: int = 2) -> Frame:
-    """The last frame of a scene: all its shots have landed."""
-    return tiled([camera.frame(shot, shot.recording.landed) for shot in shots], columns)
-
-
-def count_frames(scenes: Iterable[Sequence[Shot]]) -> int:
+def count_frames(shots: Iterable[Shot], rate: float = RATES[".mp4"]) -> int:
     """How many frames ``shoot`` yields."""
-    return sum(map(_length, scenes))
+    return sum(len(shot.moments(rate)) for shot in shots)
 
 
 def tiled(frames: Sequence[Frame], columns: int) -> Frame:
@@ -102,23 +132,23 @@ def captioned(image: Image.Image, title: str, caption: str) -> Frame:
 
 
 def write_film(path: str | os.PathLike[str], frames: Iterable[Frame]) -> None:
-    """An mp4 file that every player opens (H.264, yuv420p); it appears whole or not at all.
+    """A film, which appears whole or not at all: H.264 in an mp4 file, or a moving picture for a page.
 
     Args:
-        path: ends in .mp4.
+        path: its ending is one of ``RATES``, which says how fast it plays.
         frames: one or more, all of one size, even in height and width.
 
     Raises:
         OSError: ``path`` cannot be written, or the encoder fails.
     """
-    frames = iter(frames)
+    frames, kind = iter(frames), Path(path).suffix
     with replacing(path) as partial:
         partial.touch()  # fails before the first frame is drawn if the folder is not writable
         first = next(frames)
         size = f"{first.shape[1]}x{first.shape[0]}"
-        given = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", size, "-r", str(RATE), "-i", "-"]
-        wanted = ["-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "23", "-movflags", "+faststart", "-f", "mp4"]
-        _encode([get_ffmpeg_exe(), "-v", "error", *given, *wanted, "-y", str(partial)], chain([first], frames))
+        given = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", size, "-r", str(RATES[kind]), "-i", "-"]
+        wanted = [*_CODECS[kind], "-y", str(partial)]
+        _encode([get_ffmpeg_exe(), "-v", "error", *given, *wanted], chain([first], frames))
 
 
 def _encode(command: Sequence[str], frames: Iterable[Frame]) -> None:
@@ -152,7 +182,3 @@ def write_sheet(path: str | os.PathLike[str], frames: Sequence[Frame], *, column
 def place(point: Array) -> str:
     """``(0.20, 0.50)``, for captions."""
     return f"({', '.join(f'{x:.2f}' for x in point)})"
-
-
-def _length(shots: Sequence[Shot]) -> int:
-    return math.ceil((max(shot.recording.landed for shot in shots) + PAUSE) * RATE)
