@@ -5,7 +5,7 @@ random. SGIM-D has curiosity and a teacher. The third, practice-taught, is this 
 at the start, then it practises, one movement for each goal. They write to --out:
 
   random/seed-000/ and so on   everything that happened (docs/runs.md explains the files)
-  demo.png                     how the error falls; where the float landed; where SGIM-D's competence is changing
+  demo.png                     how the error falls; how each answers four goals; where the float landed
 
 Start it again after Ctrl-C or a power cut, and it goes on where it stopped; finished runs are used as they are.
 
@@ -27,19 +27,24 @@ from functools import partial
 from pathlib import Path
 from typing import Final
 
-from sgimd_torch.catalogue import ROD
+from sgimd_torch.catalogue import ROD, label
 from sgimd_torch.runs.command_line import parse
 from sgimd_torch.runs.engines.local import Local
 from sgimd_torch.runs.engines.loop import sweep
 from sgimd_torch.runs.process import loading, say
 
-ALGORITHMS: Final = ("random", "sgim-d", "practice-taught")
+ALGORITHMS: Final = {
+    "random": "moves at random",
+    "sgim-d": "chooses goals where its competence changes, and is shown a movement now and then",
+    "practice-taught": "is shown all movements at the start, then practises, one movement for each goal",
+}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the learners, draw the figure, print the table; returns the exit code."""
     options = _options(argv)
-    place = [f"--seed={options.seed}", f"--movements={options.movements}", f"--out={options.out}", "--answers=own"]
+    place = [f"--seed={options.seed}", f"--movements={options.movements}", f"--out={options.out}"]
+    place += ["--answers=own", f"--floor-at={options.movements}"]  # measuring the noise takes longer than all the rest
     configs = {algorithm: parse([*place, f"--algorithm={algorithm}", *options.more])[0] for algorithm in ALGORITHMS}
     base = configs["sgim-d"]
     if base.environment != ROD:
@@ -51,16 +56,19 @@ def main(argv: Sequence[str] | None = None) -> int:
         from sgimd_torch.views.demo_figure import draw, table
         from sgimd_torch.views.report.data import read_life
     began = time.monotonic()
-    say(f"{len(configs)} learners, {base.movements} movements each, seed {base.seed}: {base.out}")
+    say(f"{len(configs)} learners, {base.movements} movements each, seed {base.seed}, two at a time: {base.out}")
+    for algorithm, does in ALGORITHMS.items():
+        say(f"{label(algorithm)} {does}")
     with Local(processes=2) as engine:
-        sweep(list(configs.values()), engine, keep_going=False)
+        sweep([configs[algorithm] for algorithm in reversed(ALGORITHMS)], engine, keep_going=False)  # longest first
+    say("drawing where the float landed, and how each learner answers four goals")
     runs = {algorithm: read_life(config.directory) for algorithm, config in configs.items()}
     (figure,) = save_figure(partial(draw, runs), options.out / "demo", "png")
     print(f"\nMean distance to the benchmark goals (m) after so many movements, and seconds spent\n\n{table(runs)}\n")
     print(f"Figure    {figure}")
     for run in runs.values():
         print(f"Run       {run.path}/ (episodes.csv, evaluation.csv, summary.json ...)")
-    print(f"Time      {time.monotonic() - began:.0f} s\n\nNext, try\n{_next_steps(options)}")
+    print(f"Time      {time.monotonic() - began:.0f} s\n\nNext, try\n{_next_steps(options, base.directory)}")
     return 0
 
 
@@ -87,15 +95,12 @@ def _options(argv: Sequence[str] | None) -> argparse.Namespace:
     return options
 
 
-def _next_steps(options: argparse.Namespace) -> str:
+def _next_steps(options: argparse.Namespace, film: Path) -> str:
     sgimd = ["sgimd"] if shutil.which("sgimd") else [sys.executable, "-m", "sgimd_torch"]
-    place, more = ["--seed", str(options.seed), "--out", str(options.out)], list(options.more)
-    longer = [*sgimd, "demo", *place, "--movements", str(2 * options.movements), *(["--", *more] if more else [])]
-    run = [*sgimd, "run", *place, "--movements", str(options.movements), *more]
+    run = ["run", "--seed", str(options.seed), "--out", str(options.out), "--movements", str(options.movements)]
     steps = {
-        "all learn on": longer,
-        "without a teacher": [*run, "--algorithm", "practice"],
-        "with curiosity": [*run, "--goals", "interest-map", "--name", "interest-map"],
-        "their results": [*sgimd, "table", str(options.out)],
+        "a film of how SGIM-D learns": ["film", str(film), "--time-lapse"],
+        "one page: curves, maps, where it is curious": ["report", str(options.out)],
+        "the same without a teacher": [*run, *options.more, "--algorithm", "practice"],
     }
-    return "\n".join(f"  {shlex.join(words)}    # {why}" for why, words in steps.items())
+    return "\n".join(f"  {shlex.join([*sgimd, *words])}    # {why}" for why, words in steps.items())

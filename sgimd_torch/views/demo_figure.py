@@ -12,17 +12,16 @@ try:
 except ImportError as error:
     raise ImportError(f"the figure needs matplotlib: pip install 'sgimd-torch[plot]' ({error})") from error
 
-from sgimd_torch.figures.learning import NAMES, interest_map, landing_points, map_after, tile_counts
+from sgimd_torch.figures.learning import NAMES, landing_points, tile_counts
 from sgimd_torch.figures.results import SeedCurves, seed_curves
 from sgimd_torch.runs.log import RunError
 from sgimd_torch.spaces import Box
+from sgimd_torch.views.demo_cast import answers, from_above, from_the_side
 from sgimd_torch.views.report.data import Life, demonstrated
-
-GOALS = 100  # the last ones are shown
 
 
 def draw(runs: Mapping[str, Life]) -> Figure:
-    """The figure: error curves, the interest map, where the float landed in each run, on one scale.
+    """The figure: error curves; four goals and how each learner answers them; where the float landed in each run.
 
     Raises:
         RunError: a run was never evaluated.
@@ -35,10 +34,14 @@ def draw(runs: Mapping[str, Life]) -> Figure:
     tile = 0.05 * half_side
     most = max(float(tile_counts(run.landed, task_space, tile).max()) for run in runs.values())
     figure = Figure(figsize=(7 * len(runs), 12.6), layout="constrained")
-    axes: dict[str, Axes] = figure.subplot_mosaic([[*["curves"] * (len(runs) - 1), "interest"], [*runs]])
+    axes: dict[str, Axes] = figure.subplot_mosaic([["curves", "above", "side"], [*runs]])
     seed_curves(axes["curves"], [_curve(algorithm, run) for algorithm, run in runs.items()])
     axes["curves"].set_title("How far from its goals the float lands")
-    _draw_interest(axes["interest"], sgim_d)
+    casts = {algorithm: answers(run.path) for algorithm, run in runs.items()}
+    from_above(axes["above"], casts, task_space)
+    axes["above"].set_title("Four goals and their answers, from above", pad=55)
+    from_the_side(axes["side"], casts, task_space)
+    axes["side"].set_title("The arm casts at the goal behind it, on the left")
     for algorithm, run in runs.items():
         ax = axes[algorithm]
         shown, _ = demonstrated([run])
@@ -71,18 +74,8 @@ def table(runs: Mapping[str, Life]) -> str:
 
 
 def _curve(algorithm: str, run: Life) -> SeedCurves:
-    when, errors, floors = (run.evaluation[name] for name in ("movements", "mean_error_m", "noise_floor_m"))
-    return SeedCurves(algorithm, NAMES[algorithm], when, errors[None], errors, errors, errors, floors=floors)
-
-
-def _draw_interest(ax: Axes, run: Life) -> None:
-    """The map at the last evaluation, and the last goals chosen before it."""
-    ax.set_title(f"Where the competence of {NAMES['sgim-d']} is changing", pad=32)
-    if not run.regions or not len(run.regions["movements"]):
-        ax.text(0.5, 0.5, "uniform goals: no interest map", transform=ax.transAxes, ha="center")
-        return
-    last = map_after(run.regions, run.regions["movements"].max())
-    interest_map(ax, *last, goals=run.chosen_goals()[-GOALS:])
+    when, errors = (run.evaluation[name] for name in ("movements", "mean_error_m"))
+    return SeedCurves(algorithm, NAMES[algorithm], when, errors[None], errors, errors, errors)
 
 
 def _shown(value: float, form: str, unit: str) -> str:

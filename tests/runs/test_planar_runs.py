@@ -22,6 +22,7 @@ from sgimd_torch.runs.tasks import arm_benchmark, arm_demonstrations
 from sgimd_torch.spaces import Demonstration, stream
 from sgimd_torch.views import demo
 from sgimd_torch.views.film import command as film
+from sgimd_torch.views.memories import remember
 from sgimd_torch.views.report import command as report
 from sgimd_torch.views.report.data import demonstrated, read_life
 from tables import tiles_reached
@@ -218,7 +219,7 @@ def test_the_demo_is_of_the_rod(capsys):
 def test_the_memory_of_an_arm_rebuilt_from_the_log_is_that_of_the_living_one(reference):
     run = read_run(reference)
     parts = build(film.config_of(run))
-    film.remember(run, parts, 0, len(run.index))
+    remember(run, parts, 0, len(run.index))
     assert np.array_equal(parts.learner.memory.outcomes, run.outcomes[run.origin != ""])
 
 

@@ -2,18 +2,22 @@
 
 import os
 import re
+import shlex
 import shutil
 import signal
 import subprocess
 import sys
 import time
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from runs import ROOT
+from sgimd_torch.__main__ import COMMANDS
 from sgimd_torch.evaluation import Benchmark, save_benchmark
+from sgimd_torch.views.demo_cast import GOALS, answers
 from sgimd_torch.views.demo_figure import draw, table
 from sgimd_torch.views.report.data import read_life
 
@@ -67,6 +71,13 @@ def test_the_demo_ends_well_with_all_runs_and_a_figure(finished, runs):
     assert (out / "demo.png").stat().st_size > 50_000  # an empty figure of this size has a tenth of that
     assert not list(out.glob("*.part"))
     assert str(out / "demo.png") in said
+    assert "SGIM-D chooses goals" in errors  # what it is doing
+    commands = said.partition("Next, try\n")[2].splitlines()
+    assert len(commands) == 3
+    for command in commands:
+        name, *words = shlex.split(command.partition("sgimd")[2].removeprefix("_torch"), comments=True)
+        assert name in COMMANDS
+        assert any(Path(word).exists() for word in words)
 
 
 def test_the_table_compares_the_algorithms_in_error_noise_and_seconds(runs):
@@ -94,11 +105,19 @@ def test_the_table_is_shown(finished, runs):
 
 
 def test_the_figure_shows_the_data_of_the_runs(runs):
-    curves, interest, *landed = draw(runs).axes[:5]
-    for line, run in zip(curves.lines[::2], runs.values(), strict=True):
+    curves, above, side, *landed = draw(runs).axes[:6]
+    for line, run in zip(curves.lines, runs.values(), strict=True):
         np.testing.assert_array_equal(line.get_xdata(), [30, 60])
         np.testing.assert_array_equal(line.get_ydata(), run.evaluation["mean_error_m"])
-    assert len(interest.collections[0].get_paths()) == (runs["sgim-d"].regions["movements"] == 60).sum()
+    paths = [line for line in above.lines if line.get_linestyle() == ":"]
+    assert len(paths) == len(GOALS) * len(runs)
+    assert len([line for line in side.lines if line.get_linestyle() == ":"]) == len(runs)  # for the first goal
+    shown = [text.get_text() for text in above.get_legend().get_texts()]
+    for name, run, of_run in zip(("Random", "SGIM-D", "Practice, taught"), runs.values(), (0, 4, 8), strict=True):
+        ends = np.array([[line.get_xdata()[-1], line.get_ydata()[-1]] for line in paths[of_run : of_run + 4]])
+        missed = 100 * np.linalg.norm(ends - GOALS, axis=1).mean()
+        assert f"{name}: misses by {missed:.0f} cm" in shown
+        np.testing.assert_array_equal([cast.path[-1, :2] for cast in answers(run.path)], ends)
     for ax, run in zip(landed, runs.values(), strict=True):
         assert ax.collections[0].get_array().sum() == (np.abs(run.outcomes) <= 1).all(axis=1).sum()
     assert len({ax.collections[0].norm.vmax for ax in landed}) == 1

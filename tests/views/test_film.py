@@ -27,6 +27,7 @@ from sgimd_torch.views.film import command as film
 from sgimd_torch.views.film.camera import caption
 from sgimd_torch.views.film.panel import Panel, Stage
 from sgimd_torch.views.film.reel import PAUSE, POUR, RATES, Shot, count_frames, tiled, write_film, write_sheet
+from sgimd_torch.views.memories import remember
 
 THETAS = stream(0, "film").random((100, 25))[40:]  # some reach the water before the line is let out
 RATE = RATES[".mp4"]
@@ -100,6 +101,16 @@ def test_a_float_let_out_falls_freely_and_leaves_without_a_jump(recordings):
     np.testing.assert_allclose(np.diff(free, 2, axis=0) / 0.01**2, np.tile([0, 0, -9.81], (7, 1)), atol=1e-6)
     around = positions_along(recording, [recording.let_out - 1e-9, recording.let_out + 1e-9])
     np.testing.assert_allclose(around[0], around[1], atol=1e-6)
+
+
+def test_the_posture_of_a_recorded_movement_is_the_arm_from_its_base_to_the_tip_of_the_rod(rod, recordings):
+    for recording in recordings[:5]:
+        for time in (0.0, recording.landed / 2, recording.landed):
+            chain = rod.posture(recording, time)
+            links = np.linalg.norm(np.diff(chain, axis=0), axis=1)
+            np.testing.assert_allclose(links, [0, 0.16, 0.14, 0.04, 0.04, 0.38], atol=1e-12)  # m, of the model
+            np.testing.assert_allclose(chain[0], [0, 0, 0.25])
+        assert 0.3 < np.linalg.norm(rod.posture(recording, 0.0)[-1] - recording.float_at(0.0)) < 0.45  # the line hangs
 
 
 def test_states_and_floats_of_a_recording_belong_together_and_the_line_bends(rod, recordings):
@@ -211,8 +222,8 @@ def test_the_memory_rebuilt_from_the_log_judges_as_the_living_one_did(tmp_path, 
     run = read_run(tmp_path / algorithm / "seed-003")
     parts = build(film.config_of(run))
     assert (run.demonstration[:35] >= 0).any()
-    film.remember(run, parts, 0, 20)
-    film.remember(run, parts, 20, 35)  # in two steps, as a time lapse does
+    remember(run, parts, 0, 20)
+    remember(run, parts, 20, 35)  # in two steps, as a time lapse does
     seen = evaluate(parts.inverse, parts.environment, parts.benchmark.goals, 3, 35, repeats=0)
     assert seen.mean_error == run.evaluation["mean_error_m"][0]
 
@@ -221,8 +232,8 @@ def test_a_forward_model_learns_again_what_it_learnt_in_the_run(tmp_path, go):
     assert go(tmp_path, "--inverse", "model", "--movements", 150, "--evaluate_at", "[]") == 0
     run = read_run(tmp_path / "sgim-d" / "seed-003")
     parts = build(film.config_of(run))
-    film.remember(run, parts, 0, 60)
-    film.remember(run, parts, 60, 150)
+    remember(run, parts, 0, 60)
+    remember(run, parts, 60, 150)
     errors = [line.split(",")[4] for line in (run.path / "refreshes.csv").read_text().splitlines()]
     assert errors[-1] == repr(parts.model.relative_error)
 

@@ -29,10 +29,10 @@ from sgimd_torch.runs.build import RunParts, build
 from sgimd_torch.runs.log import RunError
 from sgimd_torch.runs.read import Run, config_of, read_run
 from sgimd_torch.spaces import Array, stream
-from sgimd_torch.strategies import Remember
 from sgimd_torch.views.film.panel import Panel, Stage
 from sgimd_torch.views.film.reel import RATES, Filming, Shot, count_frames, shoot, write_film, write_sheet
 from sgimd_torch.views.film.sketch import Sketchbook, in_picture
+from sgimd_torch.views.memories import remember
 
 AFTER = (30, 100, 300, 1000, 3000)
 EXAMPLES = """examples:
@@ -102,22 +102,6 @@ def _camera(robot: Any, shots: Sequence[Shot], size: dict[str, int]) -> Abstract
     from sgimd_torch.views.film.camera import Camera  # only the rod needs OpenGL
 
     return Camera(robot.model, **size)
-
-
-def remember(run: Run, parts: RunParts, start: int, stop: int) -> None:
-    """Add to the memory of ``parts`` what the learner remembered in movements ``start`` to ``stop``, in the same order,
-    and train a forward model on it as in the run."""
-    memory, correspondence = parts.learner.memory, parts.learner.correspondence
-    by_observation = isinstance(parts.learner.social, Remember)  # other learners remember only their own movements
-    for row in range(start, min(stop, len(run.index))):
-        if by_observation and correspondence is not None and run.demonstration[row] >= 0:
-            shown = parts.demonstrations[run.demonstration[row]]
-            memory.add(shown.context, correspondence(shown.times, shown.trajectory), shown.outcome)
-        if run.origin[row]:
-            memory.add(run.contexts[row], run.thetas[row], run.outcomes[row])
-        if parts.model is not None:
-            goal = run.goals[row]
-            parts.model.refresh(memory, goal if np.isfinite(goal).all() else None)
 
 
 def _cast(run: Run, parts: RunParts, goals: Array, stages: Sequence[int]) -> tuple[list[Shot], list[Stage]]:

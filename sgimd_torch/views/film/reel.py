@@ -80,7 +80,10 @@ class Shot:
         n = round(POUR * rate) if self.new else 0
         known = len(self.past) - self.new
         counts = [known + round(self.new * (k + 1) / n) for k in range(n)]
-        pouring = [(replace(self, past=self.past[:count]), self.begins) for count in counts]
+        pouring = [
+            (replace(self, past=self.past[:count], title=f"learning: {count} landings"), self.begins)
+            for count in counts
+        ]
         times = np.arange(self.begins, self.recording.landed + PAUSE, 1 / rate).tolist()
         return pouring + [(self, time) for time in times]
 
