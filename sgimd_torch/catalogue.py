@@ -304,6 +304,13 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
             uses={**_MODEL, "policies": "policies"},
             learns_with="linear",
         ),
+        "model-proved": _at(
+            "inverses.proved:ProvedInverse",
+            "process when learning; in evaluations the forward model's answer, where the process expects no more "
+            "error of it",
+            uses={**_MODEL, "policies": "policies", "noise": "outcome_noise"},
+            learns_with="process",
+        ),
     },
     "base": {
         "practice": _at("algorithms.asking:practised", "one movement a goal, and once what is shown"),
