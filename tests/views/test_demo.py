@@ -43,7 +43,7 @@ def start(out, benchmark_file, movements, *more, extra=()):
 
 
 def ended(demo):
-    out, errors = demo.communicate(timeout=120)
+    out, errors = demo.communicate(timeout=300)
     return demo.returncode, out, errors
 
 
