@@ -43,7 +43,7 @@ def script(commands: Mapping[str, tuple[str, str, str]], shell: str) -> str:
         parents = [command_line.parser()] if name in TAKE_OPTIONS_OF_RUN else []
         try:
             parents.append(importlib.import_module(f"sgimd_torch.{module}").parser())
-        except ModuleNotFoundError:
+        except ImportError:
             if not extra:
                 raise
         each = parsers.add_parser(name, help=about, parents=parents, add_help=False, conflict_handler="resolve")
