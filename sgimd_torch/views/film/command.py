@@ -191,7 +191,8 @@ def _spread(goals: Array) -> Array:
     return goals[list(dict.fromkeys(nearest))]
 
 
-def _options(argv: Sequence[str] | None) -> argparse.Namespace:
+def parser() -> argparse.ArgumentParser:
+    """The options of ``sgimd film``."""
     parser = argparse.ArgumentParser(
         prog="sgimd film",
         description=__doc__,
@@ -218,15 +219,19 @@ def _options(argv: Sequence[str] | None) -> argparse.Namespace:
     )
     parser.add_argument("--out", type=Path, help="the film, .mp4 or .webp (default: .mp4 next to the run's directory)")
     parser.add_argument("--sheet", type=Path, help="also an image of how each movement ends, .png")
+    return parser
+
+
+def _options(argv: Sequence[str] | None) -> argparse.Namespace:
     # A minus with a number after it begins a goal, not an option.
     given = sys.argv[1:] if argv is None else argv
     words = [f" {word}" if re.match(r"-[.\d]", word) else word for word in given]
-    options = parser.parse_args(words)
+    options = parser().parse_args(words)
     if options.after and not options.time_lapse:
-        parser.error("--after belongs to --time-lapse")
+        parser().error("--after belongs to --time-lapse")
     for path, suffixes in ((options.out, tuple(RATES)), (options.sheet, (".png",))):
         if path is not None and (path.suffix not in suffixes or path.is_dir() or not path.parent.is_dir()):
-            parser.error(f"must be a {' or '.join(suffixes)} file in a folder that exists, got {path}")
+            parser().error(f"must be a {' or '.join(suffixes)} file in a folder that exists, got {path}")
     if options.out is None:
         options.out = Path(f"{options.run.resolve()}{'-time-lapse' if options.time_lapse else ''}.mp4")
     return options
