@@ -1,0 +1,161 @@
+"""Builds the documentation: the pages of the repository, and an API page for each folder of the library.
+
+    scripts/docs            into site/, which can be opened from the disk
+    scripts/docs --serve    and shows it at an address of this machine, where the search works, too
+
+The pages are copied as they lie in the repository, with the files that they link to. So one link serves both a code
+host and the site. Where a page links to a source file of the library, the site leads to the API page about it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import http.server
+import os
+import posixpath
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from functools import partial
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+HERE = Path(__file__).resolve().parent
+PACKAGE = "sgimd_torch"
+PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md", f"{PACKAGE}/data/README.md")
+FOLDERS = ("docs", "results")
+LINK = re.compile(r"(!?\[[^\]]*\]\()([^)\s#]*)(#[^)\s]*)?(\))")
+SAVED_AS = re.compile(r"^```(\w+) ([\w./-]+)$", re.MULTILINE)  # as tests/test_readme.py reads the first line of a block
+
+
+def sources() -> list[str]:
+    """The Markdown pages of the repository that are part of the site, as paths from its root."""
+    found = [path.relative_to(ROOT).as_posix() for folder in FOLDERS for path in (ROOT / folder).rglob("*.md")]
+    return sorted([*PAGES, *found])
+
+
+def rooms() -> dict[str, list[str]]:
+    """API page -> dotted names of its modules: a page for each folder of the library, and for each file beside them."""
+    found: dict[str, list[str]] = {}
+    for path in sorted((ROOT / PACKAGE).rglob("*.py"), key=lambda path: (path.name != "__init__.py", path)):
+        parts = path.relative_to(ROOT).with_suffix("").parts
+        folder, module = parts[:-1], ".".join(parts).removesuffix(".__init__")
+        # What the package itself offers by name has the first page; its other files have pages of their own.
+        page = module if len(folder) == 1 else ".".join(folder)
+        found.setdefault(page.removeprefix(f"{PACKAGE}."), []).append(module)
+    return dict(sorted(found.items()))
+
+
+def copy_pages(to: Path) -> None:
+    """The pages with what they link to, changed where the site needs something else than a code host."""
+    for name in sources():
+        text = (ROOT / name).read_text(encoding="utf-8")
+        place = to / name
+        place.parent.mkdir(parents=True, exist_ok=True)
+        place.write_text(LINK.sub(partial(_link, name, to), SAVED_AS.sub(r'```\1 title="\2"', text)), encoding="utf-8")
+
+
+def _link(page: str, to: Path, found: re.Match[str]) -> str:
+    """The same link; the file that it leads to is copied if it is no page."""
+    before, target, anchor, after = found.groups()
+    path = posixpath.normpath(posixpath.join(posixpath.dirname(page), target))
+    if not target or "://" in target or not (ROOT / path).is_file():
+        return found[0]
+    if path.startswith(f"{PACKAGE}/") and path.endswith(".py"):
+        module = path.removesuffix(".py").replace("/", ".").removesuffix(".__init__")
+        (room,) = [room for room, modules in rooms().items() if module in modules]
+        up = posixpath.relpath(f"api/{room}.md", posixpath.dirname(page) or ".")
+        return f"{before}{up}#{module}{after}"
+    if path not in sources():
+        (to / path).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(ROOT / path, to / path)
+    return f"{before}{target}{anchor or ''}{after}"
+
+
+def write_api(to: Path) -> None:
+    """An API page for each room; what a page shows comes from the docstrings, by mkdocstrings."""
+    to.mkdir(parents=True)
+    for room, modules in rooms().items():
+        title = PACKAGE if room == PACKAGE else f"{PACKAGE}.{room}"
+        text = "\n\n".join([f"# {title}", *(f"::: {module}" for module in modules)])
+        if room == PACKAGE:
+            text += f"\n\n## From {PACKAGE} itself\n\n{front_door()}"
+        (to / f"{room}.md").write_text(f"{text}\n", encoding="utf-8")
+
+
+def front_door() -> str:
+    """A table of the names that can be imported from the package itself, with where they are explained."""
+    import sgimd_torch
+
+    rows = ["| name | what it is |", "| --- | --- |"]
+    for name in sorted(sgimd_torch.__all__, key=str.lower):
+        thing = getattr(sgimd_torch, name)
+        if name != "__version__":
+            first = re.split(r"(?<=[.?:])\s", " ".join((thing.__doc__ or "").split()), maxsplit=1)[0]
+            first = re.sub(r"([][|])", r"\\\1", first)  # a link and a border otherwise
+            rows.append(f"| [`{name}`][{thing.__module__}.{name}] | {first} |")
+    return "\n".join(rows)
+
+
+def build(out: Path) -> None:
+    """Make the site at ``out``, in the place of an earlier one.
+
+    Raises:
+        FileExistsError: something else lies there.
+        ValueError: a page has a fault, such as a link that leads nowhere; what the builder says about it.
+    """
+    if out.exists() and not (out / "objects.inv").exists():
+        raise FileExistsError(f"{out} exists and is no site of these pages; move it away")
+    with tempfile.TemporaryDirectory() as folder:
+        place = Path(folder)
+        copy_pages(place / "pages")
+        write_api(place / "pages" / "api")
+        shutil.copy(HERE / "site.css", place / "pages")
+        shutil.copy(HERE / "zensical.toml", place)
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(HERE)]), "NO_COLOR": "1"}
+        command = [sys.executable, "-m", "zensical", "build", "--strict"]
+        done = subprocess.run(command, cwd=place, env=environment, capture_output=True, text=True)
+        if done.returncode:
+            raise ValueError((done.stdout + done.stderr.partition("Traceback (most recent call last)")[0]).strip())
+        if out.exists():
+            shutil.rmtree(out)
+        shutil.move(place / "site", out)
+
+
+def serve(site: Path, port: int) -> None:
+    """Show a site at an address of this machine until Ctrl-C."""
+    handler = partial(http.server.SimpleHTTPRequestHandler, directory=str(site))
+    with http.server.ThreadingHTTPServer(("127.0.0.1", port), handler) as server:
+        print(f"http://127.0.0.1:{server.server_port}/ shows the site; Ctrl-C ends it")
+        try:
+            server.serve_forever()
+        except KeyboardInterrupt:
+            print()
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """The exit code: 1 if the pages have a fault."""
+    parser = argparse.ArgumentParser(
+        prog="scripts/docs", description="Installs what is missing and builds the documentation into site/, offline."
+    )
+    parser.add_argument("--serve", action="store_true", help="then show it at an address of this machine, until Ctrl-C")
+    parser.add_argument("--port", type=int, default=8000, help="of that address; 0 takes a free one (default: 8000)")
+    options = parser.parse_args(arguments)
+    try:
+        build(ROOT / "site")
+    except FileExistsError as error:
+        print(f"scripts/docs: {error}", file=sys.stderr)
+        return 2
+    except ValueError as error:
+        print(f"{error}\nscripts/docs: the pages have these faults; the earlier site stays as it was", file=sys.stderr)
+        return 1
+    print(f"scripts/docs: open {ROOT / 'site' / 'index.html'}")
+    if options.serve:
+        serve(ROOT / "site", options.port)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
