@@ -40,13 +40,9 @@ class Docstrings(griffe.Extension):
         text = NAME.sub(self._link, ROLE.sub(r"\1", LISTED.sub(r"]\\", text)))
         if not of_module:
             return text
-        # A module shows its use in lines that are indented, without an empty line before them.
-        lines: list[str] = []
-        for line in text.splitlines():
-            if line.startswith("    ") and lines and lines[-1] and not lines[-1].startswith("    "):
-                lines.append("")
-            lines.append(line)
-        return "\n".join(lines)
+        # A module shows its use at the end of a line, after some spaces, or in lines that are indented.
+        text = re.sub(r"^(\S.*?\S) {3,4}(?=\S)", r"\1\n    ", text, flags=re.MULTILINE)
+        return re.sub(r"^(\S.*)\n(?=    )", r"\1\n\n", text, flags=re.MULTILINE)
 
     def _link(self, found: re.Match[str]) -> str:
         places = self.places.get(found[1], [])

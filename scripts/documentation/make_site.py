@@ -27,6 +27,7 @@ PACKAGE = "sgimd_torch"
 PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md", f"{PACKAGE}/data/README.md")
 FOLDERS = ("docs", "results")
 LINK = re.compile(r"(!?\[[^\]]*\]\()([^)\s#]*)(#[^)\s]*)?(\))")
+INTERVAL = re.compile(r"(\[[+−-]?[\d.]+), ([+−-]?[\d.]+\])")  # stays on one line, also in a narrow column
 SAVED_AS = re.compile(r"^```(\w+) ([\w./-]+)$", re.MULTILINE)  # as tests/test_readme.py reads the first line of a block
 
 
@@ -52,9 +53,10 @@ def copy_pages(to: Path) -> None:
     """The pages with what they link to, changed where the site needs something else than a code host."""
     for name in sources():
         text = (ROOT / name).read_text(encoding="utf-8")
+        text = INTERVAL.sub("\\1,\N{NO-BREAK SPACE}\\2", SAVED_AS.sub(r'```\1 title="\2"', text))
         place = to / name
         place.parent.mkdir(parents=True, exist_ok=True)
-        place.write_text(LINK.sub(partial(_link, name, to), SAVED_AS.sub(r'```\1 title="\2"', text)), encoding="utf-8")
+        place.write_text(LINK.sub(partial(_link, name, to), text), encoding="utf-8")
 
 
 def _link(page: str, to: Path, found: re.Match[str]) -> str:
@@ -78,8 +80,8 @@ def write_api(to: Path) -> None:
     """An API page for each room; what a page shows comes from the docstrings, by mkdocstrings."""
     to.mkdir(parents=True)
     for room, modules in rooms().items():
-        title = PACKAGE if room == PACKAGE else f"{PACKAGE}.{room}"
-        text = "\n\n".join([f"# {title}", *(f"::: {module}" for module in modules)])
+        first = f"---\ntitle: {room}\n---\n\n::: {modules[0]}\n    options:\n      heading_level: 1"
+        text = "\n\n".join([first, *(f"::: {module}" for module in modules[1:])])
         if room == PACKAGE:
             text += f"\n\n## From {PACKAGE} itself\n\n{front_door()}"
         (to / f"{room}.md").write_text(f"{text}\n", encoding="utf-8")
