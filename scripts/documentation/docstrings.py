@@ -22,6 +22,8 @@ class Docstrings(griffe.Extension):
     def on_package(self, *, pkg: griffe.Module, **more: Any) -> None:
         """Called by griffe."""
         self.places: dict[str, list[str]] = {}
+        for each in self._objects(pkg):
+            each.members = {name: member for name, member in each.members.items() if not self._is_inner(member)}
         objects = list(self._objects(pkg))
         for each in objects:
             self.places.setdefault(each.name, []).append(each.path)
@@ -29,6 +31,15 @@ class Docstrings(griffe.Extension):
         for each in objects:
             if each.docstring is not None:
                 each.docstring.value = self._markdown(each.docstring.value, of_module=each.is_module)
+
+    def _is_inner(self, member: Any) -> bool:
+        """Whether it is what a constructor keeps for itself: no field that is declared, and nothing is said about it."""
+        return (
+            isinstance(member, griffe.Attribute)
+            and member.labels == {"instance-attribute"}
+            and member.value is not None
+            and member.docstring is None
+        )
 
     def _objects(self, owner: griffe.Object) -> Any:
         yield owner

@@ -21,7 +21,8 @@ from matplotlib.textpath import TextPath
 # Opens before and closes after something that is not a space, so that prices and variables of a shell stay as they are.
 INLINE = r"(?<![\\$\w])\$(?!\s)([^$\n]+?)(?<!\s)\$(?![\w$])"
 TAG = re.compile(r"\s*\\tag\{(\w+)\}\s*$")
-SIZE = 17  # points; everything is drawn in parts of it
+SIZE = 17  # points in which it is drawn
+EM = 15  # of these points are the size of the text around it, whose letters are larger than those of this font
 FONT = FontProperties(math_fontfamily="cm", size=SIZE)
 COMMANDS = {Path.MOVETO: "M", Path.LINETO: "L", Path.CURVE3: "Q", Path.CURVE4: "C", Path.CLOSEPOLY: "Z"}
 
@@ -41,8 +42,8 @@ def picture(latex: str) -> str:
         drawn.append(COMMANDS[code] + " ".join(numbers))
     return (
         f'<svg class="equation" role="img" aria-label="{html.escape(latex, quote=True)}" '
-        f'viewBox="-1 {-high:.1f} {width + 2:.1f} {high - low:.1f}" style="width:{(width + 2) / SIZE:.3f}em;'
-        f'height:{(high - low) / SIZE:.3f}em;vertical-align:{low / SIZE:.3f}em"><path d="{"".join(drawn)}"/></svg>'
+        f'viewBox="-1 {-high:.1f} {width + 2:.1f} {high - low:.1f}" style="width:{(width + 2) / EM:.3f}em;'
+        f'height:{(high - low) / EM:.3f}em;vertical-align:{low / EM:.3f}em"><path d="{"".join(drawn)}"/></svg>'
     )
 
 
@@ -50,7 +51,8 @@ def display(source: str, language: str, css_class: str, options: Any, md: Any, *
     """A fenced equation, as superfences asks for it."""
     number = TAG.search(source)
     tag = f'<span class="number">({number[1]})</span>' if number else ""
-    return f'<div class="display"><div>{picture(TAG.sub("", source))}</div>{tag}</div>'
+    equation = TAG.sub("", source).replace(r"\frac", r"\dfrac")  # has the space for fractions of full size
+    return f'<div class="display"><div>{picture(equation)}</div>{tag}</div>'
 
 
 class _Inline(InlineProcessor):

@@ -18,6 +18,9 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 
@@ -126,15 +129,23 @@ def build(out: Path) -> None:
         shutil.move(place / "site", out)
 
 
-def serve(site: Path, port: int) -> None:
-    """Show a site at an address of this machine until Ctrl-C."""
-    handler = partial(http.server.SimpleHTTPRequestHandler, directory=str(site))
+@contextmanager
+def serve_in_background(site: Path, port: int = 0) -> Iterator[str]:
+    """The address of this machine at which a site is shown; port 0 takes a free one."""
+    handler = partial(_Quiet, directory=str(site))
     with http.server.ThreadingHTTPServer(("127.0.0.1", port), handler) as server:
-        print(f"http://127.0.0.1:{server.server_port}/ shows the site; Ctrl-C ends it")
+        serving = threading.Thread(target=server.serve_forever)
+        serving.start()
         try:
-            server.serve_forever()
-        except KeyboardInterrupt:
-            print()
+            yield f"http://127.0.0.1:{server.server_port}/"
+        finally:
+            server.shutdown()
+            serving.join()
+
+
+class _Quiet(http.server.SimpleHTTPRequestHandler):
+    def log_message(self, format: str, *args: object) -> None:
+        """No line for each file."""
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -142,20 +153,23 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog="scripts/docs", description="Installs what is missing and builds the documentation into site/, offline."
     )
+    parser.add_argument("--out", type=Path, default=ROOT / "site", help="folder of the site (default: site/)")
     parser.add_argument("--serve", action="store_true", help="then show it at an address of this machine, until Ctrl-C")
     parser.add_argument("--port", type=int, default=8000, help="of that address; 0 takes a free one (default: 8000)")
     options = parser.parse_args(arguments)
     try:
-        build(ROOT / "site")
+        build(options.out)
     except FileExistsError as error:
         print(f"scripts/docs: {error}", file=sys.stderr)
         return 2
     except ValueError as error:
         print(f"{error}\nscripts/docs: the pages have these faults; the earlier site stays as it was", file=sys.stderr)
         return 1
-    print(f"scripts/docs: open {ROOT / 'site' / 'index.html'}")
+    print(f"scripts/docs: open {options.out / 'index.html'}")
     if options.serve:
-        serve(ROOT / "site", options.port)
+        with suppress(KeyboardInterrupt), serve_in_background(options.out, options.port) as address:
+            print(f"scripts/docs: or {address}, where the search works, too; Ctrl-C ends it", flush=True)
+            threading.Event().wait()
     return 0
 
 
