@@ -16,7 +16,7 @@ NAME = re.compile(r"(?<!`)`([A-Za-z_][\w.]*)`(?!`)")
 LISTED = re.compile(r"\](?=\[)")  # [context][policy] is a list of words, which Markdown takes for a link
 
 
-class Docstrings(griffe.Extension):
+class Docstrings(griffe.Extension):  # type: ignore[misc]
     """Changes every docstring of a package once it is loaded."""
 
     def on_package(self, *, pkg: griffe.Module, **more: Any) -> None:
@@ -33,7 +33,7 @@ class Docstrings(griffe.Extension):
                 each.docstring.value = self._markdown(each.docstring.value, of_module=each.is_module)
 
     def _is_inner(self, member: Any) -> bool:
-        """Whether it is what a constructor keeps for itself: no field that is declared, and nothing is said about it."""
+        """Whether it is only what a constructor keeps: not declared as a field, and without a docstring."""
         return (
             isinstance(member, griffe.Attribute)
             and member.labels == {"instance-attribute"}

@@ -38,8 +38,8 @@ def picture(latex: str) -> str:
     low, high = min(-depth, 0.0) - 1, height - depth + 1  # strokes are a little larger than their boxes
     drawn = []
     for points, code in TextPath((0, 0), text, prop=FONT).iter_segments(simplify=False):
-        numbers = [] if code == Path.CLOSEPOLY else [f"{sign * x:.2f}" for x, sign in zip(points, [1, -1] * 3, strict=False)]
-        drawn.append(COMMANDS[code] + " ".join(numbers))
+        points = [] if code == Path.CLOSEPOLY else points.reshape(-1, 2) * (1, -1)  # SVG counts downwards
+        drawn.append(COMMANDS[code] + " ".join(f"{x:.2f} {y:.2f}" for x, y in points))
     return (
         f'<svg class="equation" role="img" aria-label="{html.escape(latex, quote=True)}" '
         f'viewBox="-1 {-high:.1f} {width + 2:.1f} {high - low:.1f}" style="width:{(width + 2) / EM:.3f}em;'
@@ -55,12 +55,12 @@ def display(source: str, language: str, css_class: str, options: Any, md: Any, *
     return f'<div class="display"><div>{picture(equation)}</div>{tag}</div>'
 
 
-class _Inline(InlineProcessor):
-    def handleMatch(self, m: re.Match[str], data: str) -> tuple[str, int, int]:  # type: ignore[override]
+class _Inline(InlineProcessor):  # type: ignore[misc]
+    def handleMatch(self, m: re.Match[str], data: str) -> tuple[str, int, int]:
         return self.md.htmlStash.store(picture(m[1])), m.start(0), m.end(0)
 
 
-class _Equations(Extension):
+class _Equations(Extension):  # type: ignore[misc]
     def extendMarkdown(self, md: Markdown) -> None:
         # After code in backticks, which has 190, and before backslashes, which have 180.
         md.inlinePatterns.register(_Inline(INLINE, md), "equation", 185)

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import http.server
+import importlib
 import os
 import posixpath
 import re
@@ -92,11 +93,10 @@ def write_api(to: Path) -> None:
 
 def front_door() -> str:
     """A table of the names that can be imported from the package itself, with where they are explained."""
-    import sgimd_torch
-
+    package = importlib.import_module(PACKAGE)
     rows = ["| name | what it is |", "| --- | --- |"]
-    for name in sorted(sgimd_torch.__all__, key=str.lower):
-        thing = getattr(sgimd_torch, name)
+    for name in sorted(package.__all__, key=str.lower):
+        thing = getattr(package, name)
         if name != "__version__":
             first = re.split(r"(?<=[.?:])\s", " ".join((thing.__doc__ or "").split()), maxsplit=1)[0]
             first = re.sub(r"([][|])", r"\\\1", first)  # a link and a border otherwise
@@ -144,7 +144,7 @@ def serve_in_background(site: Path, port: int = 0) -> Iterator[str]:
 
 
 class _Quiet(http.server.SimpleHTTPRequestHandler):
-    def log_message(self, format: str, *args: object) -> None:
+    def log_message(self, *args: object) -> None:
         """No line for each file."""
 
 

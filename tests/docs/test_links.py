@@ -7,7 +7,6 @@ import tomllib
 from collections import Counter
 
 import pytest
-
 from make_site import HERE, ROOT, rooms, sources
 
 PAGES = [*sources(), "experiments/README.md"]

@@ -3,7 +3,6 @@
 import re
 
 import pytest
-
 from equations import display, picture
 from make_site import PACKAGE, ROOT, copy_pages, main, rooms
 
@@ -16,7 +15,14 @@ def copied(tmp_path_factory):
 
 
 def test_pages_lie_as_in_the_repository_with_the_files_that_they_link_to(copied):
-    for name in ("README.md", "docs/own-robot.md", "results/RESULTS.md", "results/paper.csv", "results/figures/errors.png", "LICENSE"):
+    for name in (
+        "README.md",
+        "docs/own-robot.md",
+        "results/RESULTS.md",
+        "results/paper.csv",
+        "results/figures/errors.png",
+        "LICENSE",
+    ):
         assert (copied / name).is_file(), name
 
 

@@ -11,10 +11,10 @@ import zlib
 from html.parser import HTMLParser
 
 import pytest
+from make_site import HERE, PACKAGE, rooms, serve_in_background
 
 import sgimd_torch
 from browser import chromium
-from make_site import HERE, PACKAGE, rooms, serve_in_background
 
 pytestmark = pytest.mark.slow
 # of the kinds that differ: front page, text and code, equations, docstrings, wide tables, pictures
@@ -116,7 +116,9 @@ def test_pages_show_whole_without_a_network(site, width):
             wider = tab.evaluate("document.documentElement.scrollWidth - window.innerWidth")
             assert wider <= 0, f"{name} is {wider} pixels wider than the window"
             if "method" in name:
-                sizes = tab.evaluate("[...document.querySelectorAll('.equation')].map(e => e.getBoundingClientRect().height)")
+                sizes = tab.evaluate(
+                    "[...document.querySelectorAll('.equation')].map(e => e.getBoundingClientRect().height)"
+                )
                 assert len(sizes) > 30
                 assert min(sizes) > 5
             tab.close()
@@ -126,6 +128,7 @@ def test_the_search_finds_a_page_when_the_site_is_served(site):
     with chromium() as browser, serve_in_background(site) as address:
         tab = browser.new_page()
         tab.goto(address)
+        tab.wait_for_load_state("networkidle")
         tab.keyboard.press("Control+k")
         tab.keyboard.type("noise floor", delay=20)
-        tab.get_by_role("link", name=re.compile("Noise and its floor")).first.wait_for(timeout=15000)
+        tab.locator("a", has_text="how the part of the error that it makes is measured").first.wait_for(timeout=60000)
