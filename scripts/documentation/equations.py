@@ -38,8 +38,8 @@ def picture(latex: str) -> str:
     low, high = min(-depth, 0.0) - 1, height - depth + 1  # strokes are a little larger than their boxes
     drawn = []
     for points, code in TextPath((0, 0), text, prop=FONT).iter_segments(simplify=False):
-        points = [] if code == Path.CLOSEPOLY else points.reshape(-1, 2) * (1, -1)  # SVG counts downwards
-        drawn.append(COMMANDS[code] + " ".join(f"{x:.2f} {y:.2f}" for x, y in points))
+        pairs = [] if code == Path.CLOSEPOLY else (points.reshape(-1, 2) * (1, -1)).tolist()  # SVG counts downwards
+        drawn.append(COMMANDS[code] + " ".join(f"{x:.2f} {y:.2f}" for x, y in pairs))
     return (
         f'<svg class="equation" role="img" aria-label="{html.escape(latex, quote=True)}" '
         f'viewBox="-1 {-high:.1f} {width + 2:.1f} {high - low:.1f}" style="width:{(width + 2) / EM:.3f}em;'
