@@ -35,7 +35,7 @@ with loading():  # Ctrl-C shows no traceback
     from anova import anova_cells, update_anova
     from asking_claims import ASKING_CLAIMS, ON_TOSS, contexts_rows, counts, read_asking, teachers_rows
     from judging import NotRun, Results, Verdict, judge
-    from learning_claims import LEARNING_CLAIMS, TIMES, answers_rows, read_learning, suite_rows
+    from learning_claims import LEARNING_CLAIMS, TIMES, answers_rows, read_learning
     from model_claims import MODEL_CLAIMS, SIMPLEX
     from paper_claims import PAPER_CLAIMS
     from quoted import MADE, Page, into_readme, render
@@ -43,6 +43,7 @@ with loading():  # Ctrl-C shows no traceback
     from sgimd_torch.files import make_folder, write_text
     from sgimd_torch.views.statistics import iqm_interval, metres, rng, show
     from sgimd_torch.views.suite import RANDOM
+    from suite_claims import read_suite, suite_claims, suite_rows
     from variants import EXPERIMENTS, LEARNING, SUITED, ladder
 
 PAGES: Final = ("RESULTS", "FORWARD_MODEL", "GYMNASIUM", "LEARNING", "BY_HAND", "ASKING")
@@ -145,8 +146,8 @@ def gymnasium_page(folder: Path) -> Page:
 
 def learning_page(folder: Path) -> Page:
     """The page results/LEARNING.md: few movements, on the rod and on the suite."""
-    rod, suite = (read_learning(folder / f"{name}.csv") for name in ("learning", "suite"))
-    verdicts, times = judge(LEARNING_CLAIMS, rod["judged"]), (*TIMES, LAST)
+    rod, suite, times = read_learning(folder / "learning.csv"), read_suite(folder), (*TIMES, LAST)
+    verdicts, on_suite = judge(LEARNING_CLAIMS, rod["judged"]), judge(suite_claims(suite), suite["process"])
     names = sorted(LEARNING, key=lambda name: _last_error(rod["process"].variants.get(name, NOBODY)))
     columns = {
         **_errors(rod["process"], times, ".4f"),
@@ -157,11 +158,12 @@ def learning_page(folder: Path) -> Page:
     others = [name for name in SUITED if name != RANDOM]
     tables = {
         "claims": verdicts_table("what", verdicts),
+        "suite_claims": verdicts_table("what", on_suite),
         "rod": variants_table(names, columns),
         "answers": markdown(["memory of", "over", *map(str, times)], answers_rows(rod)),
         **{f"suite_{when}": markdown(["task", "random, nearest", *others], suite_rows(suite, when)) for when in TIMES},
     }
-    return Page(verdicts, tables, rod["judged"])
+    return Page([*verdicts, *on_suite], tables, rod["judged"])
 
 
 def hand_page(folder: Path) -> Page:

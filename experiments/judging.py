@@ -110,6 +110,11 @@ class Results:
         errors = self.errors(ours, movements), self.errors(theirs, movements)
         return ratio_interval(*errors, rng=rng(), level=self.level)
 
+    def over_alike(self, variant: str, movements: int = LAST) -> Interval:
+        """Errors of these answers / those of the same inverse for all, on the same memories."""
+        ours, same = shared(self.at(variant, movements), self.alike.at(variant, movements))
+        return ratio_interval(_array(ours), _array(same), rng=rng(), paired=True, level=self.level)
+
     def improvement(self, ours: str, theirs: str, movements: int = LAST) -> Interval:
         """The probability that a run of ours has a smaller error than one of theirs."""
         return improvement_interval(self.errors(ours, movements), self.errors(theirs, movements), level=self.level)

@@ -1,7 +1,7 @@
-"""What the learners from few movements have to show, on the rod and on the suite, and how each bar is judged.
+"""What the learners from few movements have to show on the rod, and how each bar is judged.
 
     rod = read_learning(Path("results/learning.csv")); judge(LEARNING_CLAIMS, rod["judged"])
-All are answered by `process`, whatever they explored with, unless a table says so.
+All are answered by `process`, whatever they explored with, unless a table says so. The suite is in suite_claims.py.
 """
 
 from __future__ import annotations
@@ -11,15 +11,12 @@ from functools import partial
 from pathlib import Path
 from typing import Final
 
-import numpy as np
-
 from judging import Claim, Judged, NotRun, Results, all_of, at_most, below_zero
 from read_results import LAST, read_results
-from sgimd_torch.views.statistics import Interval, interquartile_mean, point, ratio_interval, rng, show
-from sgimd_torch.views.suite import RANDOM, TASKS, UNIFORM, titled
-from variants import LEARNING, PROVED, SUITED
+from sgimd_torch.views.statistics import Interval, interquartile_mean, point, show
+from variants import LEARNING, PROVED
 
-BEST, ALONE = "practice-taught.rod", "practice.rod"
+BEST, ALONE, IMITATION = "practice-taught.rod", "practice.rod", "imitation.rod"
 TIMES: Final = (250, 500, 1000, 2000)
 TAUGHT_RIVALS: Final = tuple(
     f"{name}.rod" for name in ("cma-mae-taught", "cma-mae-taught-once", "map-elites-taught", "uniform-nearest-taught")
@@ -27,7 +24,7 @@ TAUGHT_RIVALS: Final = tuple(
 
 
 def read_learning(path: Path) -> dict[str, Results]:
-    """The results in learning.csv or suite.csv by answer, and "judged": claims compare all answered by `process`.
+    """The results in learning.csv by answer, and "judged": claims compare all answered by `process`.
 
     Raises:
         ResultsError: there is no such table, or a line of it makes no sense.
@@ -69,6 +66,13 @@ def ratios_at_most(ours: str, theirs: str, bar: float, times: tuple[int, ...]) -
         return number, all_of(*(at_most(each, bar) for each in found.values()))
 
     return judged
+
+
+def _model_over_process(results: Results) -> Judged:
+    """The imitation learner's own answer has a model, that of `process` has none; the memory is the same."""
+    found = {when: results.over_alike(IMITATION, when) for when in (*TIMES, LAST)}
+    number = ", ".join(f"{show(each)} at {when}" for when, each in found.items())
+    return number, all_of(*(at_most(each, 1.03) for each in found.values()))
 
 
 def _near_the_floor(results: Results) -> Judged:
@@ -130,30 +134,13 @@ LEARNING_CLAIMS: Final = (
         "≤ 1.03 times the error without a teacher, after 250 and 500",
         ratios_at_most("practice-shuffled.rod", ALONE, 1.03, (250, 500)),
     ),
+    Claim(
+        "A forward model does an imitation learner no harm",
+        "≤ 1.03 times the error of `process` on the same memory, after 250 to 5000",
+        _model_over_process,
+        own=True,
+    ),
 )
-
-
-def suite_rows(suite: Mapping[str, Results], at: int) -> list[list[str]]:
-    """A row for each task: the error of random movements answered by the nearest neighbour, then that of the others in
-    it; all but the standard baseline are answered by `process`. At the end the interquartile mean over tasks."""
-    names = [name for name in SUITED if name != RANDOM]
-    lines, means = [], {name: list[float]() for name in names}
-    for task in TASKS:
-        random = partial(suite["nearest"].iqm, f"{RANDOM}.{task}", at)
-        cells = [titled(task), _shown(random, ".3f")]
-        for name in names:
-            ours = suite["nearest" if name == UNIFORM else "process"]
-            try:
-                errors = ours.errors(f"{name}.{task}", at), suite["nearest"].errors(f"{RANDOM}.{task}", at)
-            except NotRun:
-                cells.append("-")
-                continue
-            found = ratio_interval(*errors, rng=rng())
-            means[name].append(found.value)
-            cells.append(show(found))
-        lines.append(cells)
-    over = [f"{interquartile_mean(np.array(each)):.2f}" if each else "-" for each in means.values()]
-    return [*lines, ["interquartile mean over tasks", "", *over]]
 
 
 def answers_rows(by_answer: Mapping[str, Results]) -> list[list[str]]:
@@ -167,14 +154,15 @@ def answers_rows(by_answer: Mapping[str, Results]) -> list[list[str]]:
         [
             f"`{variant.removesuffix('.rod')}`",
             f"`{other}`",
-            *(_shown(partial(ratio, variant, other, when)) for when in (*TIMES, LAST)),
+            *(shown(partial(ratio, variant, other, when)) for when in (*TIMES, LAST)),
         ]
         for variant in LEARNING
         for other in ("nearest", "linear")
     ]
 
 
-def _shown(number: Callable[[], Interval], form: str = ".2f") -> str:
+def shown(number: Callable[[], Interval], form: str = ".2f") -> str:
+    """A number in words, a dash if it was not run."""
     try:
         return show(number(), form)
     except NotRun:

@@ -228,6 +228,7 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
         ROD: _rod("the paper's arm with a rod, in MuJoCo"),
         "rod-wind": _rod("the same in a side wind, up to a quarter of the float's weight: a context", max_wind=0.05),
         "rod-yaw": _rod("the same with its base turned by up to half a radian: a context", max_yaw=0.5),
+        "rod-long": _rod("the same with a line half as long again, taught with the shorter one", line=1.5),
         "planar-arm-7": _at("runs.tasks:planar_arm", "7 joints, no noise", fixed={"n_joints": 7}, filmed=True),
         "planar-arm-50": _at("runs.tasks:planar_arm", "50 joints, no noise", fixed={"n_joints": 50}, filmed=True),
         "swimmer": _at("runs.tasks:swimmer", "gymnasium's Swimmer-v5: three links, two motors (extra gym)"),
@@ -302,6 +303,13 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
             "explore and misleads the imitation learner",
             uses={**_MODEL, "policies": "policies"},
             learns_with="linear",
+        ),
+        "model-proved": _at(
+            "inverses.proved:ProvedInverse",
+            "process when learning; in evaluations the forward model's answer, where the process expects no more "
+            "error of it",
+            uses={**_MODEL, "policies": "policies", "noise": "outcome_noise"},
+            learns_with="process",
         ),
     },
     "base": {

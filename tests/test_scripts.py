@@ -248,3 +248,13 @@ def test_runs_that_are_killed_leave_what_others_do(capsys, monkeypatch):
     fields = capsys.readouterr().out.splitlines()[-1].strip("| ").split(" | ")
     assert fields[:2] == ["arm", "6"]
     assert sum(map(int, fields[2:8])) == 6
+
+
+def test_smaller_time_steps_of_the_rod_land_nearer_to_the_smallest(monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", ["check_physics.py", "--time-steps", "--movements", "10"])
+    assert check_physics.main() == 0
+    rows = [[float(cell) for cell in line.split()] for line in capsys.readouterr().out.splitlines()[1:]]
+    found = np.array(rows)
+    assert found[:, 0].tolist() == [10, 5, 2, 1]
+    assert (found[:-1, [1, 4]] > 1.5 * found[1:, [1, 4]]).all()  # the medians
+    assert found[0, 1] < 0.037  # the noise

@@ -243,11 +243,13 @@ def goal_babbling(
         memory: of the learner.
         goals: (contexts, outcomes, rng) -> the goal model.
         inverse: (memory) -> the inverse model, where searches begin and by which the learner answers; None for a
-            `LocalProcess`, whose answers have to prove themselves.
+            `LocalProcess`, whose answers have to prove themselves. Deviation: the paper infers by eq. (9) alone, which
+            is `LocalInverse`.
         search: (policies, rng) -> the refinement of its estimate.
         judge: (memory, measure) -> the competence that the goal model is told.
         measure: J; None for eq. (7), relative to the distance from rest.
-        budget: the most movements for one goal.
+        budget: the most movements for one goal. Deviation: the paper has no such number; with a complete simplex of 26
+            movements a goal would take 60 or so, and a learner with the rod would come to a hundred goals in its life.
         tolerance: distance (m) at which a goal counts as reached; None for the outcome noise, but at least .02 m.
         look: (policies, memory, inverse, rng) -> how the global regime draws movements; None: uniformly from Pi.
         global_range: least and greatest probability of the global exploration regime.

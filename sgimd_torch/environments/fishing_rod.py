@@ -44,10 +44,12 @@ class FishingRod:
         max_yaw: half range of the base's yaw offset (rad), a context; 0 leaves it out.
         max_wind: half range of a side wind on the float along x (N), a context; 0 leaves it out. The float weighs
             0.2 N.
+        line: its length, in units of the paper's rod, whose line has 0.42 m; above 0 and below 2.
         threads: for ``execute_many``; None for one per core.
 
     Raises:
-        ValueError: a negative or non-finite noise or range, no thread, or ``outcomes`` that do not contain ``rest``.
+        ValueError: a negative or non-finite noise or range, a line out of its range, no thread, or ``outcomes`` that
+            do not contain ``rest``.
     """
 
     def __init__(
@@ -57,11 +59,14 @@ class FishingRod:
         outcomes: Box | None = None,
         max_yaw: float = 0.0,
         max_wind: float = 0.0,
+        line: float = 1.0,
         threads: int | None = None,
     ) -> None:
         for name, value in (("noise", noise), ("max_yaw", max_yaw), ("max_wind", max_wind)):
             if not (np.isfinite(value) and value >= 0):
                 raise ValueError(f"{name} must be finite and >= 0, got {value}")
+        if not 0 < line < 2:
+            raise ValueError(f"line must be above 0 and below 2, got {line}; a longer one hangs in the water")
         self.noise = noise
         self.primitive = GaussianPrimitive(JOINT_RANGES, DURATIONS, sharpness=6.0)
         self.policies = self.primitive.policies
@@ -72,7 +77,7 @@ class FishingRod:
         self.contexts = Box(-ranges[self._context_columns], ranges[self._context_columns])
 
         threads = None if threads is None else check_count("threads", threads, 1)
-        self._caster = Caster(MODEL, (JOINT_RANGES.low + JOINT_RANGES.high) / 2, threads)
+        self._caster = Caster(MODEL, (JOINT_RANGES.low + JOINT_RANGES.high) / 2, threads, line=line)
         self.model = self._caster.model
         self._home = self._caster.home
         self._draws = len(self._times(DURATIONS[1] + HOLD))  # of the motor noise, for each joint

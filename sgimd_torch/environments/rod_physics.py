@@ -71,10 +71,11 @@ class Caster:
         path: of the MuJoCo model, ``fishing_rod.xml``.
         posture: ``(6,)`` rad, of the arm at the start.
         threads: for several movements at once; None for one per core.
+        line: how many times as long as in ``path`` the line is, and as heavy.
     """
 
-    def __init__(self, path: Path, posture: Array, threads: int | None = None) -> None:
-        self.model = model = mujoco.MjModel.from_xml_path(str(path))
+    def __init__(self, path: Path, posture: Array, threads: int | None = None, *, line: float = 1.0) -> None:
+        self.model = model = _model(path, line)
         self.steps = 0
         """Physics steps simulated so far, of all movements together."""
         self.timestep = float(model.opt.timestep)
@@ -210,3 +211,17 @@ class Caster:
 def _crossing(above: Array, below: Array) -> Array:
     share = above[2] / (above[2] - below[2])
     return above[:2] + share * (below[:2] - above[:2])
+
+
+def _model(path: Path, line: float) -> mujoco.MjModel:
+    """The model in ``path``, each segment of its line ``line`` times as long and as heavy."""
+    if line == 1:
+        return mujoco.MjModel.from_xml_path(str(path))
+    spec = mujoco.MjSpec.from_file(str(path))
+    for body in spec.bodies:
+        if body.name == "float" or body.name.startswith("line_"):
+            body.pos = line * body.pos
+        for geom in body.geoms:
+            if geom.name.startswith("line_"):
+                geom.fromto, geom.mass = line * geom.fromto, line * geom.mass
+    return spec.compile()

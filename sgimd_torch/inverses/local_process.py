@@ -58,23 +58,14 @@ class LocalProcess:
         Raises:
             RuntimeError: the memory is empty.
         """
-        estimate = self._nearest(context, goal)
-        self._catch_up()
-        if self._kernel is None:
+        estimate, learnt = self._nearest(context, goal), self._learn_near(context, goal)
+        if learnt is None:
             return estimate
-        near = self.memory.near_outcomes(context, goal, _NEAR)
-        rows = self._neighbours(near)
-        outcomes = self.memory.outcomes[rows]
-        process = Process(self._inputs.keys.rows[rows], outcomes, self._kernel)
-        chosen = np.arange(len(near))  # of rows, which begin with these
+        process, near, doubt = learnt
         if self.memory.context_dim:
             expected, variances = process.predict(self._in_lengths(context, self.memory.thetas[near]))
         else:
-            expected, variances = process.without_noise(chosen)
-        # Two corrections to how sure it is: by what it was surprised by here, and because a process with a length for
-        # each of many inputs, fitted to few movements, is wrong just where it looks for the best.
-        dim, n = len(self._lengths), len(self.memory)
-        doubt = len(goal) * max(1.0, process.surprise(chosen)) * (1 + dim**2 / n)
+            expected, variances = process.without_noise(np.arange(len(near)))
         exemplars = ((expected - goal) ** 2).sum(axis=1) + doubt * variances
         best = int(exemplars.argmin())
         linear = self._linear(context, goal).theta[None]
@@ -85,6 +76,12 @@ class LocalProcess:
         chosen_one = int(errors.argmin())
         clearly = errors[chosen_one] < _CLEARLY * exemplars[0]
         return estimate._replace(theta=candidates[chosen_one]) if clearly else estimate
+
+    def expected_errors(self, context: Array, goal: Array, thetas: Array) -> Array | None:
+        """``(n,)`` squared errors (unit of T, squared) that it expects of ``thetas`` ``(n, theta_dim)``: its own
+        uncertainty is included, noise is not, as when it judges its own candidates. None as for `predict`."""
+        learnt = self._learn_near(context, goal)
+        return None if learnt is None else self._expected_errors(learnt[0], context, goal, learnt[2], thetas)
 
     def predict(self, context: Array, theta: Array) -> Array | None:
         """``(outcome_dim,)`` what ``theta`` should lead to, judging by the movements most like it; None while there are
@@ -97,6 +94,20 @@ class LocalProcess:
         process = Process(self._inputs.keys.rows[rows], self.memory.outcomes[rows], self._kernel)
         expected: Array = process.expect(here)[0]
         return expected
+
+    def _learn_near(self, context: Array, goal: Array) -> tuple[Process, Rows, float] | None:
+        """The process of the movements near the goal, the rows of the nearest outcomes, with which it begins, and how
+        many times over its variance counts. None before the first fit."""
+        self._catch_up()
+        if self._kernel is None:
+            return None
+        near = self.memory.near_outcomes(context, goal, _NEAR)
+        rows = self._neighbours(near)
+        process = Process(self._inputs.keys.rows[rows], self.memory.outcomes[rows], self._kernel)
+        # Two corrections to how sure it is: by what it was surprised by here, and because a process with a length for
+        # each of many inputs, fitted to few movements, is wrong just where it looks for the best.
+        dim, n = len(self._lengths), len(self.memory)
+        return process, near, len(goal) * max(1.0, process.surprise(np.arange(len(near)))) * (1 + dim**2 / n)
 
     def _descend(
         self, process: Process, context: Array, goal: Array, doubt: float, starts: Array

@@ -72,16 +72,25 @@ class Task:
         return partial(recorded, self.environment, found) if callable(found) else None
 
 
-def fishing_rod(*, noise: float, task_space: float, threads: int, max_yaw: float = 0.0, max_wind: float = 0.0) -> Task:
+def fishing_rod(
+    *,
+    noise: float,
+    task_space: float,
+    threads: int,
+    max_yaw: float = 0.0,
+    max_wind: float = 0.0,
+    line: float = 1.0,
+) -> Task:
     """The paper's task; goals come from a square of half side ``task_space`` m.
 
     With a context, ``max_yaw`` (rad) or ``max_wind`` (N) above 0, what was demonstrated was demonstrated in the context
-    0, and the goals are those that can be reached in it.
+    0, and the goals are those that can be reached in it. So, too, with another ``line``: both are those of the
+    paper's rod.
     """
     from sgimd_torch.environments.fishing_rod import JOINTS, FishingRod  # MuJoCo is loaded only when it is needed
 
     space = Box.cube(-task_space, task_space, 2)
-    rod = FishingRod(noise=noise, outcomes=space, max_yaw=max_yaw, max_wind=max_wind, threads=threads)
+    rod = FishingRod(noise=noise, outcomes=space, max_yaw=max_yaw, max_wind=max_wind, line=line, threads=threads)
     return Task(
         rod,
         SHIPPED_BENCHMARK,

@@ -35,7 +35,14 @@ def cast(rod: FishingRod, theta: Array, context: Array = NO_CONTEXT, seed: int =
 
 @pytest.mark.parametrize(
     "options",
-    [{}, {"noise": 0.0}, {"max_yaw": 1.0}, {"max_wind": 0.05, "threads": 1}, {"max_yaw": 0.5, "max_wind": 0.02}],
+    [
+        {},
+        {"noise": 0.0},
+        {"max_yaw": 1.0},
+        {"max_wind": 0.05, "threads": 1},
+        {"max_yaw": 0.5, "max_wind": 0.02},
+        {"line": 1.5},
+    ],
 )
 def test_the_rod_keeps_the_contract_of_environments(options: dict[str, float]) -> None:
     check_environment(FishingRod(**options))
@@ -232,6 +239,27 @@ def test_no_wind_is_no_context_and_the_world_is_mirrored_left_to_right(rod: Fish
     assert cast(rod, np.append(mirrored, theta[-1])) == pytest.approx(cast(rod, theta) * [-1, 1], abs=1e-6)
 
 
+@pytest.mark.parametrize("line", [0.5, 1.5])
+def test_a_float_on_another_line_hangs_as_much_lower_and_lands_elsewhere(rod: FishingRod, line: float) -> None:
+    other = FishingRod(noise=0.0, line=line, threads=1)
+    assert [mujoco.mj_id2name(other.model, mujoco.mjtObj.mjOBJ_BODY, i) for i in range(other.model.nbody)] == [
+        mujoco.mj_id2name(rod.model, mujoco.mjtObj.mjOBJ_BODY, i) for i in range(rod.model.nbody)
+    ]
+    hanging = {}
+    for each in (rod, other):
+        data = mujoco.MjData(each.model)
+        mujoco.mj_setState(each.model, data, each._home, mujoco.mjtState.mjSTATE_FULLPHYSICS)
+        mujoco.mj_forward(each.model, data)
+        hanging[each] = float(data.site("tip").xpos[2] - data.site("float").xpos[2])
+    assert hanging[rod] == pytest.approx(0.42, abs=1e-3)
+    assert hanging[other] == pytest.approx(line * 0.42, abs=1e-3)
+    chain = slice(rod.model.body("line_01").id, rod.model.body("line_30").id + 1)
+    assert other.model.body_mass[chain] == pytest.approx(line * rod.model.body_mass[chain])
+    assert other.model.body("float").mass == rod.model.body("float").mass
+    apart = [np.linalg.norm(cast(other, theta) - cast(rod, theta)) for theta in movements(5)]
+    assert min(apart) > 0.005
+
+
 def test_dense_and_sparse_dynamics_agree(rod: FishingRod) -> None:
     sparse = FishingRod(noise=0.0, threads=1)
     assert rod.model.opt.jacobian == mujoco.mjtJacobian.mjJAC_DENSE
@@ -352,6 +380,9 @@ def test_the_task_space_may_be_a_hundred_times_larger() -> None:
         ({"noise": np.nan}, "noise"),
         ({"max_yaw": np.inf}, "max_yaw"),
         ({"max_wind": -1.0}, "max_wind"),
+        ({"line": 0.0}, "above 0 and below 2"),
+        ({"line": 2.0}, "hangs in the water"),
+        ({"line": float("nan")}, "line must be"),
         ({"threads": 0}, "threads"),
         ({"threads": 1.5}, "threads"),
         ({"outcomes": Box.cube(-1, 1, 3)}, "rest"),

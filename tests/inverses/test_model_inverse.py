@@ -9,6 +9,7 @@ from sgimd_torch.forward_model.anchored import Trust
 from sgimd_torch.forward_model.model import ForwardModel
 from sgimd_torch.inverses.local import NearestNeighbour
 from sgimd_torch.inverses.locally_linear import LocallyLinear
+from sgimd_torch.inverses.proved import ProvedInverse
 from sgimd_torch.inverses.through_model import ModelInverse
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Box, stream
@@ -199,3 +200,43 @@ def test_a_model_of_another_robot_is_refused(taught):
 def test_numbers_out_of_their_range_are_refused(taught, options):
     with pytest.raises(ValueError, match=next(iter(options))):
         ModelInverse(*taught, ARM.policies, **options)
+
+
+def test_an_answer_that_has_to_prove_itself_is_the_better_one_to_the_process(taught, goals):
+    memory, model = taught
+    proved = ProvedInverse(memory, model, ARM.policies)
+    answers = proved.many(NO_CONTEXT, goals)
+    by_model, by_process = proved.through_model.many(NO_CONTEXT, goals), [proved.process(NO_CONTEXT, g) for g in goals]
+    chosen = set()
+    for goal, answer, *two in zip(goals, answers, by_process, by_model, strict=True):
+        expected = proved.process.expected_errors(NO_CONTEXT, goal, np.stack([each.theta for each in two]))
+        assert np.array_equal(answer.theta, two[int(expected[1] <= expected[0])].theta)
+        chosen.add(bool(expected[1] <= expected[0]))
+    assert chosen == {False, True}
+
+
+def test_where_most_goals_are_far_from_what_was_tried_a_proved_answer_is_no_worse_than_the_process(goals):
+    """As in imitation: many movements around a few."""
+    rng = stream(3, "thetas")
+    thetas = np.repeat(0.35 + 0.3 * rng.random((12, 7)), 40, axis=0)
+    memory = executed(ARM, np.clip(thetas + rng.uniform(-0.05, 0.05, thetas.shape), 0, 1))
+    model = ForwardModel(0, 7, 2, rate=2.0)
+    model.refresh(memory)
+    proved = ProvedInverse(memory, model, ARM.policies, trust=Trust(noise=0.01, error=1.0))
+
+    def mean_error(estimates):
+        landed = [ARM.execute(NO_CONTEXT, estimate.theta, stream(0, "any")) for estimate in estimates]
+        return np.linalg.norm(np.array(landed) - goals, axis=1).mean()
+
+    by_process = mean_error([proved.process(NO_CONTEXT, goal) for goal in goals])
+    assert mean_error(proved.many(NO_CONTEXT, goals)) <= 1.03 * by_process
+
+
+def test_a_model_that_is_not_trusted_or_a_process_that_was_not_fitted_leaves_the_answer_to_the_process(taught, goals):
+    memory, model = taught
+    wary = ProvedInverse(memory, model, ARM.policies, trust=Trust(error=1e-9))
+    few = executed(ARM, stream(0, "thetas").random((10, 7)))
+    for inverse in (wary, ProvedInverse(few, model, ARM.policies)):
+        for goal in goals[:3]:
+            assert np.array_equal(inverse(NO_CONTEXT, goal).theta, inverse.process(NO_CONTEXT, goal).theta)
+    assert ProvedInverse(few, model, ARM.policies).process.expected_errors(NO_CONTEXT, goals[0], few.thetas) is None

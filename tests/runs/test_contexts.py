@@ -5,6 +5,7 @@ import pytest
 
 from runs import csv_of
 from sgimd_torch.catalogue import CATALOGUE
+from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.evaluation import contexts_of_goals
 from sgimd_torch.runs.build import build, task_of
 from sgimd_torch.runs.command_line import main
@@ -98,6 +99,12 @@ def test_the_contexts_of_the_rod_are_tasks(word, reach):
     assert len(parts.demonstrations) == 127
     contexts = contexts_of_goals(robot, 200)
     assert np.ptp(contexts) > 1.8 * reach
+
+
+def test_the_long_rod_is_a_task_without_context():
+    robot = task_of(Config(environment="rod-long", noise=0.01)).environment
+    assert (robot.noise, robot.contexts.dim) == (0.01, 0)
+    assert robot.model.body("line_07").mass == pytest.approx(1.5 * FishingRod().model.body("line_07").mass)
 
 
 def test_the_rod_in_the_wind_is_run_taught_and_resumed(tmp_path, benchmark):
