@@ -6,6 +6,8 @@ A block of a page says in its first line what is done with it:
     ```sh                  commands, carried out line by line
     ```                    commands that take too long: those of sgimd are read, up to where the work would begin
     ```text                is looked at only
+    ```py PATH             lines of that file, compared with it by tests/docs/test_links.py
+    ```math                an equation
 """
 
 import importlib

@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 import http.server
 import importlib
+import json
 import os
 import posixpath
 import re
@@ -25,6 +26,8 @@ from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 
+from notebooks import as_page
+
 ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(__file__).resolve().parent
 PACKAGE = "sgimd_torch"
@@ -32,6 +35,7 @@ PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md", f"{PACKA
 FOLDERS = ("docs", "results")
 LINK = re.compile(r"(!?\[[^\]]*\]\()([^)\s#]*)(#[^)\s]*)?(\))")
 INTERVAL = re.compile(r"(\[[+−-]?[\d.]+), ([+−-]?[\d.]+\])")  # stays on one line, also in a narrow column
+NOTEBOOKS = '["docs/notebooks/"]'  # in zensical.toml, in the place of all of them
 SAVED_AS = re.compile(r"^```(\w+) ([\w./-]+)$", re.MULTILINE)  # as tests/test_readme.py reads the first line of a block
 
 
@@ -63,6 +67,18 @@ def copy_pages(to: Path) -> None:
         place.write_text(LINK.sub(partial(_link, name, to), text), encoding="utf-8")
 
 
+def copy_notebooks(to: Path) -> list[str]:
+    """The notebooks as pages, with the figures that they keep; returns the paths of these pages."""
+    made = []
+    for notebook in sorted((ROOT / "docs").rglob("*.ipynb")):
+        page = to / notebook.relative_to(ROOT).with_suffix(".md")
+        page.parent.mkdir(parents=True, exist_ok=True)
+        text, name = as_page(notebook, page.parent), notebook.relative_to(ROOT).as_posix()
+        page.write_text(LINK.sub(partial(_link, name, to), text), encoding="utf-8")
+        made.append(page.relative_to(to).as_posix())
+    return made
+
+
 def _link(page: str, to: Path, found: re.Match[str]) -> str:
     """The same link; the file that it leads to is copied if it is no page."""
     before, target, anchor, after = found.groups()
@@ -74,6 +90,8 @@ def _link(page: str, to: Path, found: re.Match[str]) -> str:
         (room,) = [room for room, modules in rooms().items() if module in modules]
         up = posixpath.relpath(f"api/{room}.md", posixpath.dirname(page) or ".")
         return f"{before}{up}#{module}{after}"
+    if path.endswith(".ipynb"):
+        return f"{before}{target.removesuffix('.ipynb')}.md{anchor or ''}{after}"
     if path not in sources():
         (to / path).parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(ROOT / path, to / path)
@@ -84,7 +102,7 @@ def write_api(to: Path) -> None:
     """An API page for each room; what a page shows comes from the docstrings, by mkdocstrings."""
     to.mkdir(parents=True)
     for room, modules in rooms().items():
-        first = f"---\ntitle: {room}\n---\n\n::: {modules[0]}\n    options:\n      heading_level: 1"
+        first = f"---\ntitle: {'the command sgimd' if room == '__main__' else room}\n---\n\n::: {modules[0]}\n    options:\n      heading_level: 1"
         text = "\n\n".join([first, *(f"::: {module}" for module in modules[1:])])
         if room == PACKAGE:
             text += f"\n\n## From {PACKAGE} itself\n\n{front_door()}"
@@ -117,8 +135,10 @@ def build(out: Path) -> None:
         place = Path(folder)
         copy_pages(place / "pages")
         write_api(place / "pages" / "api")
+        notebooks = copy_notebooks(place / "pages")
         shutil.copy(HERE / "site.css", place / "pages")
-        shutil.copy(HERE / "zensical.toml", place)
+        config = (HERE / "zensical.toml").read_text(encoding="utf-8")
+        (place / "zensical.toml").write_text(config.replace(NOTEBOOKS, json.dumps(notebooks)), encoding="utf-8")
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(HERE)]), "NO_COLOR": "1"}
         command = [sys.executable, "-m", "zensical", "build", "--strict"]
         done = subprocess.run(command, cwd=place, env=environment, capture_output=True, text=True)

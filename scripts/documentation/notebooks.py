@@ -32,6 +32,6 @@ def _output(output: dict[str, Any], picture: Path) -> str:
     if "image/png" in data:
         picture.parent.mkdir(parents=True, exist_ok=True)
         picture.write_bytes(base64.b64decode("".join(data["image/png"])))
-        return f"![{''.join(data.get('text/plain', ['A figure']))}]({picture.name})"
+        return f"![What this cell drew]({picture.name})"
     text = "".join(output.get("text", data.get("text/plain", []))).rstrip()
     return f"```text\n{text}\n```" if text else ""
