@@ -102,7 +102,8 @@ def write_api(to: Path) -> None:
     """An API page for each room; what a page shows comes from the docstrings, by mkdocstrings."""
     to.mkdir(parents=True)
     for room, modules in rooms().items():
-        first = f"---\ntitle: {'the command sgimd' if room == '__main__' else room}\n---\n\n::: {modules[0]}\n    options:\n      heading_level: 1"
+        title = "the command sgimd" if room == "__main__" else room
+        first = f"---\ntitle: {title}\n---\n\n::: {modules[0]}\n    options:\n      heading_level: 1"
         text = "\n\n".join([first, *(f"::: {module}" for module in modules[1:])])
         if room == PACKAGE:
             text += f"\n\n## From {PACKAGE} itself\n\n{front_door()}"
