@@ -36,6 +36,7 @@ FOLDERS = ("docs", "results")
 LINK = re.compile(r"(!?\[[^\]]*\]\()([^)\s#]*)(#[^)\s]*)?(\))")
 INTERVAL = re.compile(r"(\[[+−-]?[\d.]+), ([+−-]?[\d.]+\])")  # stays on one line, also in a narrow column
 NOTEBOOKS = '["docs/notebooks/"]'  # in zensical.toml, in the place of all of them
+COLOUR = re.compile(r"\x1b\[[\d;]*m")
 SAVED_AS = re.compile(r"^```(\w+) ([\w./-]+)$", re.MULTILINE)  # as tests/test_readme.py reads the first line of a block
 
 
@@ -106,7 +107,7 @@ def write_api(to: Path) -> None:
         first = f"---\ntitle: {title}\n---\n\n::: {modules[0]}\n    options:\n      heading_level: 1"
         text = "\n\n".join([first, *(f"::: {module}" for module in modules[1:])])
         if room == PACKAGE:
-            text += f"\n\n## From {PACKAGE} itself\n\n{front_door()}"
+            text += f"\n\n## What `from {PACKAGE} import` offers\n\n{front_door()}"
         (to / f"{room}.md").write_text(f"{text}\n", encoding="utf-8")
 
 
@@ -117,7 +118,8 @@ def front_door() -> str:
     for name in sorted(package.__all__, key=str.lower):
         thing = getattr(package, name)
         if name != "__version__":
-            first = re.split(r"(?<=[.?:])\s", " ".join((thing.__doc__ or "").split()), maxsplit=1)[0]
+            explained = re.sub(r":\w+:(?=`)", "", " ".join((thing.__doc__ or "").split()))
+            first = re.split(r"(?<!eq)(?<!eqs)(?<=[.?])\s", explained, maxsplit=1)[0]
             first = re.sub(r"([][|])", r"\\\1", first)  # a link and a border otherwise
             rows.append(f"| [`{name}`][{thing.__module__}.{name}] | {first} |")
     return "\n".join(rows)
@@ -140,11 +142,12 @@ def build(out: Path) -> None:
         shutil.copy(HERE / "site.css", place / "pages")
         config = (HERE / "zensical.toml").read_text(encoding="utf-8")
         (place / "zensical.toml").write_text(config.replace(NOTEBOOKS, json.dumps(notebooks)), encoding="utf-8")
-        environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(HERE)]), "NO_COLOR": "1"}
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(HERE)])}
         command = [sys.executable, "-m", "zensical", "build", "--strict"]
         done = subprocess.run(command, cwd=place, env=environment, capture_output=True, text=True)
         if done.returncode:
-            raise ValueError((done.stdout + done.stderr.partition("Traceback (most recent call last)")[0]).strip())
+            said = done.stdout + done.stderr.partition("Traceback (most recent call last)")[0]
+            raise ValueError(COLOUR.sub("", said).strip())
         if out.exists():
             shutil.rmtree(out)
         shutil.move(place / "site", out)
