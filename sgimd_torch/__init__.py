@@ -23,5 +23,5 @@ Runs on disk are made by ``runs`` and looked at by ``views``, with ``board`` (Te
 
 import lazy_loader
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -54,7 +54,8 @@ examples:
   sgimd table study                                  error of each variant, over its seeds
   sgimd report study                                 curves, maps and tables on one page
 
-sgimd COMMAND --help explains a command; sgimd --version prints the version."""
+sgimd COMMAND --help explains a command; sgimd --version prints the version.
+sgimd --completion bash (or zsh, fish) prints a script for the shell: Tab then completes commands and options."""
 
 
 def main() -> int:
@@ -69,6 +70,11 @@ def _call(words: Sequence[str]) -> int:
     if name in ("-h", "--help"):
         print(HELP)
         return 0 if words else 2
+    if name == "--completion":
+        from sgimd_torch.views.completion import script  # loads all commands
+
+        print(script(COMMANDS, " ".join(words[1:])))
+        return 0
     if words == ["--version"]:
         print(f"sgimd_torch {__version__}")
         return 0

@@ -51,6 +51,7 @@ LIBRARIES = {  # library: the only rooms that may import it; of a folder, where 
     "jinja2": {"views/report"},
     "jsonargparse": {"runs/command_line"},
     "tqdm": {"runs/process", "views"},
+    "shtab": {"views/completion"},
     "cma": {"searches/cma_es"},
     "sklearn": {"goals/alp_gmm", "rivals/entropy"},
     "ribs": {"rivals"},

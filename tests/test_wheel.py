@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import tarfile
 import time
 import venv
 
@@ -20,17 +21,41 @@ SHORT = [
 ]
 
 
+USER = """
+import numpy as np
+from numpy.typing import NDArray
+
+from sgimd_torch import Episode, PlanarArm, evaluate, practice, run
+
+arm = PlanarArm()
+learner = practice(arm, 0)
+episodes: list[Episode] = list(run(learner, arm, 0, movements=200))
+goals: NDArray[np.float64] = np.array([[0.0, 0.5], [0.5, 0.5]])
+error: float = evaluate(learner.inverse, arm, goals, 0, movements=200).mean_error
+theta: NDArray[np.float64] = learner.inverse(np.empty(0), goals[0]).theta
+print(len(episodes), error < 0.1, theta.shape)
+"""
+
+
 @pytest.fixture(scope="module")
-def installed(tmp_path_factory):
-    """The folder of commands of an environment in which only the wheel is installed, with its extra for reports."""
+def built(tmp_path_factory):
+    """The folder of the source distribution and of the wheel, which is built from it as an installer would."""
+    place = tmp_path_factory.mktemp("dist")
+    words = [sys.executable, "-m", "build", "--outdir", str(place), str(ROOT)]
+    subprocess.run(words, check=True, capture_output=True, env=WITHOUT_CHECKOUT)
+    return place
+
+
+@pytest.fixture(scope="module")
+def installed(built, tmp_path_factory):
+    """The folder of commands of an environment with the wheel, its extra for reports, and mypy."""
     place = tmp_path_factory.mktemp("wheel")
-    pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "-q"]
-    subprocess.run([*pip, "wheel", "--no-deps", "-w", str(place), str(ROOT)], check=True, env=WITHOUT_CHECKOUT)
-    (wheel,) = place.glob("sgimd_torch-*.whl")
+    (wheel,) = built.glob("sgimd_torch-*.whl")
     venv.create(place / "env", with_pip=True)
     commands = place / "env" / "bin"
     pip = [str(commands / "python"), "-m", "pip", "--disable-pip-version-check", "-q", "install"]
-    subprocess.run([*pip, f"{wheel}[report]", "-c", str(ROOT / "constraints.txt")], check=True, env=WITHOUT_CHECKOUT)
+    wanted = [f"{wheel}[report]", "mypy", "-c", str(ROOT / "constraints.txt")]
+    subprocess.run([*pip, *wanted], check=True, env=WITHOUT_CHECKOUT)
     return commands
 
 
@@ -94,6 +119,43 @@ def test_what_is_not_installed_is_named_with_the_pip_command_that_brings_it(sgim
     assert code == 2
     assert f"pip install 'sgimd-torch[{extra}]'" in errors
     assert "Traceback" not in errors
+
+
+def test_the_shell_completes_what_is_installed_and_names_the_rest(sgimd):
+    code, said, errors = sgimd("--completion", "bash")
+    assert code == 0, errors
+    assert "--give-up" in said
+    assert "--film" in said  # of report, whose extra is installed
+    assert " film " in said
+    assert "--time-lapse" not in said  # of film, whose extra is not
+
+
+def test_a_strict_program_of_a_user_runs_and_its_types_are_checked_against_ours(installed, tmp_path):
+    (tmp_path / "user.py").write_text(USER)
+    (tmp_path / "wrong.py").write_text(USER.replace("arm, 0, movements=200))", "arm, 0, movements='many'))"))
+
+    def checked(*words):
+        words = [str(installed / "python"), *words]
+        return subprocess.run(words, capture_output=True, text=True, cwd=tmp_path, env=WITHOUT_CHECKOUT)
+
+    assert checked("user.py").stdout == "200 True (7,)\n"
+    done = checked("-m", "mypy", "--strict", "user.py")
+    assert done.returncode == 0, done.stdout
+    done = checked("-m", "mypy", "--strict", "wrong.py")
+    assert 'incompatible type "str"; expected "int"' in done.stdout  # so our types were read
+
+
+def test_the_source_distribution_has_what_builds_tests_and_explains_and_no_more(built):
+    (path,) = built.glob("sgimd_torch-*.tar.gz")
+    with tarfile.open(path) as archive:
+        names = {name.partition("/")[2] for name in archive.getnames()}
+    top = ["LICENSE", "README.md", "CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "constraints.txt"]
+    tests = [each.relative_to(ROOT).as_posix() for each in (ROOT / "tests").rglob("*.py")]
+    assert {*top, *tests, "sgimd_torch/py.typed", "scripts/test", "results/paper.csv", "docs/runs.md"} <= names
+    assert not [
+        name for name in names if "__pycache__" in name or name.startswith(("runs", ".venv", "results/model/g"))
+    ]
+    assert path.stat().st_size < 8e6
 
 
 def test_what_lies_beside_the_code_is_in_the_wheel(installed):

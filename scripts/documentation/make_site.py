@@ -119,7 +119,7 @@ def front_door() -> str:
         thing = getattr(package, name)
         if name != "__version__":
             explained = re.sub(r":\w+:(?=`)", "", " ".join((thing.__doc__ or "").split()))
-            first = re.split(r"(?<!eq)(?<!eqs)(?<=[.?])\s", explained, maxsplit=1)[0]
+            first = re.split(r"(?<=[.?])(?<!eq\.)(?<!eqs\.)\s", explained, maxsplit=1)[0]
             first = re.sub(r"([][|])", r"\\\1", first)  # a link and a border otherwise
             rows.append(f"| [`{name}`][{thing.__module__}.{name}] | {first} |")
     return "\n".join(rows)

@@ -62,6 +62,17 @@ def parse(argv: Sequence[str], description: str | None = None) -> tuple[Config, 
     Raises:
         SystemExit: with code 2 and a message on stderr when it makes no sense, 0 after ``--help``.
     """
+    reader = parser(description)
+    values = reader.parse_args(reader.joined(argv)).as_dict()
+    flags = {flag: bool(values.pop(flag)) for flag in FLAGS}
+    try:
+        return Config(**values), flags
+    except ValueError as error:
+        reader.error(str(error))
+
+
+def parser(description: str | None = None) -> _Parser:
+    """The options of ``sgimd run``."""
     parser = _Parser(
         prog="sgimd run",
         usage="%(prog)s [--OPTION VALUE ...] [--resume]",
@@ -81,12 +92,7 @@ def parse(argv: Sequence[str], description: str | None = None) -> tuple[Config, 
         )
     for flag, text in FLAGS.items():
         groups[next(iter(groups))].add_argument(f"--{dashed(flag)}", action="store_true", help=text)
-    values = parser.parse_args(parser.joined(argv)).as_dict()
-    flags = {flag: bool(values.pop(flag)) for flag in FLAGS}
-    try:
-        return Config(**values), flags
-    except ValueError as error:
-        parser.error(str(error))
+    return parser
 
 
 def _default(each: Field[Any]) -> str:

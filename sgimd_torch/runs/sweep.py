@@ -46,12 +46,8 @@ NOT_VARIED: Final = {
 }
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Carry out all runs that are not finished.
-
-    Returns:
-        The exit code, 1 where runs failed.
-    """
+def parser() -> argparse.ArgumentParser:
+    """The options of ``sgimd sweep``."""
     parser = argparse.ArgumentParser(
         prog="sgimd sweep",
         usage="%(prog)s [--vary OPTION=VALUE,VALUE ...] [--seeds SEEDS] [--OPTION VALUE ...]",
@@ -68,7 +64,16 @@ def main(argv: Sequence[str] | None = None) -> int:
     )
     add_options(parser, seeds="0")
     add_engines(parser)
-    options, rest = parser.parse_known_args(argv)
+    return parser
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Carry out all runs that are not finished.
+
+    Returns:
+        The exit code, 1 where runs failed.
+    """
+    options, rest = parser().parse_known_args(argv)
     variants, flags = variants_of(options.vary, rest)
     whole = [replace(variant, seed=seed) for seed in options.seeds for variant in variants]
     configs = options.shard.of(whole)

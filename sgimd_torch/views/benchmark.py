@@ -116,7 +116,8 @@ def _in_words(name: str, box: Box) -> str:
     return f"{name}, {box.low.tolist()} to {box.high.tolist()}"
 
 
-def _options(argv: Sequence[str] | None) -> argparse.Namespace:
+def parser() -> argparse.ArgumentParser:
+    """The options of ``sgimd benchmark``."""
     parser = argparse.ArgumentParser(
         prog="sgimd benchmark", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -131,7 +132,11 @@ def _options(argv: Sequence[str] | None) -> argparse.Namespace:
         "--at-least", type=int, default=2, metavar="N", help="movements in a tile that counts (default: %(default)s)"
     )
     parser.add_argument("--seed", type=int, default=0, help="of the draw within tiles (default: %(default)s)")
-    options = parser.parse_args(argv)
+    return parser
+
+
+def _options(argv: Sequence[str] | None) -> argparse.Namespace:
+    options = parser().parse_args(argv)
     for option, least in (("tiles", 1), ("at_least", 1), ("seed", 0)):
         check_count(f"--{option.replace('_', '-')}", getattr(options, option), least)
     if options.side is not None and not 0 < options.side < np.inf:

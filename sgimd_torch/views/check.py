@@ -39,18 +39,23 @@ from sgimd_torch.spaces import check_count, stream
 TIMED = 20  # movements
 
 
+def parser() -> argparse.ArgumentParser:
+    """The options of ``sgimd check``."""
+    parser = argparse.ArgumentParser(
+        prog="sgimd check", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("environment", metavar="ENVIRONMENT", help="fishing-rod, or mypackage.toss:make")
+    parser.add_argument("--movements", type=int, default=3, metavar="N", help="random movements to try (default: 3)")
+    return parser
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Print what was tried; the exit code, 0.
 
     Raises:
         ValueError: there is no such environment, or it breaks a promise.
     """
-    parser = argparse.ArgumentParser(
-        prog="sgimd check", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("environment", metavar="ENVIRONMENT", help="fishing-rod, or mypackage.toss:make")
-    parser.add_argument("--movements", type=int, default=3, metavar="N", help="random movements to try (default: 3)")
-    options = parser.parse_args(argv)
+    options = parser().parse_args(argv)
     check_count("--movements", options.movements, 1)
     config = Config(environment=options.environment)
     try:

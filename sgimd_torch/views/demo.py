@@ -64,7 +64,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     return 0
 
 
-def _options(argv: Sequence[str] | None) -> argparse.Namespace:
+def parser() -> argparse.ArgumentParser:
+    """The options of ``sgimd demo``."""
     parser = argparse.ArgumentParser(
         prog="sgimd demo",
         usage="%(prog)s [options] [-- OPTIONS OF sgimd run]",
@@ -77,7 +78,11 @@ def _options(argv: Sequence[str] | None) -> argparse.Namespace:
     )
     parser.add_argument("--out", type=Path, default=Path("runs/demo"), help="directory (default: %(default)s)")
     parser.add_argument("more", nargs="*", help=argparse.SUPPRESS)
-    options = parser.parse_args(argv)
+    return parser
+
+
+def _options(argv: Sequence[str] | None) -> argparse.Namespace:
+    options = parser().parse_args(argv)
     for word in options.more:
         name = word.partition("=")[0]
         if name in ("--seed", "--movements", "--out"):

@@ -52,19 +52,16 @@ class Checked:
     refused: str = ""
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Check or import; the exit code, 0.
-
-    Raises:
-        ValueError: the source cannot be read, or the robot cannot use all of it.
-        OSError: a file cannot be read or written.
-    """
+def parser() -> argparse.ArgumentParser:
+    """The options of ``sgimd demonstrations``."""
     parser = argparse.ArgumentParser(
         prog="sgimd demonstrations", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     commands = parser.add_subparsers(dest="command", required=True, metavar="check|import")
-    for name in ("check", "import"):
-        each = commands.add_parser(name, description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    for name, about in (("check", "are they right for a robot?"), ("import", "into a file for --demonstrations")):
+        each = commands.add_parser(
+            name, help=about, description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        )
         each.add_argument("source", type=Path, metavar="SOURCE")
         for option in ("joints", "outcome", "context"):
             each.add_argument(f"--{option}", type=_names, default=(), metavar="COLUMN,COLUMN")
@@ -80,7 +77,17 @@ def main(argv: Sequence[str] | None = None) -> int:
             )
         else:
             each.add_argument("--out", type=Path, required=True, metavar="FILE.npz")
-    options = parser.parse_args(argv)
+    return parser
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Check or import; the exit code, 0.
+
+    Raises:
+        ValueError: the source cannot be read, or the robot cannot use all of it.
+        OSError: a file cannot be read or written.
+    """
+    options = parser().parse_args(argv)
     shown = read(options)
     if options.command == "import":
         save_demonstrations(options.out, shown)

@@ -156,7 +156,8 @@ def titled(task: str) -> str:
     return task + " (new)" * TASKS[task].new
 
 
-def _options(argv: Sequence[str] | None) -> tuple[argparse.Namespace, list[str]]:
+def parser() -> argparse.ArgumentParser:
+    """The options of ``sgimd suite``."""
     parser = argparse.ArgumentParser(
         prog="sgimd suite",
         usage="%(prog)s [--tasks TASK ...] [--vary OPTION=VALUE,VALUE ...] [--seeds SEEDS] [--OPTION VALUE ...]",
@@ -178,7 +179,11 @@ def _options(argv: Sequence[str] | None) -> tuple[argparse.Namespace, list[str]]
     )
     add_options(parser, seeds="0")
     add_engines(parser)
-    options, rest = parser.parse_known_args(argv)
+    return parser
+
+
+def _options(argv: Sequence[str] | None) -> tuple[argparse.Namespace, list[str]]:
+    options, rest = parser().parse_known_args(argv)
     chosen = {"quick": [name for name, task in TASKS.items() if task.quick], "all": list(TASKS)}
     options.tasks = list(dict.fromkeys(name for word in options.tasks for name in chosen.get(word, [word])))
     return options, rest

@@ -38,12 +38,8 @@ from sgimd_torch.views.statistics import LEAST_SEEDS, common_differences, over_s
 EARLY: Final = 1000  # movements, for a column of its own
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Print the table, the worst variant first; the exit code, 0.
-
-    Raises:
-        ValueError: there is nothing to show.
-    """
+def parser() -> argparse.ArgumentParser:
+    """The options of ``sgimd table``."""
     parser = argparse.ArgumentParser(
         prog="sgimd table",
         description=__doc__,
@@ -52,7 +48,16 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("runs", type=Path, help="a run's directory, a variant's folder, or an --out of runs")
     parser.add_argument("--at", type=int, metavar="MOVEMENTS", help="compare after this number of movements")
     parser.add_argument("--baseline", metavar="NAME", help="variant that the others are compared with, seed by seed")
-    options = parser.parse_args(argv)
+    return parser
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Print the table, the worst variant first; the exit code, 0.
+
+    Raises:
+        ValueError: there is nothing to show.
+    """
+    options = parser().parse_args(argv)
     runs, left_out = _readable(options.runs)
     at = options.at
     if at is None:

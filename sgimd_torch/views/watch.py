@@ -45,13 +45,8 @@ location.replace("/#custom_scalars&_smoothingWeight=0");
 """
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Serve until Ctrl-C or SIGTERM.
-
-    Raises:
-        ValueError: the request is wrong, or tensorboard is not installed.
-        Failed: TensorBoard cannot start.
-    """
+def parser() -> argparse.ArgumentParser:
+    """The options of ``sgimd watch``."""
     parser = argparse.ArgumentParser(
         prog="sgimd watch",
         description=__doc__,
@@ -60,7 +55,17 @@ def main(argv: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("runs", nargs="?", type=Path, default=Path("runs"), help="where to look for boards (runs)")
     parser.add_argument("--port", type=int, default=6006, help="the first port to try (6006)")
-    options = parser.parse_args(argv)
+    return parser
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Serve until Ctrl-C or SIGTERM.
+
+    Raises:
+        ValueError: the request is wrong, or tensorboard is not installed.
+        Failed: TensorBoard cannot start.
+    """
+    options = parser().parse_args(argv)
     tensorboard_program()  # what is missing is named first, as without it no run has a board
     boards = boards_below(options.runs)
     port = free_port(options.port)

@@ -102,6 +102,19 @@ def test_every_name_of_the_package_itself_is_explained(site):
         assert f"#{place}" in front, place
 
 
+def test_docstrings_have_links_and_show_the_use_of_a_module_as_code(site):
+    page = (site / "api" / "goals.html").read_text(encoding="utf-8")
+    intro = page[
+        page.index('id="sgimd_torch.goals.interest_map"') : page.index(
+            'id="sgimd_torch.goals.interest_map.InterestMap"'
+        )
+    ]
+    assert 'href="#sgimd_torch.goals.tiling.Tiling"' in intro  # it says `Tiling`
+    assert "goals = InterestMap(contexts, outcomes, rng)" in re.sub(
+        "<[^>]*>", "", intro[intro.index("<code>", intro.index("<pre>")) :]
+    )
+
+
 @pytest.mark.parametrize("width", [1400, 390])
 def test_pages_show_whole_without_a_network(site, width):
     with chromium() as browser:

@@ -179,7 +179,8 @@ def _spread(goals: Array) -> Array:
     return goals[list(dict.fromkeys(nearest))]
 
 
-def _options(argv: Sequence[str] | None) -> argparse.Namespace:
+def parser() -> argparse.ArgumentParser:
+    """The options of ``sgimd film``."""
     parser = argparse.ArgumentParser(
         prog="sgimd film",
         description=__doc__,
@@ -204,15 +205,19 @@ def _options(argv: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--width", type=_width, help="of a picture, pixels (default: 640; in a time lapse 480)")
     parser.add_argument("--out", type=Path, help="the film, .mp4 (default: next to the run's directory)")
     parser.add_argument("--sheet", type=Path, help="also an image of how each scene ends, .png")
+    return parser
+
+
+def _options(argv: Sequence[str] | None) -> argparse.Namespace:
     # A minus with a number after it begins a goal, not an option.
     given = sys.argv[1:] if argv is None else argv
     words = [f" {word}" if re.match(r"-[.\d]", word) else word for word in given]
-    options = parser.parse_args(words)
+    options = parser().parse_args(words)
     if options.after and not options.time_lapse:
-        parser.error("--after belongs to --time-lapse")
+        parser().error("--after belongs to --time-lapse")
     for path, suffix in ((options.out, ".mp4"), (options.sheet, ".png")):
         if path is not None and (path.suffix != suffix or path.is_dir() or not path.parent.is_dir()):
-            parser.error(f"must be a {suffix} file in a folder that exists, got {path}")
+            parser().error(f"must be a {suffix} file in a folder that exists, got {path}")
     if options.out is None:
         options.out = Path(f"{options.run.resolve()}{'-time-lapse' if options.time_lapse else ''}.mp4")
     return options

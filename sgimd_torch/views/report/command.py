@@ -35,7 +35,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         ValueError: there is nothing to report, or no place to write.
         OSError: a file cannot be read or written.
     """
-    options = _options(argv)
+    options = parser().parse_args(argv)
     out = options.out or options.runs / "report.html"
     try:
         found = find(options.runs)
@@ -64,7 +64,8 @@ def _check_writable(out: Path) -> None:
         raise RunError(f"{out.parent} cannot be written to; name another place with --out")
 
 
-def _options(argv: Sequence[str] | None) -> argparse.Namespace:
+def parser() -> argparse.ArgumentParser:
+    """The options of ``sgimd report``."""
     parser = argparse.ArgumentParser(
         prog="sgimd report",
         description=__doc__,
@@ -75,4 +76,4 @@ def _options(argv: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--out", type=Path, metavar="FILE", help="the page (default: RUNS/report.html)")
     parser.add_argument("--baseline", metavar="NAME", help="variant that the others are compared with, seed by seed")
     parser.add_argument("--film", action="store_true", help="film the runs that are shown, if there is no film yet")
-    return parser.parse_args(argv)
+    return parser

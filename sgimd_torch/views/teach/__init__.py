@@ -59,8 +59,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     return 0
 
 
-def options_of(argv: Sequence[str]) -> tuple[Config, int]:
-    """The run that is taught, and the first port to try."""
+def parser() -> argparse.ArgumentParser:
+    """The options of ``sgimd teach``."""
     parser = argparse.ArgumentParser(
         prog="sgimd teach",
         usage="sgimd teach [RUN | options of sgimd run] [--port N]",
@@ -69,12 +69,17 @@ def options_of(argv: Sequence[str]) -> tuple[Config, int]:
         allow_abbrev=False,
     )
     parser.add_argument("--port", type=int, default=8080, help="the first port to try (8080)")
-    options, words = parser.parse_known_args(argv)
+    return parser
+
+
+def options_of(argv: Sequence[str]) -> tuple[Config, int]:
+    """The run that is taught, and the first port to try."""
+    options, words = parser().parse_known_args(argv)
     if words and not words[0].startswith("-"):
         path = Path(words[0])
         config = config_of(read_run(path))
         if len(words) > 1:
-            parser.error(f"{path} has its own options; {' '.join(words[1:])} cannot change them")
+            parser().error(f"{path} has its own options; {' '.join(words[1:])} cannot change them")
         config = replace(config, out=path.parent.parent, name=path.parent.name)
         if config.directory.resolve() != path.resolve():
             raise ValueError(f"{path} must be called {config.directory.name}, as sgimd run calls it; was it renamed?")
