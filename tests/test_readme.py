@@ -6,6 +6,8 @@ A block of a page says in its first line what is done with it:
     ```sh                  commands, carried out line by line
     ```                    commands that take too long: those of sgimd are read, up to where the work would begin
     ```text                is looked at only
+    ```py PATH             lines of that file, compared with it by tests/docs/test_links.py
+    ```math                an equation
 """
 
 import importlib
@@ -31,6 +33,12 @@ HOW_TO = tuple(
     f"docs/{name}.md"
     for name in ("own-robot", "reading-runs", "own-demonstrations", "teaching-by-hand", "own-teacher", "asking")
 )
+OTHERS = (  # each in a folder of its own
+    *(f"docs/how-to/{name}.md" for name in ("ablations", "resuming")),
+    *(f"docs/explained/{name}.md" for name in ("random-numbers", "noise")),
+    pytest.param("docs/tutorial.md", marks=pytest.mark.slow),  # the rod's physics
+    pytest.param("docs/how-to/forward-model.md", marks=pytest.mark.slow),  # torch
+)
 PAGES = [
     *ALONE,
     "CHANGELOG.md",
@@ -44,6 +52,7 @@ SMALLER = {
     "--movements 500": "--movements 60",
     "--movements 800": "--movements 80",
     "--movements 1000": "--movements 300",
+    "--movements 2000": "--movements 60 --repeats 0",
     "--seeds 0-4": "--seeds 0",
     "--seeds 2000-2001": "--seeds 2000",
     "--tiles 100": "--tiles 20",
@@ -108,14 +117,25 @@ def test_a_block_works_on_its_own(block, folder):
 
 
 def test_how_to_pages_work_one_after_the_other(folder):
-    unused = set(SMALLER)
     for page in HOW_TO:
-        for block in blocks(page, "python", "sh"):
-            for long, short in SMALLER.items():
-                unused -= {long} if long in block.text else set()
-                block = block._replace(text=block.text.replace(long, short))
-            block.carry_out()
-    assert not unused
+        work_through(page)
+
+
+@pytest.mark.parametrize("page", OTHERS)
+def test_a_page_works_from_top_to_bottom(page, folder):
+    work_through(page)
+
+
+def work_through(page):
+    for block in blocks(page, "python", "sh"):
+        for long, short in SMALLER.items():
+            block = block._replace(text=block.text.replace(long, short))
+        block.carry_out()
+
+
+def test_all_that_is_made_smaller_is_on_a_page():
+    texts = "".join((ROOT / page).read_text(encoding="utf-8") for page in PAGES)
+    assert not [long for long in SMALLER if long not in texts]
 
 
 @pytest.mark.parametrize("page", PAGES)

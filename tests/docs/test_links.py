@@ -1,0 +1,74 @@
+"""Links between the pages lead somewhere, also to the heading that they name, as a code host reads them; the site's
+navigation has every page once; what a page quotes of the code or of a results page stands there."""
+
+import posixpath
+import re
+import tomllib
+from collections import Counter
+
+import pytest
+from make_site import HERE, ROOT, rooms, sources
+
+PAGES = [*sources(), "experiments/README.md"]
+LINK = re.compile(r"(?<!`)\[[^\]]*\]\(([^)\s]*)\)")
+FENCED = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
+QUOTE = re.compile(r"^```py (\S+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+RESULT = re.compile(r"^\|[^|]*\| ([^|]*\d[^|]*) \| ([^|]*?) ?\| \[\w+\]\(([^)]*)\) \|$", re.MULTILINE)
+
+
+def text_of(page):
+    return (ROOT / page).read_text(encoding="utf-8")
+
+
+def anchors(page):
+    """Of its headings, as code hosts make them: small letters, no punctuation, a dash for each space."""
+    headings = re.findall(r"^#{1,6} (.*)$", FENCED.sub("", text_of(page)), re.MULTILINE)
+    seen, found = Counter(), set()
+    for heading in headings:
+        words = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading).lower()
+        anchor = re.sub(r"[^\w\- ]", "", words).strip().replace(" ", "-")
+        found.add(f"{anchor}-{seen[anchor]}" if seen[anchor] else anchor)
+        seen[anchor] += 1
+    return found
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_every_link_inside_the_repository_leads_to_a_file_and_a_heading(page):
+    lost = []
+    for link in LINK.findall(FENCED.sub("", text_of(page))):
+        target, _, anchor = link.partition("#")
+        if "://" in link or link.startswith("mailto:"):
+            continue
+        path = posixpath.normpath(posixpath.join(posixpath.dirname(page), target)) if target else page
+        if not (ROOT / path).exists() or (anchor and path.endswith(".md") and anchor not in anchors(path)):
+            lost.append(link)
+    assert not lost
+
+
+def test_the_navigation_has_every_page_once():
+    def pages(entry):
+        if isinstance(entry, str):
+            return [entry]
+        return [page for each in (entry.values() if isinstance(entry, dict) else entry) for page in pages(each)]
+
+    listed = pages(tomllib.loads((HERE / "zensical.toml").read_text(encoding="utf-8"))["project"]["nav"])
+    assert sorted(listed) == sorted(["docs/notebooks/", *sources(), *(f"api/{room}.md" for room in rooms())])
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if QUOTE.search(text_of(page))])
+def test_what_a_page_quotes_of_the_code_stands_there_in_this_order(page):
+    for path, quoted in QUOTE.findall(text_of(page)):
+        there = [line.strip() for line in text_of(path).splitlines()]
+        for line in quoted.splitlines():
+            if line.strip() not in ("", "..."):
+                assert line.strip() in there, f"{path} has no such line after the ones before: {line}"
+                there = there[there.index(line.strip()) + 1 :]
+
+
+def test_the_numbers_of_the_page_on_curiosity_stand_on_the_results_pages_with_that_verdict():
+    rows = RESULT.findall(text_of("docs/explained/curiosity.md"))
+    assert len(rows) == 10
+    for number, verdict, link in rows:
+        page = text_of(posixpath.normpath(posixpath.join("docs/explained", link)))
+        lines = [line for line in page.splitlines() if number.removesuffix(" times") in line]
+        assert any(not verdict or f"**{verdict}**" in line for line in lines), f"{number} {verdict} is not in {link}"

@@ -1,0 +1,147 @@
+"""The documentation site: it builds without a network, shows the whole library, and fetches nothing when it is read."""
+
+import contextlib
+import importlib
+import inspect
+import re
+import shutil
+import subprocess
+import sys
+import zlib
+from html.parser import HTMLParser
+
+import pytest
+from make_site import HERE, PACKAGE, rooms, serve_in_background
+
+import sgimd_torch
+from browser import chromium
+
+pytestmark = pytest.mark.slow
+# of the kinds that differ: front page, text and code, equations, docstrings, wide tables, pictures
+LOOKED_AT = (
+    *("index.html", "docs/tutorial.html", "docs/explained/method.html", "api/goals.html", "api/sgimd_torch.html"),
+    *("results/RESULTS.html", "results/LEARNING.html", "docs/runs.html"),
+)
+
+
+def without_network():
+    """Words before a command that take its network away, if this system lets us."""
+    words = ["unshare", "--user", "--map-root-user", "--net"]
+    allowed = shutil.which("unshare") and subprocess.run([*words, "true"], capture_output=True).returncode == 0
+    return words if allowed else []
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    for library in ("zensical", "mkdocstrings", "pymdownx"):
+        pytest.importorskip(library, reason=f"needs {library} of the extra docs, which is not installed")
+    out = tmp_path_factory.mktemp("documentation") / "site"
+    command = [*without_network(), sys.executable, str(HERE / "make_site.py"), "--out", str(out)]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return out
+
+
+class Fetched(HTMLParser):
+    """What a browser would fetch to show a page."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.addresses = []
+        self.feed(text)
+
+    def handle_starttag(self, name, attributes):
+        found = dict(attributes)
+        if name == "link" and found.get("rel") in ("canonical", "next", "prev"):
+            return
+        if name != "a":
+            self.addresses += [found[key] for key in ("src", "href", "data", "poster") if found.get(key)]
+
+
+def test_no_page_asks_for_anything_from_outside(site):
+    pages = list(site.rglob("*.html"))
+    assert len(pages) > 50
+    for page in pages:
+        text = page.read_text(encoding="utf-8")
+        outside = [address for address in Fetched(text).addresses if re.match(r"(https?:)?//", address)]
+        assert not outside, page
+    for sheet in site.rglob("*.css"):
+        assert not re.search(r"(url\(|@import)\s*[\"']?(https?:)?//", sheet.read_text(encoding="utf-8")), sheet
+
+
+def explained(site):
+    """Dotted names that have a place in the API pages: mkdocstrings lists them in a file for other projects."""
+    inventory = (site / "objects.inv").read_bytes()
+    lines = zlib.decompress(inventory.split(b"\n", 4)[4]).decode().splitlines()
+    return {line.split()[0] for line in lines}
+
+
+def test_the_api_pages_have_every_module_and_everything_public_in_it(site):
+    found = explained(site)
+    missing = []
+    for module in [module for modules in rooms().values() for module in modules]:
+        missing += [module] if module not in found else []
+        with contextlib.suppress(ImportError):  # of an extra that is not installed
+            members = vars(importlib.import_module(module)).items()
+            missing += [
+                f"{module}.{name}"
+                for name, thing in members
+                if (inspect.isclass(thing) or inspect.isfunction(thing))
+                and thing.__module__ == module
+                and not name.startswith("_")
+                and f"{module}.{name}" not in found
+            ]
+    assert not missing
+
+
+def test_every_name_of_the_package_itself_is_explained(site):
+    found, front = explained(site), (site / "api" / f"{PACKAGE}.html").read_text(encoding="utf-8")
+    for name in set(sgimd_torch.__all__) - {"__version__"}:
+        place = f"{getattr(sgimd_torch, name).__module__}.{name}"
+        assert place in found, place
+        assert f"#{place}" in front, place
+
+
+def test_docstrings_have_links_and_show_the_use_of_a_module_as_code(site):
+    page = (site / "api" / "goals.html").read_text(encoding="utf-8")
+    intro = page[
+        page.index('id="sgimd_torch.goals.interest_map"') : page.index(
+            'id="sgimd_torch.goals.interest_map.InterestMap"'
+        )
+    ]
+    assert 'href="#sgimd_torch.goals.tiling.Tiling"' in intro  # it says `Tiling`
+    assert "goals = InterestMap(contexts, outcomes, rng)" in re.sub(
+        "<[^>]*>", "", intro[intro.index("<code>", intro.index("<pre>")) :]
+    )
+
+
+@pytest.mark.parametrize("width", [1400, 390])
+def test_pages_show_whole_without_a_network(site, width):
+    with chromium() as browser:
+        context = browser.new_context(viewport={"width": width, "height": 900}, offline=True)
+        for name in LOOKED_AT:
+            tab, asked = context.new_page(), []
+            tab.on("request", lambda request, asked=asked: asked.append(request.url))
+            tab.goto(f"file://{site / name}")
+            tab.wait_for_load_state("networkidle")
+            assert not [address for address in asked if not address.startswith(("file:", "data:", "blob:"))], name
+            assert tab.evaluate("[...document.images].filter(each => each.complete && !each.naturalWidth).length") == 0
+            wider = tab.evaluate("document.documentElement.scrollWidth - window.innerWidth")
+            assert wider <= 0, f"{name} is {wider} pixels wider than the window"
+            if "method" in name:
+                sizes = tab.evaluate(
+                    "[...document.querySelectorAll('.equation')].map(e => e.getBoundingClientRect().height)"
+                )
+                assert len(sizes) > 30
+                assert min(sizes) > 5
+            tab.close()
+
+
+def test_the_search_finds_a_page_when_the_site_is_served(site):
+    with chromium() as browser, serve_in_background(site) as address:
+        tab = browser.new_page()
+        tab.goto(address)
+        tab.wait_for_load_state("networkidle")
+        tab.keyboard.press("Control+k")
+        tab.keyboard.type("noise floor", delay=20)
+        tab.locator("a", has_text="how the part of the error that it makes is measured").first.wait_for(timeout=60000)
