@@ -21,7 +21,7 @@ DEFAULTS = {
     "algorithms:imitating": {"repeats": 10, "epsilon": 0.05},
     "algorithms.asking:searched": {"repeats": 10, "epsilon": 0.05},
     "algorithms.asking:sgim_acts": {"cost": 1.0},
-    "environments.fishing_rod:FishingRod": {"noise": 0.032, "max_yaw": 0.0, "max_wind": 0.0},
+    "environments.fishing_rod:FishingRod": {"noise": 0.032, "max_yaw": 0.0, "max_wind": 0.0, "line": 1.0},
     "environments.motor_primitives:GaussianPrimitive": {"n_knots": 4, "sharpness": 9.0},
     "environments.planar_arm:PlanarArm": {"n_joints": 7, "length": 1.0, "noise": 0.0},
     "evaluation:evaluate": {"repeats": 3},

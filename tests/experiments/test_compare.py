@@ -163,7 +163,7 @@ def test_what_is_in_one_table_is_still_to_be_done_for_the_other(tmp_path, monkey
 def test_after_ctrl_c_it_goes_on(compare, tmp_path):
     log = tmp_path / "runs/long-life/seed-000/episodes.csv"
     code, errors = signal_after(compare("long", "learners"), log, 5, signal.SIGINT)
-    assert code == 130
+    assert code == 130, errors
     assert "the same command goes on from here" in errors
     assert "Traceback" not in errors
     assert not locked(log.parent / "lock")

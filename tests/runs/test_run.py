@@ -266,7 +266,8 @@ def test_every_choice_runs_and_differs_from_the_others(tmp_path, go, option, tab
     # Short attempts and a short window, so that the map is split, and has its say, before the run is over.
     common = ("--every", 20, "--budget", 3, "--imitations", 3, "--window", 4, "--movements", 240, "--evaluate_at", "[]")
     # See the next two tests; a person who is not there is like no teacher, and demonstrator 3 is all there are.
-    choices = [choice for choice in table if choice not in (*MODEL_SEARCHES, "model", "by-hand", "demonstrator-3")]
+    left_out = *MODEL_SEARCHES, "model", "model-proved", "by-hand", "demonstrator-3"
+    choices = [choice for choice in table if choice not in left_out]
     asking = {"teachers": "sgim-im", "base": "sgim-im", "doubt": "sgim-eer"}  # the others ask nobody
     learner = ("--algorithm", asking[option]) if option in asking else ()
     for choice in choices:
@@ -305,6 +306,16 @@ def test_the_inverse_through_the_model_lives_as_the_linear_one_and_answers_bette
         runs[inverse] = read_run(tmp_path / inverse / "seed-003")
     np.testing.assert_array_equal(runs["model"].thetas, runs["linear"].thetas)
     assert runs["model"].evaluation["mean_error_m"][-1] < 0.7 * runs["linear"].evaluation["mean_error_m"][-1]
+
+
+def test_the_model_that_proves_itself_lives_as_the_process_and_answers_no_worse(tmp_path, go):
+    runs = {}
+    for inverse in ("process", "model-proved"):
+        assert go(tmp_path, "--name", inverse, "--inverse", inverse, *ON_THE_ARM) == 0
+        runs[inverse] = read_run(tmp_path / inverse / "seed-003")
+    np.testing.assert_array_equal(runs["model-proved"].thetas, runs["process"].thetas)
+    errors = [run.evaluation["mean_error_m"][-1] for run in runs.values()]
+    assert errors[0] != errors[1] < 1.03 * errors[0]
 
 
 BABBLING = {"window": 4, "progress": "signed", "competence": "attempt", "search": "perturb", "budget": 3}

@@ -139,7 +139,7 @@ def test_a_second_start_uses_what_is_there(finished, benchmark_file, tmp_path):
 
 def test_stopped_it_says_how_to_go_on_and_leaves_no_process(benchmark_file, tmp_path):
     demo = start(tmp_path, benchmark_file, 100_000)
-    log = tmp_path / "random/seed-000/episodes.csv"
+    log = tmp_path / "practice-taught/seed-000/episodes.csv"
     began = time.monotonic()
     while not (log.exists() and log.read_bytes().count(b"\n") > 5):
         assert time.monotonic() < began + 60
@@ -187,12 +187,12 @@ def test_asking_for_fewer_movements_does_not_delete_the_run(finished, benchmark_
 
 
 def test_when_one_run_fails_the_other_is_stopped(benchmark_file, tmp_path):
-    foreign = tmp_path / "random/seed-000/thesis.txt"
+    foreign = tmp_path / "sgim-d/seed-000/thesis.txt"
     foreign.parent.mkdir(parents=True)
     foreign.write_text("not a run")
     code, _, errors = ended(start(tmp_path, benchmark_file, 100_000))
     assert code == 2
-    assert "random seed 0 failed: " in errors
+    assert "sgim-d seed 0 failed: " in errors
     assert "thesis.txt" in errors
     assert "Traceback" not in errors
     assert foreign.read_text() == "not a run"
