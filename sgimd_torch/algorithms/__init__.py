@@ -75,6 +75,7 @@ def practice(environment: Environment, seed: int, *, memory: Memory | None = Non
     """Practice, which is ours: goals anywhere in T, and at each one movement, the answer of a local process plus noise.
 
     It has no teacher, and nothing in it knows a unit or a robot. What the answer gets wrong is what it learns next.
+    T should not be much larger than what can be reached: its goals are drawn from all of it.
     """
     return sagg_riac(environment, seed, memory=memory, **practising(parts))
 
