@@ -52,6 +52,7 @@ LIBRARIES = {  # library: the only rooms that may import it; of a folder, where 
     "jsonargparse": {"runs/command_line"},
     "tqdm": {"runs/process", "views"},
     "shtab": {"views/completion"},
+    "threadpoolctl": {"inverses/gaussian_process"},
     "cma": {"searches/cma_es"},
     "sklearn": {"goals/alp_gmm", "rivals/entropy"},
     "ribs": {"rivals"},

@@ -10,16 +10,18 @@ Inputs are in lengths: how far each must change for the outcome to change, see `
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
-from typing import Final, NamedTuple
+from collections.abc import Callable, Sequence
+from typing import Final, NamedTuple, ParamSpec, TypeVar
 
 import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.optimize import minimize
+from threadpoolctl import ThreadpoolController
 
 from sgimd_torch.memory import Rows
 from sgimd_torch.spaces import Array
 
+_BLAS: Final = ThreadpoolController()
 _ROOT5: Final = np.sqrt(5)
 _LEAST: Final = 1e-6  # noise variance in units of the kernel's; less makes its matrix singular
 _TINY: Final = 1e-300
@@ -27,6 +29,17 @@ _NOISES: Final = (_LEAST, 1e-4, 1e-3, 1e-2, 0.03, 0.1, 0.3, 1.0, 3.0)
 _SCALES: Final = (0.5, 1.0, 2.0)
 _ROUGH: Final = ((1.0, 0.0), *itertools.product((4.0, 12.0), (0.03, 0.1, 0.3, 0.6)))  # (finer, share)
 _STEPS: Final = 30  # of the fit of lengths
+
+
+Inputs = ParamSpec("Inputs")
+Output = TypeVar("Output")
+
+
+def one_thread(function: Callable[Inputs, Output]) -> Callable[Inputs, Output]:
+    """A decorator: linear algebra in one thread. The matrices here are so small that several would only wait for each
+    other: on two cores a life of `practice` would take twice as long, on sixteen far longer."""
+    found: Callable[Inputs, Output] = _BLAS.wrap(limits=1, user_api="blas")(function)
+    return found
 
 
 class Kernel(NamedTuple):

@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from sgimd_torch.inverses.gaussian_process import Kernel, Process, choose_kernel, fit_lengths
+from sgimd_torch.inverses.gaussian_process import Kernel, Process, choose_kernel, fit_lengths, one_thread
 from sgimd_torch.inverses.local import NearestNeighbour
 from sgimd_torch.inverses.locally_linear import LocallyLinear
 from sgimd_torch.memory import Memory
@@ -52,6 +52,7 @@ class LocalProcess:
         self._fitted = 0  # exemplars at the last fit
         self._kernel: Kernel | None = None  # None: outcomes are all the same
 
+    @one_thread
     def __call__(self, context: Array, goal: Array) -> Estimate:
         """The answer, and the exemplars of the nearest outcomes, nearest first.
 
@@ -77,12 +78,14 @@ class LocalProcess:
         clearly = errors[chosen_one] < _CLEARLY * exemplars[0]
         return estimate._replace(theta=candidates[chosen_one]) if clearly else estimate
 
+    @one_thread
     def expected_errors(self, context: Array, goal: Array, thetas: Array) -> Array | None:
         """``(n,)`` squared errors (unit of T, squared) that it expects of ``thetas`` ``(n, theta_dim)``: its own
         uncertainty is included, noise is not, as when it judges its own candidates. None as for `predict`."""
         learnt = self._learn_near(context, goal)
         return None if learnt is None else self._expected_errors(learnt[0], context, goal, learnt[2], thetas)
 
+    @one_thread
     def predict(self, context: Array, theta: Array) -> Array | None:
         """``(outcome_dim,)`` what ``theta`` should lead to, judging by the movements most like it; None while there are
         too few of them, or all had the same outcome."""

@@ -24,7 +24,7 @@ from sgimd_torch.algorithms.asking import MakeBase, imitating_only, practised, s
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.goals.protocol import check_attempt, check_in
 from sgimd_torch.goals.strategic import AUTONOMOUS
-from sgimd_torch.inverses.gaussian_process import Kernel, squared_distances
+from sgimd_torch.inverses.gaussian_process import Kernel, one_thread, squared_distances
 from sgimd_torch.learner import Learner
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, Box
@@ -44,6 +44,7 @@ the policies for the points, given the exemplars. 1 on the diagonal: nothing is 
 class ByProcess:
     """The doubt of a Gaussian process from outcomes to policies."""
 
+    @one_thread
     def __call__(self, known: Array, points: Array) -> Array:
         """See ``Doubt``."""
         known = _thinned(known)

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info
 
 from sgimd_torch.environments.toys import Toy, toss, two_elbows
-from sgimd_torch.inverses.gaussian_process import Kernel, Process, choose_kernel, fit_lengths
+from sgimd_torch.inverses.gaussian_process import Kernel, Process, choose_kernel, fit_lengths, one_thread
 from sgimd_torch.inverses.local import NearestNeighbour
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.inverses.locally_linear import LocallyLinear
@@ -175,3 +176,13 @@ def test_outcomes_that_are_all_the_same_teach_it_nothing() -> None:
 def test_noise_that_is_no_standard_deviation_is_refused(noise: float) -> None:
     with pytest.raises(ValueError, match="noise must be"):
         LocalProcess(Memory(0, 1, 1), noise=noise)
+
+
+def test_its_linear_algebra_takes_one_thread_and_leaves_the_others_as_they_were():
+    @one_thread
+    def threads():
+        return {each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"}
+
+    before = threadpool_info()
+    assert threads() == {1}
+    assert threadpool_info() == before
