@@ -33,7 +33,7 @@ COMMANDS: Final = {
     "watch": Command("views.watch", "TensorBoard on the boards of runs, also while they are still running"),
     "teach": Command("views.teach", "teach a learner by hand, in a browser", "teach"),
     "film": Command("views.film.command", "a film of what a run has learnt", "film"),
-    "demo": Command("views.demo", "SGIM-D and random exploration: one figure, one table", "plot"),
+    "demo": Command("views.demo", "three learners side by side: one figure, one table", "plot"),
 }
 HELP: Final = f"""usage: sgimd COMMAND [OPTIONS]
 

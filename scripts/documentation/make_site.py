@@ -71,7 +71,8 @@ def copy_pages(to: Path) -> None:
 def copy_notebooks(to: Path) -> list[str]:
     """The notebooks as pages, with the figures that they keep; returns the paths of these pages."""
     made = []
-    for notebook in sorted((ROOT / "docs").rglob("*.ipynb")):
+    index = (ROOT / "docs" / "README.md").read_text(encoding="utf-8")  # they come in its order
+    for notebook in sorted((ROOT / "docs").rglob("*.ipynb"), key=lambda path: index.find(path.name)):
         page = to / notebook.relative_to(ROOT).with_suffix(".md")
         page.parent.mkdir(parents=True, exist_ok=True)
         text, name = as_page(notebook, page.parent), notebook.relative_to(ROOT).as_posix()
@@ -181,6 +182,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--serve", action="store_true", help="then show it at an address of this machine, until Ctrl-C")
     parser.add_argument("--port", type=int, default=8000, help="of that address; 0 takes a free one (default: 8000)")
     options = parser.parse_args(arguments)
+    print(f"scripts/docs: building {options.out}, which takes half a minute", flush=True)
     try:
         build(options.out)
     except FileExistsError as error:
@@ -189,10 +191,10 @@ def main(arguments: list[str] | None = None) -> int:
     except ValueError as error:
         print(f"{error}\nscripts/docs: the pages have these faults; the earlier site stays as it was", file=sys.stderr)
         return 1
-    print(f"scripts/docs: open {options.out / 'index.html'}")
+    print(f"scripts/docs: open {options.out / 'index.html'}; with --serve the search works, too")
     if options.serve:
         with suppress(KeyboardInterrupt), serve_in_background(options.out, options.port) as address:
-            print(f"scripts/docs: or {address}, where the search works, too; Ctrl-C ends it", flush=True)
+            print(f"scripts/docs: or {address}; Ctrl-C ends it", flush=True)
             threading.Event().wait()
     return 0
 

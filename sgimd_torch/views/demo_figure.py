@@ -49,7 +49,7 @@ def draw(runs: Mapping[str, Life]) -> Figure:
         ax.set_title(f"Where the float landed: {NAMES[algorithm]}", pad=32)
     n = " and ".join(dict.fromkeys(str(len(run.index)) for run in runs.values()))
     seed = sgim_d.config["seed"]
-    figure.suptitle(f"A simulated arm learns to place its float: {n} movements each, seed {seed}")
+    figure.suptitle(f"A simulated arm learns to place its float: {n} movements each, seed {seed}", fontsize="x-large")
     return figure
 
 
@@ -69,7 +69,7 @@ def table(runs: Mapping[str, Life]) -> str:
     ratios = " and ".join(
         f"{NAMES[algorithm]} {error / last['random']:.2f}" for algorithm, error in last.items() if algorithm != "random"
     )
-    lines.append(f"After {columns[-1]} movements the error, in Random's: {ratios}.")
+    lines.append(f"Error after {columns[-1]} movements, as a share of Random's: {ratios}.")
     return "\n".join(lines)
 
 

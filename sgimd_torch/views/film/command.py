@@ -1,10 +1,11 @@
 """Film what a run has learnt: the robot moves for chosen goals, with the movements that the run's own memory infers.
 
-Each goal is answered by the run's inverse model, its memory rebuilt from the log, in the middle of C, and executed once
-with noise. A yellow ring is the goal, white dots are past landings; of the rod, circles are half a metre and a metre
-around the base. If the float has not met the water after the movement, the line is let out and the float falls; the
-film says so. Beside it: each goal of the benchmark, the bluer the nearer its answer lands, and how the mean error has
-fallen. Planar arms, and environments of your own with record(context, theta, rng) -> Sketch, are drawn in the plane.
+Each goal is answered by the run's inverse model, its memory rebuilt from the log, and executed once with noise; where
+there are contexts, in the middle of their range. A yellow ring is the goal, white dots are past landings; of the rod,
+circles are half a metre and a metre around the base. If the float has not met the water after the movement, the line is
+let out and the float falls; the film says so. Beside it: each goal of the benchmark, the bluer the nearer its answer
+lands, and how the mean error has fallen. Planar arms, and environments of your own with record(context, theta, rng) ->
+Sketch, are drawn in the plane.
 """
 
 from __future__ import annotations
@@ -205,7 +206,7 @@ def parser() -> argparse.ArgumentParser:
         type=_goal,
         nargs="+",
         metavar="X,Y",
-        help="in the unit of T, m; without it, six of the benchmark's, all around, of which a time lapse shows two",
+        help="in the task space (m); without it, six of the benchmark's, all around, of which a time lapse shows two",
     )
     parser.add_argument("--time-lapse", action="store_true", help="the goals again and again, early and late")
     parser.add_argument(
