@@ -34,7 +34,7 @@ HOW_TO = tuple(
     for name in ("own-robot", "reading-runs", "own-demonstrations", "teaching-by-hand", "own-teacher", "asking")
 )
 OTHERS = (  # each in a folder of its own
-    *(f"docs/how-to/{name}.md" for name in ("ablations", "resuming")),
+    *(f"docs/how-to/{name}.md" for name in ("ablations", "gymnasium", "resuming")),
     *(f"docs/explained/{name}.md" for name in ("random-numbers", "noise")),
     pytest.param("docs/tutorial.md", marks=pytest.mark.slow),  # the rod's physics
     pytest.param("docs/how-to/forward-model.md", marks=pytest.mark.slow),  # torch
