@@ -61,18 +61,19 @@ def ratios_at_most(ours: str, theirs: str, bar: float, times: tuple[int, ...]) -
     """Judges our error over theirs at each time."""
 
     def judged(results: Results) -> Judged:
-        found = {when: results.ratio(ours, theirs, when) for when in times}
-        number = ", ".join(f"{show(each)} at {when}" for when, each in found.items())
-        return number, all_of(*(at_most(each, bar) for each in found.values()))
+        return _at_most_each({when: results.ratio(ours, theirs, when) for when in times}, bar)
 
     return judged
 
 
 def _model_over_process(results: Results) -> Judged:
     """The imitation learner's own answer has a model, that of `process` has none; the memory is the same."""
-    found = {when: results.over_alike(IMITATION, when) for when in (*TIMES, LAST)}
-    number = ", ".join(f"{show(each)} at {when}" for when, each in found.items())
-    return number, all_of(*(at_most(each, 1.03) for each in found.values()))
+    return _at_most_each({when: results.over_alike(IMITATION, when) for when in (*TIMES, LAST)}, 1.03)
+
+
+def _at_most_each(ratios: Mapping[int, Interval], bar: float) -> Judged:
+    number = ", ".join(f"{show(each)} at {when}" for when, each in ratios.items())
+    return number, all_of(*(at_most(each, bar) for each in ratios.values()))
 
 
 def _near_the_floor(results: Results) -> Judged:

@@ -102,8 +102,7 @@ def _on_each_memory(other: str, suite: Suite) -> Judged:
     pairs = {}
     for name in (*EXPERIMENTS["suite"], *(f"{name}.rod" for name in SUITED)):
         for at in TIMES:
-            ours, theirs = (suite[answer].at(name, at) for answer in ("process", other))
-            pairs[f"memory of {name}", at] = np.array([*ours.values()]), np.array([*theirs.values()])
+            pairs[f"memory of {name}", at] = suite["process"].errors(name, at), suite[other].errors(name, at)
     return _all_at_most(pairs, 1.02, suite, paired=True)
 
 
@@ -149,9 +148,8 @@ def _more_data(suite: Suite) -> Judged:
         errors = np.array([*late.values()]), np.array([*early.values()])
         found[task] = ratio_interval(*errors, rng=rng(), paired=True, level=suite["process"].level)
     most = max(found, key=lambda task: found[task].value)
-    return f"at most {show(found[most])} times, {most}", FAILS if any(
-        each.low > 1 for each in found.values()
-    ) else HOLDS
+    grown = any(each.low > 1 for each in found.values())
+    return f"at most {show(found[most])} times, {most}", FAILS if grown else HOLDS
 
 
 def suite_rows(suite: Mapping[str, Results], at: int) -> list[list[str]]:
