@@ -13,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colorbar import Colorbar
 from matplotlib.ticker import MaxNLocator
+from numpy.typing import ArrayLike
 
 from sgimd_torch.spaces import Array, Box
 
@@ -92,3 +93,9 @@ def note(ax: Axes, text: str, *, top: bool = False) -> None:
     white = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 2}
     height, side = (0.985, "top") if top else (0.015, "bottom")
     ax.text(0.5, height, text, transform=ax.transAxes, ha="center", va=side, fontsize="small", bbox=white)
+
+
+def goal_rings(ax: Axes, points: ArrayLike, size: float) -> None:
+    """Yellow rings with a black edge at ``(n, 2)``, ``size`` points wide: goals that are being reached for."""
+    for edge, width in (("black", 4.5), ("#f0e442", 2.5)):
+        ax.plot(*np.asarray(points).T, "o", mfc="none", mec=edge, ms=size, mew=width)

@@ -11,14 +11,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 try:
     from matplotlib.axes import Axes
 except ImportError as error:
     raise ImportError(f"the figure needs matplotlib: pip install 'sgimd-torch[plot]' ({error})") from error
 
-from sgimd_torch.figures.axes import water_plane
+from sgimd_torch.figures.axes import goal_rings, water_plane
 from sgimd_torch.figures.learning import COLOURS, NAMES
 from sgimd_torch.runs.build import build
 from sgimd_torch.runs.read import config_of, read_run
@@ -27,7 +26,7 @@ from sgimd_torch.views.memories import remember
 
 GOALS = np.array([[-0.6, -0.6], [-0.6, 0.6], [0.6, 0.6], [0.6, -0.6]])  # m; few random movements lead behind the arm
 TOP = 1.2  # m above the water, the side view's upper edge
-_WATER, _GOAL = "#4f93b8", "#f0e442"
+_WATER = "#4f93b8"
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +66,7 @@ def from_above(ax: Axes, casts: Mapping[str, Sequence[Cast]], box: Box) -> None:
         for cast in each:
             label = f"{NAMES[algorithm]}: misses by {missed:.0f} cm" if cast is each[0] else None
             _draw_path(ax, cast, algorithm, [0, 1], label)
-    _ring(ax, GOALS.T)
+    goal_rings(ax, GOALS, 17)
     water_plane(ax, box)
 
 
@@ -80,15 +79,10 @@ def from_the_side(ax: Axes, casts: Mapping[str, Sequence[Cast]], box: Box) -> No
         ax.plot(*chain.T, "-", color=colour, linewidth=1.5, alpha=0.7)  # with the rod
         ax.plot(*chain[:-1].T, "o-", color=colour, linewidth=5, markersize=6, mec="white", alpha=0.9)
         _draw_path(ax, cast, algorithm, [0, 2])
-    _ring(ax, [[GOALS[0, 0]], [0.0]])
+    goal_rings(ax, [[GOALS[0, 0], 0.0]], 17)
     ax.set(xlim=(box.low[0], box.high[0]), ylim=(-0.12, TOP), aspect="equal", xlabel="x (m)", ylabel="height (m)")
 
 
 def _draw_path(ax: Axes, cast: Cast, algorithm: str, seen: list[int], label: str | None = None) -> None:
     ax.plot(*cast.path[:, seen].T, ":", color=COLOURS[algorithm], linewidth=1.8)
     ax.plot(*cast.path[-1:, seen].T, "X", color=COLOURS[algorithm], mec="white", ms=10, label=label)
-
-
-def _ring(ax: Axes, points: ArrayLike) -> None:
-    for edge, width in (("black", 4.5), (_GOAL, 2.5)):
-        ax.plot(*np.asarray(points), "o", mfc="none", mec=edge, ms=17, mew=width)

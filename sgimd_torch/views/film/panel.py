@@ -26,7 +26,7 @@ except ImportError as error:
 
 from scipy.spatial import cKDTree
 
-from sgimd_torch.figures.axes import rounded
+from sgimd_torch.figures.axes import goal_rings, rounded
 from sgimd_torch.figures.save import STYLE
 from sgimd_torch.spaces import Array
 from sgimd_torch.views.film.reel import Frame
@@ -34,7 +34,7 @@ from sgimd_torch.views.film.sketch import in_picture
 
 _INCHES: Final = 4.8  # the height of the figure: sizes of its text and lines are relative to this
 _FINE: Final = 240  # places of the map along each side
-_GOAL, _LANDED = "#f0e442", "#d55e00"
+_LANDED = "#d55e00"
 _BLUES: Final = ListedColormap(colormaps["Blues_r"](np.linspace(0.08, 0.95, 256)))
 _TEXT: Final[Any] = {"font.size": 10, "axes.titlesize": 11, "axes.titlelocation": "left"}
 
@@ -92,8 +92,7 @@ class Panel:
         (left, bottom), (right, top) = self._low.tolist(), self._high.tolist()
         shades = np.clip(errors / (6 * self.near), 0, 1)[self._nearest]
         ax.imshow(shades, cmap=_BLUES, vmin=0, vmax=1, origin="lower", extent=(left, right, bottom, top))
-        for edge, width in (("black", 4.5), (_GOAL, 2.5)):
-            ax.plot(*in_picture(goal[None]).T, "o", mfc="none", mec=edge, ms=14, mew=width)
+        goal_rings(ax, in_picture(goal[None]), 14)
         if outcome is not None:
             ax.plot(*in_picture(outcome[None]).T, "X", color=_LANDED, mec="white", ms=10, mew=1)
         met = int((errors <= self.near).sum())
