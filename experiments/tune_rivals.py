@@ -1,12 +1,12 @@
 """Settings of the rivals, searched on tuning seeds: each line changes one keyword of a rival, or two, from its default.
 
 Rivals deserve the search that our own defaults had (results/TUNING.md). Each setting learns on the rod with each seed;
-its memory is answered by ``LocallyLinear``, on a benchmark of its own, never the shipped one. Rows go to
-results/rivals.csv; what is there is not run again.
+its memory is answered by ``LocallyLinear`` and by ``LocalProcess``, the yardsticks of the pages of results, on a
+benchmark of its own, never the shipped one. Rows go to results/rivals.csv; what is there is not run again.
 
 Examples:
   python scripts/make_benchmark.py --seed 3000 --out tuning.npz
-  python experiments/tune_rivals.py --benchmark tuning.npz                    everything: some hours on two cores
+  python experiments/tune_rivals.py --benchmark tuning.npz                    everything: an hour on two cores
   python experiments/tune_rivals.py --benchmark tuning.npz --only cma-mae --seeds 1000-1002
 """
 
@@ -39,13 +39,14 @@ with loading():  # Ctrl-C shows no traceback
     from sgimd_torch.evaluation import Benchmark, load_benchmark
     from sgimd_torch.goals.uniform import UniformGoals
     from sgimd_torch.inverses.local import NearestNeighbour
+    from sgimd_torch.inverses.local_process import LocalProcess
     from sgimd_torch.learner import Learner
     from sgimd_torch.rivals.quality_diversity import cma_mae, cma_me, isoline, map_elites
     from sgimd_torch.runs.sweep import add_options
     from sgimd_torch.searches.perturb import perturb
     from tables import Key, Table
 
-COLUMNS: Final = ("rival", "setting", "seed", "movements", "linear_error_m")
+COLUMNS: Final = ("rival", "setting", "seed", "movements", "linear_error_m", "process_error_m")
 KEY: Final = ("rival", "setting", "seed", "movements")
 FIRST_TUNING_SEED: Final = 1000
 SHOWN_EVERY: Final = 30  # movements between two demonstrations
@@ -98,8 +99,10 @@ def in_words(setting: Setting) -> str:
     return " ".join(f"{name}={value}" for name, value in setting.items()) or "default"
 
 
-def errors_of(name: str, setting: Setting, seed: int, benchmark: Benchmark, times: Sequence[int]) -> list[float]:
-    """The error (m) of a rival by ``LocallyLinear`` after each of ``times`` movements, which increase."""
+def errors_of(
+    name: str, setting: Setting, seed: int, benchmark: Benchmark, times: Sequence[int]
+) -> list[tuple[float, float]]:
+    """The errors (m) of a rival by both yardsticks after each of ``times`` movements, which increase."""
     rival, rod = RIVALS[name], FishingRod(threads=1)
     teacher, taught = None, dict[str, Any]()
     if rival.taught:
@@ -109,8 +112,10 @@ def errors_of(name: str, setting: Setting, seed: int, benchmark: Benchmark, time
     found = []
     for episode in run(learner, rod, seed, movements=max(times), teacher=teacher):
         if episode.index + 1 in times:
-            inverse = LocallyLinear(learner.memory)
-            found.append(evaluate(inverse, rod, benchmark.goals, seed, episode.index + 1, repeats=0).mean_error)
+            judged = (rod, benchmark.goals, seed, episode.index + 1)
+            linear, process = LocallyLinear(learner.memory), LocalProcess(learner.memory, noise=rod.outcome_noise)
+            linear_error, process_error = (evaluate(each, *judged, repeats=0).mean_error for each in (linear, process))
+            found.append((linear_error, process_error))
     return found
 
 
@@ -136,14 +141,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     benchmark.check(FishingRod())
     known, times = table.rows().keys(), sorted(options.times)
     with ProcessPoolExecutor(options.processes) as pool:
-        waiting: dict[Future[list[float]], list[Key]] = {}
+        waiting: dict[Future[list[tuple[float, float]]], list[Key]] = {}
         for seed, name in product(options.seeds, options.only):
             for setting in RIVALS[name].settings:
                 keys: list[Key] = [(name, in_words(setting), str(seed), str(when)) for when in times]
                 if not {*keys} <= known:
                     waiting[pool.submit(errors_of, name, setting, seed, benchmark, times)] = keys
         for made in as_completed(waiting):
-            rows = [[*key, error] for key, error in zip(waiting[made], made.result(), strict=True)]
+            rows = [[*key, *errors] for key, errors in zip(waiting[made], made.result(), strict=True)]
             table.merge(rows)
             say(" ".join(map(str, rows[-1])))
     _print_means(table, options.only, times[-1])
@@ -151,12 +156,14 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _print_means(table: Table, names: Sequence[str], last: int) -> None:
-    errors: dict[tuple[str, str], list[float]] = {}
-    for name, setting, _, movements, error in table.rows().values():
+    errors: dict[tuple[str, str], list[list[float]]] = {}
+    for name, setting, _, movements, *found in table.rows().values():
         if name in names and movements == str(last):
-            errors.setdefault((name, setting), []).append(float(error))
-    for (name, setting), found in sorted(errors.items(), key=lambda item: (item[0][0], np.mean(item[1]))):
-        print(f"{name:28} {setting:20} {np.mean(found):.4f} m, {len(found)} seeds")
+            errors.setdefault((name, setting), []).append([float(each) for each in found])
+    means = {key: np.mean(found, axis=0).tolist() for key, found in errors.items()}
+    for name, setting in sorted(means, key=lambda key: (key[0], sum(means[key]))):
+        linear, process = means[name, setting]
+        print(f"{name:28} {setting:20} {linear:.4f} {process:.4f} m, {len(errors[name, setting])} seeds")
 
 
 if __name__ == "__main__":
