@@ -8,7 +8,10 @@ not the page. The tables come from the rows in --results, which compare.py write
   GYMNASIUM       gymnasium.csv
   LEARNING        learning.csv and suite.csv
   BY_HAND         by_hand.csv
-  ASKING          asking.csv, asked.csv and contexts.csv; the page is left out while there is no asking.csv
+  ASKING          asking.csv, asked.csv and contexts.csv
+  SETTINGS        settings.csv
+
+ASKING and SETTINGS are left out while there are no rows for them.
 
 Intervals are bootstrapped with a fixed seed, so the same rows give the same page. The analyses of variance need
 run directories: --runs makes them again and keeps their rows in anova.csv.
@@ -40,14 +43,15 @@ with loading():  # Ctrl-C shows no traceback
     from paper_claims import PAPER_CLAIMS
     from quoted import MADE, Page, into_readme, render
     from read_results import LAST, Evaluated, ResultsError, read_coverages, read_goals, read_results
+    from settings_tables import SETTINGS, ideas_rows, read_settings, settings_rows, where_it_pays
     from sgimd_torch.files import make_folder, write_text
     from sgimd_torch.views.statistics import iqm_interval, metres, rng, show
     from sgimd_torch.views.suite import RANDOM
     from suite_claims import read_suite, suite_claims, suite_rows
     from variants import EXPERIMENTS, LEARNING, SUITED, ladder
 
-PAGES: Final = ("RESULTS", "FORWARD_MODEL", "GYMNASIUM", "LEARNING", "BY_HAND", "ASKING")
-OPTIONAL: Final = {"ASKING": "asking.csv"}  # pages that are left out without their rows
+PAGES: Final = ("RESULTS", "FORWARD_MODEL", "GYMNASIUM", "LEARNING", "BY_HAND", "ASKING", "SETTINGS")
+OPTIONAL: Final = {"ASKING": "asking.csv", "SETTINGS": "settings.csv"}  # pages that are left out without their rows
 ANOVA: Final = ("means compared", "of", "dimensions of theta in which they differ", "smallest p", "largest p")
 ON_ARMS: Final = (250, 500, 1000, 2000)
 EARLY: Final = (300, 500, 1000)
@@ -202,6 +206,17 @@ def asking_page(folder: Path) -> Page:
     return Page(verdicts, tables, results)
 
 
+def settings_page(folder: Path) -> Page:
+    """The page results/SETTINGS.md: where each idea pays."""
+    results = read_settings(folder)
+    tables = {
+        "where": where_it_pays(results),
+        "ideas": markdown(["idea", "errors", *SETTINGS], ideas_rows(results)),
+        **{f"settings_{when}": markdown(["learner", *SETTINGS], settings_rows(results, when)) for when in (500, 2000)},
+    }
+    return Page([], tables, results)
+
+
 def _alone(name: str) -> str:
     """The same learner without a teacher."""
     return f"{name.partition('-')[0]}-alone"
@@ -341,6 +356,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         "LEARNING": lambda: learning_page(folder),
         "BY_HAND": lambda: hand_page(folder),
         "ASKING": lambda: asking_page(folder),
+        "SETTINGS": lambda: settings_page(folder),
     }
     missing = {name: file for name, file in OPTIONAL.items() if not (options.only or (folder / file).exists())}
     say(*(f"{name} is left out: there is no {folder / file} yet" for name, file in missing.items()))

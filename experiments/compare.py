@@ -1,11 +1,10 @@
 """Run the paper's experiments, every variant with several seeds, and collect the results in tables.
 
 variants.py says which variants there are. A run goes to OUT/VARIANT/seed-003. When it ends, each of its evaluations
-becomes lines of RESULTS/paper.csv, one for each inverse model that answers; of RESULTS/forward_model.csv for
-forward-model and planar-arm-*, of RESULTS/gymnasium.csv for swimmer, of RESULTS/by_hand.csv for by-hand, of
-RESULTS/asking.csv for asking, whose requests are counted in RESULTS/asked.csv and whose errors by context are in
-RESULTS/contexts.csv. The goals that it chose in the large task space are counted in RESULTS/goals.csv. A variant in two
-experiments is run once.
+becomes lines of a table in RESULTS, one for each inverse model that answers: forward_model.csv for forward-model and
+planar-arm-*, gymnasium.csv for swimmer, one of its own name for asking, by-hand, learning, settings and suite (such as
+by_hand.csv), paper.csv for all others. Requests and errors by context of asking are in asked.csv and contexts.csv, the
+goals chosen in the large task space in goals.csv. A variant in two experiments is run once.
 
 Start the same command again after Ctrl-C or a power cut, or with more seeds: what is in the tables is not run again,
 and a run that was stopped goes on. If a run fails, the others go on.
@@ -75,6 +74,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     left = [(name, config) for name, config in wanted if not last_rows(config) <= rows[tables_of(name)[0]].keys()]
     where = " and ".join(str(options.results / table) for table in names)
     say(f"{len(wanted)} runs{options.shard.note(runs)}, {len(wanted) - len(left)} of them in {where} already")
+    if wanted and not left:
+        say("nothing is left to run: --verify 10 makes ten of these rows again, --results FOLDER all of them")
+        return 0
     if options.dry_run:
         print("".join(f"{name}: {config.title}\n" for name, config in left), end="")
         return 0

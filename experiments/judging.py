@@ -124,6 +124,13 @@ class Results:
         errors, floors = shared(self.at(ours), self.at(theirs, values="floors"))
         return ratio_interval(_array(errors), _array(floors), rng=rng(), paired=True, level=self.level)
 
+    def near_goals(self, variant: str) -> Array:
+        """``(n_seeds, 2)``: how many goals a run chose for itself, and how many of them can be reached."""
+        found = self.goals.get(variant, np.zeros((0, 2)))
+        if len(found) < 2:
+            raise NotRun(f"goals of {variant}")
+        return found
+
     def time_to_reach(self, ours: str, theirs: str, *, unit: float = 1.0, at_most: float) -> Interval:
         """When our mean curve falls to the end of theirs, in movements / ``unit``; ``at_most`` if later."""
         movements, curves = self.curves(ours)

@@ -81,6 +81,12 @@ class Quoted:
         return show(self.results.floor_ratio(ours, theirs))
 
     @_or_missing
+    def near_goals(self, name: str) -> str:
+        """The share of the goals chosen by all seeds together that can be reached: ``43.4 %``."""
+        chosen, near = self.results.near_goals(name).sum(axis=0)
+        return f"{100 * near / chosen:.1f} %"
+
+    @_or_missing
     def seeds(self, name: str, at: int = LAST) -> str:
         """How many seeds of a variant were evaluated."""
         return str(len(self.results.at(name, at)))

@@ -18,6 +18,8 @@ TRUE = {  # variant: experiment, teacher, task space, error at 5000 (m), tiles r
     **{f"observation-teacher-{k}": ("teachers", k, 1, 0.24, 0) for k in (1, 2)},
     "sagg-riac-large": ("large-space", "", 100, 0.19, 150),
     "sgim-d-large": ("large-space", 3, 100, 0.09, 290),
+    "sagg-riac-absolute-large": ("large-space", "", 100, 0.21, 150),
+    "sgim-d-absolute-large": ("large-space", 3, 100, 0.1, 280),
     "sgim-d-uniform-large": ("large-space", 3, 100, 0.12, 200),
     "sgim-d-long": ("long", 3, 1, 0.08, 300),
     "random-goals-demonstrations-large": ("large-space", 3, 100, 0.11, 250),

@@ -72,6 +72,7 @@ SPOILT = {  # claim: a change that makes it wrong
     NAMES[19]: {"cma_mae": {"last": 0.07}},
     NAMES[20]: {"cma_mae_demonstrations": {"last": 0.07}},
     NAMES[21]: {"sgim_d_letter": {"last": 0.07}},
+    NAMES[22]: {"sgim_d_absolute_large": {"last": 0.3}},
 }
 
 
@@ -242,7 +243,7 @@ def test_the_shipped_pages_are_what_the_shipped_rows_and_templates_make(tmp_path
         made, shipped = ((folder / f"{name}.md").read_text(encoding="utf-8") for folder in (tmp_path, SHIPPED))
         assert made == shipped
         assert f"experiments/pages/{name}.md.j2" in made.splitlines()[0]
-    assert "22 claims:" in said.out
+    assert "23 claims:" in said.out
 
 
 @pytest.mark.parametrize("name", [*PAGES, "README"])

@@ -1,0 +1,108 @@
+"""Beyond the setting that defaults were tuned on: the error of each learner in each, and where each idea pays.
+
+    results = read_settings(Path("results")); print(where_it_pays(results))
+A learner with a forward model is answered by the model, all others by `process`, whatever they explored with.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from judging import NotRun, Results, shared
+from learning_claims import shown
+from read_results import read_results
+from sgimd_torch.views.statistics import Interval, ratio_interval, rng, show
+from variants import EVERYWHERE, EXPERIMENTS, ROBOTS, TAUGHT_ALIKE, TEACHERS, UNTAUGHT
+
+SETTINGS: Final = (*ROBOTS, *TEACHERS)
+EVERYBODY: Final = (*UNTAUGHT, *TAUGHT_ALIKE)
+LAST_HERE: Final[int] = EVERYWHERE["movements"]
+# What has the idea against what lacks only that: without a teacher, and with one.
+IDEAS: Final = {
+    "Choosing goals by interest": (("sagg-riac", "uniform"), ("sgim-d", "uniform-taught")),
+    "Practising what is known": (("practice", "sagg-riac"), ("practice-taught", "sgim-d")),
+    "Being shown": (("sgim-d", "sagg-riac"), ("practice-taught", "practice")),
+    "The forward model": (("sagg-riac-model", "sagg-riac"), ("sgim-d-model", "sgim-d")),
+}
+
+
+def read_settings(folder: Path) -> Results:
+    """The results in settings.csv, each variant by the answer that it is judged by.
+
+    Raises:
+        ResultsError: there is no such table, or a line of it makes no sense.
+    """
+    own, process = (read_results(folder / "settings.csv", answer) for answer in ("own", "process"))
+    return Results({name: own[name] if "-model@" in name else each for name, each in process.items()})
+
+
+def settings_rows(results: Results, at: int) -> list[list[str]]:
+    """A row for each learner, its errors (m) in each setting; a dash where it is the same as in `as-it-is`."""
+    return [
+        [f"`{name}`", *(shown(partial(results.iqm, f"{name}@{setting}", at), ".3f") for setting in SETTINGS)]
+        for name in EVERYBODY
+    ]
+
+
+def ideas_rows(results: Results, at: int = LAST_HERE) -> list[list[str]]:
+    """A row for each comparison: the ratio of errors with an idea and without it in each setting, bold where its
+    interval excludes 1."""
+
+    def cell(pair: tuple[str, str], setting: str) -> str:
+        try:
+            found = _ratio(results, pair, setting, at)
+        except NotRun:
+            return "-"
+        return f"**{show(found)}**" if _sign(found) else show(found)
+
+    return [
+        [idea, f"`{ours}` / `{theirs}`", *(cell((ours, theirs), setting) for setting in SETTINGS)]
+        for idea, pairs in IDEAS.items()
+        for ours, theirs in pairs
+    ]
+
+
+def where_it_pays(results: Results, at: int = LAST_HERE) -> str:
+    """A line for each idea: the settings in which it lowers the error, and those in which it raises it."""
+    lines = []
+    for idea, pairs in IDEAS.items():
+        signs = {(pair, setting): _known(results, pair, setting, at) for pair in pairs for setting in SETTINGS}
+        pays, costs = (_listed([each for each, sign in signs.items() if sign == wanted]) for wanted in (-1, 1))
+        lines.append(f"- **{idea}** pays: {pays}. It costs: {costs}.")
+    return "\n".join(lines)
+
+
+def _listed(found: Sequence[tuple[tuple[str, str], str]]) -> str:
+    by_learner: dict[str, list[str]] = {}
+    for (ours, _), setting in found:
+        by_learner.setdefault(ours, []).append(setting)
+    return "; ".join(f"`{ours}` in {', '.join(settings)}" for ours, settings in by_learner.items()) or "nowhere"
+
+
+def _known(results: Results, pair: tuple[str, str], setting: str, at: int) -> int:
+    try:
+        return _sign(_ratio(results, pair, setting, at))
+    except NotRun:
+        return 0
+
+
+def _sign(ratio: Interval) -> int:
+    """-1 below 1 for certain, 1 above it, 0 neither."""
+    return int(ratio.low > 1) - int(ratio.high < 1)
+
+
+def _ratio(results: Results, pair: tuple[str, str], setting: str, at: int) -> Interval:
+    """Of the errors of ours and theirs, paired by seed. A learner without a teacher is the same under every teacher."""
+    names = (f"{name}@{setting}" for name in pair)
+    found = [results.at(name if name in EXPERIMENTS["settings"] else _as_it_is(name), at) for name in names]
+    ours, theirs = (np.array([*errors.values()]) for errors in shared(*found))
+    return ratio_interval(ours, theirs, rng=rng(), paired=True)
+
+
+def _as_it_is(name: str) -> str:
+    return f"{name.partition('@')[0]}@as-it-is"
