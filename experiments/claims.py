@@ -3,7 +3,7 @@
 Each page is a template in experiments/pages/, which has the text; the tables are put in by name. Change the template,
 not the page. The tables come from the rows in --results, which compare.py writes:
 
-  RESULTS         paper.csv, and goals.csv and anova.csv if they exist
+  RESULTS         paper.csv, and goals.csv, anova.csv and said.csv (what 0.1 claimed) if they exist
   FORWARD_MODEL   forward_model.csv, and the table of model_figures.py (--table) if it exists
   GYMNASIUM       gymnasium.csv
   LEARNING        learning.csv and suite.csv
@@ -42,7 +42,7 @@ with loading():  # Ctrl-C shows no traceback
     from model_claims import MODEL_CLAIMS, SIMPLEX
     from paper_claims import PAPER_CLAIMS
     from quoted import MADE, Page, into_readme, render
-    from read_results import LAST, Evaluated, ResultsError, read_coverages, read_goals, read_results
+    from read_results import LAST, Evaluated, ResultsError, read_coverages, read_goals, read_results, read_said
     from settings_tables import SETTINGS, ideas_rows, read_settings, settings_rows, where_it_pays
     from sgimd_torch.files import make_folder, write_text
     from sgimd_torch.views.statistics import iqm_interval, metres, rng, show
@@ -98,6 +98,7 @@ def paper_page(folder: Path) -> Page:
         "ladder": _ladder_table(own, ""),
         "ladder_large": _ladder_table(own, "-large"),
         "claims": verdicts_table("claim", verdicts),
+        "said": said_table(read_said(folder / "said.csv"), verdicts),
         "learners": variants_table([variant.variant for variant in learners], columns),
         "ablations": variants_table([variant.variant for variant in others], columns),
         "anova": markdown(ANOVA, anova_cells(folder / "anova.csv")),
@@ -315,6 +316,26 @@ def verdicts_table(what: str, verdicts: Sequence[Verdict]) -> str:
     """One row for each claim; ``what`` heads the first column."""
     cells = [(row.claim, row.bar, row.number, row.effect, _in_words(row)) for row in verdicts]
     return markdown((what, "bar", "our number [95 % interval]", "difference [95 % interval]", "verdict"), cells)
+
+
+def said_table(said: Mapping[str, tuple[str, str]], verdicts: Sequence[Verdict]) -> str:
+    """One row for each claim of an earlier version: what it said, and what is said now, bold where a verdict changed.
+
+    Raises:
+        ResultsError: a claim is not judged any more.
+    """
+    now = {row.claim: row for row in verdicts}
+    if lost := said.keys() - now.keys():
+        raise ResultsError(f"said.csv has {', '.join(sorted(lost))}, which is not judged any more; was it renamed?")
+    cells = [
+        (claim, number, verdict, now[claim].number, _bold(now[claim].verdict, now[claim].verdict != verdict))
+        for claim, (number, verdict) in said.items()
+    ]
+    return markdown(("claim", "we said", "verdict then", "now we say", "verdict now"), cells)
+
+
+def _bold(text: str, when: bool) -> str:
+    return f"**{text}**" if when else text
 
 
 def _in_words(row: Verdict) -> str:

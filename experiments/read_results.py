@@ -28,6 +28,7 @@ HEADER = (
 GOALS_HEADER = ("variant", "seed", "n_goals", "n_near")
 CONTEXTS_HEADER = ("variant", "seed", "movements", "answer", "low", "high", "mean_error_m")
 ASKED_HEADER = ("variant", "seed", "teacher", "requests", "shown", "late", "late_own", "strong", "weak")
+SAID_HEADER = ("claim", "number", "verdict")
 MODEL_HEADER = (
     *("run", "predicted", "error_m", "inside_50_last", "inside_80_last", "inside_95_last"),
     *("inside_50_late", "inside_80_late", "inside_95_late", "improved", "refreshes", "diverged", "ms_per_refresh"),
@@ -211,6 +212,15 @@ def read_rows(
         if len(fields) != len(header):
             raise ResultsError(f"{where} has {len(fields)} fields, not {len(header)}; was writing cut short?")
         yield where, dict(zip(header, fields, strict=True))
+
+
+def read_said(path: str | os.PathLike[str]) -> dict[str, tuple[str, str]]:
+    """Claim -> our number and the verdict in an earlier version of the page; {} without file.
+
+    Raises:
+        ResultsError: it is another table.
+    """
+    return {row["claim"]: (row["number"], row["verdict"]) for _, row in read_rows(path, SAID_HEADER, optional=True)}
 
 
 def read_seeds(folder: Path, variant: str) -> list[Run]:

@@ -372,3 +372,19 @@ def test_the_help_teaches(capsys):
     assert all(name in said for name in PAGES)
     assert "experiments/pages/" in said
     assert "python experiments/claims.py --runs runs" in said
+
+
+def test_what_an_earlier_version_said_stands_beside_what_is_said_now(results, tmp_path):
+    lines = ["claim,number,verdict", f"{NAMES[0]},ratio 0.42,holds", f"{NAMES[1]},ratio 0.90,cannot say"]
+    (tmp_path / "said.csv").write_text("\n".join(lines) + "\n")
+    assert make_page(results, tmp_path / "pages") == 0
+    page = (tmp_path / "pages/RESULTS.md").read_text()
+    assert f"| {NAMES[0]} | ratio 0.42 | holds | ratio 0.40 [0.40, 0.40] | holds |" in page
+    assert f"| {NAMES[1]} | ratio 0.90 | cannot say | ratio 0.75 [0.75, 0.75] | **holds** |" in page
+
+
+def test_a_claim_that_was_made_and_is_not_judged_any_more_is_named(results, tmp_path, capsys):
+    (tmp_path / "said.csv").write_text("claim,number,verdict\nIt flies,2 m,holds\n")
+    assert make_page(results, tmp_path / "pages") == 2
+    assert "said.csv has It flies, which is not judged any more" in capsys.readouterr().err
+    assert not (tmp_path / "pages/RESULTS.md").exists()
