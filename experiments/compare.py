@@ -25,7 +25,7 @@ with loading():  # Ctrl-C shows no traceback
     import numpy as np
 
     from read_results import HEADER
-    from sgimd_torch.catalogue import did_you_mean
+    from sgimd_torch.catalogue import unknown
     from sgimd_torch.files import make_folder
     from sgimd_torch.runs.config import Config
     from sgimd_torch.runs.engines.loop import sweep
@@ -258,7 +258,7 @@ def _check_names(experiments: Sequence[str], only: Sequence[str]) -> None:
 
 def _check_known(what: str, name: str, known: Collection[str]) -> None:
     if name not in known:
-        raise ValueError(f"unknown {what} {name!r}, known are {', '.join(known)}{did_you_mean(name, known)}")
+        raise unknown(what, name, known)
 
 
 if __name__ == "__main__":

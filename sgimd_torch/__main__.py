@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 from sgimd_torch import __version__
-from sgimd_torch.catalogue import did_you_mean
+from sgimd_torch.catalogue import unknown
 from sgimd_torch.runs.process import command, loading
 
 
@@ -79,8 +79,7 @@ def _call(words: Sequence[str]) -> int:
         print(f"sgimd_torch {__version__}")
         return 0
     if name not in COMMANDS:
-        known = f"known are {', '.join(COMMANDS)}{did_you_mean(name, COMMANDS)}"
-        raise ValueError(f"unknown command {name!r}, {known}; sgimd --help explains them")
+        raise unknown("command", name, COMMANDS, "; sgimd --help explains them")
     chosen = COMMANDS[name]
     try:
         with loading():

@@ -12,7 +12,7 @@ import importlib
 import inspect
 import os
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from functools import partial, wraps
@@ -415,10 +415,7 @@ def find(kind: str, word: str) -> Entry:
     if word in known:
         return known[word]
     if ":" not in word:
-        raise ValueError(
-            f"unknown {kind} {word!r}, known are {', '.join(known)}, and package.module:attribute for one of your own"
-            f"{did_you_mean(word, known)}"
-        )
+        raise unknown(kind, word, known, ", and package.module:attribute for one of your own")
     made = load(word, f"{kind} {word}")
     call, _ = _WANTED[kind]
     if not callable(made):
@@ -515,6 +512,12 @@ def colour(algorithm: str) -> str:
     """How figures draw an algorithm."""
     entry = CATALOGUE["algorithm"].get(algorithm)
     return entry.colour if entry else "black"
+
+
+def unknown(what: str, word: str, known: Collection[str], also: str = "") -> ValueError:
+    """The error for a ``word`` that is none of those ``known``: the nearest first, then all, then ``also``."""
+    near = did_you_mean(word, known)
+    return ValueError(f"unknown {what} {word!r}{f'{near} Known' if near else '; known'} are {', '.join(known)}{also}")
 
 
 def did_you_mean(name: str, known: Iterable[str], most: int = 1) -> str:

@@ -314,7 +314,7 @@ def test_a_run_that_was_killed_goes_on_to_the_same_files(tmp_path):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (("--teachers", "low-haf"), "unknown teachers 'low-haf', known are all, .* did you mean low-half"),
+        (("--teachers", "low-haf"), "unknown teachers 'low-haf'; did you mean low-half"),
         (("--teachers", "all,all"), "teachers must name at least one, and each once, got all,all"),
         (("--teachers", "all,slow"), "sgim_im asks one teacher, got 2"),
         (("--cost", "0"), "cost must be above 0"),

@@ -133,7 +133,7 @@ def test_a_run_has_the_answers_that_were_asked_for_and_its_log_does_not_depend_o
         ("linear", "answers must begin with own and name each once, got linear"),
         ("process,own", "answers must begin with own and name each once, got process,own"),
         ("own,own", "answers must begin with own and name each once, got own,own"),
-        ("own,liner", "unknown inverse 'liner', .*did you mean linear"),
+        ("own,liner", "unknown inverse 'liner'; did you mean linear"),
     ],
 )
 def test_answers_that_make_no_sense_are_refused(tmp_path, go, capsys, answers, message):
@@ -177,13 +177,13 @@ def test_a_damaged_config_is_named(tmp_path, go, capsys):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ("--algorithm sgimd", "unknown algorithm 'sgimd', known are random, sagg-riac, .* did you mean sgim-d"),
+        ("--algorithm sgimd", "unknown algorithm 'sgimd'; did you mean sgim-d"),
         ("--algorithm 'sgim d'", "did you mean sgim-d"),
         ("--algorithm ''", "unknown algorithm"),
         ("--sede 3", "unknown option --sede; did you mean --seed"),
         ("--see 3", "unknown option --see"),
-        ("--search downhill", "unknown search 'downhill', known are nelder-mead"),
-        ("--environment planar-arm", "unknown environment 'planar-arm', known are fishing-rod, .* did you mean planar"),
+        ("--search downhill", "unknown search 'downhill'; known are nelder-mead"),
+        ("--environment planar-arm", "unknown environment 'planar-arm'; did you mean planar"),
         ("--seed -1", "seed must be at least 0, got -1"),
         ("--seed three", "--seed must be a whole number, got three\n"),
         ("--seed", "seed.*expected one argument"),

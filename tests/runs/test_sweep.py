@@ -76,7 +76,7 @@ def test_values_and_further_options_become_those_of_the_runs():
     ("options", "message"),
     [
         ("--vary gaols=uniform", "unknown option --gaols=uniform; did you mean --goals?"),
-        ("--vary goals=unifrom,grid", "unknown goals 'unifrom', known are .*; did you mean uniform?"),
+        ("--vary goals=unifrom,grid", "unknown goals 'unifrom'; did you mean uniform?"),
         ("--vary budget=5,x", "--budget must be a whole number, or null, got x"),
         ("--vary budget=5,0", "budget must be .*at least 1, got 0"),
         ("--vary goals", "--vary must be like goals=interest-map,uniform, got 'goals'"),
