@@ -34,9 +34,10 @@ from sgimd_torch.environments.protocol import execute_many
 from sgimd_torch.runs.build import task_of
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.tasks import Task, benchmark_of, demonstrations_of
-from sgimd_torch.spaces import check_count, stream
+from sgimd_torch.spaces import Array, check_count, stream
 
 TIMED = 20  # movements
+NARROW = 0.05  # of the sides of T; where random movements span less, most goals may be out of reach
 
 
 def parser() -> argparse.ArgumentParser:
@@ -97,14 +98,25 @@ def _sizes(task: Task) -> list[str]:
     rngs = [stream(k, "check") for k in range(TIMED)]
     contexts, thetas = [robot.observe(rng) for rng in rngs], [robot.policies.sample(rng) for rng in rngs]
     begun = time.perf_counter()
-    execute_many(robot, contexts, thetas, rngs)
+    outcomes = execute_many(robot, contexts, thetas, rngs)
     milliseconds = 1e3 * (time.perf_counter() - begun) / TIMED
     dims = f"context {robot.contexts.dim}, theta {robot.policies.dim}, outcome {robot.outcomes.dim}"
     goals, notes, _ = benchmark_of(task, None)
     return [
         f"  dimensions: {dims}; {milliseconds:.3g} ms a movement, {TIMED} together",
         f"  goals of evaluation: {len(goals.goals)}",
-        *(f"  {note}" for note in notes),
+        *(f"  {note}" for note in (*notes, *_narrow(np.ptp(outcomes, axis=0) / robot.outcomes.sides))),
+    ]
+
+
+def _narrow(spans: Array) -> list[str]:
+    """A note if random movements span little of T along every side."""
+    if spans.max() >= NARROW:
+        return []
+    parts = ", ".join(f"{100 * span:.2g} %" for span in spans)
+    return [
+        f"{TIMED} random movements span only {parts} of the sides of T; if nothing else gets much farther, make T "
+        "smaller: learners draw goals from all of it"
     ]
 
 

@@ -268,6 +268,9 @@ def task():
 
 def clumsy():
     return PlanarArm(3).nothing
+
+class Wide(PlanarArm):
+    outcomes = property(lambda self: Box.cube(-100, 100, 2), lambda self, value: None)
 """
 
 
@@ -288,6 +291,12 @@ def test_the_command_says_what_it_found(capsys):
         r".*goals of evaluation: 311\n.*demonstrations: 127",
         said,
     )
+
+
+def test_a_task_space_much_larger_than_random_movements_reach_is_told(arms, capsys):
+    assert command(_call, ["check", "my_arms:Wide"]) == 0
+    said = capsys.readouterr().out
+    assert re.search(r"20 random movements span only 0\.\d+ %, 0\.\d+ % of the sides of T; .* make T smaller", said)
 
 
 @pytest.mark.parametrize(
