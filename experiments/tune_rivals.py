@@ -8,6 +8,7 @@ Examples:
   python scripts/make_benchmark.py --seed 3000 --out tuning.npz
   python experiments/tune_rivals.py --benchmark tuning.npz                    everything: an hour on two cores
   python experiments/tune_rivals.py --benchmark tuning.npz --only cma-mae --seeds 1000-1002
+  python experiments/tune_rivals.py --benchmark tuning.npz --best 3 --seeds 1002-1005    more seeds for the best
 """
 
 from __future__ import annotations
@@ -130,6 +131,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--benchmark", type=Path, required=True, help="goals to tune on, of scripts/make_benchmark.py")
     parser.add_argument("--only", nargs="+", choices=RIVALS, default=list(RIVALS), help="only these rivals")
     add_options(parser, seeds="1000-1001")
+    parser.add_argument(
+        "--best", type=int, default=0, metavar="N", help="only the default and the N best settings in the table so far"
+    )
     parser.add_argument("--times", type=int, nargs="+", default=[1000, 5000], help="movements before evaluations")
     parser.add_argument("--table", type=Path, default=Path("results/rivals.csv"), help="default: %(default)s")
     options = parser.parse_args(argv)
@@ -140,30 +144,50 @@ def main(argv: Sequence[str] | None = None) -> int:
     table, benchmark = Table(options.table, COLUMNS, KEY), load_benchmark(options.benchmark)
     benchmark.check(FishingRod())
     known, times = table.rows().keys(), sorted(options.times)
+    found = means(table, options.only, times[-1])
+    good = {name: [in_words({}), *(each.setting for each in found[name][: options.best])] for name in options.only}
     with ProcessPoolExecutor(options.processes) as pool:
         waiting: dict[Future[list[tuple[float, float]]], list[Key]] = {}
         for seed, name in product(options.seeds, options.only):
             for setting in RIVALS[name].settings:
                 keys: list[Key] = [(name, in_words(setting), str(seed), str(when)) for when in times]
-                if not {*keys} <= known:
+                if not {*keys} <= known and (not options.best or in_words(setting) in good[name]):
                     waiting[pool.submit(errors_of, name, setting, seed, benchmark, times)] = keys
         for made in as_completed(waiting):
             rows = [[*key, *errors] for key, errors in zip(waiting[made], made.result(), strict=True)]
             table.merge(rows)
             say(" ".join(map(str, rows[-1])))
-    _print_means(table, options.only, times[-1])
+    for name, settings in means(table, options.only, times[-1]).items():
+        for each in settings:
+            print(f"{name:28} {each.setting:20} {each.linear:.4f} {each.process:.4f} m, {each.seeds} seeds")
     return 0
 
 
-def _print_means(table: Table, names: Sequence[str], last: int) -> None:
-    errors: dict[tuple[str, str], list[list[float]]] = {}
+class Mean(NamedTuple):
+    """Of a setting over its ``seeds``: the errors (m) by both yardsticks."""
+
+    setting: str
+    linear: float
+    process: float
+    seeds: int
+
+
+def means(table: Table, names: Sequence[str], last: int) -> dict[str, list[Mean]]:
+    """Rival -> its settings after the ``last`` movements, the best by both yardsticks together first."""
+    errors: dict[str, dict[str, list[list[float]]]] = {name: {} for name in names}
     for name, setting, _, movements, *found in table.rows().values():
-        if name in names and movements == str(last):
-            errors.setdefault((name, setting), []).append([float(each) for each in found])
-    means = {key: np.mean(found, axis=0).tolist() for key, found in errors.items()}
-    for name, setting in sorted(means, key=lambda key: (key[0], sum(means[key]))):
-        linear, process = means[name, setting]
-        print(f"{name:28} {setting:20} {linear:.4f} {process:.4f} m, {len(errors[name, setting])} seeds")
+        if name in errors and movements == str(last):
+            errors[name].setdefault(setting, []).append([float(each) for each in found])
+    return {
+        name: sorted(
+            (
+                Mean._make((setting, *np.mean(found, axis=0).tolist(), len(found)))
+                for setting, found in settings.items()
+            ),
+            key=lambda each: each.linear + each.process,
+        )
+        for name, settings in errors.items()
+    }
 
 
 if __name__ == "__main__":

@@ -39,6 +39,18 @@ def test_each_setting_gets_a_row_for_each_evaluation_and_none_is_run_twice(tune,
     assert capsys.readouterr().err == ""
 
 
+def test_the_best_so_far_get_more_seeds_and_so_does_the_default(tune, tmp_path, capsys):
+    table = [("isoline-again", f"again={share}", 1000, 40, error, error) for share, error in ((0.1, 0.3), (0.2, 0.2))]
+    lines = [",".join(COLUMNS), *(",".join(map(str, row)) for row in table)]
+    (tmp_path / "rivals.csv").write_text("\n".join(lines) + "\n")
+    assert tune("--only", "isoline-again", "--seeds", 1001, "--best", 1) == 0
+    assert {tuple(row[1:3]) for row in rows(tmp_path)[2:]} == {("again=0.2", "1001")}
+    best, second = capsys.readouterr().out.splitlines()
+    assert "again=0.2" in best
+    assert "2 seeds" in best
+    assert "again=0.1" in second
+
+
 def test_seeds_that_learners_are_judged_by_are_refused(tune, tmp_path, capsys):
     assert tune("--seeds", "0-1") == 2
     assert "seeds must be 1000 or more, got 0" in capsys.readouterr().err
