@@ -10,8 +10,9 @@ not the page. The tables come from the rows in --results, which compare.py write
   BY_HAND         by_hand.csv
   ASKING          asking.csv, asked.csv and contexts.csv
   SETTINGS        settings.csv
+  RIVALS          rivals.csv, which tune_rivals.py writes
 
-ASKING and SETTINGS are left out while there are no rows for them.
+ASKING, SETTINGS and RIVALS are left out while there are no rows for them.
 
 Intervals are bootstrapped with a fixed seed, so the same rows give the same page. The analyses of variance need
 run directories: --runs makes them again and keeps their rows in anova.csv.
@@ -43,6 +44,7 @@ with loading():  # Ctrl-C shows no traceback
     from paper_claims import PAPER_CLAIMS
     from quoted import MADE, Page, into_readme, render
     from read_results import LAST, Evaluated, ResultsError, read_coverages, read_goals, read_results, read_said
+    from rivals_table import rivals_rows
     from settings_tables import SETTINGS, ideas_rows, read_settings, settings_rows, where_it_pays
     from sgimd_torch.files import make_folder, write_text
     from sgimd_torch.views.statistics import iqm_interval, metres, rng, show
@@ -50,8 +52,12 @@ with loading():  # Ctrl-C shows no traceback
     from suite_claims import read_suite, suite_claims, suite_rows
     from variants import EXPERIMENTS, LEARNING, SUITED, ladder
 
-PAGES: Final = ("RESULTS", "FORWARD_MODEL", "GYMNASIUM", "LEARNING", "BY_HAND", "ASKING", "SETTINGS")
-OPTIONAL: Final = {"ASKING": "asking.csv", "SETTINGS": "settings.csv"}  # pages that are left out without their rows
+PAGES: Final = ("RESULTS", "FORWARD_MODEL", "GYMNASIUM", "LEARNING", "BY_HAND", "ASKING", "SETTINGS", "RIVALS")
+OPTIONAL: Final = {
+    "ASKING": "asking.csv",
+    "SETTINGS": "settings.csv",
+    "RIVALS": "rivals.csv",
+}  # pages that are left out without their rows
 ANOVA: Final = ("means compared", "of", "dimensions of theta in which they differ", "smallest p", "largest p")
 ON_ARMS: Final = (250, 500, 1000, 2000)
 EARLY: Final = (300, 500, 1000)
@@ -71,6 +77,7 @@ IN_README: Final = {
     "random-goals-demonstrations": "uniform goals, demonstrations, noise around the nearest movement",
     "cma-mae": "CMA-MAE that saves effort, no teacher",
 }
+YARDSTICKS: Final = ("linear", "process")
 NOBODY: Final = Evaluated("", "", {})
 Cell = Callable[[str], str]  # the text of a variant in a column of a table; raises NotRun if there is none
 
@@ -216,6 +223,12 @@ def settings_page(folder: Path) -> Page:
         **{f"settings_{when}": markdown(["learner", *SETTINGS], settings_rows(results, when)) for when in (500, 2000)},
     }
     return Page([], tables, results)
+
+
+def rivals_page(folder: Path) -> Page:
+    """The page results/RIVALS.md: the search for their settings."""
+    head = ["rival", "setting", "seeds", *(f"`{answer}` at {at}" for at in (1000, LAST) for answer in YARDSTICKS)]
+    return Page([], {"rivals": markdown(head, rivals_rows(folder / "rivals.csv"))}, Results({}))
 
 
 def _alone(name: str) -> str:
@@ -378,6 +391,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         "BY_HAND": lambda: hand_page(folder),
         "ASKING": lambda: asking_page(folder),
         "SETTINGS": lambda: settings_page(folder),
+        "RIVALS": lambda: rivals_page(folder),
     }
     missing = {name: file for name, file in OPTIONAL.items() if not (options.only or (folder / file).exists())}
     say(*(f"{name} is left out: there is no {folder / file} yet" for name, file in missing.items()))

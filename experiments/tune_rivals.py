@@ -25,8 +25,7 @@ from typing import Any, Final, NamedTuple
 from sgimd_torch.runs.process import command, loading, say
 
 with loading():  # Ctrl-C shows no traceback
-    import numpy as np
-
+    from rivals_table import COLUMNS, KEY, in_words, means
     from sgimd_torch import (
         FishingRod,
         LocallyLinear,
@@ -47,8 +46,6 @@ with loading():  # Ctrl-C shows no traceback
     from sgimd_torch.searches.perturb import perturb
     from tables import Key, Table
 
-COLUMNS: Final = ("rival", "setting", "seed", "movements", "linear_error_m", "process_error_m")
-KEY: Final = ("rival", "setting", "seed", "movements")
 FIRST_TUNING_SEED: Final = 1000
 SHOWN_EVERY: Final = 30  # movements between two demonstrations
 Setting = dict[str, Any]
@@ -93,11 +90,6 @@ RIVALS: Final = {
     "isoline-demonstrations": Rival(isoline, True, one_by_one(sd=(0.01, 0.05), first=(10,), imitations=(3, 20))),
     "random-goals-demonstrations": Rival(baseline, True, one_by_one(sd=(0.02, 0.1), budget=(1, 2, 4, 8, 30))),
 }
-
-
-def in_words(setting: Setting) -> str:
-    """A setting as a field of the table: ``sd=0.2``; ``default`` for none."""
-    return " ".join(f"{name}={value}" for name, value in setting.items()) or "default"
 
 
 def errors_of(
@@ -161,33 +153,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         for each in settings:
             print(f"{name:28} {each.setting:20} {each.linear:.4f} {each.process:.4f} m, {each.seeds} seeds")
     return 0
-
-
-class Mean(NamedTuple):
-    """Of a setting over its ``seeds``: the errors (m) by both yardsticks."""
-
-    setting: str
-    linear: float
-    process: float
-    seeds: int
-
-
-def means(table: Table, names: Sequence[str], last: int) -> dict[str, list[Mean]]:
-    """Rival -> its settings after the ``last`` movements, the best by both yardsticks together first."""
-    errors: dict[str, dict[str, list[list[float]]]] = {name: {} for name in names}
-    for name, setting, _, movements, *found in table.rows().values():
-        if name in errors and movements == str(last):
-            errors[name].setdefault(setting, []).append([float(each) for each in found])
-    return {
-        name: sorted(
-            (
-                Mean._make((setting, *np.mean(found, axis=0).tolist(), len(found)))
-                for setting, found in settings.items()
-            ),
-            key=lambda each: each.linear + each.process,
-        )
-        for name, settings in errors.items()
-    }
 
 
 if __name__ == "__main__":

@@ -5,6 +5,7 @@ import csv
 import numpy as np
 import pytest
 
+from claims import main as claims
 from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.runs.process import command
@@ -76,3 +77,20 @@ def test_the_baseline_is_that_of_the_variants():
     learner = baseline(FishingRod(threads=1), 0, correspondence=FishingRod(threads=1).primitive.correspondence)
     parts = learner.autonomous
     assert [type(part).__name__ for part in (parts.goals, parts.inverse)] == ["UniformGoals", "NearestNeighbour"]
+
+
+def test_the_page_lists_settings_the_best_first_and_the_default_in_bold(tmp_path):
+    rows = [
+        ("isoline", setting, seed, when, error, error + 0.01)
+        for setting, error in (("default", 0.06), ("sd=0.01", 0.05), ("sd=0.05", 0.07))
+        for seed in (1000, 1001)
+        for when in (1000, 5000)
+    ]
+    (tmp_path / "rivals.csv").write_text("\n".join(",".join(map(str, row)) for row in (COLUMNS, *rows)) + "\n")
+    assert command(claims, ["--results", str(tmp_path), "--out", str(tmp_path / "pages"), "--only", "RIVALS"]) == 0
+    lines = (tmp_path / "pages/RIVALS.md").read_text().splitlines()
+    assert [line for line in lines if line.startswith("| `isoline`")] == [
+        "| `isoline` | `sd=0.01` | 2 | 0.0500 | 0.0600 | 0.0500 | 0.0600 |",
+        "| `isoline` | **default** | 2 | 0.0600 | 0.0700 | 0.0600 | 0.0700 |",
+        "| `isoline` | `sd=0.05` | 2 | 0.0700 | 0.0800 | 0.0700 | 0.0800 |",
+    ]
