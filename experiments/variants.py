@@ -155,11 +155,12 @@ TEACHERS: Final[dict[str, Variant]] = {
     "one-corner": {"demonstrations": CORNER},
     "shuffled": {"demonstrations": SHUFFLED},
 }
+PROVED_MODEL: Final[Variant] = {"inverse": "model-proved"}  # it answers where `process` expects no more error of it
 UNTAUGHT: Final[dict[str, Variant]] = {
     "random": {"algorithm": "random"},
     "uniform": {**SAGG_RIAC, **BASELINE},
     "sagg-riac": SAGG_RIAC,
-    "sagg-riac-model": ALONE,
+    "sagg-riac-model": {**SAGG_RIAC, **PROVED_MODEL},
     "practice": {"algorithm": "practice"},
     "cma-mae": {"algorithm": "cma-mae"},
 }
@@ -168,7 +169,7 @@ TAUGHT_ALIKE: Final[dict[str, Variant]] = {
     "imitation": {"algorithm": "imitation"},
     "uniform-taught": {**SGIM_D, **BASELINE},
     "sgim-d": SGIM_D,
-    "sgim-d-model": MODEL,
+    "sgim-d-model": {**SGIM_D, **PROVED_MODEL},
     "practice-taught": TAUGHT,
 }
 EVERYWHERE: Final[Variant] = {"movements": 2000, "evaluate_at": (500, 1000), "answers": ("own", "linear", "process")}
