@@ -33,7 +33,7 @@ with loading():  # Ctrl-C shows no traceback
     from sgimd_torch.runs.read import finished, read_run
     from sgimd_torch.runs.sweep import add_engines, add_options, engine_of
     from tables import COLUMNS, RESULTS, ROWS, Key, Table, as_text, result_rows
-    from variants import EARLIER, EXPERIMENTS, MADE, Variant, make_subsets, tables_of
+    from variants import EARLIER, EXPERIMENTS, FRESH, MADE, Variant, make_subsets, tables_of
 
 EXAMPLES: Final = f"""experiments: {", ".join(EXPERIMENTS)}
 
@@ -178,7 +178,7 @@ def runs_of(
                     changes["demonstrations"] = out / "demonstrations" / shown
                 floor_at = FLOOR_AT if experiment in FLOORS else ()
                 fixed: Variant = {"answers": ANSWERS, "floor_at": floor_at}
-                if experiment in EARLIER:
+                if experiment in EARLIER and seed < FRESH:
                     fixed["inverse"] = "linear"
                 whole = {"seed": seed, "out": out, "name": variant, **fixed, **changes}
                 found.append((experiment, Config(**whole)))
