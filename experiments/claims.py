@@ -48,9 +48,8 @@ with loading():  # Ctrl-C shows no traceback
     from settings_tables import SETTINGS, ideas_rows, read_settings, settings_rows, where_it_pays
     from sgimd_torch.files import make_folder, write_text
     from sgimd_torch.views.statistics import iqm_interval, metres, rng, show
-    from sgimd_torch.views.suite import RANDOM
-    from suite_claims import read_suite, suite_claims, suite_rows
-    from variants import EXPERIMENTS, LEARNING, SUITED, ladder
+    from suite_claims import SUITE_COLUMNS, read_suite, suite_claims, suite_rows
+    from variants import EXPERIMENTS, LEARNING, ladder
 
 PAGES: Final = ("RESULTS", "FORWARD_MODEL", "GYMNASIUM", "LEARNING", "BY_HAND", "ASKING", "SETTINGS", "RIVALS")
 OPTIONAL: Final = {
@@ -167,13 +166,13 @@ def learning_page(folder: Path) -> Page:
         "by `linear`": lambda name: show(rod["linear"].iqm(name), ".4f"),
         "times its noise floor": lambda name: show(rod["own"].floor_ratio(name, name)),
     }
-    others = [name for name in SUITED if name != RANDOM]
+    on_tasks = ["task", "seeds", "random, `nearest`", *(f"{name}, `{answer}`" for name, answer in SUITE_COLUMNS)]
     tables = {
         "claims": verdicts_table("what", verdicts),
         "suite_claims": verdicts_table("what", on_suite),
         "rod": variants_table(names, columns),
         "answers": markdown(["memory of", "over", *map(str, times)], answers_rows(rod)),
-        **{f"suite_{when}": markdown(["task", "random, nearest", *others], suite_rows(suite, when)) for when in TIMES},
+        **{f"suite_{when}": markdown(on_tasks, suite_rows(suite, when)) for when in TIMES},
     }
     return Page([*verdicts, *on_suite], tables, rod["judged"])
 
@@ -227,7 +226,8 @@ def settings_page(folder: Path) -> Page:
 
 def rivals_page(folder: Path) -> Page:
     """The page results/RIVALS.md: the search for their settings."""
-    head = ["rival", "setting", "seeds", *(f"`{answer}` at {at}" for at in (1000, LAST) for answer in YARDSTICKS)]
+    when = ("1000", f"{LAST}", f"{LAST}, later seeds")
+    head = ["rival", "setting", *(f"`{answer}` at {at}" for at in when for answer in YARDSTICKS)]
     return Page([], {"rivals": markdown(head, rivals_rows(folder / "rivals.csv"))}, Results({}))
 
 

@@ -24,7 +24,7 @@ from sgimd_torch.runs.process import command, loading, say
 with loading():  # Ctrl-C shows no traceback
     import numpy as np
 
-    from read_results import HEADER
+    from read_results import FRESH, HEADER
     from sgimd_torch.catalogue import unknown
     from sgimd_torch.files import make_folder
     from sgimd_torch.runs.config import Config
@@ -33,7 +33,7 @@ with loading():  # Ctrl-C shows no traceback
     from sgimd_torch.runs.read import finished, read_run
     from sgimd_torch.runs.sweep import add_engines, add_options, engine_of
     from tables import COLUMNS, RESULTS, ROWS, Key, Table, as_text, result_rows
-    from variants import EARLIER, EXPERIMENTS, FRESH, MADE, Variant, make_subsets, tables_of
+    from variants import EARLIER, EXPERIMENTS, MADE, Variant, make_subsets, tables_of
 
 EXAMPLES: Final = f"""experiments: {", ".join(EXPERIMENTS)}
 
@@ -51,7 +51,7 @@ Exit code: 0 all runs are in the tables, 1 some failed, 2 the request is wrong, 
 # These measure the noise floor, which takes as long as everything else.
 FLOORS: Final = ("learners", "teachers", "long", "letter", "ladder", "forward-model")
 FLOOR_AT: Final = (5000, 10_000)
-ANSWERS: Final = ("own", "nearest", "linear", "model")  # every run is evaluated by each of them
+ANSWERS: Final = ("own", "nearest", "linear", "model", "process")  # every run is evaluated by each of them
 ANSWER: Final = HEADER.index("answer")
 ROUNDING: Final = 1e-5  # relative; another processor rounds differently, and errors grow over thousands of movements
 
@@ -179,7 +179,7 @@ def runs_of(
                 floor_at = FLOOR_AT if experiment in FLOORS else ()
                 fixed: Variant = {"answers": ANSWERS, "floor_at": floor_at}
                 if experiment in EARLIER and seed < FRESH:
-                    fixed["inverse"] = "linear"
+                    fixed |= {"inverse": "linear", "answers": ANSWERS[:-1]}
                 whole = {"seed": seed, "out": out, "name": variant, **fixed, **changes}
                 found.append((experiment, Config(**whole)))
     return found

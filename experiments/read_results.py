@@ -9,7 +9,7 @@ from __future__ import annotations
 import csv
 import math
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -37,6 +37,7 @@ REGIONS: Final = (50, 80, 95)  # percent of the outcomes that a region of the mo
 UNKNOWN: Final = ("", "nan")
 MAY_BE_UNKNOWN: Final = ("noise_floor_m", "goals_claimed", "goals_met")
 LEARNERS: Final = ("random", "sagg-riac", "observation", "imitation", "sgim-d")  # the paper's five
+FRESH: Final = 100  # the first seed that was not looked at while defaults were changed
 FIRST: Final = 250  # movements before the first evaluation
 LAST: Final = 5000  # movements in the life of a learner of the paper
 
@@ -88,7 +89,7 @@ def read_results(path: str | os.PathLike[str], answer: str = OWN) -> dict[str, E
     """
     found: dict[str, Evaluated] = {}
     runs: dict[str, tuple[str, str, float]] = {}
-    for where, row in read_rows(path, HEADER):
+    for where, row in _counted(read_rows(path, HEADER)):
         variant, seed, movements = row["variant"], _count(row, "seed", where), _count(row, "movements", where)
         run = (row["experiment"], row["teacher"], number(row, "task_space", where))
         if runs.setdefault(variant, run) != run:
@@ -107,6 +108,13 @@ def read_results(path: str | os.PathLike[str], answer: str = OWN) -> dict[str, E
     return found
 
 
+def _counted(rows: Iterable[tuple[str, dict[str, str]]]) -> list[tuple[str, dict[str, str]]]:
+    """Once there are fresh seeds, the rows of others do not count."""
+    rows = list(rows)
+    fresh = [row for row in rows if row[1]["seed"].isdigit() and int(row[1]["seed"]) >= FRESH]
+    return fresh or rows
+
+
 def read_goals(path: str | os.PathLike[str]) -> dict[str, Array]:
     """Variant -> ``(n_seeds, 2)``: how many goals a run chose, and how many of them near the origin; {} without file.
 
@@ -114,7 +122,7 @@ def read_goals(path: str | os.PathLike[str]) -> dict[str, Array]:
         ResultsError: a line makes no sense.
     """
     found: dict[str, list[tuple[int, int]]] = {}
-    for where, row in read_rows(path, GOALS_HEADER, optional=True):
+    for where, row in _counted(read_rows(path, GOALS_HEADER, optional=True)):
         goals, near = _count(row, "n_goals", where), _count(row, "n_near", where)
         if not near <= goals or goals == 0:
             raise ResultsError(f"{where}: n_near must be at most n_goals, and n_goals above 0, got {near} and {goals}")

@@ -6,7 +6,7 @@ tune_rivals.py makes the rows.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -19,6 +19,7 @@ COLUMNS: Final = ("rival", "setting", "seed", "movements", "linear_error_m", "pr
 KEY: Final = ("rival", "setting", "seed", "movements")
 DEFAULT: Final = "default"
 EARLY: Final = 1000
+FIRST_ROUND: Final = frozenset((1000, 1001))  # seeds of all settings
 
 
 def in_words(setting: Mapping[str, Any]) -> str:
@@ -35,11 +36,11 @@ class Mean(NamedTuple):
     seeds: int
 
 
-def means(table: Table, names: Sequence[str], last: int) -> dict[str, list[Mean]]:
-    """Rival -> its settings after the ``last`` movements, the best by both yardsticks together first."""
+def means(table: Table, names: Sequence[str], last: int, but: Collection[int] = ()) -> dict[str, list[Mean]]:
+    """Rival -> its settings after the ``last`` movements, of all seeds ``but`` some; the best first."""
     errors: dict[str, dict[str, list[list[float]]]] = {name: {} for name in names}
-    for name, setting, _, movements, *found in table.rows().values():
-        if name in errors and movements == str(last):
+    for name, setting, seed, movements, *found in table.rows().values():
+        if name in errors and movements == str(last) and int(seed) not in but:
             errors[name].setdefault(setting, []).append([float(each) for each in found])
     return {
         name: sorted(
@@ -54,16 +55,24 @@ def means(table: Table, names: Sequence[str], last: int) -> dict[str, list[Mean]
 
 
 def rivals_rows(path: Path) -> list[list[str]]:
-    """A row for each setting of each rival, the best first, the default bold: seeds, errors (m) early and late."""
+    """A row for each setting of each rival, the best of the first round first, the default bold: its errors (m) early
+    and late in the first round, and late on the seeds that the best got afterwards."""
     table = Table(path, COLUMNS, KEY)
-    names = list(dict.fromkeys(rival for rival, *_ in table.rows().values()))
-    early, late = means(table, names, EARLY), means(table, names, LAST)
-    rows = []
-    for name in names:
-        before = {each.setting: each for each in early[name]}
-        for setting, linear, process, seeds in late[name]:
-            shown = f"**{setting}**" if setting == DEFAULT else f"`{setting}`"
-            first = before[setting]
-            errors = (first.linear, first.process, linear, process)
-            rows.append([f"`{name}`", shown, str(seeds), *(f"{error:.4f}" for error in errors)])
-    return rows
+    keys = table.rows()
+    names = list(dict.fromkeys(rival for rival, *_ in keys))
+    later = {int(seed) for _, _, seed, _ in keys} - FIRST_ROUND
+    rounds = [means(table, names, *of) for of in ((EARLY, later), (LAST, later), (LAST, FIRST_ROUND))]
+    return [
+        [
+            f"`{name}`",
+            f"**{setting}**" if setting == DEFAULT else f"`{setting}`",
+            *(cell for found in rounds for cell in _in_metres(found[name], setting)),
+        ]
+        for name in names
+        for setting, *_ in rounds[1][name]
+    ]
+
+
+def _in_metres(found: Sequence[Mean], setting: str) -> list[str]:
+    each = next((each for each in found if each.setting == setting), None)
+    return ["-", "-"] if each is None else [f"{each.linear:.4f}", f"{each.process:.4f}"]

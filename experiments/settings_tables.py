@@ -22,10 +22,10 @@ from variants import EVERYWHERE, EXPERIMENTS, ROBOTS, TAUGHT_ALIKE, TEACHERS, UN
 SETTINGS: Final = (*ROBOTS, *TEACHERS)
 EVERYBODY: Final = (*UNTAUGHT, *TAUGHT_ALIKE)
 LAST_HERE: Final[int] = EVERYWHERE["movements"]
-# What has the idea against what lacks only that: without a teacher, and with one.
+# What has the idea against what lacks it: without a teacher, and with one.
 IDEAS: Final = {
-    "Choosing goals by interest": (("sagg-riac", "uniform"), ("sgim-d", "uniform-taught")),
-    "Practising what is known": (("practice", "sagg-riac"), ("practice-taught", "sgim-d")),
+    "Choosing goals by interest": (("sagg-riac", "sagg-riac-uniform"), ("sgim-d", "sgim-d-uniform")),
+    "Practice in the place of goal babbling": (("practice", "sagg-riac"), ("practice-taught", "sgim-d")),
     "Being shown": (("sgim-d", "sagg-riac"), ("practice-taught", "practice")),
     "The forward model": (("sagg-riac-model", "sagg-riac"), ("sgim-d-model", "sgim-d")),
 }
@@ -73,7 +73,7 @@ def where_it_pays(results: Results, at: int = LAST_HERE) -> str:
     for idea, pairs in IDEAS.items():
         signs = {(pair, setting): _known(results, pair, setting, at) for pair in pairs for setting in SETTINGS}
         pays, costs = (_listed([each for each, sign in signs.items() if sign == wanted]) for wanted in (-1, 1))
-        lines.append(f"- **{idea}** pays: {pays}. It costs: {costs}.")
+        lines.append(f"- **{idea}** seems to pay: {pays}. It seems to cost: {costs}.")
     return "\n".join(lines)
 
 
@@ -99,8 +99,8 @@ def _sign(ratio: Interval) -> int:
 def _ratio(results: Results, pair: tuple[str, str], setting: str, at: int) -> Interval:
     """Of the errors of ours and theirs, paired by seed. A learner without a teacher is the same under every teacher."""
     names = (f"{name}@{setting}" for name in pair)
-    found = [results.at(name if name in EXPERIMENTS["settings"] else _as_it_is(name), at) for name in names]
-    ours, theirs = (np.array([*errors.values()]) for errors in shared(*found))
+    first, second = (results.at(name if name in EXPERIMENTS["settings"] else _as_it_is(name), at) for name in names)
+    ours, theirs = (np.array([*errors.values()]) for errors in shared(first, second))
     return ratio_interval(ours, theirs, rng=rng(), paired=True)
 
 

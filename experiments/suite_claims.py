@@ -15,7 +15,7 @@ from typing import Final
 
 import numpy as np
 
-from judging import FAILS, HOLDS, Claim, Judged, NotRun, Results, all_of, at_most, shared
+from judging import FAILS, HOLDS, OPEN, Claim, Judged, NotRun, Results, all_of, at_most, shared
 from learning_claims import TIMES, read_learning, shown
 from sgimd_torch.spaces import Array
 from sgimd_torch.views.statistics import interquartile_mean, interval, ratio_interval, rng, show
@@ -24,7 +24,12 @@ from variants import EXPERIMENTS, PROVED, SUITED
 
 Suite = Mapping[str, Results]
 OURS, RIVALS = "practice", ("cma-mae", "map-elites")
-_CLOSEST: Final = 5  # of many ratios, those that are nearest to their bar decide
+# The standard baseline as it is, and answered like the others.
+SUITE_COLUMNS: Final = (
+    (UNIFORM, "nearest"),
+    *((name, "process") for name in SUITED if name != RANDOM),
+)
+SURE: Final = 5.0
 
 
 def read_suite(folder: Path) -> dict[str, Results]:
@@ -46,7 +51,8 @@ def suite_claims(suite: Suite) -> list[Claim]:
 
     def claim(text: str, bar: str, judged: Callable[[Suite], Judged]) -> Claim:
         def at_level(results: Results) -> Judged:
-            return judged({answer: replace(each, level=results.level) for answer, each in suite.items()})
+            level, least = results.level, results.least
+            return judged({answer: replace(each, level=level, least=least) for answer, each in suite.items()})
 
         return Claim(text, bar, at_level, own=True)
 
@@ -65,6 +71,11 @@ def suite_claims(suite: Suite) -> list[Claim]:
             "Better than the standard baseline",
             "interquartile mean over tasks ≤ 0.75 after 1000",
             partial(_over_tasks, ((UNIFORM, "nearest", 1000),), 0.75),
+        ),
+        claim(
+            "... also where the baseline, too, is answered by `process`",
+            "the same; ours, not asked for",
+            partial(_over_tasks, ((UNIFORM, "process", 1000),), 0.75),
         ),
         claim(
             "Better than CMA-MAE and MAP-Elites",
@@ -109,15 +120,22 @@ def _on_each_memory(other: str, suite: Suite) -> Judged:
 def _all_at_most(
     pairs: Mapping[tuple[str, int], tuple[Array, Array]], bar: float, suite: Suite, *, paired: bool
 ) -> Judged:
-    """Are all ratios at most ``bar``? Intervals are made of the largest ones only."""
+    """Are all ratios at most ``bar``? One that stays below it by `SURE` standard errors needs no interval."""
 
     def value(pair: tuple[Array, Array]) -> float:
         return float(interquartile_mean(pair[0]) / interquartile_mean(pair[1]))
 
-    largest = sorted(pairs, key=lambda each: value(pairs[each]), reverse=True)[:_CLOSEST]
+    def reaches(pair: tuple[Array, Array]) -> float:
+        logs = [np.log(errors) for errors in pair]
+        samples = [logs[0] - logs[1]] if paired else logs
+        error = np.sqrt(sum(sample.var(ddof=1) / len(sample) for sample in samples))
+        return value(pair) * float(np.exp(SURE * error))
+
+    largest = sorted(pairs, key=lambda each: value(pairs[each]), reverse=True)
+    largest = [each for each in largest if reaches(pairs[each]) > bar] or largest[:1]
     level = suite["process"].level
     found = {each: ratio_interval(*pairs[each], rng=rng(), paired=paired, level=level) for each in largest}
-    name, at = largest[0]
+    name, at = max(found, key=lambda each: found[each].value)
     over = sum(value(pair) > bar for pair in pairs.values())
     number = f"at most {show(found[name, at])}, {name} at {at}; above the bar {over} of {len(pairs)}"
     return number, all_of(*(at_most(each, bar) for each in found.values()))
@@ -141,35 +159,35 @@ def _over_tasks(theirs: tuple[tuple[str, str, int], ...], bar: float, suite: Sui
 
 
 def _more_data(suite: Suite) -> Judged:
-    """Fails where the error has grown beyond its interval."""
+    """Fails where the error has grown beyond its interval; open where it may have grown."""
     found = {}
     for task in TASKS:
-        late, early = shared(*(suite["process"].at(f"{OURS}.{task}", at) for at in (2000, 500)))
+        found_at = {at: suite["process"].at(f"{OURS}.{task}", at) for at in (500, 2000)}
+        early, late = shared(found_at[500], found_at[2000], suite["process"].least)
         errors = np.array([*late.values()]), np.array([*early.values()])
         found[task] = ratio_interval(*errors, rng=rng(), paired=True, level=suite["process"].level)
     most = max(found, key=lambda task: found[task].value)
-    grown = any(each.low > 1 for each in found.values())
-    return f"at most {show(found[most])} times, {most}", FAILS if grown else HOLDS
+    verdicts = (FAILS if each.low > 1 else OPEN if each.value > 1 else HOLDS for each in found.values())
+    return f"at most {show(found[most])} times, {most}", all_of(*verdicts)
 
 
 def suite_rows(suite: Mapping[str, Results], at: int) -> list[list[str]]:
-    """A row for each task: the error of random movements answered by the nearest neighbour, then that of the others in
-    it; all but the standard baseline are answered by `process`. At the end the interquartile mean over tasks."""
-    names = [name for name in SUITED if name != RANDOM]
-    lines, means = [], {name: list[float]() for name in names}
+    """A row for each task: how many seeds all have, the error of random movements answered by the nearest neighbour,
+    then that of ``SUITE_COLUMNS`` in it. At the end the interquartile mean over tasks."""
+    lines, means = [], {each: list[float]() for each in SUITE_COLUMNS}
     for task in TASKS:
         random = partial(suite["nearest"].iqm, f"{RANDOM}.{task}", at)
-        cells = [titled(task), shown(random, ".3f")]
-        for name in names:
-            ours = suite["nearest" if name == UNIFORM else "process"]
+        cells, seeds = [shown(random, ".3f")], set[int]()
+        for name, answer in SUITE_COLUMNS:
             try:
-                errors = ours.errors(f"{name}.{task}", at), suite["nearest"].errors(f"{RANDOM}.{task}", at)
+                errors = suite[answer].errors(f"{name}.{task}", at), suite["nearest"].errors(f"{RANDOM}.{task}", at)
             except NotRun:
                 cells.append("-")
                 continue
             found = ratio_interval(*errors, rng=rng())
-            means[name].append(found.value)
+            means[name, answer].append(found.value)
             cells.append(show(found))
-        lines.append(cells)
+            seeds |= {len(each) for each in errors}
+        lines.append([titled(task), str(min(seeds, default=0)), *cells])
     over = [f"{interquartile_mean(np.array(each)):.2f}" if each else "-" for each in means.values()]
-    return [*lines, ["interquartile mean over tasks", "", *over]]
+    return [*lines, ["interquartile mean over tasks", "", "", *over]]

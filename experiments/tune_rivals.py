@@ -8,7 +8,7 @@ Examples:
   python scripts/make_benchmark.py --seed 3000 --out tuning.npz
   python experiments/tune_rivals.py --benchmark tuning.npz                    everything: an hour on two cores
   python experiments/tune_rivals.py --benchmark tuning.npz --only cma-mae --seeds 1000-1002
-  python experiments/tune_rivals.py --benchmark tuning.npz --best 3 --seeds 1002-1005    more seeds for the best
+  python experiments/tune_rivals.py --benchmark tuning.npz --best 3 --seeds 1002-1003    more seeds for the best
 """
 
 from __future__ import annotations
@@ -124,7 +124,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--only", nargs="+", choices=RIVALS, default=list(RIVALS), help="only these rivals")
     add_options(parser, seeds="1000-1001")
     parser.add_argument(
-        "--best", type=int, default=0, metavar="N", help="only the default and the N best settings in the table so far"
+        "--best", type=int, default=0, metavar="N", help="only the default and the N best settings of other seeds"
     )
     parser.add_argument("--times", type=int, nargs="+", default=[1000, 5000], help="movements before evaluations")
     parser.add_argument("--table", type=Path, default=Path("results/rivals.csv"), help="default: %(default)s")
@@ -136,7 +136,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     table, benchmark = Table(options.table, COLUMNS, KEY), load_benchmark(options.benchmark)
     benchmark.check(FishingRod())
     known, times = table.rows().keys(), sorted(options.times)
-    found = means(table, options.only, times[-1])
+    found = means(table, options.only, times[-1], options.seeds)
     good = {name: [in_words({}), *(each.setting for each in found[name][: options.best])] for name in options.only}
     with ProcessPoolExecutor(options.processes) as pool:
         waiting: dict[Future[list[tuple[float, float]]], list[Key]] = {}

@@ -161,6 +161,7 @@ UNTAUGHT: Final[dict[str, Variant]] = {
     "random": {"algorithm": "random"},
     "uniform": {**SAGG_RIAC, **BASELINE},
     "sagg-riac": SAGG_RIAC,
+    "sagg-riac-uniform": {**SAGG_RIAC, "goals": "uniform"},
     "sagg-riac-model": {**SAGG_RIAC, **PROVED_MODEL},
     "practice": {"algorithm": "practice"},
     "cma-mae": {"algorithm": "cma-mae"},
@@ -170,6 +171,7 @@ TAUGHT_ALIKE: Final[dict[str, Variant]] = {
     "imitation": {"algorithm": "imitation"},
     "uniform-taught": {**SGIM_D, **BASELINE},
     "sgim-d": SGIM_D,
+    "sgim-d-uniform": {**SGIM_D, "goals": "uniform"},
     "sgim-d-model": {**SGIM_D, **PROVED_MODEL},
     "practice-taught": TAUGHT,
 }
@@ -264,7 +266,7 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
     **{arm: _on_arm(arm) for arm in ARMS},
     "swimmer": {
         **{f"{name}-swimmer": {"algorithm": name, "inverse": "model", **SWIMMER} for name in SWIMMERS},
-        "practice-swimmer": {"algorithm": "practice", **SWIMMER},
+        "practice-swimmer": {"algorithm": "practice", "inverse": "process", **SWIMMER},
     },
     "by-hand": {
         "goals-alone": {**SAGG_RIAC, **SESSION},
@@ -290,7 +292,6 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
 
 # Of these experiments, rows of seeds below FRESH were made when `LocallyLinear` was the default.
 EARLIER: Final = [name for name in EXPERIMENTS if name not in ("asking", "by-hand", "learning", "settings", "suite")]
-FRESH: Final = 100
 
 
 def tables_of(experiment: str) -> list[str]:

@@ -49,6 +49,8 @@ def test_the_best_so_far_get_more_seeds_and_so_does_the_default(tune, tmp_path, 
     best, second = capsys.readouterr().out.splitlines()
     assert "again=0.2" in best
     assert "2 seeds" in best
+    assert tune("--only", "isoline-again", "--seeds", 1001, "--best", 1) == 0  # the new rows do not change the choice
+    assert len(rows(tmp_path)) == 4
     assert "again=0.1" in second
 
 
@@ -86,11 +88,12 @@ def test_the_page_lists_settings_the_best_first_and_the_default_in_bold(tmp_path
         for seed in (1000, 1001)
         for when in (1000, 5000)
     ]
+    rows.append(("isoline", "sd=0.01", 1002, 5000, 0.07, 0.08))
     (tmp_path / "rivals.csv").write_text("\n".join(",".join(map(str, row)) for row in (COLUMNS, *rows)) + "\n")
     assert command(claims, ["--results", str(tmp_path), "--out", str(tmp_path / "pages"), "--only", "RIVALS"]) == 0
     lines = (tmp_path / "pages/RIVALS.md").read_text().splitlines()
     assert [line for line in lines if line.startswith("| `isoline`")] == [
-        "| `isoline` | `sd=0.01` | 2 | 0.0500 | 0.0600 | 0.0500 | 0.0600 |",
-        "| `isoline` | **default** | 2 | 0.0600 | 0.0700 | 0.0600 | 0.0700 |",
-        "| `isoline` | `sd=0.05` | 2 | 0.0700 | 0.0800 | 0.0700 | 0.0800 |",
+        "| `isoline` | `sd=0.01` | 0.0500 | 0.0600 | 0.0500 | 0.0600 | 0.0700 | 0.0800 |",
+        "| `isoline` | **default** | 0.0600 | 0.0700 | 0.0600 | 0.0700 | - | - |",
+        "| `isoline` | `sd=0.05` | 0.0700 | 0.0800 | 0.0700 | 0.0800 | - | - |",
     ]
