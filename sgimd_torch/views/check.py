@@ -34,10 +34,10 @@ from sgimd_torch.environments.protocol import execute_many
 from sgimd_torch.runs.build import task_of
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.tasks import Task, benchmark_of, demonstrations_of
-from sgimd_torch.spaces import Array, check_count, stream
+from sgimd_torch.spaces import Array, Box, check_count, stream
 
 TIMED = 20  # movements
-NARROW = 0.05  # of the sides of T; where random movements span less, most goals may be out of reach
+NARROW = 0.03  # of the volume of T; where random movements span less, most goals may be out of reach
 
 
 def parser() -> argparse.ArgumentParser:
@@ -105,17 +105,19 @@ def _sizes(task: Task) -> list[str]:
     return [
         f"  dimensions: {dims}; {milliseconds:.3g} ms a movement, {TIMED} together",
         f"  goals of evaluation: {len(goals.goals)}",
-        *(f"  {note}" for note in (*notes, *_narrow(np.ptp(outcomes, axis=0) / robot.outcomes.sides))),
+        *(f"  {note}" for note in (*notes, *_narrow(outcomes, robot.outcomes))),
     ]
 
 
-def _narrow(spans: Array) -> list[str]:
-    """A note if random movements span little of T along every side."""
-    if spans.max() >= NARROW:
+def _narrow(outcomes: Array, space: Box) -> list[str]:
+    """A note if random movements span little of T."""
+    low, high = outcomes.min(axis=0), outcomes.max(axis=0)
+    share = float(np.prod((high - low) / space.sides))
+    if share >= NARROW:
         return []
-    parts = ", ".join(f"{100 * span:.2g} %" for span in spans)
+    spans = " x ".join(f"[{a:.3g}, {b:.3g}]" for a, b in zip(low, high, strict=True))
     return [
-        f"{TIMED} random movements span only {parts} of the sides of T; if nothing else gets much farther, make T "
+        f"{TIMED} random movements span only {100 * share:.2g} % of T, {spans}; if nothing gets much farther, make T "
         "smaller: learners draw goals from all of it"
     ]
 

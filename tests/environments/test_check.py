@@ -296,7 +296,7 @@ def test_the_command_says_what_it_found(capsys):
 def test_a_task_space_much_larger_than_random_movements_reach_is_told(arms, capsys):
     assert command(_call, ["check", "my_arms:Wide"]) == 0
     said = capsys.readouterr().out
-    assert re.search(r"20 random movements span only 0\.\d+ %, 0\.\d+ % of the sides of T; .* make T smaller", said)
+    assert re.search(r"20 random movements span only 0\.\d+ % of T, \[.*\] x \[.*\]; .* make T smaller", said)
 
 
 @pytest.mark.parametrize(
