@@ -404,11 +404,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     pages = {name: makers[name]() for name in paths}
     texts = {name: render(name, page) for name, page in pages.items()}
     if options.readme is not None:
-        paper, model, learning = (
-            pages.get(name) or makers[name]() for name in ("RESULTS", "FORWARD_MODEL", "LEARNING")
-        )
-        text = options.readme.read_text(encoding="utf-8")
-        write_text(options.readme, into_readme(text, paper, model=model, learning=learning))
+        paper, model = (pages.get(name) or makers[name]() for name in ("RESULTS", "FORWARD_MODEL"))
+        rod = read_learning(folder / "learning.csv")
+        more = {"model": model.results, **{answer: rod[answer] for answer in YARDSTICKS}}
+        write_text(options.readme, into_readme(options.readme.read_text(encoding="utf-8"), paper, **more))
     make_folder(options.out)
     for name, path in paths.items():
         write_text(path, texts[name])

@@ -122,8 +122,8 @@ def render(name: str, page: Page) -> str:
     return f"{made}\n\n{_filled(name, page)}"
 
 
-def into_readme(text: str, paper: Page, **more: Page) -> str:
-    """A README with its section of results made again from those of these pages.
+def into_readme(text: str, paper: Page, **more: Results) -> str:
+    """A README with its section of results made again from the page of the paper and ``more`` results.
 
     Raises:
         ResultsError: it has no such section.
@@ -132,8 +132,7 @@ def into_readme(text: str, paper: Page, **more: Page) -> str:
     _, end, after = rest.partition(END)
     if not begin or not end:
         raise ResultsError(f"the README must have a section from {BEGIN} to {END}; was it edited?")
-    results = {name: page.results for name, page in more.items()}
-    return f"{before}{BEGIN}\n{_filled('README', paper, **results)}{END}{after}"
+    return f"{before}{BEGIN}\n{_filled('README', paper, **more)}{END}{after}"
 
 
 def _filled(name: str, page: Page, **more: Results) -> str:

@@ -333,12 +333,14 @@ def make_subsets(folder: Path, *, by_hand: bool = False) -> None:
 
 
 def teacher_of(config: Config) -> str:
-    """Who demonstrates: the number of the demonstrator, the file's name, or "structured" for the postures that an arm
-    is shown; who can be asked; "" for a learner without a teacher."""
+    """Who demonstrates: the number of the demonstrator, the file's name, "structured" for the postures that an arm is
+    shown, "scripted" for the swimmer's teacher; who can be asked; "" for a learner without a teacher."""
     if "teachers" in config.used:
         return "+".join(config.teachers)
     if "teacher" not in config.used:
         return ""
     if config.environment in ARMS and config.demonstrations is None:
         return "structured"
+    if config.environment == "swimmer" and config.demonstrations is None:
+        return "scripted"
     return (config.demonstrations or SHIPPED).stem.removeprefix("demonstrator_")

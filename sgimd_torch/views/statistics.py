@@ -65,7 +65,8 @@ def interval(
     """Percentile bootstrap: the statistic of seeds drawn again with replacement, 9999 times; its middle 95 %.
 
     Stratified: seeds are drawn from each sample by itself, as many as it has. If errors are normal, the interval holds
-    the true interquartile mean 94 % of the time with 10 or 20 seeds, but 90 % with 5: there it is too narrow.
+    the true interquartile mean 94 % of the time with 10 or 20 seeds, but 90 % with 5: there it is too narrow. With
+    fewer than ``LEAST_SEEDS`` in a sample there is only a `point`.
 
     Args:
         statistic: of arrays ``(..., n_seeds, *rest)``, one for each sample; returns ``(...)``.
@@ -85,6 +86,9 @@ def interval(
             raise ValueError(f"values must be finite, got {sample[~np.isfinite(sample)][0]}; is an evaluation missing?")
     if paired and len({len(sample) for sample in samples}) > 1:
         raise ValueError(f"pairs need the same seeds, got samples of {[len(sample) for sample in samples]}")
+
+    if min(map(len, samples)) < LEAST_SEEDS:
+        return point(float(statistic(*samples)))
 
     def of_rows(*rows: Array, axis: int) -> Array:
         return statistic(*(sample[row] for sample, row in zip(samples, rows, strict=True)))
@@ -121,7 +125,7 @@ def over_seeds(values: Array) -> Interval | None:
     """Interquartile mean of ``(n_seeds,)``; its interval with ``LEAST_SEEDS`` or more; None if a value is missing."""
     if not len(values) or not np.isfinite(values).all():
         return None
-    return point(float(interquartile_mean(values))) if len(values) < LEAST_SEEDS else iqm_interval(values, rng=rng())
+    return point(float(values[0])) if len(values) == 1 else iqm_interval(values, rng=rng())
 
 
 def ratio_interval(

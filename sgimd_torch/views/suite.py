@@ -14,7 +14,7 @@ tasks only; the others are marked "new".
   sgimd table study/toss                                  one task in its own unit
 
 Start the same command again after Ctrl-C or a power cut, or with more seeds: finished runs stay as they are. The
-figure is OUT/suite.png. With two seeds or more, ratios have bootstrap intervals of 95 %.
+figure is OUT/suite.png. With five seeds or more, ratios have bootstrap intervals of 95 %.
 
 Exit code: 0 all runs are finished, 1 some failed, 2 the request is wrong, 130 or 143 stopped by Ctrl-C or SIGTERM.
 """

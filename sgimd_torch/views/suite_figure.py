@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from sgimd_torch.figures.axes import over_movements
 from sgimd_torch.figures.save import save_figure
 from sgimd_torch.spaces import Array
-from sgimd_torch.views.statistics import Interval, interquartile_mean, interval, rng
+from sgimd_torch.views.statistics import Interval, interquartile_mean, interval, point, rng
 
 Curve = Mapping[int, Array]
 Errors = Mapping[str, Mapping[str, Curve]]
@@ -28,13 +28,13 @@ _OVER_TASKS: Final = "interquartile mean"
 def relative(ours: Curve, theirs: Curve, at: int) -> Interval | None:
     """Mean error of a learner over that of another; None where one of them was not evaluated.
 
-    The interval spans nothing with one seed.
+    There is no interval with fewer than `LEAST_SEEDS`.
     """
     if at not in ours or at not in theirs:
         return None
     ratio = float(ours[at].mean() / theirs[at].mean())
     if min(len(ours[at]), len(theirs[at])) < 2:
-        return Interval(ratio, ratio, ratio)
+        return point(ratio)
     return interval(lambda one, other: one.mean(axis=-1) / other.mean(axis=-1), ours[at], theirs[at], rng=rng())
 
 

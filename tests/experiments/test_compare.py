@@ -296,6 +296,7 @@ def test_teachers_have_the_number_of_the_demonstrator_or_the_name_of_the_file(tm
     assert teacher_of(replace(taught, demonstrations=shipped(1))) == "1"
     assert teacher_of(replace(taught, algorithm="sagg-riac", demonstrations=shipped(1))) == ""
     assert teacher_of(replace(taught, environment="planar-arm-50")) == "structured"
+    assert teacher_of(replace(taught, environment="swimmer")) == "scripted"
     assert teacher_of(replace(taught, environment="planar-arm-50", demonstrations=shipped(1))) == "1"
     ((_, few),) = runs_of(["teaching"], ["few-demonstrations"], range(1), tmp_path)
     assert teacher_of(few) == "few"

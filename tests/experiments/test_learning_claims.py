@@ -94,6 +94,7 @@ def test_where_every_bar_is_cleared_every_one_holds(tmp_path):
         (9, {"practice_shuffled": (0.09, 0.06, 0.04, 0.036, 0.04)}),
         (10, {"practice_shuffled": (0.11, 0.06, 0.04, 0.036, 0.03)}),
         (11, {"by_model": 1.1}),
+        (12, {"uniform_nearest_taught": (0.2, 0.1, 0.08, 0.06, 0.04)}),
     ],
 )
 def test_a_bar_that_is_missed_does_not_hold(tmp_path, claim, spoilt):

@@ -46,7 +46,13 @@ def test_an_interval_is_the_middle_95_percent_of_all_possible_draws(rng):
 
 def test_seeds_are_drawn_within_their_stratum(rng):
     """Two strata without any spread: only mixing them up could make their common mean vary."""
-    assert iqm_interval(np.full(4, 1.0), np.full(4, 3.0), rng=rng) == (2, 2, 2)
+    assert iqm_interval(np.full(5, 1.0), np.full(5, 3.0), rng=rng) == (2, 2, 2)
+
+
+def test_few_seeds_have_a_value_and_no_interval():
+    found = ratio_interval(np.full(4, 1.0), np.full(9, 2.0), rng=statistics.rng())
+    assert (found.value, np.isnan(found.low), np.isnan(found.high)) == (0.5, True, True)
+    assert statistics.show(found) == "0.50"
 
 
 def test_the_same_stream_gives_the_same_interval():
@@ -55,7 +61,7 @@ def test_the_same_stream_gives_the_same_interval():
 
 
 def test_each_number_draws_from_a_stream_of_its_own_and_is_told_with_its_interval():
-    values = np.array([0.4, 0.5, 0.6])
+    values = np.array([0.3, 0.4, 0.5, 0.6, 0.7])
     found = iqm_interval(values, rng=statistics.rng())
     assert found == iqm_interval(values, rng=statistics.rng())  # whatever was computed before
     assert statistics.show(found, ".1f", "m") == f"0.5 [{found.low:.1f}, {found.high:.1f}] m"
@@ -69,7 +75,7 @@ def test_an_interval_holds_the_truth_about_as_often_as_it_says(rng, monkeypatch)
 
 
 def test_halving_every_error_gives_a_ratio_of_one_half(rng):
-    theirs = np.array([0.2, 0.3, 0.25, 0.22])
+    theirs = np.array([0.2, 0.3, 0.25, 0.22, 0.27])
     found = ratio_interval(theirs / 2, theirs, rng=rng)
     assert found.value == pytest.approx(0.5)
     assert found.low < 0.5 < found.high

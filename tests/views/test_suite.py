@@ -99,11 +99,14 @@ def test_a_suite_is_run_shown_and_gone_on_with(tmp_path, capsys):
 
 
 def test_seeds_give_the_ratio_of_means_and_an_interval_around_it():
-    found = relative({100: np.array([0.1, 0.14])}, {100: np.array([0.2, 0.4])}, 100)
+    ours, theirs = np.array([0.1, 0.12, 0.12, 0.12, 0.14]), np.array([0.2, 0.3, 0.3, 0.3, 0.4])
+    found = relative({100: ours}, {100: theirs}, 100)
     assert found.value == pytest.approx(0.4)
     assert 0.1 / 0.4 <= found.low < 0.4 < found.high <= 0.14 / 0.2
-    alone = relative({100: np.array([0.1])}, {100: np.array([0.2])}, 100)
-    assert alone.low == alone.value == alone.high == pytest.approx(0.5)
+    for few in (1, 4):
+        alone = relative({100: ours[:few]}, {100: theirs[:few]}, 100)
+        assert alone.value == pytest.approx(ours[:few].mean() / theirs[:few].mean())
+        assert np.isnan(alone.low)
 
 
 def test_what_was_not_evaluated_is_a_dash_and_no_mean():
