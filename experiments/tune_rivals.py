@@ -28,6 +28,7 @@ with loading():  # Ctrl-C shows no traceback
     from rivals_table import COLUMNS, KEY, in_words, means
     from sgimd_torch import (
         FishingRod,
+        InitialTeacher,
         LocallyLinear,
         PeriodicTeacher,
         evaluate,
@@ -47,15 +48,17 @@ with loading():  # Ctrl-C shows no traceback
     from tables import Key, Table
 
 FIRST_TUNING_SEED: Final = 1000
-SHOWN_EVERY: Final = 30  # movements between two demonstrations
 Setting = dict[str, Any]
+NOBODY: Final = None
+EVERY_30: Final = partial(PeriodicTeacher, every=30)
+AT_ONCE: Final = partial(InitialTeacher, every=1)
 
 
 class Rival(NamedTuple):
-    """What makes it, whether it is taught, and the settings that are tried; {} is its default."""
+    """What makes it, what makes its teacher, and the settings that are tried; {} is its default."""
 
     make: Any
-    taught: bool
+    teacher: Any
     settings: Sequence[Setting]
 
 
@@ -81,14 +84,24 @@ def one_by_one(**values: Sequence[Any]) -> list[Setting]:
 _TEAM: Final = one_by_one(emitters=(1, 3, 10, 15), sd=(0.05, 0.2, 0.3), batch=(8, 30), cells=(10, 40))
 _ELITES: Final = one_by_one(first=(30, 300), batch=(5, 30), cells=(10, 40))
 RIVALS: Final = {
-    "cma-mae": Rival(cma_mae, False, [*_TEAM, *({"learning_rate": rate} for rate in (0.001, 0.1, 0.5))]),
-    "cma-mae-demonstrations": Rival(cma_mae, True, [*_TEAM, *one_by_one(imitations=(3, 20), epsilon=(0.02, 0.1))[1:]]),
-    "cma-me": Rival(cma_me, False, _TEAM),
-    "map-elites": Rival(map_elites, False, [*_ELITES, *({"sd": sd} for sd in (0.02, 0.1, 0.15))]),
-    "isoline": Rival(isoline, False, [*_ELITES, *one_by_one(sd=(0.01, 0.05), line=(0.1, 0.4))[1:]]),
-    "isoline-again": Rival(isoline, False, [{"again": share} for share in (0.1, 0.2, 0.4)]),
-    "isoline-demonstrations": Rival(isoline, True, one_by_one(sd=(0.01, 0.05), first=(10,), imitations=(3, 20))),
-    "random-goals-demonstrations": Rival(baseline, True, one_by_one(sd=(0.02, 0.1), budget=(1, 2, 4, 8, 30))),
+    "cma-mae": Rival(cma_mae, NOBODY, [*_TEAM, *({"learning_rate": rate} for rate in (0.001, 0.1, 0.5))]),
+    "cma-mae-demonstrations": Rival(
+        cma_mae, EVERY_30, [*_TEAM, *one_by_one(imitations=(3, 20), epsilon=(0.02, 0.1))[1:]]
+    ),
+    "cma-mae-demonstrations-once": Rival(
+        partial(cma_mae, imitations=1),
+        AT_ONCE,
+        one_by_one(emitters=(1, 10), sd=(0.05, 0.2), batch=(8,), cells=(10, 40)),
+    ),
+    "cma-me": Rival(cma_me, NOBODY, _TEAM),
+    "map-elites": Rival(map_elites, NOBODY, [*_ELITES, *({"sd": sd} for sd in (0.02, 0.1, 0.15))]),
+    "map-elites-demonstrations": Rival(
+        map_elites, EVERY_30, one_by_one(first=(10, 300), batch=(30,), cells=(10,), imitations=(3, 20))
+    ),
+    "isoline": Rival(isoline, NOBODY, [*_ELITES, *one_by_one(sd=(0.01, 0.05), line=(0.1, 0.4))[1:]]),
+    "isoline-again": Rival(isoline, NOBODY, [{"again": share} for share in (0.1, 0.2, 0.4)]),
+    "isoline-demonstrations": Rival(isoline, EVERY_30, one_by_one(sd=(0.01, 0.05), first=(10,), imitations=(3, 20))),
+    "random-goals-demonstrations": Rival(baseline, EVERY_30, one_by_one(sd=(0.02, 0.1), budget=(1, 2, 4, 8, 30))),
 }
 
 
@@ -98,8 +111,8 @@ def errors_of(
     """The errors (m) of a rival by both yardsticks after each of ``times`` movements, which increase."""
     rival, rod = RIVALS[name], FishingRod(threads=1)
     teacher, taught = None, dict[str, Any]()
-    if rival.taught:
-        teacher = PeriodicTeacher(load_demonstrations(), stream(seed, "teacher"), every=SHOWN_EVERY)
+    if rival.teacher is not NOBODY:
+        teacher = rival.teacher(load_demonstrations(), stream(seed, "teacher"))
         taught = {"correspondence": rod.primitive.correspondence}
     learner = rival.make(rod, seed, **taught, **setting)
     found = []

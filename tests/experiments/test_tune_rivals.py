@@ -9,7 +9,7 @@ from claims import main as claims
 from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.runs.process import command
-from tune_rivals import COLUMNS, RIVALS, baseline, in_words, main
+from tune_rivals import COLUMNS, NOBODY, RIVALS, baseline, in_words, main
 
 
 @pytest.fixture
@@ -63,14 +63,14 @@ def test_seeds_that_learners_are_judged_by_are_refused(tune, tmp_path, capsys):
 @pytest.mark.parametrize("name", RIVALS)
 def test_every_setting_makes_a_learner_and_has_a_name_of_its_own(name):
     rod, rival = FishingRod(threads=1), RIVALS[name]
-    taught = {"correspondence": rod.primitive.correspondence} if rival.taught else {}
+    taught = {} if rival.teacher is NOBODY else {"correspondence": rod.primitive.correspondence}
     for setting in rival.settings:
         learner = rival.make(rod, 1000, **taught, **setting)
-        if rival.taught:
+        if taught:
             learner.watch(load_demonstrations()[0])
         move = learner.ask(np.zeros(0))
         assert rod.policies.contains(move.theta)
-        assert (move.origin == "imitate") == rival.taught
+        assert (move.origin == "imitate") == bool(taught)
     names = [in_words(setting) for setting in rival.settings]
     assert len({*names}) == len(names) > 2
 
