@@ -16,7 +16,7 @@ from typing import Any, Final, NamedTuple
 import jinja2
 
 from judging import NotRun, Results, Verdict
-from read_results import LAST, ResultsError
+from read_results import FRESH, LAST, ResultsError
 from sgimd_torch.views.statistics import Interval, show
 
 MISSING: Final = "(not run)"
@@ -41,6 +41,20 @@ class Quoted:
     """Figures from these results; ``at`` is a number of movements, ``form`` how a number is written."""
 
     results: Results
+
+    @property
+    def looked_at(self) -> bool:
+        """Whether defaults were changed after a look at these seeds."""
+        return min(self._seeds) < FRESH
+
+    @property
+    def range(self) -> str:
+        """The first and the last seed: ``100 to 119``."""
+        return f"{min(self._seeds)} to {max(self._seeds)}"
+
+    @property
+    def _seeds(self) -> set[int]:
+        return {seed for each in self.results.variants.values() for seed, _ in each.rows}
 
     @_or_missing
     def error(self, name: str, at: int = LAST, form: str = ".3f") -> str:
