@@ -19,7 +19,7 @@ TRUE = {  # variant: experiment, its errors (m) by movements
     **{f"{name}-arm-50": ("planar-arm-50", {250: 0.2, 500: 0.1, 1000: 0.03, 2000: 0.01}) for name in JUDGED},
 }
 FLOOR = 0.033  # m
-HONEST = {name: {region: np.full(3, region / 100) for region in REGIONS} for name in JUDGED}
+HONEST = {name: {region: np.full(5, region / 100) for region in REGIONS} for name in JUDGED}
 CLAIMS = [claim for claim, _, _ in BARS]
 
 
@@ -92,7 +92,7 @@ def test_what_was_not_run_is_left_open(tmp_path):
     ],
 )
 def test_a_spread_may_be_neither_overconfident_nor_too_cautious(tmp_path, region, share, verdict):
-    spoilt = {**HONEST["model"], region: np.full(3, share)}
+    spoilt = {**HONEST["model"], region: np.full(5, share)}
     found = verdicts(write(tmp_path / "x.csv"), {**HONEST, "model": spoilt})
     for each in REGIONS:
         assert found[f"calibration, {each} %: `model`"] == (verdict if each == region else "holds")
@@ -113,7 +113,8 @@ def make_page(tmp_path):
 
 def test_the_page_has_its_prose_and_gets_its_tables(tmp_path, capsys):
     write(tmp_path / "forward_model.csv")
-    write_table(tmp_path / "table.csv", ("model/seed-000", 0.8), ("model/seed-001", 0.82), ("gradient/seed-000", "nan"))
+    shares = [(f"model/seed-{seed:03d}", share) for seed, share in enumerate((0.8, 0.82, 0.81, 0.81, 0.81))]
+    write_table(tmp_path / "table.csv", *shares, ("gradient/seed-000", "nan"))
     assert make_page(tmp_path) == 0
     text = (tmp_path / "FORWARD_MODEL.md").read_text()
     assert "\n# The forward model\n" in text
