@@ -25,6 +25,7 @@ TRUE = {  # variant: experiment, teacher, task space, error at 5000 (m), tiles r
     "random-goals-demonstrations-large": ("large-space", 3, 100, 0.11, 250),
     "sgim-d-letter": ("letter", 3, 1, 0.11, 250),
     **{f"{name}-demonstrations": ("baselines", 3, 1, 0.095, 300) for name in ("random-goals", "cma-mae")},
+    "cma-mae-demonstrations-tuned": ("baselines", 3, 1, 0.094, 300),
     "cma-mae": ("baselines", "", 1, 0.1, 300),
     "uniform-goals": ("ablations", 3, 1, 0.085, 290),
     "grid": ("ablations", 3, 1, 0.079, 300),

@@ -71,8 +71,9 @@ SPOILT = {  # claim: a change that makes it wrong
     NAMES[18]: {"random_goals_demonstrations_large": {"last": 0.08}},
     NAMES[19]: {"cma_mae": {"last": 0.07}},
     NAMES[20]: {"cma_mae_demonstrations": {"last": 0.07}},
-    NAMES[21]: {"sgim_d_letter": {"last": 0.07}},
-    NAMES[22]: {"sgim_d_absolute_large": {"last": 0.3}},
+    NAMES[21]: {"cma_mae_demonstrations_tuned": {"last": 0.07}},
+    NAMES[22]: {"sgim_d_letter": {"last": 0.07}},
+    NAMES[23]: {"sgim_d_absolute_large": {"last": 0.3}},
 }
 
 
