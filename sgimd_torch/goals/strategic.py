@@ -61,8 +61,8 @@ class StrategicGoals(Goals, Protocol):
 
 
 class StrategicInterest:
-    """Interest of each (region, strategy): e^(progress / temperature), over the cost of the strategy. See
-    `StrategicGoals`.
+    """Interest of each (region, strategy): e^(progress / temperature), over the cost of the strategy. Of its progress,
+    what is more than that of the cheapest strategy there is divided by the cost, too. See `StrategicGoals`.
 
     The papers draw in proportion to progress, and try strategies by chance where they were not tried. Ours: progress
     can be negative, hence e; and where a strategy was hardly tried, its progress is that of where it was tried nearest.
@@ -133,9 +133,12 @@ class StrategicInterest:
         given = self._rng.random() < self.anywhere
         regions = self._map.regions_at(np.concatenate((context, goal)) if given else context)
         pairs = [(region, name) for region in regions for name in costs]
-        progress = np.array([self.progress(region, name) for region, name in pairs])
-        cost = np.array([costs[name] for _, name in pairs])
-        logarithms = np.minimum(progress, progress / cost) / self.temperature - np.log(cost)
+        progress = np.array([[self.progress(region, name) for name in costs] for region in regions])
+        cost = np.array([*costs.values()])
+        cheapest = progress[:, [int(cost.argmin())]]
+        more = progress - cheapest
+        worth = cheapest + np.minimum(more, more / cost)
+        logarithms = (worth / self.temperature - np.log(cost)).ravel()
         best = np.argsort(-logarithms, kind="stable")[: self.greatest]
         interests = np.exp(logarithms[best] - logarithms[best[0]])
         region, name = pairs[int(self._rng.choice(best, p=interests / interests.sum()))]
