@@ -1,7 +1,7 @@
 """Rivals with the one setting that a search on tuning seeds found better than their defaults: results/RIVALS.md.
 
-Not listed are those whose defaults stood. Each is a learner for ``--algorithm``, when this folder is importable:
-    sgimd run --algorithm tuned_rivals:cma_me
+Not listed are those whose defaults stood. Each is a learner for ``--algorithm``, in the folder above:
+    sgimd run --algorithm experiments.tuned_rivals:cma_me
 """
 
 from __future__ import annotations

@@ -252,9 +252,9 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
         "demonstrations-noise": {"algorithm": "imitation", "choice": "random"},
         **{name: {"algorithm": name} for name in SCHOOL},
         **{f"{name}-demonstrations": {"algorithm": f"{name}-taught"} for name in SCHOOL},
-        "map-elites-tuned": {"algorithm": "tuned_rivals:map_elites"},
-        "cma-me-tuned": {"algorithm": "tuned_rivals:cma_me"},
-        "cma-mae-demonstrations-tuned": {"algorithm": "tuned_rivals:cma_mae_taught"},
+        "map-elites-tuned": {"algorithm": "experiments.tuned_rivals:map_elites"},
+        "cma-me-tuned": {"algorithm": "experiments.tuned_rivals:cma_me"},
+        "cma-mae-demonstrations-tuned": {"algorithm": "experiments.tuned_rivals:cma_mae_taught"},
     },
     "teaching": {
         "every-10": {**SGIM_D, "every": 10},
