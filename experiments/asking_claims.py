@@ -22,6 +22,7 @@ IM, CHEAP, DEAR = "sgim-im", "sgim-im-83", "sgim-im-cost-10"
 SGIM_D, AT_START, AT_ONCE = "taught-every-30", "taught-at-start", "taught-at-start-once"
 SINGLE: Final = tuple(f"sgim-acts-{number}" for number in (1, 2, 3))
 ON_TOSS: Final = ("alone-toss", "sgim-im-toss")
+BLIND: Final = "alone-toss-blind"  # does not feel the wind
 EVERY, COST = 30, 10  # movements from one demonstration to the next of SGIM-D; what a demonstration costs
 MOST: Final = 127  # demonstrations that there are
 WRONG: Final = "mislabelling"
@@ -196,7 +197,14 @@ ASKING_CLAIMS: Final = (
         [(IM, "sgim-eer-mixture")],
     ),
     Claim(
-        "Contexts: in the wind it errs less than without a teacher",
+        "Contexts: it learns to use the wind, and errs less than who does not feel it",
+        "difference on the toss at 1000 and 2000 < 0",
+        difference_at(ON_TOSS[1], BLIND, (1000, 2000)),
+        [(ON_TOSS[1], BLIND)],
+        2000,
+    ),
+    Claim(
+        "... and less than without a teacher",
         "difference on the toss at 1000 and 2000 < 0",
         difference_at(ON_TOSS[1], ON_TOSS[0], (1000, 2000)),
         [(ON_TOSS[1], ON_TOSS[0])],

@@ -37,7 +37,7 @@ with loading():  # Ctrl-C shows no traceback
     import numpy as np
 
     from anova import anova_cells, update_anova
-    from asking_claims import ASKING_CLAIMS, ON_TOSS, contexts_rows, counts, read_asking, teachers_rows
+    from asking_claims import ASKING_CLAIMS, BLIND, ON_TOSS, contexts_rows, counts, read_asking, teachers_rows
     from judging import NotRun, Results, Verdict, judge
     from learning_claims import LEARNING_CLAIMS, TIMES, answers_rows, read_learning
     from model_claims import MODEL_CLAIMS, SIMPLEX
@@ -200,14 +200,14 @@ def asking_page(folder: Path) -> Page:
 
     asked = {"demonstrations": requests("shown"), "requests": requests("requests")}
     wind = {"in a strong wind": requests("strong"), "in a weak one": requests("weak")}
-    names = [name for name in EXPERIMENTS["asking"] if name not in ON_TOSS]
+    names = [name for name in EXPERIMENTS["asking"] if name not in (*ON_TOSS, BLIND)]
     names.sort(key=lambda name: _last_error(alike.variants.get(name, NOBODY)))
     asked_whom = ["variant", "teacher", "requests", "answered", "late", "late, in their half"]
     tables = {
         "claims": verdicts_table("what", verdicts),
         "rod": variants_table(names, {**_errors(alike, (*TIMES, LAST), ".4f"), **asked}),
         "teachers": markdown(asked_whom, teachers_rows(results)),
-        "toss": variants_table(ON_TOSS, {**_errors(alike, TIMES, ".4f"), **asked, **wind}),
+        "toss": variants_table((*ON_TOSS, BLIND), {**_errors(alike, TIMES, ".4f"), **asked, **wind}),
         "contexts": markdown(["variant", "wind (m/s²)", "error (m)"], contexts_rows(folder)),
     }
     return Page(verdicts, tables, results)

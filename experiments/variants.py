@@ -139,6 +139,7 @@ ASKING: Final[dict[str, Variant]] = {
     "sgim-eer": {"algorithm": "sgim-eer"},
     "sgim-eer-mixture": {"algorithm": "sgim-eer", "doubt": "mixture"},
     "alone-toss": {"algorithm": "practice", **TOSS},
+    "alone-toss-blind": {"algorithm": "practice", **TOSS, "environment": "experiments.blind_toss:blind_toss"},
     "sgim-im-toss": {**IM, **TOSS},
 }
 

@@ -15,12 +15,11 @@ from variants import EXPERIMENTS, FOUR, tables_of
 
 TIMES = (250, 500, 1000, 2000, 5000)
 GOOD, WORSE = (0.1, 0.07, 0.04, 0.036, 0.03), (0.2, 0.15, 0.07, 0.06, 0.046)
+ALONE = ("taught-every-30", "taught-at-start", "taught-at-start-once", "alone", "alone-toss", "alone-toss-blind")
 TRUE = {
     **dict.fromkeys(EXPERIMENTS["asking"], GOOD),
-    **dict.fromkeys(("taught-every-30", "taught-at-start", "taught-at-start-once", "alone", "alone-toss"), WORSE),
-    **dict.fromkeys(("sgim-eer", "sgim-eer-mixture"), WORSE),
+    **dict.fromkeys((*ALONE, "sgim-eer", "sgim-eer-mixture"), WORSE),
 }
-ALONE = ("taught-every-30", "taught-at-start", "taught-at-start-once", "alone", "alone-toss")
 # requests, shown, late, late_own, strong, weak
 ASKED = {
     **{name: {"all": (140, 110, 60, 60, 50, 40)} for name in EXPERIMENTS["asking"] if name not in ALONE},
@@ -88,8 +87,9 @@ def test_where_every_bar_is_cleared_every_one_holds(tmp_path):
         (8, {"sgim_im_cost_10": (0.2, 0.15, 0.07, 0.06, 0.052)}),
         (9, {"sgim_eer": (0.2, 0.15, 0.07, 0.06, 0.029)}),
         (10, {"sgim_eer_mixture": (0.2, 0.15, 0.039, 0.06, 0.046)}),
-        (11, {"alone_toss": (0.2, 0.15, 0.039, 0.06, 0.046)}),
-        (12, {"asked": {"sgim-im-toss": {"all": (140, 110, 60, 60, 40, 50)}}}),
+        (11, {"alone_toss_blind": (0.2, 0.15, 0.039, 0.06, 0.046)}),
+        (12, {"alone_toss": (0.2, 0.15, 0.039, 0.06, 0.046)}),
+        (13, {"asked": {"sgim-im-toss": {"all": (140, 110, 60, 60, 40, 50)}}}),
     ],
 )
 def test_a_bar_that_is_missed_does_not_hold(tmp_path, claim, spoilt):
@@ -108,7 +108,7 @@ def test_at_equal_cost_sgim_d_is_taken_between_its_evaluations(tmp_path):
 def test_what_was_not_run_is_left_open(tmp_path):
     missing = ("sgim-acts-four", "sgim-im-toss", *SINGLE)
     found = verdicts(write(tmp_path, without=missing))
-    assert [claim for claim, verdict in enumerate(found) if verdict == "cannot say"] == [4, 5, 11, 12]
+    assert [claim for claim, verdict in enumerate(found) if verdict == "cannot say"] == [4, 5, 11, 12, 13]
 
 
 def test_who_was_asked_and_the_errors_by_wind_are_means_over_seeds(tmp_path):
