@@ -26,7 +26,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Final
@@ -38,14 +38,15 @@ with loading():  # Ctrl-C shows no traceback
 
     from anova import anova_cells, update_anova
     from asking_claims import ASKING_CLAIMS, BLIND, ON_TOSS, contexts_rows, counts, read_asking, teachers_rows
-    from judging import NotRun, Results, Verdict, judge
+    from judging import Results, judge
     from learning_claims import LEARNING_CLAIMS, TIMES, answers_rows, read_learning
     from model_claims import MODEL_CLAIMS, SIMPLEX
+    from page_tables import Cell, markdown, said_table, variants_table, verdicts_table
     from paper_claims import PAPER_CLAIMS
     from quoted import MADE, Page, into_readme, render
     from read_results import LAST, Evaluated, ResultsError, read_coverages, read_goals, read_results, read_said
     from rivals_table import rivals_rows
-    from settings_tables import SETTINGS, ideas_rows, read_settings, settings_rows, where_it_pays
+    from settings_tables import SETTINGS, ideas_rows, ratios, read_settings, settings_rows, where_it_pays
     from sgimd_torch.files import make_folder, write_text
     from sgimd_torch.views.statistics import iqm_interval, metres, rng, show
     from suite_claims import SUITE_COLUMNS, read_suite, suite_claims, suite_rows
@@ -78,7 +79,6 @@ IN_README: Final = {
 }
 YARDSTICKS: Final = ("linear", "process")
 NOBODY: Final = Evaluated("", "", {})
-Cell = Callable[[str], str]  # the text of a variant in a column of a table; raises NotRun if there is none
 
 
 def paper_page(folder: Path) -> Page:
@@ -216,9 +216,10 @@ def asking_page(folder: Path) -> Page:
 def settings_page(folder: Path) -> Page:
     """The page results/SETTINGS.md: where each idea pays."""
     results = read_settings(folder)
+    found = ratios(results)
     tables = {
-        "where": where_it_pays(results),
-        "ideas": markdown(["idea", "errors", *SETTINGS], ideas_rows(results)),
+        "where": where_it_pays(found),
+        "ideas": markdown(["idea", "errors", *SETTINGS], ideas_rows(found)),
         **{f"settings_{when}": markdown(["learner", *SETTINGS], settings_rows(results, when)) for when in (500, 2000)},
     }
     return Page([], tables, results)
@@ -311,56 +312,6 @@ def _plain_learner(ending: str, name: str) -> str:
 def _last_error(variant: Evaluated) -> float:
     """Mean over seeds at the end; inf if it was never evaluated there."""
     return float(np.mean(list(variant.at(LAST).values()) or [np.inf]))
-
-
-def variants_table(names: Sequence[str], columns: Mapping[str, Cell]) -> str:
-    """One row for each variant, with a dash for what was not run."""
-
-    def shown(cell: Cell, name: str) -> str:
-        try:
-            return cell(name)
-        except NotRun:
-            return "-"
-
-    return markdown([*columns], [[shown(cell, name) for cell in columns.values()] for name in names])
-
-
-def verdicts_table(what: str, verdicts: Sequence[Verdict]) -> str:
-    """One row for each claim; ``what`` heads the first column."""
-    cells = [(row.claim, row.bar, row.number, row.effect, _in_words(row)) for row in verdicts]
-    return markdown((what, "bar", "our number [95 % interval]", "difference [95 % interval]", "verdict"), cells)
-
-
-def said_table(said: Mapping[str, tuple[str, str]], verdicts: Sequence[Verdict]) -> str:
-    """One row for each claim of an earlier version: what it said, and what is said now, bold where a verdict changed.
-
-    Raises:
-        ResultsError: a claim is not judged any more.
-    """
-    now = {row.claim: row for row in verdicts}
-    if lost := said.keys() - now.keys():
-        raise ResultsError(f"said.csv has {', '.join(sorted(lost))}, which is not judged any more; was it renamed?")
-    cells = [
-        (claim, number, verdict, now[claim].number, _bold(now[claim].verdict, now[claim].verdict != verdict))
-        for claim, (number, verdict) in said.items()
-    ]
-    return markdown(("claim", "we said", "verdict then", "now we say", "verdict now"), cells)
-
-
-def _bold(text: str, when: bool) -> str:
-    return f"**{text}**" if when else text
-
-
-def _in_words(row: Verdict) -> str:
-    return f"**{row.verdict}**" + (f" (alone: {row.alone})" if row.alone != row.verdict else "")
-
-
-def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table; "Not run." without rows."""
-    if not rows:
-        return "Not run."
-    lines = [head, ["---"] * len(head), *([cell.replace("|", "\\|") for cell in row] for row in rows)]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
 def _check_place(path: Path) -> None:

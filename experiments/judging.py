@@ -17,7 +17,6 @@ import numpy as np
 from read_results import FIRST, LAST, Asked, Evaluated
 from sgimd_torch.spaces import Array
 from sgimd_torch.views.statistics import (
-    LEAST_SEEDS,
     LEVEL,
     Interval,
     difference_interval,
@@ -52,7 +51,7 @@ class Results:
     some claims ``goals`` from ``read_goals``, ``coverages`` from ``read_coverages`` and ``asked`` from ``read_asked``.
 
     Errors are in metres; intervals are over seeds, of confidence ``level``. All methods raise ``NotRun`` if fewer than
-    ``least`` seeds have what they need.
+    two seeds have what they need; of fewer than `LEAST_SEEDS` there are points, which decide nothing.
     """
 
     variants: Mapping[str, Evaluated]
@@ -60,7 +59,6 @@ class Results:
     coverages: Mapping[str, Mapping[int, Array]] = field(default_factory=dict)
     same: Mapping[str, Evaluated] = field(default_factory=dict)
     level: float = LEVEL
-    least: int = 2
     asked: Mapping[str, Mapping[int, Mapping[str, Asked]]] = field(default_factory=dict)
 
     @property
@@ -71,7 +69,7 @@ class Results:
     def at(self, variant: str, movements: int = LAST, values: str = "errors") -> dict[int, float]:
         """Seed -> value of "errors", "floors", "tiles", "claimed" or "met"."""
         found = self.variants[variant].at(movements, values) if variant in self.variants else {}
-        if len(found) < self.least:
+        if len(found) < 2:
             what = f": {len(found)} seeds with {values} at {movements}" if variant in self.variants else ""
             raise NotRun(f"{variant}{what}")
         return found
@@ -84,7 +82,7 @@ class Results:
         """``(n,)`` movements and ``(n_seeds, n)`` errors, of the seeds that were evaluated at each of them."""
         self.at(variant)
         movements, errors = self.variants[variant].curves()
-        if len(errors) < self.least or len(movements) < 2:
+        if len(errors) < 2 or len(movements) < 2:
             raise NotRun(f"{variant}: {len(errors)} whole curves")
         return movements, errors
 
@@ -101,7 +99,7 @@ class Results:
 
     def pairs(self, ours: str, theirs: str, movements: int = LAST) -> tuple[dict[int, float], dict[int, float]]:
         """Errors of both by seed, for common seeds."""
-        return shared(self.at(ours, movements), self.at(theirs, movements), self.least)
+        return shared(self.at(ours, movements), self.at(theirs, movements))
 
     def difference(self, ours: str, theirs: str, movements: int = LAST) -> Interval:
         """Ours - theirs, paired by seed."""
@@ -114,7 +112,7 @@ class Results:
 
     def over_alike(self, variant: str, movements: int = LAST) -> Interval:
         """Errors of these answers / those of the same inverse for all, on the same memories."""
-        ours, same = shared(self.at(variant, movements), self.alike.at(variant, movements), self.least)
+        ours, same = shared(self.at(variant, movements), self.alike.at(variant, movements))
         return ratio_interval(_array(ours), _array(same), rng=rng(), paired=True, level=self.level)
 
     def improvement(self, ours: str, theirs: str, movements: int = LAST) -> Interval:
@@ -123,13 +121,13 @@ class Results:
 
     def floor_ratio(self, ours: str, theirs: str) -> Interval:
         """Our errors / their noise floors, paired by seed."""
-        errors, floors = shared(self.at(ours), self.at(theirs, values="floors"), self.least)
+        errors, floors = shared(self.at(ours), self.at(theirs, values="floors"))
         return ratio_interval(_array(errors), _array(floors), rng=rng(), paired=True, level=self.level)
 
     def near_goals(self, variant: str) -> Array:
         """``(n_seeds, 2)``: how many goals a run chose for itself, and how many of them can be reached."""
         found = self.goals.get(variant, np.zeros((0, 2)))
-        if len(found) < self.least:
+        if len(found) < 2:
             raise NotRun(f"goals of {variant}")
         return found
 
@@ -144,17 +142,15 @@ class Results:
         return interval(time, curves, self.errors(theirs), rng=rng(), level=self.level)
 
 
-def shared(
-    ours: dict[int, float], theirs: dict[int, float], least: int = 2
-) -> tuple[dict[int, float], dict[int, float]]:
+def shared(ours: dict[int, float], theirs: dict[int, float]) -> tuple[dict[int, float], dict[int, float]]:
     """Both, restricted to common seeds.
 
     Raises:
-        NotRun: fewer than ``least``.
+        NotRun: fewer than two.
     """
     seeds = [seed for seed in ours if seed in theirs]
-    if len(seeds) < least:
-        raise NotRun(f"fewer than {least} seeds in common")
+    if len(seeds) < 2:
+        raise NotRun("fewer than two seeds in common")
     return {seed: ours[seed] for seed in seeds}, {seed: theirs[seed] for seed in seeds}
 
 
@@ -188,12 +184,11 @@ class Verdict(NamedTuple):
 def judge(claims: Iterable[Claim], results: Results) -> list[Verdict]:
     """All claims in order, together, by Holm's method: were each claim one interval, the chance that any verdict is
     wrong would be 5 % at most. Of several intervals the worst decides; the intervals of ten seeds are a little narrow.
-    "Cannot say" if something was not run with `LEAST_SEEDS`, or if only a single claim could be so sure.
+    "Cannot say" if something was not run, or with fewer than `LEAST_SEEDS`, or if only a single claim could be so sure.
 
     Raises:
         ValueError: errors that have no ratio, such as 0.
     """
-    claims, results = list(claims), replace(results, least=LEAST_SEEDS)
     seen = {claim.text: claim for claim in claims}
 
     def decides(text: str, level: float) -> bool:
@@ -210,7 +205,7 @@ def judge(claims: Iterable[Claim], results: Results) -> list[Verdict]:
             alone[claim.text][1] if claim.text in standing else OPEN,
             alone[claim.text][1],
         )
-        for claim in claims
+        for claim in seen.values()
     ]
 
 

@@ -1,13 +1,15 @@
 """Beyond the setting that defaults were tuned on: the error of each learner in each, and where each idea pays.
 
-    results = read_settings(Path("results")); print(where_it_pays(results))
+    results = read_settings(Path("results")); print(where_it_pays(ratios(results)))
 A learner with a forward model is answered by the model, all others by `process`, whatever they explored with.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Final
 
@@ -19,6 +21,7 @@ from read_results import read_results
 from sgimd_torch.views.statistics import Interval, ratio_interval, rng, show
 from variants import EVERYWHERE, EXPERIMENTS, ROBOTS, TAUGHT_ALIKE, TEACHERS, UNTAUGHT
 
+Pair = tuple[str, str]  # ours and theirs
 SETTINGS: Final = (*ROBOTS, *TEACHERS)
 EVERYBODY: Final = (*UNTAUGHT, *TAUGHT_ALIKE)
 LAST_HERE: Final[int] = EVERYWHERE["movements"]
@@ -49,46 +52,47 @@ def settings_rows(results: Results, at: int) -> list[list[str]]:
     ]
 
 
-def ideas_rows(results: Results, at: int = LAST_HERE) -> list[list[str]]:
-    """A row for each comparison: the ratio of errors with an idea and without it in each setting, bold where its
-    interval excludes 1."""
+def ratios(results: Results, at: int = LAST_HERE) -> dict[Pair, dict[str, Interval]]:
+    """By pair of `IDEAS` and by setting, our error over theirs; none where one of them was not run."""
+    found: dict[Pair, dict[str, Interval]] = {pair: {} for pairs in IDEAS.values() for pair in pairs}
+    for pair, setting in product(found, SETTINGS):
+        with suppress(NotRun):
+            found[pair][setting] = _ratio(results, pair, setting, at)
+    return found
 
-    def cell(pair: tuple[str, str], setting: str) -> str:
-        try:
-            found = _ratio(results, pair, setting, at)
-        except NotRun:
+
+def ideas_rows(found: Mapping[Pair, Mapping[str, Interval]]) -> list[list[str]]:
+    """A row for each comparison of `ratios`, a cell for each setting, bold where its interval excludes 1."""
+
+    def cell(ratio: Interval | None) -> str:
+        if ratio is None:
             return "-"
-        return f"**{show(found)}**" if _sign(found) else show(found)
+        return f"**{show(ratio)}**" if _sign(ratio) else show(ratio)
 
     return [
-        [idea, f"`{ours}` / `{theirs}`", *(cell((ours, theirs), setting) for setting in SETTINGS)]
+        [idea, f"`{ours}` / `{theirs}`", *(cell(found[ours, theirs].get(setting)) for setting in SETTINGS)]
         for idea, pairs in IDEAS.items()
         for ours, theirs in pairs
     ]
 
 
-def where_it_pays(results: Results, at: int = LAST_HERE) -> str:
+def where_it_pays(found: Mapping[Pair, Mapping[str, Interval]]) -> str:
     """A line for each idea: the settings in which it lowers the error, and those in which it raises it."""
     lines = []
     for idea, pairs in IDEAS.items():
-        signs = {(pair, setting): _known(results, pair, setting, at) for pair in pairs for setting in SETTINGS}
-        pays, costs = (_listed([each for each, sign in signs.items() if sign == wanted]) for wanted in (-1, 1))
+        signs = [
+            (ours, setting, _sign(each)) for ours, theirs in pairs for setting, each in found[ours, theirs].items()
+        ]
+        pays, costs = (_listed([each[:2] for each in signs if each[2] == wanted]) for wanted in (-1, 1))
         lines.append(f"- **{idea}** seems to pay: {pays}. It seems to cost: {costs}.")
     return "\n".join(lines)
 
 
-def _listed(found: Sequence[tuple[tuple[str, str], str]]) -> str:
+def _listed(found: Sequence[tuple[str, str]]) -> str:
     by_learner: dict[str, list[str]] = {}
-    for (ours, _), setting in found:
+    for ours, setting in found:
         by_learner.setdefault(ours, []).append(setting)
     return "; ".join(f"`{ours}` in {', '.join(settings)}" for ours, settings in by_learner.items()) or "nowhere"
-
-
-def _known(results: Results, pair: tuple[str, str], setting: str, at: int) -> int:
-    try:
-        return _sign(_ratio(results, pair, setting, at))
-    except NotRun:
-        return 0
 
 
 def _sign(ratio: Interval) -> int:
@@ -96,7 +100,7 @@ def _sign(ratio: Interval) -> int:
     return int(ratio.low > 1) - int(ratio.high < 1)
 
 
-def _ratio(results: Results, pair: tuple[str, str], setting: str, at: int) -> Interval:
+def _ratio(results: Results, pair: Pair, setting: str, at: int) -> Interval:
     """Of the errors of ours and theirs, paired by seed. A learner without a teacher is the same under every teacher."""
     names = (f"{name}@{setting}" for name in pair)
     first, second = (results.at(name if name in EXPERIMENTS["settings"] else _as_it_is(name), at) for name in names)

@@ -51,8 +51,7 @@ def suite_claims(suite: Suite) -> list[Claim]:
 
     def claim(text: str, bar: str, judged: Callable[[Suite], Judged]) -> Claim:
         def at_level(results: Results) -> Judged:
-            level, least = results.level, results.least
-            return judged({answer: replace(each, level=level, least=least) for answer, each in suite.items()})
+            return judged({answer: replace(each, level=results.level) for answer, each in suite.items()})
 
         return Claim(text, bar, at_level, own=True)
 
@@ -163,7 +162,7 @@ def _more_data(suite: Suite) -> Judged:
     found = {}
     for task in TASKS:
         found_at = {at: suite["process"].at(f"{OURS}.{task}", at) for at in (500, 2000)}
-        early, late = shared(found_at[500], found_at[2000], suite["process"].least)
+        early, late = shared(found_at[500], found_at[2000])
         errors = np.array([*late.values()]), np.array([*early.values()])
         found[task] = ratio_interval(*errors, rng=rng(), paired=True, level=suite["process"].level)
     most = max(found, key=lambda task: found[task].value)

@@ -5,7 +5,7 @@ import pytest
 from claims import main
 from paper import HEADER, spread
 from read_results import ResultsError
-from settings_tables import EVERYBODY, IDEAS, SETTINGS, ideas_rows, read_settings, settings_rows, where_it_pays
+from settings_tables import EVERYBODY, IDEAS, SETTINGS, ideas_rows, ratios, read_settings, settings_rows, where_it_pays
 from sgimd_torch.runs.process import command
 from variants import EXPERIMENTS
 
@@ -40,7 +40,7 @@ def test_every_setting_has_every_learner_that_it_changes_something_for():
 def test_an_idea_pays_where_its_error_is_smaller_and_costs_where_it_is_larger(tmp_path):
     sagg_riac = {"noise-none": 0.1, "swimmer": 0.3}
     results = read_settings(write(tmp_path, sagg_riac=sagg_riac, sgim_d_model={"shuffled": 0.1}))
-    lines = where_it_pays(results).splitlines()
+    lines = where_it_pays(ratios(results)).splitlines()
     interest = "`sagg-riac` in noise-none. It seems to cost: `sagg-riac` in swimmer."
     assert lines[0] == f"- **Choosing goals by interest** seems to pay: {interest}"
     assert lines[1].endswith("pay: `practice` in swimmer. It seems to cost: `practice` in noise-none.")
@@ -51,7 +51,7 @@ def test_an_idea_pays_where_its_error_is_smaller_and_costs_where_it_is_larger(tm
 
 def test_under_another_teacher_a_learner_without_one_is_what_it_was(tmp_path):
     results = read_settings(write(tmp_path, sgim_d={"one-corner": 0.3}, sagg_riac={"as-it-is": 0.1}))
-    rows = {tuple(row[:2]): row[2:] for row in ideas_rows(results)}
+    rows = {tuple(row[:2]): row[2:] for row in ideas_rows(ratios(results))}
     shown = dict(zip(SETTINGS, rows["Being shown", "`sgim-d` / `sagg-riac`"], strict=True))
     assert shown["one-corner"].startswith("**3.00 [")
     assert shown["13-shown"].startswith("**2.00 [")

@@ -97,12 +97,19 @@ def test_improvement_is_the_mann_whitney_statistic_and_its_opposite_makes_one(rn
     assert opposite == pytest.approx((1 - found.value, 1 - found.high, 1 - found.low))
 
 
-@pytest.mark.parametrize(("n", "low"), [(2, 0.386), (10, 0.80), (20, 0.90)])
+@pytest.mark.parametrize(("n", "low"), [(5, 0.643), (10, 0.80), (20, 0.90)])
 def test_few_seeds_never_make_an_improvement_certain(n, low):
     ours, theirs = np.zeros(n), np.ones(n)
     assert improvement_interval(ours, theirs) == pytest.approx((1, low, 1), abs=0.005)
     assert improvement_interval(theirs, ours) == pytest.approx((0, 0, 1 - low), abs=0.005)
     assert improvement_interval(ours, theirs, level=0.99).low < low
+
+
+def test_an_improvement_of_fewer_than_five_seeds_has_no_interval():
+    found = improvement_interval(np.zeros(4), np.ones(20))
+    assert found.value == 1
+    assert np.isnan(found.low)
+    assert np.isnan(found.high)
 
 
 @pytest.mark.parametrize(("n", "shift"), [(5, 0.0), (5, 2.0), (10, 1.0), (20, 2.0)])
