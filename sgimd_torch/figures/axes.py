@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 from sgimd_torch.spaces import Array, Box
 
 GREY: Final = "0.45"
+PALETTE: Final = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#999933", "#882255")
 LEGEND: Final[dict[str, Any]] = {
     "loc": "lower center",
     "bbox_to_anchor": (0.5, 1.0),  # above the axes

@@ -6,6 +6,7 @@ run = read_run("runs/sgim-d/seed-003"); run.outcomes, run.evaluation["mean_error
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -77,6 +78,12 @@ class Run:
         own = self.goals[np.isfinite(self.goals).all(axis=1) & (self.origin != "imitate")]
         new = (np.diff(own, axis=0, prepend=np.nan) != 0).any(axis=1)
         return own[new]
+
+
+def points_of(requests: Mapping[str, np.ndarray], part: str, dim: int) -> Array:
+    """``(n, dim)`` the outcomes that were "wanted" or "got"; contexts come before them in the table."""
+    names = [name for name in requests if name.startswith(f"{part}_")][-dim:]
+    return np.stack([requests[name] for name in names], axis=1)
 
 
 def read_run(path: str | os.PathLike[str]) -> Run:

@@ -163,6 +163,38 @@ def test_the_panel_counts_the_goals_that_are_met_and_marks_the_landing():
     assert columns.min() > 240
 
 
+def test_the_panel_shows_what_each_teacher_has_shown_so_far():
+    goals = np.stack(np.meshgrid(np.linspace(-1, 1, 5), np.linspace(-1, 1, 5)), axis=-1).reshape(-1, 2)
+    shown = stream(0, "shown").uniform(-1, 1, (30, 2))
+    with_ben = {"ann": shown, "ben": shown[:20] * 0.9}
+    stages = [Stage(10, np.full(25, 0.5), {"ann": shown[:2]}), Stage(100, np.full(25, 0.5), with_ben)]
+    panel = Panel(goals, stages, "black", height=480)
+    pictures = [panel.beside(k, goals[0], goals[0])[0].astype(int) for k in (0, 1)]
+    ann, ben = (
+        [int((np.abs(picture - colour).max(axis=2) < 40).sum()) for picture in pictures]
+        for colour in ((0, 114, 178), (213, 94, 0))
+    )
+    assert 0 < 4 * ann[0] < ann[1]
+    assert 0 < 4 * ben[0] < ben[1]  # who comes later has a line from the start
+
+
+def test_a_film_knows_what_was_shown_on_request_before_a_movement(tmp_path):
+    options = ["--environment", "planar-arm-7", "--algorithm", "sgim-acts", "--teachers", "low-half,high-half"]
+    words = [*options, "--movements", "60", "--evaluate-at", "[]", "--out", str(tmp_path), "--name", "asks"]
+    assert command(command_line.main, words) == 0
+    run = read_run(tmp_path / "asks" / "seed-000")
+    asked = run.requests
+    for movements in (20, 60):
+        found = film._shown(run, movements)
+        assert set(found) == set(asked["teacher"].tolist())
+        given = (asked["index"] < movements) & (asked["reply"] == "shown")
+        assert sum(map(len, found.values())) == given.sum()
+    low = found["low-half"]
+    assert len(low)
+    rows = (asked["teacher"] == "low-half") & (asked["reply"] == "shown")
+    np.testing.assert_array_equal(low, np.column_stack([asked["got_0"], asked["got_1"]])[rows])
+
+
 def test_the_sides_of_a_panel_are_even_as_a_film_needs():
     for width in range(160, 1288, 8):
         panel = Panel(np.eye(2), [Stage(1, np.ones(2))], "black", height=width * 3 // 4)

@@ -4,8 +4,8 @@ Each goal is answered by the run's inverse model, its memory rebuilt from the lo
 there are contexts, in the middle of their range. A yellow ring is the goal, white dots are past landings; of the rod,
 circles are half a metre and a metre around the base. If the float has not met the water after the movement, the line is
 let out and the float falls; the film says so. Beside it: each goal of the benchmark, the bluer the nearer its answer
-lands, and how the mean error has fallen. Planar arms, and environments of your own with record(context, theta, rng) ->
-Sketch, are drawn in the plane.
+lands, what teachers have shown when they were asked, and how the mean error has fallen. Planar arms, and environments
+of your own with record(context, theta, rng) -> Sketch, are drawn in the plane.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from sgimd_torch.environments.protocol import Sketch
 from sgimd_torch.evaluation import evaluate
 from sgimd_torch.runs.build import RunParts, build
 from sgimd_torch.runs.log import RunError
-from sgimd_torch.runs.read import Run, config_of, read_run
+from sgimd_torch.runs.read import Run, config_of, points_of, read_run
 from sgimd_torch.spaces import Array, stream
 from sgimd_torch.views.film.panel import Panel, Stage
 from sgimd_torch.views.film.reel import RATES, Filming, Shot, count_frames, shoot, write_film, write_sheet
@@ -130,8 +130,17 @@ def _cast(run: Run, parts: RunParts, goals: Array, stages: Sequence[int]) -> tup
         judged = evaluate(
             parts.inverse, robot, parts.benchmark.goals, run.config["seed"], movements, context=context, repeats=0
         )
-        found.append(Stage(movements, judged.errors))
+        found.append(Stage(movements, judged.errors, _shown(run, movements)))
     return shots, found
+
+
+def _shown(run: Run, movements: int) -> dict[str, Array]:
+    """Teacher -> ``(n, outcome_dim)`` what they have shown before so many movements, because they were asked."""
+    if run.requests is None:
+        return {}
+    got, teachers = points_of(run.requests, "got", run.outcomes.shape[1]), run.requests["teacher"]
+    given = (run.requests["reply"] == "shown") & (run.requests["index"] < movements)
+    return {name: got[given & (teachers == name)] for name in sorted(set(teachers.tolist()))}
 
 
 def _with_panels(run: Run, parts: RunParts, shots: list[Shot], found: list[Stage], height: int) -> list[Shot]:

@@ -4,13 +4,14 @@
     shot = Shot(recording, goal, beside=panel.beside(0, goal, recording.outcome))
 
 The map shows T around the goals of the benchmark: the bluer a place, the nearer the answer to its nearest goal has
-landed. A yellow ring is the present goal, a cross where its answer has landed. Needs the extra ``film``.
+landed. A yellow ring is the present goal, a cross where its answer has landed. Diamonds are what teachers have shown
+because they were asked, in a colour for each teacher. Needs the extra ``film``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 import numpy as np
@@ -26,7 +27,7 @@ except ImportError as error:
 
 from scipy.spatial import cKDTree
 
-from sgimd_torch.figures.axes import goal_rings, rounded
+from sgimd_torch.figures.axes import PALETTE, goal_rings, rounded
 from sgimd_torch.figures.save import STYLE
 from sgimd_torch.spaces import Array
 from sgimd_torch.views.film.reel import Frame
@@ -37,14 +38,25 @@ _FINE: Final = 240  # places of the map along each side
 _LANDED = "#d55e00"
 _BLUES: Final = ListedColormap(colormaps["Blues_r"](np.linspace(0.08, 0.95, 256)))
 _TEXT: Final[Any] = {"font.size": 10, "axes.titlesize": 11, "axes.titlelocation": "left"}
+_LEGEND: Final[Any] = {
+    "loc": "upper center",
+    "bbox_to_anchor": (0.5, 0.0),  # below the map
+    "ncols": 2,
+    "fontsize": 8,
+    "frameon": False,
+    "columnspacing": 0.6,
+    "handletextpad": 0.0,
+}
 
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """What a learner can do after some ``movements``: how far it misses each goal of the benchmark, ``(n,)``."""
+    """What a learner can do after some ``movements``: how far it misses each goal of the benchmark, ``(n,)``; and by
+    teacher, what they have ``shown`` because they were asked, ``(m, outcome_dim)``, none of who was not asked."""
 
     movements: int
     errors: Array
+    shown: Mapping[str, Array] = field(default_factory=dict)
 
 
 class Panel:
@@ -69,6 +81,8 @@ class Panel:
         side = float(np.ptp(places, axis=0).max()) or 1.0
         self.near = rounded(side / 50)
         """Nearer than this, in the unit of T, is met."""
+        names = sorted({name for stage in stages for name in stage.shown})
+        self._teachers = {name: PALETTE[k % len(PALETTE)] for k, name in enumerate(names)}
         self._low, self._high = places.min(axis=0) - side / 20, places.max(axis=0) + side / 20
         x, y = np.linspace(self._low, self._high, _FINE).T
         self._nearest = cKDTree(places).query(np.stack(np.meshgrid(x, y), axis=-1))[1]  # (_FINE, _FINE)
@@ -82,16 +96,22 @@ class Panel:
             width, height = (self._size / self._dpi).tolist()
             figure = Figure(figsize=(width, height), dpi=self._dpi, layout="constrained")
             above, below = figure.subplots(2, height_ratios=[2.7, 1])
-            self._map(above, self._stages[k].errors, *marked)
+            self._map(above, self._stages[k], *marked)
             self._curve(below, self._stages[k].movements)
             canvas: Any = FigureCanvasAgg(figure)
             canvas.draw()
             return np.array(canvas.buffer_rgba())[..., :3]
 
-    def _map(self, ax: Axes, errors: Array, goal: Array, outcome: Array | None = None) -> None:
+    def _map(self, ax: Axes, stage: Stage, goal: Array, outcome: Array | None = None) -> None:
         (left, bottom), (right, top) = self._low.tolist(), self._high.tolist()
+        errors = stage.errors
         shades = np.clip(errors / (6 * self.near), 0, 1)[self._nearest]
         ax.imshow(shades, cmap=_BLUES, vmin=0, vmax=1, origin="lower", extent=(left, right, bottom, top))
+        for name, colour in self._teachers.items():
+            shown = stage.shown.get(name, np.empty((0, len(goal))))
+            ax.plot(*in_picture(shown).T, "D", color=colour, mec="white", mew=0.6, ms=4, label=f"{name} {len(shown)}")
+        if self._teachers:
+            ax.legend(**_LEGEND)
         goal_rings(ax, in_picture(goal[None]), 14)
         if outcome is not None:
             ax.plot(*in_picture(outcome[None]).T, "X", color=_LANDED, mec="white", ms=10, mew=1)

@@ -13,10 +13,11 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from sgimd_torch.figures.axes import LEGEND, colour_bar, limits, over_movements
+from sgimd_torch.figures.axes import LEGEND, PALETTE, colour_bar, limits, over_movements
 from sgimd_torch.figures.learning import map_after, regions_in
 from sgimd_torch.figures.sections import of_regions, sections
 from sgimd_torch.goals.strategic import AUTONOMOUS
+from sgimd_torch.runs.read import points_of
 from sgimd_torch.spaces import Array
 from sgimd_torch.views.report.data import Life, Variant
 from sgimd_torch.views.report.figures import png
@@ -25,7 +26,6 @@ from sgimd_torch.views.report.record import Table
 LATE: Final = 1000  # movements; from then on a learner should know whom to ask
 PARTS: Final = 20  # of a life, each with its shares
 _REPLIES: Final = ("shown", "again", "nothing", "failed", "timed out")
-_COLOURS: Final = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#999933", "#882255")
 _ALONE: Final = "#d9d9d9"
 HEAD: Final = (
     *("requests", *_REPLIES, "shown this far from the goal (m), median"),
@@ -54,7 +54,12 @@ def strategies(life: Life) -> NDArray[np.str_]:
     found, asked = np.full(len(life.index), AUTONOMOUS, dtype=object), life.requests
     own, ends = (life.origin != "imitate") & (life.origin != ""), np.append(asked["index"][1:], len(life.index))
     for begin, end, strategy, reply, got in zip(
-        asked["index"], ends, asked["strategy"], asked["reply"], _points(asked, "got", life), strict=True
+        asked["index"],
+        ends,
+        asked["strategy"],
+        asked["reply"],
+        points_of(asked, "got", life.outcomes.shape[1]),
+        strict=True,
     ):
         if reply == "shown":
             span = slice(begin, end)
@@ -94,7 +99,7 @@ def over_goals(figure: Figure, life: Life) -> None:
     """Where the goals lie that were asked for, by strategy; and in which share of its goals each region was asked."""
     assert life.requests is not None
     asked, dim = life.requests, life.outcomes.shape[1]
-    wanted, ax = _points(asked, "wanted", life), figure.subplots()
+    wanted, ax = points_of(asked, "wanted", dim), figure.subplots()
     if life.has_map and life.regions is not None:
         lows, highs, _ = map_after(life.regions, life.regions["movements"].max())
         section = of_regions(lows, highs, dim)[0]
@@ -132,14 +137,8 @@ def _row(tables: Sequence[Mapping[str, np.ndarray]], teacher: str) -> list[str]:
     ]
 
 
-def _points(asked: Mapping[str, np.ndarray], part: str, life: Life) -> Array:
-    """``(n, outcome_dim)`` the outcomes that were "wanted" or "got"; contexts come before them in the table."""
-    names = [name for name in asked if name.startswith(f"{part}_")][-life.outcomes.shape[1] :]
-    return np.stack([asked[name] for name in names], axis=1)
-
-
 def _colours(life: Life) -> dict[str, str]:
     """A colour for each strategy, in the order of their names."""
     assert life.requests is not None
     found = sorted(set(life.requests["strategy"].tolist()))
-    return {name: _COLOURS[k % len(_COLOURS)] for k, name in enumerate(found)}
+    return {name: PALETTE[k % len(PALETTE)] for k, name in enumerate(found)}
