@@ -131,7 +131,9 @@ def test_goals_come_from_the_region_that_was_drawn_and_contains_the_context():
         assert np.mean(drawn) > 0.8
 
 
-@pytest.mark.parametrize("options", [{"by_chance": 1.1}, {"anywhere": 1.1}, {"anywhere": -0.1}, {"greatest": 0}, {"temperature": 0.0}])
+@pytest.mark.parametrize(
+    "options", [{"by_chance": 1.1}, {"anywhere": 1.1}, {"anywhere": -0.1}, {"greatest": 0}, {"temperature": 0.0}]
+)
 def test_numbers_out_of_range_are_refused(options):
     with pytest.raises(
         ValueError, match=r"anywhere must lie in \[0, 1\], greatest be at least 1 and temperature above 0"
