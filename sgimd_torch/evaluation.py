@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -79,6 +79,11 @@ class Evaluation:
     def noise_floor(self) -> float:
         """The part of ``mean_error`` that noise alone makes, m; the rest is bias."""
         return float(self.scatter.mean())
+
+    @property
+    def without_noise(self) -> Evaluation:
+        """The same, its noise not measured."""
+        return replace(self, scatter=np.full_like(self.scatter, np.nan))
 
     def met(self, near: float) -> int:
         """How many goals were missed by ``near`` (m) or less."""

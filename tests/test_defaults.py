@@ -31,7 +31,7 @@ DEFAULTS = {
     "goals.alp_gmm:AlpGmm": {"refit": 50, "memory": 250, "components": 10, "uniform": 0.2},
     "goals.interest_map:InterestMap": {**TREE, "g_max": 30, "cuts": 20, "min_side": 1 / 15, "max_aspect": 5.0},
     "goals.progress_grid:ProgressGrid": TREE,
-    "goals.strategic:StrategicInterest": {"anywhere": 0.5, "greatest": 10, "temperature": 0.03},
+    "goals.strategic:StrategicInterest": {"by_chance": 0.0, "anywhere": 0.5, "greatest": 10, "temperature": 0.03},
     "inverses.local:LocalInverse": {"h_max": 10, "k_max": 10, "alpha": 0.5, "width": 0.25},
     "inverses.local:NearestNeighbour": {"k": 10},
     "inverses.locally_linear:LocallyLinear": {"ridge": 0.001, "h_max": 10, "k_max": 20, "alpha": 0.5, "width": 1.0},

@@ -96,7 +96,7 @@ def build(config: Config, directory: Path | None = None) -> RunParts:
     learner = parts["algorithm"](task.environment, config.seed)
     words = {answer: config.inverse if answer == OWN else answer for answer in config.answered}
     if "inverse" in config.entry("algorithm").options and config.entry("inverse").learns_with is None:
-        words[OWN] = OWN  # the one that it learns with
+        words = {answer: OWN if word == config.inverse else word for answer, word in words.items()}  # it learns with it
     inverses = {
         word: learner.inverse if word == OWN else parts.maker("inverse", word, learning=False)(learner.memory)
         for word in dict.fromkeys(words.values())

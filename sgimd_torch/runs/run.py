@@ -212,7 +212,7 @@ class Life:
             for answer, inverse in parts.answers.items():
                 if answer != OWN:
                     same = inverse is parts.inverse
-                    found[answer] = found[OWN] if same else evaluate(inverse, *judged, repeats=0)
+                    found[answer] = found[OWN].without_noise if same else evaluate(inverse, *judged, repeats=0)
         if self.board is not None:
             self.board.evaluation(found)
         with self.seconds.of("evaluation"):

@@ -22,7 +22,7 @@ from sgimd_torch.runs.build import build
 from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.process import Stopped, Stopping, command
-from sgimd_torch.runs.read import read_run
+from sgimd_torch.runs.read import config_of, read_run
 from sgimd_torch.spaces import Demonstration, stream
 
 MODEL_SEARCHES = [word for word, entry in CATALOGUE["search"].items() if "model" in entry.uses]
@@ -119,6 +119,18 @@ def test_an_inverse_answers_alike_whether_it_is_the_runs_own_or_another(tmp_path
         assert np.isfinite(mine["noise_floor_m"]).all()
         assert np.isnan(theirs["noise_floor_m"]).all()
     assert found[0]["own"]["mean_error_m"].tolist() != found[0]["linear"]["mean_error_m"].tolist()
+
+
+def test_what_a_run_learns_with_answers_once_for_both_of_its_names(tmp_path, go):
+    found, _ = answers_of(
+        tmp_path, go, "--algorithm", "sgim-d", "--inverse", "linear", "--answers", "own,nearest,linear"
+    )
+    assert found["linear"]["mean_error_m"].tolist() == found["own"]["mean_error_m"].tolist()
+    assert np.isfinite(found["own"]["noise_floor_m"]).all()
+    assert np.isnan(found["linear"]["noise_floor_m"]).all()
+    parts = build(config_of(read_run(next(tmp_path.glob("*/seed-003")))))
+    assert parts.answers["linear"] is parts.inverse is parts.learner.inverse
+    assert parts.answers["nearest"] is not parts.inverse
 
 
 def test_a_run_has_the_answers_that_were_asked_for_and_its_log_does_not_depend_on_them(tmp_path, go, reference):
