@@ -28,11 +28,13 @@ SAGG_RIAC: Final[Variant] = {"algorithm": "sagg-riac"}
 # paper gives no number for the budget and for g_max: 60 movements are more than come between two demonstrations.
 STEPS: Final[tuple[tuple[str, Variant, Variant], ...]] = (
     ("inverse", {"inverse": "paper"}, {"inverse": "linear"}),
-    ("simplex", {"search": "nelder-mead-complete", "budget": 60}, {"search": "nelder-mead-exact", "budget": 15}),
+    ("simplex", {"search": "nelder-mead-complete"}, {"search": "nelder-mead-exact"}),
+    ("budget", {"budget": 60}, {"budget": 15}),
     ("noise", {}, {"search": "nelder-mead"}),
     ("progress", {"progress": "absolute"}, {"progress": "gained"}),
     ("giving-up", {"give_up": -1.0}, {"give_up": -0.5}),
-    ("regions", {"g_max": 50, "max_aspect": 1e9}, {"g_max": 30, "max_aspect": 5.0}),
+    ("regions", {"g_max": 50}, {"g_max": 30}),
+    ("slivers", {"max_aspect": 1e9}, {"max_aspect": 5.0}),
     ("proof", {"inverse": "linear"}, {"inverse": "process"}),  # the last one: our defaults
 )
 LETTER: Final[Variant] = {option: value for _, was, _ in reversed(STEPS) for option, value in was.items()}
