@@ -5,7 +5,7 @@ Each function draws on the axes it is given.   mesh = ax.pcolormesh(x, y, z); co
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -18,7 +18,6 @@ from numpy.typing import ArrayLike
 from sgimd_torch.spaces import Array, Box
 
 GREY: Final = "0.45"
-PALETTE: Final = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#999933", "#882255")
 LEGEND: Final[dict[str, Any]] = {
     "loc": "lower center",
     "bbox_to_anchor": (0.5, 1.0),  # above the axes
@@ -27,6 +26,12 @@ LEGEND: Final[dict[str, Any]] = {
     "borderaxespad": 0.2,
     "handletextpad": 0.2,
 }
+_PALETTE: Final = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#999933", "#882255")
+
+
+def colours(names: Iterable[str]) -> dict[str, str]:
+    """A colour for each name, in their order; of more than eight names, the first colours serve again."""
+    return {name: _PALETTE[k % len(_PALETTE)] for k, name in enumerate(sorted({*names}))}
 
 
 def limits(points: Array) -> Box:

@@ -27,7 +27,7 @@ except ImportError as error:
 
 from scipy.spatial import cKDTree
 
-from sgimd_torch.figures.axes import PALETTE, goal_rings, rounded
+from sgimd_torch.figures.axes import colours, goal_rings, rounded
 from sgimd_torch.figures.save import STYLE
 from sgimd_torch.spaces import Array
 from sgimd_torch.views.film.reel import Frame
@@ -81,8 +81,7 @@ class Panel:
         side = float(np.ptp(places, axis=0).max()) or 1.0
         self.near = rounded(side / 50)
         """Nearer than this, in the unit of T, is met."""
-        names = sorted({name for stage in stages for name in stage.shown})
-        self._teachers = {name: PALETTE[k % len(PALETTE)] for k, name in enumerate(names)}
+        self._teachers = colours(name for stage in stages for name in stage.shown)
         self._low, self._high = places.min(axis=0) - side / 20, places.max(axis=0) + side / 20
         x, y = np.linspace(self._low, self._high, _FINE).T
         self._nearest = cKDTree(places).query(np.stack(np.meshgrid(x, y), axis=-1))[1]  # (_FINE, _FINE)

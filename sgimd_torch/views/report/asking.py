@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from sgimd_torch.figures.axes import LEGEND, PALETTE, colour_bar, limits, over_movements
+from sgimd_torch.figures.axes import LEGEND, colour_bar, colours, limits, over_movements
 from sgimd_torch.figures.learning import map_after, regions_in
 from sgimd_torch.figures.sections import of_regions, sections
 from sgimd_torch.goals.strategic import AUTONOMOUS
@@ -75,19 +75,19 @@ def over_time(figure: Figure, life: Life) -> None:
     figure.set_size_inches(6.4, 6.4)
     assert life.requests is not None
     above, below = figure.subplots(2, 1, sharex=True)
-    used, colours = strategies(life), _colours(life)
+    used, asked = strategies(life), life.requests
+    coloured = colours(asked["strategy"])
     edges = np.linspace(0, len(used), min(PARTS, len(used)) + 1)
     parts = [used[int(low) : int(high)] for low, high in pairwise(edges)]
     bottom = np.zeros(len(parts))
-    for strategy, colour in {**colours, AUTONOMOUS: _ALONE}.items():
+    for strategy, colour in {**coloured, AUTONOMOUS: _ALONE}.items():
         shares = np.array([100 * np.mean(part == strategy) for part in parts])
         above.bar(edges[:-1], shares, np.diff(edges), bottom, align="edge", color=colour, label=strategy)
         bottom += shares
     over_movements(above, "share of movements (%)")
     above.set(xlabel="", ylim=(0, 100))
     above.legend(**LEGEND)
-    asked = life.requests
-    for strategy, colour in colours.items():
+    for strategy, colour in coloured.items():
         mine = (asked["strategy"] == strategy) & (asked["reply"] == "shown")
         below.plot(asked["index"][mine], asked["brought"][mine], "o", color=colour, markersize=4, alpha=0.7)
     over_movements(below, "competence raised at the goal by")
@@ -109,7 +109,7 @@ def over_goals(figure: Figure, life: Life) -> None:
         colour_bar([ax], drawn, "goals in this region that it asked for (%)")
     else:
         section = sections(limits(wanted))[0]
-    for strategy, colour in _colours(life).items():
+    for strategy, colour in colours(asked["strategy"]).items():
         x, y = section.points(wanted[asked["strategy"] == strategy]).T
         ax.plot(x, y, "o", color=colour, markersize=4, markeredgecolor="white", markeredgewidth=0.5, label=strategy)
     section.frame(ax)
@@ -135,10 +135,3 @@ def _row(tables: Sequence[Mapping[str, np.ndarray]], teacher: str) -> list[str]:
         f"{brought.mean():.3f}" if len(brought) else "–",
         f"{late:.3g}",
     ]
-
-
-def _colours(life: Life) -> dict[str, str]:
-    """A colour for each strategy, in the order of their names."""
-    assert life.requests is not None
-    found = sorted(set(life.requests["strategy"].tolist()))
-    return {name: PALETTE[k % len(PALETTE)] for k, name in enumerate(found)}
