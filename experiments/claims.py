@@ -85,6 +85,7 @@ def paper_page(folder: Path) -> Page:
     """The page results/RESULTS.md; learners from the worst to the best, other variants in the order of their rows."""
     path = folder / "paper.csv"
     own = Results(read_results(path), read_goals(folder / "goals.csv"), same=read_results(path, "linear"))
+    proved = Results(read_results(path, "process"))
     verdicts, results, variants = judge(PAPER_CLAIMS, own), own.alike, own.same
     learners = sorted((v for v in variants.values() if v.experiment == "learners"), key=lambda v: -_last_error(v))
     others = [variant for variant in variants.values() if variant.experiment != "learners"]
@@ -93,6 +94,7 @@ def paper_page(folder: Path) -> Page:
         "experiment": lambda name: variants[name].experiment,
         **_errors(results, (1000, LAST), ".3f"),
         f"by its own inverse at {LAST} (m)": lambda name: show(own.iqm(name), ".3f"),
+        f"by `LocalProcess` at {LAST} (m)": lambda name: show(proved.iqm(name), ".3f"),
         "mean over life (m)": lambda name: show(iqm_interval(results.lives(name), rng=rng()), ".3f"),
         "SGIM-D better, probability": better,
         "difference to SGIM-D (m)": difference,
@@ -101,14 +103,14 @@ def paper_page(folder: Path) -> Page:
         "goals met": lambda name: show(results.iqm(name, values="met"), ".0f"),
     }
     tables = {
-        "ladder": _ladder_table(own, ""),
-        "ladder_large": _ladder_table(own, "-large"),
+        "ladder": _ladder_table(own, proved, ""),
+        "ladder_large": _ladder_table(own, proved, "-large"),
         "claims": verdicts_table("claim", verdicts),
         "said": said_table(read_said(folder / "said.csv"), verdicts),
         "learners": variants_table([variant.variant for variant in learners], columns),
         "ablations": variants_table([variant.variant for variant in others], columns),
         "anova": markdown(ANOVA, anova_cells(folder / "anova.csv")),
-        "readme": _readme_table(own),
+        "readme": _readme_table(own, proved),
     }
     return Page(verdicts, tables, own)
 
@@ -242,19 +244,20 @@ def _answers(name: str, answer: str) -> bool:
     return answer != ("own" if EXPERIMENTS["swimmer"][name].get("inverse") == "model" else "model")
 
 
-def _readme_table(own: Results) -> str:
+def _readme_table(own: Results, proved: Results) -> str:
     """The learners and their peers in short."""
     columns: dict[str, Cell] = {
         "learner": lambda name: IN_README[name],
         "error after 1000 (m)": lambda name: show(own.alike.iqm(name, 1000), ".3f"),
         f"after {LAST} (m)": lambda name: show(own.alike.iqm(name), ".3f"),
         f"after {LAST}, by its own inverse (m)": lambda name: show(own.iqm(name), ".3f"),
+        f"after {LAST}, by `LocalProcess` (m)": lambda name: show(proved.iqm(name), ".3f"),
         "seeds": lambda name: str(len(own.alike.at(name))),
     }
     return variants_table([*IN_README], columns)
 
 
-def _ladder_table(own: Results, ending: str) -> str:
+def _ladder_table(own: Results, proved: Results, ending: str) -> str:
     """The steps from the letter to our defaults: the error of each, and the difference that it makes."""
     names = ladder(ending)
     before = dict(zip(names[1:], names, strict=False))
@@ -270,6 +273,7 @@ def _ladder_table(own: Results, ending: str) -> str:
         "difference to the step before (m)": step(own),
         f"by `LocallyLinear` at {LAST} (m)": lambda name: show(own.alike.iqm(name), ".3f"),
         "difference, by `LocallyLinear` (m)": step(own.alike),
+        f"by `LocalProcess` at {LAST} (m)": lambda name: show(proved.iqm(name), ".3f"),
     }
     return variants_table(names, columns)
 
