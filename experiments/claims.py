@@ -112,7 +112,7 @@ def paper_page(folder: Path) -> Page:
         "anova": markdown(ANOVA, anova_cells(folder / "anova.csv")),
         "readme": _readme_table(own, proved),
     }
-    return Page(verdicts, tables, own)
+    return Page(verdicts, tables, own, {"proved": proved})
 
 
 def model_page(folder: Path, table: Path) -> Page:

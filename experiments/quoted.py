@@ -1,13 +1,13 @@
 """Pages from their templates; figures that prose quotes are computed from the rows, so that they cannot drift.
 
-A template has two of these, ``own`` and ``alike`` (every variant answered by ``LocallyLinear``):
+A template has two of these, ``own`` and ``alike`` (every variant answered by ``LocallyLinear``), and some have more:
     SGIM-D ends at {{ alike.error("sgim-d") }} m, {{ alike.less("sgim-d", "imitation") }} m below Imitation.
 What was not run is quoted as "(not run)".
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
@@ -16,7 +16,7 @@ from typing import Any, Final, NamedTuple
 import jinja2
 
 from judging import NotRun, Results, Verdict
-from read_results import FRESH, LAST, ResultsError
+from read_results import LAST, ResultsError
 from sgimd_torch.views.statistics import Interval, show
 
 MISSING: Final = "(not run)"
@@ -41,11 +41,6 @@ class Quoted:
     """Figures from these results; ``at`` is a number of movements, ``form`` how a number is written."""
 
     results: Results
-
-    @property
-    def looked_at(self) -> bool:
-        """Whether defaults were changed after a look at these seeds."""
-        return min(self._seeds) < FRESH
 
     @property
     def range(self) -> str:
@@ -123,11 +118,12 @@ class Quoted:
 
 
 class Page(NamedTuple):
-    """What is put into a template: verdicts, tables by name, and the results that both come from."""
+    """What is put into a template: verdicts, tables by name, the results that both come from, and others by name."""
 
     verdicts: list[Verdict]
     tables: dict[str, str]
     results: Results
+    more: Mapping[str, Results] = {}
 
 
 def render(name: str, page: Page) -> str:
@@ -150,7 +146,7 @@ def into_readme(text: str, paper: Page, **more: Results) -> str:
 
 
 def _filled(name: str, page: Page, **more: Results) -> str:
-    quoted = {"own": page.results, "alike": page.results.alike, **more}
+    quoted = {"own": page.results, "alike": page.results.alike, **page.more, **more}
     loader = jinja2.FileSystemLoader(TEMPLATES)
     environment = jinja2.Environment(loader=loader, undefined=jinja2.StrictUndefined, keep_trailing_newline=True)
     figures = {each: Quoted(results) for each, results in quoted.items()}

@@ -53,7 +53,7 @@ def rows(variant, *, last=None, tiles=None, seeds=range(SEEDS), **changes):
             value = error(final, seed, movements)
             floor = 0.9 * final * spread(seed) if movements == 5000 else ""
             run = f"{experiment},{variant},{teacher},{task_space},{seed},{movements}"
-            for answer in ("own", "linear"):
+            for answer in ("own", "linear", "process"):
                 yield f"{run},{answer},{value},{floor},{reached},{reached},{reached // 2}"
 
 

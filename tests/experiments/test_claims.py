@@ -196,16 +196,16 @@ def test_the_tables_give_each_variant_beside_sgim_d(results, tmp_path):
     out = tmp_path / "new"
     assert make_page(results, out) == 0
     text = (out / "RESULTS.md").read_text()
-    experiment, _, seeds, early, late, own, _, better, difference, *counts = cells(text, "uniform-goals")
+    experiment, _, seeds, early, late, own, proved, _, better, difference, *counts = cells(text, "uniform-goals")
     assert (experiment, seeds) == ("ablations", str(SEEDS))
     middle = range(SEEDS // 4, SEEDS - SEEDS // 4)
-    assert late == own
+    assert late == own == proved
     assert late.startswith(f"{0.085 * np.mean([spread(seed) for seed in middle]):.3f} [")
     assert early.startswith(f"{np.mean([error(0.085, seed, 1000) for seed in middle]):.3f} [")
     assert better == "1.00 [0.90, 1.00]"
     assert difference.startswith("+0.0050 [+0.00")
     assert [count.partition(" ")[0] for count in counts] == ["300", "300", "150"]  # tiles reached, goals claimed, met
-    assert cells(section(text, "The five learners"), "sgim-d")[7:9] == ["", ""]
+    assert cells(section(text, "The five learners"), "sgim-d")[8:10] == ["", ""]
     learners = section(text, "The five learners")
     order = re.findall(r"\| learners \| ([\w-]+)", learners)
     assert order == ["observation", "random", "sagg-riac", "imitation", "sgim-d"]  # the best last
@@ -231,8 +231,8 @@ def test_the_same_results_give_the_same_file_and_the_prose_follows_other_ones(re
     said, before = prose(page.read_text()), prose(first)
     assert len(said) == len(before)
     changed = [(now, then) for now, then in zip(said, before, strict=True) if now != then]
-    assert "SGIM-D 0.130" in "".join(now for now, _ in changed)
-    assert "SGIM-D 0.080" in "".join(then for _, then in changed)
+    assert "SGIM-D to 0.130" in "".join(now for now, _ in changed)
+    assert "SGIM-D to 0.080" in "".join(then for _, then in changed)
     assert len(changed) < len(before) / 4
 
 
@@ -321,7 +321,7 @@ def test_seeds_that_only_one_side_has_are_left_out_of_pairs_and_that_is_told(res
     assert make_page(results, tmp_path) == 0
     grid = cells((tmp_path / "RESULTS.md").read_text(), "grid")
     assert grid[2] == str(SEEDS - 1)
-    assert grid[8].endswith(f"({SEEDS - 4} pairs)")
+    assert grid[9].endswith(f"({SEEDS - 4} pairs)")
 
 
 def test_a_run_that_is_under_way_is_counted_where_it_was_evaluated(results):
