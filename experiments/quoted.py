@@ -65,7 +65,7 @@ class Quoted:
     def less(self, ours: str, theirs: str, at: int = LAST, form: str = ".3f") -> str:
         """How much smaller (m) our error is than theirs, paired by seed, with its interval."""
         found = self.results.difference(ours, theirs, at)
-        return show(Interval(-found.value, -found.high, -found.low), form)
+        return show(Interval(-found.value, -found.high, -found.low), form).replace("-", "−")
 
     @_or_missing
     def ratio(self, ours: str, theirs: str, at: int = LAST, form: str = ".2f") -> str:

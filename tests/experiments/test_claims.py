@@ -272,7 +272,7 @@ def test_a_figure_in_prose_is_that_of_the_rows(results):
     assert made.error("sgim-d") == f"{0.08 * np.mean([spread(seed) for seed in range(5, 15)]):.3f}"
     assert made.interval("sgim-d", values="tiles", form=".0f").startswith("310 [3")
     assert made.less("sgim-d", "random").startswith("0.120 [0.1")
-    assert made.less("random", "sgim-d").startswith("-0.120 [-0.1")
+    assert made.less("random", "sgim-d").startswith("−0.120 [−0.1")
     assert made.ratio("sgim-d", "random") == "0.40"
     assert made.percent_more("random", "sgim-d").startswith("150 % [1")
     assert made.floor("sgim-d") == "0.072"
