@@ -15,7 +15,7 @@ import numpy as np
 from judging import Claim, Judged, NotRun, Results, all_of, at_least, at_most, below_zero, shared
 from read_results import LAST, read_asked, read_contexts, read_results
 from sgimd_torch.spaces import Array
-from sgimd_torch.views.statistics import Interval, difference_interval, interquartile_mean, interval, rng, show
+from sgimd_torch.views.statistics import Interval, difference_interval, interquartile_mean, interval, metres, rng, show
 from variants import FOUR, HALVES
 
 IM, CHEAP, DEAR = "sgim-im", "sgim-im-83", "sgim-im-cost-10"
@@ -60,7 +60,7 @@ def difference_at(
 
     def judged(results: Results) -> Judged:
         found = {when: results.difference(ours, theirs, when) for when in times}
-        said = ", ".join(f"{_metres(each)} at {when}" for when, each in found.items())
+        said = ", ".join(f"{metres(each)} at {when}" for when, each in found.items())
         return _with_shown(results, ours, said, all_of(*map(below_zero, found.values())), most_shown)
 
     return judged
@@ -71,7 +71,7 @@ def no_more_than(ours: str, theirs: str, most_shown: float = np.inf) -> Callable
 
     def judged(results: Results) -> Judged:
         found = results.difference(ours, theirs)
-        return _with_shown(results, ours, _metres(found), at_most(found, 0.0), most_shown)
+        return _with_shown(results, ours, metres(found), at_most(found, 0.0), most_shown)
 
     return judged
 
@@ -129,7 +129,7 @@ def _less_at_equal_cost(results: Results) -> Judged:
             when, errors = np.array(points).T
             theirs[seed] = float(np.interp(same, when, errors))
     found = _paired(results, *shared(ours, theirs))
-    return _metres(found), below_zero(found)
+    return metres(found), below_zero(found)
 
 
 def _in_strong_wind(results: Results) -> Judged:
@@ -260,9 +260,5 @@ def _paired(results: Results, ours: Mapping[int, float], theirs: Mapping[int, fl
     return difference_interval(ours, theirs, rng=rng(), level=results.level)
 
 
-def _metres(found: Interval) -> str:
-    return f"{show(found, '+.4f')} m".replace("-0", "−0")
-
-
 def _percent(found: Interval) -> str:
-    return f"{show(Interval(*(100 * each for each in found)), '.0f')} %"
+    return show(Interval(*(100 * each for each in found)), ".0f", "%")

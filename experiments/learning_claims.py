@@ -13,7 +13,7 @@ from typing import Final
 
 from judging import Claim, Judged, NotRun, Results, all_of, at_most, below_zero
 from read_results import LAST, read_results
-from sgimd_torch.views.statistics import Interval, interquartile_mean, point, show
+from sgimd_torch.views.statistics import Interval, interquartile_mean, metres, point, show
 from variants import LEARNING, PROVED
 
 BEST, ALONE, IMITATION = "practice-taught.rod", "practice.rod", "imitation.rod"
@@ -51,8 +51,8 @@ def below(ours: str, theirs: tuple[str, ...], times: tuple[int, ...]) -> Callabl
     def judged(results: Results) -> Judged:
         found = {(name, when): results.difference(ours, name, when) for name in theirs for when in times}
         least = max(found, key=lambda each: found[each].value)
-        said = f"the closest: {least[0].removesuffix('.rod')} at {least[1]}, {show(found[least], '+.4f')} m"
-        return said.replace("-0", "−0"), all_of(*map(below_zero, found.values()))
+        said = f"the closest: {least[0].removesuffix('.rod')} at {least[1]}, {metres(found[least])}"
+        return said, all_of(*map(below_zero, found.values()))
 
     return judged
 

@@ -36,7 +36,7 @@ def rng() -> np.random.Generator:
 
 
 def show(found: Interval, form: str = ".2f", unit: str = "") -> str:
-    """``0.48 [0.45, 0.52]``, followed by a unit; without brackets for few seeds."""
+    """``0.48 [0.45, 0.52]``, followed by a unit; without brackets for few seeds. A minus is a hyphen, for programs."""
     between = "" if np.isnan(found.low) else f" [{found.low:{form}}, {found.high:{form}}]"
     return f"{found.value:{form}}{between}{f' {unit}' if unit else ''}"
 
