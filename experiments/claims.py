@@ -135,16 +135,16 @@ def model_page(folder: Path, table: Path) -> Page:
 def gymnasium_page(folder: Path) -> Page:
     """The page results/GYMNASIUM.md: each way to explore, answered in each way."""
     path = folder / "gymnasium.csv"
-    by_answer = {answer: Results(read_results(path, answer)) for answer in ("nearest", "linear", "model", "own")}
+    by_answer = {answer: Results(read_results(path, answer)) for answer in ("nearest", "linear", "model", "process")}
     rows = [
         (name, answer)
         for name in EXPERIMENTS["swimmer"]
-        for answer in by_answer
-        if name in by_answer[answer].variants and _answers(name, answer)
+        for answer, results in by_answer.items()
+        if name in results.variants and results.variants[name].rows
     ]
     columns: dict[str, Callable[[str, str], str]] = {
         "explored by": lambda name, _: f"`{name.removesuffix('-swimmer')}`",
-        "answered by": lambda _, answer: f"`{answer}`" if answer != "own" else "its own process",
+        "answered by": lambda _, answer: f"`{answer}`",
         "seeds": lambda name, answer: str(len(by_answer[answer].at(name, ON_ARMS[-1]))),
         **{
             f"error at {when} (m)": partial(
@@ -154,7 +154,7 @@ def gymnasium_page(folder: Path) -> Page:
         },
     }
     cells = [[cell(name, answer) for cell in columns.values()] for name, answer in rows]
-    return Page([], {"swimmer": markdown([*columns], cells)}, by_answer["own"])
+    return Page([], {"swimmer": markdown([*columns], cells)}, by_answer["process"])
 
 
 def learning_page(folder: Path) -> Page:
@@ -237,11 +237,6 @@ def rivals_page(folder: Path) -> Page:
 def _alone(name: str) -> str:
     """The same learner without a teacher."""
     return f"{name.partition('-')[0]}-alone"
-
-
-def _answers(name: str, answer: str) -> bool:
-    """Whether a row says anything new: the own answer of a run with the model is the model's."""
-    return answer != ("own" if EXPERIMENTS["swimmer"][name].get("inverse") == "model" else "model")
 
 
 def _readme_table(own: Results, proved: Results) -> str:

@@ -62,6 +62,12 @@ PANELS = {
     "letter": "The paper to the letter",
     "ladder": "From there to our defaults, step by step",
 }
+SWIMMER_ANSWERS = {
+    "nearest": "the nearest neighbour",
+    "linear": "LocallyLinear",
+    "process": "LocalProcess",
+    "model": "the forward model",
+}
 APART = ("learners", "teachers", "large-space", "ladder-large", "long")  # experiments without a panel of their own
 MOVING = (("random", "sagg-riac"), ("imitation", "sgim-d"))  # the paper's learners that execute movements
 REACH = 1.5  # m; the float hardly ever lands farther from the base
@@ -238,26 +244,15 @@ def variants(data: Data) -> Figure:
 
 
 def swimmer(data: Data) -> Figure:
-    """A robot that nobody here wrote: the same movements, answered in three ways."""
+    """A robot that nobody here wrote: the same movements, answered in four ways; practice has no model."""
     if not data.swimmer:
         raise NotRun("the swimmer")
-    figure = _figure(13, 4.6)
-    answers = {
-        "nearest": "the nearest neighbour",
-        "linear": "LocallyLinear",
-        "model": "the model; practice by its process",
-    }
-    axes = figure.subplots(1, 3, sharey=True)
-    for ax, (answer, title) in zip(axes, answers.items(), strict=True):
-        own = "own" if answer == "model" else answer
-        explored = [*((name, answer) for name in SWIMMERS), ("practice", own)]
-        seed_curves(
-            ax,
-            [
-                replace(data, results=data.swimmer[by]).curves(f"{name}-swimmer", name, label(name))
-                for name, by in explored
-            ],
-        )
+    figure = _figure(16, 4.6)
+    axes = figure.subplots(1, len(SWIMMER_ANSWERS), sharey=True)
+    for ax, (answer, title) in zip(axes, SWIMMER_ANSWERS.items(), strict=True):
+        answered = replace(data, results=data.swimmer[answer])
+        explored = [*SWIMMERS, *(["practice"] if answer != "model" else [])]
+        seed_curves(ax, [answered.curves(f"{name}-swimmer", name, label(name)) for name in explored])
         ax.set_title(f"answered by {title}", fontsize=11)
         ax.label_outer()
     axes[0].set_ylim(0, 1.05 * max(line.get_ydata().max() for ax in axes for line in ax.lines))
@@ -311,8 +306,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--only", choices=FIGURES, help="only this figure")
     options = parser.parse_args(argv)
     path = options.results / "gymnasium.csv"
-    answers = ("nearest", "linear", "model", "own") if path.exists() else ()
-    swimmer = {answer: Results(read_results(path, answer)) for answer in answers}
+    swimmer = {answer: Results(read_results(path, answer)) for answer in SWIMMER_ANSWERS} if path.exists() else {}
     data = Data(Results(read_results(options.results / "paper.csv", "linear")), options.runs, swimmer)
     make_folder(options.out)
     for name in FIGURES if options.only is None else [options.only]:
