@@ -56,18 +56,18 @@ def test_under_another_teacher_a_learner_without_one_is_what_it_was(tmp_path):
     assert shown["one-corner"].startswith("**3.00 [")
     assert shown["13-shown"].startswith("**2.00 [")
     assert shown["swimmer"] == "1.00 [1.00, 1.00]"
+    assert rows["Practice in the place of goal babbling", "`practice` / `sagg-riac`"][len(SETTINGS) - 3 :] == ["-"] * 3
     errors = {row[0]: row[1:] for row in settings_rows(results, 2000)}
     assert errors["`sagg-riac`"][len(SETTINGS) - 3 :] == ["-", "-", "-"]
 
 
 def test_the_page_says_what_was_not_run_with_a_dash(tmp_path):
-    write(tmp_path, without=("practice@swimmer",))
+    write(tmp_path, without=("practice-taught@swimmer",))
     assert command(main, ["--results", str(tmp_path), "--out", str(tmp_path / "pages"), "--only", "SETTINGS"]) == 0
     page = (tmp_path / "pages/SETTINGS.md").read_text()
     assert "{{" not in page
-    row = next(
-        line for line in page.splitlines() if line.startswith("| Practice in the place of goal babbling | `practice` /")
-    )
+    head = "| Practice in the place of goal babbling | `practice-taught` /"
+    row = next(line for line in page.splitlines() if line.startswith(head))
     same = "1.00 [1.00, 1.00]"
     assert [cell.strip() for cell in row.split("|")[3:-1]] == [*[same] * 4, "-", *[same] * 3]
 
