@@ -154,7 +154,7 @@ def gymnasium_page(folder: Path) -> Page:
         },
     }
     cells = [[cell(name, answer) for cell in columns.values()] for name, answer in rows]
-    return Page([], {"swimmer": markdown([*columns], cells)}, by_answer["process"])
+    return Page([], {"swimmer": markdown([*columns], cells)}, by_answer["process"], by_answer)
 
 
 def learning_page(folder: Path) -> Page:
