@@ -117,19 +117,23 @@ def paper_page(folder: Path) -> Page:
 
 def model_page(folder: Path, table: Path) -> Page:
     """The page results/FORWARD_MODEL.md; variants in the order of ``EXPERIMENTS``."""
-    results = Results(read_results(folder / "forward_model.csv"), coverages=read_coverages(table))
+    path = folder / "forward_model.csv"
+    results = Results(read_results(path), coverages=read_coverages(table), same=read_results(path, "linear"))
+    proved = Results(read_results(path, "process"))
     verdicts = judge(MODEL_CLAIMS, results)
     tables = {"bars": verdicts_table("what", verdicts)}
     for experiment, (ending, times) in MODEL_TABLES.items():
         better, difference = _against(results, partial(_plain_learner, ending), times[-1])
+        *_, by_process = _errors(proved, times[-1:], ".4f").values()
         columns = {
             **_errors(results, times, ".4f"),
             f"difference to the plain learner at {times[-1]} (m)": difference,
             "plain better, probability": better,
+            f"by `LocalProcess` at {times[-1]} (m)": by_process,
         }
         names = [name for name in EXPERIMENTS[experiment] if name in results.variants]
         tables[experiment] = variants_table(names, columns)
-    return Page(verdicts, tables, results)
+    return Page(verdicts, tables, results, {"proved": proved})
 
 
 def gymnasium_page(folder: Path) -> Page:

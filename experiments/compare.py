@@ -24,7 +24,7 @@ from sgimd_torch.runs.process import command, loading, say
 with loading():  # Ctrl-C shows no traceback
     import numpy as np
 
-    from read_results import FRESH, HEADER
+    from read_results import HEADER
     from sgimd_torch.catalogue import unknown
     from sgimd_torch.files import make_folder
     from sgimd_torch.runs.config import Config
@@ -33,7 +33,7 @@ with loading():  # Ctrl-C shows no traceback
     from sgimd_torch.runs.read import finished, read_run
     from sgimd_torch.runs.sweep import add_engines, add_options, engine_of
     from tables import COLUMNS, RESULTS, ROWS, Key, Table, as_text, result_rows
-    from variants import EARLIER, EXPERIMENTS, MADE, Variant, make_subsets, tables_of
+    from variants import EXPERIMENTS, MADE, Variant, make_subsets, tables_of
 
 EXAMPLES: Final = f"""experiments: {", ".join(EXPERIMENTS)}
 
@@ -178,8 +178,6 @@ def runs_of(
                     changes["demonstrations"] = out / "demonstrations" / shown
                 floor_at = FLOOR_AT if experiment in FLOORS else ()
                 fixed: Variant = {"answers": ANSWERS, "floor_at": floor_at}
-                if experiment in EARLIER and seed < FRESH:
-                    fixed |= {"inverse": "linear", "answers": ANSWERS[:-1]}
                 whole = {"seed": seed, "out": out, "name": variant, **fixed, **changes}
                 found.append((experiment, Config(**whole)))
     return found

@@ -296,10 +296,6 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
 }
 
 
-# Of these experiments, rows of seeds below FRESH were made when `LocallyLinear` was the default.
-EARLIER: Final = [name for name in EXPERIMENTS if name not in ("asking", "by-hand", "learning", "settings", "suite")]
-
-
 def tables_of(experiment: str) -> list[str]:
     """The tables of results that its runs write rows to; the first has their evaluations."""
     if experiment in ("by-hand", "learning", "settings", "suite"):

@@ -299,8 +299,8 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
         ),
         "model": _at(
             "inverses.through_model:ModelInverse",
-            "linear when learning, through a forward model in evaluations (extra forward); it helps learners that "
-            "explore and misleads the imitation learner",
+            "linear when learning, through a forward model in evaluations (extra forward); it helps late in life "
+            "where movements are noisy, and errs more than process where they are not",
             uses={**_MODEL, "policies": "policies"},
             learns_with="linear",
         ),
