@@ -70,13 +70,13 @@ def table(path):
 def keys_of(path, name="paper.csv"):
     """(variant, movements) of each run's own answers; the others have a row for each of them, too."""
     rows = table(path / "results" / name)[1]
-    own, nearest, linear = ([(row[1], int(row[5])) for row in rows if row[6] == each] for each in ANSWERS)
-    assert own == nearest == linear
-    assert 3 * len(own) == len(rows)
+    own, *others = ([(row[1], int(row[5])) for row in rows if row[6] == each] for each in ANSWERS)
+    assert others == [own, own, own]
+    assert 4 * len(own) == len(rows)
     return own
 
 
-ANSWERS = ("own", "nearest", "linear")  # of runs without a forward model
+ANSWERS = ("own", "nearest", "linear", "process")  # of runs without a forward model
 WHOLE = [("random", 20), ("random", 40), ("sgim-d-large", 20), ("sgim-d-large", 40)]
 
 
@@ -389,7 +389,7 @@ def test_rows_made_again_are_equal_but_for_rounding_or_differ():
 def test_rows_are_drawn_by_lot_and_made_again_in_a_folder_of_their_own(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     results = table_in(tmp_path, "forward_model.csv")
-    config = Config(algorithm="sgim-d", environment="planar-arm-7", name="sgim-d-arm-7", movements=20, inverse="linear")
+    config = Config(algorithm="sgim-d", environment="planar-arm-7", name="sgim-d-arm-7", movements=20)
     again = replace(config, evaluate_at=(20,), floor_at=(), answers=("own", "nearest"), out=tmp_path / "first")
     assert sweep_here([again]) == []
     _, row = result_rows("planar-arm-7", again, read_run(again.directory))
