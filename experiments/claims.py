@@ -93,8 +93,8 @@ def paper_page(folder: Path) -> Page:
     columns = {
         "experiment": lambda name: variants[name].experiment,
         **_errors(results, (1000, LAST), ".3f"),
-        f"by its own inverse at {LAST} (m)": lambda name: show(own.iqm(name), ".3f"),
-        f"by `LocalProcess` at {LAST} (m)": lambda name: show(proved.iqm(name), ".3f"),
+        f"by its own inverse at {LAST} (m)": _error(own),
+        f"by `LocalProcess` at {LAST} (m)": _error(proved),
         "mean over life (m)": lambda name: show(iqm_interval(results.lives(name), rng=rng()), ".3f"),
         "SGIM-D better, probability": better,
         "difference to SGIM-D (m)": difference,
@@ -124,12 +124,11 @@ def model_page(folder: Path, table: Path) -> Page:
     tables = {"bars": verdicts_table("what", verdicts)}
     for experiment, (ending, times) in MODEL_TABLES.items():
         better, difference = _against(results, partial(_plain_learner, ending), times[-1])
-        *_, by_process = _errors(proved, times[-1:], ".4f").values()
         columns = {
             **_errors(results, times, ".4f"),
             f"difference to the plain learner at {times[-1]} (m)": difference,
             "plain better, probability": better,
-            f"by `LocalProcess` at {times[-1]} (m)": by_process,
+            f"by `LocalProcess` at {times[-1]} (m)": _error(proved, times[-1], ".4f"),
         }
         names = [name for name in EXPERIMENTS[experiment] if name in results.variants]
         tables[experiment] = variants_table(names, columns)
@@ -168,8 +167,8 @@ def learning_page(folder: Path) -> Page:
     names = sorted(LEARNING, key=lambda name: _last_error(rod["process"].variants.get(name, NOBODY)))
     columns = {
         **_errors(rod["process"], times, ".4f"),
-        "by its own": lambda name: show(rod["own"].iqm(name), ".4f"),
-        "by `linear`": lambda name: show(rod["linear"].iqm(name), ".4f"),
+        "by its own": _error(rod["own"], LAST, ".4f"),
+        "by `linear`": _error(rod["linear"], LAST, ".4f"),
         "times its noise floor": lambda name: show(rod["own"].floor_ratio(name, name)),
     }
     on_tasks = ["task", "seeds", "random, `nearest`", *(f"{name}, `{answer}`" for name, answer in SUITE_COLUMNS)]
@@ -247,10 +246,10 @@ def _readme_table(own: Results, proved: Results) -> str:
     """The learners and their peers in short."""
     columns: dict[str, Cell] = {
         "learner": lambda name: IN_README[name],
-        "error after 1000 (m)": lambda name: show(own.alike.iqm(name, 1000), ".3f"),
-        f"after {LAST} (m)": lambda name: show(own.alike.iqm(name), ".3f"),
-        f"after {LAST}, by its own inverse (m)": lambda name: show(own.iqm(name), ".3f"),
-        f"after {LAST}, by `LocalProcess` (m)": lambda name: show(proved.iqm(name), ".3f"),
+        "error after 1000 (m)": _error(own.alike, 1000),
+        f"after {LAST} (m)": _error(own.alike),
+        f"after {LAST}, by its own inverse (m)": _error(own),
+        f"after {LAST}, by `LocalProcess` (m)": _error(proved),
         "seeds": lambda name: str(len(own.alike.at(name))),
     }
     return variants_table([*IN_README], columns)
@@ -270,24 +269,25 @@ def _ladder_table(own: Results, proved: Results, ending: str) -> str:
     columns = {
         **_errors(own, (1000, LAST), ".3f"),
         "difference to the step before (m)": step(own),
-        f"by `LocallyLinear` at {LAST} (m)": lambda name: show(own.alike.iqm(name), ".3f"),
+        f"by `LocallyLinear` at {LAST} (m)": _error(own.alike),
         "difference, by `LocallyLinear` (m)": step(own.alike),
-        f"by `LocalProcess` at {LAST} (m)": lambda name: show(proved.iqm(name), ".3f"),
+        f"by `LocalProcess` at {LAST} (m)": _error(proved),
     }
     return variants_table(names, columns)
 
 
 def _errors(results: Results, times: Sequence[int], form: str) -> dict[str, Cell]:
     """A variant's name, how many of its seeds reached the last of these ``times``, its errors at each of them."""
-
-    def error(when: int) -> Cell:
-        return lambda name: show(results.iqm(name, when), form)
-
     return {
         "variant": str,
         "seeds": lambda name: str(len(results.variants[name].at(times[-1])) if name in results.variants else 0),
-        **{f"error at {when} (m)": error(when) for when in times},
+        **{f"error at {when} (m)": _error(results, when, form) for when in times},
     }
+
+
+def _error(results: Results, when: int = LAST, form: str = ".3f") -> Cell:
+    """A column: the error of a variant (m), with its interval."""
+    return lambda name: show(results.iqm(name, when), form)
 
 
 def _against(results: Results, plain: Callable[[str], str], movements: int) -> tuple[Cell, Cell]:

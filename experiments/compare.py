@@ -172,14 +172,17 @@ def runs_of(
             for variant, line in EXPERIMENTS[experiment].items():
                 if only and variant not in only:
                     continue
-                changes = dict(line)
-                shown = changes.get("demonstrations")
-                if shown in MADE:
-                    changes["demonstrations"] = out / "demonstrations" / shown
-                floor_at = FLOOR_AT if experiment in FLOORS else ()
-                fixed: Variant = {"answers": ANSWERS, "floor_at": floor_at}
-                whole = {"seed": seed, "out": out, "name": variant, **fixed, **changes}
-                found.append((experiment, Config(**whole)))
+                run: Variant = {
+                    "seed": seed,
+                    "out": out,
+                    "name": variant,
+                    "answers": ANSWERS,
+                    "floor_at": FLOOR_AT if experiment in FLOORS else (),
+                    **line,
+                }
+                if run.get("demonstrations") in MADE:
+                    run["demonstrations"] = out / "demonstrations" / run["demonstrations"]
+                found.append((experiment, Config(**run)))
     return found
 
 
