@@ -179,7 +179,7 @@ def learning_page(folder: Path) -> Page:
         "answers": markdown(["memory of", "over", *map(str, times)], answers_rows(rod)),
         **{f"suite_{when}": markdown(on_tasks, suite_rows(suite, when)) for when in TIMES},
     }
-    return Page([*verdicts, *on_suite], tables, rod["judged"])
+    return Page([*verdicts, *on_suite], tables, rod["judged"], {"linear": rod["linear"]})
 
 
 def hand_page(folder: Path) -> Page:

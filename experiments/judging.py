@@ -183,7 +183,9 @@ class Verdict(NamedTuple):
 
 def judge(claims: Iterable[Claim], results: Results) -> list[Verdict]:
     """All claims in order, together, by Holm's method: were each claim one interval, the chance that any verdict is
-    wrong would be 5 % at most. Of several intervals the worst decides; the intervals of ten seeds are a little narrow.
+    wrong would be 5 % at most. Of several intervals the worst decides. Intervals of few seeds are too narrow: where n
+    paired differences all have one sign, their bootstrap interval excludes 0 at any level, however strict, and by
+    chance alone they have one sign with probability 2^(1 - n).
     "Cannot say" if something was not run, or with fewer than `LEAST_SEEDS`, or if only a single claim could be so sure.
 
     Raises:

@@ -106,6 +106,11 @@ class Quoted:
         return str(len(self.results.pairs(ours, theirs, at)[0]))
 
     @_or_missing
+    def one_sign(self, name: str) -> str:
+        """How often by chance alone paired differences of all seeds of a variant have one sign: ``one of 16``."""
+        return f"one of {2 ** (len(self.results.at(name)) - 1)}"
+
+    @_or_missing
     def worse_in(self, ours: str, theirs: str, at: int = LAST) -> str:
         """In how many of the common seeds our error is larger: ``8 of 10``."""
         found, others = self.results.pairs(ours, theirs, at)
