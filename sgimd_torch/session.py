@@ -12,6 +12,8 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
+import numpy as np
+
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.learner import Learner, ReplayError
 from sgimd_torch.learner.life import check_repeats
@@ -53,7 +55,8 @@ def run(
     the context of the demonstration.
 
     Args:
-        learner: is asked, told and shown. The caller may stop iterating at any time and go on using it.
+        learner: is asked, told and shown. The caller may stop iterating at any time and go on using it; if a
+            movement was broken off, as by Ctrl-C, after ``learner.interrupt()``.
         environment: is observed and executed.
         seed: of the environment's streams.
         movements: in all, counting those before ``first``; at least 1.
@@ -76,7 +79,9 @@ def run(
         raise ValueError(f"first must be at most movements, got {first} of {movements}; movements counts all of a run")
     execute = live(environment, seed) if execute is None else execute
     for index in range(first, movements):
-        demonstration = teacher.offer(index, learner.memory) if teacher is not None else None
+        demonstration = None
+        if teacher is not None and not learner.just_shown:  # an earlier part of this life may end with a lesson
+            demonstration = teacher.offer(index, learner.memory)
         if demonstration is not None:
             learner.watch(demonstration)
         context = read_only(environment.observe(stream(seed, "context", index))) if learner.idle else learner.context
@@ -91,6 +96,7 @@ def run(
         if move is not None:
             outcome = execute(index, context, move.theta)
             learner.tell(outcome)
+            outcome = np.asarray(outcome, dtype=np.float64)  # as memory keeps it, also of integers
         yield Episode(index, context, move, outcome, demonstration, request, reply)
 
 

@@ -58,6 +58,19 @@ class OtherPicture(Slider):
     def record(self, context, theta, rng):
         return Sketch(np.zeros(2), 0.1, np.zeros((5, 1, 2)))
 
+class LostConnection(Slider):
+    left = 10
+
+    def execute(self, context, theta, rng):
+        self.left -= 1
+        if not self.left:
+            raise ConnectionResetError("the robot closed the connection")
+        return super().execute(context, theta, rng)
+
+class Steps(Slider):
+    def execute(self, context, theta, rng):
+        return np.rint(2 * super().execute(context, theta, rng)).astype(int)
+
 class LostPicture(Slider):
     def record(self, context, theta, rng):
         return {}["where"]

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from functools import partial
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -38,8 +39,10 @@ def teacher_of(arm: PlanarArm, every: int = 30) -> PeriodicTeacher:
     return PeriodicTeacher(demonstrations(arm), stream(0, "teacher"), every=every)
 
 
-def life(name: str, arm: PlanarArm, movements: int = 200, seed: int = 0, **options: object) -> list[Episode]:
-    teacher = teacher_of(arm) if name in TAUGHT else None
+def life(
+    name: str, arm: PlanarArm, movements: int = 200, seed: int = 0, *, every: int = 30, **options: object
+) -> list[Episode]:
+    teacher = teacher_of(arm, every) if name in TAUGHT else None
     return list(run(make(name, arm, seed), arm, seed, movements=movements, teacher=teacher, **options))
 
 
@@ -291,6 +294,58 @@ def test_a_run_in_two_parts_is_the_whole_run(context: bool) -> None:
     assert not learner.idle  # the first part ends in mid-search
     parts += [e.outcome for e in run(learner, arm, 0, movements=60, first=37)]
     assert np.array_equal(whole, parts)
+
+
+class BreaksOff(CountingArm):
+    """Its connection is lost once, in the movement after so many."""
+
+    def __init__(self, after: int) -> None:
+        super().__init__(noise=0.05)
+        self.after = after
+
+    def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
+        if len(self.executed) == self.after:
+            self.after = -1
+            raise ConnectionError("lost")
+        return super().execute(context, theta, rng)
+
+
+@pytest.mark.parametrize("after", [4, 15, 16, 17])
+def test_a_life_saved_where_a_movement_was_broken_off_goes_on_as_if_it_never_was(after: int, tmp_path: Path) -> None:
+    whole = life("sgim-d", PlanarArm(5, noise=0.05), 60, every=5)
+    arm, other = BreaksOff(after), PlanarArm(5, noise=0.05)
+    learner = make("sgim-d", arm)
+    with pytest.raises(ConnectionError):
+        list(run(learner, arm, 0, movements=60, teacher=teacher_of(other, 5)))
+    learner.save(tmp_path / "life.npz")
+    again, teacher = make("sgim-d", arm), teacher_of(other, 5)
+    again.load(tmp_path / "life.npz", teacher=teacher)
+    rest = list(run(again, arm, 0, movements=60, first=again.movements, teacher=teacher))
+    assert summary(rest) == summary(whole[after:])
+    again.save(tmp_path / "later.npz")
+    make("sgim-d", arm).load(tmp_path / "later.npz", teacher=teacher_of(other, 5))
+
+
+def test_after_a_movement_that_was_broken_off_a_run_goes_on_when_it_is_given_up() -> None:
+    arm = BreaksOff(16)
+    learner = make("sagg-riac", arm)
+    with pytest.raises(ConnectionError):
+        list(run(learner, arm, 0, movements=60))
+    with pytest.raises(RuntimeError, match=r"interrupt\(\)"):
+        list(run(learner, arm, 0, movements=60, first=16))
+    learner.interrupt()
+    assert len(list(run(learner, arm, 0, movements=60, first=16))) == 44
+
+
+def test_an_outcome_of_integers_is_recorded_as_it_is_remembered() -> None:
+    class Counts(PlanarArm):
+        def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
+            return np.rint(super().execute(context, theta, rng)).astype(int)
+
+    arm = Counts(5)
+    assert {e.outcome.dtype for e in run(make("random", arm), arm, 0, movements=5) if e.outcome is not None} == {
+        np.dtype(np.float64)
+    }
 
 
 @pytest.mark.parametrize("counts", [{"movements": 0}, {"movements": 1.5}, {"first": -1}, {"first": 11}])

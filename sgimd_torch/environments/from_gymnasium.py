@@ -131,9 +131,10 @@ class FromGymnasium:
         """``(outcome_dim,)`` of one episode.
 
         Raises:
-            ValueError: ``context`` is not one point of C or ``theta`` not one of Pi, or ``place`` led elsewhere.
+            ValueError: ``context`` is not one point of C or ``theta`` not one of Pi, ``place`` led elsewhere, or
+                the observations make no outcome.
             TypeError: ``rng`` is not a Generator.
-            SimulationError: MuJoCo gave a warning, or the outcome is not finite.
+            SimulationError: MuJoCo gave a warning, or the last observation is not finite.
         """
         context, theta = check_movement(self, context, theta)
         return self._judged(self.episode(context, theta, rng))

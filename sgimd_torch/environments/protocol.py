@@ -184,8 +184,13 @@ def execute_many(
     if len(thetas) == 0:
         return np.empty((0, environment.outcomes.dim))
     if isinstance(environment, BatchEnvironment):
-        return environment.execute_many(contexts, thetas, rngs)
-    return np.stack([environment.execute(*movement) for movement in zip(contexts, thetas, rngs, strict=True)])
+        outcomes = environment.execute_many(contexts, thetas, rngs)
+    else:
+        outcomes = np.stack([environment.execute(*movement) for movement in zip(contexts, thetas, rngs, strict=True)])
+    lost = np.flatnonzero(~np.isfinite(outcomes).reshape(len(thetas), -1).all(axis=1))
+    if len(lost):
+        raise SimulationError(thetas[lost[0]], "the outcome is not finite")
+    return outcomes
 
 
 def recorded(

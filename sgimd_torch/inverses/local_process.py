@@ -27,6 +27,7 @@ _NEAR: Final = 20  # outcomes near the goal that the process learns from, and th
 _LEARNT: Final = 100  # exemplars that the process learns from
 _STARTS, _STEPS = 3, 4  # exemplars that steps begin at, and steps from each
 _DAMPINGS: Final = np.array([1e-3, 0.1, 1.0, 10.0])
+_FAR: Final = 1e3  # spreads from 0: squares of inputs farther out would hide their differences
 _CLEARLY: Final = 0.8  # of the squared error expected of the nearest exemplar: what a candidate has to be below
 
 
@@ -87,11 +88,11 @@ class LocalProcess:
 
     @one_thread
     def predict(self, context: Array, theta: Array) -> Array | None:
-        """``(outcome_dim,)`` what ``theta`` should lead to, judging by the movements most like it; None while there are
-        too few of them, or all had the same outcome."""
+        """``(outcome_dim,)`` what ``theta`` should lead to, judging by the movements most like it, or by the last
+        one while all led to the same. None while there are too few."""
         self._catch_up()
         if self._kernel is None:
-            return None
+            return self.memory.outcomes[-1] if self._fitted else None
         here = self._in_lengths(context, theta[None])
         rows = self._inputs.nearest(here, min(_LEARNT, len(self.memory)))[0]
         process = Process(self._inputs.keys.rows[rows], self.memory.outcomes[rows], self._kernel)
@@ -172,13 +173,15 @@ class LocalProcess:
         self._fitted, self._kernel = n, None
         raw = np.concatenate((self.memory.thetas[:n], self.memory.contexts[:n]), axis=1)
         outcomes = self.memory.outcomes[:n]
-        self._spreads = np.where(raw.std(axis=0) > 0, raw.std(axis=0), 1.0)
-        if not outcomes.std() > 0:
+        self._origin = np.where(np.abs(raw[0]) > _FAR * _spreads(raw), raw[0], 0.0)
+        raw = raw - self._origin
+        self._spreads = _spreads(raw)
+        if not np.ptp(outcomes, axis=0).any():
             return
         order = stream(n, "fit of a local process").permutation(n)
         self._lengths = fit_lengths(raw[order[:_FITTED]] / self._spreads, outcomes[order[:_FITTED]])
         self._inputs = PolicyNeighbours(Table(raw.shape[1]))
-        self._inputs.keys.append(self._scaled(0)[:n])
+        self._inputs.keys.append(raw / self._spreads / self._lengths)
         centres = self._inputs.keys.rows[order[:_GROUPS]]
         groups = self._inputs.nearest(centres, min(_GROUP, n))
         varied = [rows for rows in groups if np.ptp(outcomes[rows], axis=0).any()]
@@ -189,9 +192,15 @@ class LocalProcess:
     def _scaled(self, first: int) -> Array:
         """Inputs from row ``first`` on, in lengths."""
         raw = np.concatenate((self.memory.thetas[first:], self.memory.contexts[first:]), axis=1)
-        return raw / self._spreads / self._lengths
+        return (raw - self._origin) / self._spreads / self._lengths
 
     def _in_lengths(self, context: Array, thetas: Array) -> Array:
         inputs = np.concatenate((thetas, np.tile(context, (len(thetas), 1))), axis=1)
-        scaled: Array = inputs / self._spreads / self._lengths
+        scaled: Array = (inputs - self._origin) / self._spreads / self._lengths
         return scaled
+
+
+def _spreads(inputs: Array) -> Array:
+    """``(dim,)`` standard deviations, 1 of what does not vary."""
+    found = inputs.std(axis=0)
+    return np.where(found > 0, found, 1.0)

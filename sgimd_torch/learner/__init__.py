@@ -87,6 +87,7 @@ class Learner:
         self._begun = len(memory)
         self._movements = 0
         self._lessons: set[tuple[bytes, bytes]] = set()
+        self._shown_at = -1  # movements it had made at the last lesson that it had not asked for
 
     @property
     def movements(self) -> int:
@@ -97,6 +98,11 @@ class Learner:
     def idle(self) -> bool:
         """Whether no attempt is under way, so that the next ``ask`` begins one, also in a new context."""
         return self._attempt is None
+
+    @property
+    def just_shown(self) -> bool:
+        """Whether it saw a demonstration since its last movement, one that it had not asked for."""
+        return self._shown_at == self._movements
 
     @property
     def context(self) -> Array:
@@ -122,7 +128,9 @@ class Learner:
         """
         context = check_point("context", context, self.memory.context_dim)
         if self._asked:
-            raise RuntimeError("ask() again needs the outcome of the last movement; was tell() forgotten?")
+            raise RuntimeError(
+                "ask() again needs the outcome of the last movement; was tell() forgotten? Without one, interrupt()"
+            )
         self._go_unanswered()
         if self._attempt is None:
             context = read_only(context)
@@ -193,6 +201,7 @@ class Learner:
         theta_d = self.translate(demonstration)
         if not requested:
             self._end()
+            self._shown_at = self._movements
         self._events.append(Event(Kind.SHOWN, lesson=demonstration))
         self._lessons.add(_lesson(demonstration, theta_d))
         if requested:

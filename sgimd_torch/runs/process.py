@@ -108,8 +108,8 @@ class Stopping:
     """In this block, SIGINT and SIGTERM wait for the next ``check()``, or for ``at_once()``; a context manager."""
 
     def __init__(self) -> None:
-        self._signum = 0
-        self._at_once = False
+        self._signum = self._heard = 0
+        self._enough: int | None = None  # signals that stop at once
         self._block = _on_signals(self._hear)
 
     def __enter__(self) -> Self:
@@ -120,10 +120,13 @@ class Stopping:
         self._block.__exit__(*error)
 
     def _hear(self, signum: int, frame: FrameType | None) -> None:
-        self._signum = signum
-        if self._at_once:
-            self._at_once = False
+        self._signum, self._heard = signum, self._heard + 1
+        if self._enough is None:
+            return
+        if self._heard >= self._enough:
+            self._enough = None
             raise Stopped(signum)
+        say("stops after the movement under way; once more stops at once")
 
     def check(self) -> None:
         """Raise ``Stopped`` if a signal has come."""
@@ -131,14 +134,15 @@ class Stopping:
             raise Stopped(self._signum)
 
     @contextmanager
-    def at_once(self) -> Iterator[None]:
-        """In this block, a signal raises ``Stopped`` at once."""
-        self._at_once = True
+    def at_once(self, enough: int = 1) -> Iterator[None]:
+        """In this block, so many signals, with those that came before, raise ``Stopped`` at once."""
+        self._enough = enough
         try:
-            self.check()
+            if self._heard >= enough:
+                self.check()
             yield
         finally:
-            self._at_once = False
+            self._enough = None
 
 
 class Progress:

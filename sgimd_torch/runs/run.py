@@ -26,7 +26,7 @@ from sgimd_torch.teachers.answering import Demonstrator
 from sgimd_torch.teachers.awaited import Awaited
 from sgimd_torch.teachers.by_hand import ByHand
 
-FLUSH_EVERY = 1.0  # s, what a killed run loses at most
+FLUSH_EVERY = 1.0  # s, after which a finished movement hands over all before it; a killed run loses what came since
 
 
 def carry_out(parts: RunParts, stopping: Stopping, *, resume: bool, accept_loss: bool, again: str) -> str:
@@ -56,7 +56,8 @@ def carry_out(parts: RunParts, stopping: Stopping, *, resume: bool, accept_loss:
         except (SimulationError, ValueError) as error:
             raise Failed(str(error)) from error
         except OSError as error:
-            raise Failed(f"{directory.path} cannot be written: {error}; is the disk full? --resume goes on") from error
+            either = f"{directory.path} cannot be written, or the robot failed"
+            raise Failed(f"{either}: {type(error).__name__}: {error}; --resume goes on") from error
 
 
 def live_in(directory: RunDirectory, parts: RunParts, stopping: Stopping) -> str:
@@ -122,7 +123,8 @@ class Life:
         """The same, one movement after the other; each is written, shown and learnt from when it comes."""
         parts, total, seed = self.parts, self.parts.config.movements, self.parts.config.seed
         recorded = self.directory.columns.recorded(self.directory.lines)
-        execute = replay(recorded, self.seconds.of("physics")(live(parts.environment, seed)))
+        alive = self.stopping.at_once(2)(live(parts.environment, seed))
+        execute = replay(recorded, self.seconds.of("physics")(alive))
         on_record = self.requests.answers(parts.teachers, self._row)
         episodes = run(
             parts.learner,

@@ -18,7 +18,7 @@ from sgimd_torch.spaces import Array, Box
 
 _FIRST, _NARROWEST, _WIDEST = 0.1, 0.03, 0.3  # standard deviations, in sides of Pi
 _FACTOR: Final = 1.15  # from one width to the next
-_WELL: Final = 0.1  # of the outcomes' variance: a squared error below this is a good prediction
+_WELL: Final = 0.1  # of the outcomes' variance: a squared error of at most this is a good prediction
 _LOOKED_AT: Final = 1000  # exemplars, for that variance
 
 
@@ -74,4 +74,4 @@ class Widening:
             return
         row, expected = self._expected
         variance = self.memory.outcomes[:: 1 + len(self.memory) // _LOOKED_AT].var(axis=0).sum()
-        self.width.update(bool(((self.memory.outcomes[row] - expected) ** 2).sum() < _WELL * variance))
+        self.width.update(bool(((self.memory.outcomes[row] - expected) ** 2).sum() <= _WELL * variance))

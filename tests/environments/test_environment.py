@@ -98,6 +98,16 @@ def test_a_batch_is_executed_at_once_where_the_environment_can():
     assert environment.n_batches == 1
 
 
+class BrokenSlope(Slope):
+    def execute(self, context: Array, theta: Array, rng: np.random.Generator) -> Array:
+        return np.where(theta > 0.7, np.nan, theta)
+
+
+def test_an_outcome_in_a_batch_that_is_not_finite_is_an_error_with_its_theta():
+    with pytest.raises(SimulationError, match=r"the outcome is not finite; theta=\[0.75\]"):
+        execute_many(BrokenSlope(), np.empty((2, 0)), [[0.25], [0.75]], [stream(seed, "row") for seed in range(2)])
+
+
 class CarelessSlope(Slope):
     def execute(self, context: Array, theta: Array, rng: np.random.Generator) -> Array:
         theta *= 2

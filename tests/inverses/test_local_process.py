@@ -154,6 +154,33 @@ def test_units_do_not_matter() -> None:
         assert other(NO_CONTEXT, 1000 * goal).theta == pytest.approx(7 * theta + 3, abs=1e-3)
 
 
+def in_wind(contexts: Array) -> float:
+    """The mean error of a robot that does not feel the wind that it remembers."""
+    toy = two_elbows()
+    memory, goals = played(toy, 200), played(toy, 20, seed=1).outcomes
+    windy = Memory(contexts.shape[1], memory.theta_dim, 2)
+    for context, theta, outcome in zip(contexts[:200], memory.thetas, memory.outcomes, strict=True):
+        windy.add(context, theta, outcome)
+    inverse = LocalProcess(windy)
+    thetas = np.stack([inverse(*asked).theta for asked in zip(contexts[200:], goals, strict=True)])
+    return float(np.linalg.norm(toy.effect(np.zeros((20, 0)), thetas) - goals, axis=1).mean())
+
+
+@pytest.mark.parametrize("value", [0.3, 0.5, 101325.0, 1e9])
+def test_it_does_not_matter_how_far_from_0_an_input_is(value: float) -> None:
+    wind = stream(0, "wind").uniform(-1, 1, size=(220, 1))
+    assert in_wind(value * (1 + 1e-9 * wind)) == pytest.approx(in_wind(wind), rel=0.1)
+    assert in_wind(np.full((220, 1), value)) == pytest.approx(in_wind(np.zeros((220, 0))), rel=0.1)
+
+
+def test_an_input_far_from_0_is_told_apart_as_well() -> None:
+    toy = two_elbows()
+    memory, goals = played(toy, 200), played(toy, 10, seed=1).outcomes
+    inverse, far = LocalProcess(memory), LocalProcess(remember(memory.thetas + 2.0**26, memory.outcomes))
+    for goal in goals:
+        assert far(NO_CONTEXT, goal).theta - 2.0**26 == pytest.approx(inverse(NO_CONTEXT, goal).theta, abs=1e-3)
+
+
 def test_an_answer_depends_on_the_memory_and_not_on_when_it_was_asked() -> None:
     whole = played(two_elbows(), 200)
     memory, goal = remember(whole.thetas[:50], whole.outcomes[:50]), np.array([0.3, 0.2])
@@ -170,6 +197,9 @@ def test_outcomes_that_are_all_the_same_teach_it_nothing() -> None:
     thetas = stream(0, "still").uniform(size=(40, 2))
     inverse = LocalProcess(remember(thetas, np.ones((40, 2))))
     assert inverse(NO_CONTEXT, np.zeros(2)).theta.tolist() == thetas[0].tolist()
+    predicted = inverse.predict(NO_CONTEXT, thetas[0])
+    assert predicted is not None
+    assert predicted.tolist() == [1, 1]
 
 
 @pytest.mark.parametrize("noise", [-1.0, np.nan, np.inf])

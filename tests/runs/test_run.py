@@ -463,6 +463,19 @@ def test_a_signal_waits_for_the_next_check_but_where_it_may_come_at_once(after_a
         signal.raise_signal(signal.SIGTERM)
 
 
+def test_a_second_signal_ends_a_movement_that_does_not_end(capsys):
+    with Stopping() as stopping, stopping.at_once(2):
+        signal.raise_signal(signal.SIGINT)
+        assert "once more stops at once" in capsys.readouterr().err
+        with pytest.raises(Stopped):
+            signal.raise_signal(signal.SIGINT)
+    with Stopping() as stopping:
+        with stopping.at_once(2):
+            signal.raise_signal(signal.SIGTERM)
+        with pytest.raises(Stopped):
+            stopping.check()
+
+
 SCRIPTS = {**os.environ, "PYTHONPATH": str(ROOT)}
 
 

@@ -116,3 +116,26 @@ def test_a_sweep_says_that_finished_runs_were_made_by_another_file(own, capsys):
     said = capsys.readouterr().err
     assert "2 of them finished" in said
     assert "random seed 0: sliders.py has changed since this run was made" in said
+
+
+def test_a_robot_that_loses_its_connection_is_told_and_the_run_goes_on(own, capsys):
+    lost = [each.replace("Slider", "LostConnection") for each in OWN]
+    assert command(main, lost) == 1
+    assert (
+        "or the robot failed: ConnectionResetError: the robot closed the connection; --resume"
+        in capsys.readouterr().err
+    )
+    assert len((own / "runs/random/seed-000/episodes.csv").read_text().splitlines()) == 10
+    sys.modules.pop("sliders")
+    path = own / "sliders.py"
+    path.write_text(path.read_text().replace("left = 10", "left = -1"))
+    assert command(main, [*lost, "--resume"]) == 0
+
+
+def test_a_run_with_outcomes_of_integers_goes_on_bit_for_bit(own):
+    steps = [each.replace("Slider", "Steps") for each in OWN]
+    assert command(main, steps) == 0
+    assert command(main, [*steps, "--movements", "60", "--resume"]) == 0
+    assert command(main, [*steps, "--movements", "60", "--name", "whole"]) == 0
+    there, whole = (own / f"runs/{name}/seed-000/episodes.csv" for name in ("random", "whole"))
+    assert there.read_bytes() == whole.read_bytes()

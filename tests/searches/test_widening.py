@@ -64,6 +64,26 @@ def test_it_looks_wide_where_movements_are_alike_and_near_where_they_are_not(mak
     assert least <= learner.autonomous.look.width.sd <= most
 
 
+class Ball:
+    """It moves if it is hit, as a fifth of all movements do, far from the middle."""
+
+    contexts, policies, outcomes = Box.cube(0, 1, 0), Box.cube(0, 1, 3), Box.cube(-1, 1, 2)
+    outcome_noise, rest = 0.0, np.zeros(2)
+
+    def observe(self, rng):
+        return np.zeros(0)
+
+    def execute(self, context, theta, rng):
+        return np.sin(3 * (theta[1:] - 0.5)) if theta[0] > 0.8 else np.zeros(2)
+
+
+def test_where_nothing_happens_practice_looks_wider_until_something_does():
+    robot = Ball()
+    learner = practice(robot, 0)
+    moved = [episode.outcome.any() for episode in run(learner, robot, 0, movements=400)]
+    assert np.mean(moved[200:]) > 0.4  # of movements drawn anywhere a fifth
+
+
 def test_around_a_copied_movement_practice_looks_half_as_wide():
     robot = two_elbows()
     learner = practice(robot, 0)
