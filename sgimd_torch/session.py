@@ -79,11 +79,10 @@ def run(
         raise ValueError(f"first must be at most movements, got {first} of {movements}; movements counts all of a run")
     execute = live(environment, seed) if execute is None else execute
     for index in range(first, movements):
-        demonstration = None
-        if teacher is not None and not learner.just_shown:  # an earlier part of this life may end with a lesson
-            demonstration = teacher.offer(index, learner.memory)
+        asked = None if learner.lesson_waits else teacher
+        demonstration = asked.offer(index, learner.memory) if asked is not None else None
         if demonstration is not None:
-            learner.watch(demonstration)
+            learner.watch(demonstration, offered=True)
         context = read_only(environment.observe(stream(seed, "context", index))) if learner.idle else learner.context
         request, reply = learner.request(context) if teachers else None, ""
         if request is not None and teachers is not None:

@@ -14,6 +14,7 @@ from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
 from sgimd_torch.demonstrations.columns import Columns, read_csv
 from sgimd_torch.demonstrations.lerobot import read_lerobot
 from sgimd_torch.environments.planar_arm import PlanarArm
+from sgimd_torch.environments.protocol import SimulationError
 from sgimd_torch.runs.process import command
 from sgimd_torch.spaces import Demonstration
 
@@ -248,6 +249,19 @@ def test_check_says_where_each_lands_and_draws_it(tmp_path, capsys):
     assert f"{np.linalg.norm(lands(0.3) - 0.5):.3f}" in said[2]
     assert said[-1].startswith("2 of 2 can be used; they land")
     assert figure.read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("fails", [SimulationError(np.zeros(7), "it hit the table"), np.full(2, np.nan)])
+def test_check_says_whose_movement_has_no_outcome(tmp_path, capsys, monkeypatch, fails):
+    def execute(self, context, theta, rng):
+        if isinstance(fails, Exception):
+            raise fails
+        return fails
+
+    save_demonstrations(tmp_path / "shown.npz", [led(0.1, lands(0.1))])
+    monkeypatch.setattr(PlanarArm, "execute", execute)
+    assert sgimd("check", tmp_path / "shown.npz", "--task", "planar-arm-7") == 2
+    assert re.search("cannot be used: (it hit the table|the outcome is not finite)", capsys.readouterr().out)
 
 
 def test_check_names_those_that_cannot_be_used_and_exits_with_2(tmp_path, capsys):

@@ -337,6 +337,29 @@ def test_after_a_movement_that_was_broken_off_a_run_goes_on_when_it_is_given_up(
     assert len(list(run(learner, arm, 0, movements=60, first=16))) == 44
 
 
+def test_a_lesson_whose_answer_was_given_up_is_offered_again_and_such_a_life_can_be_loaded(tmp_path: Path) -> None:
+    arm, other = BreaksOff(15), PlanarArm(5, noise=0.05)
+    learner, teacher = make("sgim-d", arm), teacher_of(other, 5)
+    with pytest.raises(ConnectionError):
+        list(run(learner, arm, 0, movements=40, teacher=teacher))
+    assert learner.lesson_waits
+    learner.interrupt()
+    rest = list(run(learner, arm, 0, movements=40, first=15, teacher=teacher))
+    assert [e.index for e in rest if e.demonstration is not None] == [15, 20, 25, 30, 35]
+    learner.save(tmp_path / "life.npz")
+    make("sgim-d", arm).load(tmp_path / "life.npz", teacher=teacher_of(other, 5))
+
+
+def test_a_lesson_of_ones_own_before_a_run_takes_none_of_the_teachers_away() -> None:
+    arm = PlanarArm(5)
+    shown = demonstrations(arm)
+    learner = sgim_d(arm, 0, correspondence=last_posture)
+    learner.watch(shown[-1])
+    teacher = InitialTeacher(shown[:3], stream(0, "teacher"), every=10)
+    episodes = list(run(learner, arm, 0, movements=40, teacher=teacher))
+    assert [e.index for e in episodes if e.demonstration is not None] == [0, 10, 20]
+
+
 def test_an_outcome_of_integers_is_recorded_as_it_is_remembered() -> None:
     class Counts(PlanarArm):
         def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:

@@ -25,7 +25,7 @@ try:
 except ImportError as error:
     raise ImportError(f"this environment needs gymnasium: pip install 'sgimd-torch[gym]' ({error})") from error
 
-SAME = 1e-6  # what a context may differ after ``place``
+SAME = 1e-6  # what a context may differ after ``place``, also relative to it: observations may be float32
 
 
 @runtime_checkable
@@ -181,7 +181,7 @@ class FromGymnasium:
             observation = self._place(self.world, context)
         if self._context is not None and self.contexts.dim:
             found = np.asarray(self._context(observation), dtype=np.float64)
-            if not np.allclose(found, context, rtol=0, atol=SAME):
+            if not np.allclose(found, context, rtol=SAME, atol=SAME):
                 raise ValueError(f"place= led to the context {found.tolist()}, {context.tolist()} was wanted")
         return deepcopy(observation)
 
@@ -244,4 +244,9 @@ def _seed(rng: np.random.Generator) -> int:
 
 
 def _parts(observation: Any) -> list[Any]:
-    return list(observation.values()) if isinstance(observation, dict) else [observation]
+    """The arrays of an observation, which may be nested."""
+    if isinstance(observation, dict):
+        observation = tuple(observation.values())
+    if isinstance(observation, tuple):
+        return [part for each in observation for part in _parts(each)]
+    return [observation] if np.issubdtype(np.asarray(observation).dtype, np.number) else []

@@ -170,10 +170,16 @@ class LocalProcess:
 
     def _fit(self, n: int) -> None:
         """Fit lengths and kernel to the first ``n`` exemplars, whatever was added since."""
+        try:
+            self._fit_to(n, _FAR)
+        except np.linalg.LinAlgError:  # some are so much alike that they have to be measured from one of them
+            self._fit_to(n, 0.0)
+
+    def _fit_to(self, n: int, far: float) -> None:
         self._fitted, self._kernel = n, None
         raw = np.concatenate((self.memory.thetas[:n], self.memory.contexts[:n]), axis=1)
         outcomes = self.memory.outcomes[:n]
-        self._origin = np.where(np.abs(raw[0]) > _FAR * _spreads(raw), raw[0], 0.0)
+        self._origin = np.where(np.abs(raw[0]) > far * _spreads(raw), raw[0], 0.0)
         raw = raw - self._origin
         self._spreads = _spreads(raw)
         if not np.ptp(outcomes, axis=0).any():

@@ -87,7 +87,7 @@ class Learner:
         self._begun = len(memory)
         self._movements = 0
         self._lessons: set[tuple[bytes, bytes]] = set()
-        self._shown_at = -1  # movements it had made at the last lesson that it had not asked for
+        self._offered = False  # the lesson under way is a teacher's, and no movement has answered it yet
 
     @property
     def movements(self) -> int:
@@ -100,9 +100,9 @@ class Learner:
         return self._attempt is None
 
     @property
-    def just_shown(self) -> bool:
-        """Whether it saw a demonstration since its last movement, one that it had not asked for."""
-        return self._shown_at == self._movements
+    def lesson_waits(self) -> bool:
+        """Whether no movement has answered yet what a teacher offered: a `run` that goes on here asks for no other."""
+        return self._offered
 
     @property
     def context(self) -> Array:
@@ -143,6 +143,7 @@ class Learner:
         if not isinstance(self._next, Move):
             self._events.append(Event(Kind.RESTED, self._context))
             self._movements += 1
+            self._offered = False
             self._advance(None)
             return None
         self._asked = True
@@ -182,11 +183,16 @@ class Learner:
         self._asked = False
         self._events.append(len(self.memory) - 1)
         self._movements += 1
+        self._offered = False
         self._advance(self.memory.outcomes[-1])
 
-    def watch(self, demonstration: Demonstration) -> None:
+    def watch(self, demonstration: Demonstration, *, offered: bool = False) -> None:
         """See a demonstration: the attempt under way ends, and the social strategy answers from the next ``ask`` on.
         One that was requested goes to the attempt that had requested it.
+
+        Args:
+            demonstration: what is shown.
+            offered: by the teacher of a `run`, see ``lesson_waits``.
 
         Raises:
             RuntimeError: this learner has no social strategy, or the last movement's outcome was not told.
@@ -201,7 +207,7 @@ class Learner:
         theta_d = self.translate(demonstration)
         if not requested:
             self._end()
-            self._shown_at = self._movements
+            self._offered = offered
         self._events.append(Event(Kind.SHOWN, lesson=demonstration))
         self._lessons.add(_lesson(demonstration, theta_d))
         if requested:
@@ -287,6 +293,8 @@ class Learner:
                 offered = self.movements
                 check_lesson(offered, event.lesson, teacher.offer(offered, self.memory))
             move = self._live_again(event)
+            if event.kind == Kind.DROPPED:
+                offered = -1  # the run that went on asked once more
             if after is not None and event.kind in (Kind.MOVED, Kind.RESTED):
                 after(move)
         if life.memory_crc32 != memory_crc32(self.memory):
@@ -297,7 +305,7 @@ class Learner:
             if self.social is None and not isinstance(self._next, Request):
                 found = f"before movement {self.movements} it asked for a demonstration, the learner now does not"
                 raise ReplayError(f"{found}; is it built in the same way, with the same seed?")
-            self.watch(event.lesson)
+            self.watch(event.lesson, offered=True)
         if event.context is None:
             if event.kind == Kind.INTERRUPTED:
                 self.interrupt()
@@ -317,7 +325,7 @@ class Learner:
         if self._attempt is not None:
             self._attempt.close()
         self._attempt = self._next = None
-        self._asked = False
+        self._asked = self._offered = False
 
     def _begin(self, attempt: AskingAttempt, context: Array) -> None:
         self._context, self._attempt = context, attempt

@@ -30,6 +30,7 @@ import numpy as np
 from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
 from sgimd_torch.demonstrations.columns import Columns, read_csv
 from sgimd_torch.demonstrations.lessons import beyond_limits, played
+from sgimd_torch.environments.protocol import SimulationError, execute_many
 from sgimd_torch.runs.build import task_of
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.tasks import Task, correspondence_of
@@ -161,9 +162,9 @@ def check(task: Task, shown: Demonstration, row: int) -> Checked:
         theta = correspondence_of(task)(shown.times, shown.trajectory)
         theta = robot.policies.check("theta_d of the correspondence", theta)
         misfit = float("nan") if task.misfit is None else task.misfit(shown)
-    except ValueError as error:
+        lands = execute_many(robot, context[None], theta[None], [stream(row, "demonstrations check")])[0]
+    except (ValueError, SimulationError) as error:
         return Checked(shown, None, None, float("nan"), remarks, str(error))
-    lands = robot.execute(context, theta.copy(), stream(row, "demonstrations check"))
     return Checked(shown, theta, lands, misfit, remarks)
 
 

@@ -155,6 +155,17 @@ def test_what_cannot_be_a_task_is_refused(make, message):
         make()
 
 
+def test_a_context_in_millimetres_is_found_again_in_observations_of_32_bits_however_they_are_nested():
+    class Coarse(Sled):
+        def seen(self):
+            return {"robot": {"speed": self.speed}, "name": "sled", "achieved_goal": self.place.astype(np.float32)}
+
+    robot = sled(
+        world=Coarse(), contexts=Box.cube(0, 1000, 2), context=start, place=place, outcomes=Box.cube(0, 1000, 2)
+    )
+    assert robot.execute(np.array([700.3, 0.1]), np.full(6, 0.5), stream(1, "any")) == pytest.approx([700.3, 0.1])
+
+
 def test_a_place_that_leads_elsewhere_is_told():
     robot = sled(contexts=Box.cube(-0.1, 0.1, 2), context=start, place=lambda world, context: place(world, context / 2))
     with pytest.raises(ValueError, match=r"place= led to the context \[0.05, 0.05\], \[0.1, 0.1\] was wanted"):

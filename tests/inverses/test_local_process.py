@@ -181,6 +181,20 @@ def test_an_input_far_from_0_is_told_apart_as_well() -> None:
         assert far(NO_CONTEXT, goal).theta - 2.0**26 == pytest.approx(inverse(NO_CONTEXT, goal).theta, abs=1e-3)
 
 
+def test_movements_nearly_alike_far_from_0_end_nothing() -> None:
+    rng = np.random.default_rng(0)
+    weights = rng.normal(size=(7, 2))
+    memory = Memory(0, 7, 2)
+    inverse = LocalProcess(memory)
+    for row in range(260):
+        theta = rng.uniform(size=7)
+        if row < 120:  # a demonstration is repeated with small variations
+            theta = 0.5 + 1e-4 * (theta - 0.5)
+        memory.add(NO_CONTEXT, 100 + theta, np.sin(theta @ weights))
+        if row % 13 == 0:
+            inverse(NO_CONTEXT, np.sin(rng.uniform(size=7) @ weights))
+
+
 def test_an_answer_depends_on_the_memory_and_not_on_when_it_was_asked() -> None:
     whole = played(two_elbows(), 200)
     memory, goal = remember(whole.thetas[:50], whole.outcomes[:50]), np.array([0.3, 0.2])

@@ -1,5 +1,7 @@
 """The report of learners that ask: who was asked, by which strategy movements were made, where it asked."""
 
+from shutil import copytree
+
 import numpy as np
 import pytest
 
@@ -36,6 +38,13 @@ def page(runs, tmp_path_factory):
     path = tmp_path_factory.mktemp("page") / "x.html"
     assert report.main([str(runs), "--out", str(path)]) == 0
     return path.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("name", ["acts", "toss"])
+def test_a_run_whose_log_is_lost_does_not_keep_the_page_from_being_written(runs, tmp_path, name):
+    copytree(runs, tmp_path / "runs")
+    (tmp_path / "runs" / name / "seed-000" / "episodes.csv").write_text("")
+    assert report.main([str(tmp_path / "runs"), "--out", str(tmp_path / "x.html")]) == 0
 
 
 @pytest.mark.parametrize(("name", "columns"), [("acts", ("got_0", "got_1")), ("toss", ("got_1", "got_2"))])

@@ -34,8 +34,8 @@ HEAD: Final = (
 
 
 def asks(life: Life) -> bool:
-    """Whether it has asked anybody."""
-    return life.requests is not None and len(life.requests["index"]) > 0
+    """Whether it has asked anybody, and its movements are there."""
+    return life.requests is not None and len(life.requests["index"]) > 0 and len(life.index) > 0
 
 
 def requests_of(variants: Sequence[Variant]) -> Table:

@@ -94,7 +94,7 @@ class Life(Run):
         """Movement -> the outcome ``(outcome_dim,)`` m of the demonstration that it had asked for."""
         found: dict[int, Array] = {}
         for k, reply in enumerate(self.requests["reply"].tolist() if self.requests else ()):
-            if self.requests and reply == "shown":
+            if self.requests and reply == "shown" and len(self.index):
                 got = [self.requests[name][k] for name in self.requests if name.startswith("got_")]
                 found[int(self.requests["index"][k])] = np.array(got[-self.outcomes.shape[1] :])
         return found
