@@ -187,7 +187,7 @@ class LocalProcess:
         order = stream(n, "fit of a local process").permutation(n)
         self._lengths = fit_lengths(raw[order[:_FITTED]] / self._spreads, outcomes[order[:_FITTED]])
         self._inputs = PolicyNeighbours(Table(raw.shape[1]))
-        self._inputs.keys.append(raw / self._spreads / self._lengths)
+        self._inputs.keys.append(self._scaled(0)[:n])
         centres = self._inputs.keys.rows[order[:_GROUPS]]
         groups = self._inputs.nearest(centres, min(_GROUP, n))
         varied = [rows for rows in groups if np.ptp(outcomes[rows], axis=0).any()]

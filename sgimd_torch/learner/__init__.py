@@ -87,7 +87,7 @@ class Learner:
         self._begun = len(memory)
         self._movements = 0
         self._lessons: set[tuple[bytes, bytes]] = set()
-        self._offered = False  # the lesson under way is a teacher's, and no movement has answered it yet
+        self._offered_at = -1  # how many it had made when a teacher offered the lesson under way
 
     @property
     def movements(self) -> int:
@@ -102,7 +102,7 @@ class Learner:
     @property
     def lesson_waits(self) -> bool:
         """Whether no movement has answered yet what a teacher offered: a `run` that goes on here asks for no other."""
-        return self._offered
+        return self._offered_at == self._movements
 
     @property
     def context(self) -> Array:
@@ -143,7 +143,6 @@ class Learner:
         if not isinstance(self._next, Move):
             self._events.append(Event(Kind.RESTED, self._context))
             self._movements += 1
-            self._offered = False
             self._advance(None)
             return None
         self._asked = True
@@ -183,7 +182,6 @@ class Learner:
         self._asked = False
         self._events.append(len(self.memory) - 1)
         self._movements += 1
-        self._offered = False
         self._advance(self.memory.outcomes[-1])
 
     def watch(self, demonstration: Demonstration, *, offered: bool = False) -> None:
@@ -207,7 +205,7 @@ class Learner:
         theta_d = self.translate(demonstration)
         if not requested:
             self._end()
-            self._offered = offered
+            self._offered_at = self._movements if offered else -1
         self._events.append(Event(Kind.SHOWN, lesson=demonstration))
         self._lessons.add(_lesson(demonstration, theta_d))
         if requested:
@@ -325,7 +323,7 @@ class Learner:
         if self._attempt is not None:
             self._attempt.close()
         self._attempt = self._next = None
-        self._asked = self._offered = False
+        self._asked, self._offered_at = False, -1
 
     def _begin(self, attempt: AskingAttempt, context: Array) -> None:
         self._context, self._attempt = context, attempt
