@@ -16,6 +16,7 @@ import argparse
 import sys
 from collections.abc import Collection, Sequence
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 from typing import Final
 
@@ -33,16 +34,15 @@ with loading():  # Ctrl-C shows no traceback
     from sgimd_torch.runs.read import finished, read_run
     from sgimd_torch.runs.sweep import add_engines, add_options, engine_of
     from tables import COLUMNS, RESULTS, ROWS, Key, Table, as_text, result_rows
-    from variants import EXPERIMENTS, MADE, Variant, make_subsets, tables_of
+    from variants import EXPERIMENTS, MADE, SEEDS, Variant, make_subsets, seeds_of, tables_of
 
 EXAMPLES: Final = f"""experiments: {", ".join(EXPERIMENTS)}
 
 examples:
-  python experiments/compare.py                                   everything, 10 seeds each: some hours on two cores
-  python experiments/compare.py learners large-space --seeds 0-2
-  python experiments/compare.py forward-model planar-arm-7 planar-arm-50
-  python experiments/compare.py ablations --only uniform-goals grid
-  python experiments/compare.py --dry-run                         what is still to be done
+  python experiments/compare.py --dry-run                         what the pages still lack
+  python experiments/compare.py                                   run it: each experiment with the seeds of its page
+  python experiments/compare.py learners large-space --seeds 0-2 --results mine
+  python experiments/compare.py ablations --only uniform-goals grid --results mine   all their rows, into mine/
   python experiments/compare.py --shard 3/20                      a part of the runs, see docs/clusters.md
   python experiments/compare.py --verify 10 --lot 7               ten rows of the tables, drawn by lot, made again
 
@@ -156,21 +156,23 @@ def compared(shipped: Sequence[str], now: Sequence[str]) -> str:
 
 
 def runs_of(
-    experiments: Sequence[str], only: Sequence[str], seeds: Sequence[int], out: Path
+    experiments: Sequence[str], only: Sequence[str], seeds: Sequence[int] | None, out: Path
 ) -> list[tuple[str, Config]]:
     """All runs, each with its experiment, seed by seed, so that every variant gets its first seeds early.
 
     Args:
         experiments: names in ``EXPERIMENTS``.
         only: only these of their variants; empty for all.
-        seeds: of each.
+        seeds: of each; None for those that its page stands on.
         out: where runs go; the subsets of ``make_subsets`` are in ``out/demonstrations``.
     """
     found = []
-    for seed in seeds:
+    for seed in sorted({*chain(*SEEDS.values())}) if seeds is None else seeds:
         for experiment in experiments:
             for variant, line in EXPERIMENTS[experiment].items():
                 if only and variant not in only:
+                    continue
+                if seeds is None and seed not in seeds_of(experiment, variant):
                     continue
                 run: Variant = {
                     "seed": seed,
@@ -221,7 +223,7 @@ def _options(argv: Sequence[str] | None) -> argparse.Namespace:
     )
     parser.add_argument("experiments", nargs="*", metavar="EXPERIMENT", help="which; all if none is named")
     parser.add_argument("--only", nargs="+", default=[], metavar="VARIANT", help="only these of their variants")
-    add_options(parser, seeds="0-9")
+    add_options(parser, seeds=None, default="those of the page of each experiment")
     add_engines(parser)
     parser.add_argument("--out", type=Path, default=Path("runs"), help="where the runs go (default: %(default)s)")
     parser.add_argument(

@@ -296,6 +296,24 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
 }
 
 
+# The seeds of each page: used once, with frozen defaults.
+SEEDS: Final[dict[str, range]] = {
+    **dict.fromkeys(("learners", "large-space", "letter", "ladder", "ladder-large", "baselines"), range(100, 120)),
+    **dict.fromkeys(("teachers", "long", "ablations", "teaching"), range(100, 110)),
+    **dict.fromkeys(("forward-model", *ARMS, "swimmer"), range(100, 110)),
+    "settings": range(100, 105),
+    **dict.fromkeys(("learning", "suite"), range(120, 140)),
+    "asking": range(140, 160),
+    "by-hand": range(150, 160),
+}
+MAIN: Final = ("sgim-d", "sagg-riac", "model", "gradient")  # of the forward model, with as many seeds as learners
+
+
+def seeds_of(experiment: str, variant: str) -> range:
+    """The seeds that the page of a variant stands on."""
+    return SEEDS["learners" if experiment == "forward-model" and variant in MAIN else experiment]
+
+
 def tables_of(experiment: str) -> list[str]:
     """The tables of results that its runs write rows to; the first has their evaluations."""
     if experiment in ("by-hand", "learning", "settings", "suite"):

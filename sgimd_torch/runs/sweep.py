@@ -102,9 +102,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     return 1 if failures else 0
 
 
-def add_options(parser: argparse.ArgumentParser, *, seeds: str) -> None:
+def add_options(parser: argparse.ArgumentParser, *, seeds: str | None, default: str = "%(default)s") -> None:
     """Options of every command with many runs: --seeds, with that default, --processes and --dry-run."""
-    parser.add_argument("--seeds", type=_seeds, default=seeds, help="5, 0-19 or 0,3,7-9 (default: %(default)s)")
+    parser.add_argument("--seeds", type=_seeds, default=seeds, help=f"5, 0-19 or 0,3,7-9 (default: {default})")
     parser.add_argument("--processes", type=_count, help="runs at a time (default: one for each core)")
     parser.add_argument("--dry-run", action="store_true", help="only list what is still to be done")
 

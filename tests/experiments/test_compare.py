@@ -290,6 +290,18 @@ def test_every_variant_is_a_valid_run_with_its_own_name_in_its_table(tmp_path):
         assert parse(words(vars(config)))[0] == config
 
 
+def test_without_seeds_each_experiment_has_those_that_its_shipped_rows_are_of(tmp_path):
+    wanted = {}
+    for name, config in runs_of(list(EXPERIMENTS), [], None, tmp_path):
+        wanted.setdefault((name, config.variant), []).append(config.seed)
+    assert wanted["learners", "sgim-d"] == wanted["forward-model", "sgim-d"] == [*range(100, 120)]
+    assert wanted["forward-model", "model-5"] == [*range(100, 110)]
+    tables = {tables_of(name)[0] for name in EXPERIMENTS}
+    rows = [row for name in tables for row in table(ROOT / "results" / name)[1]]
+    assert {row[0] for row in rows} == {*EXPERIMENTS}
+    assert not [row for row in rows if int(row[4]) not in wanted[row[0], row[1]]]
+
+
 def test_teachers_have_the_number_of_the_demonstrator_or_the_name_of_the_file(tmp_path):
     taught = Config(algorithm="sgim-d")
     assert teacher_of(taught) == "3"
@@ -394,8 +406,8 @@ def test_rows_are_drawn_by_lot_and_made_again_in_a_folder_of_their_own(tmp_path,
     assert sweep_here([again]) == []
     _, row = result_rows("planar-arm-7", again, read_run(again.directory))
     results.merge([row, [*row[:4], 1, 20, "nearest", 0.5, "", 7, 7, 7]])
-    words = ["planar-arm-7", "--only", "sgim-d-arm-7", "--results", ".", "--verify", "2", "--processes", "1"]
-    code = command(main, words)
+    words = ["planar-arm-7", "--only", "sgim-d-arm-7", "--seeds", "0-1", "--results", ".", "--processes", "1"]
+    code = command(main, [*words, "--verify", "2"])
     said = capsys.readouterr()
     lines = sorted(said.out.splitlines())
     assert code == 1
