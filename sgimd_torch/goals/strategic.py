@@ -162,23 +162,26 @@ class StrategicInterest:
             ValueError: see `Goals.add`.
         """
         self._map.add(context, goal, competence, strategy, gain)
-        tried = self._tried.setdefault(strategy, _Tried([], [], [], {}))
-        tried.points.append(np.concatenate((np.asarray(context, dtype=np.float64), np.asarray(goal, dtype=np.float64))))
-        tried.competences.append(competence)
-        tried.gains.append(gain)
+        point = np.concatenate((np.asarray(context, dtype=np.float64), np.asarray(goal, dtype=np.float64)))
+        nothing = _Tried(np.empty((0, len(point))), np.empty(0), np.empty(0), {})
+        self._tried[strategy] = self._tried.get(strategy, nothing).extend(point, competence, gain)
 
 
 class _Tried(NamedTuple):
     """All attempts of a strategy. ``known``: by the path of a region, its progress there, and for which region and
     number of attempts that is right."""
 
-    points: list[Array]
-    competences: list[float]
-    gains: list[float]
+    points: Array
+    competences: Array
+    gains: Array
     known: dict[str, tuple[Region, int, float]]
+
+    def extend(self, point: Array, competence: float, gain: float) -> _Tried:
+        """These with one more attempt."""
+        competences, gains = np.append(self.competences, competence), np.append(self.gains, gain)
+        return _Tried(np.vstack((self.points, point)), competences, gains, self.known)
 
     def progress_near(self, point: Array, sides: Array) -> float:
         """Of the ten attempts that were nearest to a point of C x T with these ``sides``."""
-        points = np.array(self.points)
-        nearest = np.argsort(np.square((points - point) / sides).sum(axis=1), kind="stable")[:_LAST]
-        return strategic_progress(points[nearest], np.array(self.competences)[nearest], np.array(self.gains)[nearest])
+        nearest = np.argsort(np.square((self.points - point) / sides).sum(axis=1), kind="stable")[:_LAST]
+        return strategic_progress(self.points[nearest], self.competences[nearest], self.gains[nearest])
