@@ -73,26 +73,40 @@ class Process:
     """
 
     def __init__(self, inputs: Array, outcomes: Array, kernel: Kernel) -> None:
-        self.inputs, self.outcomes, self.kernel = inputs, outcomes, kernel
+        self.outcomes, self.kernel = outcomes, kernel
         self.mean = outcomes.mean(axis=0)
         n, dim = outcomes.shape
-        covariance = kernel(squared_distances(inputs, inputs)) + kernel.noise * np.eye(n)
-        root = solve_triangular(np.linalg.cholesky(covariance), np.eye(n), lower=True)
+        try:
+            lower = self._factor(inputs, origin=np.zeros(inputs.shape[1]))
+        except np.linalg.LinAlgError:  # far from 0, their squares hide by how little some of them differ
+            lower = self._factor(inputs, origin=inputs.mean(axis=0))
+        root = solve_triangular(lower, np.eye(n), lower=True)
         self._root = root.T  # times its transpose it is the inverse of the covariance
         self._weights = self._root @ (root @ (outcomes - self.mean))  # (n, outcome_dim)
         self._precisions = (root * root).sum(axis=0)
         self.variance = max(float(((outcomes - self.mean) * self._weights).sum()) / (n * dim), _TINY)
 
+    def _factor(self, inputs: Array, origin: Array) -> Array:
+        """The Cholesky factor of the covariance ``(n, n)`` of the inputs, measured from ``origin`` from now on."""
+        self._origin, self._inputs = origin, inputs - origin
+        covariance = self.kernel(squared_distances(self._inputs, self._inputs))
+        factor: Array = np.linalg.cholesky(covariance + self.kernel.noise * np.eye(len(inputs)))
+        return factor
+
+    def _covariances(self, inputs: Array) -> Array:
+        """``(m, n)`` of new inputs ``(m, dim)`` and those given."""
+        return self.kernel(squared_distances(inputs - self._origin, self._inputs))
+
     def predict(self, inputs: Array) -> tuple[Array, Array]:
         """The expected outcomes ``(m, outcome_dim)`` of ``(m, dim)`` new inputs, and the variance ``(m,)`` of each
         dimension; noise comes on top."""
-        across = self.kernel(squared_distances(inputs, self.inputs))
+        across = self._covariances(inputs)
         known = across @ self._root
         return across @ self._weights + self.mean, self.variance * np.maximum(1 - (known * known).sum(axis=1), 0)
 
     def expect(self, inputs: Array) -> Array:
         """The expected outcomes alone."""
-        expected: Array = self.kernel(squared_distances(inputs, self.inputs)) @ self._weights + self.mean
+        expected: Array = self._covariances(inputs) @ self._weights + self.mean
         return expected
 
     def without_noise(self, rows: Rows) -> tuple[Array, Array]:
@@ -109,7 +123,7 @@ class Process:
 
     def jacobians(self, points: Array) -> Array:
         """``(m, outcome_dim, dim)`` of the expected outcomes at ``(m, dim)``."""
-        differences = points[:, None] - self.inputs  # (m, n, dim)
+        differences = (points - self._origin)[:, None] - self._inputs  # (m, n, dim)
         slopes = self.kernel.slope((differences * differences).sum(axis=2))
         found: Array = self._weights.T @ (slopes[..., None] * differences)
         return found

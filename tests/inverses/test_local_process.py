@@ -195,6 +195,18 @@ def test_movements_nearly_alike_far_from_0_end_nothing() -> None:
             inverse(NO_CONTEXT, np.sin(rng.uniform(size=7) @ weights))
 
 
+@pytest.mark.parametrize("far", [25.0, 50.0])
+def test_a_wide_movement_after_many_nearly_alike_is_answered(far: float) -> None:
+    rng = np.random.default_rng(0)
+    thetas = np.concatenate((1e-4 * rng.uniform(size=(120, 3)), rng.uniform(size=(4, 3))))
+    outcomes = np.stack([np.sin(3 * thetas.sum(axis=1)), np.cos(2 * thetas[:, 0])], axis=1)
+    thetas += far
+    inverse = LocalProcess(remember(thetas, outcomes))
+    expected = inverse.predict(NO_CONTEXT, thetas[-1])
+    assert expected == pytest.approx(outcomes[-1], abs=0.01)
+    assert inverse(NO_CONTEXT, outcomes[-1]).theta == pytest.approx(thetas[-1])
+
+
 def test_an_answer_depends_on_the_memory_and_not_on_when_it_was_asked() -> None:
     whole = played(two_elbows(), 200)
     memory, goal = remember(whole.thetas[:50], whole.outcomes[:50]), np.array([0.3, 0.2])
