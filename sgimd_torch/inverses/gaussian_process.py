@@ -90,8 +90,7 @@ class Process:
         """The Cholesky factor of the covariance ``(n, n)`` of the inputs, measured from ``origin`` from now on."""
         self._origin, self._inputs = origin, inputs - origin
         covariance = self.kernel(squared_distances(self._inputs, self._inputs))
-        factor: Array = np.linalg.cholesky(covariance + self.kernel.noise * np.eye(len(inputs)))
-        return factor
+        return np.asarray(np.linalg.cholesky(covariance + self.kernel.noise * np.eye(len(inputs))), dtype=np.float64)
 
     def _covariances(self, inputs: Array) -> Array:
         """``(m, n)`` of new inputs ``(m, dim)`` and those given."""
