@@ -116,10 +116,10 @@ class Quoted:
         found, others = self.results.pairs(ours, theirs, at)
         return f"{sum(found[seed] > others[seed] for seed in found)} of {len(found)}"
 
-    def lowest(self, names: Sequence[str], at: int = LAST) -> str:
-        """The name of the variant with the smallest error."""
-        known = [name for name in names if self.error(name, at) != MISSING]
-        return min(known, key=lambda name: self.results.iqm(name, at).value) if known else MISSING
+    def lowest(self, names: Sequence[str], beside: str, at: int = LAST) -> str:
+        """The name of the variant with the smallest error, each compared with the one ``beside`` on common seeds."""
+        known = [name for name in names if self.less(name, beside, at) != MISSING]
+        return min(known, key=lambda name: self.results.difference(name, beside, at).value) if known else MISSING
 
 
 class Page(NamedTuple):
