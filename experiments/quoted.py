@@ -118,7 +118,7 @@ class Quoted:
 
     def lowest(self, names: Sequence[str], beside: str, at: int = LAST) -> str:
         """The name of the variant with the smallest error, each compared with the one ``beside`` on common seeds."""
-        known = [name for name in names if self.less(name, beside, at) != MISSING]
+        known = [name for name in names if self.common(name, beside, at) != MISSING]
         return min(known, key=lambda name: self.results.difference(name, beside, at).value) if known else MISSING
 
 
