@@ -303,6 +303,11 @@ class Config:
             raise ValueError(f"name must be that of one directory, got {self.variant!r}; is the path for --out?")
 
     @property
+    def settings(self) -> dict[str, Any]:
+        """All options, as json has them."""
+        return plain(vars(self))
+
+    @property
     def variant(self) -> str:
         """The name of the run's directory and of its curve."""
         return self.algorithm.replace("/", "-") if self.name is None else self.name
@@ -463,3 +468,8 @@ def dashed(name: str) -> str:
 def plain(value: Any) -> Any:
     """As json has it."""
     return json.loads(json.dumps(value, default=str))
+
+
+# Files count by their content, of which a checksum is recorded; a benchmark may be another one when a run is resumed.
+MAY_CHANGE: Final = (*having("on_resume"), "benchmark_crc32")
+EVALUATES: Final = (*having("evaluates"), "benchmark_crc32")  # all evaluations of a run share these

@@ -1,21 +1,20 @@
 """The forward model of a run: it is trained, its predictions are recorded, and a message says when it is not asked.
 
-predictions.csv and refreshes.csv are made again by a replay, so a resumed run has them as if it had never stopped.
-    model = RunModel(directory.path, parts.model, trust); model.episode(episode, memory); model.flush()
+A replay makes its tables again, so a resumed run has them as if it had never stopped.
+    model = RunModel(record, parts.model, trust); model.episode(episode, memory)
 """
 
 from __future__ import annotations
 
 import time
 from collections import deque
-from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from sgimd_torch.forward_model.diagnostics import coverage, improvements
 from sgimd_torch.memory import Memory
-from sgimd_torch.runs.tables import numbers, sealed, small_table
+from sgimd_torch.record import Record
 from sgimd_torch.spaces import Array, Episode
 
 if TYPE_CHECKING:
@@ -46,33 +45,25 @@ LAYOUT: Final = {  # as that of board/scalars.py
 
 
 class RunModel:
-    """Refreshes the model after every movement and keeps a record.
+    """Refreshes the model after every movement and records what it predicts.
 
     Args:
-        directory: of the run; its files stay as they are until ``begin``.
+        record: of the run.
         model: of the run.
         trust: relative error above which the model is not asked.
 
     ``curves`` are for the board, by tag, as the last refresh left them.
     """
 
-    def __init__(self, directory: Path, model: ForwardModel, trust: float) -> None:
+    def __init__(self, record: Record, model: ForwardModel, trust: float) -> None:
         self._model, self._trust = model, trust
-        self._predictions = small_table(directory / "predictions.csv", model.sizes["outcome_dim"])
-        self._refreshes = small_table(directory / "refreshes.csv", 0)
-        self._tables = self._predictions, self._refreshes
+        self._record = record
         self._asked = False
         self._learnt = 0  # refreshes so far
         self._lately: deque[tuple[Array, Array, str]] = deque(maxlen=LATELY)
         self._seconds = 0.0
-        self._news = [note for t in self._tables for note in t.notes(t.read(), "the replay makes them again")]
+        self._news: list[str] = []
         self.curves: dict[str, float] = {}
-
-    def begin(self) -> None:
-        """The replay is over: replace earlier files."""
-        for table in self._tables:
-            table.begin()
-            table.flush()
 
     def episode(self, episode: Episode, memory: Memory) -> dict[str, float]:
         """Refresh after a movement, new or replayed; returns new ``curves``, none if the model has not learnt."""
@@ -86,8 +77,8 @@ class RunModel:
             return {}
         self._learnt += 1
         error = self._model.relative_error
-        fields = [movements, len(memory), refresh.steps, repr(refresh.held_out), repr(error), int(refresh.diverged)]
-        self._refreshes.append(sealed(list(map(str, fields))))
+        learnt = refresh.steps, refresh.held_out, error, int(refresh.diverged)
+        self._record.remake_rows("refreshes", [(movements, len(memory), *learnt)])
         self.curves = {
             "model/relative_error": error,
             "model/held_out": refresh.held_out,
@@ -96,16 +87,11 @@ class RunModel:
             "model/improved": self._improved(),
         }
         if refresh.predicted is not None:
-            self._record(refresh.first, memory.outcomes[refresh.first :], refresh.predicted)
+            self._predicted(refresh.first, memory.outcomes[refresh.first :], refresh.predicted)
         if refresh.diverged:
             self._news.append(f"movement {movements}: training diverged; the forward model keeps its last good weights")
         self._say_whether_asked(movements, error)
         return self.curves
-
-    def flush(self) -> None:
-        """Hand everything to the operating system."""
-        for table in self._tables:
-            table.flush()
 
     def news(self, *, ended: bool = False) -> list[str]:
         """Messages about the model that were not returned yet; at the end of a run also that it is not asked."""
@@ -117,13 +103,12 @@ class RunModel:
         return news
 
     def summary(self) -> dict[str, float]:
-        """For summary.json: seconds spent on refreshes since movement 0, because a replay repeats them."""
+        """Seconds spent on refreshes since movement 0, because a replay repeats them."""
         return {"seconds_model": round(self._seconds, 3)}
 
-    def _record(self, first: int, outcomes: Array, predicted: Prediction) -> None:
-        parts = (outcomes, *predicted)
-        for row, values in enumerate(np.hstack(parts), first):
-            self._predictions.append(sealed([str(row), *numbers(values, len(values))]))
+    def _predicted(self, first: int, outcomes: Array, predicted: Prediction) -> None:
+        values = np.hstack((outcomes, *predicted)).tolist()
+        self._record.remake_rows("predictions", ((row, *each) for row, each in enumerate(values, first)))
         spread = np.hypot(predicted.epistemic, predicted.aleatoric)
         self.curves["model/error"] = float(np.linalg.norm(outcomes - predicted.mean, axis=1).mean())
         self.curves["model/coverage"] = float(coverage(outcomes, predicted.mean, spread, (LEVEL,))[0])
