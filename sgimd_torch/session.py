@@ -15,7 +15,7 @@ import numpy as np
 
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.learner import Learner, ReplayError
-from sgimd_torch.learner.replay import TEACHER, replay
+from sgimd_torch.learner.replay import TEACHER, BeforeMovement, replay
 from sgimd_torch.record import Event, Kind, Record
 from sgimd_torch.spaces import Array, Demonstration, Episode, Request, check_count, read_only, stream
 from sgimd_torch.teachers import Teacher
@@ -69,25 +69,28 @@ def run(
     if check_count("first", first, 0) > check_count("movements", movements, 1):
         raise ValueError(f"first must be at most movements, got {first} of {movements}; movements counts all of a run")
     execute = live(environment, seed) if execute is None else execute
+    before = BeforeMovement()
     if record is not None:
-        yield from replay(learner, record.events(), teacher=teacher)
+        before = yield from replay(learner, record.events(), teacher=teacher)
         first = learner.movements
     tell = (lambda event: None) if record is None else record.add
     for index in range(first, movements):
-        asked = None if learner.lesson_waits else teacher
-        demonstration = asked.offer(index, learner.memory) if asked is not None else None
-        if demonstration is not None:
-            learner.watch(demonstration, offered=True)
-            tell(Event(Kind.SHOWN, lesson=demonstration, who=getattr(teacher, "who", TEACHER)))
+        (demonstration, request, reply), before = before, BeforeMovement()
+        asks = None if learner.lesson_waits else teacher
+        offered = None if asks is None else asks.offer(index, learner.memory)
+        if offered is not None:
+            learner.watch(offered, offered=True)
+            tell(Event(Kind.SHOWN, lesson=offered, who=getattr(teacher, "who", TEACHER)))
+            demonstration = offered
         context = read_only(environment.observe(stream(seed, "context", index))) if learner.idle else learner.context
-        request, reply = learner.request(context) if teachers else None, ""
-        if request is not None and teachers is not None:
-            answer, reply = _asked(learner, environment, context, request, teachers)
-            of = request
-            tell(Event(Kind.ASKED, context, goal=of.goal, who=of.teacher, strategy=of.strategy, reply=reply))
+        asked = learner.request(context) if teachers and request is None else None
+        if asked is not None and teachers is not None:
+            answer, reply = _asked(learner, environment, context, asked, teachers)
+            request = asked
+            tell(Event(Kind.ASKED, context, goal=asked.goal, who=asked.teacher, strategy=asked.strategy, reply=reply))
             if answer is not None:
                 learner.watch(answer)
-                tell(Event(Kind.SHOWN, lesson=answer, who=request.teacher))
+                tell(Event(Kind.SHOWN, lesson=answer, who=asked.teacher))
                 demonstration = answer
         move, outcome = learner.ask(context), None
         if move is None:

@@ -7,8 +7,8 @@ attempt, too. So nothing but events has to be kept; ``record.py`` keeps them.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, Final
+from collections.abc import Generator, Iterable
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -28,7 +28,17 @@ class ReplayError(RuntimeError):
     """The learner does not repeat what was recorded: another library version, processor or configuration."""
 
 
-def replay(learner: Learner, events: Iterable[Event], *, teacher: Teacher | None = None) -> Iterator[Episode]:
+class BeforeMovement(NamedTuple):
+    """What came since the last movement: a demonstration, a request and the reply to it, as in an `Episode`."""
+
+    demonstration: Demonstration | None = None
+    request: Request | None = None
+    reply: str = ""
+
+
+def replay(
+    learner: Learner, events: Iterable[Event], *, teacher: Teacher | None = None
+) -> Generator[Episode, None, BeforeMovement]:
     """Let ``learner`` live through ``events``. Nothing is executed and nobody is asked for a demonstration.
 
     Args:
@@ -40,12 +50,15 @@ def replay(learner: Learner, events: Iterable[Event], *, teacher: Teacher | None
     Yields:
         The episodes, as `run` has yielded them.
 
+    Returns:
+        What came after the last of them.
+
     Raises (when iterated):
         ReplayError: the learner proposes another movement than the recorded one, or the teacher shows something else.
     """
     offered: Demonstration | None = None
     asked_at = -1  # the movement before which the teacher was asked last
-    shown, request, reply = None, None, ""
+    before = BeforeMovement()
     for event in events:
         index = learner.movements
         if teacher is not None and asked_at < index and event.kind != Kind.INTERRUPTED:
@@ -55,12 +68,13 @@ def replay(learner: Learner, events: Iterable[Event], *, teacher: Teacher | None
                 if event.who == TEACHER and teacher is not None:
                     _check_lesson(index, event.lesson, offered)
                 _watch(learner, event)
-                offered, shown = None, event.lesson
+                offered, before = None, before._replace(demonstration=event.lesson)
             case Kind.ASKED:
                 assert event.context is not None
                 learner.request(event.context)
                 if event.who is not None and event.goal is not None:
-                    request, reply = Request(event.who, event.goal, event.strategy or ""), event.reply or ""
+                    request = Request(event.who, event.goal, event.strategy or "")
+                    before = before._replace(request=request, reply=event.reply or "")
             case Kind.INTERRUPTED:
                 learner.interrupt()
             case _:
@@ -76,8 +90,9 @@ def replay(learner: Learner, events: Iterable[Event], *, teacher: Teacher | None
                     continue
                 if event.outcome is not None:
                     learner.tell(event.outcome)
-                yield Episode(index, event.context, move, event.outcome, shown, request, reply)
-                shown, request, reply = None, None, ""
+                yield Episode(index, event.context, move, event.outcome, *before)
+                before = BeforeMovement()
+    return before
 
 
 def _watch(learner: Learner, event: Event) -> None:
@@ -85,7 +100,7 @@ def _watch(learner: Learner, event: Event) -> None:
     if learner.social is None and not learner.waits_for_answer:
         found = f"before movement {learner.movements} it asked for a demonstration, the learner now does not"
         raise ReplayError(f"{found}; is it built in the same way, with the same seed?")
-    learner.watch(event.lesson, offered=event.who == TEACHER)
+    learner.watch(event.lesson, offered=event.who is not None)
 
 
 def _check_repeats(index: int, name: str, recorded: Array | None, now: Array | None) -> None:

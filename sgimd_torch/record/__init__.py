@@ -327,13 +327,13 @@ class Record:
 
 
 def _connect(path: Path, write: bool) -> sqlite3.Connection:
+    # Nothing here may open the file: to close it again would give up the locks that this process has on it.
     if not path.is_file():
         raise RunError(f"there is no record {path}")
+    if not path.stat().st_size:
+        raise RunError(f"{path} holds nothing yet")
     place = path.resolve().as_uri()
     try:
-        with path.open("rb") as file:
-            if not file.read(1):
-                raise RunError(f"{path} holds nothing yet")
         mode = "rw" if os.access(path, os.W_OK) and os.access(path.parent, os.W_OK) else "ro"
         # Read-only, SQLite could not clean up after a writer that was killed.
         return sqlite3.connect(f"{place}?mode={mode}", uri=True, isolation_level=None, timeout=0.5 if write else 10.0)

@@ -111,10 +111,12 @@ def _whole(path: Path, accept_loss: bool, notes: list[str]) -> Record | None:
         return None
     if not wrong:
         return record
+    lost = [message for table, message in wrong.items() if table in _LASTING]
+    if lost:
+        record.close()
+        _accept(path, "; ".join(lost), "keep those before and make the others", accept_loss, notes)
+        record = Record(path, write=True)
     try:
-        lost = [message for table, message in wrong.items() if table in _LASTING]
-        if lost:
-            _accept(path, "; ".join(lost), "keep those before and make the others", accept_loss, notes)
         whole = () if lost else [table for table in DERIVED if table not in wrong]
         notes += [f"{message}; it is made again" for message in wrong.values() if message not in lost]
         kept = record.rewrite(keep=whole)

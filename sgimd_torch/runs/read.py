@@ -11,7 +11,7 @@ from array import array
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,7 +68,9 @@ class Run:
     def at(self, movements: int, column: str = "mean_error", answer: str = OWN) -> float:
         """An entry of an evaluation, NaN if there is none."""
         evaluation = self.answers.get(answer)
-        found = () if evaluation is None else evaluation[column][evaluation["movements"] == movements]
+        if evaluation is None:
+            return float("nan")
+        found = evaluation[column][evaluation["movements"] == movements]
         return float(found[0]) if len(found) else float("nan")
 
     def chosen_goals(self) -> Array:
@@ -129,12 +131,15 @@ def read_run(path: str | os.PathLike[str]) -> Run:
         errors=found["errors"],
         benchmark=np.stack(list(found["goals"].values())[1:], axis=1),
         demonstrations=shown,
-        **{name: found[name] if len(next(iter(found[name].values()))) else None for name in _OPTIONAL},
+        regions=_if_any(found["regions"]),
+        predictions=_if_any(found["predictions"]),
+        refreshes=_if_any(found["refreshes"]),
         requests=events.requests(),
     )
 
 
-_OPTIONAL: Final = ("regions", "predictions", "refreshes")
+def _if_any(columns: Columns) -> Columns | None:
+    return columns if len(next(iter(columns.values()))) else None
 
 
 class _Movements:
