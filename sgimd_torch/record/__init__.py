@@ -78,7 +78,7 @@ class Record:
         self.path = Path(path)
         self._waiting: dict[str, list[Row]] = {}
         self._seals: dict[str, tuple[int, int]] = {}  # of each table: how many rows, the seal of the last
-        self._committed: dict[str, tuple[int, int]] = {}
+        self._written: dict[str, tuple[int, int]] = {}
         self._movements = 0
         self._shown: dict[bytes, int] = {}
         self._remade: dict[str, int] = {}
@@ -135,7 +135,7 @@ class Record:
         return self._movements
 
     def rows(self, table: str) -> Iterator[Row]:
-        """The rows of a table that were committed, in order, without their seals.
+        """The rows of a table that were committed or replaced, in order, without their seals.
 
         Raises:
             RunError: one of them is not what was written, or there are more or fewer; those before it were yielded.
@@ -150,8 +150,8 @@ class Record:
                         raise RunError(f"{self.path}: row {n + 1} of {table} is not what was written; {HINT}")
                     n += 1
                     yield tuple(row)
-        if (n, seal) != self._committed[table]:
-            raise RunError(f"{self.path}: {table} has {n} rows, {self._committed[table][0]} were written; {HINT}")
+        if (n, seal) != self._written[table]:
+            raise RunError(f"{self.path}: {table} has {n} rows, {self._written[table][0]} were written; {HINT}")
 
     def columns(self, table: str) -> list[str]:
         """Names of the columns, without the seal."""
@@ -184,7 +184,7 @@ class Record:
         """The same for a table that a replay makes again from its beginning: rows that are there already stay."""
         for row in rows:
             made = self._remade[table] = self._remade.get(table, 0) + 1
-            if made > self._committed[table][0]:
+            if made > self._written[table][0]:
                 self.add_rows(table, [row])
 
     def replace_rows(self, table: str, rows: Iterable[Sequence[Any]]) -> None:
@@ -194,6 +194,7 @@ class Record:
         self._waiting[table] = []
         self._seals[table] = 0, self._root(table)
         self._append(table, [plain(row) for row in rows])
+        self._write()
 
     def settle(self, **about: Any) -> None:
         """Say more about the run, or something else than before; anything that json can hold."""
@@ -207,15 +208,9 @@ class Record:
             OSError: the disk is full, or cannot be written; what was committed before is still there.
             RunError: another process has written in the meantime.
         """
+        self._write()
         with self._told(writing=True):
-            for table, rows in self._waiting.items():
-                marks = ", ".join("?" * len(layout(self.dims)[table]))
-                self._connection.executemany(f"INSERT INTO {table} VALUES ({marks})", rows)
-            seals = [(*self._seals[table], table) for table in self._waiting]
-            self._connection.executemany("UPDATE seals SET n_rows = ?, seal = ? WHERE name = ?", seals)
             self._connection.execute("COMMIT")
-            self._waiting.clear()
-            self._committed = dict(self._seals)
             self._lock()
 
     def check(self) -> dict[str, str]:
@@ -284,6 +279,17 @@ class Record:
             self._waiting.setdefault(table, []).extend(new)
             self._seals[table] = n + len(new), new[-1][-1]
 
+    def _write(self) -> None:
+        """Hand waiting rows to SQLite."""
+        with self._told(writing=True):
+            for table, rows in self._waiting.items():
+                marks = ", ".join("?" * len(layout(self.dims)[table]))
+                self._connection.executemany(f"INSERT INTO {table} VALUES ({marks})", rows)
+            seals = [(*self._seals[table], table) for table in self._waiting]
+            self._connection.executemany("UPDATE seals SET n_rows = ?, seal = ? WHERE name = ?", seals)
+        self._waiting.clear()
+        self._written = dict(self._seals)
+
     def _root(self, table: str) -> int:
         return root("" if table == "about" else self.about["run"], table)
 
@@ -291,8 +297,8 @@ class Record:
         found = dict(self._connection.execute("SELECT name, sql FROM sqlite_schema").fetchall())
         if not found:
             raise RunError("it holds nothing yet")
-        self._committed = {name: (n, seal) for name, n, seal in self._connection.execute("SELECT * FROM seals")}
-        self._seals = dict(self._committed)
+        self._written = {name: (n, seal) for name, n, seal in self._connection.execute("SELECT * FROM seals")}
+        self._seals = dict(self._written)
         self.about: dict[str, Any] = {name: json.loads(value) for name, value in self.rows("about")}
         self.dims: Dims = tuple(self.about["dims"])
         wanted = {name: create(name, columns) for name, columns in {**layout(self.dims), "seals": SEALS}.items()}
