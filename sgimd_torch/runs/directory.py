@@ -44,26 +44,32 @@ def open_run(parts: RunParts, *, resume: bool, accept_loss: bool = False) -> tup
         OSError: it cannot be written.
     """
     config, robot = parts.config, parts.environment
+    spaces = {"contexts": robot.contexts, "policies": robot.policies, "outcomes": robot.outcomes}
     path, notes = config.directory / FILE, list[str]()
     refuse_foreign(config.directory)
     about = {
         "settings": config.settings,
         "files": parts.data,
         "versions": {**versions(forward=parts.model is not None), **sources(config)},
+        "robot": type(robot).__name__,
+        "spaces": {name: [box.low.tolist(), box.high.tolist()] for name, box in spaces.items()},
     }
+    dims = robot.contexts.dim, robot.policies.dim, robot.outcomes.dim
     make_folder(config.directory)
     if holds_run(path) and not resume:
         raise RunError(f"{config.directory} holds a run already; go on with it by --resume, or choose another --out")
     record = _whole(path, accept_loss, notes) if holds_run(path) else None
     if record is None:
         notes += [f"{config.directory} holds no run yet: it starts from the beginning"] if resume and not notes else []
-        dims = robot.contexts.dim, robot.policies.dim, robot.outcomes.dim
         record = Record.make(path, dims, about)
     else:
         try:
             if "settings" not in record.about:
                 raise RunError(f"{path} is a life that Learner.save wrote, not a run; choose another --out")
             _refuse_other(record, about)
+            if record.dims != dims:
+                was = f"dims {record.dims} of context, theta, outcome, the robot now has {dims}"
+                raise RunError(f"{path} was recorded with {was}; has the robot become another one?")
             if record.movements > config.movements:
                 raise RunError(f"{path} has {record.movements} movements already, {config.movements} were asked for")
             about["versions"] = _with_earlier(record.about["versions"], about["versions"], notes)

@@ -16,11 +16,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sgimd_torch.evaluation import Evaluation, Part
 from sgimd_torch.files import checksum
 from sgimd_torch.record import Event, Kind, Record, RunError
 from sgimd_torch.runs.config import FILES, OWN, Config, from_settings, having, options
 from sgimd_torch.runs.directory import FILE
-from sgimd_torch.spaces import Array, Demonstration
+from sgimd_torch.spaces import Array, Box, Demonstration
 
 Columns = dict[str, np.ndarray]
 """By name; an entry for each row."""
@@ -36,13 +37,16 @@ class Run:
     every evaluation, ``benchmark`` ``(n_goals, outcome_dim)`` the goals; ``regions`` those of the goal model at every
     evaluation, None for a goal model without regions; ``predictions`` and ``refreshes`` those of a forward model, None
     without one; ``requests`` those of what was asked for, None if nothing was. ``config``: all options by name;
-    ``summary``: movements, whether it is finished, and seconds.
+    ``robot``: the class of the environment; ``spaces``: its contexts, policies and outcomes; ``summary``: movements,
+    whether it is finished, and seconds.
     """
 
     path: Path
     config: dict[str, Any]
     versions: dict[str, Any]
     files: dict[str, Any]
+    robot: str
+    spaces: dict[str, Box]
     summary: dict[str, Any]
     index: NDArray[np.int64]
     origin: NDArray[np.str_]
@@ -79,6 +83,24 @@ class Run:
         own = self.goals[np.isfinite(self.goals).all(axis=1) & (self.origin != "imitate")]
         new = (np.diff(own, axis=0, prepend=np.nan) != 0).any(axis=1)
         return own[new]
+
+    @property
+    def by_context(self) -> Columns | None:
+        """The mean error in each third of each context, at each evaluation, by each answer; None without contexts."""
+        contexts, errors = self.spaces["contexts"], self.errors
+        if not contexts.dim:
+            return None
+        points = np.stack([errors[f"context_{k}"] for k in range(contexts.dim)], axis=1)
+        unknown = np.full(len(points), np.nan)
+        rows = []
+        for answer in self.answers:
+            for movements in np.unique(errors["movements"]):
+                here = (errors["answer"] == answer) & (errors["movements"] == movements)
+                found = Evaluation(errors["error"][here], points[here], points[here], unknown[here], points[here])
+                rows += [(movements, answer, *part) for part in found.by_context(contexts) if here.any()]
+        names = ("movements", "answer", *Part._fields)
+        columns = zip(*rows, strict=True) if rows else ([] for _ in names)
+        return {name: np.array(column) for name, column in zip(names, columns, strict=True)}
 
 
 def points_of(requests: Mapping[str, np.ndarray], part: str, dim: int) -> Array:
@@ -125,6 +147,8 @@ def read_run(path: str | os.PathLike[str]) -> Run:
         config=settings,
         versions=about["versions"],
         files=about["files"],
+        robot=about["robot"],
+        spaces={name: Box(np.array(low), np.array(high)) for name, (low, high) in about["spaces"].items()},
         summary={"movements": n, "finished": bool(finished), **about.get("seconds", {})},
         **events.arrays(),
         answers=_by_answer(found["evaluations"]),
