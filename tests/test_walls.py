@@ -15,7 +15,7 @@ import sgimd_torch
 PACKAGE = "sgimd_torch"
 ROWS = [  # a room imports only from the rows before its own
     {"spaces", "files", "catalogue"},
-    {"memory", "environments", "goals"},
+    {"memory", "environments", "goals", "record"},
     {"demonstrations"},
     {"competence", "teachers", "evaluation", "forward_model"},
     {"strategies", "inverses", "searches", "figures"},

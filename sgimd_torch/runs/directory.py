@@ -47,7 +47,7 @@ def open_run(parts: RunParts, *, resume: bool, accept_loss: bool = False) -> tup
     spaces = {"contexts": robot.contexts, "policies": robot.policies, "outcomes": robot.outcomes}
     path, notes = config.directory / FILE, list[str]()
     refuse_foreign(config.directory)
-    about = {
+    about: dict[str, Any] = {
         "settings": config.settings,
         "files": parts.data,
         "versions": {**versions(forward=parts.model is not None), **sources(config)},
