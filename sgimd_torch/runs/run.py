@@ -8,11 +8,11 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator
-from contextlib import nullcontext
+from contextlib import closing, nullcontext
+from typing import TYPE_CHECKING
 
 from sgimd_torch.environments.protocol import SimulationError
 from sgimd_torch.evaluation import evaluate
-from sgimd_torch.runs.board import RunBoard
 from sgimd_torch.runs.build import RunParts
 from sgimd_torch.runs.clock import Seconds
 from sgimd_torch.runs.config import OWN
@@ -25,6 +25,9 @@ from sgimd_torch.spaces import Demonstration, Episode
 from sgimd_torch.teachers.answering import Demonstrator
 from sgimd_torch.teachers.awaited import Awaited
 from sgimd_torch.teachers.by_hand import ByHand
+
+if TYPE_CHECKING:
+    from sgimd_torch.board.listener import BoardListener
 
 FLUSH_EVERY = 1.0  # s, after which a finished movement hands over all before it; a killed run loses what came since
 
@@ -67,7 +70,7 @@ def live_in(directory: RunDirectory, parts: RunParts, stopping: Stopping) -> str
     if it was killed; the learner's are counted from movement 0 on, since a replay lets it do all its work again.
     """
     seconds = Seconds(directory.summary)
-    with RunBoard(directory, parts, seconds) if parts.config.board else nullcontext() as board:
+    with closing(_board(directory, parts, seconds)) if parts.config.board else nullcontext() as board:
         life = Life(directory, parts, stopping, seconds, board)
         finished = False
         try:
@@ -82,11 +85,22 @@ def live_in(directory: RunDirectory, parts: RunParts, stopping: Stopping) -> str
     return f"{directory.path}: {life.movements} movements, {found}"
 
 
+def _board(directory: RunDirectory, parts: RunParts, seconds: Seconds) -> BoardListener:
+    from sgimd_torch.board.listener import BoardListener  # loaded only when there is a board
+
+    return BoardListener(directory.path, parts, seconds.summary)
+
+
 class Life:
     """A run under way: after each movement it is written, shown, learnt from and evaluated, in this order."""
 
     def __init__(
-        self, directory: RunDirectory, parts: RunParts, stopping: Stopping, seconds: Seconds, board: RunBoard | None
+        self,
+        directory: RunDirectory,
+        parts: RunParts,
+        stopping: Stopping,
+        seconds: Seconds,
+        board: BoardListener | None,
     ) -> None:
         self.directory, self.parts, self.stopping, self.seconds, self.board = directory, parts, stopping, seconds, board
         model, trust = parts.model, parts.trust
@@ -116,8 +130,6 @@ class Life:
                 self.stopping.check()
         if self.model is not None:
             say(*self.model.news(ended=True))
-        if self.board is not None:
-            self.board.finish()
 
     def episodes(self) -> Iterator[Episode]:
         """The same, one movement after the other; each is written, shown and learnt from when it comes."""
@@ -170,7 +182,8 @@ class Life:
         self.movements = episode.index + 1
         curves = {} if self.model is None else self.model.episode(episode, self.parts.learner.memory)
         if self.board is not None:
-            self.board.episode(episode, curves)
+            self.board.episode(episode, replayed=episode.index < self.recorded)
+            self.board.model(curves)
         if self.movements in self._wanted:
             self._evaluate()
         if self.movements == self.recorded:
@@ -198,11 +211,11 @@ class Life:
 
     def _evaluate(self) -> None:
         """Evaluate the learner as it is now by each of its answers, with streams that the run does not use; unless it
-        was done, and shown, before. All answers get the same noise, goal by goal; of the run's own it is measured, too.
-        Without an exemplar there is nothing to infer a movement from, so there is no evaluation: the learner
-        by observation has none before its first demonstration."""
+        was done before, and there is no board to tell. All answers get the same noise, goal by goal; of the run's own
+        it is measured, too. Without an exemplar there is nothing to infer a movement from, so there is no evaluation:
+        the learner by observation has none before its first demonstration."""
         parts, config, evaluations = self.parts, self.parts.config, self.directory.evaluations
-        if self.movements in evaluations and (self.board is None or self.board.recall_evaluation()):
+        if self.movements in evaluations and self.board is None:
             return
         self._flush()
         if len(parts.learner.memory) == 0:
@@ -216,7 +229,8 @@ class Life:
                     same = inverse is parts.inverse
                     found[answer] = found[OWN].without_noise if same else evaluate(inverse, *judged, repeats=0)
         if self.board is not None:
-            self.board.evaluation(found)
+            self.board.evaluated(self.movements, found)
+            self.board.flush()
         with self.seconds.of("evaluation"):
             evaluations.add(self.movements, found, parts.benchmark.side / 2, parts.regions)
 
