@@ -23,25 +23,6 @@ if TYPE_CHECKING:
 LEVEL: Final = 0.8  # of the regions whose coverage the board shows
 LATELY: Final = 500  # movements, over which the board shows how often refining a guess helped
 NOT_ASKED: Final = "the forward model is not asked, the local inverse model answers and the simplex searches instead"
-LEGEND: Final = {
-    "model/relative_error": "Error for exemplars never trained on, over that of always predicting their mean.",
-    "model/held_out": "Negative log likelihood of exemplars never trained on; lower is better.",
-    "model/steps": "Of the optimiser, at the last refresh.",
-    "model/error": "Distance (m) from where the newest movements landed to where the model, before learning them, "
-    "predicted that they would.",
-    "model/coverage": f"Share of the newest movements that landed in the model's {LEVEL:.0%} region.",
-    "model/improved": f"Share of the goals of the last {LATELY} movements for which refining came nearer than the "
-    "first guess.",
-    "model/ms": "Milliseconds of a refresh, the mean so far.",
-}
-LAYOUT: Final = {  # as that of board/scalars.py
-    "Does the forward model predict where movements land?": {
-        ("", "distance to where they landed (m)"): "model/error",
-        ("", f"share in its {LEVEL:.0%} region"): "model/coverage",
-        ("", "relative error on what it never learns from; 1 is no better than their mean"): "model/relative_error",
-        ("goals", f"share of refinements that helped, last {LATELY} movements"): "model/improved",
-    },
-}
 
 
 class RunModel:
@@ -59,7 +40,6 @@ class RunModel:
         self._model, self._trust = model, trust
         self._record = record
         self._asked = False
-        self._learnt = 0  # refreshes so far
         self._lately: deque[tuple[Array, Array, str]] = deque(maxlen=LATELY)
         self._seconds = 0.0
         self._news: list[str] = []
@@ -75,7 +55,6 @@ class RunModel:
         self._seconds += time.perf_counter() - begun
         if refresh is None:
             return {}
-        self._learnt += 1
         error = self._model.relative_error
         learnt = refresh.steps, refresh.held_out, error, int(refresh.diverged)
         self._record.remake_rows("refreshes", [(movements, len(memory), *learnt)])
@@ -83,7 +62,6 @@ class RunModel:
             "model/relative_error": error,
             "model/held_out": refresh.held_out,
             "model/steps": refresh.steps,
-            "model/ms": 1000 * self._seconds / self._learnt,
             "model/improved": self._improved(),
         }
         if refresh.predicted is not None:

@@ -109,7 +109,6 @@ def test_the_server_has_the_regions_of_the_run(server, runs):
             competence, interest = (np.nansum(values * goals) / goals.sum() for values in (competences, interests))
             assert curve(ask, f"competence/{path}")[movements] == pytest.approx(competence, rel=1e-5)
             assert curve(ask, f"interest/{path}")[movements] == pytest.approx(interest, rel=1e-5)
-            assert curve(ask, f"region_goals/{path}")[movements] == now["attempts"][below].sum()
 
 
 def test_the_server_has_what_the_log_says_about_regimes_and_demonstrations(server, runs):
@@ -127,7 +126,7 @@ def test_the_server_explains_its_curves_and_shows_pictures_and_the_page_of_chart
     _, _, ask = server
     tags = ask("scalars/tags")[RUN]
     assert all(tag["description"] for tag in tags.values())
-    assert len(tags) < 140
+    assert len(tags) < 70
     pictures = ask("images/tags")[RUN]
     assert pictures.keys() == {"competent/since", "map/competence", "map/interest", "map/landed", "map/error"}
     (page,) = [page for page in [ask("custom_scalars/layout")] if page]
