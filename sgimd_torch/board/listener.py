@@ -49,10 +49,17 @@ class BoardListener:
         folder: of the run; its event files stay as they are until ``begin``.
         parts: of the run.
         seconds: gives the seconds spent so far, by what they were spent on.
+        curves: gives what a forward model has learnt from the last movement, by tag.
     """
 
-    def __init__(self, folder: Path, parts: Watched, seconds: Callable[[], Mapping[str, float]]) -> None:
-        self._parts, self._seconds, self._file = parts, seconds, EventFile(folder)
+    def __init__(
+        self,
+        folder: Path,
+        parts: Watched,
+        seconds: Callable[[], Mapping[str, float]],
+        curves: Callable[[], Mapping[str, float]] = dict,
+    ) -> None:
+        self._parts, self._seconds, self._curves, self._file = parts, seconds, curves, EventFile(folder)
         self._movements = self._drawn_at = 0
         self._page: dict[str, dict[str, str]] = {}
         self._behaviour = Behaviour(getattr(parts.learner.autonomous, "tolerance", 0.02))
@@ -80,10 +87,7 @@ class BoardListener:
             self._scalars({**self._behaviour.curves(), **of_regions(self._parts.regions)})
             if not replayed:
                 self._scalars({f"time/{name.removeprefix('seconds_')}": s for name, s in self._seconds().items()})
-
-    def model(self, curves: Mapping[str, float]) -> None:
-        """A point for the curves of a forward model that has learnt from the last movement."""
-        self._scalars(curves)
+        self._scalars(self._curves())
 
     def evaluated(self, movements: int, found: Mapping[str, Evaluation]) -> None:
         """Show an evaluation by each answer, "own" among them; of the others only the mean error. Pictures take as long

@@ -352,11 +352,6 @@ class Config:
         return value if isinstance(value, tuple) else (value,)
 
     @property
-    def settings(self) -> dict[str, Any]:
-        """Every option by name."""
-        return {each.name: getattr(self, each.name) for each in fields(self)}
-
-    @property
     def used(self) -> set[str]:
         """Options and shared parts that have an effect in this run."""
         waiting, used, ignored = ["algorithm", "environment", "inverse"], set[str](), set[str]()

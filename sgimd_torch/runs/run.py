@@ -18,7 +18,7 @@ from sgimd_torch.runs.clock import Seconds
 from sgimd_torch.runs.config import OWN
 from sgimd_torch.runs.directory import open_run
 from sgimd_torch.runs.evaluations import read_evaluations, write_evaluation
-from sgimd_torch.runs.model_record import RunModel
+from sgimd_torch.runs.listeners import listeners_of
 from sgimd_torch.runs.process import Failed, Progress, Stopped, Stopping, say
 from sgimd_torch.session import ReplayError, live, run
 from sgimd_torch.spaces import Episode
@@ -84,12 +84,7 @@ class Life:
         self.evaluations = read_evaluations(self.record)
         self._wanted = set(parts.config.evaluations)
         self._committed = time.monotonic()
-        self.model = RunModel(self.record, parts.model, parts.trust.error) if parts.model and parts.trust else None
-        self.board = None
-        if parts.config.board:
-            from sgimd_torch.board.listener import BoardListener  # loaded only when there is a board
-
-            self.board = BoardListener(parts.config.directory, parts, self.seconds.summary)
+        self.listeners = listeners_of(parts, self.record, self.seconds)
 
     def __enter__(self) -> Self:
         return self
@@ -100,8 +95,8 @@ class Life:
                 self.commit()
         finally:
             self.record.close()
-            if self.board is not None:
-                self.board.close()
+            for each in self.listeners:
+                each.close()
 
     @property
     def replaying(self) -> bool:
@@ -129,8 +124,6 @@ class Life:
                 if self.movements == self.recorded < total:
                     progress.begin(title, total, self.movements)
                 self.stopping.check()
-        if self.model is not None:
-            say(*self.model.news(ended=True))
 
     def episodes(self) -> Iterator[Episode]:
         """The same, one movement after the other: first those that were recorded, then new ones."""
@@ -154,10 +147,9 @@ class Life:
 
     def commit(self) -> None:
         """Bring everything to the disk."""
-        if self.board is not None:
-            self.board.flush()
-        seconds = {**self.seconds.summary(), **({} if self.model is None else self.model.summary())}
-        self.record.settle(seconds=seconds)
+        for each in self.listeners:
+            each.flush()
+        self.record.settle(seconds=self.seconds.summary())
         self.record.commit()
         self._committed = time.monotonic()
 
@@ -175,18 +167,14 @@ class Life:
     def _after(self, episode: Episode) -> None:
         replayed = self.replaying
         self.movements = episode.index + 1
-        curves = {} if self.model is None else self.model.episode(episode, self.parts.learner.memory)
-        if self.board is not None:
-            self.board.episode(episode, replayed)
-            self.board.model(curves)
+        for each in self.listeners:
+            each.episode(episode, replayed)
         if self.movements in self._wanted:
             self._evaluate()
         if self.movements == self.recorded:
             self._begin()
         if not self.replaying and time.monotonic() - self._committed >= COMMIT_EVERY:
             self.commit()
-        if self.model is not None and not self.replaying:
-            say(*self.model.news())
 
     def _evaluate(self) -> None:
         """Evaluate the learner as it is now, if that is not recorded. Without an exemplar there is nothing to infer a
@@ -199,15 +187,15 @@ class Life:
                 found = self.evaluations[self.movements] = evaluate_answers(self.parts, self.movements)
             near = self.parts.benchmark.side / 2
             write_evaluation(self.record, self.movements, found, near, self.parts.regions)
-        if self.board is not None:
-            self.board.evaluated(self.movements, found)
+        for each in self.listeners:
+            each.evaluated(self.movements, found)
         if not self.replaying:
             self.commit()
 
     def _begin(self) -> None:
         """The replay is over: from now on files change."""
-        if self.board is not None:
-            self.board.begin()
+        for each in self.listeners:
+            each.begin()
         self.commit()
 
 

@@ -1,20 +1,23 @@
 """The forward model of a run: it is trained, its predictions are recorded, and a message says when it is not asked.
 
 A replay makes its tables again, so a resumed run has them as if it had never stopped.
-    model = RunModel(record, parts.model, trust); model.episode(episode, memory)
+    model = ModelListener(record, parts.model, trust, memory, seconds); model.episode(episode, replayed=False)
 """
 
 from __future__ import annotations
 
-import time
 from collections import deque
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from sgimd_torch.evaluation import Evaluation
 from sgimd_torch.forward_model.diagnostics import coverage, improvements
 from sgimd_torch.memory import Memory
 from sgimd_torch.record import Record
+from sgimd_torch.runs.clock import Seconds
+from sgimd_torch.runs.process import say
 from sgimd_torch.spaces import Array, Episode
 
 if TYPE_CHECKING:
@@ -25,40 +28,66 @@ LATELY: Final = 500  # movements, over which the board shows how often refining 
 NOT_ASKED: Final = "the forward model is not asked, the local inverse model answers and the simplex searches instead"
 
 
-class RunModel:
+class ModelListener:
     """Refreshes the model after every movement and records what it predicts.
 
     Args:
         record: of the run.
         model: of the run.
         trust: relative error above which the model is not asked.
-
-    ``curves`` are for the board, by tag, as the last refresh left them.
+        memory: of the learner.
+        seconds: of the run; those spent here are counted since movement 0, because a replay spends them again.
     """
 
-    def __init__(self, record: Record, model: ForwardModel, trust: float) -> None:
-        self._model, self._trust = model, trust
+    def __init__(self, record: Record, model: ForwardModel, trust: float, memory: Memory, seconds: Seconds) -> None:
+        self._model, self._trust, self._memory, self._seconds = model, trust, memory, seconds
         self._record = record
         self._asked = False
         self._lately: deque[tuple[Array, Array, str]] = deque(maxlen=LATELY)
-        self._seconds = 0.0
         self._news: list[str] = []
-        self.curves: dict[str, float] = {}
+        self._curves: dict[str, float] = {}
 
-    def episode(self, episode: Episode, memory: Memory) -> dict[str, float]:
-        """Refresh after a movement, new or replayed; returns new ``curves``, none if the model has not learnt."""
+    def episode(self, episode: Episode, replayed: bool) -> None:
+        """Refresh after a movement; say what is new."""
+        self._refresh(episode)
+        if not replayed:
+            say(*self._news)
+            self._news.clear()
+
+    def evaluated(self, movements: int, found: Mapping[str, Evaluation]) -> None:
+        """Nothing to do."""
+
+    def begin(self) -> None:
+        """Nothing to do: what a replay makes again is there."""
+
+    def flush(self) -> None:
+        """Nothing to do: the record is flushed by the run."""
+
+    def close(self) -> None:
+        """Say so if the model is not asked."""
+        if not self._asked:
+            trained = self._model.trained
+            why = self._how_wrong(self._model.relative_error) if trained else "there were too few exemplars to train it"
+            say(f"{NOT_ASKED}: {why}")
+
+    def new_curves(self) -> dict[str, float]:
+        """For the board, by tag: what the last refresh left, none where they were given already."""
+        curves, self._curves = self._curves, {}
+        return curves
+
+    def _refresh(self, episode: Episode) -> None:
+        memory = self._memory
         movements, move = episode.index + 1, episode.move
         if move is not None and move.goal is not None and episode.outcome is not None:
             self._lately.append((move.goal, episode.outcome, move.origin))
-        begun = time.perf_counter()
-        refresh = self._model.refresh(memory, None if move is None else move.goal)
-        self._seconds += time.perf_counter() - begun
+        with self._seconds.of("model"):
+            refresh = self._model.refresh(memory, None if move is None else move.goal)
         if refresh is None:
-            return {}
+            return
         error = self._model.relative_error
         learnt = refresh.steps, refresh.held_out, error, int(refresh.diverged)
         self._record.remake_rows("refreshes", [(movements, len(memory), *learnt)])
-        self.curves = {
+        self._curves = {
             "model/relative_error": error,
             "model/held_out": refresh.held_out,
             "model/steps": refresh.steps,
@@ -69,27 +98,13 @@ class RunModel:
         if refresh.diverged:
             self._news.append(f"movement {movements}: training diverged; the forward model keeps its last good weights")
         self._say_whether_asked(movements, error)
-        return self.curves
-
-    def news(self, *, ended: bool = False) -> list[str]:
-        """Messages about the model that were not returned yet; at the end of a run also that it is not asked."""
-        news, self._news = self._news, []
-        if ended and not self._asked:
-            trained = self._model.trained
-            why = self._how_wrong(self._model.relative_error) if trained else "there were too few exemplars to train it"
-            news.append(f"{NOT_ASKED}: {why}")
-        return news
-
-    def summary(self) -> dict[str, float]:
-        """Seconds spent on refreshes since movement 0, because a replay repeats them."""
-        return {"seconds_model": round(self._seconds, 3)}
 
     def _predicted(self, first: int, outcomes: Array, predicted: Prediction) -> None:
         values = np.hstack((outcomes, *predicted)).tolist()
         self._record.remake_rows("predictions", ((row, *each) for row, each in enumerate(values, first)))
         spread = np.hypot(predicted.epistemic, predicted.aleatoric)
-        self.curves["model/error"] = float(np.linalg.norm(outcomes - predicted.mean, axis=1).mean())
-        self.curves["model/coverage"] = float(coverage(outcomes, predicted.mean, spread, (LEVEL,))[0])
+        self._curves["model/error"] = float(np.linalg.norm(outcomes - predicted.mean, axis=1).mean())
+        self._curves["model/coverage"] = float(coverage(outcomes, predicted.mean, spread, (LEVEL,))[0])
 
     def _improved(self) -> float:
         if not self._lately:
