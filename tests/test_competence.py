@@ -70,11 +70,6 @@ def test_a_scale_that_is_not_positive_is_refused(wrong: float) -> None:
         performance(REST, REST, REST, d_min=wrong)
 
 
-def test_nothing_remembered_is_no_competence() -> None:
-    assert Competence(memory_of(), relative)(NO_CONTEXT, np.array([0.3, 0.2])) == -1
-    assert AttemptCompetence(relative)(NO_CONTEXT, np.array([0.3, 0.2]), np.zeros((0, 2))) == -1
-
-
 def test_competence_is_the_best_performance_over_all_of_memory() -> None:
     rng = stream(1, "test")
     memory = memory_of(*rng.uniform(-1, 1, (60, 2)))

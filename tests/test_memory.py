@@ -44,22 +44,6 @@ def test_near_outcomes_are_those_of_brute_force_however_far_the_goal(large: Memo
         assert large.near_outcomes(NO_CONTEXT, goal, 10).tolist() == nearest(large.outcomes, goal, 10)
 
 
-def test_outcomes_that_float32_cannot_tell_apart_are_still_ranked_by_float64() -> None:
-    n = 200
-    outcomes = np.zeros((n, 2))
-    outcomes[:, 0] = 1 + 1e-12 * stream(0, "order").permutation(n)
-    memory = remember(np.zeros((n, 1)), outcomes)
-    assert memory.near_outcomes(NO_CONTEXT, np.zeros(2), 10).tolist() == nearest(outcomes, np.zeros(2), 10)
-
-
-def test_ties_go_to_the_older_exemplar_even_among_many_copies() -> None:
-    grid = np.stack(np.meshgrid([-1.0, 0.0, 1.0], [-1.0, 0.0, 1.0]), axis=-1).reshape(-1, 2)
-    outcomes = np.tile(grid, (30, 1))[stream(0, "order").permutation(270)]
-    memory = remember(np.zeros((270, 1)), outcomes)
-    for k in (1, 5, 40, 200):
-        assert memory.near_outcomes(NO_CONTEXT, np.zeros(2), k).tolist() == nearest(outcomes, np.zeros(2), k)
-
-
 def test_mirror_images_that_float32_rounds_apart_are_still_ties() -> None:
     rng = stream(0, "mirror")
     goal, shifts = rng.integers(2**38, 2**40) * 2.0**-40, rng.integers(2**38, 2**40, 100) * 2.0**-40
@@ -73,13 +57,6 @@ def test_outcomes_too_far_for_float32_do_not_hide_the_near_ones() -> None:
     memory = remember(np.zeros((52, 1)), outcomes)
     for goal in (outcomes[-1], np.full(2, 1e25)):
         assert memory.near_outcomes(NO_CONTEXT, goal, 10).tolist() == nearest(outcomes, goal, 10)
-
-
-@pytest.mark.parametrize("n", [0, 1, 4, 12])
-def test_asking_for_more_than_there_is_gives_all_nearest_first(n: int) -> None:
-    memory = random_memory(n)
-    goal = np.array([0.2, 0.1])
-    assert memory.near_outcomes(NO_CONTEXT, goal, 12).tolist() == nearest(memory.outcomes, goal, 12)
 
 
 @pytest.mark.parametrize("within", [0.0, 0.9, 1.2, np.inf])

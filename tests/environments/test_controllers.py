@@ -26,11 +26,6 @@ def test_a_sinusoid_has_the_amplitude_phase_offset_and_frequency_of_its_theta():
     np.testing.assert_allclose(found[:, 1], 3.0)
 
 
-def test_a_command_stays_in_its_range():
-    skill = Sinusoids(TORQUES, (0.5, 1.5), steer=1.0)
-    assert TORQUES.contains(skill.at(np.array([1.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.3]), TIMES)).all()
-
-
 @pytest.mark.parametrize("seed", range(5))
 def test_what_knots_play_gives_their_theta_back(seed):
     skill = Knots(TORQUES, TIMES[-1], n_knots=4)

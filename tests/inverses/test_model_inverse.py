@@ -58,16 +58,6 @@ def test_where_outcomes_are_noisy_it_lands_nearer_than_what_it_starts_from(goals
     assert found < 0.85 * mean_error([start(NO_CONTEXT, goal) for goal in goals])
 
 
-def test_without_noise_it_lands_several_times_nearer_than_what_it_starts_from(taught, goals):
-    inverse = ModelInverse(*taught, ARM.policies)
-
-    def mean_error(estimates):
-        landed = [ARM.execute(NO_CONTEXT, estimate.theta, stream(0, "any")) for estimate in estimates]
-        return np.linalg.norm(np.array(landed) - goals, axis=1).mean()
-
-    assert mean_error(inverse.many(NO_CONTEXT, goals)) < mean_error([inverse.start(NO_CONTEXT, g) for g in goals]) / 2
-
-
 def test_without_steps_it_picks_among_what_is_known(taught, goals, monkeypatch):
     memory, model = taught
     monkeypatch.setattr(through_model, "_STEPS", 0)
@@ -115,15 +105,6 @@ def test_all_goals_together_find_what_each_finds_alone(taught, goals):
         np.testing.assert_array_equal(estimate.outcomes, alone.outcomes)
 
 
-def test_its_neighbours_are_those_of_what_it_starts_from(taught, goals):
-    memory, model = taught
-    inverse = ModelInverse(memory, model, ARM.policies)
-    theta, *rest = inverse(NO_CONTEXT, goals[0])
-    first, *wanted = inverse.start(NO_CONTEXT, goals[0])
-    assert not np.array_equal(theta, first)
-    assert all(np.array_equal(found, neighbours) for found, neighbours in zip(rest, wanted, strict=True))
-
-
 def test_it_stays_in_the_box_at_a_goal_out_of_reach(taught, monkeypatch):
     monkeypatch.setattr(through_model, "_STEP", 0.3)
     theta = ModelInverse(*taught, ARM.policies)(NO_CONTEXT, np.array([9.0, 9.0])).theta
@@ -164,11 +145,6 @@ def test_it_answers_like_its_start_only_until_the_model_is_good_enough(taught, g
 def test_a_memory_may_have_fewer_exemplars_than_candidates_and_anchors(taught):
     memory = executed(ARM, stream(3, "thetas").random((3, 7)))
     assert ARM.policies.contains(ModelInverse(memory, taught[1], ARM.policies)(NO_CONTEXT, np.zeros(2)).theta)
-
-
-def test_an_empty_memory_is_refused_by_name(taught):
-    with pytest.raises(RuntimeError, match="empty; explore first"):
-        ModelInverse(Memory(0, 7, 2), taught[1], ARM.policies)(NO_CONTEXT, np.zeros(2))
 
 
 def test_contexts_reach_the_model():

@@ -190,21 +190,6 @@ def test_it_starts_from_the_estimate_and_then_from_what_has_landed_nearest(model
     assert not np.array_equal(first, second)
 
 
-def test_every_goal_begins_with_the_same_trust_region(model, inverse):
-    goal, seen = np.array([3.0, 3.0]), []
-
-    def watched(anchored, starts, goal, policies, radius):
-        seen.append(radius)
-        return descend(anchored, starts, goal, policies, radius)
-
-    search = gradient_search(ARM.policies, stream(0, "search"), model=model, propose=watched)
-    for _ in range(2):
-        attempt = search(inverse(NO_CONTEXT, goal), goal)
-        next(attempt)
-        attempt.send(-goal)
-    assert seen == pytest.approx([0.15, 0.075, 0.15, 0.075])
-
-
 def test_of_two_ways_to_a_goal_the_reliable_one_is_tried():
     memory, rng = Memory(0, 2, 2), stream(0, "exemplars")
     for theta in rng.random((1500, 2)):  # theta_1 moves nothing, but the larger, the noisier
@@ -288,11 +273,6 @@ def test_gauss_newton_takes_the_least_change_that_meets_the_goal_to_first_order(
         missing = goal[0] - near.predict(start[None])[0][0].detach()
         least = np.linalg.pinv(jacobian.double().numpy() * policies.sides) @ missing.double().numpy()
         np.testing.assert_allclose((proposal - start).numpy() / policies.sides, least, atol=1e-4)
-
-
-def test_it_never_ends(model, inverse, goals):
-    attempt = gradient_search(ARM.policies, stream(0, "search"), model=model, propose=gauss_newton)
-    assert len(pursue(attempt, inverse(NO_CONTEXT, goals[0]), goals[0], n=60)[0]) == 60
 
 
 @pytest.mark.parametrize("noise", [-0.1, 0.6, np.nan])
