@@ -54,7 +54,7 @@ LIBRARIES = {  # library: the only rooms that may import it; of a folder, where 
     "shtab": {"views/completion"},
     "threadpoolctl": {"inverses/gaussian_process"},
     "cma": {"searches/cma_es"},
-    "sklearn": {"goals/alp_gmm", "rivals/entropy"},
+    "sklearn": {"goals/alp_gmm"},
     "ribs": {"rivals"},
     "pyarrow": {"demonstrations/lerobot"},
     "ray": {"runs/engines/on_ray"},

@@ -220,7 +220,6 @@ class Config:
         "What those who ask do on their own, and how they imitate (sgim-im, sgim-acts, sgim-eer).",
         before="search",
     )
-    doubt: str = option("process", TEACHER, "What a demonstration should take away (sgim-eer).", before="process")
     cost: float = option(
         1.0,
         TEACHER,

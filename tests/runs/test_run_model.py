@@ -259,11 +259,10 @@ def test_options_of_a_model_that_is_not_there_are_named():
     assert named().keys() == given.keys()
     assert "without a forward model, see --search and --inverse" in named()["members"]
     assert named(inverse="model").keys() == {"residual"}
-    assert named(search="nelder-mead-polished").keys() == {"residual"}
     assert named(algorithm="random", inverse="model").keys() == {"residual", "focus"}
     assert named(algorithm="imitation", inverse="model").keys() == {"residual"}
     assert given.keys() <= named(algorithm="random", search="gradient").keys()
-    for search in ("gradient", "gauss-newton", "screened"):
+    for search in ("gradient", "gauss-newton"):
         assert not named(search=search)
     assert not Config().without_effect
 
