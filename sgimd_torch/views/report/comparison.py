@@ -16,10 +16,6 @@ from sgimd_torch.views.statistics import LEAST_SEEDS, Interval, common_differenc
 from sgimd_torch.views.table import known
 
 USUAL: Final = "sgim-d"  # the baseline where nobody chose one
-BETTER: Final = "better"
-WORSE: Final = "worse"
-OPEN: Final = "not told apart"
-FEW: Final = f"fewer than {LEAST_SEEDS} common seeds"
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,16 +28,11 @@ class Comparison:
     found: Interval
 
     @property
-    def few(self) -> bool:
-        """Whether there are too few seeds for an interval."""
-        return len(self.seeds) < LEAST_SEEDS
-
-    @property
     def verdict(self) -> str:
         """What the interval says of the difference."""
-        if self.few:
-            return FEW
-        return BETTER if self.found.high < 0 else WORSE if self.found.low > 0 else OPEN
+        if len(self.seeds) < LEAST_SEEDS:
+            return f"fewer than {LEAST_SEEDS} common seeds"
+        return "better" if self.found.high < 0 else "worse" if self.found.low > 0 else "not told apart"
 
 
 def baseline_of(variants: Sequence[Variant], name: str | None = None) -> Variant | None:
@@ -58,20 +49,11 @@ def baseline_of(variants: Sequence[Variant], name: str | None = None) -> Variant
 
 def compare(variants: Sequence[Variant], baseline: Variant) -> list[Comparison]:
     """The others against the baseline: those that have a seed in common, and the same number of movements."""
-    theirs = {life.seed: life.at(baseline.last) for life in baseline.used}
-    rows = []
-    for variant in variants:
-        if variant is baseline or variant.last != baseline.last:
-            continue
-        seeds = common_differences({life.seed: life.at(variant.last) for life in variant.used}, theirs)
-        if found := over_seeds(seeds):
-            rows.append(Comparison(variant, seeds, found))
-    return rows
+    theirs = _last_errors(baseline)
+    others = [variant for variant in variants if variant is not baseline and variant.last == baseline.last]
+    differences = [(variant, common_differences(_last_errors(variant), theirs)) for variant in others]
+    return [Comparison(variant, seeds, found) for variant, seeds in differences if (found := over_seeds(seeds))]
 
 
-def few_seeds(variants: Sequence[Variant]) -> list[str]:
-    """A sentence that names the variants with too few seeds; none where there is nothing to say."""
-    few = [f"{variant.label} ({len(variant.used)})" for variant in variants if 0 < len(variant.used) < LEAST_SEEDS]
-    if not few:
-        return []
-    return [f"Fewer than {LEAST_SEEDS} seeds: {', '.join(few)}. They have points, but no intervals and no verdict."]
+def _last_errors(variant: Variant) -> dict[int, float]:
+    return {int(run.config["seed"]): run.at(variant.last) for run in variant.used}
