@@ -4,8 +4,7 @@ It takes a folder with run directories, OUT/NAME/seed-000, or one variant's, OUT
 last number of movements at which all finished runs were evaluated, or after --at. The worst comes first. Errors and
 noise floors are means over seeds in metres, ± the standard deviation; with fewer than 5 seeds there is none, and a
 note. "by linear" is the error if LocallyLinear answers, whatever inverse model the run has: compare learners by it.
-Costs are milliseconds for each movement. Runs that are not finished or not evaluated there are left out, and named
-below the table.
+Costs are milliseconds for each movement. Runs that were not evaluated there are left out, and named below the table.
 
 With --baseline there is a column more: error minus that of the baseline, paired by seed, interquartile mean over the
 seeds that both have; with five seeds or more, its bootstrap interval of 95 % in brackets. Below 0 is better.
@@ -13,7 +12,7 @@ seeds that both have; with five seeds or more, its bootstrap interval of 95 % in
 With --episodes it prints all movements of one run instead, as csv: a line for each, numbers that read back exactly.
 
   sgimd table runs
-  sgimd table study --at 2000                      also with unfinished runs that were evaluated there
+  sgimd table study --at 2000                      such as while runs are under way
   sgimd table study --baseline goals=interest-map  what the others are compared with
   sgimd table runs/sgim-d/seed-003 --episodes > movements.csv
 
@@ -25,19 +24,20 @@ from __future__ import annotations
 import argparse
 import csv
 import sys
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
-from sgimd_torch.catalogue import did_you_mean
 from sgimd_torch.runs.log import RunError
 from sgimd_torch.runs.process import say
 from sgimd_torch.spaces import Array
-from sgimd_torch.views.statistics import LEAST_SEEDS, common_differences, over_seeds, show
+from sgimd_torch.views.comparison import baseline_of, compare
+from sgimd_torch.views.statistics import LEAST_SEEDS, show
 from sgimd_torch.views.text_table import print_table
-from sgimd_torch.views.whole import Run, find_runs, read_run
+from sgimd_torch.views.variants import Variant, best_first, read
+from sgimd_torch.views.whole import Run, read_run
 
 EARLY: Final = 1000  # movements, for a column of its own
 
@@ -66,32 +66,30 @@ def main(argv: Sequence[str] | None = None) -> int:
     if options.episodes:
         print_episodes(read_run(options.runs))
         return 0
-    found = {name: [read_run(path) for path in paths] for name, paths in find_runs(options.runs).items()}
-    runs = [run for theirs in found.values() for run in theirs]
-    at = options.at
-    if at is None:
-        ended = [_evaluated(run) for run in runs if run.summary["finished"]]
-        common = set.intersection(*ended) if ended else set[int]()
-        if ended and not common:
-            raise RunError("finished runs were never evaluated after the same number of movements; --at chooses one")
-        at = max(common, default=0)
-    why = {run.path: _left_out(run, at, unfinished=options.at is not None) for run in runs}
-    variants = {name: [run for run in theirs if not why[run.path]] for name, theirs in found.items()}
-    variants = {name: theirs for name, theirs in variants.items() if theirs}
-    left_out = [reason for reason in why.values() if reason]
+    found = read(options.runs)
+    at = options.at or _last_common([run for runs in found.values() for run in runs if run.summary["finished"]])
+    every = best_first(Variant(name, runs, at) for name, runs in found.items())
+    variants = [variant for variant in every if variant.used][::-1]
+    left_out = [
+        f"{run.path} was not evaluated after {at} movements, it has {len(run.index)} of {run.config['movements']}"
+        for variant in every
+        for run in variant.runs
+        if run not in variant.used
+    ]
     if not variants:
         raise RunError("\n".join(["there is nothing to compare; is --at another number of movements?", *left_out]))
-    worst_first = sorted(variants.items(), key=lambda variant: -_at(variant[1], at).mean())
     errors = (f"error at {EARLY}", f"at {at} (m)", "by linear (m)", "noise floor (m)")
-    heads: tuple[str, ...] = ("variant", "seeds", *errors, "physics (ms)", "learning (ms)")
-    table = [heads, *(_row(name, theirs, at) for name, theirs in worst_first)]
+    table: list[tuple[str, ...]] = [
+        ("variant", "seeds", *errors, "physics (ms)", "learning (ms)"),
+        *map(_row, variants),
+    ]
     if options.baseline is not None:
-        baseline = variants[known(options.baseline, variants)]
-        further = [f"minus {options.baseline} (m)", *(_minus(theirs, baseline, at) for _, theirs in worst_first)]
+        baseline = baseline_of(variants, options.baseline)
+        minus = {each.variant: show(each.found, "+.4f") for each in compare(variants, baseline)}
+        further = [f"minus {options.baseline} (m)", *(minus.get(variant, "-") for variant in variants)]
         table = [(*cells, cell) for cells, cell in zip(table, further, strict=True)]
     print_table(table)
-    few = [f"{name} ({len(theirs)})" for name, theirs in worst_first if len(theirs) < LEAST_SEEDS]
-    if few:
+    if few := [f"{variant.name} ({len(variant.used)})" for variant in variants if variant.few]:
         say(f"fewer than {LEAST_SEEDS} seeds, too few for a verdict or a deviation: {', '.join(few)}")
     say(*(f"left out: {reason}" for reason in left_out))
     return 0
@@ -109,59 +107,32 @@ def print_episodes(run: Run) -> None:
         writer.writerow([index, origin, shown if shown >= 0 else "", *cells])
 
 
-def known(baseline: str, variants: Collection[str]) -> str:
-    """The ``baseline``, which has to be one of the variants with errors to compare.
+def _last_common(runs: Sequence[Run]) -> int:
+    """The most movements after which all of these runs were evaluated; 0 without runs.
 
     Raises:
-        ValueError: it is not; they are named.
+        RunError: there is no such number.
     """
-    if baseline not in variants:
-        names = f"{', '.join(sorted(variants))}{did_you_mean(baseline, variants)}"
-        raise ValueError(f"--baseline must be a variant with errors to compare, got {baseline!r}; these are {names}")
-    return baseline
+    moments = [set(run.answers["own"]["movements"].tolist()) for run in runs]
+    common = set.intersection(*moments) if moments else {0}
+    if not common:
+        raise RunError("finished runs were never evaluated after the same number of movements; --at chooses one")
+    return int(max(common))
 
 
-def _left_out(run: Run, at: int, *, unfinished: bool) -> str:
-    """Why a run is not in the table; "" if it is. Those not finished are in it only if ``unfinished`` ones count."""
-    if not run.summary["finished"] and not unfinished:
-        return f"{run.path} is not finished: {len(run.index)} of {run.config['movements']} movements; --resume goes on"
-    return "" if at in _evaluated(run) else f"{run.path} was not evaluated after {at} movements"
-
-
-def _row(name: str, runs: Sequence[Run], at: int) -> tuple[str, ...]:
-    errors = _at(runs, at)
+def _row(variant: Variant) -> tuple[str, ...]:
+    errors = variant.values(variant.last)
+    milliseconds = 1e3 / np.mean([run.summary["movements"] for run in variant.used])
     return (
-        name,
-        str(len(runs)),
-        _metres(_at(runs, EARLY)),
-        f"{errors.mean():.3f}" + (f" ± {errors.std(ddof=1):.3f}" if len(runs) >= LEAST_SEEDS else ""),
-        _metres(_at(runs, at, "mean_error", "linear")),
-        _metres(_at(runs, at, "noise_floor")),
-        *(f"{np.mean([_milliseconds(run, part) for run in runs]):.2f}" for part in ("physics", "learner")),
+        variant.name,
+        str(len(errors)),
+        _metres(variant.values(EARLY)),
+        _metres(errors) + ("" if variant.few else f" ± {errors.std(ddof=1):.3f}"),
+        _metres(variant.values(variant.last, answer="linear")),
+        _metres(variant.values(variant.last, "noise_floor")),
+        *(f"{milliseconds * variant.seconds(part):.2f}" for part in ("physics", "learner")),
     )
-
-
-def _minus(ours: Sequence[Run], theirs: Sequence[Run], at: int) -> str:
-    """Our errors minus theirs, over the seeds that both have."""
-    errors = ({run.config["seed"]: run.at(at) for run in runs} for runs in (ours, theirs))
-    found = None if ours is theirs else over_seeds(common_differences(*errors))
-    return "-" if found is None else show(found, "+.4f")
 
 
 def _metres(lengths: Array) -> str:
     return f"{lengths.mean():.3f}" if np.isfinite(lengths.mean()) else "-"
-
-
-def _evaluated(run: Run) -> set[int]:
-    """The numbers of movements after which it was evaluated."""
-    return set(run.answers["own"]["movements"].astype(int).tolist())
-
-
-def _at(runs: Sequence[Run], movements: int, column: str = "mean_error", answer: str = "own") -> Array:
-    """``(n_runs,)`` see ``Run.at``."""
-    return np.array([run.at(movements, column, answer) for run in runs])
-
-
-def _milliseconds(run: Run, part: str) -> float:
-    """Mean milliseconds for one movement."""
-    return 1e3 * run.summary[f"seconds_{part}"] / run.summary["movements"]

@@ -23,7 +23,7 @@ Begin here:  {url}#custom_scalars&_smoothingWeight=0
       Where is it competent, and since when? Does it learn? What did it do, and its teacher?
       First switch off "Ignore outliers in chart scaling": it hides the first values of a learner.
 
-TensorBoard shows {boards} of {runs}   (Ctrl-C ends it)
+TensorBoard shows the boards of {runs}   (Ctrl-C ends it)
   {url}#images
       The same as a map (competent/since); the regions that curves are named after; where movements landed.
   {url}#scalars&_smoothingWeight=0
@@ -55,23 +55,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         Failed: TensorBoard cannot start.
     """
     options = parser().parse_args(argv)
-    boards, url = boards_below(options.runs), serve(options.runs, options.port)
-    shown = "1 board" if boards == 1 else f"{boards} boards"
-    print(WHERE.format(boards=shown, runs=options.runs, url=url), flush=True)
+    if not any(options.runs.rglob("events.out.tfevents.*")):
+        raise ValueError(f"{options.runs} holds no board; start a run with --board true, or resume one with it")
+    print(WHERE.format(runs=options.runs, url=serve(options.runs, options.port)), flush=True)
     threading.Event().wait()  # until a signal
     return 0
-
-
-def boards_below(runs: Path) -> int:
-    """How many boards there are.
-
-    Raises:
-        ValueError: none.
-    """
-    found = {path.parent for path in runs.rglob("events.out.tfevents.*")}
-    if not found:
-        raise ValueError(f"{runs} holds no board; start a run with --board true, or resume one with it")
-    return len(found)
 
 
 def serve(runs: Path, port: int | None) -> str:

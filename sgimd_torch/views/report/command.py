@@ -12,8 +12,8 @@ from pathlib import Path
 
 from sgimd_torch.files import write_text
 from sgimd_torch.runs.log import RunError
-from sgimd_torch.views.report.data import read
 from sgimd_torch.views.report.page import page
+from sgimd_torch.views.variants import Variant, best_first, read
 
 EXAMPLES = """examples:
   sgimd report runs/sgim-d/seed-003               one run, into runs/sgim-d/seed-003/report.html
@@ -34,7 +34,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     out = options.out or options.runs / "report.html"
     if options.out is not None and (out.is_dir() or not out.parent.is_dir()):  # before any work
         raise RunError(f"--out must be a file in a folder that exists, got {out}")
-    write_text(out, page(options.runs, read(options.runs), options.baseline))
+    variants = best_first(Variant(name, runs) for name, runs in read(options.runs).items())
+    write_text(out, page(options.runs, variants, options.baseline))
     print(out)
     return 0
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import io
 from base64 import b64encode
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from functools import wraps
 from typing import Any, Concatenate, Final, ParamSpec
@@ -16,7 +15,6 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from PIL import Image
 
 from sgimd_torch.figures.axes import LEGEND, alike, limits, over_movements, rounded
 from sgimd_torch.figures.axes import colours as palette
@@ -26,9 +24,9 @@ from sgimd_torch.figures.results import Difference, forest
 from sgimd_torch.figures.sections import Section, of_regions, sections
 from sgimd_torch.forward_model.diagnostics import LEVELS, TRUSTED_UP_TO, running
 from sgimd_torch.spaces import Array, Box
+from sgimd_torch.views.comparison import Comparison
 from sgimd_torch.views.model_run import model_run
-from sgimd_torch.views.report.comparison import Comparison
-from sgimd_torch.views.report.data import Variant
+from sgimd_torch.views.variants import Variant
 from sgimd_torch.views.whole import Run
 
 P = ParamSpec("P")
@@ -48,35 +46,21 @@ STYLE: Final[Any] = {
     "lines.linewidth": 2,
     "legend.fontsize": 10,
 }
-_LINES: Final = ("-", (0, (5, 2)), (0, (1, 1.4)), (0, (6, 2, 1, 2)))  # of variants in one colour
-_MARKERS: Final = "osD^vPX*"
 # Of further variants of an algorithm: after Okabe & Ito and P. Tol, none that an algorithm of the paper has.
 _FURTHER: Final = ("#e69f00", "#56b4e9", "#000000", "#882255", "#999933", "#aa4499", "#44aa99", "#661100")
-_COLOURS_OF_PNG: Final = 256  # a palette; enough for maps on one colour scale and smooth letters
-
-
-def data_uri(kind: str, content: bytes) -> str:
-    """A file as an address."""
-    return f"data:{kind};base64,{b64encode(content).decode()}"
 
 
 def png(draw: Callable[Concatenate[Figure, P], None]) -> Callable[P, str]:
-    """A function that gives what ``draw`` draws as the address of a png; the same figure has the same address.
-
-    It has enough pixels for dense screens; having few colours, it is smaller than an svg.
-    """
+    """A function that gives what ``draw`` draws as the address of a png, with enough pixels for dense screens."""
 
     @wraps(draw)
     def address(*args: P.args, **kwargs: P.kwargs) -> str:
-        pixels, content = io.BytesIO(), io.BytesIO()
+        content = io.BytesIO()
         with rc_context(STYLE):
             figure = Figure(figsize=(6, 5.2), layout="constrained")
             draw(figure, *args, **kwargs)
-            figure.savefig(pixels, format="png", dpi=140)
-        with Image.open(pixels) as full:
-            few = full.convert("RGB").quantize(_COLOURS_OF_PNG, dither=Image.Dither.NONE)
-            few.save(content, "png", optimize=True)
-        return data_uri("image/png", content.getvalue())
+            figure.savefig(content, format="png", dpi=120, pil_kwargs={"optimize": True})
+        return f"data:image/png;base64,{b64encode(content.getvalue()).decode()}"
 
     return address
 
@@ -95,20 +79,14 @@ def colours_of(variants: Sequence[Variant]) -> dict[str, str]:
 
 
 @png
-def curves(
-    figure: Figure, variants: Sequence[Variant], colours: Mapping[str, str], behind: Sequence[Variant] = ()
-) -> None:
-    """Error against movements: interquartile means over seeds with their intervals, other variants in grey ``behind``.
+def curves(figure: Figure, variants: Sequence[Variant], colours: Mapping[str, str]) -> None:
+    """Error against movements: interquartile means over seeds with their intervals, points where there are few seeds.
 
-    With few seeds there are points instead of intervals. A single variant is shown with its seeds, thin, and its noise
-    floor.
+    A single variant is shown with its seeds, thin, and its noise floor.
     """
     if len(variants) > 1:
         figure.set_size_inches(6.8, 4.5)
     ax = figure.subplots()
-    for other in behind:
-        ax.plot(other.evaluated, other.curve[0], color="0.8", linewidth=1.2)
-    before: Counter[str] = Counter()
     for variant in variants:
         n, colour, (centre, low, high) = len(variant.used), colours[variant.name], variant.curve
         if n > 1 and variant.few:
@@ -118,30 +96,15 @@ def curves(
             ax.fill_between(variant.evaluated, low, high, color=colour, alpha=0.2, linewidth=0)
         if n > 1 and len(variants) == 1:
             ax.plot(variant.evaluated, variant.errors.T, color=colour, linewidth=0.7, alpha=0.4)
-        line, marker = _LINES[before[colour] % len(_LINES)], _MARKERS[before[colour] % len(_MARKERS)]
-        before[colour] += 1
         label = f"{_plain(variant.label)} ({n} seed{'s' * (n > 1)})"
-        ax.plot(variant.evaluated, centre, color=colour, ls=line, marker=marker, markersize=4.5, label=label)
+        ax.plot(variant.evaluated, centre, "o-", color=colour, markersize=4.5, label=label)
         if len(variants) == 1:
-            _floor(ax, variant.evaluated.astype(np.float64), variant.floors.mean(axis=0))
-    if behind:
-        ax.plot([], [], color="0.8", label="other variants")
-        ax.set_xlim(right=1.05 * variants[0].last)
-    _finish(ax, columns=1 + (len(variants) > 4))
-
-
-@png
-def one_curve(figure: Figure, run: Run) -> None:
-    """Of one run: mean, median and 90th percentile of the distances to the benchmark's goals."""
-    ax = figure.subplots()
-    columns, colour = run.answers["own"], COLOURS.get(str(run.config["algorithm"]), "black")
-    when = columns["movements"]
-    ax.fill_between(when, columns["median_error"], columns["p90_error"], color=colour, alpha=0.12, linewidth=0)
-    ax.plot(when, columns["p90_error"], "^:", color=colour, linewidth=1.2, markersize=4, label="90th percentile")
-    ax.plot(when, columns["mean_error"], "o-", color=colour, markersize=5, label="mean")
-    ax.plot(when, columns["median_error"], "v:", color=colour, linewidth=1.2, markersize=4, label="median")
-    _floor(ax, when, columns["noise_floor"])
-    _finish(ax, ylabel="distance to benchmark goals (m)")
+            floor = variant.floors.mean(axis=0)
+            ax.plot(variant.evaluated, floor, "_--", color="black", linewidth=1.2, markersize=8, label="noise floor")
+    over_movements(ax, "mean distance to benchmark goals (m)")
+    ax.set_ylim(bottom=0)
+    handles = [line for line in ax.lines if not str(line.get_label()).startswith("_")]
+    ax.legend(handles=handles, ncols=1 + (len(variants) > 4), loc="upper right")
 
 
 @png
@@ -236,21 +199,6 @@ def _panels(figure: Figure, shown: Sequence[Section]) -> list[Axes]:
     height = 3 if shown[0].is_strip else 5.2 if len(shown) == 1 else 4.6
     figure.set_size_inches(6, height * len(shown))
     return list(figure.subplots(len(shown), 1, squeeze=False).flat)
-
-
-def _floor(ax: Axes, movements: Array, floors: Array) -> None:
-    """The noise floor, where it was measured."""
-    measured = np.isfinite(floors)
-    style = "--" if measured.sum() > 1 else "_"
-    ax.plot(movements[measured], floors[measured], style, color="black", linewidth=1.2, markersize=14)
-    ax.plot([], [], "--", color="black", linewidth=1.2, label="noise floor")
-
-
-def _finish(ax: Axes, *, ylabel: str = "mean distance to benchmark goals (m)", columns: int = 1) -> None:
-    over_movements(ax, ylabel)
-    ax.set_ylim(bottom=0)
-    handles = [line for line in ax.lines if not str(line.get_label()).startswith("_")]
-    ax.legend(handles=handles, ncols=columns, loc="upper right")
 
 
 def _plain(name: str) -> str:

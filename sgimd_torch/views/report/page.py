@@ -12,10 +12,11 @@ from typing import Final
 import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
+from sgimd_torch.views import comparison
 from sgimd_torch.views.model_run import has_predictions
-from sgimd_torch.views.report import comparison, figures, record
-from sgimd_torch.views.report.data import Variant
+from sgimd_torch.views.report import figures, record
 from sgimd_torch.views.statistics import LEAST_SEEDS, Interval, show
+from sgimd_torch.views.variants import Variant
 from sgimd_torch.views.whole import Run
 
 EARLY: Final = 1000  # movements, for the column next to the last error
@@ -48,7 +49,7 @@ def page(place: Path, variants: Sequence[Variant], baseline: str | None = None) 
         n_runs=len(runs),
         warnings=list(record.doubts(variants)),
         baseline=reference,
-        compared=comparison.compare(variants, reference) if reference else [],
+        compared=comparison.compare(variants, reference),
         colours=figures.colours_of(variants),
         planes=figures.planes_of(variants),
         early=EARLY,

@@ -13,8 +13,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from sgimd_torch.runs.config import words
-from sgimd_torch.views.report.data import Variant
 from sgimd_torch.views.statistics import LEAST_SEEDS
+from sgimd_torch.views.variants import Variant
 from sgimd_torch.views.whole import Run
 
 AGAIN: Final = "runs/again"  # a folder that holds no run yet
@@ -75,16 +75,13 @@ def by_context(variants: Sequence[Variant]) -> Table:
     return Table(parts, rows)
 
 
-def versions(variants: Sequence[Variant]) -> Table:
-    """A column for each set of versions, headed by its variants; a row for each library, the commit first."""
-    made: dict[str, dict[str, None]] = {}
-    for variant in variants:
-        for run in variant.runs:
-            made.setdefault(json.dumps(run.versions, sort_keys=True), {})[variant.label] = None
-    every = [json.loads(text) for text in made]
-    names = sorted({name for each in every for name in each}, key=lambda name: (name != "commit", name))
-    heads = [", ".join(labels) if len(made) > 1 else "all runs" for labels in made.values()]
-    return Table(heads, [(name, [_shown(each.get(name)) for each in every]) for name in names])
+def versions(variants: Sequence[Variant]) -> list[tuple[str, str]]:
+    """Of each library and of this one, the commit first; where runs differ, all of them."""
+    found: dict[str, dict[str, None]] = {"commit": {}}
+    for run in [run for variant in variants for run in variant.runs]:
+        for name, value in run.versions.items():
+            found.setdefault(name, {})[shown(value)] = None
+    return [(name, " or ".join(values)) for name, values in found.items() if values]
 
 
 def checkout(variants: Sequence[Variant]) -> str:
@@ -112,11 +109,11 @@ def commands(runs: Sequence[Run]) -> list[str]:
 def settings(config: Mapping[str, Any]) -> str:
     """A line for each setting, those of a part below it: ``goals: interest-map``, then ``  window: 12``."""
     parts = dict.fromkeys(name.partition(".")[0] for name in config if "." in name)
-    lines = [f"{name}: {_shown(value)}" for name, value in config.items() if name.partition(".")[0] not in parts]
+    lines = [f"{name}: {shown(value)}" for name, value in config.items() if name.partition(".")[0] not in parts]
     for part in parts:
-        lines += ["", f"{part}: {_shown(config.get(part))}"]
+        lines += ["", f"{part}: {shown(config.get(part))}"]
         own = {name.partition(".")[2]: config[name] for name in config if name.startswith(f"{part}.")}
-        lines += [f"  {name}: {_shown(value)}" for name, value in own.items()]
+        lines += [f"  {name}: {shown(value)}" for name, value in own.items()]
     return "\n".join(lines)
 
 
@@ -124,7 +121,7 @@ def differing(variants: Sequence[Variant]) -> dict[str, list[str]]:
     """Setting -> for each variant its values as text, for settings in which runs differ, without seed and place."""
     found = {}
     for name in dict.fromkeys(name for variant in variants for run in variant.runs for name in run.config):
-        values = [dict.fromkeys(_shown(run.config.get(name)) for run in variant.runs) for variant in variants]
+        values = [dict.fromkeys(shown(run.config.get(name)) for run in variant.runs) for variant in variants]
         if name not in PLACE and len(set().union(*values)) > 1:
             found[name] = [" or ".join(each) for each in values]
     return found
@@ -134,5 +131,5 @@ def _count(n: int) -> str:
     return f"{n} run{'s' * (n != 1)}"
 
 
-def _shown(value: Any) -> str:
+def shown(value: Any) -> str:
     return "–" if value is None else value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)

@@ -1,11 +1,11 @@
-"""The data of a report: each run is read once; statistics are over the seeds of a variant.
+"""Variants of a study: the runs of each over its seeds, and statistics over them. Reports and tables show these.
 
 variants = read(Path("runs")); variants[0].last_error    # interquartile mean and interval (m)
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import cached_property, reduce
 from pathlib import Path
@@ -32,8 +32,8 @@ from sgimd_torch.views.whole import Run, find_runs, read_run
 NOISELESS: Final = 1e-9  # m; a lower noise floor is rounding, so errors are not divided by it
 
 
-def read(place: Path) -> list[Variant]:
-    """The variants of all runs at a place, the one with the smallest error first.
+def read(place: Path) -> dict[str, list[Run]]:
+    """All runs at a place by variant, without their thetas.
 
     Raises:
         RunError: there is none, or a run is damaged.
@@ -43,7 +43,11 @@ def read(place: Path) -> list[Variant]:
     for name, path in tqdm(found, "reading", unit="", delay=1.0, disable=None):
         run = replace(read_run(path), thetas=np.empty((0, 0)))  # they would fill the memory, and are not shown
         runs.setdefault(name, []).append(run)
-    variants = [Variant(name, each) for name, each in runs.items()]
+    return runs
+
+
+def best_first(variants: Iterable[Variant]) -> list[Variant]:
+    """By their last error; those without one come last."""
     return sorted(variants, key=lambda v: (v.last_error.value if v.last_error else np.inf, v.name))
 
 
@@ -56,22 +60,31 @@ class Variant:
     Args:
         name: of its folder.
         runs: one or more.
+        at: the movements after which it is compared, and errors are of all runs that were evaluated there; None for
+            the last evaluation.
     """
 
-    def __init__(self, name: str, runs: Sequence[Run]) -> None:
+    def __init__(self, name: str, runs: Sequence[Run], at: int | None = None) -> None:
         self.name, self.label = name, label(name)
         self.runs = sorted(runs, key=lambda run: int(run.config["seed"]))
         self.algorithm = str(self.runs[0].config["algorithm"])
         self.environment = str(self.runs[0].config["environment"])
         evaluated = [run for run in self.runs if len(run.answers["own"]["movements"])]
-        self.used = [run for run in evaluated if run.summary["finished"]] or evaluated
+        if at is None:
+            self.used = [run for run in evaluated if run.summary["finished"]] or evaluated
+        else:
+            self.used = [run for run in evaluated if at in run.answers["own"]["movements"]]
         moments = [run.answers["own"]["movements"] for run in self.used]
         self.evaluated: NDArray[np.int64] = reduce(np.intersect1d, moments or [np.empty(0)]).astype(np.int64)
-        self.last = int(self.evaluated[-1]) if len(self.evaluated) else 0  # movements before the last one
+        self.last = at or (int(self.evaluated[-1]) if len(self.evaluated) else 0)  # movements before the last one
+
+    def values(self, movements: int, column: str = "mean_error", answer: str = "own") -> Array:
+        """``(n_seeds,)`` a column of the evaluations; NaN where there is none."""
+        return np.array([run.at(movements, column, answer) for run in self.used], dtype=np.float64)
 
     def at(self, movements: int, column: str = "mean_error", answer: str = "own") -> Interval | None:
-        """A column of the evaluations over its seeds; None where one of them has no value."""
-        return over_seeds(np.array([run.at(movements, column, answer) for run in self.used]))
+        """The same over its seeds; None where one of them has no value."""
+        return over_seeds(self.values(movements, column, answer))
 
     @property
     def few(self) -> bool:
@@ -114,9 +127,9 @@ class Variant:
     @property
     def ratio(self) -> Interval | None:
         """The last error over its noise floor; None where the robot moves without noise."""
-        if not self.last_error or not (self.floors[:, -1] >= NOISELESS).all():
+        errors, floors = self.values(self.last), self.values(self.last, "noise_floor")
+        if not len(errors) or not np.isfinite(errors).all() or not (floors >= NOISELESS).all():
             return None
-        errors, floors = self.errors[:, -1], self.floors[:, -1]
         if self.few:
             return point(float(interquartile_mean(errors) / interquartile_mean(floors)))
         return ratio_interval(errors, floors, rng=rng(), paired=True)
@@ -140,5 +153,5 @@ class Variant:
         return float(np.mean([run.summary[f"seconds_{part}"] for run in self.used or self.runs]))
 
     def _over_time(self, column: str) -> Array:
-        rows = [[run.at(movements, column) for movements in self.evaluated.tolist()] for run in self.used]
-        return np.array(rows, dtype=np.float64).reshape(len(self.used), len(self.evaluated))
+        columns = [self.values(movements, column) for movements in self.evaluated.tolist()]
+        return np.array(columns, dtype=np.float64).reshape(len(self.evaluated), len(self.used)).T

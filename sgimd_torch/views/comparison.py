@@ -10,10 +10,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from sgimd_torch.catalogue import did_you_mean
 from sgimd_torch.spaces import Array
-from sgimd_torch.views.report.data import Variant
 from sgimd_torch.views.statistics import LEAST_SEEDS, Interval, common_differences, over_seeds
-from sgimd_torch.views.table import known
+from sgimd_torch.views.variants import Variant
 
 USUAL: Final = "sgim-d"  # the baseline where nobody chose one
 
@@ -44,11 +44,16 @@ def baseline_of(variants: Sequence[Variant], name: str | None = None) -> Variant
     evaluated = {variant.name: variant for variant in variants if variant.last_error}
     if name is None:
         return evaluated.get(USUAL) or next(iter(evaluated.values()), None)
-    return evaluated[known(name, evaluated)]
+    if name not in evaluated:
+        names = f"{', '.join(sorted(evaluated))}{did_you_mean(name, evaluated)}"
+        raise ValueError(f"--baseline must be a variant with errors to compare, got {name!r}; these are {names}")
+    return evaluated[name]
 
 
-def compare(variants: Sequence[Variant], baseline: Variant) -> list[Comparison]:
+def compare(variants: Sequence[Variant], baseline: Variant | None) -> list[Comparison]:
     """The others against the baseline: those that have a seed in common, and the same number of movements."""
+    if baseline is None:
+        return []
     theirs = _last_errors(baseline)
     others = [variant for variant in variants if variant is not baseline and variant.last == baseline.last]
     differences = [(variant, common_differences(_last_errors(variant), theirs)) for variant in others]
