@@ -28,10 +28,9 @@ import numpy as np
 
 from sgimd_torch.evaluation import TILES, Benchmark, save_benchmark, tile_goals, tile_side
 from sgimd_torch.runs.build import task_of
-from sgimd_torch.runs.log import RunError
 from sgimd_torch.runs.process import say
-from sgimd_torch.runs.read import Run, config_of, find_runs, read_run
-from sgimd_torch.spaces import Array, Box, check_count, stream
+from sgimd_torch.spaces import Box, check_count, stream
+from sgimd_torch.views.whole import Run, config_of, find_runs, read_run
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -46,74 +45,40 @@ def main(argv: Sequence[str] | None = None) -> int:
     runs = [read_run(path) for path in dict.fromkeys(paths)]
     name, box = _reached_by(runs)
     outcomes = np.concatenate([run.outcomes[np.isfinite(run.outcomes).all(axis=1)] for run in runs])
-    benchmark = from_outcomes(
-        outcomes, name, box, seed=options.seed, side=options.side, tiles=options.tiles, at_least=options.at_least
-    )
-    save_benchmark(options.out, benchmark)
-    say(*(f"{run.path}: {file} is damaged at line {line}" for run in runs for file, line in run.damage.items()))
-    n = len(benchmark.goals)
-    made = f"{len(outcomes)} movements of {len(runs)} run{'s' * (len(runs) > 1)}"
-    print(f"{n} goals, on tiles of {benchmark.side:.4g} reached by {made}: {options.out}")
+    side = options.side or tile_side(outcomes, box, options.tiles, at_least=options.at_least)
+    if side > box.sides.max():
+        raise ValueError(f"--side must be at most {box.sides.max():g}, the longest side of T, got {side:g}")
+    goals = tile_goals(outcomes, box, side, stream(options.seed, "benchmark"), at_least=options.at_least)
+    if not len(goals):
+        inside = int(box.contains(outcomes).sum())
+        raise ValueError(
+            f"no tile of {side:.4g} was reached {options.at_least} times: {inside} of {len(outcomes)} movements ended "
+            "in T; longer runs, a larger --side, or --at-least 1?"
+        )
+    save_benchmark(options.out, Benchmark(name, goals, side))
+    n, made = len(goals), f"{len(outcomes)} movements of {len(runs)} run{'s' * (len(runs) > 1)}"
+    print(f"{n} goals, on tiles of {side:.4g} reached by {made}: {options.out}")
     if options.side is None and n < options.tiles / 2:
         say(f"{n} goals are few, {options.tiles} were wanted; longer runs, or --at-least 1, give more")
     return 0
 
 
-def from_outcomes(
-    outcomes: Array, name: str, box: Box, *, seed: int, side: float | None, tiles: int, at_least: int
-) -> Benchmark:
-    """A goal in each tile that ``outcomes`` ``(n, outcome_dim)`` reached.
-
-    Args:
-        outcomes: of several runs together.
-        name: of the class of their environment.
-        box: its T.
-        seed: of the draw.
-        side: of a tile, in the unit of T; None for about so many ``tiles``.
-        tiles: about how many.
-        at_least: outcomes in a tile for it to be reachable.
+def _reached_by(runs: Sequence[Run]) -> tuple[str, Box]:
+    """The class of the environment of all runs, and its T.
 
     Raises:
-        ValueError: no tile was reached, or a tile is larger than T.
+        ValueError: they have different ones.
     """
-    if side is None:
-        side = tile_side(outcomes, box, tiles, at_least=at_least)
-    elif side > box.sides.max():
-        raise ValueError(f"--side must be at most {box.sides.max():g}, the longest side of T, got {side:g}")
-    goals = tile_goals(outcomes, box, side, stream(seed, "benchmark"), at_least=at_least)
-    if not len(goals):
-        inside = int(box.contains(outcomes).sum())
-        raise ValueError(
-            f"no tile of {side:.4g} was reached {at_least} times: {inside} of {len(outcomes)} movements ended in T; "
-            "longer runs, a larger --side, or --at-least 1?"
-        )
-    return Benchmark(name, goals, side)
-
-
-def _reached_by(runs: Sequence[Run]) -> tuple[str, Box]:
-    """The class of the environment of all runs, and its T."""
     found: dict[str, tuple[Run, str, Box]] = {}
     for run in runs:
-        config = config_of(run)
-        options = {name: getattr(config, name) for name in ("environment", *config.entry("environment").options)}
-        if str(options) not in found:
-            robot = task_of(config).environment
-            found[str(options)] = run, type(robot).__name__, robot.outcomes
-    (first, name, box), *others = found.values()
-    for run, other, space in others:
-        if other != name or (space.low.tolist(), space.high.tolist()) != (box.low.tolist(), box.high.tolist()):
-            raise ValueError(
-                f"all runs must be of one environment with one T: {first.path} is of {_in_words(name, box)}, "
-                f"{run.path} of {_in_words(other, space)}; make a benchmark for each"
-            )
-    wrong = next((run for run in runs if len(run.index) and run.outcomes.shape[1] != box.dim), None)
-    if wrong is not None:
-        raise RunError(f"{wrong.path} has outcomes of {wrong.outcomes.shape[1]} dimensions, {name} has {box.dim} today")
+        robot = task_of(config_of(run)).environment
+        name, box = type(robot).__name__, robot.outcomes
+        found.setdefault(f"{name}, {box.low.tolist()} to {box.high.tolist()}", (run, name, box))
+    if len(found) > 1:
+        apart = ", ".join(f"{run.path} is of {words}" for words, (run, _, _) in found.items())
+        raise ValueError(f"all runs must be of one environment with one T: {apart}; make a benchmark for each")
+    (_, name, box), *_ = found.values()
     return name, box
-
-
-def _in_words(name: str, box: Box) -> str:
-    return f"{name}, {box.low.tolist()} to {box.high.tolist()}"
 
 
 def parser() -> argparse.ArgumentParser:

@@ -1,4 +1,4 @@
-"""Does an environment keep every promise? Each slip is one line: what was found, and the likely cause.
+"""Does an environment keep every promise? Each broken one is named, with what was found and the likely cause.
 
 An environment is named as for sgimd run --environment: a word of the catalogue, or package.module:attribute for one of
 your own, a class or a function that returns an environment or a Task; packages of the working directory are found.

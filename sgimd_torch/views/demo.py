@@ -54,7 +54,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     with loading():
         from sgimd_torch.figures.save import save_figure  # after --help
         from sgimd_torch.views.demo_figure import draw, table
-        from sgimd_torch.views.report.data import read_life
+        from sgimd_torch.views.variants import read_life
     began = time.monotonic()
     say(f"{len(configs)} learners, {base.movements} movements each, seed {base.seed}, two at a time: {base.out}")
     for algorithm, does in ALGORITHMS.items():

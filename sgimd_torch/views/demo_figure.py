@@ -17,7 +17,7 @@ from sgimd_torch.figures.results import SeedCurves, seed_curves
 from sgimd_torch.runs.log import RunError
 from sgimd_torch.spaces import Box
 from sgimd_torch.views.demo_cast import answers, from_above, from_the_side
-from sgimd_torch.views.report.data import Life, demonstrated
+from sgimd_torch.views.variants import Life, demonstrated
 
 
 def draw(runs: Mapping[str, Life]) -> Figure:

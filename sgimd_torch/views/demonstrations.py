@@ -24,6 +24,7 @@ import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, Final
 
 import numpy as np
 
@@ -35,6 +36,9 @@ from sgimd_torch.runs.build import task_of
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.tasks import Task, correspondence_of
 from sgimd_torch.spaces import Array, Demonstration, stream
+from sgimd_torch.views.text_table import print_table
+
+HEADS: Final = ("recording", "lasts (s)", "samples", "says", "lands", "apart", "misfit", "remarks")
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,32 +56,29 @@ class Checked:
     remarks: list[str]
     refused: str = ""
 
+    @property
+    def apart(self) -> float:
+        """How far it lands from where it says; NaN if it cannot be translated."""
+        return float("nan") if self.lands is None else float(np.linalg.norm(self.lands - self.shown.outcome))
+
 
 def parser() -> argparse.ArgumentParser:
     """The options of ``sgimd demonstrations``."""
-    parser = argparse.ArgumentParser(
-        prog="sgimd demonstrations", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    source = argparse.ArgumentParser(add_help=False)
+    source.add_argument("source", type=Path, metavar="SOURCE")
+    for option in ("joints", "outcome", "context"):
+        source.add_argument(f"--{option}", type=_names, default=(), metavar="COLUMN,COLUMN")
+    source.add_argument("--time", metavar="COLUMN", help="seconds (default: time; of a LeRobot dataset: timestamp)")
+    source.add_argument("--recording", metavar="COLUMN", help="its number or name (of LeRobot: episode_index)")
+    source.add_argument("--degrees", action="store_true", help="joints are in degrees")
+    shown: dict[str, Any] = {"description": __doc__, "formatter_class": argparse.RawDescriptionHelpFormatter}
+    parser = argparse.ArgumentParser(prog="sgimd demonstrations", **shown)
     commands = parser.add_subparsers(dest="command", required=True, metavar="check|import")
-    for name, about in (("check", "are they right for a robot?"), ("import", "into a file for --demonstrations")):
-        each = commands.add_parser(
-            name, help=about, description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-        )
-        each.add_argument("source", type=Path, metavar="SOURCE")
-        for option in ("joints", "outcome", "context"):
-            each.add_argument(f"--{option}", type=_names, default=(), metavar="COLUMN,COLUMN")
-        each.add_argument("--time", metavar="COLUMN", help="seconds (default: time; of a LeRobot dataset: timestamp)")
-        each.add_argument(
-            "--recording", metavar="COLUMN", help="number or name of the recording (of LeRobot: episode_index)"
-        )
-        each.add_argument("--degrees", action="store_true", help="joints are in degrees")
-        if name == "check":
-            each.add_argument("--task", required=True, metavar="ENVIRONMENT", help="as sgimd run --environment")
-            each.add_argument(
-                "--figure", type=Path, metavar="FILE.png", help="draw curves and places (needs extra plot)"
-            )
-        else:
-            each.add_argument("--out", type=Path, required=True, metavar="FILE.npz")
+    checked = commands.add_parser("check", help="are they right for a robot?", parents=[source], **shown)
+    checked.add_argument("--task", required=True, metavar="ENVIRONMENT", help="as sgimd run --environment")
+    checked.add_argument("--figure", type=Path, metavar="FILE.png", help="draw curves and places (needs extra plot)")
+    imported = commands.add_parser("import", help="into a file for --demonstrations", parents=[source], **shown)
+    imported.add_argument("--out", type=Path, required=True, metavar="FILE.npz")
     return parser
 
 
@@ -86,6 +87,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     Raises:
         ValueError: the source cannot be read, or the robot cannot use all of it.
+        ImportError: there is no matplotlib for the figure.
         OSError: a file cannot be read or written.
     """
     options = parser().parse_args(argv)
@@ -94,22 +96,20 @@ def main(argv: Sequence[str] | None = None) -> int:
         save_demonstrations(options.out, shown)
         print(f"{options.out}: {len(shown)} recordings, {shown[0].trajectory.shape[1]} joints")
         return 0
+    if options.figure is not None and options.figure.suffix not in (".png", ".svg", ".pdf"):
+        raise ValueError(f"--figure must end in .png, .svg or .pdf, got {options.figure}")
     task = task_of(Config(environment=options.task))
     found = [check(task, each, row) for row, each in enumerate(shown)]
-    print("\n".join(table(found)))
+    print_table([HEADS, *(_cells(row, each) for row, each in enumerate(found))])
+    apart = [each.apart for each in found if each.lands is not None]
+    if apart:
+        remarked = sum(bool(each.remarks) for each in found)
+        print(
+            f"{len(apart)} of {len(found)} can be used; they land {np.median(apart):.3f} (median), "
+            f"{max(apart):.3f} (most) from where they say; {remarked} have remarks"
+        )
     if options.figure is not None:
-        try:  # matplotlib is loaded only when it is needed
-            from sgimd_torch.figures.demonstrations import draw
-            from sgimd_torch.figures.save import save_figure
-        except ModuleNotFoundError as error:
-            raise ImportError(f"--figure needs {error.name}: pip install 'sgimd-torch[plot]'") from error
-
-        if options.figure.suffix not in (".png", ".svg", ".pdf"):
-            raise ValueError(f"--figure must end in .png, .svg or .pdf, got {options.figure}")
-        instead = [None if each.theta is None else played(task.environment, each.theta, each.shown) for each in found]
-        places = [each.lands for each in found]
-        stem = options.figure.with_suffix("")
-        save_figure(lambda: draw(shown, instead, places), stem, options.figure.suffix[1:])
+        _draw(options.figure, task, found)
     refused = [row for row, each in enumerate(found) if each.refused]
     if refused:
         first = f"the first is recording {refused[0]}: {found[refused[0]].refused}"
@@ -152,12 +152,8 @@ def check(task: Task, shown: Demonstration, row: int) -> Checked:
     robot = task.environment
     remarks = beyond_limits(robot, shown)
     try:
-        for name, box, point in (
-            ("context", robot.contexts, shown.context),
-            ("outcome", robot.outcomes, shown.outcome),
-        ):
-            if point.shape != (box.dim,):
-                raise ValueError(f"its {name} has {point.size} numbers, the robot's has {box.dim}")
+        if shown.outcome.shape != (robot.outcomes.dim,):
+            raise ValueError(f"its outcome has {shown.outcome.size} numbers, the robot's has {robot.outcomes.dim}")
         context = robot.contexts.check("its context", shown.context)
         theta = correspondence_of(task)(shown.times, shown.trajectory)
         theta = robot.policies.check("theta_d of the correspondence", theta)
@@ -168,30 +164,30 @@ def check(task: Task, shown: Demonstration, row: int) -> Checked:
     return Checked(shown, theta, lands, misfit, remarks)
 
 
-def table(found: Sequence[Checked]) -> list[str]:
-    """A line for each recording, and their summary."""
-    heads = ("recording", "lasts (s)", "samples", "says", "lands", "apart", "misfit", "remarks")
-    cells = [heads]
-    for row, each in enumerate(found):
-        lands, apart = "-", "-"
-        if each.lands is not None:
-            lands, apart = _point(each.lands), f"{np.linalg.norm(each.lands - each.shown.outcome):.3f}"
-        misfit = "-" if np.isnan(each.misfit) else f"{each.misfit:.3f}"
-        remarks = "; ".join([*([f"cannot be used: {each.refused}"] if each.refused else []), *each.remarks])
-        lasts = f"{each.shown.times[-1] - each.shown.times[0]:.3g}"
-        cells.append(
-            (str(row), lasts, str(len(each.shown.times)), _point(each.shown.outcome), lands, apart, misfit, remarks)
-        )
-    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
-    lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in cells]
-    apart_by = np.array([np.linalg.norm(each.lands - each.shown.outcome) for each in found if each.lands is not None])
-    if len(apart_by):
-        remarked = sum(bool(each.remarks) for each in found)
-        lines.append(
-            f"{len(apart_by)} of {len(found)} can be used; they land {np.median(apart_by):.3f} (median), "
-            f"{apart_by.max():.3f} (most) from where they say; {remarked} have remarks"
-        )
-    return lines
+def _cells(row: int, found: Checked) -> tuple[str, ...]:
+    """Of the table, below ``HEADS``."""
+    times = found.shown.times
+    refused = [f"cannot be used: {found.refused}"] if found.refused else []
+    return (
+        str(row),
+        f"{times[-1] - times[0]:.3g}",
+        str(len(times)),
+        _point(found.shown.outcome),
+        *(("-", "-") if found.lands is None else (_point(found.lands), f"{found.apart:.3f}")),
+        "-" if np.isnan(found.misfit) else f"{found.misfit:.3f}",
+        "; ".join([*refused, *found.remarks]),
+    )
+
+
+def _draw(path: Path, task: Task, found: Sequence[Checked]) -> None:
+    try:  # matplotlib is loaded only when it is needed
+        from sgimd_torch.figures.demonstrations import draw
+        from sgimd_torch.figures.save import save_figure
+    except ModuleNotFoundError as error:
+        raise ImportError(f"--figure needs {error.name}: pip install 'sgimd-torch[plot]'") from error
+    shown, places = [each.shown for each in found], [each.lands for each in found]
+    instead = [None if each.theta is None else played(task.environment, each.theta, each.shown) for each in found]
+    save_figure(lambda: draw(shown, instead, places), path.with_suffix(""), path.suffix[1:])
 
 
 def _point(point: Array) -> str:

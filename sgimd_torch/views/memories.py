@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from sgimd_torch.runs.build import RunParts
-from sgimd_torch.runs.read import Run
 from sgimd_torch.strategies import Remember
+from sgimd_torch.views.whole import Run
 
 
 def remember(run: Run, parts: RunParts, start: int, stop: int) -> None:
@@ -20,7 +20,7 @@ def remember(run: Run, parts: RunParts, start: int, stop: int) -> None:
     by_observation = isinstance(parts.learner.social, Remember)  # other learners remember only their own movements
     for row in range(start, min(stop, len(run.index))):
         if by_observation and correspondence is not None and run.demonstration[row] >= 0:
-            shown = parts.demonstrations[run.demonstration[row]]
+            shown = run.demonstrations[run.demonstration[row]]
             memory.add(shown.context, correspondence(shown.times, shown.trajectory), shown.outcome)
         if run.origin[row]:
             memory.add(run.contexts[row], run.thetas[row], run.outcomes[row])

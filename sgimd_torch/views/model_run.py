@@ -1,4 +1,4 @@
-"""The forward model of a run, from its files: what it predicted before it learnt from it, how sure it was, when asked.
+"""The forward model of a run, from its record: what it predicted before it learnt from it, how sure it was, when asked.
 
 model = model_run(run); np.linalg.norm(model.observed - model.mean, axis=1); model.inside(slice(-1000, None))
 """
@@ -13,9 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from sgimd_torch.forward_model.diagnostics import LEVELS, TRUSTED_UP_TO, coverage
 from sgimd_torch.runs.log import RunError
-from sgimd_torch.runs.read import Run, read_run
-from sgimd_torch.runs.tables import WHOLE, small_table
 from sgimd_torch.spaces import Array
+from sgimd_torch.views.whole import Run, read_run
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,55 +49,27 @@ class ModelRun:
         return coverage(observed, mean, spread, levels) if len(observed) else np.full(np.shape(levels), np.nan)
 
 
+def has_predictions(run: Run) -> bool:
+    """Whether a run has a forward model that has predicted a movement."""
+    return run.predictions is not None and len(run.predictions["exemplar"]) > 0
+
+
 def read_model_run(path: Path) -> ModelRun:
     """The forward model of the run at a path; see `model_run`."""
     return model_run(read_run(path))
 
 
 def model_run(run: Run) -> ModelRun:
-    """The forward model of a run, finished or not; predictions of movements that its log lacks are left out.
+    """The forward model of a run, finished or not.
 
     Raises:
-        RunError: it has no model, has predicted nothing yet, or its files are damaged or do not belong together.
+        RunError: it has no model, or its model has predicted nothing yet.
     """
-    path, file = run.path, run.path / "predictions.csv"
-    if run.predictions is None:
-        raise RunError(f"{path} has no {file.name}: it ran without a forward model; see --inverse model of sgimd run")
-    exemplars, *values = _checked(run, file.name, run.predictions).values()
-    lived = np.flatnonzero(np.isfinite(run.outcomes).all(axis=1))
-    rows = exemplars[exemplars < len(lived)]
-    if not len(rows):
-        raise RunError(f"{file} holds no prediction of a movement yet; the model learns from 50 before its first")
-    if (np.diff(exemplars) <= 0).any():
-        raise RunError(f"{file} must name exemplars by whole numbers that increase; was it edited?")
-    observed, mean, epistemic, aleatoric = np.split(np.stack(values, axis=1)[: len(rows)], 4, axis=1)
-    differ = (observed != run.outcomes[lived[rows]]).any(axis=1)
-    if differ.any():
-        raise RunError(f"{file}: exemplar {rows[differ][0]} is another one in episodes.csv; is it another run's file?")
-    spread = np.hypot(epistemic, aleatoric)
-    if not (spread > 0).all():
-        raise RunError(f"{file}: exemplar {rows[(spread <= 0).any(axis=1)][0]} has a spread of 0; was it edited?")
-    if run.refreshes is None:
-        raise RunError(f"{path}/refreshes.csv is missing; was it deleted?")
-    refreshes = _checked(run, "refreshes.csv", run.refreshes)
-    if not len(refreshes["diverged"]) or not np.isin(refreshes["diverged"], (0, 1)).all():
-        raise RunError(f"{path}/refreshes.csv must hold a refresh, and 0 or 1 for diverged; was it cut or edited?")
-    return ModelRun(run, lived[rows], observed, mean, spread, refreshes)
-
-
-def _checked(run: Run, name: str, table: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """The ``table`` of a model as it is.
-
-    Raises:
-        RunError: it is damaged, or has other outcomes.
-    """
-    path, bad = run.path / name, run.damage.get(name, 1)
-    names = small_table(path, run.outcomes.shape[1]).names
-    if name not in run.damage and tuple(table) == names:
-        return table
-    line = path.read_text(errors="replace").split("\n")[bad - 1][:60]
-    if bad == 1:
-        raise RunError(f"{path} must begin with {','.join(names)}, got {line}; was it edited?")
-    whole = ", ".join(column for column in names if column in WHOLE)
-    wanted = f"{len(names)} numbers" + ("" if name in run.unchecked else " and their checksum")
-    raise RunError(f"{path}, line {bad}: needs {wanted}, got {line!r} (whole ones for {whole}); was it edited?")
+    if run.predictions is None or run.refreshes is None:
+        raise RunError(f"{run.path} ran without a forward model; see --inverse model of sgimd run")
+    if not has_predictions(run):
+        raise RunError(f"{run.path} holds no prediction of a movement yet; the model learns from 50 before its first")
+    exemplars, *columns = run.predictions.values()
+    executed = np.flatnonzero(np.isfinite(run.outcomes).all(axis=1))
+    observed, mean, epistemic, aleatoric = np.split(np.stack(columns, axis=1), 4, axis=1)
+    return ModelRun(run, executed[exemplars], observed, mean, np.hypot(epistemic, aleatoric), run.refreshes)

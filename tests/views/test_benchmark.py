@@ -6,9 +6,9 @@ import pytest
 from sgimd_torch.evaluation import SIDES, load_benchmark, tile_side
 from sgimd_torch.runs.command_line import main as live
 from sgimd_torch.runs.process import command
-from sgimd_torch.runs.read import read_run
 from sgimd_torch.spaces import Box, stream
 from sgimd_torch.views.benchmark import main
+from sgimd_torch.views.whole import read_run
 
 
 def run(*options, movements=300, algorithm="random"):
@@ -40,8 +40,8 @@ def test_goals_lie_on_tiles_that_were_reached_twice_and_a_run_uses_them(own, cap
     assert command(live, [*robot, *words.split()]) == 0
     assert "has no benchmark goals" not in capsys.readouterr().err
     judged = read_run("judged/random/seed-000")
-    assert len(judged.config["benchmark_crc32"]) == 8
-    assert judged.evaluation["movements"].tolist() == [20, 40]
+    assert len(judged.files["benchmark_crc32"]) == 8
+    assert judged.answers["own"]["movements"].tolist() == [20, 40]
 
 
 def test_runs_are_named_one_by_one_by_variant_or_all_together(own):
@@ -117,14 +117,3 @@ def test_what_cannot_be_made_is_refused_in_a_line_and_nothing_is_written(own, ca
     assert message in said
     assert "Traceback" not in said
     assert sorted(path for path in own.rglob("*") if "__pycache__" not in str(path)) == before
-
-
-def test_a_damaged_run_counts_up_to_its_first_bad_line(own, capsys):
-    run("--environment", "sliders:Slider2", movements=60)
-    log = own / "runs/random/seed-000/episodes.csv"
-    lines = log.read_bytes().splitlines(keepends=True)
-    log.write_bytes(b"".join([*lines[:31], b"torn\n", *lines[32:]]))
-    goals_of("runs", "--side", 1.0)
-    said = capsys.readouterr()
-    assert "30 movements of 1 run:" in said.out
-    assert "episodes.csv is damaged at line 32" in said.err

@@ -13,13 +13,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from sgimd_torch.views.report.data import read_life
 
 from runs import ROOT
 from sgimd_torch.__main__ import COMMANDS
 from sgimd_torch.evaluation import Benchmark, save_benchmark
 from sgimd_torch.views.demo_cast import GOALS, answers
 from sgimd_torch.views.demo_figure import draw, table
-from sgimd_torch.views.report.data import read_life
 
 
 @pytest.fixture(scope="module")

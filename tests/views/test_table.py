@@ -1,7 +1,9 @@
 """The table of the results of runs."""
 
-import json
+import csv
+import io
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,20 +11,37 @@ import pytest
 from sgimd_torch.evaluation import Benchmark, save_benchmark
 from sgimd_torch.runs.command_line import main as live
 from sgimd_torch.runs.process import command
-from sgimd_torch.runs.read import read_run
+from sgimd_torch.views import variants
 from sgimd_torch.views.table import main
+from sgimd_torch.views.whole import read_run
 
 SEEDS = 5
+
+
+def damage(path):
+    """Change some bytes in the middle of the largest file of a run."""
+    file = max(path.iterdir(), key=lambda each: each.stat().st_size)
+    content = bytearray(file.read_bytes())
+    content[len(content) // 2 : len(content) // 2 + 4] = b"junk"
+    file.write_bytes(content)
+
+
 FEW = "fewer than 5 seeds, too few for a verdict or a deviation: sgim-d (1)\n"
 
 
 @pytest.fixture(scope="module")
-def runs(tmp_path_factory):
+def tiny(tmp_path_factory):
+    path = tmp_path_factory.mktemp("benchmark") / "tiny.npz"
+    save_benchmark(path, Benchmark("FishingRod", np.array([[0.0, 0.6], [0.3, 0.5]]), 0.1))
+    return path
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory, tiny):
     out = tmp_path_factory.mktemp("runs")
-    save_benchmark(out / "tiny.npz", Benchmark("FishingRod", np.array([[0.0, 0.6], [0.3, 0.5]]), 0.1))
     for algorithm, seed in (*(("random", seed) for seed in range(SEEDS)), ("sgim-d", 0)):
         options = f"--algorithm {algorithm} --seed {seed} --movements 40 --repeats 2 --evaluate_at 20"
-        assert live([*options.split(), "--benchmark", str(out / "tiny.npz"), "--out", str(out)]) == 0
+        assert live([*options.split(), "--benchmark", str(tiny), "--out", str(out)]) == 0
     return out
 
 
@@ -41,7 +60,7 @@ def test_the_table_gives_mean_and_deviation_over_five_seeds_or_more_and_a_note_w
     said = capsys.readouterr()
     lines = {line.split()[0]: line for line in said.out.splitlines()}
     errors, few = (
-        np.array([read_run(path).evaluation["mean_error_m"][-1] for path in sorted((runs / name).iterdir())])
+        np.array([read_run(path).answers["own"]["mean_error"][-1] for path in sorted((runs / name).iterdir())])
         for name in ("random", "sgim-d")
     )
     deviation = np.sqrt(((errors - errors.mean()) ** 2).sum() / (SEEDS - 1))
@@ -53,41 +72,45 @@ def test_the_table_gives_mean_and_deviation_over_five_seeds_or_more_and_a_note_w
     assert said.err == FEW
 
 
-def test_variants_are_compared_where_all_finished_runs_were_evaluated_the_last_time(runs, copied, capsys):
+def test_variants_are_compared_where_all_finished_runs_were_evaluated_the_last_time(copied, tiny, capsys):
     assert table(copied) == 0
     said = capsys.readouterr()
     assert "at 40 (m)" in said.out
     assert said.err == FEW
     options = "--algorithm random --name longer --movements 60 --repeats 0 --evaluate_at 20"
-    assert live([*options.split(), "--benchmark", str(runs / "tiny.npz"), "--out", str(copied)]) == 0
+    assert live([*options.split(), "--benchmark", str(tiny), "--out", str(copied)]) == 0
     capsys.readouterr()
     assert table(copied) == 0  # after 20 and 60 the one, after 20 and 40 the others
     said = capsys.readouterr()
     assert "at 20 (m)" in said.out
     assert len(said.out.splitlines()) == 4
-    error = read_run(copied / "longer/seed-000").evaluation["mean_error_m"][0]
+    error = read_run(copied / "longer/seed-000").answers["own"]["mean_error"][0]
     assert f"{error:.3f}" in next(line for line in said.out.splitlines() if line.startswith("longer"))
 
 
-def test_a_run_that_is_not_finished_is_named_and_left_out_unless_at_says_where_to_look(copied, capsys):
-    path = copied / "random/seed-001"
-    summary = json.loads((path / "summary.json").read_text())
-    (path / "summary.json").write_text(json.dumps({**summary, "finished": False}))
-    assert table(copied) == 0
-    said = capsys.readouterr()
-    assert next(line for line in said.out.splitlines() if line.startswith("random")).split()[1] == "4"
-    few, left_out = said.err.splitlines()
-    assert "random (4)" in few
-    assert left_out == f"left out: {path} is not finished: 40 of 40 movements; --resume goes on"
-    assert table(copied, "--at", 20) == 0
-    said = capsys.readouterr()
-    assert next(line for line in said.out.splitlines() if line.startswith("random")).split()[1] == "5"
-    assert said.err == FEW
+def test_an_unfinished_run_counts_where_it_was_evaluated_and_is_named_where_it_was_not(runs, monkeypatch, capsys):
+    cut, read_whole = runs / "random/seed-001", variants.read_run
+
+    def read(path):
+        run = read_whole(path)
+        if path != cut:
+            return run
+        own = {name: column[:1] for name, column in run.answers["own"].items()}
+        summary = {**run.summary, "finished": False}
+        return replace(run, index=run.index[:30], answers={**run.answers, "own": own}, summary=summary)
+
+    monkeypatch.setattr(variants, "read_run", read)
+    for at, seeds in ((), "4"), (("--at", 20), "5"):
+        assert table(runs, *at) == 0
+        said = capsys.readouterr()
+        assert next(line for line in said.out.splitlines() if line.startswith("random")).split()[1] == seeds
+        left_out = f"left out: {cut} was not evaluated after 40 movements, it has 30 of 40"
+        assert (left_out in said.err) == (seeds == "4")
 
 
-def test_runs_without_a_common_evaluation_need_at(runs, copied, capsys):
+def test_runs_without_a_common_evaluation_need_at(copied, tiny, capsys):
     options = "--algorithm random --name other --movements 50 --repeats 0 --evaluate_at 30"
-    assert live([*options.split(), "--benchmark", str(runs / "tiny.npz"), "--out", str(copied)]) == 0
+    assert live([*options.split(), "--benchmark", str(tiny), "--out", str(copied)]) == 0
     assert table(copied) == 2
     assert "never evaluated after the same number of movements; --at chooses one" in capsys.readouterr().err
 
@@ -109,38 +132,36 @@ def test_a_folder_without_runs_is_refused(tmp_path, capsys):
     assert "holds no runs" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("damage", ["no summary", "junk log", "junk in the log", "directory", "summary is a list"])
-def test_a_damaged_run_is_named_in_one_line_below_the_others(copied, capsys, damage):
-    run = copied / "random" / "seed-001"
-    if damage == "no summary":
-        (run / "summary.json").unlink()
-    elif damage == "junk log":
-        (run / "episodes.csv").write_text("junk")
-    elif damage == "junk in the log":
-        (run / "episodes.csv").write_bytes((run / "episodes.csv").read_bytes().replace(b"\n7,", b"\n77,"))
-    elif damage == "directory":
-        (run / "episodes.csv").unlink()
-        (run / "episodes.csv").mkdir()
-    else:
-        (run / "summary.json").write_text("[]")
-    assert table(copied) == 0
-    said = capsys.readouterr()
-    few, left_out = said.err.splitlines()
-    assert few.startswith("fewer than 5 seeds")
-    assert left_out.startswith("left out: ")
-    assert str(run) in left_out
-    counts = {line.split()[0]: line.split()[1] for line in said.out.splitlines()}
-    assert counts == {"variant": "seeds", "random": "4", "sgim-d": "1"}
-
-
-def test_where_every_run_is_damaged_there_is_nothing_to_show(copied, capsys):
-    for path in copied.glob("*/*/summary.json"):
-        path.unlink()
+def test_a_damaged_run_is_named_and_nothing_is_printed(copied, capsys):
+    path = copied / "random" / "seed-001"
+    damage(path)
     assert table(copied) == 2
     said = capsys.readouterr()
     assert not said.out
-    assert "there is nothing to compare" in said.err
-    assert said.err.count("summary.json is missing or damaged") == SEEDS + 1
+    assert str(path) in said.err
+
+
+def test_all_movements_of_a_run_are_printed_as_csv_with_numbers_that_read_back_exactly(runs, capsys):
+    assert table(runs / "sgim-d" / "seed-000", "--episodes") == 0
+    head, *rows = csv.reader(io.StringIO(capsys.readouterr().out))
+    run = read_run(runs / "sgim-d" / "seed-000")
+    assert head[:5] == ["movement", "origin", "demonstration", "theta_0", "theta_1"]
+    assert head[-4:] == ["goal_0", "goal_1", "outcome_0", "outcome_1"]
+    columns = dict(zip(head, zip(*rows, strict=True), strict=True))
+    assert columns["movement"] == tuple(map(str, range(40)))
+    assert columns["origin"] == tuple(run.origin)
+    assert [int(cell or -1) for cell in columns["demonstration"]] == run.demonstration.tolist()
+    for name, values in (
+        ("theta_24", run.thetas[:, 24]),
+        ("goal_1", run.goals[:, 1]),
+        ("outcome_0", run.outcomes[:, 0]),
+    ):
+        assert np.array_equal([float(cell or "nan") for cell in columns[name]], values, equal_nan=True)
+
+
+def test_the_movements_of_several_runs_are_refused(runs, capsys):
+    assert table(runs, "--episodes") == 2
+    assert str(runs) in capsys.readouterr().err
 
 
 def test_what_was_not_measured_is_a_dash(runs, capsys):
@@ -160,7 +181,9 @@ def last_column(said):
 def test_few_seeds_are_compared_with_the_baseline_by_their_differences_alone(runs, capsys):
     assert table(runs, "--at", 40, "--baseline", "random") == 0
     head, found = last_column(capsys.readouterr().out)
-    ours, theirs = (read_run(runs / name / "seed-000").evaluation["mean_error_m"][-1] for name in ("sgim-d", "random"))
+    ours, theirs = (
+        read_run(runs / name / "seed-000").answers["own"]["mean_error"][-1] for name in ("sgim-d", "random")
+    )
     assert head == "minus random (m)"
     assert found == {"random": "-", "sgim-d": f"{ours - theirs:+.4f}"}  # of the only seed that both have
 
@@ -174,7 +197,7 @@ def test_with_five_seeds_the_difference_to_the_baseline_has_its_interval(tmp_pat
     assert table(tmp_path, "--baseline", "sagg-riac") == 0
     _, found = last_column(capsys.readouterr().out)
     errors = {
-        name: [read_run(tmp_path / name / f"seed-00{seed}").evaluation["mean_error_m"][-1] for seed in range(5)]
+        name: [read_run(tmp_path / name / f"seed-00{seed}").answers["own"]["mean_error"][-1] for seed in range(5)]
         for name in ("random", "sagg-riac")
     }
     differences = np.sort(np.subtract(errors["random"], errors["sagg-riac"]))

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import io
 from base64 import b64encode
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from functools import wraps
 from typing import Any, Concatenate, Final, ParamSpec
@@ -16,21 +15,28 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from PIL import Image
 
-from sgimd_torch.figures.axes import alike, limits, over_movements, rounded
-from sgimd_torch.figures.learning import COLOURS, interest_map, landing_points, map_after
-from sgimd_torch.figures.movements import interest_over_time
+from sgimd_torch.figures.axes import LEGEND, alike, limits, over_movements, rounded
+from sgimd_torch.figures.axes import colours as palette
+from sgimd_torch.figures.learning import COLOURS, competence_map, interest_map, landing_points, map_after
+from sgimd_torch.figures.predictions import coverage_over_time, error_over_time
 from sgimd_torch.figures.results import Difference, forest
 from sgimd_torch.figures.sections import Section, of_regions, sections
+from sgimd_torch.forward_model.diagnostics import LEVELS, TRUSTED_UP_TO, running
 from sgimd_torch.spaces import Array, Box
-from sgimd_torch.views.report.comparison import Comparison
-from sgimd_torch.views.report.data import Life, Variant
+from sgimd_torch.views.comparison import Comparison
+from sgimd_torch.views.model_run import model_run
+from sgimd_torch.views.variants import Variant
+from sgimd_torch.views.whole import Run
 
 P = ParamSpec("P")
 TILES: Final = 50  # along the longer side of a map, at most
 GOALS: Final = 100  # the last ones are shown
 MOST_CURVES: Final = 8
+PARTS: Final = 20  # of a run, each with its requests
+LEVEL: Final = 0.8  # of the forward model's regions
+WINDOW: Final = 100  # predictions, from one point of a curve to the next
+NOT_ASKED: Final = "#f3e3bf"  # where the forward model was not asked
 STYLE: Final[Any] = {
     "font.size": 11,
     "axes.titlesize": 11,
@@ -40,35 +46,21 @@ STYLE: Final[Any] = {
     "lines.linewidth": 2,
     "legend.fontsize": 10,
 }
-_LINES: Final = ("-", (0, (5, 2)), (0, (1, 1.4)), (0, (6, 2, 1, 2)))  # of variants in one colour
-_MARKERS: Final = "osD^vPX*"
 # Of further variants of an algorithm: after Okabe & Ito and P. Tol, none that an algorithm of the paper has.
 _FURTHER: Final = ("#e69f00", "#56b4e9", "#000000", "#882255", "#999933", "#aa4499", "#44aa99", "#661100")
-_COLOURS_OF_PNG: Final = 256  # a palette; enough for maps on one colour scale and smooth letters
-
-
-def data_uri(kind: str, content: bytes) -> str:
-    """A file as an address."""
-    return f"data:{kind};base64,{b64encode(content).decode()}"
 
 
 def png(draw: Callable[Concatenate[Figure, P], None]) -> Callable[P, str]:
-    """A function that gives what ``draw`` draws as the address of a png; the same figure has the same address.
-
-    It has enough pixels for dense screens; having few colours, it is smaller than an svg.
-    """
+    """A function that gives what ``draw`` draws as the address of a png, with enough pixels for dense screens."""
 
     @wraps(draw)
     def address(*args: P.args, **kwargs: P.kwargs) -> str:
-        pixels, content = io.BytesIO(), io.BytesIO()
+        content = io.BytesIO()
         with rc_context(STYLE):
             figure = Figure(figsize=(6, 5.2), layout="constrained")
             draw(figure, *args, **kwargs)
-            figure.savefig(pixels, format="png", dpi=140)
-        with Image.open(pixels) as full:
-            few = full.convert("RGB").quantize(_COLOURS_OF_PNG, dither=Image.Dither.NONE)
-            few.save(content, "png", optimize=True)
-        return data_uri("image/png", content.getvalue())
+            figure.savefig(content, format="png", dpi=120, pil_kwargs={"optimize": True})
+        return f"data:image/png;base64,{b64encode(content.getvalue()).decode()}"
 
     return address
 
@@ -87,20 +79,14 @@ def colours_of(variants: Sequence[Variant]) -> dict[str, str]:
 
 
 @png
-def curves(
-    figure: Figure, variants: Sequence[Variant], colours: Mapping[str, str], behind: Sequence[Variant] = ()
-) -> None:
-    """Error against movements: interquartile means over seeds with their intervals, other variants in grey ``behind``.
+def curves(figure: Figure, variants: Sequence[Variant], colours: Mapping[str, str]) -> None:
+    """Error against movements: interquartile means over seeds with their intervals, points where there are few seeds.
 
-    With few seeds there are points instead of intervals. A single variant is shown with its seeds, thin, and its noise
-    floor.
+    A single variant is shown with its seeds, thin, and its noise floor.
     """
     if len(variants) > 1:
         figure.set_size_inches(6.8, 4.5)
     ax = figure.subplots()
-    for other in behind:
-        ax.plot(other.evaluated, other.curve[0], color="0.8", linewidth=1.2)
-    before: Counter[str] = Counter()
     for variant in variants:
         n, colour, (centre, low, high) = len(variant.used), colours[variant.name], variant.curve
         if n > 1 and variant.few:
@@ -110,31 +96,15 @@ def curves(
             ax.fill_between(variant.evaluated, low, high, color=colour, alpha=0.2, linewidth=0)
         if n > 1 and len(variants) == 1:
             ax.plot(variant.evaluated, variant.errors.T, color=colour, linewidth=0.7, alpha=0.4)
-        line, marker = _LINES[before[colour] % len(_LINES)], _MARKERS[before[colour] % len(_MARKERS)]
-        before[colour] += 1
         label = f"{_plain(variant.label)} ({n} seed{'s' * (n > 1)})"
-        ax.plot(variant.evaluated, centre, color=colour, ls=line, marker=marker, markersize=4.5, label=label)
+        ax.plot(variant.evaluated, centre, "o-", color=colour, markersize=4.5, label=label)
         if len(variants) == 1:
-            floors = [[life.at(m, "noise_floor_m") for m in variant.evaluated.tolist()] for life in variant.used]
-            _floor(ax, variant.evaluated.astype(np.float64), np.mean(floors, axis=0))
-    if behind:
-        ax.plot([], [], color="0.8", label="other variants")
-        ax.set_xlim(right=1.05 * variants[0].last)
-    _finish(ax, columns=1 + (len(variants) > 4))
-
-
-@png
-def one_curve(figure: Figure, life: Life) -> None:
-    """Of one run: mean, median and 90th percentile of the distances to the benchmark's goals."""
-    ax = figure.subplots()
-    columns, colour = life.evaluation, COLOURS.get(str(life.config["algorithm"]), "black")
-    when = columns["movements"]
-    ax.fill_between(when, columns["median_error_m"], columns["p90_error_m"], color=colour, alpha=0.12, linewidth=0)
-    ax.plot(when, columns["p90_error_m"], "^:", color=colour, linewidth=1.2, markersize=4, label="90th percentile")
-    ax.plot(when, columns["mean_error_m"], "o-", color=colour, markersize=5, label="mean")
-    ax.plot(when, columns["median_error_m"], "v:", color=colour, linewidth=1.2, markersize=4, label="median")
-    _floor(ax, when, columns["noise_floor_m"])
-    _finish(ax, ylabel="distance to benchmark goals (m)")
+            floor = variant.floors.mean(axis=0)
+            ax.plot(variant.evaluated, floor, "_--", color="black", linewidth=1.2, markersize=8, label="noise floor")
+    over_movements(ax, "mean distance to benchmark goals (m)")
+    ax.set_ylim(bottom=0)
+    handles = [line for line in ax.lines if not str(line.get_label()).startswith("_")]
+    ax.legend(handles=handles, ncols=1 + (len(variants) > 4), loc="upper right")
 
 
 @png
@@ -151,77 +121,84 @@ def differences(figure: Figure, compared: Sequence[Comparison], baseline: Varian
     forest(figure.subplots(), rows, reference=_plain(baseline.label))
 
 
-def planes_of(variants: Sequence[Variant]) -> dict[tuple[str, int], Box]:
-    """For each environment and outcome_dim the part of T that maps show: where movements of all variants landed."""
-    found: dict[tuple[str, int], list[Array]] = {}
+def planes_of(variants: Sequence[Variant]) -> dict[str, Box]:
+    """For each environment the part of T that maps show: where movements of all variants landed."""
+    found: dict[str, list[Array]] = {}
     for variant in variants:
         if len(variant.landed):
             box = limits(variant.landed)
-            found.setdefault((variant.typical.environment, box.dim), []).extend([box.low, box.high])
+            found.setdefault(variant.environment, []).extend([box.low, box.high])
     return {name: Box(np.min(corners, axis=0), np.max(corners, axis=0)) for name, corners in found.items()}
 
 
 @png
-def landing(figure: Figure, landed: Array, shown: Array, plane: Box) -> None:
+def landing(figure: Figure, variant: Variant, plane: Box) -> None:
     """Where movements landed, and the demonstrated outcomes, on a part of T; the rest is marked at its edge."""
-    crosses = shown if len(shown) and shown.shape[1] == plane.dim else None
-    panels = sections(plane)
+    panels, shown = sections(plane), variant.demonstrated
     for ax, section in zip(_panels(figure, panels), panels, strict=True):
         sides = section.box.sides
         longest = float(sides[0] if section.is_strip or not alike(sides) else sides.max())
-        side = rounded(longest / TILES)
-        landing_points(ax, landed, plane, demonstrated=crosses, side=side, section=section)
+        side, crosses = rounded(longest / TILES), shown if len(shown) else None
+        landing_points(ax, variant.landed, plane, demonstrated=crosses, side=side, section=section)
+
+
+def has_regions(run: Run) -> bool:
+    """Whether there is a map to draw: of outcomes, or of contexts and outcomes."""
+    return run.regions is not None and len(run.regions["movements"]) > 0
 
 
 @png
-def interest(figure: Figure, life: Life) -> None:
-    """The interest map at the last evaluation, with the goals chosen before it."""
-    last, panels = _last_map(life)
-    for ax, section in zip(_panels(figure, panels), panels, strict=True):
-        interest_map(ax, *last, goals=life.chosen_goals()[-GOALS:], section=section)
+def regions(figure: Figure, run: Run) -> None:
+    """The regions of T at the last evaluation, by competence and by interest, with the goals chosen last."""
+    assert run.regions is not None
+    now = run.regions["movements"].max()
+    lows, highs, interests = map_after(run.regions, now)
+    competences = run.regions["competence"][run.regions["movements"] == now]
+    panels = of_regions(lows, highs, run.outcomes.shape[1])
+    axes = _panels(figure, [*panels, *panels])
+    for above, below, section in zip(axes, axes[len(panels) :], panels, strict=False):
+        competence_map(above, lows, highs, competences, section=section)
+        interest_map(below, lows, highs, interests, goals=run.chosen_goals()[-GOALS:], section=section)
 
 
 @png
-def splitting(figure: Figure, life: Life) -> None:
-    """Up to four interest maps of one run."""
-    assert life.regions is not None
-    n = min(4, len(np.unique(life.regions["movements"])))
-    axes = figure.subplots(1 + (n > 2), min(2, n), squeeze=False)
-    interest_over_time(axes.flat, life.regions, _last_map(life)[1][0])
-    for ax in axes.flat:  # the maps are small
-        ax.set_title(ax.get_title().replace(": ", ":\n"), fontsize=10)
-        ax.tick_params(labelsize=9)
-        ax.label_outer()
+def requests(figure: Figure, run: Run) -> None:
+    """How many demonstrations a learner asked for in each twentieth of its movements, by its strategies."""
+    assert run.requests is not None
+    ax, when, strategy = figure.subplots(), run.requests["index"], run.requests["strategy"]
+    edges = np.linspace(0, len(run.index), PARTS + 1)
+    below = np.zeros(PARTS)
+    for name, colour in palette(strategy).items():
+        counts, _ = np.histogram(when[strategy == name], edges)
+        ax.bar(edges[:-1], counts, np.diff(edges), below, align="edge", color=colour, label=name)
+        below += counts
+    over_movements(ax, "requests for a demonstration")
+    ax.legend(**LEGEND)
 
 
-def _last_map(life: Life) -> tuple[tuple[Array, Array, Array], list[Section]]:
-    """See ``map_after``; and the sections that show it."""
-    assert life.regions is not None
-    last = map_after(life.regions, life.regions["movements"].max())
-    return last, of_regions(*last[:2], life.outcomes.shape[1])
+@png
+def model(figure: Figure, run: Run) -> None:
+    """Error and coverage of the forward model's predictions against movements, shaded where it was not asked."""
+    figure.set_size_inches(6.4, 6.4)
+    found = model_run(run)
+    windows = running(found.observed, found.mean, found.spread, WINDOW)
+    ends = (found.movements[windows.last] + 1).astype(np.float64)
+    above, below = figure.subplots(2, 1, sharex=True)
+    error_over_time(above, ends, windows.errors)
+    coverage_over_time(below, ends, windows.coverages[:, LEVELS.index(LEVEL)])
+    for ax in (above, below):
+        edge = ax.get_xaxis_transform()
+        ax.fill_between(run.index, 0, 1, where=~found.asked, step="post", transform=edge, color=NOT_ASKED, zorder=0)
+    above.plot([], [], color=NOT_ASKED, linewidth=8, label=f"not asked: relative error above {TRUSTED_UP_TO:g}")
+    above.set_xlabel("")
+    above.legend(loc="upper right")
 
 
 def _panels(figure: Figure, shown: Sequence[Section]) -> list[Axes]:
     """An axis for each section, below each other; a strip is low."""
-    if len(shown) > 1:
-        figure.set_size_inches(6, 4.6 * len(shown))
-    elif shown[0].is_strip:
-        figure.set_size_inches(6, 3)
+    height = 3 if shown[0].is_strip else 5.2 if len(shown) == 1 else 4.6
+    figure.set_size_inches(6, height * len(shown))
     return list(figure.subplots(len(shown), 1, squeeze=False).flat)
-
-
-def _floor(ax: Axes, movements: Array, floors: Array) -> None:
-    """The noise floor, where it was measured."""
-    measured = np.isfinite(floors)
-    style = "--" if measured.sum() > 1 else "_"
-    ax.plot(movements[measured], floors[measured], style, color="black", linewidth=1.2, markersize=14)
-    ax.plot([], [], "--", color="black", linewidth=1.2, label="noise floor")
-
-
-def _finish(ax: Axes, *, ylabel: str = "mean distance to benchmark goals (m)", columns: int = 1) -> None:
-    over_movements(ax, ylabel)
-    ax.set_ylim(bottom=0)
-    ax.legend(handles=[line for line in ax.lines if not str(line.get_label()).startswith("_")], ncols=columns)
 
 
 def _plain(name: str) -> str:

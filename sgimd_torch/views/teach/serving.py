@@ -13,20 +13,14 @@ from typing import Final
 
 import viser
 
-from sgimd_torch.views.watch import free_port
-
 PATIENCE: Final = 60.0  # s without doing anything, after which someone else may take the seat
 
 
 @contextlib.contextmanager
 def serving(port: int) -> Iterator[viser.ViserServer]:
-    """A server on 127.0.0.1, at the first free port from ``port`` on.
-
-    Raises:
-        ValueError: no such port, or none is free.
-    """
+    """A server on 127.0.0.1, at the first free port from ``port`` on: viser looks for it."""
     with contextlib.redirect_stdout(io.StringIO()):  # a banner, and where it listens
-        server = viser.ViserServer(host="127.0.0.1", port=free_port(port), verbose=False)
+        server = viser.ViserServer(host="127.0.0.1", port=port, verbose=False)
     try:
         yield server
     finally:

@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from sgimd_torch.views.report.data import demonstrated, read_life
 
 from runs import ROOT
 from sgimd_torch.demonstrations import save_demonstrations
@@ -25,7 +26,6 @@ from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.tasks import arm_demonstrations
 from sgimd_torch.teachers.by_hand import ByHand, GivenLesson, keep_lesson, read_lessons
 from sgimd_torch.views.report.command import main as report
-from sgimd_torch.views.report.data import demonstrated, read_life
 from sgimd_torch.views.teach import main, options_of
 from sgimd_torch.views.teach.hanging import Hanging
 from sgimd_torch.views.teach.serving import PATIENCE, Seat

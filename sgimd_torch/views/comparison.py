@@ -10,16 +10,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from sgimd_torch.catalogue import did_you_mean
 from sgimd_torch.spaces import Array
-from sgimd_torch.views.report.data import Variant
 from sgimd_torch.views.statistics import LEAST_SEEDS, Interval, common_differences, over_seeds
-from sgimd_torch.views.table import known
+from sgimd_torch.views.variants import Variant
 
 USUAL: Final = "sgim-d"  # the baseline where nobody chose one
-BETTER: Final = "better"
-WORSE: Final = "worse"
-OPEN: Final = "not told apart"
-FEW: Final = f"fewer than {LEAST_SEEDS} common seeds"
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,16 +28,11 @@ class Comparison:
     found: Interval
 
     @property
-    def few(self) -> bool:
-        """Whether there are too few seeds for an interval."""
-        return len(self.seeds) < LEAST_SEEDS
-
-    @property
     def verdict(self) -> str:
         """What the interval says of the difference."""
-        if self.few:
-            return FEW
-        return BETTER if self.found.high < 0 else WORSE if self.found.low > 0 else OPEN
+        if len(self.seeds) < LEAST_SEEDS:
+            return f"fewer than {LEAST_SEEDS} common seeds"
+        return "better" if self.found.high < 0 else "worse" if self.found.low > 0 else "not told apart"
 
 
 def baseline_of(variants: Sequence[Variant], name: str | None = None) -> Variant | None:
@@ -53,25 +44,21 @@ def baseline_of(variants: Sequence[Variant], name: str | None = None) -> Variant
     evaluated = {variant.name: variant for variant in variants if variant.last_error}
     if name is None:
         return evaluated.get(USUAL) or next(iter(evaluated.values()), None)
-    return evaluated[known(name, evaluated)]
+    if name not in evaluated:
+        names = f"{', '.join(sorted(evaluated))}{did_you_mean(name, evaluated)}"
+        raise ValueError(f"--baseline must be a variant with errors to compare, got {name!r}; these are {names}")
+    return evaluated[name]
 
 
-def compare(variants: Sequence[Variant], baseline: Variant) -> list[Comparison]:
+def compare(variants: Sequence[Variant], baseline: Variant | None) -> list[Comparison]:
     """The others against the baseline: those that have a seed in common, and the same number of movements."""
-    theirs = {life.seed: life.at(baseline.last) for life in baseline.used}
-    rows = []
-    for variant in variants:
-        if variant is baseline or variant.last != baseline.last:
-            continue
-        seeds = common_differences({life.seed: life.at(variant.last) for life in variant.used}, theirs)
-        if found := over_seeds(seeds):
-            rows.append(Comparison(variant, seeds, found))
-    return rows
-
-
-def few_seeds(variants: Sequence[Variant]) -> list[str]:
-    """A sentence that names the variants with too few seeds; none where there is nothing to say."""
-    few = [f"{variant.label} ({len(variant.used)})" for variant in variants if 0 < len(variant.used) < LEAST_SEEDS]
-    if not few:
+    if baseline is None:
         return []
-    return [f"Fewer than {LEAST_SEEDS} seeds: {', '.join(few)}. They have points, but no intervals and no verdict."]
+    theirs = _last_errors(baseline)
+    others = [variant for variant in variants if variant is not baseline and variant.last == baseline.last]
+    differences = [(variant, common_differences(_last_errors(variant), theirs)) for variant in others]
+    return [Comparison(variant, seeds, found) for variant, seeds in differences if (found := over_seeds(seeds))]
+
+
+def _last_errors(variant: Variant) -> dict[int, float]:
+    return {int(run.config["seed"]): run.at(variant.last) for run in variant.used}

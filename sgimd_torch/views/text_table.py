@@ -1,0 +1,18 @@
+"""Tables of text on stdout, the same in every command.
+
+print_table([("variant", "error (m)"), ("sgim-d", "0.123"), ("random", "0.456")])    # the first row names the columns
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+
+def print_table(rows: Sequence[Sequence[str]]) -> None:
+    """Print rows of equally many cells in aligned columns, two spaces apart.
+
+    Each row is flushed, so that a reader such as ``head`` may close the pipe.
+    """
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        print("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip(), flush=True)
