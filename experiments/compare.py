@@ -30,7 +30,7 @@ with loading():  # Ctrl-C shows no traceback
     from sgimd_torch.files import make_folder
     from sgimd_torch.runs.config import Config
     from sgimd_torch.runs.engines.loop import sweep
-    from sgimd_torch.runs.log import RunError
+    from sgimd_torch.record import RunError
     from sgimd_torch.runs.read import finished, read_run
     from sgimd_torch.runs.sweep import add_engines, add_options, engine_of
     from tables import COLUMNS, RESULTS, ROWS, Key, Table, as_text, result_rows

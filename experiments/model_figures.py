@@ -39,7 +39,7 @@ with loading():  # Ctrl-C shows no traceback
     from sgimd_torch.figures.save import save_figure
     from sgimd_torch.files import make_folder, write_text
     from sgimd_torch.forward_model.diagnostics import LEVELS, error_by_cell, improvements, running
-    from sgimd_torch.runs.log import RunError
+    from sgimd_torch.record import RunError
     from sgimd_torch.spaces import Box
     from sgimd_torch.views.model_run import ModelRun, read_model_run
 

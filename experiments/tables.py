@@ -27,7 +27,7 @@ from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.files import lock, write_text
 from sgimd_torch.runs.build import task_of
 from sgimd_torch.runs.config import Config
-from sgimd_torch.runs.log import RunError
+from sgimd_torch.record import RunError
 from sgimd_torch.runs.read import Run
 from sgimd_torch.runs.tasks import benchmark_of, demonstrations_of
 from sgimd_torch.spaces import Array

@@ -29,8 +29,8 @@ import numpy as np
 from sgimd_torch.evaluation import TILES, Benchmark, save_benchmark, tile_goals, tile_side
 from sgimd_torch.runs.build import task_of
 from sgimd_torch.runs.process import say
+from sgimd_torch.runs.read import Run, config_of, find_runs, read_run
 from sgimd_torch.spaces import Box, check_count, stream
-from sgimd_torch.views.whole import Run, config_of, find_runs, read_run
 
 
 def main(argv: Sequence[str] | None = None) -> int:

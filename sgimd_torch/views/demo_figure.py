@@ -14,7 +14,7 @@ except ImportError as error:
 
 from sgimd_torch.figures.learning import NAMES, landing_points, tile_counts
 from sgimd_torch.figures.results import SeedCurves, seed_curves
-from sgimd_torch.runs.log import RunError
+from sgimd_torch.record import RunError
 from sgimd_torch.spaces import Box
 from sgimd_torch.views.demo_cast import answers, from_above, from_the_side
 from sgimd_torch.views.variants import Life, demonstrated
@@ -65,7 +65,7 @@ def table(runs: Mapping[str, Life]) -> str:
         cells.append(_shown(run.evaluation["noise_floor_m"][-1], ".3f", "m"))
         cells += [_shown(run.seconds(part), ".0f", "s") for part in ("physics", "learner", "evaluation")]
         lines.append(f"{NAMES[algorithm]:{width}}" + "".join(f"{cell:>13}" for cell in cells))
-    last = {algorithm: run.evaluation["mean_error_m"][-1] for algorithm, run in runs.items()}
+    last = {algorithm: run.evaluation["mean_error"][-1] for algorithm, run in runs.items()}
     ratios = " and ".join(
         f"{NAMES[algorithm]} {error / last['random']:.2f}" for algorithm, error in last.items() if algorithm != "random"
     )
@@ -74,7 +74,7 @@ def table(runs: Mapping[str, Life]) -> str:
 
 
 def _curve(algorithm: str, run: Life) -> SeedCurves:
-    when, errors = (run.evaluation[name] for name in ("movements", "mean_error_m"))
+    when, errors = (run.evaluation[name] for name in ("movements", "mean_error"))
     return SeedCurves(algorithm, NAMES[algorithm], when, errors[None], errors, errors, errors)
 
 

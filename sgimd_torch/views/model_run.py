@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sgimd_torch.forward_model.diagnostics import LEVELS, TRUSTED_UP_TO, coverage
-from sgimd_torch.runs.log import RunError
+from sgimd_torch.record import RunError
+from sgimd_torch.runs.read import Run, read_run
 from sgimd_torch.spaces import Array
-from sgimd_torch.views.whole import Run, read_run
 
 
 @dataclass(frozen=True, eq=False)

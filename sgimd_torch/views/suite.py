@@ -143,7 +143,7 @@ def errors_of(configs: Sequence[Config]) -> dict[str, dict[str, dict[int, Array]
     for config in configs:
         run = read_run(config.directory).evaluation
         curve = found.setdefault(titled(config.out.name), {}).setdefault(config.variant, {})
-        for movements, error in zip(run["movements"], run["mean_error_m"], strict=True):
+        for movements, error in zip(run["movements"], run["mean_error"], strict=True):
             curve.setdefault(int(movements), []).append(float(error))
     return {
         task: {name: {at: np.array(values) for at, values in curve.items()} for name, curve in learners.items()}

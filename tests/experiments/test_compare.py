@@ -18,7 +18,7 @@ from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.files import locked
 from sgimd_torch.runs.command_line import parse
 from sgimd_torch.runs.config import Config, words
-from sgimd_torch.runs.log import RunError
+from sgimd_torch.record import RunError
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import Run, read_run
 from tables import RESULTS, Table, goal_rows, goals_claimed, result_rows, tiles_reached

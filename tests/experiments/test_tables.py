@@ -10,7 +10,7 @@ import time
 import pytest
 
 from runs import ROOT
-from sgimd_torch.runs.log import RunError
+from sgimd_torch.record import RunError
 from tables import RESULTS, Table
 
 COLUMNS = ("variant", "seed", "error_m")

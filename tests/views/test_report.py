@@ -20,6 +20,7 @@ from sgimd_torch.figures.learning import COLOURS
 from sgimd_torch.runs.command_line import main as live
 from sgimd_torch.runs.command_line import parse
 from sgimd_torch.runs.process import command
+from sgimd_torch.runs.read import read_run
 from sgimd_torch.views.comparison import compare
 from sgimd_torch.views.model_run import has_predictions, model_run
 from sgimd_torch.views.report import command as report
@@ -27,7 +28,6 @@ from sgimd_torch.views.report import figures, record
 from sgimd_torch.views.report.page import page, requested
 from sgimd_torch.views.statistics import interquartile_mean
 from sgimd_torch.views.variants import Variant
-from sgimd_torch.views.whole import read_run
 
 ODD = "<b>&'$x\" "
 

@@ -127,7 +127,7 @@ def _cast(run: Run, parts: RunParts, goals: Array, stages: Sequence[int]) -> lis
         errors.append(found.errors)
     curve = np.array(stages), np.array([each.mean() for each in errors])
     if len(stages) == 1 and len(run.evaluation["movements"]):
-        curve = run.evaluation["movements"], run.evaluation["mean_error_m"]
+        curve = run.evaluation["movements"], run.evaluation["mean_error"]
     panel = Panel(parts.benchmark.goals, colour(run.config["algorithm"]), *curve)
     return [
         replace(shot, beside=panel.beside(stages[k], errors[k], shot.goal, shot.recording.outcome))

@@ -17,10 +17,10 @@ from runs import ROOT
 from sgimd_torch.demonstrations import save_demonstrations
 from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.environments.planar_arm import PlanarArm
+from sgimd_torch.record import RunError
 from sgimd_torch.runs.build import build
 from sgimd_torch.runs.command_line import main as run
 from sgimd_torch.runs.config import Config, plain, words
-from sgimd_torch.runs.log import RunError
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.tasks import arm_demonstrations
