@@ -1,7 +1,7 @@
 """How a theta becomes a sequence of commands: sums of knots, or a sinusoid for each joint.
 
 A controller has ``policies``, its Pi, and ``at(theta, times)``, the commands, as `GaussianPrimitive` has; so each can
-stand in the place of the others. Each translates a recording by its ``correspondence``, eq. (6) of Nguyen & Oudeyer
+replace the others. Each translates a recording by its ``correspondence``, eq. (6) of Nguyen & Oudeyer
 (2014).
     swim = Sinusoids(actions, frequencies=(0.2, 2.0)); commands = swim.at(theta, times)
 """

@@ -3,7 +3,7 @@
 theta are the parameters of a controller, which gives the actions; the outcome is a function of what was observed.
     actions = Box(world.action_space.low, world.action_space.high)
     swimmer = FromGymnasium(world, Sinusoids(actions, (0.2, 2.0)), steps=150, outcome=travelled, outcomes=..., ...)
-A policy of your own fits in the place of the controller: ``policies``, and ``act(theta, observation, time)``.
+A policy of your own fits instead of the controller: ``policies``, and ``act(theta, observation, time)``.
 The other direction is ``to_gymnasium.py``.
 """
 

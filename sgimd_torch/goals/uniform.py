@@ -1,4 +1,4 @@
-"""Goals drawn anywhere in T, whatever was learnt: in the place of the interest map they show what interest is worth.
+"""Goals drawn anywhere in T, whatever was learnt: instead of the interest map they show what interest is worth.
 
 goals = UniformGoals(contexts, outcomes, rng)
 """

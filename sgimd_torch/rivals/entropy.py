@@ -4,7 +4,7 @@ After Kulak & Calinon (2023), "Combining social and intrinsically-motivated lear
 acquisition": the expected epistemic entropy over goals, and how much each mode should reduce it; a demonstration is
 asked for where the epistemic entropy is greatest.
     learner = sgim_eer(environment, seed, correspondence=..., teachers={"ann": ann})
-Ours: a Gaussian process says what is not known of the policy for a goal, in the place of a Bayesian mixture, so that
+Ours: a Gaussian process says what is not known of the policy for a goal, instead of a Bayesian mixture, so that
 reductions have a closed form; the nearest earlier attempt says where a movement of one's own would land.
 """
 

@@ -280,7 +280,7 @@ def test_every_choice_runs_and_differs_from_the_others(tmp_path, go, option, tab
     # See the next two tests; a person who is not there is like no teacher, and demonstrator 3 is all there are.
     left_out = *MODEL_SEARCHES, "model", "model-proved", "by-hand", "demonstrator-3"
     choices = [choice for choice in table if choice not in left_out]
-    asking = {"teachers": "sgim-im", "base": "sgim-im", "doubt": "sgim-eer"}  # the others ask nobody
+    asking = {"teachers": "sgim-im", "base": "sgim-im"}  # the others ask nobody
     learner = ("--algorithm", asking[option]) if option in asking else ()
     for choice in choices:
         assert go(tmp_path, "--name", choice, f"--{option}", choice, *common, *learner) == 0
