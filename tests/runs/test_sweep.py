@@ -8,14 +8,13 @@ import os
 import re
 import shutil
 import signal
-import subprocess
-import sys
 from concurrent.futures import Future
 from pathlib import Path
 
 import pytest
 
-from runs import ROOT, csv_of, start, sweep_here
+from odd import ODD, SWEEP, as_alone, odd_place, said_by
+from runs import csv_of, start, sweep_here
 from sgimd_torch.runs.command_line import main as run
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.engines import loop
@@ -23,45 +22,9 @@ from sgimd_torch.runs.process import Failed, Progress, command
 from sgimd_torch.runs.read import finished, movements_on_disk
 from sgimd_torch.runs.sweep import main, variants_of
 
-SWEEP = "import sys; from sgimd_torch.runs import process, sweep; sys.exit(process.command(sweep.main))"
 # An arm without physics; 40 movements and one evaluation take a moment.
 ALONE = ["--environment", "planar-arm-7", "--movements", "40", "--evaluate-at", "20", "--repeats", "0"]
 SHORT = [*ALONE, "--algorithm", "random"]
-# Such an arm that does, before its 20th movement, what the variable AT_20 says.
-ROBOT = """
-import os, signal
-import numpy as np
-from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.evaluation import Benchmark
-from sgimd_torch.runs.tasks import Task
-
-def stop_the_sweep():
-    heard, hears = os.pipe()
-    os.set_blocking(hears, False)
-    signal.set_wakeup_fd(hears)
-    os.kill(os.getppid(), int(os.environ["SIGNAL"]))
-    os.read(heard, 1)  # until the sweep's own signal has come
-
-WAYS = {
-    "": lambda: None,
-    "dies": lambda: os.kill(os.getpid(), signal.SIGKILL),
-    "stands still": lambda: os.kill(os.getpid(), signal.SIGSTOP),
-    "stops the sweep": stop_the_sweep,
-}
-
-class Arm(PlanarArm):
-    made = 0
-
-    def execute(self, context, theta, rng):
-        self.made += 1
-        if self.made == 20:
-            WAYS[os.environ.get("AT_20", "")]()
-        return super().execute(context, theta, rng)
-
-def make():
-    return Task(Arm(), lambda: Benchmark("Arm", np.array([[0.5, 0.5], [-0.3, 0.2]]), 0.1))
-"""
-ODD = ["--environment", "odd:make", "--algorithm", "random", "--movements", "40", "--evaluate-at", "[]"]
 
 
 def short(out, **changes):
@@ -322,11 +285,7 @@ def test_a_run_that_ends_badly_is_told_by_its_last_words(tmp_path, code, said, e
 @pytest.fixture(scope="module")
 def odd(tmp_path_factory):
     """The working directory with a robot that behaves as AT_20 says, and its runs when it does nothing special."""
-    place = tmp_path_factory.mktemp("odd")
-    (place / "odd.py").write_text(ROBOT)
-    words = [sys.executable, "-c", SWEEP, *ODD, "--seeds", "0-1", "--out", "alone"]
-    subprocess.run(words, cwd=place, env={**os.environ, "PYTHONPATH": str(ROOT)}, check=True, capture_output=True)
-    return place
+    return odd_place(tmp_path_factory.mktemp("odd"))
 
 
 @pytest.fixture
@@ -339,19 +298,6 @@ def begun(odd, tmp_path, monkeypatch):
         return start(program, *ODD, "--out", tmp_path, *options)
 
     return begun
-
-
-def said_by(process, code):
-    """What it says until it ends with this code."""
-    _, said = process.communicate()
-    assert process.returncode == code, said
-    assert "Traceback" not in said
-    return said
-
-
-def as_alone(odd, out, seeds):
-    places = [f"random/seed-{seed:03d}" for seed in seeds]
-    return [csv_of(out / place) for place in places] == [csv_of(odd / "alone" / place) for place in places]
 
 
 def test_a_run_that_is_killed_is_named_and_goes_on_next_time(odd, begun, tmp_path):
