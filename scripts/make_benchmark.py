@@ -18,8 +18,9 @@ import numpy as np
 from options import at_least, writable_file
 from sgimd_torch.evaluation import SHIPPED
 from sgimd_torch.runs.config import Config
-from sgimd_torch.runs.engines.local import Local
+from sgimd_torch.runs.engines.local import local
 from sgimd_torch.runs.engines.loop import sweep
+from sgimd_torch.runs.process import Failed
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.spaces import Array
 from sgimd_torch.views import benchmark
@@ -31,8 +32,10 @@ def live(learners: Iterable[tuple[str, int]], movements: int, processes: int, fo
         Config(algorithm=algorithm, seed=seed, movements=movements, evaluate_at=(), out=folder)
         for algorithm, seed in learners
     ]
-    with Local(processes) as engine:
-        sweep(configs, engine, keep_going=False)
+    with local(processes) as submit:
+        failures = sweep(configs, submit)
+    if failures:
+        raise Failed("\n".join(failures))
     return [config.directory for config in configs]
 
 

@@ -14,7 +14,8 @@ from sgimd_torch.runs.process import command, loading
 
 
 class Command(NamedTuple):
-    """A command: the ``module`` whose ``main(argv)`` it is, one line ``about`` it, and the ``extra`` that it needs."""
+    """A command: the ``module`` whose ``main(argv)`` it is, one line ``about`` it, and the ``extra`` with what it
+    imports, at once or later; if that is not installed, the extra is named."""
 
     module: str
     about: str
@@ -25,8 +26,10 @@ COMMANDS: Final = {
     "run": Command("runs.command_line", "run one learner, evaluate it, write everything to a directory"),
     "sweep": Command("runs.sweep", "many runs: options crossed with each other and with seeds, in parallel"),
     "check": Command("views.check", "does an environment keep every promise? each slip by name"),
-    "demonstrations": Command("views.demonstrations", "are they right for a robot? import from CSV and LeRobot"),
-    "suite": Command("views.suite", "one learner on many robots, against random movements"),
+    "demonstrations": Command(
+        "views.demonstrations", "are they right for a robot? import from CSV and LeRobot", "plot"
+    ),
+    "suite": Command("views.suite", "one learner on many robots, against random movements", "plot"),
     "benchmark": Command("views.benchmark", "goals of evaluation from what runs have reached"),
     "table": Command("views.table", "results of runs, over their seeds"),
     "report": Command("views.report.command", "one page about one run, or about many side by side", "report"),
@@ -54,8 +57,7 @@ examples:
   sgimd table study                                  error of each variant, over its seeds
   sgimd report study                                 curves, maps and tables on one page
 
-sgimd COMMAND --help explains a command; sgimd --version prints the version.
-sgimd --completion bash (or zsh, fish) prints a script for the shell: Tab then completes commands and options."""
+sgimd COMMAND --help explains a command; sgimd --version prints the version."""
 
 
 def main() -> int:
@@ -70,11 +72,6 @@ def _call(words: Sequence[str]) -> int:
     if name in ("-h", "--help"):
         print(HELP)
         return 0 if words else 2
-    if name == "--completion":
-        from sgimd_torch.views.completion import script  # loads all commands
-
-        print(script(COMMANDS, " ".join(words[1:])))
-        return 0
     if words == ["--version"]:
         print(f"sgimd_torch {__version__}")
         return 0
@@ -84,12 +81,12 @@ def _call(words: Sequence[str]) -> int:
     try:
         with loading():
             module = importlib.import_module(f"sgimd_torch.{chosen.module}")
+        return int(module.main(words[1:]))
     except ModuleNotFoundError as error:
         if not chosen.extra:
             raise
         slip = f"pip install 'sgimd-torch[{chosen.extra}]' installs it"
         raise ImportError(f"sgimd {name} needs {error.name}, which is not installed; {slip}") from error
-    return int(module.main(words[1:]))
 
 
 if __name__ == "__main__":

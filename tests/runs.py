@@ -11,7 +11,7 @@ import sgimd_torch
 from sgimd_torch.runs.build import build
 from sgimd_torch.runs.command_line import parse
 from sgimd_torch.runs.directory import RunDirectory
-from sgimd_torch.runs.engines.local import Local
+from sgimd_torch.runs.engines.local import local
 from sgimd_torch.runs.engines.loop import sweep
 from sgimd_torch.runs.process import Stopping
 from sgimd_torch.runs.run import live_in
@@ -45,8 +45,8 @@ def accept_loss(out, benchmark, *options):
 
 def sweep_here(configs, processes=1, **options):
     """On this machine; the failures."""
-    with Local(processes) as engine:
-        return sweep(configs, engine, **options)
+    with local(processes) as submit:
+        return sweep(configs, submit, **options)
 
 
 def start(program, *options, limit=""):

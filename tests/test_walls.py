@@ -51,7 +51,6 @@ LIBRARIES = {  # library: the only rooms that may import it; of a folder, where 
     "jinja2": {"views/report"},
     "jsonargparse": {"runs/command_line"},
     "tqdm": {"runs/process", "views"},
-    "shtab": {"views/completion"},
     "threadpoolctl": {"inverses/gaussian_process"},
     "cma": {"searches/cma_es"},
     "sklearn": {"goals/alp_gmm"},

@@ -121,15 +121,6 @@ def test_what_is_not_installed_is_named_with_the_pip_command_that_brings_it(sgim
     assert "Traceback" not in errors
 
 
-def test_the_shell_completes_what_is_installed_and_names_the_rest(sgimd):
-    code, said, errors = sgimd("--completion", "bash")
-    assert code == 0, errors
-    assert "--give-up" in said
-    assert "--film" in said  # of report, whose extra is installed
-    assert " film " in said
-    assert "--time-lapse" not in said  # of film, whose extra is not
-
-
 def test_a_strict_program_of_a_user_runs_and_its_types_are_checked_against_ours(installed, tmp_path):
     (tmp_path / "user.py").write_text(USER)
     (tmp_path / "wrong.py").write_text(USER.replace("arm, 0, movements=200))", "arm, 0, movements='many'))"))

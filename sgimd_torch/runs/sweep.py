@@ -23,18 +23,17 @@ import argparse
 import itertools
 import os
 import re
-import sys
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from contextlib import AbstractContextManager
+from dataclasses import fields, replace
 from pathlib import Path
-from typing import Final, TypeVar
+from typing import Final, NamedTuple, TypeVar
 
-from sgimd_torch.catalogue import CATALOGUE
 from sgimd_torch.files import make_folder
 from sgimd_torch.runs.command_line import parse
-from sgimd_torch.runs.config import Config, dashed
-from sgimd_torch.runs.engines.local import Engine, Local
-from sgimd_torch.runs.engines.loop import sweep
+from sgimd_torch.runs.config import FILES, Config, dashed
+from sgimd_torch.runs.engines.local import local
+from sgimd_torch.runs.engines.loop import Submit, sweep
 from sgimd_torch.runs.process import loading, say
 from sgimd_torch.runs.read import finished, movements_on_disk
 
@@ -55,32 +54,35 @@ def parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
-    parser.add_argument(
-        "--vary",
-        action="append",
-        default=[],
-        metavar="OPTION=VALUE,VALUE",
-        help="one option of sgimd run and its values; a list is one value in brackets: floor-at=[1000],[1000,5000]",
-    )
+    add_vary(parser)
     add_options(parser, seeds="0")
     add_engines(parser)
     return parser
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Carry out all runs that are not finished.
-
-    Returns:
-        The exit code, 1 where runs failed.
-    """
+    """Carry out all runs that are not finished; 1 where runs failed."""
     options, rest = parser().parse_known_args(argv)
     variants, flags = variants_of(options.vary, rest)
-    whole = [replace(variant, seed=seed) for seed in options.seeds for variant in variants]
+    configs = [replace(variant, seed=seed) for seed in options.seeds for variant in variants]
+    return carry_out(configs, options, flags, variants[0].out)
+
+
+def carry_out(whole: Sequence[Config], options: argparse.Namespace, flags: Sequence[str], out: Path) -> int:
+    """Carry out those of the runs that are not finished, or list them; 1 where runs failed.
+
+    Args:
+        whole: all runs of a study.
+        options: see ``add_options`` and ``add_engines``.
+        flags: of ``sgimd run``, for all of them, besides --resume.
+        out: the folder of the study.
+
+    Raises:
+        ValueError, OSError, ImportError: the request is wrong; nothing was started.
+    """
     configs = options.shard.of(whole)
     left = [config for config in configs if not finished(config)]
-    out = variants[0].out
-    counts = f"{len(variants)} variants, {len(options.seeds)} seeds{options.shard.note(whole)}"
-    say(f"{len(configs)} runs ({counts}), {len(configs) - len(left)} of them finished: {out}")
+    say(f"{len(configs)} runs{options.shard.note(whole)}, {len(configs) - len(left)} of them finished: {out}")
     own = [config for config in configs if config.own and config not in left]
     if own:
         from sgimd_torch.runs.directory import stale  # loads numpy
@@ -88,18 +90,29 @@ def main(argv: Sequence[str] | None = None) -> int:
         say(*dict.fromkeys(f"{config.title}: {note}" for config in own for note in stale(config)))
     if options.dry_run:
         for config in left:
-            print(f"{config.title}: {movements_on_disk(config.directory)} of {config.movements} movements")
+            print(f"{config.directory}: {movements_on_disk(config.directory)} of {config.movements} movements")
     if options.dry_run or not left:
         return 0
     with loading():
         from sgimd_torch.runs.build import build  # after --help
-    for variant in variants:
-        build(variant)  # a wrong option is refused before anything starts
-    with engine_of(options, left) as engine:
+    for config in {each.directory.parent: each for each in left}.values():
+        build(config)  # a wrong option is refused before anything starts
+    with engine_of(options, left) as submit:
         make_folder(out)
-        failures = sweep(left, engine, flags=flags)
+        failures = sweep(left, submit, flags=flags)
     say(f"{len(left) - len(failures)} runs ended well, {len(failures)} failed: {out}", *failures)
     return 1 if failures else 0
+
+
+def add_vary(parser: argparse.ArgumentParser) -> None:
+    """The option --vary, for ``variants_of``."""
+    parser.add_argument(
+        "--vary",
+        action="append",
+        default=[],
+        metavar="OPTION=VALUE,VALUE",
+        help="one option of sgimd run and its values; a list is one value in brackets: floor-at=[1000],[1000,5000]",
+    )
 
 
 def add_options(parser: argparse.ArgumentParser, *, seeds: str | None, default: str = "%(default)s") -> None:
@@ -113,7 +126,7 @@ def add_engines(parser: argparse.ArgumentParser) -> None:
     """Options of where runs are carried out: --shard, --engine and --address."""
     parser.add_argument(
         "--shard",
-        type=Shard.parse,
+        type=_shard,
         default="1/1",
         metavar="K/N",
         help="only the K-th of N equal parts of the list of runs, for a job array",
@@ -131,7 +144,7 @@ def add_engines(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def engine_of(options: argparse.Namespace, configs: Sequence[Config]) -> Engine:
+def engine_of(options: argparse.Namespace, configs: Sequence[Config]) -> AbstractContextManager[Submit]:
     """What the options of ``add_options`` and ``add_engines`` ask for, for these runs; its block starts it.
 
     Raises:
@@ -145,18 +158,23 @@ def engine_of(options: argparse.Namespace, configs: Sequence[Config]) -> Engine:
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1  # we may use
     processes = options.processes or cores
     if options.engine == "local" or not configs:  # nothing to do needs no cluster
-        return Local(processes)
+        return local(processes)
+    for config in configs:
+        if config.board:
+            raise ValueError("--board true cannot be given with --engine ray: a run returns without its event files")
+        for path in (getattr(config, option) for option in FILES):
+            if path is not None and (path.is_absolute() or ".." in path.parts):
+                raise ValueError(f"--engine ray sends files of the working directory only, not {path}; copy it there")
     try:
         with loading():
-            from sgimd_torch.runs.engines.on_ray import OnRay  # takes longer than all else to import
+            from sgimd_torch.runs.engines.on_ray import on_ray  # takes longer than all else to import
     except ModuleNotFoundError as error:
         slip = "pip install 'sgimd-torch[ray]' installs it"
         raise ImportError(f"--engine ray needs {error.name}, which is not installed; {slip}") from error
-    return OnRay(options.address, processes, ships=any(map(uses_working_directory, configs)), out=configs[0].out)
+    return on_ray(options.address, processes, ships=any(config.own for config in configs), out=configs[0].out)
 
 
-@dataclass(frozen=True)
-class Shard:
+class Shard(NamedTuple):
     """The ``k``-th of ``n`` parts of a list, 1 the first: consecutive runs, so that each part has nearly all variants.
 
     Which runs they are depends on the list alone, not on what is finished. Sizes differ by 1 at most.
@@ -164,14 +182,6 @@ class Shard:
 
     k: int
     n: int
-
-    @classmethod
-    def parse(cls, text: str) -> Shard:
-        """Of ``2/4``."""
-        k, slash, n = text.partition("/")
-        if not (slash and k.isdecimal() and n.isdecimal() and 1 <= int(k) <= int(n)):
-            raise argparse.ArgumentTypeError(f"must be like 1/4, the first of four parts, got {text!r}")
-        return cls(int(k), int(n))
 
     def of(self, whole: Sequence[Item]) -> Sequence[Item]:
         """This part of the list."""
@@ -216,16 +226,16 @@ def variants_of(varied: Sequence[str], options: Sequence[str]) -> tuple[list[Con
     return found, [f"--{dashed(flag)}" for flag, on in flags.items() if on]
 
 
-def uses_working_directory(config: Config) -> bool:
-    """Whether one of its parts or answers comes from a module there, which was loaded when it was chosen."""
-    chosen = [*(word for kind in CATALOGUE for word in config.choices(kind)), *config.answers]
-    modules = [sys.modules.get(word.partition(":")[0]) for word in chosen if ":" in word]
-    return any(Path(module.__file__ or "").is_relative_to(Path.cwd()) for module in modules if module)
-
-
 def _in_name(option: str, value: str) -> str:
     """A choice in the name of a variant; a path is shortened to the name of its file."""
     return value if option == "algorithm" else f"{option}={Path(value).name if os.sep in value else value}"
+
+
+def _shard(text: str) -> Shard:
+    k, slash, n = text.partition("/")
+    if not (slash and k.isdecimal() and n.isdecimal() and 1 <= int(k) <= int(n)):
+        raise argparse.ArgumentTypeError(f"must be like 1/4, the first of four parts, got {text!r}")
+    return Shard(int(k), int(n))
 
 
 def _count(text: str) -> int:

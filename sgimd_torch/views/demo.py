@@ -2,38 +2,41 @@
 
 Three runs with the same seed, two at a time. All move the same simulated arm with the same motor noise. One moves at
 random. SGIM-D has curiosity and a teacher. The third, practice-taught, is this library's best: it is shown everything
-at the start, then it practises, one movement for each goal. They write to --out:
+at the start, then it practises, one movement for each goal. They write to --out (default: runs/demo):
 
   random/seed-000/ and so on   everything that happened (docs/runs.md explains the files)
   demo.png                     how the error falls; how each answers four goals; where the float landed
 
-Start it again after Ctrl-C or a power cut, and it goes on where it stopped; finished runs are used as they are.
+Start it again after Ctrl-C or a power cut, and it goes on where it stopped; finished runs are used as they are. Options
+of sgimd run apply to all three; sgimd run --help lists them.
 
   sgimd demo                                       the paper's 5000 movements, seed 0
   sgimd demo --movements 1000                      a first look, in less than a minute
   sgimd demo --seed 1                              another seed
-  sgimd demo --out runs/quiet -- --noise 0         options after -- go to all runs; sgimd run --help lists them
+  sgimd demo --out runs/quiet --noise 0            without motor noise
+
+Exit code: 0 all went well, 1 a run failed, 2 the request is wrong, 130 or 143 stopped by Ctrl-C or SIGTERM.
 """
 
 from __future__ import annotations
 
 import argparse
-import shlex
-import shutil
-import sys
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from typing import Final
 
 from sgimd_torch.catalogue import ROD, label
 from sgimd_torch.runs.command_line import parse
-from sgimd_torch.runs.engines.local import Local
+from sgimd_torch.runs.config import Config
+from sgimd_torch.runs.engines.local import local
 from sgimd_torch.runs.engines.loop import sweep
-from sgimd_torch.runs.process import loading, say
+from sgimd_torch.runs.process import Failed, loading, say
+from sgimd_torch.runs.read import finished, read_run
+from sgimd_torch.views.text_table import print_table
 
-ALGORITHMS: Final = {
+LEARNERS: Final = {
     "random": "moves at random",
     "sgim-d": "chooses goals where its competence changes, and is shown a movement now and then",
     "practice-taught": "is shown all movements at the start, then practises, one movement for each goal",
@@ -41,71 +44,63 @@ ALGORITHMS: Final = {
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the learners, draw the figure, print the table; returns the exit code."""
-    options = _options(argv)
-    place = [f"--seed={options.seed}", f"--movements={options.movements}", f"--out={options.out}"]
-    place += ["--answers=own", f"--floor-at={options.movements}"]  # measuring the noise takes longer than all the rest
-    configs = {algorithm: parse([*place, f"--algorithm={algorithm}", *options.more])[0] for algorithm in ALGORITHMS}
-    base = configs["sgim-d"]
-    if base.environment != ROD:
-        raise ValueError("--environment cannot be given here: the demo shows the fishing rod")
-    if not base.evaluations:
-        raise ValueError("--evaluate-at [] leaves nothing to draw; choose some movements, or omit it")
-    with loading():
-        from sgimd_torch.figures.save import save_figure  # after --help
+    """Run the learners, draw the figure, print the table; returns the exit code, 0.
+
+    Raises:
+        ValueError: the request is wrong.
+        Failed: a run failed.
+    """
+    _, rest = parser().parse_known_args(argv)
+    configs = configs_of(rest)
+    with loading():  # after --help, and before the runs: it may not be installed
+        from sgimd_torch.figures.save import save_figure
         from sgimd_torch.views.demo_figure import draw, table
-        from sgimd_torch.views.variants import read_life
-    began = time.monotonic()
+    began, base = time.monotonic(), configs["sgim-d"]
     say(f"{len(configs)} learners, {base.movements} movements each, seed {base.seed}, two at a time: {base.out}")
-    for algorithm, does in ALGORITHMS.items():
-        say(f"{label(algorithm)} {does}")
-    with Local(processes=2) as engine:
-        sweep([configs[algorithm] for algorithm in reversed(ALGORITHMS)], engine, keep_going=False)  # longest first
+    say(*(f"{label(algorithm)} {does}" for algorithm, does in LEARNERS.items()))
+    longest_first = [config for config in reversed(configs.values()) if not finished(config)]
+    with local(processes=2) as submit:
+        failures = sweep(longest_first, submit)
+    if failures:
+        raise Failed("\n".join(failures))
     say("drawing where the float landed, and how each learner answers four goals")
-    runs = {algorithm: read_life(config.directory) for algorithm, config in configs.items()}
-    (figure,) = save_figure(partial(draw, runs), options.out / "demo", "png")
-    print(f"\nMean distance to the benchmark goals (m) after so many movements, and seconds spent\n\n{table(runs)}\n")
-    print(f"Figure    {figure}")
-    for run in runs.values():
-        print(f"Run       {run.path}/ (episodes.csv, evaluation.csv, summary.json ...)")
-    print(f"Time      {time.monotonic() - began:.0f} s\n\nNext, try\n{_next_steps(options, base.directory)}")
+    runs = {algorithm: read_run(config.directory) for algorithm, config in configs.items()}
+    (figure,) = save_figure(partial(draw, runs), base.out / "demo", "png")
+    print("\nMean distance to the benchmark goals after so many movements, and time spent\n")
+    print_table(table(runs))
+    print(f"\nFigure  {figure}\nRuns    {base.out}\nTime    {time.monotonic() - began:.0f} s\n\nNext, try")
+    print(f"  sgimd film {base.directory} --time-lapse    # a film of how SGIM-D learns")
+    print(f"  sgimd report {base.out}    # one page: curves, maps, where it is curious")
     return 0
+
+
+def configs_of(rest: Sequence[str]) -> dict[str, Config]:
+    """The run of each learner.
+
+    Args:
+        rest: options of ``sgimd run``, for all of them.
+
+    Raises:
+        ValueError: an option that the demo decides, or that leaves nothing to draw.
+    """
+    given = {word.partition("=")[0].lstrip("-") for word in rest}
+    for name in ("algorithm", "name", "environment"):
+        if name in given:
+            raise ValueError(f"--{name} cannot be given here: the demo shows its own learners on the fishing rod")
+    words = ["--out=runs/demo", "--answers=own", f"--environment={ROD}", *rest]
+    configs = {algorithm: parse([*words, f"--algorithm={algorithm}"])[0] for algorithm in LEARNERS}
+    if not configs["sgim-d"].evaluations:
+        raise ValueError("--evaluate-at [] leaves nothing to draw; choose some movements, or omit it")
+    # Measuring the noise takes longer than all the rest.
+    return {name: replace(config, floor_at=(config.movements,)) for name, config in configs.items()}
 
 
 def parser() -> argparse.ArgumentParser:
     """The options of ``sgimd demo``."""
-    parser = argparse.ArgumentParser(
+    return argparse.ArgumentParser(
         prog="sgimd demo",
-        usage="%(prog)s [options] [-- OPTIONS OF sgimd run]",
+        usage="%(prog)s [--OPTION VALUE ...]",
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
     )
-    parser.add_argument("--seed", type=int, default=0, help="of all runs (default: %(default)s)")
-    parser.add_argument(
-        "--movements", type=int, default=5000, help="of each run; more than last time extends it (default: %(default)s)"
-    )
-    parser.add_argument("--out", type=Path, default=Path("runs/demo"), help="directory (default: %(default)s)")
-    parser.add_argument("more", nargs="*", help=argparse.SUPPRESS)
-    return parser
-
-
-def _options(argv: Sequence[str] | None) -> argparse.Namespace:
-    options = parser().parse_args(argv)
-    for word in options.more:
-        name = word.partition("=")[0]
-        if name in ("--seed", "--movements", "--out"):
-            raise ValueError(f"{name} is the demo's own; it goes before --")
-        if name in ("--algorithm", "--name"):
-            raise ValueError(f"{name} cannot be given here: the demo compares learners by their own names")
-    return options
-
-
-def _next_steps(options: argparse.Namespace, film: Path) -> str:
-    sgimd = ["sgimd"] if shutil.which("sgimd") else [sys.executable, "-m", "sgimd_torch"]
-    run = ["run", "--seed", str(options.seed), "--out", str(options.out), "--movements", str(options.movements)]
-    steps = {
-        "a film of how SGIM-D learns": ["film", str(film), "--time-lapse"],
-        "one page: curves, maps, where it is curious": ["report", str(options.out)],
-        "the same without a teacher": [*run, *options.more, "--algorithm", "practice"],
-    }
-    return "\n".join(f"  {shlex.join([*sgimd, *words])}    # {why}" for why, words in steps.items())

@@ -2,81 +2,112 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
-try:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-except ImportError as error:
-    raise ImportError(f"the figure needs matplotlib: pip install 'sgimd-torch[plot]' ({error})") from error
-
-from sgimd_torch.figures.learning import NAMES, landing_points, tile_counts
+from sgimd_torch.figures.axes import goal_rings, water_plane
+from sgimd_torch.figures.learning import COLOURS, NAMES, landing_points, tile_counts
 from sgimd_torch.figures.results import SeedCurves, seed_curves
-from sgimd_torch.record import RunError
-from sgimd_torch.spaces import Box
-from sgimd_torch.views.demo_cast import answers, from_above, from_the_side
-from sgimd_torch.views.variants import Life, demonstrated
+from sgimd_torch.runs.build import build
+from sgimd_torch.runs.read import Run, config_of
+from sgimd_torch.spaces import Array, Box, stream
+from sgimd_torch.views.memories import remember
+
+GOALS = np.array([[-0.6, -0.6], [-0.6, 0.6], [0.6, 0.6], [0.6, -0.6]])  # m; few random movements lead behind the arm
 
 
-def draw(runs: Mapping[str, Life]) -> Figure:
-    """The figure: error curves; four goals and how each learner answers them; where the float landed in each run.
+class Cast(NamedTuple):
+    """An answer: of the float its ``path`` ``(n, 3)`` m down to the water, of the arm its ``posture`` ``(7, 3)`` m when
+    the float is let go or lands."""
 
-    Raises:
-        RunError: a run was never evaluated.
-    """
-    for run in runs.values():
-        if not run.evaluated:
-            raise RunError(f"{run.path} was never evaluated, so there is no curve to draw; was --evaluate_at [] given?")
-    sgim_d, half_side = runs["sgim-d"], float(runs["sgim-d"].config["task_space"])
-    task_space = Box.cube(-half_side, half_side, 2)
-    tile = 0.05 * half_side
-    most = max(float(tile_counts(run.landed, task_space, tile).max()) for run in runs.values())
+    path: Array
+    posture: Array
+
+
+def draw(runs: Mapping[str, Run]) -> Figure:
+    """The figure: error curves; four goals and how each learner answers them; where the float landed in each run."""
+    half_side = float(runs["sgim-d"].config["task_space"])
+    box, tile = Box.cube(-half_side, half_side, 2), 0.05 * half_side
     figure = Figure(figsize=(7 * len(runs), 12.6), layout="constrained")
     axes: dict[str, Axes] = figure.subplot_mosaic([["curves", "above", "side"], [*runs]])
     seed_curves(axes["curves"], [_curve(algorithm, run) for algorithm, run in runs.items()])
     axes["curves"].set_title("How far from its goals the float lands")
-    casts = {algorithm: answers(run.path) for algorithm, run in runs.items()}
-    from_above(axes["above"], casts, task_space)
     axes["above"].set_title("Four goals and their answers, from above", pad=55)
-    from_the_side(axes["side"], casts, task_space)
     axes["side"].set_title("The arm casts at the goal behind it, on the left")
+    _draw_casts(axes["above"], axes["side"], {algorithm: list(answers(run)) for algorithm, run in runs.items()}, box)
+    landed = {algorithm: run.outcomes[np.isfinite(run.outcomes).all(axis=1)] for algorithm, run in runs.items()}
+    most = max(float(tile_counts(each, box, tile).max()) for each in landed.values())
     for algorithm, run in runs.items():
-        ax = axes[algorithm]
-        shown, _ = demonstrated([run])
-        landing_points(ax, run.landed, task_space, demonstrated=shown if len(shown) else None, side=tile, most=most)
-        ax.set_title(f"Where the float landed: {NAMES[algorithm]}", pad=32)
-    n = " and ".join(dict.fromkeys(str(len(run.index)) for run in runs.values()))
-    seed = sgim_d.config["seed"]
-    figure.suptitle(f"A simulated arm learns to place its float: {n} movements each, seed {seed}", fontsize="x-large")
+        landing_points(axes[algorithm], landed[algorithm], box, demonstrated=_shown(run), side=tile, most=most)
+        axes[algorithm].set_title(f"Where the float landed: {NAMES[algorithm]}", pad=32)
+    config = runs["sgim-d"].config
+    about = f"{config['movements']} movements each, seed {config['seed']}"
+    figure.suptitle(f"A simulated arm learns to place its float: {about}", fontsize="x-large")
     return figure
 
 
-def table(runs: Mapping[str, Life]) -> str:
-    """Errors and costs of the runs, and the ratios of the last errors."""
-    evaluated = runs["sgim-d"].evaluation["movements"].astype(int).tolist()
-    columns = [movements for movements in (1000, 2000, 5000) if movements in evaluated[:-1]] + evaluated[-1:]
-    heads = [*(f"error {movements}" for movements in columns), "noise floor", "physics", "learning", "evaluation"]
-    width = max(len(NAMES[algorithm]) for algorithm in runs)
-    lines = [" " * width + "".join(f"{head:>13}" for head in heads)]
+def table(runs: Mapping[str, Run]) -> list[list[str]]:
+    """A row for each run: errors, the last one also as a share of the random learner's, noise floor and costs; the
+    first row has the heads."""
+    whens = runs["sgim-d"].evaluation["movements"].astype(int).tolist()
+    columns = [movements for movements in (1000, 2000, 5000) if movements in whens[:-1]] + whens[-1:]
+    heads = [*(f"error {movements} (m)" for movements in columns), "of Random's", "noise floor (m)"]
+    rows = [["learner", *heads, "physics (s)", "learning (s)", "evaluation (s)"]]
     for algorithm, run in runs.items():
-        cells = [_shown(run.at(movements), ".3f", "m") for movements in columns]
-        cells.append(_shown(run.evaluation["noise_floor_m"][-1], ".3f", "m"))
-        cells += [_shown(run.seconds(part), ".0f", "s") for part in ("physics", "learner", "evaluation")]
-        lines.append(f"{NAMES[algorithm]:{width}}" + "".join(f"{cell:>13}" for cell in cells))
-    last = {algorithm: run.evaluation["mean_error"][-1] for algorithm, run in runs.items()}
-    ratios = " and ".join(
-        f"{NAMES[algorithm]} {error / last['random']:.2f}" for algorithm, error in last.items() if algorithm != "random"
-    )
-    lines.append(f"Error after {columns[-1]} movements, as a share of Random's: {ratios}.")
-    return "\n".join(lines)
+        last = run.evaluation["mean_error"][-1]
+        errors = [f"{run.at(movements):.3f}" for movements in columns]
+        share, floor = last / runs["random"].evaluation["mean_error"][-1], run.at(columns[-1], "noise_floor")
+        seconds = [f"{run.summary[f'seconds_{part}']:.0f}" for part in ("physics", "learner", "evaluation")]
+        rows.append([NAMES[algorithm], *errors, f"{share:.2f}", f"{floor:.3f}", *seconds])
+    return rows
 
 
-def _curve(algorithm: str, run: Life) -> SeedCurves:
+def answers(run: Run) -> Iterator[Cast]:
+    """How a learner on the fishing rod answers ``GOALS`` after its last movement; all runs have the same noise."""
+    parts = build(config_of(run), run.path)
+    remember(run, parts, 0, len(run.index))
+    rod: Any = parts.environment
+    context = (rod.contexts.low + rod.contexts.high) / 2
+    for k, goal in enumerate(GOALS):
+        recording = rod.record(context, parts.inverse(context, goal).theta, stream(run.config["seed"], "demo", k))
+        path = np.stack([recording.float_at(time) for time in np.linspace(0, recording.landed, 100)])
+        end = recording.landed if recording.let_out is None else recording.let_out
+        yield Cast(path, rod.posture(recording, end))
+
+
+def _draw_casts(above: Axes, beside: Axes, casts: Mapping[str, Sequence[Cast]], box: Box) -> None:
+    """From above, the float's paths to all goals; from the side, the arms and the paths for the first goal."""
+    beside.axhspan(-0.12, 0, color="#4f93b8", alpha=0.5, linewidth=0)  # the water
+    beside.plot([0, 0], [0, 0.25], color="0.4", linewidth=7, solid_capstyle="butt")
+    for algorithm, each in casts.items():
+        colour, first = COLOURS[algorithm], each[0]
+        ends = np.array([cast.path[-1, :2] for cast in each])
+        missed = f"{NAMES[algorithm]}: misses by {100 * np.linalg.norm(ends - GOALS, axis=1).mean():.0f} cm"
+        drawn = [(above, cast, [0, 1]) for cast in each] + [(beside, first, [0, 2])]
+        beside.plot(*first.posture[:, [0, 2]].T, "-", color=colour, linewidth=1.5, alpha=0.7)  # with the rod
+        arm = first.posture[:-1, [0, 2]]
+        beside.plot(*arm.T, "o-", color=colour, linewidth=5, markersize=6, mec="white", alpha=0.9)
+        for ax, cast, seen in drawn:
+            ax.plot(*cast.path[:, seen].T, ":", color=colour, linewidth=1.8)
+            label = missed if ax is above and cast is first else None
+            ax.plot(*cast.path[-1:, seen].T, "X", color=colour, mec="white", ms=10, label=label)
+    goal_rings(above, GOALS, 17)
+    water_plane(above, box)
+    goal_rings(beside, [[GOALS[0, 0], 0.0]], 17)
+    beside.set(xlim=(box.low[0], box.high[0]), ylim=(-0.12, 1.2), aspect="equal", xlabel="x (m)", ylabel="height (m)")
+
+
+def _curve(algorithm: str, run: Run) -> SeedCurves:
     when, errors = (run.evaluation[name] for name in ("movements", "mean_error"))
     return SeedCurves(algorithm, NAMES[algorithm], when, errors[None], errors, errors, errors)
 
 
-def _shown(value: float, form: str, unit: str) -> str:
-    return f"{value:{form}} {unit}" if np.isfinite(value) else "-"
+def _shown(run: Run) -> Array | None:
+    """``(n, 2)`` m outcomes of the demonstrations that the learner was shown, None without any."""
+    rows = sorted({*run.demonstration[run.demonstration >= 0].tolist()})
+    shown = build(config_of(run), run.path).demonstrations if rows else []
+    return np.array([shown[row].outcome for row in rows]) if rows else None

@@ -24,17 +24,14 @@ from __future__ import annotations
 import argparse
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from sgimd_torch.catalogue import ROD
 from sgimd_torch.runs.config import Config
-from sgimd_torch.runs.engines.loop import sweep
 from sgimd_torch.runs.process import loading, say
-from sgimd_torch.runs.read import finished, movements_on_disk, read_run
-from sgimd_torch.runs.sweep import add_engines, add_options, engine_of, variants_of
-
-if TYPE_CHECKING:
-    from sgimd_torch.spaces import Array
+from sgimd_torch.runs.read import finished
+from sgimd_torch.runs.sweep import add_engines, add_options, add_vary, carry_out, variants_of
+from sgimd_torch.views.text_table import print_table
 
 
 @dataclass(frozen=True)
@@ -47,21 +44,17 @@ class Suited:
     quick: bool = True
 
 
-def _robot(word: str, *, new: bool = False) -> Suited:
-    return Suited({"environment": word}, new)
-
-
 TASKS: Final[dict[str, Suited]] = {
     "rod": Suited({"environment": ROD}, quick=False),
-    "planar-arm-50": _robot("planar-arm-50"),
-    "toss": _robot("toss"),
-    "two-elbows": _robot("two-elbows"),
-    "half-reached": _robot("half-reached"),
+    "planar-arm-50": Suited({"environment": "planar-arm-50"}),
+    "toss": Suited({"environment": "toss"}),
+    "two-elbows": Suited({"environment": "two-elbows"}),
+    "half-reached": Suited({"environment": "half-reached"}),
     "rod-large": Suited({"environment": ROD, "task_space": 100.0}, new=True, quick=False),
     "swimmer": Suited({"environment": "swimmer"}, new=True, quick=False),
-    "planar-arm-7": _robot("planar-arm-7", new=True),
-    "crawler": _robot("crawler", new=True),
-    "spatial-arm": _robot("spatial-arm", new=True),
+    "planar-arm-7": Suited({"environment": "planar-arm-7"}, new=True),
+    "crawler": Suited({"environment": "crawler"}, new=True),
+    "spatial-arm": Suited({"environment": "spatial-arm"}, new=True),
 }
 RANDOM, UNIFORM = "random-nearest", "uniform-nearest"
 REFERENCES: Final[dict[str, dict[str, Any]]] = {
@@ -82,27 +75,17 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run what is not finished, print the table, draw the figure; 1 where runs failed."""
     options, rest = _options(argv)
     configs, flags = runs_of(options, rest)
-    mine, out = options.shard.of(configs), configs[0].out.parent
-    left = [config for config in mine if not finished(config)]
-    say(f"{len(mine)} runs{options.shard.note(configs)}, {len(mine) - len(left)} of them finished: {out}")
+    out = configs[0].out.parent
     if options.dry_run:
-        for config in left:
-            done = movements_on_disk(config.directory)
-            print(f"{config.out.name}: {config.title}: {done} of {config.movements} movements")
-        return 0
-    with loading():
-        from sgimd_torch.runs.build import build  # after --help
-        from sgimd_torch.views.suite_figure import draw, table
-    for config in {(each.out, each.variant): each for each in left}.values():
-        build(config)  # a wrong option is refused before anything starts
-    with engine_of(options, left) as engine:
-        failures = sweep(left, engine, flags=flags)
-    errors = errors_of([config for config in configs if finished(config)])
+        return carry_out(configs, options, flags, out)
+    with loading():  # after --help, and before the runs: it may not be installed
+        from sgimd_torch.views.suite_figure import draw, errors_of, table
+    code = carry_out(configs, options, flags, out)
+    errors = errors_of([config for config in configs if finished(config)], titled)
     if errors:
-        print(table(errors))
+        print_table(table(errors))
         say(*(f"figure: {path}" for path in draw(errors, out / "suite")))
-    say(f"{len(left) - len(failures)} runs ended well, {len(failures)} failed: {out}", *failures)
-    return 1 if failures else 0
+    return code
 
 
 def runs_of(options: argparse.Namespace, rest: Sequence[str]) -> tuple[list[Config], list[str]]:
@@ -135,22 +118,6 @@ def runs_of(options: argparse.Namespace, rest: Sequence[str]) -> tuple[list[Conf
     return configs, flags
 
 
-def errors_of(configs: Sequence[Config]) -> dict[str, dict[str, dict[int, Array]]]:
-    """Mean errors ``(n_seeds,)`` of finished runs: by task, learner and number of movements."""
-    import numpy as np
-
-    found: dict[str, dict[str, dict[int, list[float]]]] = {}
-    for config in configs:
-        run = read_run(config.directory).evaluation
-        curve = found.setdefault(titled(config.out.name), {}).setdefault(config.variant, {})
-        for movements, error in zip(run["movements"], run["mean_error"], strict=True):
-            curve.setdefault(int(movements), []).append(float(error))
-    return {
-        task: {name: {at: np.array(values) for at, values in curve.items()} for name, curve in learners.items()}
-        for task, learners in found.items()
-    }
-
-
 def titled(task: str) -> str:
     """The name of a task, marked if it is new."""
     return task + " (new)" * TASKS[task].new
@@ -174,9 +141,7 @@ def parser() -> argparse.ArgumentParser:
         metavar="TASK",
         help="which; quick: those without physics; all (default: quick)",
     )
-    parser.add_argument(
-        "--vary", action="append", default=[], metavar="OPTION=VALUE,VALUE", help="one option of sgimd run"
-    )
+    add_vary(parser)
     add_options(parser, seeds="0")
     add_engines(parser)
     return parser

@@ -1,206 +1,119 @@
-"""Sweeps on a Ray cluster: what dies on the way, a node or the sweep itself, changes no byte of what comes out."""
+"""Sweeps on a Ray cluster: what dies on the way changes nothing in what comes home."""
 
+import os
 import re
 import secrets
-import signal
-import socket
+import sqlite3
 import subprocess
 import sys
-import time
 
 import pytest
 
-from runs import csv_of, signal_after, start
-from sgimd_torch.files import locked
-from sgimd_torch.runs.process import command
-from sgimd_torch.runs.sweep import main
-
-# An arm that takes its time, so that there is something to interrupt, but only on the nodes of the cluster.
-SLOW = """
-import os, time
-import numpy as np
-from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.evaluation import Benchmark
-from sgimd_torch.runs.tasks import Task
-
-class Slow(PlanarArm):
-    def execute(self, context, theta, rng):
-        time.sleep(float(os.environ.get("NAP", "0")))
-        return super().execute(context, theta, rng)
-
-def make():
-    return Task(Slow(), lambda: Benchmark("Slow", np.array([[0.5, 0.5], [-0.3, 0.2]]), 0.1))
-"""
-# Ray's own cluster for tests: a head without cores for runs, and two nodes with one each, all on this machine.
-CLUSTER = """
-import sys
-from ray.cluster_utils import Cluster
-cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 0})
-nodes = [cluster.add_node(num_cpus=1), cluster.add_node(num_cpus=1)]
-print("address", cluster.address, flush=True)
-for line in sys.stdin:
-    cluster.remove_node(nodes.pop(0), allow_graceful=False)
-    nodes.append(cluster.add_node(num_cpus=1))
-cluster.shutdown()
-"""
-SWEEP = """
-import os, sys
-os.chdir(sys.argv.pop(1))
-from sgimd_torch.runs import process, sweep
+from odd import ODD, SWEEP, as_alone, odd_place, said_by
+from runs import start
+from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.engines import on_ray
-on_ray.SEND_EVERY, on_ray.ANSWER_WITHIN = 0.3, float(os.environ.get("ANSWER_WITHIN", "60"))
-sys.exit(process.command(sweep.main))
+from sgimd_torch.runs.process import Failed
+
+# Like SWEEP, in a working directory, and it leaves its number where MARK says.
+FAR = "import os, sys; os.chdir(sys.argv.pop(1)); open(os.environ['MARK'], 'w').write(str(os.getpid()));" + SWEEP
+# A process that is killed in the middle of a transaction, with half of it in the file.
+TORN = """
+import os, signal, sqlite3, sys
+file = sqlite3.connect(sys.argv[1], isolation_level=None)
+file.execute("PRAGMA cache_size = 1")
+file.execute("CREATE TABLE rows (content)")
+for committed in (True, False):
+    file.execute("BEGIN")
+    file.executemany("INSERT INTO rows VALUES (?)", [(str(committed) * 500,)] * 100)
+    if committed:
+        file.execute("COMMIT")
+os.kill(os.getpid(), signal.SIGKILL)
 """
-LIVES = ["--environment", "slow:make", "--algorithm", "sagg-riac", "--movements", "250", "--evaluate-at", "100"]
-LIVES += ["--repeats", "0", "--seeds", "0-1"]
 pytestmark = pytest.mark.skipif(" " in sys.executable, reason="Ray cannot start Python from a path with a space")
-FRESH = "holds no run yet"  # what a run says that does not go on from somewhere
 
 
-@pytest.fixture(scope="module")
-def place(tmp_path_factory):
-    """The working directory of the sweeps, with their robot."""
-    place = tmp_path_factory.mktemp("place")
-    (place / "slow.py").write_text(SLOW)
-    return place
+def test_a_task_begins_with_what_it_is_given_and_returns_the_record_and_what_was_said(monkeypatch):
+    program = (
+        "import pathlib, sys; record = pathlib.Path('runs/run.sqlite');"
+        "record.write_bytes(record.read_bytes() + b' and more'); print(sys.argv[1:]); sys.exit('error: no goals')"
+    )
+    monkeypatch.setattr(on_ray, "PROGRAM", ("-c", program))
+    code, said, record = on_ray.carry_out(["run"], "runs/run.sqlite", {"runs/run.sqlite": b"some", "goals.npz": b"1"})
+    assert (code, said, record) == (1, b"['run']\nerror: no goals\n", b"some and more")
+    monkeypatch.setattr(on_ray, "PROGRAM", ("-c", "print(open('goals.npz').read())"))
+    assert on_ray.carry_out([], "runs/run.sqlite", {"goals.npz": b"1"}) == (0, b"1\n", None)
 
 
-@pytest.fixture(scope="module")
-def slowly():
-    """What is started from now on takes its time; and has a token of its own, or Ray would write one to the home."""
-    with pytest.MonkeyPatch.context() as patched:
-        for name, value in {"NAP": "0.02", "RAY_AUTH_MODE": "token", "RAY_AUTH_TOKEN": secrets.token_hex(32)}.items():
-            patched.setenv(name, value)
-        yield
+def test_what_a_task_returns_is_kept_whatever_came_of_it(tmp_path):
+    config = Config("random", out=tmp_path)
+    on_ray._keep(config, (0, b"well\n", b"record"))
+    with pytest.raises(Failed, match="no goals"):
+        on_ray._keep(config, (1, b"error: no goals\n", None))
+    assert (config.directory / "run.sqlite").read_bytes() == b"record"
+    assert config.directory.with_suffix(".log").read_text() == "well\nerror: no goals\n"
 
 
-@pytest.fixture(scope="module")
-def cluster(slowly):
-    """The process of a cluster; each line that it reads kills a node, and later adds another."""
-    words, pipe = [sys.executable, "-c", CLUSTER], subprocess.PIPE
-    process = subprocess.Popen(words, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL, text=True)
-    process.address = next(line.split()[1] for line in process.stdout if line.startswith("address"))
-    yield process
-    process.communicate()
-
-
-def directories_in(out):
-    return [out / "sagg-riac" / f"seed-00{seed}" for seed in (0, 1)]
-
-
-def on_ray(out, *options):
-    """Start the sweep; ``out`` is in its working directory."""
-    return start(SWEEP, out.parent, *LIVES, "--out", out.name, "--engine", "ray", *options)
-
-
-@pytest.fixture(scope="module")
-def alone(place, tmp_path_factory):
-    """What the same runs write on one machine."""
-    with pytest.MonkeyPatch.context() as patched:
-        patched.chdir(place)
-        patched.delenv("NAP", raising=False)
-        assert command(main, [*LIVES, "--out", "alone", "--processes", "1"]) == 0
-    return [csv_of(directory) for directory in directories_in(place / "alone")]
-
-
-def under_way(process, directories):
-    """Wait until all runs have movements at home."""
-    logs = [directory / "episodes.csv" for directory in directories]
-    while not all(log.exists() and log.read_bytes().count(b"\n") > 20 for log in logs):
-        assert process.poll() is None, process.communicate()
-        time.sleep(0.05)
-
-
-def ended(process):
-    _, errors = process.communicate(timeout=300)
-    assert process.returncode == 0, errors
-    assert "Traceback" not in errors
-    return errors
-
-
-@pytest.mark.slow
-def test_when_a_node_dies_its_run_goes_on_elsewhere_with_the_same_results(cluster, place, alone):
-    directories, process = directories_in(place / "node"), on_ray(place / "node", "--address", cluster.address)
-    under_way(process, directories)
-    print(file=cluster.stdin, flush=True)
-    assert "2 runs ended well, 0 failed" in ended(process)
-    assert [csv_of(directory) for directory in directories] == alone
-    resumed = [FRESH not in directory.with_suffix(".log").read_text() for directory in directories]
-    assert sorted(resumed) == [False, True]
-
-
-@pytest.mark.slow
-def test_when_the_sweep_is_killed_the_same_command_goes_on_with_the_same_results(cluster, place, alone):
-    out = place / "driver"
-    directories, process = directories_in(out), on_ray(out, "--address", cluster.address)
-    under_way(process, directories)
-    process.kill()
-    process.communicate()
-    before = [(directory / "episodes.csv").read_bytes() for directory in directories]
-    ended(on_ray(out, "--address", cluster.address))
-    for directory, start_of_it, wanted in zip(directories, before, alone, strict=True):
-        assert csv_of(directory) == wanted
-        assert wanted["episodes.csv"].startswith(start_of_it[: start_of_it.rindex(b"\n")])
-        assert FRESH not in directory.with_suffix(".log").read_text()
-
-
-@pytest.mark.slow
-def test_stopped_it_leaves_no_run_behind_and_goes_on_as_if_nothing_had_happened(slowly, place, alone, monkeypatch):
-    directories = directories_in(place / "stopped")
-    log = directories[0] / "episodes.csv"
-    code, said = signal_after(on_ray(place / "stopped", "--processes", 1), log, 20, signal.SIGINT)
-    assert code == 130
-    assert "stopping all runs; the same command goes on from here" in said
-    assert "Traceback" not in said
-    assert not any(locked(directory / "lock") for directory in directories)
-    before = log.read_bytes()
-    assert 20 <= before.count(b"\n") < 251
-    assert not directories[1].exists()  # there is one core, and the other run waits for it
-    monkeypatch.chdir(place)
-    monkeypatch.delenv("NAP")
-    assert command(main, [*LIVES, "--out", "stopped"]) == 0  # now without Ray
-    assert [csv_of(directory) for directory in directories] == alone
-    assert FRESH not in directories[0].with_suffix(".log").read_text()
+def test_of_a_record_whose_process_was_killed_the_last_commit_is_sent(tmp_path):
+    path = tmp_path / "run.sqlite"
+    subprocess.run([sys.executable, "-c", TORN, path])
+    assert path.with_name("run.sqlite-journal").exists()
+    with sqlite3.connect(":memory:") as sent:
+        sent.deserialize(on_ray._snapshot(path))
+        assert sent.execute("SELECT count(*) FROM rows").fetchone() == (100,)
+    path.write_bytes(b"no record" * 500)
+    with pytest.raises(sqlite3.DatabaseError):
+        on_ray._snapshot(path)
 
 
 def test_a_python_that_ray_cannot_start_is_refused(monkeypatch):
-    from sgimd_torch.runs.engines.on_ray import OnRay
-
     monkeypatch.setattr(sys, "executable", "/a place/bin/python")
-    with pytest.raises(
-        ValueError, match="from a path with a space, /a place/bin/python, for runs with parts of your own"
-    ):
-        OnRay(None, ships=True)
-    OnRay(None)
+    with pytest.raises(ValueError, match="/a place/bin/python"), on_ray.on_ray(None, ships=True):
+        pass
 
 
 @pytest.mark.parametrize(
     ("address", "message"),
     [
-        ("nonsense", "no Ray cluster can be used at nonsense: .*nonsense"),
-        ("ray://head:10001", "--address must be host:port, or auto, got ray://head:10001; start the sweep on a node"),
+        ("nonsense", "--address must be host:port, or auto, got nonsense"),
+        ("ray://head:10001", "--address must be host:port, or auto, got ray://head:10001"),
+        ("127.0.0.1:99999", "no Ray cluster answers at 127.0.0.1:99999"),
+        ("127.0.0.1:1", "no Ray cluster answers at 127.0.0.1:1: .*is its head running"),
     ],
 )
-def test_an_address_that_cannot_be_used_is_refused_in_one_line(place, address, message):
-    assert re.search(message, refused(place, "--address", address))
+def test_an_address_that_cannot_be_used_is_refused(address, message):
+    with pytest.raises(ValueError, match=re.escape(message).replace(r"\.\*", ".*")), on_ray.on_ray(address):
+        pass
 
 
-def test_where_nothing_answers_it_ends_in_time(place, monkeypatch):
-    monkeypatch.setenv("ANSWER_WITHIN", "4")
-    with socket.create_server(("127.0.0.1", 0)) as silent:
-        address = f"127.0.0.1:{silent.getsockname()[1]}"
-        began = time.monotonic()
-        said = refused(place, "--address", address)
-    assert f"no Ray cluster answers at {address} within 4 s; is its head running" in said
-    assert time.monotonic() - began < 30
+@pytest.fixture(scope="module")
+def odd(tmp_path_factory):
+    """The working directory of the sweeps, with their robot; Ray gets a token, or it would write one to the home."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setenv("RAY_AUTH_MODE", "token")
+        patched.setenv("RAY_AUTH_TOKEN", secrets.token_hex(32))
+        yield odd_place(tmp_path_factory.mktemp("odd"))
 
 
-def refused(place, *options):
-    """What it says; nothing is left behind."""
-    process = on_ray(place / "refused", *options)
-    _, errors = process.communicate(timeout=120)
-    assert process.returncode == 2, errors
-    said = [line for line in errors.splitlines() if "of them finished" not in line]
-    assert len(said) == 1
-    assert not (place / "refused").exists()
-    return said[0]
+def far(odd, monkeypatch, out, at_20):
+    """A sweep of two runs on a cluster of one core that Ray starts here."""
+    monkeypatch.setenv("MARK", str(odd / "mark"))
+    monkeypatch.setenv("AT_20", at_20)
+    engine = ["--engine", "ray", "--processes", "1", "--seeds", "0-1"]
+    return start(FAR, odd, *ODD, *engine, "--out", os.path.relpath(odd / out, odd))
+
+
+@pytest.mark.slow
+def test_when_a_task_dies_it_is_started_again_with_the_same_results(odd, monkeypatch):
+    said = said_by(far(odd, monkeypatch, "far", "kills the task once"), 0)
+    assert (odd / "mark").read_text() == "killed"
+    assert "2 runs ended well, 0 failed" in said
+    assert as_alone(odd, odd / "far", (0, 1))
+
+
+@pytest.mark.slow
+def test_stopped_it_goes_on_as_if_nothing_had_happened(odd, monkeypatch):
+    said = said_by(far(odd, monkeypatch, "stopped", "stops the sweep far away"), 130)
+    assert "stopping all runs; the same command goes on from here" in said
+    assert "2 runs ended well, 0 failed" in said_by(far(odd, monkeypatch, "stopped", ""), 0)
+    assert as_alone(odd, odd / "stopped", (0, 1))

@@ -16,7 +16,6 @@ from sgimd_torch.runs.directory import sources
 from sgimd_torch.runs.log import read_json
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.sweep import main as sweep
-from sgimd_torch.runs.sweep import uses_working_directory
 
 SHORT = "--environment sliders:Slider --algorithm random --movements 40 --evaluate-at 20 --repeats 0 --out"
 OWN = [*SHORT.split(), "runs"]
@@ -71,9 +70,6 @@ def test_every_part_of_ones_own_counts_and_none_of_ours(own):
         assert sorted(sources(config)) == ["source of kit.answers:nearest", "source of sliders:Slider"]
         assert sources(config)["source of kit.answers:nearest"].startswith("kit/answers.py, crc32 ")
         assert source("kit:nearest") == own / "kit/answers.py"
-        alone = Config(environment="planar-arm-7", algorithm="random", answers=("own", "kit.answers:nearest"))
-        assert uses_working_directory(alone)
-        assert not uses_working_directory(Config())
     finally:
         for name in ("kit", "kit.answers"):
             sys.modules.pop(name, None)

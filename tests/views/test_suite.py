@@ -1,5 +1,7 @@
 """The suite: which runs it makes, what it shows of them, and what it refuses."""
 
+import sys
+
 import numpy as np
 import pytest
 
@@ -9,11 +11,13 @@ from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.tasks import goals_all_over
-from sgimd_torch.views.suite import RANDOM, TASKS, UNIFORM, _options, errors_of, main, runs_of
+from sgimd_torch.views.suite import RANDOM, TASKS, UNIFORM, _options, main, runs_of
 from sgimd_torch.views.suite_figure import figure, relative, table
 
 SHORT = ("--movements", "40", "--evaluate-at", "20", "--processes", "1")
 LEARNER = ("--goals", "uniform", "--search", "perturb", "--budget", "1")
+FOUND = {("toss", RANDOM, 100): [0.2], ("toss", "mine", 100): [0.1], ("toss", "other", 100): [0.3]}
+ERRORS = {key: np.array(values) for key, values in FOUND.items()}
 
 
 def suite(*words):
@@ -23,11 +27,6 @@ def suite(*words):
 
 def configs_of(*words):
     return runs_of(*_options(words))[0]
-
-
-def errors(**learners):
-    """Of one task, after 100 movements."""
-    return {"toss": {name.replace("_", "-"): {100: np.array(values)} for name, values in learners.items()}}
 
 
 def test_half_of_the_tasks_and_no_more_are_used_to_choose_defaults():
@@ -51,8 +50,7 @@ def test_each_task_is_run_with_the_learner_and_with_the_two_that_it_has_to_beat(
         (word, side, seed) for word, side in (("toss", 1.0), ("fishing-rod", 100.0)) for seed in (3, 4)
     }
     assert {(config.variant, config.budget) for config in configs} == {(RANDOM, 15), (UNIFORM, 1), ("practice", 7)}
-    assert {config.movements for config in configs} == {40}
-    assert {config.evaluate_at for config in configs} == {(20,)}
+    assert {(config.movements, config.evaluate_at) for config in configs} == {(40, (20,))}
 
 
 def test_what_is_varied_gives_a_learner_for_each_value():
@@ -85,53 +83,58 @@ def test_a_suite_is_run_shown_and_gone_on_with(tmp_path, capsys):
     assert suite(*words) == 0
     shown = capsys.readouterr().out
     assert (out / "suite.png").read_bytes().startswith(b"\x89PNG")
-    at_40 = {
-        name: read_run(out / "toss" / name / "seed-000").evaluation["mean_error_m"][-1] for name in (RANDOM, UNIFORM)
-    }
+    random, uniform = (read_run(out / "toss" / name / "seed-000").at(40) for name in (RANDOM, UNIFORM))
     line = next(line.split() for line in shown.splitlines() if line.startswith("40") and "toss" in line)
-    assert line[2:4] == [f"{at_40[RANDOM]:.4g}", f"{at_40[UNIFORM] / at_40[RANDOM]:.2f}"]
+    assert line[2:4] == [f"{random:.4g}", f"{uniform / random:.2f}"]
     assert suite(*words, "--dry-run") == 0
     assert capsys.readouterr().out == ""
     assert suite(*words, "--seeds", "0-1", "--dry-run") == 0
-    assert "toss: practice seed 1: 0 of 40 movements" in capsys.readouterr().out
+    assert f"{out}/toss/practice/seed-001: 0 of 40 movements" in capsys.readouterr().out
     assert suite(*words, "--seeds", "0-1", "--shard", "1/2", "--dry-run") == 0
     assert capsys.readouterr().out == ""  # the first half of the list is seed 0
 
 
 def test_seeds_give_the_ratio_of_means_and_an_interval_around_it():
     ours, theirs = np.array([0.1, 0.12, 0.12, 0.12, 0.14]), np.array([0.2, 0.3, 0.3, 0.3, 0.4])
-    found = relative({100: ours}, {100: theirs}, 100)
-    assert found.value == pytest.approx(0.4)
-    assert 0.1 / 0.4 <= found.low < 0.4 < found.high <= 0.14 / 0.2
+    found = relative({("toss", "one", 9): theirs, ("toss", "mine", 9): ours})
+    assert [*found] == [("toss", "mine", 9)]
+    ratio = found["toss", "mine", 9]
+    assert ratio.value == pytest.approx(0.4)
+    assert 0.1 / 0.4 <= ratio.low < 0.4 < ratio.high <= 0.14 / 0.2
     for few in (1, 4):
-        alone = relative({100: ours[:few]}, {100: theirs[:few]}, 100)
-        assert alone.value == pytest.approx(ours[:few].mean() / theirs[:few].mean())
-        assert np.isnan(alone.low)
+        (ratio,) = relative({("toss", "one", 9): theirs[:few], ("toss", "mine", 9): ours[:few]}).values()
+        assert ratio.value == pytest.approx(ours[:few].mean() / theirs[:few].mean())
+        assert np.isnan(ratio.low)
 
 
 def test_what_was_not_evaluated_is_a_dash_and_no_mean():
-    found = errors(random_nearest=[0.2], mine=[0.1])
-    found["crawler (new)"] = {"random-nearest": {100: np.array([0.5])}}
-    lines = table(found).splitlines()
-    assert lines[1].split() == ["100", "toss", "0.2", "0.50"]
-    assert lines[2].split() == ["100", "crawler", "(new)", "0.5", "-"]
-    assert lines[3].split() == ["100", "interquartile", "mean", "0.50"]
+    assert table({**ERRORS, ("crawler (new)", RANDOM, 100): np.array([0.5])}) == [
+        ["movements", "task", f"error of {RANDOM}", "mine", "other"],
+        ["100", "toss", "0.2", "0.50", "1.50"],
+        ["100", "crawler (new)", "0.5", "-", "-"],
+        ["100", "interquartile mean", "", "0.50", "1.50"],
+    ]
 
 
 def test_the_figure_has_a_panel_for_each_task_with_a_curve_for_each_learner():
-    found = errors(random_nearest=[0.2], mine=[0.1], other=[0.3])
-    found["crawler (new)"] = found["toss"]
-    panels = [ax for ax in figure(found).axes if ax.axison]
+    crawler = {("crawler (new)", learner, at): errors for (_, learner, at), errors in ERRORS.items()}
+    panels = [ax for ax in figure({**ERRORS, **crawler}).axes if ax.axison]
     assert [ax.get_title() for ax in panels] == ["toss", "crawler (new)"]
     assert [line.get_label() for line in panels[0].lines] == [RANDOM, "mine", "other"]
     assert panels[0].lines[1].get_ydata() == pytest.approx([0.5])
 
 
-def test_runs_that_are_there_are_read_by_task_and_learner(tmp_path):
-    words = ("--tasks", "toss", "--out", str(tmp_path), *LEARNER, *SHORT)
-    assert suite(*words) == 0
-    found = errors_of(configs_of(*words))
-    assert list(found) == ["toss"]
-    assert {name: sorted(curve) for name, curve in found["toss"].items()} == {
-        name: [20, 40] for name in (RANDOM, UNIFORM, "practice")
-    }
+@pytest.mark.parametrize("words", [["suite"], ["demo"]])
+def test_without_matplotlib_the_extra_is_named_before_anything_runs(tmp_path, monkeypatch, capsys, words):
+    from sgimd_torch.__main__ import _call
+
+    monkeypatch.chdir(tmp_path)
+    for name in [name for name in sys.modules if name.startswith(("sgimd_torch.views", "sgimd_torch.figures"))]:
+        monkeypatch.delitem(sys.modules, name)
+    for name in ("matplotlib", "matplotlib.axes", "matplotlib.figure"):
+        monkeypatch.setitem(sys.modules, name, None)
+    assert command(_call, words) == 2
+    slip = "which is not installed; pip install 'sgimd-torch[plot]' installs it"
+    assert f"error: sgimd {words[0]} needs matplotlib" in (said := capsys.readouterr().err)
+    assert slip in said
+    assert not list(tmp_path.iterdir())

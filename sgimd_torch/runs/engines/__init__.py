@@ -1,1 +1,1 @@
-"""Where the runs of a sweep are carried out: in processes of this machine, or on a cluster."""
+"""Where a list of runs is carried out: in processes of this machine, or on a cluster; ``loop`` is the same for both."""

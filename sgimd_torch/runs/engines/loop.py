@@ -1,109 +1,112 @@
-"""The loop over the runs of a sweep, the same on every engine: start them, show how far they are, name the failures.
+"""Carry out a list of runs on any engine: start them, show how far they are, name the failures.
 
-with Local(processes=4) as engine: failures = sweep([Config(seed=seed) for seed in range(20)], engine)
+with local(processes=4) as submit: failures = sweep([Config(seed=seed) for seed in range(20)], submit)
+
+An engine is a context manager that gives ``submit(config, flags)``. It starts runs in the order in which they come, as
+many at a time as it has room for, and stops those that have not ended when its block is left.
 """
 
 from __future__ import annotations
 
+import signal
 from collections import Counter
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future
-from contextlib import suppress
-from queue import Empty, SimpleQueue
-from typing import Final, TypeVar
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from pathlib import Path
+from typing import Final
 
-from sgimd_torch.runs.config import Config
-from sgimd_torch.runs.engines.local import LOOK_EVERY, Engine, Job
+from sgimd_torch.runs.config import Config, words
 from sgimd_torch.runs.process import Failed, Progress, say
+from sgimd_torch.runs.read import movements_on_disk
 
-Item = TypeVar("Item")
-NAMED: Final = 8  # runs in the live line
+REFRESH: Final = 1.0  # s, from one look at the movements on disk to the next; the end of a run is shown at once
+
+Submit = Callable[[Config, Sequence[str]], Future[None]]
+"""Starts a run with these flags of ``sgimd run``, or goes on with it; the future ends with the run. It raises what
+``check_end`` raises, and OSError where files cannot be written or no process starts."""
 
 
 def sweep(
     configs: Sequence[Config],
-    engine: Engine,
+    submit: Submit,
     *,
     flags: Sequence[str] = (),
     on_end: Callable[[Config], None] | None = None,
-    keep_going: bool = True,
 ) -> list[str]:
-    """Run them, in this order, and show how far they are; those that are finished already are not started.
-
-    If another process writes a run, such as one left by a killed sweep, it is waited for and then taken over.
+    """Run them, in this order, and show how far they are. If a run fails, the others go on.
 
     Args:
         configs: the runs, each with a directory of its own.
-        engine: where they run; leaving its block stops those that have not ended.
+        submit: of the engine where they run.
         flags: of ``sgimd run``, for all of them, besides --resume.
         on_end: called with each run that ended well, in this thread; its ValueError or OSError counts as a failure.
-        keep_going: False: the first failure is raised.
 
     Returns:
         The failures: which run, the last words of its log, and where the log is.
 
     Raises:
-        ValueError: two runs have one directory; without ``keep_going`` also: a run refused its request.
-        Failed: the engine failed; without ``keep_going`` also: a run failed under way.
+        ValueError: two runs have one directory.
         KeyboardInterrupt: a signal came.
     """
     twice = [path for path, n in Counter(config.directory for config in configs).items() if n > 1]
     if twice:
         raise ValueError(f"two runs would be written to {twice[0]}; their variants need different names")
-    jobs, failures, ended = [Job(config, flags) for config in configs], list[str](), SimpleQueue[Future[None]]()
-    total = sum(config.movements for config in configs)
+    done = {config: _on_disk(config) for config in configs}
+    failures: dict[Config, str] = {}
     try:
-        with Progress("sweep", total, _done(jobs), every=30.0) as progress:
-            pending = {engine.submit(job): job for job in jobs}
-            for future in pending:
-                future.add_done_callback(ended.put)
+        with Progress("sweep", sum(config.movements for config in configs), sum(done.values()), every=30.0) as progress:
+            pending = {submit(config, flags): config for config in configs}
             while pending:
-                for future in _arrived(ended):
-                    job = pending.pop(future)
-                    job.look()
+                for future in wait(pending, REFRESH, FIRST_COMPLETED).done:
+                    config = pending.pop(future)
+                    done[config] = _on_disk(config)
                     try:
                         future.result()
                         if on_end is not None:
-                            on_end(job.config)
-                        job.state = "done"
+                            on_end(config)
                     except (Failed, ValueError, OSError) as error:
-                        job.state = "failed"
-                        progress.total -= job.config.movements - job.done  # the rest will not be run
-                        failures.append(f"{job.config.title} failed: {error}")
-                        if not keep_going:
-                            raise (Failed if isinstance(error, Failed) else ValueError)(failures[0]) from error
-                engine.refresh()
-                progress.show(_done(jobs), _note(jobs))
+                        failures[config] = f"{config.title} failed: {error}"
+                        progress.total -= config.movements - done[config]  # the rest will not be run
+                done |= {config: _on_disk(config) for future, config in pending.items() if future.running()}
+                ended = f"{len(configs) - len(pending) - len(failures)} of {len(configs)} runs"
+                progress.show(sum(done.values()), ended + (f", {len(failures)} failed" if failures else ""))
     except KeyboardInterrupt:
         say("stopping all runs; the same command goes on from here")
         raise
-    return failures
+    return [failures[config] for config in configs if config in failures]
 
 
-def _arrived(queue: SimpleQueue[Item]) -> list[Item]:
-    """What is in the queue; waits a moment for the first."""
-    found = []
-    with suppress(Empty):
-        found.append(queue.get(timeout=LOOK_EVERY))
-        while True:
-            found.append(queue.get_nowait())
-    return found
+def run_words(config: Config, flags: Sequence[str]) -> list[str]:
+    """The command line of a run after ``sgimd``."""
+    return ["run", "--resume", *flags, *words(vars(config))]
 
 
-def _done(jobs: Sequence[Job]) -> int:
-    """Movements on disk of all of them."""
-    for job in jobs:
-        if job.state in ("held", "running"):
-            job.look()
-    return sum(job.done for job in jobs)
+def log_of(config: Config) -> Path:
+    """The file of a run's output, next to its directory."""
+    return config.directory.with_suffix(".log")
 
 
-def _note(jobs: Sequence[Job]) -> str:
-    """How many runs are in each state, and how far the first of the running ones are."""
-    states = Counter(job.state for job in jobs)
-    parts = [f"{states['done']} of {len(jobs)} runs"]
-    parts += [f"{states['failed']} failed"] if states["failed"] else []
-    parts += [f"waiting for {states['held']} held by another process"] if states["held"] else []
-    running = [f"{job.config.title} at {job.done}" for job in jobs if job.state == "running"]
-    more = [f"{len(running) - NAMED} more are running"] if len(running) > NAMED else []
-    return ", ".join([*parts, *running[:NAMED], *more])
+def check_end(config: Config, code: int, said: bytes) -> None:
+    """Raise what is wrong, if anything, with the last words of a run.
+
+    Args:
+        config: of the run.
+        code: exit code of its process; negative: the signal that killed it.
+        said: its output.
+
+    Raises:
+        ValueError: the run refused its request.
+        Failed: it failed under way.
+    """
+    if code == 0:
+        return
+    _, mark, last = ("\n" + said.decode(errors="replace").rstrip()).rpartition("\nerror: ")
+    if code < 0:
+        last = f"stopped by {signal.Signals(-code).name}; the same command goes on with it"
+    elif not mark:
+        last = last.rpartition("\n")[2] or "it said nothing"
+    raise (ValueError if code == 2 else Failed)(f"{last}\nIts whole log: {log_of(config)}")
+
+
+def _on_disk(config: Config) -> int:
+    return min(movements_on_disk(config.directory), config.movements)

@@ -1,0 +1,79 @@
+"""A robot of a user's own that stops itself, or others, in the middle of a run: no test has to wait for that."""
+
+import os
+import subprocess
+import sys
+
+from runs import ROOT, csv_of
+
+# An arm that does, before its 20th movement, what the variable AT_20 says.
+ROBOT = """
+import os, signal
+from pathlib import Path
+import numpy as np
+from sgimd_torch.environments.planar_arm import PlanarArm
+from sgimd_torch.evaluation import Benchmark
+from sgimd_torch.runs.tasks import Task
+
+def stop_the_sweep():
+    heard, hears = os.pipe()
+    os.set_blocking(hears, False)
+    signal.set_wakeup_fd(hears)
+    os.kill(os.getppid(), int(os.environ["SIGNAL"]))
+    os.read(heard, 1)  # until the sweep's own signal has come
+
+def stop_the_sweep_far_away():
+    os.kill(int(Path(os.environ["MARK"]).read_text()), signal.SIGINT)
+    signal.pause()
+
+def kill_the_task_once():
+    mark = Path(os.environ["MARK"])
+    if not mark.read_text().startswith("killed"):
+        mark.write_text("killed")
+        os.kill(os.getppid(), signal.SIGKILL)
+
+WAYS = {
+    "": lambda: None,
+    "dies": lambda: os.kill(os.getpid(), signal.SIGKILL),
+    "stands still": lambda: os.kill(os.getpid(), signal.SIGSTOP),
+    "stops the sweep": stop_the_sweep,
+    "stops the sweep far away": stop_the_sweep_far_away,
+    "kills the task once": kill_the_task_once,
+}
+
+class Arm(PlanarArm):
+    made = 0
+
+    def execute(self, context, theta, rng):
+        self.made += 1
+        if self.made == 20:
+            WAYS[os.environ.get("AT_20", "")]()
+        return super().execute(context, theta, rng)
+
+def make():
+    return Task(Arm(), lambda: Benchmark("Arm", np.array([[0.5, 0.5], [-0.3, 0.2]]), 0.1))
+"""
+ODD = ["--environment", "odd:make", "--algorithm", "random", "--movements", "40", "--evaluate-at", "[]"]
+SWEEP = "import sys; from sgimd_torch.runs import process, sweep; sys.exit(process.command(sweep.main))"
+
+
+def odd_place(place):
+    """``place`` with the module of the robot, and in ``alone`` its runs of seeds 0 and 1 when it does nothing odd."""
+    (place / "odd.py").write_text(ROBOT)
+    words = [sys.executable, "-c", SWEEP, *ODD, "--seeds", "0-1", "--out", "alone"]
+    subprocess.run(words, cwd=place, env={**os.environ, "PYTHONPATH": str(ROOT)}, check=True, capture_output=True)
+    return place
+
+
+def as_alone(place, out, seeds):
+    """Whether the runs in ``out`` are those in ``alone``."""
+    places = [f"random/seed-{seed:03d}" for seed in seeds]
+    return [csv_of(out / each) for each in places] == [csv_of(place / "alone" / each) for each in places]
+
+
+def said_by(process, code):
+    """What a process says until it ends with this code."""
+    _, said = process.communicate()
+    assert process.returncode == code, said
+    assert "Traceback" not in said
+    return said
