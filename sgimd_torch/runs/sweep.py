@@ -35,7 +35,7 @@ from sgimd_torch.runs.config import FILES, Config, dashed
 from sgimd_torch.runs.engines.local import local
 from sgimd_torch.runs.engines.loop import Submit, sweep
 from sgimd_torch.runs.process import loading, say
-from sgimd_torch.runs.read import finished, movements_on_disk
+from sgimd_torch.runs.read import finished, movements_on_disk, read_run
 
 Item = TypeVar("Item")
 NOT_VARIED: Final = {
@@ -85,9 +85,10 @@ def carry_out(whole: Sequence[Config], options: argparse.Namespace, flags: Seque
     say(f"{len(configs)} runs{options.shard.note(whole)}, {len(configs) - len(left)} of them finished: {out}")
     own = [config for config in configs if config.own and config not in left]
     if own:
-        from sgimd_torch.runs.directory import stale  # loads numpy
+        from sgimd_torch.runs.directory import changed_sources, sources
 
-        say(*dict.fromkeys(f"{config.title}: {note}" for config in own for note in stale(config)))
+        notes = ((each, changed_sources(read_run(each.directory).versions, sources(each))) for each in own)
+        say(*(f"{config.title}: {note}" for config, found in notes for note in found))
     if options.dry_run:
         for config in left:
             print(f"{config.directory}: {movements_on_disk(config.directory)} of {config.movements} movements")

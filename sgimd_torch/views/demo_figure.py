@@ -68,7 +68,7 @@ def table(runs: Mapping[str, Run]) -> list[list[str]]:
 
 def answers(run: Run) -> Iterator[Cast]:
     """How a learner on the fishing rod answers ``GOALS`` after its last movement; all runs have the same noise."""
-    parts = build(config_of(run), run.path)
+    parts = build(config_of(run))
     remember(run, parts, 0, len(run.index))
     rod: Any = parts.environment
     context = (rod.contexts.low + rod.contexts.high) / 2
@@ -108,6 +108,4 @@ def _curve(algorithm: str, run: Run) -> SeedCurves:
 
 def _shown(run: Run) -> Array | None:
     """``(n, 2)`` m outcomes of the demonstrations that the learner was shown, None without any."""
-    rows = sorted({*run.demonstration[run.demonstration >= 0].tolist()})
-    shown = build(config_of(run), run.path).demonstrations if rows else []
-    return np.array([shown[row].outcome for row in rows]) if rows else None
+    return np.array([shown.outcome for shown in run.demonstrations]) if run.demonstrations else None
