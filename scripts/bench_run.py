@@ -24,13 +24,13 @@ from pathlib import Path
 from typing import Any
 
 import torch
+from tensorboard.backend.event_processing.event_file_loader import EventFileLoader
 from tqdm import tqdm
 
 from options import at_least
-from sgimd_torch.board.writer import read_events
+from sgimd_torch.board.listener import BoardListener
 from sgimd_torch.catalogue import CATALOGUE, ROD
 from sgimd_torch.runs import command_line
-from sgimd_torch.runs.board import RunBoard
 from sgimd_torch.runs.build import build
 from sgimd_torch.runs.config import Config
 from sgimd_torch.session import live, run
@@ -82,8 +82,8 @@ class Clock:
 def board(options: argparse.Namespace) -> int:
     """Time a run with a board, and print a line."""
     clock, begun = Clock(), time.process_time()
-    watched: Any = RunBoard
-    for name in ("__init__", "episode", "evaluation", "begin", "flush", "finish", "__exit__"):
+    watched: Any = BoardListener
+    for name in ("__init__", "episode", "model", "evaluated", "begin", "flush", "close"):
         setattr(watched, name, clock.around(getattr(watched, name)))
     with tempfile.TemporaryDirectory() as folder:
         given = {"movements": options.movements, "seed": options.seed, "environment": options.environment}
@@ -92,7 +92,7 @@ def board(options: argparse.Namespace) -> int:
             return code
         rest = time.process_time() - begun - clock.seconds
         (path,) = Path(folder).rglob("events.out.tfevents.*")
-        tags = {value.tag for event in read_events(path) for value in event.summary.value}
+        tags = {value.tag for event in EventFileLoader(str(path)).Load() for value in event.summary.value}
         size = path.stat().st_size
     print(
         f"{options.movements} movements: board {clock.seconds:.2f} s, the run without it {rest:.2f} s, "

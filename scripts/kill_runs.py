@@ -45,7 +45,6 @@ RUNS: Final = {
     "arm, model": "--environment planar-arm-7 --movements 1200 --evaluate-at 400,800 --repeats 0 --inverse model",
 }
 PARTS: Final = ("start", "movements", "evaluation", "refresh", "end", "replay")
-TIMED: Final = ("time/", "model/ms")  # tags of the board whose values are seconds
 
 
 class Part(NamedTuple):
@@ -121,16 +120,17 @@ def live(folder: Path, words: str, kill: tuple[str, int, float] | None = None) -
 
 def contents(run: Path) -> dict[str, Any]:
     """What must be equal: files by name, points of the board by tag and step."""
-    from sgimd_torch.board.writer import read_events
+    from tensorboard.backend.event_processing.event_file_loader import EventFileLoader
 
     found: dict[str, Any] = {}
     for path in sorted(run.iterdir()):
         if path.name.startswith("events."):
-            for event in read_events(path):
+            for event in EventFileLoader(str(path)).Load():
                 for value in event.summary.value:
-                    point = f"{value.tag} at {event.step}"
-                    again = ", again" if point in found else ""
-                    found[point + again] = value.tag.startswith(TIMED) or value.tensor.SerializeToString()
+                    if not value.tag.startswith("time/"):  # replayed movements have no seconds
+                        point = f"{value.tag} at {event.step}"
+                        again = ", again" if point in found else ""
+                        found[point + again] = value.tensor.SerializeToString()
         elif path.suffix == ".json":
             content = json.loads(path.read_bytes())
             found[path.name] = {name: value for name, value in content.items() if not name.startswith("seconds_")}

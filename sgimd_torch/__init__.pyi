@@ -7,7 +7,6 @@ from .algorithms import sagg_riac as sagg_riac
 from .algorithms import sgim_d as sgim_d
 from .algorithms.asking import sgim_acts as sgim_acts
 from .algorithms.asking import sgim_im as sgim_im
-from .competence import absolute_performance as absolute_performance
 from .competence import performance as performance
 from .demonstrations import load_demonstrations as load_demonstrations
 from .demonstrations import save_demonstrations as save_demonstrations

@@ -104,14 +104,6 @@ _IMITATED: Final = {**_SHOWN, "imitations": "imitations", "epsilon": "epsilon"}
 _SCHOOL: Final[tuple[tuple[str, str, dict[str, object], str, str, tuple[str, str]], ...]] = (  # of quality diversity
     ("map-elites", "map_elites", {}, "fills an archive of outcomes", "MAP-Elites", ("#56b4e9", "#1f78a8")),
     ("isoline", "isoline", {}, "the same along lines between elites", "Isoline", ("#999933", "#5c5c1f")),
-    (
-        "isoline-again",
-        "isoline",
-        {"again": 0.2},
-        "the same, elites repeated",
-        "Isoline, repeated",
-        ("#ddcc77", "#a08c2c"),
-    ),
     ("cma-me", "cma_me", {}, "the same with evolution strategies", "CMA-ME", ("#e69f00", "#8f6300")),
     ("cma-mae", "cma_mae", {}, "the same with thresholds that rise slowly", "CMA-MAE", ("#882255", "#4d1330")),
 )
@@ -204,7 +196,7 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
         "sgim-eer": _at(
             "rivals.entropy:sgim_eer",
             "asks the one teacher of --teachers when that should take away more doubt",
-            uses={**_ASKS, "doubt": "doubt"},
+            uses=_ASKS,
             also=_ANSWERED,
             label="By entropy",
             colour="#117733",
@@ -278,15 +270,6 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
             uses=_REFINED,
             fixed={"propose": "sgimd_torch.searches.through_model:gauss_newton"},
         ),
-        "screened": _at(
-            "searches.through_model:gradient_search",
-            "the best of 64 variations",
-            uses=_REFINED,
-            fixed={"propose": "sgimd_torch.searches.through_model:screen", "noise": 0.0},
-        ),
-        "nelder-mead-polished": _at(
-            "searches.through_model:polished_simplex", "a simplex from where the gradient would go", uses=_MODEL
-        ),
     },
     "inverse": {
         "linear": _at("inverses.locally_linear:LocallyLinear", "eq. (9) corrected to first order"),
@@ -323,10 +306,6 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
                 "epsilon": "epsilon",
             },
         ),
-    },
-    "doubt": {
-        "process": _at("rivals.entropy:ByProcess", "of a Gaussian process"),
-        "mixture": _at("rivals.entropy:ByMixture", "of a Bayesian mixture of Gaussians (extra rivals)"),
     },
     "social": {
         "imitate": _at(
@@ -397,7 +376,6 @@ _WANTED: Final[dict[str, tuple[str, tuple[str, ...]]]] = {
     "search": ("(policies, rng) -> a search", ("__call__",)),
     "inverse": ("(memory) -> an inverse model", ("__call__",)),
     "base": ("(environment) -> what a learner that asks does on its own, and how it answers", ("parts", "ways")),
-    "doubt": ("() -> what is not known about the policies for goals", ("__call__",)),
     "social": ("(goal babbling, outcomes, rng) -> a social strategy", ("attempt",)),
     "teacher": ("(demonstrations, rng) -> a teacher", ("offer",)),
     "teachers": ("(demonstrations, rng) -> a teacher who answers", ("demonstrate",)),

@@ -36,12 +36,9 @@ def performance(goal: Array, outcome: Array, rest: Array, d_min: float) -> Array
     Raises:
         ValueError: ``d_min`` is not positive.
     """
-    return -np.minimum(1.0, _distance(goal, outcome) / np.maximum(_distance(goal, rest), _positive("d_min", d_min)))
-
-
-def absolute_performance(goal: Array, outcome: Array, d_ref: float) -> Array:
-    """As :func:`performance`, but relative to the same ``d_ref`` > 0, metres, for all goals: -1 from there on."""
-    return -np.minimum(1.0, _distance(goal, outcome) / _positive("d_ref", d_ref))
+    if not 0 < d_min < np.inf:
+        raise ValueError(f"d_min must be positive and finite, got {d_min}; without it a goal at rest divides by zero")
+    return -np.minimum(1.0, _distance(goal, outcome) / np.maximum(_distance(goal, rest), d_min))
 
 
 class Competence:
@@ -92,9 +89,3 @@ def _best(performance: Performance, goal: Array, outcomes: Array) -> float:
 def _distance(a: Array, b: Array) -> Array:
     difference = np.subtract(a, b, dtype=np.float64)
     return np.sqrt((difference * difference).sum(axis=-1))
-
-
-def _positive(name: str, value: float) -> float:
-    if not 0 < value < np.inf:
-        raise ValueError(f"{name} must be positive and finite, got {value}; without it a goal at rest divides by zero")
-    return value

@@ -2,7 +2,7 @@
 
 Section 5.2 and eq. (10) of Nguyen & Oudeyer (2014). An evaluation changes nothing: it executes without learning or
 remembering, with random streams of its own.
-    benchmark = load_benchmark(); evaluation = evaluate(inverse, environment, benchmark.goals, seed, movements)
+    benchmark = load_benchmark(); evaluation = evaluate(inverse, environment, benchmark.goals, seed, step)
 """
 
 from __future__ import annotations
@@ -20,7 +20,6 @@ from sgimd_torch.environments.protocol import Environment, execute_many
 from sgimd_torch.files import read_npz, write_npz
 from sgimd_torch.spaces import Array, Box, Estimate, check_count, check_vector, first_entry, stream
 
-VERSION = 1
 SHIPPED = Path(__file__).with_name("data") / "benchmark.npz"
 TILES: Final = 358  # of the paper's benchmark
 PARTS: Final = 3  # of the range of each context, for errors by context
@@ -129,21 +128,22 @@ def evaluate(
     environment: Environment,
     goals: Array,
     seed: int,
-    movements: int,
+    step: int,
     *,
     context: ArrayLike | None = None,
     repeats: int = 3,
 ) -> Evaluation:
     """Invert every goal, execute the result once, and ``repeats`` times more to measure the noise.
 
-    Two inverses that are evaluated with the same ``seed`` and ``movements`` get the same noise, goal by goal.
+    Two inverses that are evaluated with the same ``seed`` and ``step`` get the same noise, goal by goal.
 
     Args:
         inverse: (context, goal) -> estimate; its memory must not be empty. If it has a method ``many``, (context,
             goals) -> estimates, that is used instead.
         environment: executed, all goals side by side if it can do that.
         goals: ``(n, outcome_dim)`` m.
-        seed, movements: name the random streams, so that each evaluation of a run has its own.
+        seed, step: name the random streams: each evaluation of a run has a step of its own, such as the number of
+            movements so far.
         context: in which to execute: ``(context_dim,)`` for all goals, or ``(n, context_dim)``; None draws one for
             each goal, see `contexts_of_goals`.
         repeats: k; 0 does not measure the noise; otherwise 2 or more, as one landing point does not scatter. Landing
@@ -151,13 +151,13 @@ def evaluate(
             for Gaussian noise its mean is then the same for every k.
 
     Raises:
-        ValueError: no goals, of another dimension, or not finite; repeats or movements out of range.
+        ValueError: no goals, of another dimension, or not finite; repeats or step out of range.
         RuntimeError: the memory behind ``inverse`` is empty.
     """
     goals = check_vector("goals", goals, environment.outcomes.dim)
     if goals.ndim != 2 or len(goals) == 0:
         raise ValueError(f"goals must have shape (n, outcome_dim) with n > 0, got {goals.shape}")
-    check_count("movements", movements, 0)
+    check_count("step", step, 0)
     if check_count("repeats", repeats, 0) == 1:
         raise ValueError("repeats must be 0 or at least 2, got 1; one landing point does not scatter")
     if context is None:
@@ -172,7 +172,7 @@ def evaluate(
         estimates = [inverse(*each) for each in zip(contexts, goals, strict=True)]
     thetas = np.stack([estimate.theta for estimate in estimates])
     copies = np.tile(thetas, (1 + repeats, 1))  # all goals once, then again: the judged rows do not depend on repeats
-    rngs = [stream(seed, f"evaluation {movements}", row) for row in range(len(copies))]
+    rngs = [stream(seed, f"evaluation {step}", row) for row in range(len(copies))]
     landed = execute_many(environment, np.tile(contexts, (1 + repeats, 1)), copies, rngs)
     landed = landed.reshape(1 + repeats, *goals.shape)
     outcomes, again = landed[0], landed[1:]
@@ -201,7 +201,7 @@ def tile_goals(outcomes: Array, box: Box, side: float, rng: np.random.Generator,
 
 
 def tile_side(outcomes: Array, box: Box, tiles: int = TILES, *, at_least: int = 2) -> float:
-    """The side (m) at which about so many ``tiles`` are reachable; other arguments as for `tile_goals`.
+    """The side (m) that gives about ``tiles`` reachable tiles; other arguments as for `tile_goals`.
 
     Tried are sides of a fortieth to a tenth of T's in the plane, and in other dimensions those that leave as many tiles
     of T. Where less than a tenth of a side of T was reached, what was reached counts in its place.
@@ -214,7 +214,7 @@ def tile_side(outcomes: Array, box: Box, tiles: int = TILES, *, at_least: int = 
 
 
 def _reached(outcomes: Array, box: Box, side: float, at_least: int) -> Array:
-    """``(n_tiles, dim)`` the tiles of T with ``at_least`` so many outcomes, counted from its lower corner, in order."""
+    """``(n_tiles, dim)`` the tiles of T with ``at_least`` outcomes, counted from its lower corner, in order."""
     inside = outcomes[box.contains(outcomes)]
     tiles = np.floor((inside - box.low) / side)
     per_side = np.floor(box.sides / side) + 1
@@ -236,18 +236,18 @@ def save_benchmark(path: str | os.PathLike[str], benchmark: Benchmark) -> None:
     """
     name, goals, side = np.array(benchmark.environment), np.asarray(benchmark.goals), np.array(benchmark.side)
     right = _checked(str(path), name, goals, side)
-    write_npz(path, {"version": np.array(VERSION), "environment": name, "goals": right.goals, "side": side})
+    write_npz(path, {"environment": name, "goals": right.goals, "side": side})
 
 
 def load_benchmark(path: str | os.PathLike[str] = SHIPPED) -> Benchmark:
     """Read a benchmark; by default the shipped one for ``FishingRod``.
 
     Raises:
-        ValueError: not such a file, truncated, of another version, without goals, or with numbers that are not finite.
+        ValueError: not such a file, damaged, without goals, or with numbers that are not finite.
         OSError: there is no file, or it is a directory.
     """
-    names = ("environment", "goals", "side")
-    return _checked(str(path), *read_npz(path, "benchmark", "sgimd benchmark", VERSION, names))
+    arrays = read_npz(path, "benchmark", "sgimd benchmark", ("environment", "goals", "side"))
+    return _checked(str(path), *arrays)
 
 
 def _checked(source: str, name: np.ndarray, goals: np.ndarray, side: np.ndarray) -> Benchmark:

@@ -1,4 +1,4 @@
-"""The main loop: a learner in an environment, movement by movement; live, or replayed from a record.
+"""The main loop: a learner in an environment, movement by movement; what a record holds is replayed first.
 
 Algorithm 1 of Nguyen & Oudeyer (2014).
     for episode in run(learner, environment, seed, movements=5000, teacher=teacher): ...
@@ -9,32 +9,22 @@ executes nothing, does not change the noise of the movements after it.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.learner import Learner, ReplayError
-from sgimd_torch.learner.life import check_repeats
+from sgimd_torch.learner.replay import TEACHER, BeforeMovement, replay
+from sgimd_torch.record import Event, Kind, Record
 from sgimd_torch.spaces import Array, Demonstration, Episode, Request, check_count, read_only, stream
 from sgimd_torch.teachers import Teacher
 from sgimd_torch.teachers.answering import Demonstrator
 
-__all__ = ["Answers", "Execute", "Recorded", "ReplayError", "live", "replay", "run"]
+__all__ = ["Execute", "ReplayError", "live", "run"]
 
 Execute = Callable[[int, Array, Array], Array]
 """(index, context, theta) -> outcome of movement ``index``."""
-
-Answers = Mapping[tuple[int, str], tuple[Demonstration | None, str]]
-"""Requests on record: (index of the movement that came next, teacher) -> what was shown, and ``Episode.reply``."""
-
-
-class Recorded(NamedTuple):
-    """A movement on record: its ``theta`` and ``outcome``, both None if the learner rested."""
-
-    theta: Array | None
-    outcome: Array | None
 
 
 def run(
@@ -47,7 +37,7 @@ def run(
     teacher: Teacher | None = None,
     teachers: Mapping[str, Demonstrator] | None = None,
     execute: Execute | None = None,
-    answers: Answers | None = None,
+    record: Record | None = None,
 ) -> Iterator[Episode]:
     """Let ``learner`` make ``movements`` movements, counting those at rest.
 
@@ -65,8 +55,9 @@ def run(
         teachers: by name, for a learner that asks for demonstrations. One that fails, or shows what this robot cannot
             use, counts as one without an answer, with a `RuntimeWarning`; so does one that raises TimeoutError, see
             `sgimd_torch.teachers.awaited`.
-        execute: is called instead of the environment's, see ``live`` and ``replay``.
-        answers: of an earlier part of this life; these teachers are not asked again.
+        execute: is called instead of the environment's, see ``live``.
+        record: what it holds is lived through again first, without executing anything or asking ``teachers``; what
+            happens then is added to it. It is for a learner and a teacher freshly built, and ``first`` 0.
 
     Yields:
         Every episode, after the learner was told its outcome.
@@ -78,24 +69,37 @@ def run(
     if check_count("first", first, 0) > check_count("movements", movements, 1):
         raise ValueError(f"first must be at most movements, got {first} of {movements}; movements counts all of a run")
     execute = live(environment, seed) if execute is None else execute
+    before = BeforeMovement()
+    if record is not None:
+        before = yield from replay(learner, record.events(), teacher=teacher)
+        first = learner.movements
+    tell = (lambda event: None) if record is None else record.add
     for index in range(first, movements):
-        asked = None if learner.lesson_waits else teacher
-        demonstration = asked.offer(index, learner.memory) if asked is not None else None
-        if demonstration is not None:
-            learner.watch(demonstration, offered=True)
+        (demonstration, request, reply), before = before, BeforeMovement()
+        asks = None if learner.lesson_waits else teacher
+        offered = None if asks is None else asks.offer(index, learner.memory)
+        if offered is not None:
+            learner.watch(offered, offered=True)
+            tell(Event(Kind.SHOWN, lesson=offered, who=getattr(teacher, "who", TEACHER)))
+            demonstration = offered
         context = read_only(environment.observe(stream(seed, "context", index))) if learner.idle else learner.context
-        request, reply = learner.request(context) if teachers else None, ""
-        if request is not None and teachers is not None:
-            known = (answers or {}).get((index, request.teacher))
-            answer, reply = known or _asked(learner, environment, context, request, teachers)
+        asked = learner.request(context) if teachers and request is None else None
+        if asked is not None and teachers is not None:
+            answer, reply = _asked(learner, environment, context, asked, teachers)
+            request = asked
+            tell(Event(Kind.ASKED, context, goal=asked.goal, who=asked.teacher, strategy=asked.strategy, reply=reply))
             if answer is not None:
                 learner.watch(answer)
+                tell(Event(Kind.SHOWN, lesson=answer, who=asked.teacher))
                 demonstration = answer
         move, outcome = learner.ask(context), None
-        if move is not None:
+        if move is None:
+            tell(Event(Kind.RESTED, context))
+        else:
             outcome = execute(index, context, move.theta)
             learner.tell(outcome)
             outcome = np.asarray(outcome, dtype=np.float64)  # as memory keeps it, also of integers
+            tell(Event(Kind.MOVED, context, move.theta, move.goal, outcome, move.origin))
         yield Episode(index, context, move, outcome, demonstration, request, reply)
 
 
@@ -131,23 +135,5 @@ def live(environment: Environment, seed: int) -> Execute:
     def execute(index: int, context: Array, theta: Array) -> Array:
         # Copies, so that an environment may write into them.
         return environment.execute(context.copy(), theta.copy(), stream(seed, "environment", index))
-
-    return execute
-
-
-def replay(recorded: Sequence[Recorded], then: Execute) -> Execute:
-    """Give the ``recorded`` outcomes without executing anything; after them, call ``then``.
-
-    Raises (when called):
-        ReplayError: the learner proposes another theta than the recorded one.
-    """
-
-    def execute(index: int, context: Array, theta: Array) -> Array:
-        if index >= len(recorded):
-            return then(index, context, theta)
-        record = recorded[index]
-        check_repeats(index, None if record.outcome is None else record.theta, theta)
-        assert record.outcome is not None
-        return record.outcome
 
     return execute

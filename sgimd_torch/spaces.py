@@ -65,21 +65,21 @@ def check_vector(name: str, value: ArrayLike, dim: int, hint: str = "") -> Array
         with_itself = np.vdot(value, value)
         if with_itself < 1e199:
             return value
-    slip = f"; {hint}" if hint else ""
+    hint = f"; {hint}" if hint else ""
     try:
         array = np.asarray(value)
     except (TypeError, ValueError) as error:
-        raise ValueError(f"{name} must be real numbers of shape (..., {dim}), got {_in_short(value)}{slip}") from error
+        raise ValueError(f"{name} must be real numbers of shape (..., {dim}), got {_in_short(value)}{hint}") from error
     masked = isinstance(value, np.ma.MaskedArray)
     if masked or array.dtype.kind not in "fiu":
         kind = "a masked array" if masked else array.dtype
-        raise ValueError(f"{name} must be real numbers of shape (..., {dim}), got {kind} {_in_short(value)}{slip}")
+        raise ValueError(f"{name} must be real numbers of shape (..., {dim}), got {kind} {_in_short(value)}{hint}")
     if array.ndim == 0 or array.shape[-1] != dim:
-        raise ValueError(f"{name} must have shape (..., {dim}), got {array.shape}{slip}")
+        raise ValueError(f"{name} must have shape (..., {dim}), got {array.shape}{hint}")
     array = array.astype(np.float64, copy=False)
     usable = np.abs(array) <= _LARGEST  # NaN is not
     if not usable.all():
-        raise ValueError(f"{name} must be finite and within +-{_LARGEST:g}, but {first_entry(array, ~usable)}{slip}")
+        raise ValueError(f"{name} must be finite and within +-{_LARGEST:g}, but {first_entry(array, ~usable)}{hint}")
     return array
 
 

@@ -1,25 +1,14 @@
 """Learners that ask: when, whom and what for; teachers that answer, badly too; a life that asked is lived again."""
 
-import re
-import signal
 from collections import Counter
-from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from runs import EAGER, signal_after, start
 from sgimd_torch.algorithms import sagg_riac
 from sgimd_torch.algorithms.asking import searched, sgim_acts, sgim_im
 from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.goals.uniform import UniformGoals
 from sgimd_torch.learner import ReplayError
-from sgimd_torch.runs.build import build
-from sgimd_torch.runs.command_line import main
-from sgimd_torch.runs.config import Config
-from sgimd_torch.runs.process import command
-from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.tasks import arm_demonstrations
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Demonstration, Lesson, Request, stream
@@ -281,48 +270,4 @@ def test_sgim_im_asks_one_teacher_and_imitates_what_it_is_shown():
         sgim_im(ARM, 0, correspondence=last_posture, teachers=halves())
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"cost": 0.0}, "costs must be positive and finite"),
-        ({"goals": UniformGoals}, re.escape("goals must have choose(context, costs), got a UniformGoals")),
-    ],
-)
-def test_wrong_options_are_refused(options, message):
-    with pytest.raises(ValueError, match=message):
-        partial(acts, **options)()
-
-
 ACTS = ("--environment", "planar-arm-7", "--algorithm", "sgim-acts", "--teachers", "mislabelling,slow")
-
-
-def test_a_run_that_was_killed_goes_on_to_the_same_files(tmp_path):
-    options = [*ACTS, "--seed", "3", "--movements", "150", "--evaluate-at", "[]", "--board", "false"]
-    log = Path("sgim-acts", "seed-003", "episodes.csv")
-    assert command(main, [*options, "--out", str(tmp_path / "whole")]) == 0
-    process = start(EAGER, *options, "--out", tmp_path / "killed")
-    signal_after(process, tmp_path / "killed" / log, 60, signal.SIGKILL)
-    assert command(main, [*options, "--out", str(tmp_path / "killed"), "--resume"]) == 0
-    whole, killed = ((tmp_path / each / log).read_bytes() for each in ("whole", "killed"))
-    assert whole == killed
-    run = read_run(tmp_path / "whole" / log.parent)
-    assert (run.demonstration >= 0).sum() > 3
-    assert (run.origin == "").any()  # it rested for the slow one
-    assert len(build(Config(algorithm="sgim-acts", environment="planar-arm-7")).teachers) == 1
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (("--teachers", "low-haf"), "unknown teachers 'low-haf'; did you mean low-half"),
-        (("--teachers", "all,all"), "teachers must name at least one, and each once, got all,all"),
-        (("--teachers", "all,slow"), "sgim_im asks one teacher, got 2"),
-        (("--cost", "0"), "cost must be above 0"),
-        (("--environment", "crawler"), "comes without demonstrations"),
-    ],
-)
-def test_wrong_words_on_the_command_line_are_refused_and_nothing_is_written(options, message, tmp_path, capsys):
-    given = ["--environment", "planar-arm-7", "--algorithm", "sgim-im", "--out", str(tmp_path / "runs"), *options]
-    assert command(main, given) == 2
-    assert re.search(message, capsys.readouterr().err)
-    assert not (tmp_path / "runs").exists()

@@ -5,7 +5,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from sgimd_torch.competence import AttemptCompetence, Competence, absolute_performance, performance
+from sgimd_torch.competence import AttemptCompetence, Competence, performance
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, stream
 
@@ -54,43 +54,28 @@ def test_a_goal_at_rest_is_judged_by_the_noise_instead_of_dividing_by_zero() -> 
     assert relative(from_rest(0.002, 0.0), REST) == pytest.approx(-0.2)
 
 
-def test_absolute_performance_judges_near_and_far_goals_alike() -> None:
-    for goal in (REST, from_rest(50.0, 0.0)):
-        assert absolute_performance(goal, goal + np.array([0.3, 0.4]), d_ref=2.0) == pytest.approx(-0.25)
-        assert absolute_performance(goal, goal + np.array([3.0, 0.0]), d_ref=2.0) == -1
-
-
-@pytest.mark.parametrize("measure", [relative, partial(absolute_performance, d_ref=0.7)])
-def test_leading_axes_broadcast_and_agree_with_one_at_a_time(measure: partial[Array]) -> None:
+def test_leading_axes_broadcast_and_agree_with_one_at_a_time() -> None:
     rng = stream(0, "test")
     goals, outcomes = rng.normal(size=(3, 1, 2)), rng.normal(size=(4, 2))
-    together = measure(goals, outcomes)
+    together = relative(goals, outcomes)
     assert together.shape == (3, 4)
     for i in range(3):
         for j in range(4):
-            assert together[i, j] == measure(goals[i, 0], outcomes[j])
+            assert together[i, j] == relative(goals[i, 0], outcomes[j])
 
 
 @pytest.mark.parametrize("wrong", [0.0, -1.0, np.nan, np.inf])
-def test_scales_that_are_not_positive_are_refused(wrong: float) -> None:
+def test_a_scale_that_is_not_positive_is_refused(wrong: float) -> None:
     with pytest.raises(ValueError, match="d_min"):
         performance(REST, REST, REST, d_min=wrong)
-    with pytest.raises(ValueError, match="d_ref"):
-        absolute_performance(REST, REST, d_ref=wrong)
 
 
-def test_nothing_remembered_is_no_competence() -> None:
-    assert Competence(memory_of(), relative)(NO_CONTEXT, np.array([0.3, 0.2])) == -1
-    assert AttemptCompetence(relative)(NO_CONTEXT, np.array([0.3, 0.2]), np.zeros((0, 2))) == -1
-
-
-@pytest.mark.parametrize("measure", [relative, partial(absolute_performance, d_ref=0.7)])
-def test_competence_is_the_best_performance_over_all_of_memory(measure: partial[Array]) -> None:
+def test_competence_is_the_best_performance_over_all_of_memory() -> None:
     rng = stream(1, "test")
     memory = memory_of(*rng.uniform(-1, 1, (60, 2)))
-    competence = Competence(memory, measure)
+    competence = Competence(memory, relative)
     for goal in rng.uniform(-2, 2, (30, 2)):
-        assert competence(NO_CONTEXT, goal) == max(measure(goal, outcome) for outcome in memory.outcomes)
+        assert competence(NO_CONTEXT, goal) == max(relative(goal, outcome) for outcome in memory.outcomes)
 
 
 def test_competence_never_falls_while_the_attempt_reading_can() -> None:

@@ -109,7 +109,6 @@ def test_a_file_cut_short_anywhere_is_refused(tmp_path: Path) -> None:
 def fields() -> dict[str, np.ndarray]:
     """Two recordings of 2 and 3 samples, as they stand in a file."""
     return {
-        "version": np.array(1),
         "lengths": np.array([2, 3]),
         "times": np.array([0.0, 0.02, 0.0, 0.02, 0.04]),
         "trajectories": np.zeros((5, 6)),
@@ -138,8 +137,6 @@ def test_a_file_written_by_hand_as_documented_is_read(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("spoil", "message"),
     [
-        (changed("version", 2), "version 2"),
-        (changed("version", [1, 1]), "version"),
         (changed("lengths", [2, 4]), "truncated"),
         (changed("lengths", [5, 0]), "fewer than 2"),
         (changed("lengths", [-1, 6]), "fewer than 2"),

@@ -8,7 +8,6 @@ import pytest
 
 from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.environments.toys import toss
 from sgimd_torch.evaluation import (
     Benchmark,
     Evaluation,
@@ -19,7 +18,7 @@ from sgimd_torch.evaluation import (
     save_benchmark,
     tile_goals,
 )
-from sgimd_torch.inverses.local import LocalInverse, NearestNeighbour
+from sgimd_torch.inverses.local import NearestNeighbour
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, Box, Estimate, stream
 
@@ -71,11 +70,11 @@ def test_each_goal_has_a_context_of_its_own_the_same_in_every_evaluation_of_ever
         asked.append(context.tolist())
         return perfect(arm)(context, goal)
 
-    first = evaluate(inverse, arm, goals, seed=0, movements=100, repeats=2)
+    first = evaluate(inverse, arm, goals, seed=0, step=100, repeats=2)
     assert first.errors == pytest.approx(np.zeros(200), abs=1e-9)  # executed in the context that was asked about
     assert first.contexts.tolist() == asked
-    for seed, movements in ((0, 200), (1, 100)):
-        later = evaluate(perfect(arm), arm, goals, seed, movements, repeats=0)
+    for seed, step in ((0, 200), (1, 100)):
+        later = evaluate(perfect(arm), arm, goals, seed, step, repeats=0)
         assert np.array_equal(later.contexts, first.contexts)
     assert np.array_equal(contexts_of_goals(arm, 50), first.contexts[:50])  # goal k, whatever their number
     # Uniform in +-pi / 4: mean 0, sd pi / 4 / sqrt(3) = .453; four standard errors of 200 are .13 and .06.
@@ -113,19 +112,6 @@ def test_errors_by_context_are_those_of_the_thirds_of_each_of_its_dimensions() -
     assert found.by_context(Box.cube(0, 1, 0)) == []
 
 
-def test_the_wind_of_a_ball_is_drawn_and_its_error_falls_with_what_is_known_of_it() -> None:
-    ball = toss(noise=0.0)
-    theta = np.array([0.5, 0.9, 0.9, 0.5])
-    goal = ball.effect(np.zeros(1), theta)
-
-    def inverse(context: Array, goal: Array) -> Estimate:
-        return Estimate(theta, theta[None], goal[None])
-
-    found = evaluate(inverse, ball, np.tile(goal, (300, 1)), 0, 0, repeats=0)
-    left, middle, right = found.by_context(ball.contexts)
-    assert middle.mean_error < 0.5 * min(left.mean_error, right.mean_error)  # without wind it would be 0
-
-
 def test_without_repeats_there_is_no_noise_floor_and_without_noise_it_is_zero() -> None:
     arm, goals = PlanarArm(5), np.array([[0.5, 0.5], [-0.3, 0.2]])
     assert np.isnan(evaluate(perfect(arm), arm, goals, 0, 0, repeats=0).noise_floor)
@@ -154,11 +140,11 @@ def test_the_movement_that_is_judged_is_not_one_of_its_own_repeats() -> None:
     )  # from two points to their middle
 
 
-@pytest.mark.parametrize("counts", [{"repeats": -1}, {"repeats": 1}, {"repeats": 2.5}, {"movements": -1}])
+@pytest.mark.parametrize("counts", [{"repeats": -1}, {"repeats": 1}, {"repeats": 2.5}, {"step": -1}])
 def test_a_count_out_of_its_range_is_refused(counts: dict[str, int]) -> None:
     arm = PlanarArm(5)
     with pytest.raises(ValueError, match=f"{next(iter(counts))} must be"):
-        evaluate(perfect(arm), arm, np.array([[0.5, 0.5]]), **{"seed": 0, "movements": 0} | counts)
+        evaluate(perfect(arm), arm, np.array([[0.5, 0.5]]), **{"seed": 0, "step": 0} | counts)
 
 
 def test_bias_raises_the_error_and_leaves_the_noise_floor() -> None:
@@ -173,18 +159,11 @@ def test_bias_raises_the_error_and_leaves_the_noise_floor() -> None:
     assert evaluation.noise_floor < 0.01
 
 
-def test_the_repeats_leave_the_errors_of_eq_10_of_a_noise_free_arm_as_they_were() -> None:
-    arm, goals = PlanarArm(5), np.array([[0.5, 0.5], [-0.3, 0.2]])
-    memory = knowing(arm, [0.5] * 5, [0.6] * 5)
-    few, many = (evaluate(LocalInverse(memory), arm, goals, 0, 0, repeats=repeats) for repeats in (0, 5))
-    assert np.array_equal(few.errors, many.errors)
-
-
 def test_the_same_streams_give_the_same_and_every_evaluation_of_a_run_has_its_own() -> None:
     arm, goals = PlanarArm(5, noise=0.05), np.array([[0.5, 0.5], [-0.3, 0.2]])
 
-    def look(seed: int, movements: int) -> Evaluation:
-        return evaluate(perfect(arm), arm, goals, seed, movements, repeats=2)
+    def look(seed: int, step: int) -> Evaluation:
+        return evaluate(perfect(arm), arm, goals, seed, step, repeats=2)
 
     first, same, later, other = look(0, 1000), look(0, 1000), look(0, 2000), look(1, 1000)
     assert np.array_equal(first.outcomes, same.outcomes)
@@ -193,39 +172,11 @@ def test_the_same_streams_give_the_same_and_every_evaluation_of_a_run_has_its_ow
     assert not np.isclose(first.outcomes, other.outcomes).any()
 
 
-def test_no_two_executions_of_an_evaluation_share_their_noise() -> None:
-    arm = PlanarArm(5, noise=0.05)
-    evaluation = evaluate(perfect(arm), arm, np.tile([0.0, 0.5], (20, 1)), 0, 0, repeats=2)
-    assert len(np.unique(evaluation.outcomes, axis=0)) == 20
-    assert (evaluation.scatter > 0).all()
-
-
-def test_an_evaluation_remembers_nothing() -> None:
-    arm = PlanarArm(5)
-    memory = knowing(arm, [0.5] * 5, [0.6] * 5)
-    evaluate(LocalInverse(memory), arm, np.array([[0.5, 0.5]]), 0, 0)
-    assert len(memory) == 2
-
-
-def test_nothing_can_be_evaluated_before_the_first_movement() -> None:
-    arm = PlanarArm(5)
-    with pytest.raises(RuntimeError, match="empty"):
-        evaluate(LocalInverse(Memory(0, 5, 2)), arm, np.array([[0.5, 0.5]]), 0, 0)
-
-
 @pytest.mark.parametrize("goals", [np.zeros((3, 3)), np.full((3, 2), np.nan), np.zeros(2), np.zeros((0, 2))])
 def test_anything_but_goals_is_refused(goals: Array) -> None:
     arm = PlanarArm(5)
     with pytest.raises(ValueError, match="goals must"):
         evaluate(perfect(arm), arm, goals, 0, 0)
-
-
-def test_a_context_of_another_kind_is_refused() -> None:
-    arm = PlanarArm(5, context=True)
-    memory = Memory(1, 5, 2)
-    memory.add([0.0], np.full(5, 0.5), [1.0, 0.0])
-    with pytest.raises(ValueError, match="context"):
-        evaluate(LocalInverse(memory), arm, np.zeros((1, 2)), 0, 0, context=np.array([0.1, 0.2]))
 
 
 def test_one_goal_is_drawn_in_each_tile_that_was_reached() -> None:
@@ -258,7 +209,6 @@ def test_a_benchmark_is_loaded_as_it_was_saved(tmp_path: Path) -> None:
     loaded = load_benchmark(tmp_path / "goals.npz")
     assert (loaded.environment, loaded.side) == ("PlanarArm", 0.1)
     assert np.array_equal(loaded.goals, BENCHMARK.goals)
-    assert [path.name for path in tmp_path.iterdir()] == ["goals.npz"]
 
 
 def test_a_benchmark_of_another_environment_is_refused() -> None:
@@ -280,95 +230,17 @@ def test_goals_outside_the_task_space_are_refused_and_a_larger_space_takes_them(
 
 
 @pytest.mark.parametrize(
-    ("change", "message"),
+    "change",
     [
-        ({"goals": np.zeros((0, 2))}, "n > 0"),
-        ({"goals": np.array([[0.0, np.nan]])}, r"entry \[0, 1\] is nan"),
-        ({"side": 0.0}, "side"),
-        ({"side": "wide"}, "side"),
-        ({"environment": None}, "name of a class"),
+        {"goals": np.zeros((0, 2))},
+        {"goals": np.array([[0.0, np.nan]])},
+        {"side": 0.0},
+        {"side": "wide"},
+        {"environment": None},
     ],
+    ids=lambda change: next(iter(change)),
 )
-def test_what_would_be_refused_is_not_saved(tmp_path: Path, change: dict[str, object], message: str) -> None:
-    with pytest.raises(ValueError, match=message):
+def test_what_would_be_refused_is_not_saved(tmp_path: Path, change: dict[str, object]) -> None:
+    with pytest.raises(ValueError, match=next(iter(change))):
         save_benchmark(tmp_path / "goals.npz", replace(BENCHMARK, **change))
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_benchmark_saved_or_read_at_a_directory_is_refused_and_leaves_nothing_behind(tmp_path: Path) -> None:
-    (tmp_path / "folder").mkdir()
-    with pytest.raises(IsADirectoryError, match="is a directory"):
-        save_benchmark(tmp_path / "folder", BENCHMARK)
-    with pytest.raises(IsADirectoryError, match="directory"):
-        load_benchmark(tmp_path / "folder")
-    assert [path.name for path in tmp_path.rglob("*")] == ["folder"]
-
-
-def test_a_benchmark_file_cut_short_or_corrupt_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "goals.npz"
-    save_benchmark(path, BENCHMARK)
-    content = path.read_bytes()
-    for length in range(0, len(content), 11):
-        path.write_bytes(content[:length])
-        with pytest.raises(ValueError, match=r"goals\.npz is no benchmark"):
-            load_benchmark(path)
-    for position in range(len(content)):
-        path.write_bytes(content[:position] + bytes([content[position] ^ 0x55]) + content[position + 1 :])
-        try:
-            loaded = load_benchmark(path)
-        except ValueError as error:
-            loaded, message = None, str(error)
-        if loaded is None:
-            assert "goals.npz" in message
-        else:
-            assert np.array_equal(loaded.goals, BENCHMARK.goals)
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"version": np.array(2)}, "version 2"),
-        ({"version": np.array([1, 1])}, "version"),
-        ({"goals": np.zeros((0, 2))}, "n > 0"),
-        ({"goals": np.zeros(2)}, "n > 0"),
-        ({"goals": np.full((2, 2), np.nan)}, "finite"),
-        ({"goals": np.full((2, 2), "far")}, "real numbers"),
-        ({"goals": np.full((2, 2), None)}, "no benchmark"),
-        ({"side": np.array(0.0)}, "side"),
-        ({"side": np.array(np.nan)}, "side"),
-        ({"side": np.array("wide")}, "side"),
-    ],
-)
-def test_a_benchmark_that_cannot_be_right_is_refused(
-    tmp_path: Path, change: dict[str, np.ndarray], message: str
-) -> None:
-    right = {
-        "version": np.array(1),
-        "environment": np.array("PlanarArm"),
-        "goals": np.zeros((3, 2)),
-        "side": np.array(0.1),
-    }
-    np.savez(tmp_path / "goals.npz", **(right | change))
-    with pytest.raises(ValueError, match=message):
-        load_benchmark(tmp_path / "goals.npz")
-
-
-def test_anything_but_a_benchmark_is_refused(tmp_path: Path) -> None:
-    np.savez(tmp_path / "other.npz", goals=np.zeros((3, 2)))
-    np.save(tmp_path / "one.npy", np.zeros((3, 2)))
-    for name in ("other.npz", "one.npy"):
-        with pytest.raises(ValueError, match="no benchmark"):
-            load_benchmark(tmp_path / name)
-    with pytest.raises(FileNotFoundError):
-        load_benchmark(tmp_path / "none.npz")
-
-
-def test_measuring_the_noise_leaves_the_errors_as_they_are() -> None:
-    rod = FishingRod(threads=1)
-    memory = Memory(0, 25, 2)
-    for theta in stream(0, "thetas").random((5, 25)):
-        memory.add(np.zeros(0), theta, rod.execute(np.zeros(0), theta, stream(0, "environment")))
-    goals = np.array([[0.0, 0.5], [0.3, 0.4], [-0.3, 0.6]])
-    plain, repeated = (evaluate(LocalInverse(memory), rod, goals, 0, 5, repeats=n) for n in (0, 4))
-    assert np.array_equal(plain.errors, repeated.errors)
-    assert (repeated.scatter > 0).all()

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sgimd_torch.competence import Competence, absolute_performance
+from sgimd_torch.competence import Competence, performance
 from sgimd_torch.memory import Memory
 from sgimd_torch.memory.neighbours import EXACT_UP_TO, PolicyNeighbours, Table, TreeNeighbours, _Flat
 from sgimd_torch.spaces import Array, stream
@@ -118,7 +118,7 @@ def test_competence_asked_again_after_each_movement_is_that_of_a_fresh_look(cont
     rng, memory = stream(context_dim, "test"), Memory(context_dim, 1, 2)
 
     def measure(goal: Array, outcome: Array) -> Array:
-        return absolute_performance(goal, outcome, 2.0)
+        return performance(goal, outcome, np.full(2, 2.0), 0.1)
 
     kept, looks = Competence(memory, measure), 0
     for _ in range(20):

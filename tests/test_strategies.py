@@ -14,7 +14,7 @@ from sgimd_torch.memory import Memory
 from sgimd_torch.searches.perturb import perturb
 from sgimd_torch.searches.simplex import nelder_mead
 from sgimd_torch.spaces import Array, Attempt, Box, Demonstration, Estimate, Move, Search, stream
-from sgimd_torch.strategies import Babble, Emulate, GoalBabbling, Imitate, Remember, Rest
+from sgimd_torch.strategies import Babble, Emulate, GoalBabbling, Imitate, Remember
 from worlds import NO_CONTEXT, demonstrate
 
 ARM = PlanarArm(5)
@@ -188,10 +188,6 @@ def test_babbling_is_one_uniform_movement_without_a_goal() -> None:
     assert all(attempt[0].goal is None and attempt[0].origin == "babble" for attempt in moves)
 
 
-def test_resting_yields_none_once() -> None:
-    assert live(Rest().attempt(NO_CONTEXT)) == [None]
-
-
 @pytest.mark.parametrize("budget", [1, 2, 7])
 def test_goal_babbling_spends_exactly_its_budget_on_a_goal_it_does_not_reach(budget: int) -> None:
     for global_range in ((0.0, 0.0), (0.5, 0.5), (1.0, 1.0)):
@@ -205,15 +201,6 @@ def test_goal_babbling_stops_with_the_movement_that_reaches_the_goal() -> None:
     moves = live(babbling(remembering(20), goals, search=third_time_lucky, tolerance=0.01).attempt(NO_CONTEXT))
     assert len(moves) == 3
     assert goals.entries[0][1] == pytest.approx(0.0, abs=1e-9)
-
-
-def test_the_tolerance_is_a_distance_in_metres() -> None:
-    memory, outcome = remembering(20), execute(Move(np.full(5, 0.6), None, "test"))
-    once_or_twice = plan(np.full(5, 0.6), np.full(5, 0.5))
-    for tolerance, n in ((0.051, 1), (0.049, 2)):
-        goals = Diary(outcome + np.array([0.03, 0.04]))  # 0.05 m away
-        strategy = babbling(memory, goals, search=once_or_twice, tolerance=tolerance, budget=2)
-        assert len(live(strategy.attempt(NO_CONTEXT))) == n
 
 
 def test_with_an_empty_memory_the_first_movement_is_global_however_unlikely() -> None:
@@ -280,10 +267,6 @@ def test_imitation_of_a_policy_on_the_border_is_clipped_to_the_policy_space() ->
     assert (thetas[:, :4] == [0, 1, 0, 1]).mean() == pytest.approx(0.5, abs=0.2)  # half of the variations lead outside
 
 
-def test_imitation_without_a_number_of_repeats_never_ends() -> None:
-    assert len(live(imitation(Diary(), repeats=None).attempt(NO_CONTEXT, THETA_D, LESSON), n=1000)) == 1000
-
-
 def test_a_demonstrated_outcome_becomes_a_goal_of_the_social_strategy_after_its_imitation() -> None:
     goals = Diary()
     live(imitation(goals, repeats=3).attempt(NO_CONTEXT, THETA_D, LESSON))
@@ -301,11 +284,6 @@ def test_a_demonstrated_outcome_outside_the_task_space_is_imitated_but_is_no_goa
     goals = Diary()
     assert len(live(imitation(goals, repeats=3).attempt(NO_CONTEXT, THETA_D, outside(LESSON)))) == 3
     assert goals.entries == []
-
-
-def test_imitation_without_goals_only_imitates() -> None:
-    imitate = Imitate(ARM.policies, stream(0, "imitate"), repeats=3)
-    assert len(live(imitate.attempt(NO_CONTEXT, THETA_D, LESSON))) == 3
 
 
 @pytest.mark.parametrize(("name", "value"), [("epsilon", np.nan), ("epsilon", -0.1), ("repeats", 0), ("repeats", 1.5)])

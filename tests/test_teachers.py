@@ -2,7 +2,6 @@
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -80,14 +79,6 @@ def test_the_initial_teacher_gives_each_demonstration_once_and_then_falls_silent
     assert {id(offer) for offer in offers.values()} == {id(mine) for mine in LESSONS}
 
 
-def test_the_initial_teacher_has_an_order_of_its_own() -> None:
-    orders = {
-        tuple(id(o) for o in course(InitialTeacher(LESSONS, stream(seed, "teacher")), reached()).values())
-        for seed in range(5)
-    }
-    assert len(orders) == 5
-
-
 def choices(
     lessons: Sequence[Demonstration], memory: Memory, n: int = 200, tiles: int = 2
 ) -> Counter[tuple[float, ...]]:
@@ -139,11 +130,6 @@ def test_borders_belong_to_a_tile_the_outermost_included(tiles: int) -> None:
         assert set(choices(corners, inside, n=20, tiles=tiles)) == set(shown)
 
 
-def test_a_border_between_two_tiles_belongs_to_the_upper_one() -> None:
-    assert (4.0, 4.0) not in choices(QUARTERS, reached([2.0, 2.0]))
-    assert (0.0, 0.0) in choices(QUARTERS, reached([2.0, 2.0]))
-
-
 def test_demonstrations_on_a_line_or_on_one_point_have_tiles_too() -> None:
     on_a_line = [lesson(0.0, 1.0), lesson(4.0, 1.0)]
     assert set(choices(on_a_line, reached([0.5, 1.0]))) == {(4.0, 1.0)}
@@ -159,18 +145,13 @@ def test_all_demonstrations_are_equally_likely_when_the_teacher_chooses_at_rando
 
 def test_the_asked_teacher_is_silent_while_progress_is_made_and_demonstrates_when_it_stalls() -> None:
     goal = lesson(1.0, 0.0)
-    teacher = AskedTeacher([goal], stream(0, "teacher"), patience=10, threshold=0.1)
+    teacher = AskedTeacher([goal], stream(0, "teacher"), patience=10)
     memory, offered = reached([0.0, 0.0]), []
-    for look, nearest in enumerate([0.0, 0.5, 0.8, 0.81, 0.9, 0.9], start=1):
+    for look, nearest in enumerate([0.0, 0.5, 0.8, 0.801, 0.9, 0.9], start=1):
         memory.add(NO_CONTEXT, np.zeros(3), np.array([nearest, 0.0]))
         offered += [10 * look] if teacher.offer(10 * look, memory) is goal else []
-    # Distances 1, .5, .2, .19, .1, .1: the fall from .2 to .19 is less than a tenth, and so is none at all.
+    # Distances 1, .5, .2, .199, .1, .1: the fall from .2 to .199 is less than a hundredth, and so is none at all.
     assert offered == [40, 60]
-
-
-def test_the_asked_teacher_looks_only_when_its_patience_is_over() -> None:
-    teacher = AskedTeacher([lesson(1.0, 0.0)], stream(0, "teacher"), patience=10)
-    assert list(course(teacher, reached([0.0, 0.0]), 60)) == [20, 30, 40, 50]  # the first look only compares
 
 
 def test_the_asked_teacher_demonstrates_to_a_learner_that_rests() -> None:
@@ -179,13 +160,13 @@ def test_the_asked_teacher_demonstrates_to_a_learner_that_rests() -> None:
 
 
 def test_the_asked_teacher_judges_by_all_its_demonstrations() -> None:
-    teacher = AskedTeacher([lesson(1.0, 0.0), lesson(-1.0, 0.0)], stream(0, "teacher"), patience=1, threshold=0.2)
+    teacher = AskedTeacher([lesson(1.0, 0.0), lesson(-1.0, 0.0)], stream(0, "teacher"), patience=1)
     memory = reached([0.0, 0.0])
     assert teacher.offer(1, memory) is None
     memory.add(NO_CONTEXT, np.zeros(3), np.array([0.5, 0.0]))
     assert teacher.offer(2, memory) is None  # mean distance from 1 to .75
-    memory.add(NO_CONTEXT, np.zeros(3), np.array([0.7, 0.0]))
-    assert teacher.offer(3, memory) is not None  # to .65, by less than a fifth
+    memory.add(NO_CONTEXT, np.zeros(3), np.array([0.51, 0.0]))
+    assert teacher.offer(3, memory) is not None  # to .745, by less than a hundredth
 
 
 @pytest.mark.parametrize(
@@ -201,7 +182,7 @@ def test_a_teacher_without_demonstrations_or_with_a_wrong_period_is_refused(make
         make([], stream(0, "teacher"))
     (word,) = make.keywords
     for movements in (0, 1.5):
-        with pytest.raises(ValueError, match=f"{word} must be a whole number >= 1, got {movements}"):
+        with pytest.raises(ValueError, match=word):
             make(LESSONS, stream(0, "teacher"), **{word: movements})
 
 
@@ -211,12 +192,6 @@ def test_demonstrations_of_another_robot_are_refused_by_name(other: Demonstratio
         least_explored([other] * 9, reached([0.0, 0.0]), stream(0, "teacher"))
     with pytest.raises(ValueError, match=r"demonstrations must have contexts .*all alike, got .*\(2,\)"):
         PeriodicTeacher([LESSONS[0], other], stream(0, "teacher"))
-
-
-@pytest.mark.parametrize("shape", [(1, 2), ()])
-def test_a_demonstration_with_more_or_less_than_one_outcome_is_refused(shape: tuple[int, ...]) -> None:
-    with pytest.raises(ValueError, match="demonstrations must have contexts"):
-        InitialTeacher([replace(LESSONS[0], outcome=np.zeros(shape))], stream(0, "teacher"))
 
 
 def test_tiles_are_counted_as_if_all_outcomes_were_looked_at_each_time() -> None:

@@ -31,7 +31,7 @@ arm = PlanarArm()
 learner = practice(arm, 0)
 episodes: list[Episode] = list(run(learner, arm, 0, movements=200))
 goals: NDArray[np.float64] = np.array([[0.0, 0.5], [0.5, 0.5]])
-error: float = evaluate(learner.inverse, arm, goals, 0, movements=200).mean_error
+error: float = evaluate(learner.inverse, arm, goals, 0, step=200).mean_error
 theta: NDArray[np.float64] = learner.inverse(np.empty(0), goals[0]).theta
 print(len(episodes), error < 0.1, theta.shape)
 """

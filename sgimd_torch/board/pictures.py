@@ -1,12 +1,12 @@
 """The pictures on the board: the water plane from above, coloured by competence, interest, landing points and error.
 
-pictures = draw(regions, space, outcomes=..., ...); pictures["map/competence"] is a png, by its tag
+pictures = draw(regions, space, competent, outcomes=..., ...); pictures["map/competence"] is a png, by its tag
 """
 
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,14 +15,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from sgimd_torch.board.scalars import Grid, branches
+from sgimd_torch.board.curves import DEPTH, Competent, branches, summary
 from sgimd_torch.figures.axes import colour_bar, plane
 from sgimd_torch.figures.learning import competence_map, interest_map, landing_points
 from sgimd_torch.figures.sections import Section, sections
 from sgimd_torch.goals.regions import Region
 from sgimd_torch.spaces import Array, Box
 
-LEVEL = 3  # of the tree: regions named in the pictures, those with curves of their own
 # Fixed scales, so that pictures of different times and runs can be compared; values beyond look like the end.
 WORST = -0.25
 FARTHEST = 0.3  # m
@@ -35,26 +34,23 @@ STYLE: Any = {"font.size": 8, "axes.titlesize": 8}
 def draw(
     regions: Sequence[Region],
     space: Box,
+    competent: Competent,
     *,
     outcomes: Array,
     goals: Array,
     demonstrated: Array,
     benchmark: Array,
     errors: Array,
-    cells: Grid,
-    shares: Mapping[str, float],
-    since: Mapping[str, int],
 ) -> dict[str, bytes]:
     """The pictures, as png, by tag.
 
     Args:
         regions: of the goal model; no pictures of them if there are none.
         space: T; of more than two dimensions, a picture shows pairs next to each other.
+        competent: where it is, since when; shown in the plane only.
         outcomes, goals, demonstrated: ``(n, outcome_dim)`` m, where the float landed; the learner's last goals;
             demonstrated.
         benchmark, errors: ``(n, outcome_dim)`` and ``(n,)`` m, its goals and how far from each the float landed.
-        cells: of T; they have a picture in the plane only.
-        shares, since: by cell the share of its goals that are met, and since when half of them were, see ``Curves``.
     """
 
     def landed(ax: Axes, section: Section) -> None:
@@ -66,7 +62,7 @@ def draw(
         "map/error": lambda ax, section: _errors(ax, benchmark, errors, section),
     }
     if space.dim == 2:
-        pictures = {"competent/since": lambda ax, section: _since(ax, cells, shares, since), **pictures}
+        pictures = {"competent/since": lambda ax, section: _since(ax, competent), **pictures}
     if regions:
         pictures["map/interest"] = lambda ax, section: _interest(ax, regions, goals, section)
         pictures["map/competence"] = lambda ax, section: _competence(ax, regions, section)
@@ -76,13 +72,11 @@ def draw(
 def where(regions: Sequence[Region]) -> str:
     """A table, in Markdown, of the regions that have curves of their own: corners, competence, interest."""
     lines = ["| region | corner below | corner above | goals | competence | interest |", "|---|---|---|---|---|---|"]
-    for path, below in branches(regions, 3).items():
-        low, high = _corners(below)
-        competences = np.concatenate([region.competences for region in below])
-        competence = f"{competences.mean():.2f}" if len(competences) else "-"
-        interest = sum(region.interest() * len(region.goals) for region in below) / max(1, len(competences))
-        corners = (", ".join(f"{x:.2f}" for x in corner) for corner in (low, high))
-        lines.append(f"| {path} | {' | '.join(corners)} | {len(competences)} | {competence} | {interest:.3f} |")
+    for path, below in branches(regions, DEPTH).items():
+        lows, highs = _boxes(below)
+        corners = (", ".join(f"{x:.2f}" for x in corner) for corner in (lows.min(axis=0), highs.max(axis=0)))
+        competence, interest, goals = summary(below)
+        lines.append(f"| {path} | {' | '.join(corners)} | {goals} | {competence:.2f} | {interest:.3f} |")
     return "\n".join(lines)
 
 
@@ -98,20 +92,20 @@ def _competence(ax: Axes, regions: Sequence[Region], section: Section) -> None:
     _name(ax, regions, section)
 
 
-def _since(ax: Axes, cells: Grid, shares: Mapping[str, float], since: Mapping[str, int]) -> None:
+def _since(ax: Axes, competent: Competent) -> None:
     """Each cell coloured by the share of its goals that are met; where half of them are, since when is written."""
-    n, box = cells.per_side, cells.box
-    values = np.array([shares.get(name, np.nan) for name in cells.names]).reshape(n, n).T  # (n_y, n_x)
+    grid, shares, since = competent.grid, competent.shares, competent.since
+    n, box = grid.per_side, grid.box
+    values = np.array([shares.get(name, np.nan) for name in grid.names]).reshape(n, n).T  # (n_y, n_x)
     x, y = (np.linspace(low, high, n + 1) for low, high in zip(box.low, box.high, strict=True))
     mesh = ax.pcolormesh(x, y, np.ma.masked_invalid(values), cmap="viridis", vmin=0, vmax=1, edgecolors="white")
-    for k, name in enumerate(cells.names):
+    for k, name in enumerate(grid.names):
         if name in shares:
             column, row = divmod(k, n)
             said = f"since\n{since[name]}" if name in since else f"{shares[name]:.0%}"
             ink = "white" if shares[name] < 0.6 else "black"
             middle = x[column : column + 2].mean(), y[row : row + 2].mean()
-            weight = "bold" if name in since else "normal"
-            ax.text(*middle, said, ha="center", va="center", color=ink, fontweight=weight)
+            ax.text(*middle, said, ha="center", va="center", color=ink, weight="bold" if name in since else "normal")
     colour_bar([ax], mesh, "share of the goals met now")
     plane(ax, box)
     ax.set_title("since when half of the goals are met, else the share")
@@ -137,7 +131,7 @@ def _name(ax: Axes, regions: Sequence[Region], section: Section) -> None:
     """Frame and name the regions of the curves."""
     lows, highs, met = section.cut(*_boxes(regions))
     rows = {regions[k]: row for row, k in enumerate(np.flatnonzero(met).tolist())}
-    named, (lowest, highest) = branches(list(rows), LEVEL), (lows.min(axis=0), highs.max(axis=0))
+    named, (lowest, highest) = branches(list(rows), DEPTH), (lows.min(axis=0), highs.max(axis=0))
     frontier = [path for path in named if not {f"{path}0", f"{path}1"} & named.keys()]
     for k, path in enumerate(frontier):
         among = [rows[region] for region in named[path]]
@@ -155,11 +149,6 @@ def _name(ax: Axes, regions: Sequence[Region], section: Section) -> None:
 
 def _boxes(regions: Sequence[Region]) -> tuple[Array, Array]:
     return np.stack([region.low for region in regions]), np.stack([region.high for region in regions])
-
-
-def _corners(regions: Sequence[Region]) -> tuple[Array, Array]:
-    lows, highs = _boxes(regions)
-    return lows.min(axis=0), highs.max(axis=0)
 
 
 def _png(picture: Callable[[Axes, Section], object], shown: Sequence[Section]) -> bytes:

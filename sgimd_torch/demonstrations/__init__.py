@@ -19,10 +19,9 @@ from pathlib import Path
 
 import numpy as np
 
-from sgimd_torch.files import UNPACKED, read_npz, write_npz
+from sgimd_torch.files import read_npz, write_npz
 from sgimd_torch.spaces import Array, Demonstration, first_entry
 
-VERSION = 1
 SHIPPED = Path(__file__).parents[1] / "data" / "demonstrator_3.npz"
 _MOST = 100_000  # recordings in a file
 _FIELDS = ("lengths", "times", "trajectories", "outcomes", "contexts")
@@ -48,8 +47,7 @@ def save_demonstrations(path: str | os.PathLike[str], demonstrations: Sequence[D
         "contexts": np.stack([d.context for d in demonstrations]),
     }
     _check(str(path), fields)
-    small = sum(field.nbytes for field in fields.values()) <= UNPACKED  # a large one that unpacks to much is not read
-    write_npz(path, {"version": np.array(VERSION), **fields}, compressed=small)
+    write_npz(path, fields)
 
 
 def load_demonstrations(
@@ -71,7 +69,7 @@ def load_demonstrations(
         OSError: there is no file, or it is a directory.
     """
     source = str(path)
-    arrays = read_npz(path, "demonstration file", "save_demonstrations", VERSION, _FIELDS)
+    arrays = read_npz(path, "demonstration file", "save_demonstrations", _FIELDS)
     fields = dict(zip(_FIELDS, arrays, strict=True))
     _check(source, fields)
     fields = {name: field if name == "lengths" else field.astype(np.float64) for name, field in fields.items()}

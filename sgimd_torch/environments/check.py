@@ -60,8 +60,8 @@ def _spaces(environment: Environment, _: Movements) -> Iterator[str]:
     for name, least in (("contexts", 0), ("policies", 1), ("outcomes", 1)):
         box = getattr(environment, name, None)
         if not isinstance(box, Box):
-            slip = "; without contexts it is Box.cube(0, 1, 0)" if name == "contexts" else ""
-            yield f"{name} must be a sgimd_torch.Box, got {type(box).__name__}{slip}"
+            hint = "; without contexts it is Box.cube(0, 1, 0)" if name == "contexts" else ""
+            yield f"{name} must be a sgimd_torch.Box, got {type(box).__name__}{hint}"
         elif box.dim < least:
             yield f"{name} must have a dimension at least, got a Box of none"
     for name in ("observe", "execute"):
@@ -222,8 +222,8 @@ def _misshapen(what: str, value: Any, *shape: int) -> str | None:
     if not isinstance(value, np.ndarray):
         return f"{what} must give an array of shape {shape}, got {type(value).__name__}; np.array([x]) makes one"
     if value.shape != shape or value.dtype != np.float64:
-        slip = "is it called with one movement?" if value.ndim != len(shape) else "was an axis forgotten, or a dtype?"
-        return f"{what} must give float64 of shape {shape}, got {value.dtype} {value.shape}; {slip}"
+        hint = "is it called with one movement?" if value.ndim != len(shape) else "was an axis forgotten, or a dtype?"
+        return f"{what} must give float64 of shape {shape}, got {value.dtype} {value.shape}; {hint}"
     return None
 
 

@@ -13,7 +13,8 @@ from typing import Final, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sgimd_torch.spaces import Array, Box, check_vector
+from sgimd_torch.environments.protocol import check_recording
+from sgimd_torch.spaces import Array, Box
 
 _GRID: Final = 200  # frequencies that are tried before the best one is refined
 
@@ -69,7 +70,7 @@ class Knots:
         """
         from scipy.optimize import lsq_linear  # takes longer to import than this whole library
 
-        times, trajectory = check_recording(times, trajectory, self.commands.dim, self.duration)
+        times, trajectory = check_recording(times, trajectory, self.commands.dim, longest=self.duration)
         weights = self._weights((times - times[0]) / self.duration)
         scaled = (trajectory - self.commands.low) / self.commands.sides
         # A recording may end before the last knots; these then stay in the middle, as nothing else pulls at them.
@@ -151,24 +152,3 @@ class Sinusoids:
     def _frequency(self, pace: float) -> float:
         lowest, highest = self.frequencies
         return float(lowest + pace * (highest - lowest))
-
-
-def check_recording(
-    times: ArrayLike, trajectory: ArrayLike, n_commands: int, longest: float = np.inf
-) -> tuple[Array, Array]:
-    """A recording as float64: ``(n_times,)`` s and ``(n_times, n_commands)``.
-
-    Raises:
-        ValueError: shapes that do not fit, fewer than 2 samples, values that are not finite, unsorted times, or a
-            recording that lasts longer than ``longest`` s.
-    """
-    trajectory = check_vector("trajectory", trajectory, n_commands, "one column for each command")
-    if trajectory.ndim != 2 or len(trajectory) < 2:
-        raise ValueError(f"trajectory needs 2 samples or more in rows, got shape {trajectory.shape}")
-    times = check_vector("times", times, len(trajectory), "one time in s for each row of the trajectory")
-    if times.ndim != 1 or not (np.diff(times) > 0).all():
-        raise ValueError(f"times must increase from sample to sample, got {times}; were the rows shuffled?")
-    lasts = times[-1] - times[0]
-    if lasts > longest * (1 + 1e-9):
-        raise ValueError(f"a movement lasts {longest:g} s at most, the recording {lasts:g} s; is it in milliseconds?")
-    return times, trajectory

@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sgimd_torch.environments.motor_primitives import GaussianPrimitive
-from sgimd_torch.environments.protocol import HandLed, SimulationError, check_movement, check_rng
+from sgimd_torch.environments.protocol import HandLed, SimulationError, check_movement, check_recording, check_rng
 from sgimd_torch.environments.rod_physics import Caster, Recording
-from sgimd_torch.spaces import Array, Box, check_count, check_vector, first_entry
+from sgimd_torch.spaces import Array, Box, check_count
 
 MODEL = Path(__file__).with_name("fishing_rod.xml")
 JOINTS = ("yaw", "shoulder", "elbow", "forearm_roll", "wrist_pitch", "wrist_yaw")
@@ -171,15 +171,9 @@ class FishingRod:
                 exceed 60 s.
             SimulationError: the simulation diverged.
         """
-        trajectory = check_vector("trajectory", trajectory, len(JOINTS), "one column for each joint, in rad")
-        times = check_vector("times", times, len(trajectory), "one time in s for each row of the trajectory")
-        if trajectory.ndim != 2 or times.ndim != 1 or len(times) < 2:
-            raise ValueError(f"needs (n,) times and (n, 6) angles, n > 1, got {times.shape} and {trajectory.shape}")
-        if times[0] != 0 or not (np.diff(times) > 0).all():
-            falls = np.append(times[0] != 0, np.diff(times) <= 0)
-            raise ValueError(f"times must increase from 0, but {first_entry(times, falls)}; were the rows shuffled?")
-        if times[-1] > LONGEST:
-            raise ValueError(f"times must end within {LONGEST} s, got {times[-1]}; are they in milliseconds?")
+        times, trajectory = check_recording(times, trajectory, len(JOINTS), longest=LONGEST)
+        if times[0] != 0:
+            raise ValueError(f"times must start at 0, got {times[0]}; subtract the first one")
         end = float(times[-1]) + HOLD
         steps = self._times(end)
         commands = np.stack([np.interp(steps, times, column) for column in trajectory.T], axis=1)

@@ -11,7 +11,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sgimd_torch.spaces import Array, Box, check_vector
+from sgimd_torch.environments.protocol import check_recording
+from sgimd_torch.spaces import Array, Box
 
 
 class GaussianPrimitive:
@@ -105,13 +106,10 @@ class GaussianPrimitive:
         """
         from scipy.optimize import lsq_linear  # takes longer to import than this whole library
 
-        times, trajectory = self._check_recording(times, trajectory)
+        times, trajectory = check_recording(
+            times, trajectory, self.joints.dim, samples=self.n_knots, longest=self.durations[1]
+        )
         span = times[-1] - times[0]
-        if span > self.durations[1] * (1 + 1e-9):
-            raise ValueError(
-                f"a movement lasts {self.durations[1]:g} s at most, the recording {span:g} s; is it in milliseconds? A "
-                "slow one can be played faster: multiply its times"
-            )
         weights = self._weights((times - times[0]) / span)
         low, sides = self.joints.low, self.joints.sides
         scaled = (trajectory - low) / sides
@@ -130,7 +128,7 @@ class GaussianPrimitive:
             ValueError: as ``correspondence``.
         """
         theta = self.policies.check("theta", theta)
-        times, trajectory = self._check_recording(times, trajectory)
+        times, trajectory = check_recording(times, trajectory, self.joints.dim, samples=self.n_knots)
         phases = (times - times[0]) / (times[-1] - times[0])
         return float(np.sqrt(np.mean((self._weights(phases) @ self._knots(theta).T - trajectory) ** 2)))
 
@@ -143,12 +141,3 @@ class GaussianPrimitive:
         # sigma = s / delta^2 the weights depend on the phase t / delta alone.
         weights = np.exp(-self.sharpness * (phases[:, None] - self._centres) ** 2)  # eq. (5)
         return weights / weights.sum(axis=1, keepdims=True)
-
-    def _check_recording(self, times: ArrayLike, trajectory: ArrayLike) -> tuple[Array, Array]:
-        trajectory = check_vector("trajectory", trajectory, self.joints.dim, "one column for each joint, in rad")
-        if trajectory.ndim != 2 or len(trajectory) < self.n_knots:
-            raise ValueError(f"trajectory needs {self.n_knots} samples or more in rows, got shape {trajectory.shape}")
-        times = check_vector("times", times, len(trajectory), "one time in s for each row of the trajectory")
-        if times.ndim != 1 or not (np.diff(times) > 0).all():
-            raise ValueError(f"times must increase from sample to sample, got {times}; were the rows shuffled?")
-        return times, trajectory

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sgimd_torch.environments.protocol import HandLed, Sketch, check_movement, check_rng
+from sgimd_torch.environments.protocol import HandLed, Sketch, check_movement, check_recording, check_rng
 from sgimd_torch.spaces import Array, Box, check_count, check_vector, first_entry
 
 _STEP = 0.04  # s, of a recorded movement
@@ -117,12 +117,7 @@ class PlanarArm:
             ValueError: shapes that do not fit, values that are not finite, unsorted times, or a last posture that the
                 joints cannot take.
         """
-        trajectory = check_vector("trajectory", trajectory, self.policies.dim, "one column for each joint, in rad")
-        if trajectory.ndim != 2 or len(trajectory) == 0:
-            raise ValueError(f"trajectory needs samples in rows, got shape {trajectory.shape}")
-        times = check_vector("times", times, len(trajectory), "one time in s for each row of the trajectory")
-        if times.ndim != 1 or not (np.diff(times) > 0).all():
-            raise ValueError(f"times must increase from sample to sample, got {times}; were the rows shuffled?")
+        _, trajectory = check_recording(times, trajectory, self.policies.dim, samples=1)
         turned = trajectory[-1] / self._limits
         beyond = np.abs(turned) > 1 + 1e-12  # more than rounding
         if beyond.any():

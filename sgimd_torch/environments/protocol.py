@@ -14,7 +14,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sgimd_torch.spaces import Array, Box, read_only
+from sgimd_torch.spaces import Array, Box, check_point, check_vector, first_entry, read_only
 
 
 class Environment(Protocol):
@@ -228,6 +228,35 @@ def check_movement(environment: Environment, context: ArrayLike, theta: ArrayLik
     return context, theta
 
 
+def check_recording(
+    times: ArrayLike, trajectory: ArrayLike, columns: int, *, samples: int = 2, longest: float = np.inf
+) -> tuple[Array, Array]:
+    """A recording as float64: ``(n_times,)`` s, and ``(n_times, columns)`` angles or commands.
+
+    Raises:
+        ValueError: shapes that do not fit, fewer than ``samples`` rows, values that are not finite, times that do not
+            increase, or a recording that lasts longer than ``longest`` s.
+    """
+    trajectory = check_vector("trajectory", trajectory, columns, "one column for each joint or command")
+    if trajectory.ndim != 2 or len(trajectory) < samples:
+        raise ValueError(f"trajectory needs {samples} samples or more in rows, got shape {trajectory.shape}")
+    times = check_point(
+        "times", check_vector("times", times, len(trajectory), "one in s for each row"), len(trajectory)
+    )
+    falls = np.diff(times, prepend=-np.inf) <= 0
+    if falls.any():
+        raise ValueError(
+            f"times must increase from sample to sample, but {first_entry(times, falls)}; were rows shuffled?"
+        )
+    lasts = times[-1] - times[0]
+    if lasts > longest * (1 + 1e-9):
+        raise ValueError(
+            f"a movement lasts {longest:g} s at most, the recording {lasts:g} s; is it in milliseconds? A slow one can "
+            "be played faster: multiply its times"
+        )
+    return times, trajectory
+
+
 def check_rest(environment: Environment) -> None:
     """Refuse an environment whose ``rest`` is not one point of T, before a learner is built for it.
 
@@ -245,5 +274,5 @@ def check_rng(rng: object) -> None:
         TypeError: it is not a Generator.
     """
     if not isinstance(rng, np.random.Generator):
-        slip = "was the seed passed instead of a Generator, such as stream(seed, name)?"
-        raise TypeError(f"rng must be a numpy.random.Generator, got {type(rng).__name__}; {slip}")
+        hint = "was the seed passed instead of a Generator, such as stream(seed, name)?"
+        raise TypeError(f"rng must be a numpy.random.Generator, got {type(rng).__name__}; {hint}")

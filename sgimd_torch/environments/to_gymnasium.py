@@ -27,25 +27,13 @@ class ToGymnasium(gymnasium.Env[Any, Any]):
 
     ``observation`` is the context, ``achieved_goal`` the outcome (``rest`` before the movement), ``desired_goal`` the
     goal, uniform over T or given as ``reset(options={"goal": ...})``; likewise ``"context"``. The reward is minus their
-    distance; ``info`` has ``is_success``.
-
-    Args:
-        environment: of ours.
-        tolerance: distance at which the goal counts as reached; None for the outcome noise, but at least .02.
-        goals: ``(n, outcome_dim)`` in T, of which one is drawn; None for any goal in T.
-
-    Raises:
-        ValueError: goals outside T.
+    distance; ``info`` has ``is_success``, whether that is no more than the outcome noise or .02.
     """
 
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 - as gymnasium declares it
 
-    def __init__(
-        self, environment: Environment, *, tolerance: float | None = None, goals: ArrayLike | None = None
-    ) -> None:
+    def __init__(self, environment: Environment) -> None:
         self.environment = environment
-        self.tolerance = max(environment.outcome_noise, 0.02) if tolerance is None else tolerance
-        self.goals = None if goals is None else environment.outcomes.check("goals", goals)
         anywhere = gymnasium.spaces.Box(-np.inf, np.inf, (environment.outcomes.dim,), np.float64)  # also outside T
         self.observation_space: gymnasium.spaces.Dict[Any] = gymnasium.spaces.Dict(
             {
@@ -69,8 +57,6 @@ class ToGymnasium(gymnasium.Env[Any, Any]):
         wanted, robot = options or {}, self.environment
         self._context = robot.contexts.check("context", wanted.get("context", robot.observe(self.np_random)))
         drawn = robot.outcomes.sample(self.np_random)
-        if self.goals is not None:
-            drawn = self.goals[int(self.np_random.integers(len(self.goals)))]
         self._goal = robot.outcomes.check("goal", wanted.get("goal", drawn), "was a theta passed instead?")
         return self._observation(robot.rest), {}
 
@@ -87,7 +73,7 @@ class ToGymnasium(gymnasium.Env[Any, Any]):
         outcome = self.environment.execute(self._context.copy(), theta, self.np_random)
         observation = self._observation(outcome)
         distance = float(np.linalg.norm(outcome - self._goal))
-        info = {"is_success": distance <= self.tolerance}
+        info = {"is_success": distance <= max(self.environment.outcome_noise, 0.02)}
         self._goal = None
         return observation, -distance, True, False, info
 

@@ -6,21 +6,25 @@ Not in Nguyen & Oudeyer (2014), who use local models only. `OnlineTrainer` train
 
 from __future__ import annotations
 
+import json
 import math
 import os
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 try:
     import torch
+    from safetensors import SafetensorError, safe_open
+    from safetensors.torch import save
 except ImportError as error:
     raise ImportError(f"the forward model needs torch: pip install 'sgimd-torch[forward]' ({error})") from error
 
+from sgimd_torch.files import write_bytes
 from sgimd_torch.forward_model.ensemble import Ensemble
-from sgimd_torch.forward_model.stored import read_model, write_model
-from sgimd_torch.forward_model.training import OnlineTrainer
+from sgimd_torch.forward_model.training import RECENT, OnlineTrainer
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, check_count, check_vector, stream
 
@@ -58,13 +62,12 @@ class ForwardModel(Ensemble):
     Args:
         context_dim, theta_dim, outcome_dim: those of the memory.
         seed: of the weights and of all batches; torch's global generator is not used.
-        members, hidden, noise_heads, lr, beta: as in ``Ensemble``; each member draws batches of its own.
+        members, hidden, noise_heads: as in ``Ensemble``; each member draws batches of its own.
         every: number of new exemplars that a refresh waits for.
         rate: steps of the optimiser for each new exemplar, the cost of learning: .3 steps take about a fifth of the
             time of a movement of the fishing rod, 2 steps as long as a movement.
-        batch: exemplars per step, for each member.
-        recent: share of every batch that is drawn from the newest ``every`` exemplars.
-        focus: share that is drawn from the 200 exemplars nearest to the goal that ``refresh`` is told.
+        focus: share of every batch that is drawn from the 200 exemplars nearest to the goal that ``refresh`` is told;
+            a quarter is drawn from the newest ``every`` exemplars.
         accelerator: Lightning's name of where to train: "cpu", the fastest for these sizes, "auto" or "cuda".
 
     The first refresh fixes the scales. If its exemplars are variations of one movement, all later ones lie far outside
@@ -92,32 +95,28 @@ class ForwardModel(Ensemble):
         hidden: Sequence[int] = (64, 64),
         every: int = 50,
         rate: float = 0.3,
-        batch: int = 128,
-        recent: float = 0.25,
         focus: float = 0.0,
-        lr: float = 1e-2,
-        beta: float = 0.5,
         noise_heads: bool = True,
         accelerator: str = "cpu",
     ) -> None:
         sizes = {"context_dim": context_dim, "theta_dim": theta_dim, "outcome_dim": outcome_dim}
-        for name, count in {**sizes, "members": members, "every": every, "batch": batch}.items():
+        for name, count in {**sizes, "members": members, "every": every}.items():
             check_count(name, count, 0 if name == "context_dim" else 1)
         if not isinstance(hidden, Sequence) or not hidden:
             raise ValueError(f"hidden must be a sequence with the units of each layer, as (64, 64), got {hidden}")
         for units in hidden:
             check_count("hidden", units, 1)
-        if not (0 < rate < math.inf and 0 < lr < math.inf and 0 <= beta <= 1):
-            raise ValueError(f"needs rate, lr > 0, beta in [0, 1], got {rate}, {lr}, {beta}")
-        if not (recent >= 0 and focus >= 0 and recent + focus <= 1):
-            raise ValueError(f"recent and focus are shares of a batch, got {recent} and {focus}")
+        if not 0 < rate < math.inf:
+            raise ValueError(f"rate must be positive and finite, got {rate}")
+        if not 0 <= focus <= 1 - RECENT:
+            raise ValueError(f"focus must lie in [0, {1 - RECENT}], got {focus}; it is a share of a batch")
         generator = torch.Generator().manual_seed(int(stream(seed, "forward model").integers(2**63)))
         shape = members, list(hidden), noise_heads
-        super().__init__(context_dim + theta_dim, outcome_dim, generator, *shape, lr=lr, beta=beta)
+        super().__init__(context_dim + theta_dim, outcome_dim, generator, *shape)
         self.sizes = sizes
         self.shape = dict(zip(("members", "hidden", "noise_heads"), shape, strict=True))
         self.every, self.rate = every, rate
-        self._online = OnlineTrainer(self, generator, batch, every, recent, focus, accelerator)
+        self._online = OnlineTrainer(self, generator, every, focus, accelerator)
         for name, dim in {"input": context_dim + theta_dim, "outcome": outcome_dim}.items():
             self.register_buffer(f"{name}_mean", torch.zeros(dim))
             self.register_buffer(f"{name}_scale", torch.ones(dim))
@@ -220,24 +219,31 @@ class ForwardModel(Ensemble):
             raise ValueError(f"the model has dimensions {self.sizes}, the {what} {sizes}; is it another robot's?")
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write a safetensors file, see ``stored.py``; it appears whole or not at all.
+        """Write a safetensors file; it appears whole or not at all. Its header says of which sizes the model is.
 
         The optimiser's moments are not in it: a loaded model predicts the same, and learns on with new moments.
 
         Raises:
             OSError: ``path`` is a directory, or cannot be written.
         """
-        write_model(path, {**self.sizes, **self.shape}, self.state_dict())
+        state = {name: values.cpu().contiguous() for name, values in self.state_dict().items()}
+        write_bytes(path, save(state, {"model": json.dumps({**self.sizes, **self.shape})}))
 
     @classmethod
     def load(cls, path: str | os.PathLike[str], **options: Any) -> ForwardModel:
         """The model that ``save`` wrote; ``options`` are the constructor's options for training.
 
         Raises:
-            ValueError: not such a file, truncated or changed, of another version, or with numbers that no model has.
+            ValueError: not such a file, or truncated.
             OSError: there is no file, or it may not be read.
         """
-        about, state = read_model(path)
+        Path(path).open("rb").close()  # says why it may not be read
+        try:
+            with safe_open(str(path), framework="pt") as file:
+                about = json.loads(file.metadata()["model"])
+                state = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118, it is no dict
+        except (SafetensorError, KeyError, TypeError, ValueError) as error:
+            raise ValueError(f"{path} is no forward model: {str(error)[:100]}; was it written by save()?") from error
         model = cls(**{**options, **about})
         model.load_state_dict(state)
         return model

@@ -15,6 +15,8 @@ from lightning import Fabric
 
 from sgimd_torch.forward_model.ensemble import Ensemble, nll
 
+RECENT: Final = 0.25  # share of every batch that is drawn from the newest exemplars
+_BATCH: Final = 128  # exemplars per step, for each member
 _HELD_OUT_EVERY: Final = 10  # the last of this many exemplars is held out: never trained on
 _STEPS_PER_LOOK: Final = 20  # of the optimiser, between two looks at what is held out
 _PATIENCE: Final = 5  # looks without improvement that end a fit
@@ -37,17 +39,14 @@ class OnlineTrainer:
     Args:
         ensemble: its weights change.
         generator: draws the batches, of each member its own.
-        batch: exemplars per step, for each member.
-        newest, recent: how many exemplars count as new, and the share of every batch that is drawn from them.
-        focus: share that is drawn from the exemplars that a fit favours.
+        newest: how many exemplars count as new.
+        focus: share of every batch that is drawn from the exemplars that a fit favours.
         accelerator: Lightning's name of where to train.
     """
 
     ensemble: Ensemble
     generator: torch.Generator
-    batch: int
     newest: int
-    recent: float
     focus: float
     accelerator: str
     fabric: Fabric | None = None
@@ -87,9 +86,9 @@ class OnlineTrainer:
         fabric = self.prepare()
         is_held = torch.arange(len(x)) % _HELD_OUT_EVERY == _HELD_OUT_EVERY - 1
         rows = torch.nonzero(~is_held)[:, 0]
-        shares = [(rows[-self.newest :], round(self.recent * self.batch))]
+        shares = [(rows[-self.newest :], round(RECENT * _BATCH))]
         if favoured is not None:
-            shares.append((favoured[~is_held[favoured]], round(self.focus * self.batch)))
+            shares.append((favoured[~is_held[favoured]], round(self.focus * _BATCH)))
         before = {name: values.clone() for name, values in self.ensemble.state_dict().items()}
         best, waited, done = math.inf, 0, 0
         try:
@@ -127,7 +126,7 @@ class OnlineTrainer:
     def _draw(self, rows: torch.Tensor, shares: list[tuple[torch.Tensor, int]]) -> torch.Tensor:
         """``(members, batch)`` of the ``rows``, of which each of ``shares`` gives as many as it says."""
         members = self.ensemble.members
-        picked = rows[torch.randint(len(rows), (members, self.batch), generator=self.generator)]
+        picked = rows[torch.randint(len(rows), (members, _BATCH), generator=self.generator)]
         taken = 0
         for some, count in shares:
             drawn = torch.randint(len(some), (members, count), generator=self.generator)

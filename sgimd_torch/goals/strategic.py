@@ -31,7 +31,7 @@ def progresses(competences: Array, gains: Array) -> Array:
     """(after - before) * max(after, before)^2 of each attempt, of competences in [0, 1]; ours lie in [-1, 0].
 
     Deviation: ``after`` is what the attempt itself came to, so progress is negative where it came to less than what
-    memory holds. Somebody who mislabels is told from somebody who has nothing new only by this.
+    memory holds. Only this distinguishes a mislabelling teacher from one with nothing new.
     """
     return gains * (1 + competences + np.maximum(-gains, 0)) ** 2
 
@@ -62,17 +62,16 @@ class StrategicGoals(Goals, Protocol):
 
 class StrategicInterest:
     """Interest of each (region, strategy): e^(progress / temperature), over the cost of the strategy. Of its progress,
-    what is more than that of the cheapest strategy there is divided by the cost, too. See `StrategicGoals`.
+    what exceeds that of the cheapest strategy there is divided by the cost, too. See `StrategicGoals`.
 
     The papers draw in proportion to progress, and try strategies by chance where they were not tried. Ours: progress
     can be negative, hence e; and where a strategy was hardly tried, its progress is that of where it was tried nearest.
-    So no share of the choices has to be spent on strategies drawn at random; ``by_chance`` is there for who wants it.
+    So no choice has to be spent on a strategy drawn at random.
 
     Args:
         contexts, outcomes, rng: as in `InterestMap`.
-        by_chance: share of the choices whose strategy is any, and whose goal is drawn from all of T.
-        anywhere: share of the others whose goal is drawn from all of T, and whose strategy by its interest there.
-        greatest: in what is left, so many (region, strategy) of the greatest interest are drawn from, in
+        anywhere: share of the choices whose goal is drawn from all of T, and whose strategy by its interest there.
+        greatest: number of pairs (region, strategy) of the greatest interest that the others are drawn from, in
             proportion to it.
         temperature: the difference of progress that makes interest e times as large.
         make: (contexts, outcomes, rng) -> the map of regions; interest is its progress.
@@ -87,17 +86,16 @@ class StrategicInterest:
         outcomes: Box,
         rng: np.random.Generator,
         *,
-        by_chance: float = 0.0,
         anywhere: float = 0.5,
         greatest: int = 10,
         temperature: float = 0.03,
         make: Callable[[Box, Box, np.random.Generator], InterestMap] = BY_STRATEGY,
     ) -> None:
-        if not (0 <= by_chance <= 1 and 0 <= anywhere <= 1 and greatest >= 1 and 0 < temperature < np.inf):
-            wanted = "by_chance and anywhere must lie in [0, 1], greatest be at least 1 and temperature above 0"
-            raise ValueError(f"{wanted}, got {by_chance}, {anywhere}, {greatest} and {temperature}")
+        if not (0 <= anywhere <= 1 and greatest >= 1 and 0 < temperature < np.inf):
+            wanted = "anywhere must lie in [0, 1], greatest be at least 1 and temperature above 0"
+            raise ValueError(f"{wanted}, got {anywhere}, {greatest} and {temperature}")
         self.contexts, self.outcomes = contexts, outcomes
-        self.by_chance, self.anywhere, self.greatest, self.temperature = by_chance, anywhere, greatest, temperature
+        self.anywhere, self.greatest, self.temperature = anywhere, greatest, temperature
         self._rng = rng
         self._map = make(contexts, outcomes, rng)
         self._tried: dict[str, _Tried] = {}
@@ -132,8 +130,6 @@ class StrategicInterest:
             ValueError: ``context`` is not one point of C.
         """
         context, goal = check_in(self.contexts, "context", context), self.outcomes.sample(self._rng)
-        if self.by_chance and self._rng.random() < self.by_chance:
-            return str(self._rng.choice([*costs])), goal
         given = self._rng.random() < self.anywhere
         regions = self._map.regions_at(np.concatenate((context, goal)) if given else context)
         pairs = [(region, name) for region in regions for name in costs]

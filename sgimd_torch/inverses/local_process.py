@@ -34,8 +34,8 @@ _CLEARLY: Final = 0.8  # of the squared error expected of the nearest exemplar: 
 class LocalProcess:
     """The inverse model; it only reads, draws nothing, and depends on the memory alone.
 
-    Lengths and kernel are fitted anew when the memory has grown by half, so a call never passes over the memory. Units
-    do not matter. The answer is clipped to the box around all that was ever executed.
+    Lengths and kernel are refitted when the memory has 1.5 times its size at the last fit; other calls use neighbours
+    only. Units do not matter. The answer is clipped to the box around all that was ever executed.
 
     Args:
         memory: of the learner.

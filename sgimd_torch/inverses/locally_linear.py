@@ -12,6 +12,8 @@ from sgimd_torch.inverses.local import LocalInverse, gaussian_weights
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, Estimate
 
+# More exemplars in a neighbourhood, and a wider Gaussian, than `LocalInverse` averages: a slope needs them.
+_K_MAX, _WIDTH = 20, 1.0
 _COINCIDENT = 1e-12  # m: outcomes that spread less count as one outcome, which has no slope
 
 
@@ -25,30 +27,17 @@ class LocallyLinear:
         memory: of the learner.
         ridge: relative to the variance of the outcomes, > 0; the larger, the closer to :class:`LocalInverse`. It also
             makes the regression unique when outcomes lie on a line, or are fewer than its slopes.
-        h_max, k_max, dist_n, alpha, width: as in :class:`LocalInverse`, whose defaults average fewer exemplars with a
-            narrower Gaussian.
 
     Raises:
-        ValueError: ``ridge`` or ``width`` is not positive.
+        ValueError: ``ridge`` is not positive.
     """
 
-    def __init__(
-        self,
-        memory: Memory,
-        *,
-        ridge: float = 1e-3,
-        h_max: int = 10,
-        k_max: int = 20,
-        dist_n: float | None = None,
-        alpha: float = 0.5,
-        width: float = 1.0,
-    ) -> None:
+    def __init__(self, memory: Memory, *, ridge: float = 1e-3) -> None:
         if not ridge > 0:
             raise ValueError(f"ridge must be positive, got {ridge}; outcomes on a line have no slope across it")
         self.memory = memory
         self.ridge = ridge
-        self.width = width
-        self._local = LocalInverse(memory, h_max=h_max, k_max=k_max, dist_n=dist_n, alpha=alpha, width=width)
+        self._local = LocalInverse(memory, k_max=_K_MAX, width=_WIDTH)
 
     def __call__(self, context: Array, goal: Array) -> Estimate:
         """The corrected theta_g, with K_best as :class:`LocalInverse` gives it.
@@ -58,7 +47,7 @@ class LocallyLinear:
         """
         estimate = self._local(context, goal)
         mean_theta, thetas, outcomes, _ = estimate
-        weights = gaussian_weights(goal, outcomes, self.width)
+        weights = gaussian_weights(goal, outcomes, _WIDTH)
         mean_outcome = weights @ outcomes
         deviations = outcomes - mean_outcome
         covariance = (weights * deviations.T) @ deviations

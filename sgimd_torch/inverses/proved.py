@@ -25,7 +25,7 @@ class ProvedInverse:
         noise: as for `LocalProcess`.
 
     Raises:
-        ValueError: a number out of its range, or a model of other dimensions.
+        ValueError: ``noise`` out of its range, or a model of other dimensions.
     """
 
     def __init__(

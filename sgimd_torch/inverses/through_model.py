@@ -7,7 +7,7 @@ expected squared distance to the goal, predicted noise included: of several move
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from typing import Final
 
 import numpy as np
 import torch
@@ -16,56 +16,37 @@ from sgimd_torch.forward_model.anchored import TRUST, Anchored, Trust
 from sgimd_torch.forward_model.model import ForwardModel
 from sgimd_torch.inverses.locally_linear import LocallyLinear
 from sgimd_torch.memory import Memory
-from sgimd_torch.spaces import Array, Box, Estimate, check_count
+from sgimd_torch.spaces import Array, Box, Estimate
 
-_GOALS_PER_BATCH = 64  # about 50 MB
+_NEAREST: Final = 10  # remembered movements that landed nearest to the goal: candidates beside the first estimate
+_ANCHORS: Final = 40  # neighbours in policy space that correct the predictions for a candidate
+# Of the descent; a step in sides of Pi. Many small steps end nearer to the start than few large ones.
+_STEPS, _STEP = 40, 0.005
+_GOALS_PER_BATCH: Final = 64  # about 50 MB
 
 
 class ModelInverse:
-    """Descends from the estimate of ``start`` and from the nearest remembered movements to what ``model`` expects to be
-    best.
+    """Descends from the estimate of `LocallyLinear` and from the nearest remembered movements to what ``model`` expects
+    to be best.
 
     It never trains the model, so that an evaluation changes nothing: call ``model.refresh(memory)`` in the loop that
-    adds to the memory. Until the model is good enough for ``trust`` it answers like ``start``.
+    adds to the memory. Until the model is good enough for ``trust`` it answers like `LocallyLinear`.
 
     Args:
         memory: gives candidates and anchors; only read.
         model: predicts.
         policies: Pi; nothing outside is proposed.
-        start: another inverse model, whose estimate is one candidate; None for :class:`LocallyLinear`.
-        k: number of further candidates, the remembered movements that landed nearest to the goal.
-        anchors: number of neighbours in policy space that correct the predictions for a candidate.
-        steps, step: of the descent; ``step`` in sides of ``policies``. Many small steps end nearer to the start than
-            few large ones.
         trust: how far to trust the model.
 
     Raises:
-        ValueError: a number out of its range, or a model of other dimensions.
+        ValueError: a model of other dimensions.
     """
 
-    def __init__(
-        self,
-        memory: Memory,
-        model: ForwardModel,
-        policies: Box,
-        *,
-        start: Callable[[Array, Array], Estimate] | None = None,
-        k: int = 10,
-        anchors: int = 40,
-        steps: int = 40,
-        step: float = 0.005,
-        trust: Trust = TRUST,
-    ) -> None:
-        check_count("k", k, 1)
-        check_count("anchors", anchors, 1)
-        check_count("steps", steps, 0)
-        if not 0 < step < np.inf:
-            raise ValueError(f"step must be positive and finite, got {step}")
+    def __init__(self, memory: Memory, model: ForwardModel, policies: Box, *, trust: Trust = TRUST) -> None:
         model.check_fits("memory", **{name: getattr(memory, name) for name in model.sizes})
         model.check_fits("policies", theta_dim=policies.dim)
         self.memory, self.model, self.policies, self.trust = memory, model, policies, trust
-        self.start = LocallyLinear(memory) if start is None else start
-        self.k, self.anchors, self.steps, self.step = k, anchors, steps, step
+        self.start = LocallyLinear(memory)
 
     @property
     def trusted(self) -> bool:
@@ -98,18 +79,18 @@ class ModelInverse:
     def _descended(self, context: Array, goals: Array, estimates: list[Estimate]) -> list[Estimate]:
         memory = self.memory
         starts = [
-            np.vstack([estimate.theta, memory.thetas[memory.near_outcomes(context, goal, self.k)]])
+            np.vstack([estimate.theta, memory.thetas[memory.near_outcomes(context, goal, _NEAREST)]])
             for goal, estimate in zip(goals, estimates, strict=True)
         ]
         n_each = min(map(len, starts))
         candidates = self.policies.clip(np.vstack([thetas[:n_each] for thetas in starts]))
-        rows = [memory.near_policies(context, theta, self.anchors) for theta in candidates]
+        rows = [memory.near_policies(context, theta, _ANCHORS) for theta in candidates]
         near = np.stack([row[: min(map(len, rows))] for row in rows])
         anchored = Anchored(
             self.model, context, memory.contexts[near], memory.thetas[near], memory.outcomes[near], self.trust
         )
         aims = anchored.tensor(goals.repeat(n_each, axis=0))
-        theta = anchored.descend(anchored.tensor(candidates), aims, self.policies, steps=self.steps, step=self.step)
+        theta = anchored.descend(anchored.tensor(candidates), aims, self.policies, steps=_STEPS, step=_STEP)
         with torch.no_grad():
             best = anchored.expected(theta, aims).reshape(len(goals), n_each).argmin(dim=1)
         chosen = theta.reshape(len(goals), n_each, -1)[torch.arange(len(goals)), best].cpu().double().numpy()

@@ -15,18 +15,11 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
+from sgimd_torch.files import replacing
 from sgimd_torch.inverses.locally_linear import LocallyLinear
-from sgimd_torch.learner.life import (
-    Event,
-    Kind,
-    ReplayError,
-    check_lesson,
-    check_repeats,
-    memory_crc32,
-    read_life,
-    write_life,
-)
+from sgimd_torch.learner.replay import TEACHER, ReplayError, replay
 from sgimd_torch.memory import Memory
+from sgimd_torch.record import Event, Kind, Record, RunError
 from sgimd_torch.spaces import (
     Array,
     AskingAttempt,
@@ -105,6 +98,11 @@ class Learner:
         return self._offered_at == self._movements
 
     @property
+    def waits_for_answer(self) -> bool:
+        """Whether it has asked for a demonstration, which `watch` would answer."""
+        return isinstance(self._next, Request)
+
+    @property
     def context(self) -> Array:
         """``(context_dim,)`` of the attempt under way, read-only.
 
@@ -162,7 +160,7 @@ class Learner:
         if self._attempt is None:
             context = read_only(context)
             self._begin(self.autonomous.attempt(context), context)
-            self._events.append(Event(Kind.BEGUN, self._context))
+            self._events.append(Event(Kind.ASKED, self._context))
         return self._next if isinstance(self._next, Request) else None
 
     def tell(self, outcome: ArrayLike) -> None:
@@ -197,7 +195,7 @@ class Learner:
             ValueError: a demonstration that does not fit the spaces or the correspondence, or whose theta_d leaves Pi;
                 nothing has happened then.
         """
-        requested = isinstance(self._next, Request)
+        requested = self.waits_for_answer
         if self.social is None and not requested:
             raise RuntimeError("this learner has no social strategy, so it cannot be taught; use no teacher")
         if self._asked:
@@ -206,7 +204,7 @@ class Learner:
         if not requested:
             self._end()
             self._offered_at = self._movements if offered else -1
-        self._events.append(Event(Kind.SHOWN, lesson=demonstration))
+        self._events.append(Event(Kind.SHOWN, lesson=demonstration, who=TEACHER if offered else None))
         self._lessons.add(_lesson(demonstration, theta_d))
         if requested:
             self._advance(Lesson(theta_d, demonstration))
@@ -242,21 +240,29 @@ class Learner:
     def interrupt(self) -> None:
         """End the attempt under way; what it learnt so far counts. An outcome not yet told is no longer expected."""
         if self._asked and isinstance(self._next, Move):
-            self._events.append(Event(Kind.DROPPED, self._context, self._next.theta))
+            self._events.append(Event(Kind.FAILED, self._context, self._next.theta))
         elif self._attempt is not None:
             self._events.append(Event(Kind.INTERRUPTED))
         self._end()
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write its life: contexts, movements, rests, outcomes and lessons, an npz file without pickle.
+        """Write its life to a record: contexts, movements, rests, outcomes and lessons, in SQLite.
 
         A movement that was asked for and not told yet is left out: after `load`, ask for it again.
 
         Raises:
-            ValueError: lessons whose shapes differ.
+            ValueError: a lesson whose times do not fit its trajectory.
             OSError: ``path`` is a directory, or cannot be written.
         """
-        write_life(path, self._events, self._begun, self.memory)
+        memory = self.memory
+        dims = memory.context_dim, memory.theta_dim, memory.outcome_dim
+        with (
+            replacing(path) as partial,
+            Record.make(partial, dims, {"begun": self._begun, "exemplars": len(memory)}) as record,
+        ):
+            for event in self._events:
+                record.add(self._moved(event) if isinstance(event, int) else event)
+            record.commit()
 
     def load(
         self,
@@ -265,10 +271,10 @@ class Learner:
         teacher: Teacher | None = None,
         after: Callable[[Move | None], object] | None = None,
     ) -> None:
-        """Live through a saved life again without executing anything, and go on as if it had never stopped.
+        """Live through a saved life again, or through the life of a run; then go on as if it had never stopped.
 
         Args:
-            path: what `save` wrote.
+            path: what `save` wrote, or the ``run.sqlite`` of a run.
             teacher: freshly built, too, if one draws lessons at random: it is asked before each movement, as in `run`,
                 so that it goes on in the same way. None for the lessons of the file alone.
             after: called after each movement, told or at rest (then with None), as your loop does to refresh a forward
@@ -278,46 +284,26 @@ class Learner:
             ReplayError: this learner would have moved otherwise, or its memory comes out otherwise. It has then lived a
                 part of that life; build another one.
             RuntimeError: it has lived already.
-            ValueError: not such a file, damaged, or of another robot.
-            OSError: there is no file, or it is a directory.
+            RunError: no record, damaged, or of another robot.
         """
         if self._events or self._attempt is not None:
             raise RuntimeError("load() needs a learner freshly built; this one has lived already")
-        life, offered = read_life(path, self.memory), -1
-        if life.begun != self._begun:
-            raise ReplayError(f"{path} began with {life.begun} exemplars in memory, this learner with {self._begun}")
-        for event in life.events:
-            if teacher is not None and offered < self.movements and event.kind != Kind.INTERRUPTED:
-                offered = self.movements
-                check_lesson(offered, event.lesson, teacher.offer(offered, self.memory))
-            move = self._live_again(event)
-            if event.kind == Kind.DROPPED:
-                offered = -1  # the run that went on asked once more
-            if after is not None and event.kind in (Kind.MOVED, Kind.RESTED):
-                after(move)
-        if life.memory_crc32 != memory_crc32(self.memory):
+        dims = self.memory.context_dim, self.memory.theta_dim, self.memory.outcome_dim
+        with Record(path) as record:
+            if record.dims != dims:
+                raise RunError(f"{path} has dims {record.dims} of context, theta, outcome, got {dims}; another robot?")
+            begun, exemplars = record.about.get("begun", 0), record.about.get("exemplars")
+            if begun != self._begun:
+                raise ReplayError(f"{path} began with {begun} exemplars in memory, this learner with {self._begun}")
+            for episode in replay(self, record.events(), teacher=teacher):
+                if after is not None:
+                    after(episode.move)
+        if exemplars not in (None, len(self.memory)):
             raise ReplayError(f"{path} ended with another memory; were exemplars added to one of them by hand?")
 
-    def _live_again(self, event: Event) -> Move | None:
-        if event.lesson is not None:
-            if self.social is None and not isinstance(self._next, Request):
-                found = f"before movement {self.movements} it asked for a demonstration, the learner now does not"
-                raise ReplayError(f"{found}; is it built in the same way, with the same seed?")
-            self.watch(event.lesson, offered=True)
-        if event.context is None:
-            if event.kind == Kind.INTERRUPTED:
-                self.interrupt()
-            return None
-        if event.kind == Kind.BEGUN:
-            self.request(event.context)
-            return None
-        index, move = self.movements, self.ask(event.context)
-        check_repeats(index, event.theta, None if move is None else move.theta)
-        if event.outcome is not None:
-            self.tell(event.outcome)
-        elif event.kind == Kind.DROPPED:
-            self.interrupt()
-        return move
+    def _moved(self, row: int) -> Event:
+        memory = self.memory
+        return Event(Kind.MOVED, memory.contexts[row], memory.thetas[row], outcome=memory.outcomes[row])
 
     def _end(self) -> None:
         if self._attempt is not None:

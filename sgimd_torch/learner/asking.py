@@ -67,7 +67,7 @@ class StrategicBabbling:
         teacher, answer, _, takes = self.asking[strategy]
         lesson = yield Request(teacher, goal, strategy)
         before = self.babbling.competence(context, goal)
-        if lesson is None:  # whatever there was to hope for, it came to nothing
+        if lesson is None:  # no answer counts as no progress
             self.goals.add(context, goal, -1.0, strategy, -1.0)
             self.brought.append(0.0)
             yield from self.babbling.pursue(context, goal)

@@ -7,47 +7,41 @@ there?" (H of eq. 8), the policy side "which movements are like this one?" (K_h 
 
 from __future__ import annotations
 
-import os
 from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sgimd_torch.files import read_npz, write_npz
 from sgimd_torch.memory.neighbours import PolicyNeighbours, Rows, Table, TreeNeighbours, squared_distances
-from sgimd_torch.spaces import Array, check_point, check_vector
+from sgimd_torch.spaces import Array, check_point
 
 __all__ = ["Memory", "Nearest", "Rows"]
 
-_VERSION: Final = 1
-_MOST_DIMS: Final = 100_000  # of a table in a file
 _NO_CONTEXT: Final = "an environment without contexts gives np.zeros(0)"
 
 
 class Memory:
     """Exemplars in the order in which they were added; the row number of an exemplar never changes.
 
+    In distances a unit of context counts as much as a unit of outcome or theta.
+
     Args:
         context_dim: 0 without contexts, as in the fishing task.
         theta_dim, outcome_dim: at least 1.
-        context_weight: in distances, the length of one unit of context next to one unit of outcome or theta.
 
     Raises:
-        ValueError: a dimension or the weight is out of range.
+        ValueError: a dimension is out of range.
     """
 
-    def __init__(self, context_dim: int, theta_dim: int, outcome_dim: int, *, context_weight: float = 1.0) -> None:
+    def __init__(self, context_dim: int, theta_dim: int, outcome_dim: int) -> None:
         if context_dim < 0 or theta_dim < 1 or outcome_dim < 1:
             raise ValueError(
                 "Memory needs context_dim >= 0, theta_dim >= 1 and outcome_dim >= 1, "
                 f"got {context_dim}, {theta_dim} and {outcome_dim}"
             )
-        if not 0 <= context_weight < np.inf:
-            raise ValueError(f"context_weight must be finite and >= 0, got {context_weight}")
         self.context_dim, self.theta_dim, self.outcome_dim = context_dim, theta_dim, outcome_dim
-        self.context_weight = context_weight
         self._contexts, self._thetas, self._outcomes = Table(context_dim), Table(theta_dim), Table(outcome_dim)
-        # A key is the weighted context and an outcome or a theta; without contexts nothing is kept twice.
+        # A key is the context and an outcome or a theta; without contexts nothing is kept twice.
         self._outcome_side = TreeNeighbours(Table(context_dim + outcome_dim) if context_dim else self._outcomes)
         self._policy_side = PolicyNeighbours(Table(context_dim + theta_dim) if context_dim else self._thetas)
         self._range, self._ranged = (np.full(theta_dim, np.inf), np.full(theta_dim, -np.inf)), 0
@@ -118,39 +112,20 @@ class Memory:
 
     def copy(self) -> Memory:
         """The same exemplars, in a memory that grows on its own."""
-        same = Memory(self.context_dim, self.theta_dim, self.outcome_dim, context_weight=self.context_weight)
+        same = Memory(self.context_dim, self.theta_dim, self.outcome_dim)
         same._append(self.contexts, self.thetas, self.outcomes)
         return same
-
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write an npz file without pickle; ``path`` holds the old file or the whole new one."""
-        arrays = {"contexts": self.contexts, "thetas": self.thetas, "outcomes": self.outcomes}
-        write_npz(path, {"version": _VERSION, "context_weight": self.context_weight, **arrays})
-
-    @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> Memory:
-        """The memory that :meth:`save` wrote.
-
-        Raises:
-            ValueError: not such a file, truncated, of another version, or with arrays that do not fit together.
-            OSError: there is no file, or it is a directory.
-        """
-        weight, contexts, thetas, outcomes = _read(path)
-        memory = cls(contexts.shape[1], thetas.shape[1], outcomes.shape[1], context_weight=weight)
-        memory._append(contexts, thetas, outcomes)
-        return memory
 
     def _append(self, contexts: Array, thetas: Array, outcomes: Array) -> None:
         for table, rows in ((self._contexts, contexts), (self._thetas, thetas), (self._outcomes, outcomes)):
             table.append(rows)
         if self.context_dim:
-            weighted = self.context_weight * contexts
-            self._outcome_side.keys.append(np.concatenate((weighted, outcomes), axis=1))
-            self._policy_side.keys.append(np.concatenate((weighted, thetas), axis=1))
+            self._outcome_side.keys.append(np.concatenate((contexts, outcomes), axis=1))
+            self._policy_side.keys.append(np.concatenate((contexts, thetas), axis=1))
 
     def _key(self, context: ArrayLike, point: Array) -> Array:
         context = check_point("context", context, self.context_dim, _NO_CONTEXT)
-        return np.concatenate((self.context_weight * context, point)) if self.context_dim else point.copy()
+        return np.concatenate((context, point)) if self.context_dim else point.copy()
 
 
 class Nearest:
@@ -172,19 +147,3 @@ class Nearest:
             if (nearest := squared.min()) < self._squared:
                 self._row, self._squared = first + int(squared.argmin()), nearest
         return self._row
-
-
-def _read(path: str | os.PathLike[str]) -> tuple[float, Array, Array, Array]:
-    names = ("context_weight", "contexts", "thetas", "outcomes")
-    weight, *tables = read_npz(path, "saved Memory", "Memory.save", _VERSION, names)
-    fitting = all(t.dtype == np.float64 and t.ndim == 2 and len(t) == len(tables[0]) for t in tables)
-    if weight.shape != () or weight.dtype.kind not in "iuf" or not fitting:
-        shapes = [f"{array.dtype} {array.shape}" for array in (weight, *tables)]
-        raise ValueError(f"{path} must hold a number and three float64 tables of equal length, got {shapes}")
-    if not 0 <= weight < np.inf:
-        raise ValueError(f"{path} has context_weight {weight}, which must be finite and >= 0")
-    dims = [table.shape[1] for table in tables]
-    if not (dims[1] and dims[2]) or max(dims) > _MOST_DIMS:  # room is made for a table without rows, too
-        raise ValueError(f"{path} must have 1 to {_MOST_DIMS} dimensions of theta and outcome, got {dims[1:]}")
-    contexts, thetas, outcomes = (check_vector(f"a table of {path}", table, table.shape[1]) for table in tables)
-    return float(weight), contexts, thetas, outcomes

@@ -3,18 +3,16 @@
 After Kulak & Calinon (2023), "Combining social and intrinsically-motivated learning for multi-task robot skill
 acquisition": the expected epistemic entropy over goals, and how much each mode should reduce it; a demonstration is
 asked for where the epistemic entropy is greatest.
-    learner = sgim_eer(environment, seed, correspondence=..., teachers={"ann": ann})              # by a process
-    learner = sgim_eer(environment, seed, correspondence=..., teachers={"ann": ann}, doubt=ByMixture)
-Ours: what is known of the policy for a goal is linear in features of the goal, so that reductions have a closed form;
-and where a movement of one's own would land is told by the earlier attempt that was nearest.
+    learner = sgim_eer(environment, seed, correspondence=..., teachers={"ann": ann})
+Ours: a Gaussian process says what is not known of the policy for a goal, in the place of a Bayesian mixture, so that
+reductions have a closed form; the nearest earlier attempt says where a movement of one's own would land.
 """
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import partial
-from typing import Any, Final, Unpack
+from typing import Final, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -36,55 +34,6 @@ _NOISE: Final = 0.1  # variance of what one exemplar says, in units of the doubt
 _LENGTH: Final = 0.1  # of the sides of C x T: how far an exemplar says something
 _KERNEL: Final = Kernel(1 / _LENGTH, 1.0, 0.0, _NOISE)
 
-Doubt = Callable[[Array, Array], Array]
-"""(known, points): exemplars ``(n, dim)`` and points ``(m, dim)`` of C x T in its sides -> ``(m, m)`` covariances of
-the policies for the points, given the exemplars. 1 on the diagonal: nothing is known."""
-
-
-class ByProcess:
-    """The doubt of a Gaussian process from outcomes to policies."""
-
-    @one_thread
-    def __call__(self, known: Array, points: Array) -> Array:
-        """See ``Doubt``."""
-        known = _thinned(known)
-        across = _KERNEL(squared_distances(points, known))
-        inner = _KERNEL(squared_distances(known, known)) + _NOISE * np.eye(len(known))
-        found: Array = _KERNEL(squared_distances(points, points)) - across @ np.linalg.solve(inner, across.T)
-        return found
-
-
-class ByMixture:
-    """The doubt of a Bayesian mixture of Gaussians, scikit-learn's (extra rivals): the policy of a component is known
-    the better, the more exemplars the component has; far from all of them nothing is known. It is fitted anew when
-    there are a tenth more exemplars."""
-
-    def __init__(self, components: int = 20) -> None:
-        self.components, self._fitted = components, 0
-        self._mixture: Any = None
-
-    def __call__(self, known: Array, points: Array) -> Array:
-        """See ``Doubt``."""
-        prior = _KERNEL(squared_distances(points, points))
-        if len(known) < 2 * self.components:
-            return prior
-        if len(known) >= 1.1 * self._fitted:
-            from sklearn.mixture import BayesianGaussianMixture
-
-            self._fitted = len(known)
-            self._mixture = BayesianGaussianMixture(n_components=self.components, random_state=0, reg_covar=_LENGTH**2)
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # that it has not converged
-                self._mixture.fit(_thinned(known))
-        mixture = self._mixture
-        apart = points[:, None] - mixture.means_  # (m, components, dim)
-        squared = np.einsum("mki,kij,mkj->mk", apart, mixture.precisions_, apart).min(axis=1)
-        within = np.exp(-squared / 2)
-        features = mixture.predict_proba(points) * np.sqrt(within)[:, None]
-        outside = np.sqrt(1 - within)
-        found: Array = (features / mixture.mean_precision_) @ features.T + np.outer(outside, outside) * prior
-        return found
-
 
 class EntropyGoals:
     """Chooses mode and goal by the expected reduction of the epistemic entropy; see `StrategicGoals`.
@@ -92,11 +41,10 @@ class EntropyGoals:
     Args:
         contexts, outcomes, rng: as in `InterestMap`.
         memory: of the learner; only read.
-        doubt: what is not known about the policies for goals.
     """
 
-    def __init__(self, contexts: Box, outcomes: Box, rng: np.random.Generator, *, memory: Memory, doubt: Doubt) -> None:
-        self.contexts, self.outcomes, self.memory, self.doubt, self._rng = contexts, outcomes, memory, doubt, rng
+    def __init__(self, contexts: Box, outcomes: Box, rng: np.random.Generator, *, memory: Memory) -> None:
+        self.contexts, self.outcomes, self.memory, self._rng = contexts, outcomes, memory, rng
         self._box = Box(np.concatenate((contexts.low, outcomes.low)), np.concatenate((contexts.high, outcomes.high)))
         self._tried: dict[str, list[tuple[Array, Array]]] = {}  # goals, and by how much they were missed, in sides
 
@@ -111,7 +59,7 @@ class EntropyGoals:
         points = self._scaled(np.tile(context, (_GOALS, 1)), goals)
         places = [points, *(self._landing(points, name) for name in costs)]
         known = self._scaled(self.memory.contexts, self.memory.outcomes)
-        covariance = self.doubt(known, np.concatenate(places))
+        covariance = doubt(known, np.concatenate(places))
         entropies = _entropy(np.diag(covariance)[:_GOALS])
         doubtful = int(entropies.argmax())
         found = dict[str, float]()
@@ -135,13 +83,11 @@ class EntropyGoals:
             ValueError: see `Goals.add`.
         """
         point = check_attempt(self.contexts, self.outcomes, context, goal, competence, gain)
-        goals, last = (
-            (point - self._box.low) / self._box.sides,
-            self._scaled(self.memory.contexts, self.memory.outcomes),
-        )
+        goal = (point - self._box.low) / self._box.sides
+        landed = self._scaled(self.memory.contexts[-1:], self.memory.outcomes[-1:])
         # Without an answer nothing is learnt: as if it had landed where something has landed before.
-        missed = np.full(len(point), np.nan) if gain == -1.0 else last[-1] - goals
-        self._tried.setdefault(strategy, []).append((goals, missed))
+        missed = np.full(len(point), np.nan) if gain == -1.0 else landed[0] - goal
+        self._tried.setdefault(strategy, []).append((goal, missed))
 
     def _landing(self, points: Array, strategy: str) -> Array:
         """Where attempts at ``points`` should end: they miss as the nearest earlier one did; at first not at all."""
@@ -167,7 +113,6 @@ def sgim_eer(
     teachers: Mapping[str, Demonstrator],
     cost: float = 1.0,
     base: MakeBase = practised,
-    doubt: Callable[[], Doubt] = ByProcess,
     memory: Memory | None = None,
     **parts: Unpack[Parts],
 ) -> Learner:
@@ -175,16 +120,29 @@ def sgim_eer(
 
     Args:
         environment, seed, correspondence, teachers, cost, base, parts: as in `sgim_im`.
-        doubt: what the entropy is measured by: `ByProcess`, or `ByMixture` as in the paper.
         memory: to start from; None for an empty one.
     """
     memory, base = start_memory(environment, memory), partial(imitating_only, base)
-    chosen: Parts = {"goals": partial(EntropyGoals, memory=memory, doubt=doubt()), **parts}
+    chosen: Parts = {"goals": partial(EntropyGoals, memory=memory), **parts}
     return strategic(environment, seed, memory, correspondence, teachers, cost, base, **chosen)
 
 
-def _thinned(known: Array) -> Array:
-    return known[:: 1 + len(known) // _KNOWN]
+@one_thread
+def doubt(known: Array, points: Array) -> Array:
+    """How little is known about the policies for goals, by a Gaussian process from outcomes to policies.
+
+    Args:
+        known: ``(n, dim)`` exemplars in C x T, in its sides.
+        points: ``(m, dim)`` likewise.
+
+    Returns:
+        ``(m, m)`` covariances of the policies for the points, given the exemplars; 1 on the diagonal: nothing is known.
+    """
+    known = known[:: 1 + len(known) // _KNOWN]
+    across = _KERNEL(squared_distances(points, known))
+    inner = _KERNEL(squared_distances(known, known)) + _NOISE * np.eye(len(known))
+    found: Array = _KERNEL(squared_distances(points, points)) - across @ np.linalg.solve(inner, across.T)
+    return found
 
 
 def _entropy(variances: Array) -> Array:

@@ -37,15 +37,12 @@ MakeEmitters = Callable[[GridArchive, np.random.Generator], Sequence[EmitterBase
 class Options(TypedDict, total=False):
     """The keywords that all of them have.
 
-    ``cells`` for each dimension of T, None for about 400 in all. ``again``: share of the movements that repeat elites,
-    whose cell is then that of their mean outcome; 0 believes the first outcome, however lucky. ``correspondence``, eq.
-    (6): what is demonstrated is imitated as by SGIM-D, ``imitations`` times with variations up to ``epsilon``, and
-    enters the archive; None learns alone. ``memory`` to start from: its exemplars enter the archive, and take the place
-    of first movements.
+    ``cells`` for each dimension of T, None for about 400 in all. ``correspondence``, eq. (6): what is demonstrated is
+    imitated as by SGIM-D, ``imitations`` times with variations up to ``epsilon``, and enters the archive; None learns
+    alone. ``memory`` to start from: its exemplars enter the archive, and take the place of first movements.
     """
 
     cells: int | None
-    again: float
     correspondence: Correspondence | None
     imitations: int
     epsilon: float
@@ -208,7 +205,6 @@ def _learner(
     annealed: dict[str, Any] | None = None,
     *,
     cells: int | None = None,
-    again: float = 0.0,
     correspondence: Correspondence | None = None,
     imitations: int = 10,
     epsilon: float = 0.05,
@@ -229,7 +225,7 @@ def _learner(
         **(annealed or {}),
     )
     scheduler = Scheduler(archive, emitters(archive, rng))
-    explorer = QualityDiversity(environment.policies, scheduler, origin, again, memory)
+    explorer = QualityDiversity(environment.policies, scheduler, origin, memory)
     inverse = answering(environment, memory, None)
     if correspondence is None:
         return Learner(memory, explorer, inverse=inverse)

@@ -21,7 +21,7 @@ from sgimd_torch.runs.tasks import Task, benchmark_of, correspondence_of, demons
 from sgimd_torch.spaces import Array, Demonstration, Estimate, stream
 from sgimd_torch.teachers import Teacher
 from sgimd_torch.teachers.answering import Demonstrator
-from sgimd_torch.teachers.by_hand import FOLDER, ByHand, read_lessons
+from sgimd_torch.teachers.by_hand import ByHand
 
 if TYPE_CHECKING:
     from sgimd_torch.forward_model.anchored import Trust
@@ -89,10 +89,7 @@ def build(config: Config, directory: Path | None = None) -> RunParts:
         teacher = parts["teacher"](demonstrations, stream(config.seed, "teacher"))
     teachers = parts.asked(demonstrations) if "teachers" in parts.used else {}
     demonstrations = [*demonstrations, *_others(demonstrations, teachers)]
-    lessons = read_lessons((directory or config.directory) / FOLDER)
     hand = next((each for each in teachers.values() if isinstance(each, ByHand)), ByHand(teacher=teacher))
-    for lesson in lessons:
-        hand.add(lesson)
     learner = parts["algorithm"](task.environment, config.seed)
     words = {answer: config.inverse if answer == OWN else answer for answer in config.answered}
     if "inverse" in config.entry("algorithm").options and config.entry("inverse").learns_with is None:
@@ -105,8 +102,8 @@ def build(config: Config, directory: Path | None = None) -> RunParts:
         config=config,
         environment=task.environment,
         learner=learner,
-        teacher=hand if lessons or "by-hand" in (config.teacher, *config.teachers) else teacher,
-        demonstrations=[*demonstrations, *(lesson.demonstration for lesson in lessons)],
+        teacher=hand if "by-hand" in (config.teacher, *config.teachers) else teacher,
+        demonstrations=demonstrations,
         answers={answer: inverses[word] for answer, word in words.items()},
         benchmark=benchmark,
         data={"demonstrations_crc32": demonstrations_crc32, "benchmark_crc32": benchmark_crc32},

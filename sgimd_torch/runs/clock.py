@@ -11,7 +11,7 @@ from sgimd_torch.spaces import Episode
 
 
 class Seconds:
-    """Seconds spent so far; those of a resumed run are added to ``before``, its last summary."""
+    """Seconds spent so far. Those of a resumed run add to ``before``, but for those that a replay spends again."""
 
     def __init__(self, before: dict[str, Any]) -> None:
         self._spent = {
@@ -28,7 +28,7 @@ class Seconds:
             yield
         finally:
             taken = time.perf_counter() - begun
-            self._spent[part] += taken
+            self._spent[part] = self._spent.get(part, 0.0) + taken
             if part == "physics":
                 self._spent["learner"] -= taken
 

@@ -220,7 +220,6 @@ class Config:
         "What those who ask do on their own, and how they imitate (sgim-im, sgim-acts, sgim-eer).",
         before="search",
     )
-    doubt: str = option("process", TEACHER, "What a demonstration should take away (sgim-eer).", before="process")
     cost: float = option(
         1.0,
         TEACHER,
@@ -301,6 +300,11 @@ class Config:
             raise ValueError("board true needs tensorboard, which is not installed; pip install 'sgimd-torch[board]'")
         if self.variant in ("", ".", "..") or any(sign in self.variant for sign in "/\\\0"):
             raise ValueError(f"name must be that of one directory, got {self.variant!r}; is the path for --out?")
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """All options, as json has them."""
+        return plain(vars(self))
 
     @property
     def variant(self) -> str:
@@ -463,3 +467,8 @@ def dashed(name: str) -> str:
 def plain(value: Any) -> Any:
     """As json has it."""
     return json.loads(json.dumps(value, default=str))
+
+
+# Files count by their content, of which a checksum is recorded; a benchmark may be another one when a run is resumed.
+MAY_CHANGE: Final = (*having("on_resume"), "benchmark_crc32")
+EVALUATES: Final = (*having("evaluates"), "benchmark_crc32")  # all evaluations of a run share these

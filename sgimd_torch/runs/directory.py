@@ -1,7 +1,7 @@
-"""Writing a run directory: refuse what is not this run, keep what is undamaged, go on from there.
+"""Opening the record of a run: refuse what is not this run, keep what is whole, say what is not.
 
-with RunDirectory(build(config), resume=False) as directory: directory.begin(); directory.log.append(line); ...
-``log.py`` explains the files.
+record, notes = open_run(build(config), resume=True, accept_loss=False)
+A run is the file ``run.sqlite`` in OUT/NAME/seed-003; ``docs/runs.md`` explains its tables.
 """
 
 from __future__ import annotations
@@ -9,204 +9,180 @@ from __future__ import annotations
 import importlib.metadata
 import os
 import platform
+import shutil
 import subprocess
 from collections.abc import Mapping
 from itertools import count
 from pathlib import Path
-from typing import Any, Final, Self
+from typing import Any, Final
 
 import sgimd_torch
 from sgimd_torch.catalogue import source
-from sgimd_torch.files import checksum, lock, make_folder, write_bytes, write_json
+from sgimd_torch.files import checksum, make_folder
+from sgimd_torch.record import DERIVED, InUseError, Record, RunError
 from sgimd_torch.runs.build import RunParts
-from sgimd_torch.runs.config import Config, before_there_was_a_choice, having, plain
-from sgimd_torch.runs.evaluations import Evaluations
-from sgimd_torch.runs.log import Columns, RunError, read_json
+from sgimd_torch.runs.config import EVALUATES, MAY_CHANGE, Config
 
-_SOURCE: Final = "source of "  # in versions.json, before the word that names a thing of a user's own
-_UNFINISHED = ("lock", "versions.json")  # what a run killed before its config.json may have left, besides *.part
-# Files count by their content, of which a checksum is recorded; a benchmark may be another one when a run is resumed.
-MAY_CHANGE: Final = (*having("on_resume"), "benchmark_crc32")
+FILE: Final = "run.sqlite"
+_LASTING: Final = ("events", "demonstrations")  # tables that only a new life would make again
+_SOURCE: Final = "source of "  # among the versions, before the word that names a part of a user's own
 LIBRARIES: Final = {"numpy": "numpy", "scipy": "scipy", "faiss": "faiss-cpu", "mujoco": "mujoco"}
 FORWARD: Final = ("torch", "lightning", "safetensors")  # of runs with a forward model
-EVALUATION_SETTINGS: Final = (*having("evaluates"), "benchmark_crc32")  # all evaluations of a run share these
 
 
-class RunDirectory:
-    """Where one run is written, from ``begin`` on, by one process at a time; a context manager.
-
-    Of the evaluations of an earlier part it keeps those that the whole run would have.
+def open_run(parts: RunParts, *, resume: bool, accept_loss: bool = False) -> tuple[Record, list[str]]:
+    """The record of a run, open for writing, and messages; nothing in it has changed before its first commit.
 
     Args:
-        parts: of the run; its configuration says where the directory is.
-        resume: go on with what is there; False refuses a directory that is in use already.
-        accept_loss: go on even if the log lacks movements that summary.json counts: they are made again.
-
-    Attributes:
-        columns, log: the columns of the log, and its table.
-        lines: of the log, as they were found.
-        summary: the last one, {} if there is none.
-        evaluations: those found, and where new ones go.
-        notes: messages for the user, such as what was dropped from damaged files.
+        parts: of the run; its configuration says where it is.
+        resume: go on with what is there; False refuses a run that is there already.
+        accept_loss: go on even if movements of it are damaged or missing: a copy is kept, they are made again.
 
     Raises:
-        RunError: it holds a run and ``resume`` is False, or a run with other settings, or something else; or its log
-            lacks movements, or has more than the run is to have; or another process writes in it.
+        RunError: there is a run and ``resume`` is False, or it has other settings or more movements, or it is damaged
+            and the loss is not accepted; or something else is there; or another process writes it.
         OSError: it cannot be written.
     """
-
-    def __init__(self, parts: RunParts, *, resume: bool, accept_loss: bool = False) -> None:
-        config, robot = parts.config, parts.environment
-        self.path = path = config.directory
-        self.columns = Columns(robot.contexts.dim, robot.policies.dim, robot.outcomes.dim)
-        self.log = self.columns.table(path)
-        self.notes: list[str] = []
-        self.summary: dict[str, Any] = {}
-        self._settings: dict[str, Any] = plain({**vars(config), **parts.data})
-        self._versions = {**versions(forward=parts.model is not None), **sources(config)}
-        _refuse_foreign(path)
-        make_folder(path)
+    config, robot = parts.config, parts.environment
+    spaces = {"contexts": robot.contexts, "policies": robot.policies, "outcomes": robot.outcomes}
+    path, notes = config.directory / FILE, list[str]()
+    refuse_foreign(config.directory)
+    about: dict[str, Any] = {
+        "settings": config.settings,
+        "files": parts.data,
+        "versions": {**versions(forward=parts.model is not None), **sources(config)},
+        "robot": type(robot).__name__,
+        "spaces": {name: [box.low.tolist(), box.high.tolist()] for name, box in spaces.items()},
+    }
+    dims = robot.contexts.dim, robot.policies.dim, robot.outcomes.dim
+    make_folder(config.directory)
+    if holds_run(path) and not resume:
+        raise RunError(f"{config.directory} holds a run already; go on with it by --resume, or choose another --out")
+    record = _whole(path, accept_loss, notes) if holds_run(path) else None
+    if record is None:
+        notes += [f"{config.directory} holds no run yet: it starts from the beginning"] if resume and not notes else []
+        record = Record.make(path, dims, about)
+    else:
         try:
-            self._lock = lock(path / "lock")
-        except BlockingIOError:
-            raise RunError(f"{path} is in use by another process; wait for it, or choose another --out") from None
-        try:
-            before = self._settings_before(resume)
-            if before is not None:
-                self._keep_versions_before()
-                self.summary = self._summary_before()
-            elif resume:
-                self.notes.append(f"{path} holds no run yet: it starts from the beginning")
-            self._copy = self._read_log(accept_loss)
-            if len(self.lines) > config.movements:
-                raise RunError(f"{path} has {len(self.lines)} movements already, {config.movements} were asked for")
-            region_dims = len(parts.regions[0].low) if parts.regions else None
-            self.evaluations = Evaluations(path, robot.contexts, region_dims, self.notes)
-            alike = before is not None and all(before.get(name) == self._settings[name] for name in EVALUATION_SETTINGS)
-            kept = [n for n in config.evaluations if alike and n <= len(self.lines)]
-            self.evaluations.keep(kept, config.answered)
-            for partial in (*path.glob("*.json*.part"), *path.glob("*.csv*.part")):  # of a process that was killed
-                partial.unlink()
+            if "settings" not in record.about:
+                raise RunError(f"{path} is a life that Learner.save wrote, not a run; choose another --out")
+            _refuse_other(record, about)
+            if record.dims != dims:
+                was = f"dims {record.dims} of context, theta, outcome, the robot now has {dims}"
+                raise RunError(f"{path} was recorded with {was}; has the robot become another one?")
+            if record.movements > config.movements:
+                raise RunError(f"{path} has {record.movements} movements already, {config.movements} were asked for")
+            about["versions"] = _with_earlier(record.about["versions"], about["versions"], notes)
+            _keep_evaluations(record, parts, about)
+            record.settle(**about)
         except BaseException:
-            os.close(self._lock)
+            record.close()
             raise
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        os.close(self._lock)
-
-    def begin(self) -> None:
-        """Start to write. Until then what was found stays as it is, so that a replay that fails does no harm."""
-        write_json(self.path / "versions.json", self._versions)
-        write_json(self.path / "config.json", self._settings)  # from here on it counts as a run
-        if self._copy is not None:
-            write_bytes(self._copy, self.log.path.read_bytes())
-        if self._lost:  # the loss is accepted once
-            self.summarise(**{**self.summary, "movements": len(self.lines), "finished": False})
-        self.log.begin(self._kept)
-        self.log.flush()
-        self.evaluations.begin()
-
-    def summarise(self, **summary: Any) -> None:
-        """Replace summary.json, once the log is on the disk: it must not count movements that the log lacks."""
-        self.log.flush(sync=True)
-        self.summary = summary
-        write_json(self.path / "summary.json", summary)
-
-    def _settings_before(self, resume: bool) -> dict[str, Any] | None:
-        """Those that it was started or last resumed with; None for a new run."""
-        settings = self._settings
-        before: dict[str, Any] | None = read_json(self.path / "config.json", missing=None)
-        if before is None:
-            return None
-        if not resume:
-            raise RunError(f"{self.path} holds a run already; go on with it by --resume, or choose another --out")
-        before = {**before_there_was_a_choice(), **before}
-        differ = [
-            f"{name} was {before.get(name)}, now {settings.get(name)}"
-            for name in dict.fromkeys((*settings, *before))
-            if name not in MAY_CHANGE and before.get(name) != settings.get(name)
-        ]
-        if differ:
-            raise RunError(
-                f"{self.path} belongs to another configuration: {'; '.join(differ)}. "
-                "Resume it with its own, or give the new variant another --name or --out"
-            )
-        return before
-
-    def _keep_versions_before(self) -> None:
-        """Other versions that an earlier part ran with."""
-        old = self._read_or_note("versions.json")
-        earlier = old.pop("before", [])
-        if not isinstance(earlier, list):
-            earlier = []
-        unknown = {name: now for name, now in self._versions.items() if name in FORWARD}  # earlier versions left it out
-        differ = [name for name, now in self._versions.items() if {**unknown, **old}.get(name) != now]
-        if old and differ:
-            changes = ", ".join(f"{name} {old.get(name)} -> {self._versions[name]}" for name in differ)
-            self.notes += [f"resumed with other versions: {changes}", *changed_sources(old, self._versions)]
-            earlier = [*earlier, old]
-        if earlier:
-            self._versions["before"] = earlier
-
-    def _summary_before(self) -> dict[str, Any]:
-        summary = self._read_or_note("summary.json")
-        kinds = {name: (int, float) for name in summary if name.startswith("seconds_")} | {"movements": (int,)}
-        wrong = [name for name, kind in kinds.items() if type(summary.get(name, 0)) not in kind]
-        if wrong:
-            self.notes.append(f"{self.path}/summary.json: {', '.join(wrong)} must be numbers; it counts as missing")
-        return {} if wrong else summary
-
-    def _read_or_note(self, name: str) -> dict[str, Any]:
-        """A file that a run can go on without: if it is damaged, it counts as missing."""
-        try:
-            found: dict[str, Any] = read_json(self.path / name, missing={})
-        except RunError as error:
-            self.notes.append(f"{error}; it counts as missing")
-            return {}
-        return found
-
-    def _read_log(self, accept_loss: bool) -> Path | None:
-        """Take over the undamaged lines; returns where to keep a copy of the log, None if nothing was lost."""
-        log, found = self.log.path, self.log.read()
-        begins_otherwise = found.bad == 1 and not self.log.header.startswith(found.tail) and found.tail.strip(b"\0")
-        if begins_otherwise or not found.checked:
-            start = self.log.header[:40].decode()
-            raise RunError(f"{log} does not begin with {start}...; restore it, or choose another --out")
-        self.lines, self._kept, n = found.lines, found.size, len(found.lines)
-        self._lost = max(0, self.summary.get("movements", 0) - n)
-        damaged = found.damage is not None
-        if self._lost and not accept_loss:
-            raise RunError(
-                f"{log} holds {n} movements{f', line {found.bad} is damaged' if damaged else ''}, but summary.json "
-                f"counts {n + self._lost}; was it cut, emptied or deleted? Restore it, or make the {self._lost} "
-                "missing ones again with --accept-loss, which keeps a copy of what is there"
-            )
-        self.notes += self.log.notes(found, f"{n} movements are kept")
-        if self._lost:
-            self.notes.append(f"{log} lacks {self._lost} movements: {n} are kept, the others will be made again")
-        if not damaged and not (self._lost and os.path.lexists(log)):
-            return None
-        copies = (log.with_name(f"{log.name}.lost-{k}") for k in count())
-        copy = next(path for path in copies if not os.path.lexists(path))
-        self.notes.append(f"{log} as it was found is kept as {copy}")
-        return copy
+    record.replace_rows("goals", ((k, *goal) for k, goal in enumerate(parts.benchmark.goals.tolist())))
+    return record, notes
 
 
-def _refuse_foreign(path: Path) -> None:
-    if not path.exists() or (path / "config.json").exists():
+def holds_run(path: Path) -> bool:
+    """Whether there is a record; a process that was killed while it made one leaves an empty file."""
+    return path.is_file() and path.stat().st_size > 0
+
+
+def refuse_foreign(folder: Path) -> None:
+    """Refuse a folder with other things in it.
+
+    Raises:
+        RunError: it is a file, or holds something else than a run.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise RunError(f"{folder} is a file, not a run directory; choose another --out")
+    if not folder.exists() or (folder / FILE).exists():
         return
-    if not path.is_dir():
-        raise RunError(f"{path} is a file, not a run directory; choose another --out")
-    foreign = [entry for entry in sorted(os.listdir(path)) if entry not in _UNFINISHED and not entry.endswith(".part")]
+    foreign = sorted(entry for entry in os.listdir(folder) if not entry.endswith(".part"))
+    if "config.json" in foreign:
+        raise RunError(f"{folder} holds a run of files that this version does not read; choose another --out")
     if foreign:
-        raise RunError(f"{path} holds {', '.join(foreign[:3])} but no run (no config.json); choose another --out")
+        raise RunError(f"{folder} holds {', '.join(foreign[:3])} but no run (no {FILE}); choose another --out")
+
+
+def _whole(path: Path, accept_loss: bool, notes: list[str]) -> Record | None:
+    """The record at ``path``, without what is damaged; None if nothing is left of it."""
+    try:
+        record = Record(path, write=True)
+        wrong = record.check()
+    except InUseError:
+        raise
+    except RunError as error:
+        _accept(path, f"{error}; nothing of it can be read", "make them", accept_loss, notes)
+        path.unlink()
+        return None
+    if not wrong:
+        return record
+    lost = [message for table, message in wrong.items() if table in _LASTING]
+    if lost:
+        record.close()
+        _accept(path, "; ".join(lost), "keep those before and make the others", accept_loss, notes)
+        record = Record(path, write=True)
+    try:
+        whole = () if lost else [table for table in DERIVED if table not in wrong]
+        notes += [f"{message}; it is made again" for message in wrong.values() if message not in lost]
+        kept = record.rewrite(keep=whole)
+    finally:
+        record.close()
+    if lost:
+        notes.append(f"{kept} movements of {path} are kept, the others are made again")
+    return Record(path, write=True)
+
+
+def _accept(path: Path, what: str, how: str, accept_loss: bool, notes: list[str]) -> None:
+    """Keep a copy of a record that loses movements, or refuse to go on."""
+    if not accept_loss:
+        raise RunError(f"{what} Restore it, or {how} again with --resume --accept-loss, which keeps a copy")
+    copy = next(place for k in count() if not (place := path.with_name(f"run.lost-{k}.sqlite")).exists())
+    shutil.copy2(path, copy)
+    notes.append(f"{what} It is kept as {copy}")
+
+
+def _refuse_other(record: Record, about: Mapping[str, Any]) -> None:
+    before = {**record.about["settings"], **record.about["files"]}
+    now = {**about["settings"], **about["files"]}
+    differ = [
+        f"{name} was {before.get(name)}, now {now.get(name)}"
+        for name in dict.fromkeys((*now, *before))
+        if name not in MAY_CHANGE and before.get(name) != now.get(name)
+    ]
+    if differ:
+        raise RunError(
+            f"{record.path.parent} belongs to another configuration: {'; '.join(differ)}. "
+            "Resume it with its own, or give the new variant another --name or --out"
+        )
+
+
+def _with_earlier(old: dict[str, Any], now: dict[str, Any], notes: list[str]) -> dict[str, Any]:
+    """The versions ``now``; those of earlier parts of the run, where they differ, are kept beside them."""
+    earlier = old.pop("before", [])
+    differ = [name for name, version in now.items() if old.get(name) != version]
+    if differ:
+        changes = ", ".join(f"{name} {old.get(name)} -> {now[name]}" for name in differ)
+        notes += [f"resumed with other versions: {changes}", *changed_sources(old, now)]
+        earlier = [*earlier, old]
+    return {**now, "before": earlier} if earlier else now
+
+
+def _keep_evaluations(record: Record, parts: RunParts, about: Mapping[str, Any]) -> None:
+    """Of the evaluations so far only those that the whole run would have."""
+    before = {**record.about["settings"], **record.about["files"]}
+    now = {**about["settings"], **about["files"]}
+    alike = all(before.get(name) == now.get(name) for name in EVALUATES)
+    wanted = {*parts.config.evaluations} if alike else set()
+    for table in ("evaluations", "errors", "regions"):
+        rows = list(record.rows(table))
+        kept = [row for row in rows if row[0] in wanted]
+        if len(kept) < len(rows):
+            record.replace_rows(table, kept)
 
 
 def sources(config: Config) -> dict[str, str]:
-    """The file of each thing of a user's own in a run, and its checksum, such as "toss.py, crc32 8f0a1b2c"."""
+    """The file of each part of a user's own in a run, and its checksum, such as "toss.py, crc32 8f0a1b2c"."""
     found = {}
     for word in config.own:
         if (file := source(word)) is not None:
@@ -215,17 +191,8 @@ def sources(config: Config) -> dict[str, str]:
     return found
 
 
-def stale(config: Config) -> list[str]:
-    """The same notes for a run on disk; none if what made it is as it was, or cannot be read."""
-    try:
-        before: dict[str, Any] = read_json(config.directory / "versions.json", missing={})
-    except RunError:  # the run itself says so when it is resumed
-        return []
-    return changed_sources(before, sources(config))
-
-
 def changed_sources(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
-    """A note for each file of a user's own that is another one than ``before``, of two versions.json."""
+    """A note for each file of a user's own that is another one than ``before``."""
     changed = {name: str(was) for name, was in before.items() if name.startswith(_SOURCE) and now.get(name, was) != was}
     return [
         f"{was.partition(',')[0]} has changed since this run was made ({was} -> {now[name]}): what is recorded was "

@@ -1,49 +1,52 @@
-"""Reading run directories: everything that a run has written, as arrays. Figures and tables are made from this alone.
+"""Reading runs: everything that a run has recorded, as arrays. Figures, reports and tables are made from this alone.
 
-run = read_run("runs/sgim-d/seed-003"); run.outcomes, run.evaluation["mean_error_m"]    # log.py explains the files
+run = read_run("runs/sgim-d/seed-003"); run.outcomes, run.evaluation["mean_error"]    # docs/runs.md explains the tables
 """
 
 from __future__ import annotations
 
 import os
+import re
+from array import array
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sgimd_torch.evaluation import Evaluation, Part
 from sgimd_torch.files import checksum
-from sgimd_torch.runs.config import FILES, OWN, Config, before_there_was_a_choice, from_settings, having, options
-from sgimd_torch.runs.log import Columns, RunError, read_json
-from sgimd_torch.runs.tables import EVALUATION, SMALL, small_table
-from sgimd_torch.spaces import Array
+from sgimd_torch.record import Event, Kind, Record, RunError
+from sgimd_torch.runs.config import FILES, OWN, Config, from_settings, having, options
+from sgimd_torch.runs.directory import FILE
+from sgimd_torch.spaces import Array, Box, Demonstration
 
-NO_EVALUATION: Final = {name: np.empty(0) for name in EVALUATION}
-LONGEST_LINE: Final = 1 << 16  # bytes, of a log
+Columns = dict[str, np.ndarray]
+"""By name; an entry for each row."""
 
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """A run as it was read.
+    """A run as it was recorded so far: finished, stopped or under way.
 
-    ``index`` ``(n,)``, ``origin`` ``(n,)`` names, "" at rest, ``demonstration`` ``(n,)`` row of the demonstration just
-    before, -1 if there was none; ``contexts``, ``thetas``, ``goals`` and ``outcomes`` ``(n, dim)``, NaN where there was
-    none. ``answers`` has, for each answer, an array for each column of evaluation.csv, an entry for each evaluation;
-    ``by_context`` likewise, with an entry for each part of C and each answer, None without contexts; ``regions``
-    likewise, with an entry for each region at each evaluation, None for a goal model without regions;
-    ``predictions`` and ``refreshes`` likewise, None without a forward model; ``requests`` with an entry for each
-    request, None if there was none. ``config``, ``versions``, ``summary``: as in their files.
-
-    ``damage``: file name -> number of its first bad line, where reading ended, such as ``{"evaluation.csv": 3}``; the
-    names of the columns are line 1. ``unchecked``: names of the files without checksums, which an earlier version
-    wrote: in them, a changed number is noticed only if it is impossible.
+    ``index`` ``(n,)``, ``origin`` ``(n,)`` names, "" at rest, ``demonstration`` ``(n,)`` which of ``demonstrations``
+    came just before, -1 if there was none; ``contexts``, ``thetas``, ``goals`` and ``outcomes`` ``(n, dim)``, NaN where
+    there was none. ``answers`` has, for each answer, the columns of its evaluations; ``errors`` those of every goal at
+    every evaluation, ``benchmark`` ``(n_goals, outcome_dim)`` the goals; ``regions`` those of the goal model at every
+    evaluation, None for a goal model without regions; ``predictions`` and ``refreshes`` those of a forward model, None
+    without one; ``requests`` those of what was asked for, None if nothing was. ``config``: all options by name;
+    ``robot``: the class of the environment; ``spaces``: its contexts, policies and outcomes; ``summary``: movements,
+    whether it is finished, and seconds.
     """
 
     path: Path
     config: dict[str, Any]
     versions: dict[str, Any]
+    files: dict[str, Any]
+    robot: str
+    spaces: dict[str, Box]
     summary: dict[str, Any]
     index: NDArray[np.int64]
     origin: NDArray[np.str_]
@@ -52,23 +55,25 @@ class Run:
     thetas: Array
     goals: Array
     outcomes: Array
-    answers: dict[str, dict[str, Array]]
-    regions: dict[str, np.ndarray] | None
-    predictions: dict[str, np.ndarray] | None = None
-    refreshes: dict[str, np.ndarray] | None = None
-    by_context: dict[str, np.ndarray] | None = None
-    requests: dict[str, np.ndarray] | None = None
-    damage: dict[str, int] = field(default_factory=dict)
-    unchecked: tuple[str, ...] = ()
+    answers: dict[str, Columns]
+    errors: Columns = field(default_factory=dict)
+    benchmark: Array = field(default_factory=lambda: np.empty((0, 0)))
+    demonstrations: list[Demonstration] = field(default_factory=list)
+    regions: Columns | None = None
+    predictions: Columns | None = None
+    refreshes: Columns | None = None
+    requests: Columns | None = None
 
     @property
     def evaluation(self) -> dict[str, Array]:
         """The evaluations of the run's own answers."""
         return self.answers[OWN]
 
-    def at(self, movements: int, column: str = "mean_error_m", answer: str = OWN) -> float:
-        """An entry of evaluation.csv, NaN if there is none."""
-        evaluation = self.answers.get(answer, NO_EVALUATION)
+    def at(self, movements: int, column: str = "mean_error", answer: str = OWN) -> float:
+        """An entry of an evaluation, NaN if there is none."""
+        evaluation = self.answers.get(answer)
+        if evaluation is None:
+            return float("nan")
         found = evaluation[column][evaluation["movements"] == movements]
         return float(found[0]) if len(found) else float("nan")
 
@@ -79,6 +84,24 @@ class Run:
         new = (np.diff(own, axis=0, prepend=np.nan) != 0).any(axis=1)
         return own[new]
 
+    @property
+    def by_context(self) -> Columns | None:
+        """The mean error in each third of each context, at each evaluation, by each answer; None without contexts."""
+        contexts, errors = self.spaces["contexts"], self.errors
+        if not contexts.dim:
+            return None
+        points = np.stack([errors[f"context_{k}"] for k in range(contexts.dim)], axis=1)
+        unknown = np.full(len(points), np.nan)
+        rows = []
+        for answer in self.answers:
+            for movements in np.unique(errors["movements"]):
+                here = (errors["answer"] == answer) & (errors["movements"] == movements)
+                found = Evaluation(errors["error"][here], points[here], points[here], unknown[here], points[here])
+                rows += [(movements, answer, *part) for part in found.by_context(contexts) if here.any()]
+        names = ("movements", "answer", *Part._fields)
+        columns = zip(*rows, strict=True) if rows else ([] for _ in names)
+        return {name: np.array(column) for name, column in zip(names, columns, strict=True)}
+
 
 def points_of(requests: Mapping[str, np.ndarray], part: str, dim: int) -> Array:
     """``(n, dim)`` the outcomes that were "wanted" or "got"; contexts come before them in the table."""
@@ -87,55 +110,131 @@ def points_of(requests: Mapping[str, np.ndarray], part: str, dim: int) -> Array:
 
 
 def read_run(path: str | os.PathLike[str]) -> Run:
-    """What a run has written so far: finished, stopped or still running. An incomplete last line is left out.
+    """What a run has recorded so far.
 
-    A damaged file is read up to its first bad line, see ``damage``.
+    Args:
+        path: of the run's folder.
 
     Raises:
-        RunError: there is no run at ``path``, or one of its files cannot be read at all.
+        RunError: there is no run at ``path``, or it is damaged.
     """
     path = Path(path)
-    config = read_json(path / "config.json", missing=None)
-    if config is None:
-        raise RunError(f"{path} is no run directory, it has no config.json; runs are in OUT/NAME/seed-000")
-    try:
-        columns = Columns.of(path)
-        log = columns.table(path)
-        small = [small_table(path / name) for name in SMALL if os.path.lexists(path / name)]
-        found = {table.path.name: table.read() for table in (log, *small)}
-        rows = found[log.path.name].rows
-        demonstration = np.array([int(row[2] or -1) for row in rows], dtype=np.int64)
-        contexts, thetas, goals, outcomes = columns.split(rows)
-        arrays = {table.path.name: table.arrays(found[table.path.name]) for table in small}
-    except OSError as error:
-        raise RunError(f"{error.filename} cannot be read: {error.strerror}") from error
-    except RunError:
-        raise
-    except (ValueError, OverflowError) as error:  # an edited line with a new checksum
-        raise RunError(
-            f"{path} has a table that holds what no run writes ({str(error)[:100]}); was it edited?"
-        ) from error
+    if not (path / FILE).exists():
+        what = "a run of files that this version does not read" if (path / "config.json").exists() else "no run"
+        raise RunError(f"{path} holds {what}; runs are in OUT/NAME/seed-000 and have a file {FILE}")
+    with Record(path / FILE) as record:
+        about = record.about
+        if "settings" not in about:
+            raise RunError(f"{path / FILE} is a life that Learner.save wrote, not a run")
+        settings = about["settings"]
+        seed = re.fullmatch(r"seed-(\d+)", path.resolve().name)
+        if seed is not None and int(seed[1]) != settings["seed"]:
+            raise RunError(f"{path} holds a run of seed {settings['seed']}; was it copied from another one?")
+        shown = record.demonstrations()
+        events = _Movements(record.dims, shown)
+        for event in record.events(shown):
+            events.add(event)
+        found: dict[str, Columns] = {
+            table: _columns(record, table)
+            for table in ("goals", "evaluations", "errors", "regions", "predictions", "refreshes")
+        }
+        n = record.movements
+    evaluated = found["evaluations"]["movements"]
+    nothing = not shown and not np.isfinite(events.arrays()["outcomes"]).any()  # to infer a movement from
+    finished = n == settings["movements"] and (settings["evaluate_at"] == [] or n in evaluated or nothing)
     return Run(
         path=path,
-        config=config,
-        versions=read_json(path / "versions.json", missing={}),
-        summary=read_json(path / "summary.json", missing={}),
-        index=np.arange(len(rows)),
-        origin=np.array([row[1] for row in rows], dtype=np.str_),
-        demonstration=demonstration,
-        contexts=contexts,
-        thetas=thetas,
-        goals=goals,
-        outcomes=outcomes,
-        answers=_by_answer(arrays.get("evaluation.csv", NO_EVALUATION)),
-        regions=arrays.get("regions.csv"),
-        predictions=arrays.get("predictions.csv"),
-        refreshes=arrays.get("refreshes.csv"),
-        by_context=arrays.get("by_context.csv"),
-        requests=arrays.get("requests.csv"),
-        damage={name: table.damage for name, table in found.items() if table.damage is not None},
-        unchecked=tuple(name for name, table in found.items() if not table.checked),
+        config=settings,
+        versions=about["versions"],
+        files=about["files"],
+        robot=about["robot"],
+        spaces={name: Box(np.array(low), np.array(high)) for name, (low, high) in about["spaces"].items()},
+        summary={"movements": n, "finished": bool(finished), **about.get("seconds", {})},
+        **events.arrays(),
+        answers=_by_answer(found["evaluations"]),
+        errors=found["errors"],
+        benchmark=np.stack(list(found["goals"].values())[1:], axis=1),
+        demonstrations=shown,
+        regions=_if_any(found["regions"]),
+        predictions=_if_any(found["predictions"]),
+        refreshes=_if_any(found["refreshes"]),
+        requests=events.requests(),
     )
+
+
+def _if_any(columns: Columns) -> Columns | None:
+    return columns if len(next(iter(columns.values()))) else None
+
+
+class _Movements:
+    """Events as arrays of movements, and of requests."""
+
+    def __init__(self, dims: tuple[int, int, int], shown: list[Demonstration]) -> None:
+        c, p, t = dims
+        self.dims = {"contexts": c, "thetas": p, "goals": t, "outcomes": t}
+        self._vectors = {name: array("d") for name in self.dims}
+        self._row = {id(each): k for k, each in enumerate(shown)}
+        self._origins, self._shown, self._requests = list[str](), array("q"), list[tuple[Any, ...]]()
+        self._last = -1
+
+    def add(self, event: Event) -> None:
+        if event.lesson is not None:
+            self._last = self._row[id(event.lesson)]
+            if self._requests and self._requests[-1][3] == "shown" and self._requests[-1][4] is None:
+                self._requests[-1] = (*self._requests[-1][:4], event.lesson, *self._requests[-1][5:])
+        elif event.kind == Kind.ASKED and event.goal is not None:
+            asked = len(self._origins), event.who, event.strategy, event.reply, None, event.context, event.goal
+            self._requests.append(asked)
+        elif event.kind in (Kind.MOVED, Kind.RESTED):
+            self._origins.append(event.origin or "")
+            self._shown.append(self._last)
+            self._last = -1
+            values = (event.context, event.theta, event.goal, event.outcome)
+            for (name, dim), value in zip(self.dims.items(), values, strict=True):
+                self._vectors[name].extend([np.nan] * dim if value is None else value.tolist())
+
+    def arrays(self) -> dict[str, Any]:
+        n = len(self._origins)
+        vectors = {
+            name: np.frombuffer(self._vectors[name]).reshape(n, dim) if n * dim else np.empty((n, dim))
+            for name, dim in self.dims.items()
+        }
+        shown = np.array(self._shown, dtype=np.int64)
+        origin = np.array(self._origins, dtype=np.str_)
+        return {"index": np.arange(n), "origin": origin, "demonstration": shown, **vectors}
+
+    def requests(self) -> Columns | None:
+        """index of the movement that came next, teacher, strategy, reply, shown (which demonstration, -1 for none),
+        wanted_* and got_*, points of C x T, and how far their outcomes are ``apart``."""
+        if not self._requests:
+            return None
+        index, teacher, strategy, reply, shown, contexts, goals = zip(*self._requests, strict=True)
+        wanted = np.stack([np.concatenate(each) for each in zip(contexts, goals, strict=True)])
+        nothing = np.full(wanted.shape[1], np.nan)
+        got = np.stack([nothing if each is None else np.concatenate((each.context, each.outcome)) for each in shown])
+        t = self.dims["outcomes"]
+        words = {"teacher": teacher, "strategy": strategy, "reply": reply}
+        return {
+            "index": np.array(index),
+            **{name: np.array(values, dtype=np.str_) for name, values in words.items()},
+            "shown": np.array([-1 if each is None else self._row[id(each)] for each in shown]),
+            **{f"wanted_{k}": column for k, column in enumerate(wanted.T)},
+            **{f"got_{k}": column for k, column in enumerate(got.T)},
+            "apart": np.array([np.linalg.norm(each) for each in got[:, -t:] - wanted[:, -t:]]),
+        }
+
+
+def _columns(record: Record, table: str) -> Columns:
+    names, rows = record.columns(table), list(record.rows(table))
+    columns = zip(*rows, strict=True) if rows else ([] for _ in names)
+    return {name: _column(name, column) for name, column in zip(names, columns, strict=True)}
+
+
+def _column(name: str, values: Any) -> np.ndarray:
+    if name in ("answer", "path"):
+        return np.array(values, dtype=np.str_)
+    whole = name in ("movements", "goal", "goals", "attempts", "exemplar", "exemplars", "steps", "diverged")
+    return np.array(values, dtype=np.int64 if whole else np.float64)
 
 
 def config_of(run: Run) -> Config:
@@ -147,7 +246,7 @@ def config_of(run: Run) -> Config:
     try:
         return from_settings(run.config)
     except (TypeError, ValueError) as error:
-        raise RunError(f"{run.path}/config.json does not describe a run of this version: {error}") from error
+        raise RunError(f"the settings of {run.path} do not describe a run of this version: {error}") from error
 
 
 def find_runs(place: str | os.PathLike[str]) -> dict[str, list[Path]]:
@@ -158,7 +257,7 @@ def find_runs(place: str | os.PathLike[str]) -> dict[str, list[Path]]:
     """
     place, found = Path(place), dict[str, list[Path]]()
     for pattern in ("", "seed-*/", "*/seed-*/"):
-        for config in sorted(place.glob(f"{pattern}config.json")):
+        for config in sorted(place.glob(f"{pattern}run.sqlite")):
             found.setdefault(variant_of(config.parent), []).append(config.parent)
     if not found:
         why = "holds no runs" if place.is_dir() else "is a file, not a folder" if place.exists() else "does not exist"
@@ -172,42 +271,32 @@ def variant_of(path: Path) -> str:
 
 
 def finished(config: Config) -> bool:
-    """Whether this run is on disk with these options, undamaged to its last movement and its last evaluation."""
-    path = config.directory
+    """Whether this run is on disk with these options, whole, to its last movement and its last evaluation."""
     try:
-        summary, settings = (read_json(path / name, missing={}) for name in ("summary.json", "config.json"))
-        if not summary.get("finished") or movements_on_disk(path) != config.movements:
-            return False
-        run = read_run(path)
-        whole = len(run.index) == config.movements and not run.damage
-        last = [run.answers.get(answer, {}).get("movements", ()) for answer in config.answered]
-        evaluated = not config.evaluations or all(config.movements in movements for movements in last)
-        found, place = from_settings({**before_there_was_a_choice(), **settings}), having("place")
+        run = read_run(config.directory)
+        found, place = from_settings(run.config), having("place")
         same = all(getattr(found, name) == getattr(config, name) for name in options() if name not in place)
         files = [(name, getattr(config, name)) for name in FILES]
-        return (whole and evaluated and same) and all(
-            file is None or settings.get(f"{name}_crc32") in (None, checksum(file)) for name, file in files
+        return bool(run.summary["finished"] and same) and all(
+            file is None or run.files.get(f"{name}_crc32") in (None, checksum(file)) for name, file in files
         )
     except (ValueError, OSError):  # of another version, or unreadable: the run says so when it is resumed
         return False
 
 
-def _by_answer(columns: dict[str, Any]) -> dict[str, dict[str, Array]]:
-    """The rows of evaluation.csv, apart for each answer; the run's own answers are always there."""
+def movements_on_disk(path: Path) -> int:
+    """How many movements the record of a run directory holds."""
+    try:
+        with Record(path / FILE) as record:
+            return record.movements
+    except RunError:
+        return 0
+
+
+def _by_answer(columns: Columns) -> dict[str, Columns]:
+    """The evaluations, apart for each answer; the run's own answers are always there."""
     words = columns["answer"]
     return {
         word: {name: values[words == word] for name, values in columns.items() if name != "answer"}
         for word in dict.fromkeys((OWN, *words.tolist()))
     }
-
-
-def movements_on_disk(path: Path) -> int:
-    """How many movements the log of a run directory holds, by the index of its last whole line."""
-    try:
-        with (path / "episodes.csv").open("rb") as log:
-            log.seek(max(0, log.seek(0, os.SEEK_END) - LONGEST_LINE))
-            last = log.read().rpartition(b"\n")[0].rpartition(b"\n")[2]
-    except OSError:
-        return 0
-    index = last.partition(b",")[0]
-    return int(index) + 1 if index.isdigit() else 0

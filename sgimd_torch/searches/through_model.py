@@ -1,8 +1,8 @@
-"""Searches through the forward model: by its gradient, which movement should land nearer to the goal, and reliably?
+"""A search through the forward model: by its gradient, which movement should land nearer to the goal, and reliably?
 
-Not in Nguyen & Oudeyer (2014); swaps for the simplex of section 4.4.2, which needs no model.
+Not in Nguyen & Oudeyer (2014); a swap for the simplex of section 4.4.2, which needs no model.
     search = gradient_search(policies, rng, model=model); movements = search(estimate, goal); theta = next(movements)
-Until the model is good enough for ``trust``, each of these searches is the simplex.
+Until the model is good enough for ``trust``, the search is the simplex.
 """
 
 from __future__ import annotations
@@ -17,12 +17,14 @@ import torch
 from sgimd_torch.forward_model.anchored import TRUST, Anchored, Trust
 from sgimd_torch.forward_model.model import ForwardModel
 from sgimd_torch.searches.simplex import nelder_mead
-from sgimd_torch.spaces import Array, Box, Estimate, Search, check_count
+from sgimd_torch.spaces import Array, Box, Estimate, Search
 
-Propose = Callable[[Anchored, torch.Tensor, torch.Tensor, Box, float, np.random.Generator], torch.Tensor]
-"""(anchored, starts ``(n, theta_dim)``, goal ``(1, outcome_dim)``, policies, radius, rng) -> proposals, of which the
-one that should be best is taken; none is farther than the radius from its start, see ``Anchored.descend``."""
+Propose = Callable[[Anchored, torch.Tensor, torch.Tensor, Box, float], torch.Tensor]
+"""(anchored, starts ``(n, theta_dim)``, goal ``(1, outcome_dim)``, policies, radius) -> proposals within the radius of
+their starts, see ``Anchored.descend``; the one that should be best is taken."""
 
+_CANDIDATES: Final = 5  # remembered movements to start from
+_RADIUS: Final = 0.15  # of the trust region at first
 _RADII: Final = (0.02, 0.3)  # sides, root mean square: smaller is less than the noise, larger leaves the neighbourhood
 
 
@@ -32,7 +34,6 @@ def descend(
     goal: torch.Tensor,
     policies: Box,
     radius: float,
-    rng: np.random.Generator,
     *,
     steps: int = 5,
     step: float = 0.03,
@@ -47,7 +48,6 @@ def gauss_newton(
     goal: torch.Tensor,
     policies: Box,
     radius: float,
-    rng: np.random.Generator,
     *,
     steps: int = 3,
     damping: float = 1e-3,
@@ -69,21 +69,6 @@ def gauss_newton(
     return theta.detach()
 
 
-def screen(
-    anchored: Anchored,
-    starts: torch.Tensor,
-    goal: torch.Tensor,
-    policies: Box,
-    radius: float,
-    rng: np.random.Generator,
-    *,
-    draws: int = 64,
-) -> torch.Tensor:
-    """Variations of the starts, root mean square half the radius, without a gradient."""
-    thetas = starts.double().cpu().numpy()[np.arange(draws) % len(starts)]
-    return anchored.tensor(policies.clip(rng.normal(thetas, radius / 2 * policies.sides)))
-
-
 def gradient_search(
     policies: Box,
     rng: np.random.Generator,
@@ -91,8 +76,6 @@ def gradient_search(
     model: ForwardModel,
     propose: Propose = descend,
     noise: float = 0.05,
-    candidates: int = 5,
-    radius: float = 0.15,
     residual: bool = True,
     trust: Trust = TRUST,
 ) -> Search:
@@ -106,17 +89,15 @@ def gradient_search(
         policies: Pi; nothing outside is proposed.
         rng: draws the noise.
         model: predicts; the caller's loop refreshes it.
-        propose: from starting points to proposals: ``descend``, ``gauss_newton`` or ``screen``.
+        propose: from starting points to proposals: ``descend`` or ``gauss_newton``.
         noise: as in ``nelder_mead``: without it the memory soon holds too few different movements.
-        candidates: number of remembered movements to start from.
-        radius: of the trust region at first, root mean square over the parameters, in sides of ``policies``.
         residual: False leaves the outcomes of this search out of the anchors, for comparison.
         trust: how far to trust the model.
 
     Raises:
-        ValueError: a number out of its range, or a model of other dimensions.
+        ValueError: ``noise`` out of its range, or a model of other dimensions.
     """
-    _check(policies, model, candidates, radius)
+    model.check_fits("policies", theta_dim=policies.dim)
     if not 0 <= noise <= 0.5:
         raise ValueError(f"noise must lie in [0, 0.5], got {noise}; it is a fraction of the sides of Pi")
     simplex = nelder_mead(policies, rng)
@@ -125,66 +106,27 @@ def gradient_search(
         if not model.relative_error <= trust.error:
             yield from simplex(start, goal)
             return
-        within = radius
+        radius = _RADIUS
         thetas, outcomes, n_anchors = start.thetas, start.outcomes, len(start.thetas)
         first = policies.check("theta of the estimate", start.theta)[None]
         while True:
-            nearest = np.linalg.norm(outcomes - goal, axis=1).argsort(kind="stable")[:candidates]
+            nearest = np.linalg.norm(outcomes - goal, axis=1).argsort(kind="stable")[:_CANDIDATES]
             anchored = _anchored(model, start.context, thetas[:n_anchors], outcomes[:n_anchors], trust)
             starts = anchored.tensor(np.vstack([first, thetas[nearest]]))
-            theta = _best(anchored, propose, starts, goal, policies, within, rng)
+            theta = _best(anchored, propose, starts, goal, policies, radius)
             theta = policies.clip(rng.normal(theta, noise * policies.sides)) if noise else policies.clip(theta)
             with torch.no_grad():
                 predicted = anchored.predict(anchored.tensor(theta[None]))[0][0].cpu().double().numpy()
             outcome = yield theta
             misfit, change = math.dist(predicted, outcome), math.dist(predicted, outcomes[nearest[0]])
             if misfit < 0.5 * change:
-                within = min(within * 1.5, _RADII[1])
+                radius = min(radius * 1.5, _RADII[1])
             elif misfit > change:
-                within = max(within / 2, _RADII[0])
+                radius = max(radius / 2, _RADII[0])
             thetas, outcomes, first = np.vstack([thetas, theta]), np.vstack([outcomes, outcome]), first[:0]
             n_anchors += residual
 
     return search
-
-
-def polished_simplex(
-    policies: Box,
-    rng: np.random.Generator,
-    *,
-    model: ForwardModel,
-    propose: Propose = descend,
-    candidates: int = 5,
-    radius: float = 0.15,
-    trust: Trust = TRUST,
-) -> Search:
-    """Nelder & Mead's simplex from where the model would go: one descent for each simplex, not for each movement.
-
-    Args:
-        policies, rng, model, propose, candidates, radius, trust: as in ``gradient_search``.
-
-    Raises:
-        ValueError: as in ``gradient_search``.
-    """
-    _check(policies, model, candidates, radius)
-    simplex = nelder_mead(policies, rng)
-
-    def search(start: Estimate, goal: Array) -> Generator[Array, Array, None]:
-        if model.relative_error <= trust.error:
-            nearest = np.linalg.norm(start.outcomes - goal, axis=1).argsort(kind="stable")[:candidates]
-            anchored = _anchored(model, start.context, start.thetas, start.outcomes, trust)
-            starts = anchored.tensor(np.vstack([start.theta, start.thetas[nearest]]))
-            start = start._replace(theta=policies.clip(_best(anchored, propose, starts, goal, policies, radius, rng)))
-        yield from simplex(start, goal)
-
-    return search
-
-
-def _check(policies: Box, model: ForwardModel, candidates: int, radius: float) -> None:
-    model.check_fits("policies", theta_dim=policies.dim)
-    check_count("candidates", candidates, 1)
-    if not _RADII[0] <= radius <= _RADII[1]:
-        raise ValueError(f"radius must lie in {list(_RADII)}, got {radius}; it is a fraction of the sides of Pi")
 
 
 def _anchored(model: ForwardModel, context: Array, thetas: Array, outcomes: Array, trust: Trust) -> Anchored:
@@ -200,9 +142,8 @@ def _best(
     goal: Array,
     policies: Box,
     radius: float,
-    rng: np.random.Generator,
 ) -> Array:
     aim = anchored.tensor(goal[None])
-    proposals = propose(anchored, starts, aim, policies, radius, rng)
+    proposals = propose(anchored, starts, aim, policies, radius)
     with torch.no_grad():
         return proposals[anchored.expected(proposals, aim).argmin()].cpu().double().numpy()

@@ -8,7 +8,7 @@ movements, demonstrates something from a tile chosen at random among those the l
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Protocol
+from typing import Final, Protocol
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, Demonstration, check_count, check_vector
+
+_STALLED: Final = 0.01  # share by which distances fall at least while a learner progresses
 
 
 class Teacher(Protocol):
@@ -129,7 +131,7 @@ class AskedTeacher:
     """Demonstrates when the learner's competence stalls, as if the learner had asked.
 
     Every ``patience`` movements it looks how near the learner has come to each demonstrated outcome. It demonstrates if
-    the mean distance fell by less than a share of ``threshold`` since the last look.
+    the mean distance fell by less than a hundredth since the last look.
     """
 
     def __init__(
@@ -138,13 +140,11 @@ class AskedTeacher:
         rng: np.random.Generator,
         *,
         patience: int = 30,
-        threshold: float = 0.01,
         choose: Choose = least_explored,
     ) -> None:
         self.demonstrations = check_demonstrations(demonstrations)
         self.rng = rng
         self.patience = check_count("patience", patience, 1)
-        self.threshold = threshold
         self.choose = choose
         self._distance = np.inf
 
@@ -153,7 +153,7 @@ class AskedTeacher:
         if index == 0 or index % self.patience:
             return None
         before, self._distance = self._distance, self._distance_left(memory)
-        if self._distance < (1 - self.threshold) * before:
+        if self._distance < (1 - _STALLED) * before:
             return None
         return self.choose(self.demonstrations, memory, self.rng)
 

@@ -14,7 +14,7 @@ except ImportError as error:
 
 from sgimd_torch.figures.learning import NAMES, landing_points, tile_counts
 from sgimd_torch.figures.results import SeedCurves, seed_curves
-from sgimd_torch.runs.log import RunError
+from sgimd_torch.record import RunError
 from sgimd_torch.spaces import Box
 from sgimd_torch.views.demo_cast import answers, from_above, from_the_side
 from sgimd_torch.views.variants import Life, demonstrated

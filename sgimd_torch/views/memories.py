@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from sgimd_torch.runs.build import RunParts
+from sgimd_torch.runs.read import Run
 from sgimd_torch.strategies import Remember
-from sgimd_torch.views.whole import Run
 
 
 def remember(run: Run, parts: RunParts, start: int, stop: int) -> None:

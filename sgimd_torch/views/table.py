@@ -30,14 +30,14 @@ from typing import Final
 
 import numpy as np
 
-from sgimd_torch.runs.log import RunError
+from sgimd_torch.record import RunError
 from sgimd_torch.runs.process import say
+from sgimd_torch.runs.read import Run, read_run
 from sgimd_torch.spaces import Array
 from sgimd_torch.views.comparison import baseline_of, compare
 from sgimd_torch.views.statistics import LEAST_SEEDS, show
 from sgimd_torch.views.text_table import print_table
 from sgimd_torch.views.variants import Variant, best_first, read
-from sgimd_torch.views.whole import Run, read_run
 
 EARLY: Final = 1000  # movements, for a column of its own
 

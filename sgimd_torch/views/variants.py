@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from sgimd_torch.catalogue import label
+from sgimd_torch.runs.read import Run, find_runs, read_run
 from sgimd_torch.spaces import Array
 from sgimd_torch.views.statistics import (
     LEAST_SEEDS,
@@ -27,7 +28,6 @@ from sgimd_torch.views.statistics import (
     ratio_interval,
     rng,
 )
-from sgimd_torch.views.whole import Run, find_runs, read_run
 
 NOISELESS: Final = 1e-9  # m; a lower noise floor is rounding, so errors are not divided by it
 

@@ -248,11 +248,6 @@ def test_all_slips_of_the_spaces_are_told_at_once():
     ]
 
 
-def test_a_movement_at_least_has_to_be_tried():
-    with pytest.raises(ValueError, match="movements must be a whole number >= 1, got 0"):
-        check_environment(Cannon(), movements=0)
-
-
 MODULE = """
 import numpy as np
 from sgimd_torch import Box, PlanarArm
@@ -318,10 +313,3 @@ def test_the_command_refuses_with_exit_code_2_and_no_traceback(arms, capsys, wor
     said = capsys.readouterr().err
     assert told in said
     assert "Traceback" not in said
-
-
-def test_its_help_says_every_promise(capsys):
-    assert command(_call, ["check", "--help"]) == 0
-    said = capsys.readouterr().out
-    for word in ("rest", "outcome_noise", "execute_many", "carries over", "mypackage.toss:make", "Exit code"):
-        assert word in said

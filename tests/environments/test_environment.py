@@ -17,6 +17,7 @@ from sgimd_torch.environments.protocol import (
     SimulationError,
     Sketch,
     check_movement,
+    check_recording,
     execute_many,
 )
 from sgimd_torch.spaces import Array, Box, stream
@@ -145,11 +146,6 @@ def test_two_links_up_and_then_right_end_at_half_a_metre_each():
     np.testing.assert_allclose(end_of(arm, [0.75, 0.25]), [0.5, 0.5], atol=1e-15)  # pi/2, then -pi/2
 
 
-def test_later_joints_are_scaled_to_the_largest_bend():
-    arm = PlanarArm(2, max_angle=np.pi / 2)
-    np.testing.assert_allclose(end_of(arm, [0.5, 1.0]), [0.5, 0.5], atol=1e-15)  # straight, then +pi/2
-
-
 def test_angles_are_those_of_the_joints_from_the_middle_to_both_limits():
     arm = PlanarArm(3, max_angle=0.5)
     np.testing.assert_allclose(arm.angles([[0.5, 0.5, 0.5], [1.0, 1.0, 0.0]]), [[0, 0, 0], [np.pi, 0.5, -0.5]])
@@ -173,26 +169,31 @@ def test_a_posture_at_its_limits_is_accepted_also_with_rounding():
     assert arm.correspondence([0.0], [[np.pi * (1 + 1e-15), -1.0 - 1e-15]]).tolist() == [1.0, 0.0]
 
 
+@pytest.mark.parametrize("last", [[0, 1.1], [-3.2, 0]])
+def test_a_posture_that_the_joints_cannot_take_is_refused(last):
+    with pytest.raises(ValueError, match="of the last posture entry"):
+        PlanarArm(2, max_angle=1.0).correspondence([0.0, 1.0], [[0, 0], last])
+
+
 @pytest.mark.parametrize(
-    ("times", "trajectory", "message"),
+    ("times", "trajectory", "name"),
     [
-        (
-            [0.0, 1.0],
-            [[0, 0], [0, 1.1]],
-            r"others \+-1.000 rad, but of the last posture entry \[1\] is 1.1; is it in deg",
-        ),
-        ([0.0, 1.0], [[0, 0], [-3.2, 0]], r"first joint turns within \+-3.142 rad"),
-        ([0.0, 1.0], [[0, 0, 0], [0, 0, 0]], "one column for each joint"),
-        ([0.0, 1.0], [[0, 0], [0, np.nan]], "trajectory must be finite"),
-        ([0.0], [0, 0], "trajectory needs samples in rows"),
-        ([], np.empty((0, 2)), "trajectory needs samples in rows"),
-        ([0.0, 1.0, 2.0], [[0, 0], [0, 0]], "one time in s for each row"),
-        ([0.0, 0.0], [[0, 0], [0, 0]], "times must increase"),
+        (np.arange(10.0), np.zeros((10, 3)), "trajectory"),
+        (np.arange(2.0), np.zeros(2), "trajectory"),
+        (np.arange(1.0), np.zeros((1, 2)), "trajectory"),
+        (np.arange(10.0), np.full((10, 2), np.nan), "trajectory"),
+        (np.arange(9.0), np.zeros((10, 2)), "times"),
+        (np.arange(10.0)[::-1], np.zeros((10, 2)), "times"),
+        (np.zeros(10), np.zeros((10, 2)), "times"),
+        (np.full(10, np.inf), np.zeros((10, 2)), "times"),
+        (np.zeros((2, 10)), np.zeros((10, 2)), "times"),
+        (["a"] * 10, np.zeros((10, 2)), "times"),
+        (1000 * np.arange(10.0), np.zeros((10, 2)), "lasts 9 s at most, the recording 9000 s; is it in milliseconds"),
     ],
 )
-def test_correspondence_refuses_what_the_joints_cannot_end_with(times, trajectory, message):
-    with pytest.raises(ValueError, match=message):
-        PlanarArm(2, max_angle=1.0).correspondence(times, trajectory)
+def test_anything_but_a_recording_is_refused(times, trajectory, name):
+    with pytest.raises(ValueError, match=name):
+        check_recording(times, trajectory, 2, longest=9.0)
 
 
 def test_a_context_turns_the_whole_arm():
@@ -230,10 +231,6 @@ def test_the_default_arm_reaches_its_whole_disc_and_nothing_beyond():
     assert arm.reachable(straight).all()  # some are 4e-16 beyond the length
 
 
-def test_an_arm_that_can_bend_more_than_a_full_turn_still_reaches_its_base():
-    assert PlanarArm(7, max_angle=5 * np.pi / 7).min_radius == pytest.approx(0, abs=1e-15)
-
-
 def test_no_bends_bring_the_end_closer_than_the_inner_radius():
     arm = PlanarArm(3, max_angle=1.0)
     assert arm.min_radius == pytest.approx((1 + 2 * np.cos(1.0)) / 3)  # cos(-1) + cos(0) + cos(1) links of 1/3
@@ -265,13 +262,6 @@ def test_a_stretched_arm_is_noisier_than_a_folded_one():
     assert deviations[0] > 1.5 * deviations[1]
 
 
-def test_without_noise_the_stream_goes_on_in_the_same_way():
-    streams = [stream(5, "environment") for _ in range(2)]
-    for noise, rng in zip((0.0, 0.1), streams, strict=True):
-        PlanarArm(noise=noise).execute(NO_CONTEXT, np.full(7, 0.5), rng)
-    assert streams[0].random() == streams[1].random()
-
-
 @pytest.mark.parametrize("goal", [[1.01, 0.0], [np.nan, 0.0], [0.1, 0.0, 0.0], [[0.1, 0.0]], [0.3, 0.0]])
 def test_solve_refuses_goals_that_are_not_one_reachable_point(goal):
     with pytest.raises(ValueError, match="goal must"):
@@ -296,15 +286,6 @@ def test_solve_refuses_goals_that_are_not_one_reachable_point(goal):
 def test_an_impossible_arm_is_refused(options):
     with pytest.raises(ValueError, match=r"must|needs"):
         PlanarArm(**options)
-
-
-def test_a_seed_instead_of_a_generator_is_refused():
-    with pytest.raises(TypeError, match="got int; was the seed passed instead of a Generator"):
-        PlanarArm(5).execute(NO_CONTEXT, np.full(5, 0.5), 0)
-
-
-def test_a_sketch_lasts_from_its_first_drawing_to_its_last() -> None:
-    assert Sketch(np.zeros(1), 0.1, np.zeros((11, 1, 2))).landed == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize(

@@ -11,10 +11,7 @@ from sgimd_torch.environments.check import check_environment
 from sgimd_torch.environments.fishing_rod import HOLD, JOINT_RANGES, JOINTS, MODEL, FishingRod
 from sgimd_torch.environments.protocol import SimulationError
 from sgimd_torch.environments.rod_physics import TOP_SPEED, Caster
-from sgimd_torch.learner import Learner
-from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, Box, stream
-from sgimd_torch.strategies import Babble
 
 NO_CONTEXT = np.zeros(0)
 
@@ -46,22 +43,6 @@ def cast(rod: FishingRod, theta: Array, context: Array = NO_CONTEXT, seed: int =
 )
 def test_the_rod_keeps_the_contract_of_environments(options: dict[str, float]) -> None:
     check_environment(FishingRod(**options))
-
-
-def test_without_a_context_asked_for_there_is_none(rod: FishingRod) -> None:
-    assert rod.contexts.dim == 0
-    assert FishingRod(max_yaw=1.0, max_wind=0.05).contexts.high.tolist() == [1.0, 0.05]
-    assert FishingRod(max_wind=0.05).contexts.low.tolist() == [-0.05]
-
-
-def test_every_element_of_the_model_has_a_name(rod: FishingRod) -> None:
-    for kind in ("BODY", "JOINT", "GEOM", "SITE", "ACTUATOR", "SENSOR", "CAMERA", "LIGHT", "MATERIAL"):
-        kind_of_object = getattr(mujoco.mjtObj, f"mjOBJ_{kind}")
-        count = {"BODY": "nbody", "JOINT": "njnt", "ACTUATOR": "nu", "CAMERA": "ncam", "MATERIAL": "nmat"}
-        n = getattr(rod.model, count.get(kind, f"n{kind.lower()}"))
-        assert n > 0
-        names = [mujoco.mj_id2name(rod.model, kind_of_object, i) for i in range(n)]
-        assert all(names), f"{kind}: {names}"
 
 
 def test_six_joints_move_the_arm_and_thirty_the_line(rod: FishingRod) -> None:
@@ -176,15 +157,6 @@ def test_the_number_of_draws_does_not_depend_on_theta() -> None:
     assert rngs[0].bit_generator.state != stream(0, "environment").bit_generator.state
 
 
-def test_without_noise_the_stream_does_not_matter_and_with_noise_it_does(rod: FishingRod) -> None:
-    theta = movements(1)[0]
-    assert np.array_equal(cast(rod, theta, seed=1), cast(rod, theta, seed=2))
-    assert rod.outcome_noise == 0
-    noisy = FishingRod(noise=0.03, threads=1)
-    assert not np.array_equal(cast(noisy, theta, seed=1), cast(noisy, theta, seed=2))
-    assert noisy.outcome_noise > 0
-
-
 def test_motor_noise_has_the_stated_deviation_for_each_speed_from_the_first_step_on(rod: FishingRod) -> None:
     noisy, step, n_steps = FishingRod(noise=0.03, threads=1), rod.model.opt.timestep, 25
     taken = 1 - np.exp(-step / rod.model.actuator_dynprm[:6, 0])  # share of a command that a servo takes up in a step
@@ -204,13 +176,6 @@ def test_an_arm_that_does_not_move_has_no_noise() -> None:
     noisy = FishingRod(noise=0.1, threads=1)
     assert cast(noisy, still, seed=1) == pytest.approx(cast(noisy, still, seed=2), abs=1e-9)
     assert cast(noisy, still) == pytest.approx(noisy.rest, abs=1e-3)
-
-
-def test_every_movement_begins_in_the_start_configuration() -> None:
-    first, second = movements(2)
-    fresh, used = FishingRod(noise=0.0, threads=1), FishingRod(noise=0.0, threads=1)
-    cast(used, first)
-    assert np.array_equal(cast(used, second), cast(fresh, second))
 
 
 def test_a_turned_base_turns_the_landing_point_about_itself(rod: FishingRod) -> None:
@@ -334,16 +299,6 @@ def test_a_diverged_movement_in_a_batch_is_the_one_that_is_named() -> None:
     assert np.array_equal(raised.value.theta, moving)
 
 
-@pytest.mark.usefixtures("mujoco_log")
-def test_a_diverged_movement_never_enters_memory() -> None:
-    fragile = unstable()
-    learner = Learner(Memory(0, 25, 2), Babble(fragile.policies, stream(0, "babble")))
-    move = learner.ask(NO_CONTEXT)
-    with pytest.raises(SimulationError):
-        learner.tell(fragile.execute(NO_CONTEXT, move.theta, stream(0, "environment")))
-    assert len(learner.memory) == 0
-
-
 def test_nothing_diverges_and_everything_lands_in_reach_even_on_the_corners_of_the_box() -> None:
     noisy, rng = FishingRod(threads=2), stream(0, "corners")
     thetas = np.concatenate([rng.random((150, 25)), rng.integers(0, 2, (50, 25)).astype(float)])
@@ -366,13 +321,6 @@ def test_re_executed_movements_scatter_as_the_paper_says() -> None:
     assert 0.5 < noisy.outcome_noise / sds.mean() < 2
 
 
-def test_the_task_space_may_be_a_hundred_times_larger() -> None:
-    large = FishingRod(noise=0.0, outcomes=Box.cube(-100, 100, 2), threads=1)
-    assert large.outcomes.sides.tolist() == [200.0, 200.0]
-    theta = movements(1)[0]
-    assert np.array_equal(cast(large, theta), cast(FishingRod(noise=0.0, threads=1), theta))
-
-
 @pytest.mark.parametrize(
     ("options", "name"),
     [
@@ -380,9 +328,9 @@ def test_the_task_space_may_be_a_hundred_times_larger() -> None:
         ({"noise": np.nan}, "noise"),
         ({"max_yaw": np.inf}, "max_yaw"),
         ({"max_wind": -1.0}, "max_wind"),
-        ({"line": 0.0}, "above 0 and below 2"),
-        ({"line": 2.0}, "hangs in the water"),
-        ({"line": float("nan")}, "line must be"),
+        ({"line": 0.0}, "line"),
+        ({"line": 2.0}, "line"),
+        ({"line": float("nan")}, "line"),
         ({"threads": 0}, "threads"),
         ({"threads": 1.5}, "threads"),
         ({"outcomes": Box.cube(-1, 1, 3)}, "rest"),
@@ -394,22 +342,10 @@ def test_an_impossible_rod_is_refused(options: dict[str, object], name: str) -> 
         FishingRod(**options)
 
 
-@pytest.mark.parametrize(
-    ("times", "trajectory", "message"),
-    [
-        (np.arange(3.0), np.zeros((3, 5)), "trajectory must have shape"),
-        (np.arange(4.0), np.zeros((3, 6)), "times must have shape"),
-        (np.array([0.0, 2.0, 1.0]), np.zeros((3, 6)), "increase from 0"),
-        (np.array([1.0, 2.0, 3.0]), np.zeros((3, 6)), "increase from 0"),
-        (np.arange(3.0), np.full((3, 6), np.nan), "finite"),
-        (np.array([0.0, 20.0, 1e5]), np.zeros((3, 6)), "in milliseconds"),
-        (np.zeros(1), np.zeros((1, 6)), "n > 1"),
-        (np.zeros((2, 3, 2)), np.zeros((2, 3, 6)), "times must|n > 1"),
-    ],
-)
-def test_only_a_recording_is_replayed(rod: FishingRod, times: Array, trajectory: Array, message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        rod.replay(times, trajectory)
+@pytest.mark.parametrize("times", [[1.0, 2.0, 3.0], [0.0, 20.0, 1e5]])
+def test_only_a_recording_from_0_to_60_s_is_replayed(rod: FishingRod, times: list[float]) -> None:
+    with pytest.raises(ValueError, match=r"must start at 0|lasts 60 s at most"):
+        rod.replay(times, np.zeros((3, 6)))
 
 
 def test_a_seed_instead_of_a_generator_is_refused(rod: FishingRod) -> None:

@@ -18,7 +18,7 @@ from sgimd_torch.runs.build import task_of
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.tasks import benchmark_of, demonstrations_of
 from sgimd_torch.session import run
-from sgimd_torch.spaces import Box, Demonstration, stream
+from sgimd_torch.spaces import Box, stream
 
 PUSHES = Box.cube(-1, 1, 2)
 NO_CONTEXT = np.zeros(0)
@@ -95,12 +95,6 @@ def test_a_movement_is_an_episode_of_the_controllers_commands():
 def test_a_policy_of_the_users_sees_what_it_does():
     outcome = sled(Brake(), steps=100).execute(NO_CONTEXT, [0.5, -0.5], stream(0, "any"))
     np.testing.assert_allclose(outcome, [0.5, -0.5], atol=0.01)
-
-
-def test_an_episode_ends_when_the_world_says_so():
-    robot = sled(world=Sled(ends_at=0.5, noise=0.0))
-    outcome = robot.execute(NO_CONTEXT, np.ones(6), stream(0, "any"))
-    assert 0.5 < np.linalg.norm(outcome) < 0.8
 
 
 def test_an_outcome_may_be_a_slice_or_any_function_of_what_was_observed():
@@ -215,10 +209,9 @@ def test_an_episode_of_ours_is_one_movement_whose_reward_is_the_distance_to_the_
 
 
 def test_goals_and_contexts_of_ours_come_from_the_seed_or_from_the_caller():
-    arm = PlanarArm(3, context=True)
-    world = ToGymnasium(arm, goals=[[0.5, 0.0], [0.0, 0.5]])
-    goals = {tuple(world.reset(seed=seed)[0]["desired_goal"].tolist()) for seed in range(20)}
-    assert goals == {(0.5, 0.0), (0.0, 0.5)}
+    world = ToGymnasium(PlanarArm(3, context=True))
+    goals = {tuple(world.reset(seed=seed)[0]["desired_goal"].tolist()) for seed in (0, 1, 2, 1)}
+    assert len(goals) == 3
     assert world.reset(options={"context": [0.3]})[0]["observation"].tolist() == [0.3]
     for options in ({"goal": [5.0, 0.0]}, {"context": [5.0]}, {"goal": [0.0]}):
         with pytest.raises(ValueError, match=r"goal|context"):
@@ -239,11 +232,6 @@ def test_ours_and_theirs_are_the_same_when_one_is_put_into_the_other():
     assert there.tolist() == here.tolist()
 
 
-def test_a_recording_that_no_controller_can_play_is_refused():
-    with pytest.raises(ValueError, match="Brake cannot translate recorded actions"):
-        sled(Brake()).misfit(Demonstration(NO_CONTEXT, np.arange(3.0), np.zeros((3, 2)), np.zeros(2)))
-
-
 class Angles:
     """The action is theta itself."""
 
@@ -260,12 +248,6 @@ def swimmer():
 
 def test_the_swimmer_keeps_every_promise(swimmer):
     check_environment(swimmer)
-
-
-def test_a_swimmer_that_starts_alike_scatters_not_at_all():
-    still = Swimmer(start=0.0)
-    assert still.outcome_noise == 0
-    check_environment(still, movements=1)
 
 
 def test_the_noise_of_the_swimmer_is_as_announced(swimmer):

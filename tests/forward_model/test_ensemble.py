@@ -5,9 +5,7 @@ import math
 import numpy as np
 import pytest
 import torch
-from lightning import Trainer
 from scipy.stats import norm
-from torch.utils.data import DataLoader
 
 from sgimd_torch.forward_model.ensemble import Ensemble, nll
 from sgimd_torch.spaces import stream
@@ -101,16 +99,3 @@ def test_with_beta_outputs_taken_for_noise_keep_a_larger_gradient(beta, given_up
     torch.testing.assert_close(gradient[..., :2], of_means / given_up)
     of_log_variances = (1 - outputs**2 / 4).sum(dim=1, keepdim=True) / 2 / outputs.numel()
     torch.testing.assert_close(gradient[..., 2:], of_log_variances * 4 / given_up)  # its minimum stays where it was
-
-
-@pytest.mark.filterwarnings("ignore")  # of Lightning's, of the torch that it came with, and of few workers
-def test_lightnings_trainer_can_train_it():
-    inputs = random(MEMBERS, 200, 4)
-    outputs = torch.stack([inputs[..., 0], -inputs[..., 1]], dim=-1)
-    networks = ensemble()
-    before = nll(*networks(inputs), outputs).mean()
-    quiet = dict.fromkeys(("logger", "enable_checkpointing", "enable_progress_bar", "enable_model_summary"), False)
-    Trainer(max_epochs=1, accelerator="cpu", devices=1, **quiet).fit(
-        networks, DataLoader([(inputs, outputs)] * 100, None)
-    )
-    assert nll(*networks(inputs), outputs).mean() < before - 1.0

@@ -1,6 +1,5 @@
 """The forward model: what it learns, how sure it is, and what it refuses."""
 
-import json
 import pickle
 import subprocess
 import sys
@@ -8,11 +7,10 @@ import sys
 import numpy as np
 import pytest
 import torch
-from safetensors.torch import load_file, save_file
+from safetensors.torch import save_file
 
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.forward_model.model import ForwardModel
-from sgimd_torch.forward_model.stored import write_model
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import stream
 
@@ -61,13 +59,6 @@ def test_it_predicts_unseen_movements_far_better_than_their_mean(model, unseen):
     assert error < spread / 10
 
 
-def test_contexts_are_inputs_too():
-    arm = PlanarArm(3, context=True)
-    model = taught(remembered(600, arm=arm), rate=1.8)
-    unseen = remembered(100, seed=1, arm=arm)
-    assert np.linalg.norm(model.predict(unseen.contexts, unseen.thetas).mean - unseen.outcomes, axis=1).mean() < 0.1
-
-
 def test_batch_axes_lead_and_change_nothing(model, unseen):
     together = model.predict(NO_CONTEXT, unseen.thetas[:6].reshape(2, 3, 3))
     one_by_one = [model.predict(NO_CONTEXT, theta) for theta in unseen.thetas[:6]]
@@ -111,13 +102,6 @@ def test_its_relative_error_is_that_on_movements_it_never_saw(model, unseen):
     assert model.relative_error < 0.05
 
 
-def test_its_relative_error_is_infinite_before_learning_and_about_one_where_there_is_nothing_to_learn():
-    model = ForwardModel(0, 3, 2, rate=5.0)
-    assert model.relative_error == np.inf
-    model.refresh(noise_only(400))
-    assert model.relative_error == pytest.approx(1.0, abs=0.05)
-
-
 def test_the_gradient_equals_finite_differences_and_is_finite_at_the_goal_itself():
     double = taught(remembered(100)).double()
     theta = torch.full((3,), 0.45, dtype=torch.float64, requires_grad=True)
@@ -158,7 +142,7 @@ def test_with_a_focus_a_small_network_learns_best_what_lands_near_the_goal(unsee
     near = np.linalg.norm(unseen.outcomes - goal, axis=1) < 0.2
     errors = {}
     for name, focus, told in (("all", 0.0, goal), ("near", 0.75, goal), ("no goal", 0.75, None)):
-        model = ForwardModel(0, 3, 2, rate=0.3, hidden=(3,), recent=0.0, focus=focus)
+        model = ForwardModel(0, 3, 2, rate=0.3, hidden=(3,), focus=focus)
         model.refresh(memory, told)
         errors[name] = np.linalg.norm(model.predict(NO_CONTEXT, unseen.thetas).mean - unseen.outcomes, axis=1)
     assert errors["near"][near].mean() < 0.8 * errors["all"][near].mean()
@@ -166,7 +150,7 @@ def test_with_a_focus_a_small_network_learns_best_what_lands_near_the_goal(unsee
     np.testing.assert_array_equal(errors["no goal"], errors["all"])
 
 
-@pytest.mark.parametrize("options", [{"recent": 1.0}, {"recent": 0.0, "focus": 1.0}, {"recent": 0.3, "focus": 0.3}])
+@pytest.mark.parametrize("options", [{}, {"focus": 0.75}])
 def test_what_is_held_out_is_looked_at_but_never_learnt_from(options):
     memory, other = remembered(200), Memory(0, 3, 2)
     for row, (theta, outcome) in enumerate(zip(memory.thetas, memory.outcomes, strict=True)):
@@ -258,16 +242,6 @@ def test_on_a_gpu_it_learns_as_well(unseen):
     assert error < 0.1
 
 
-def test_the_weights_have_moved_to_where_they_are_trained_before_any_exemplar_does(monkeypatch):
-    model, order = ForwardModel(0, 3, 2), []
-    for part, name in ((model._online, "prepare"), (model, "_tensor")):
-        step = getattr(part, name)
-        monkeypatch.setattr(part, name, lambda *args, name=name, step=step: (order.append(name), step(*args))[1])
-    model.refresh(remembered(100))
-    assert order[0] == "prepare"
-    assert "_tensor" in order
-
-
 def test_a_copy_for_another_process_predicts_the_same_and_learns_on(model, unseen):
     copy = pickle.loads(pickle.dumps(model))
     np.testing.assert_array_equal(
@@ -289,88 +263,15 @@ def test_a_saved_model_predicts_the_same_and_keeps_its_relative_error(tmp_path, 
     assert [path.name for path in tmp_path.iterdir()] == ["model.safetensors"]
 
 
-def changed(state, name, change):
-    """The tensors of a model, one of them replaced."""
-    return {**state, name: change(state[name])}
-
-
-def rewritten(*, version="2", model=None, **said):
-    """Write the same tensors with another header, where None leaves a field out."""
-
-    def write(path, state, about):
-        header = {"version": version, "model": json.dumps({**about, **said}) if model is None else model}
-        save_file(state, path, {name: value for name, value in header.items() if value})
-
-    return write
-
-
-def number(name, change):
-    """Write a file whose checksum is right, but with other numbers in a tensor."""
-    return lambda path, state, about: write_model(path, about, changed(state, name, change))
-
-
-@pytest.mark.parametrize(
-    ("spoil", "words"),
-    [
-        (lambda path, state, about: path.write_bytes(path.read_bytes()[:-100]), "truncated"),
-        (lambda path, state, about: path.write_bytes(b"PK not a model"), "no forward model"),
-        (lambda path, state, about: path.write_bytes(b""), "no forward model"),
-        (rewritten(version="3"), "version 3, this library reads 2"),
-        (rewritten(version="1"), "no checksum, this library reads 2; train the model again"),
-        (lambda path, state, about: save_file(state, path), "version None"),
-        (rewritten(), "checksum"),
-        (rewritten(model="{"), "not say what model"),
-        (rewritten(model="[" * 100_000), "not say what model"),
-        (rewritten(model="[]"), "not say what model"),
-        (rewritten(model="{}"), "not say .*context_dim"),
-        (rewritten(members=2.5), "not say .*members"),
-        (rewritten(members=True), "not say .*members"),
-        (rewritten(hidden=[]), "not say .*hidden"),
-        (rewritten(hidden=[0]), "not say .*hidden"),
-        (rewritten(noise_heads=1), "not say .*noise_heads"),
-        (rewritten(theta_dim=4), r"another shape .* biases|another shape .* input_mean"),
-        (rewritten(hidden=[100_000, 100_000]), r"another shape .* biases\.0 should be .* \[3, 1, 100000\]"),  # 120 GB
-        (rewritten(members=10**15), "another shape"),
-        (
-            lambda path, state, about: write_model(path, about, {**state, "more": state["missed"].clone()}),
-            "another shape .* more",
-        ),
-        (number("missed", torch.Tensor.double), "another shape .* missed"),
-        (number("biases.0", lambda values: values * np.nan), "not finite"),
-        (number("n_seen", torch.neg), "negative n_seen"),
-        (number("missed", lambda values: values - 9), "negative missed"),
-        (number("input_scale", torch.zeros_like), "input_scale that is not positive"),
-        (number("outcome_scale", torch.neg), "outcome_scale that is not positive"),
-    ],
-)
-def test_a_file_that_is_not_a_forward_model_is_refused(tmp_path, model, spoil, words):
+@pytest.mark.parametrize("header", [None, {}, {"model": "{"}, {"model": "[" * 100}])
+def test_weights_of_something_else_are_refused_by_name(tmp_path, model, header):
     path = tmp_path / "model.safetensors"
-    model.save(path)
-    spoil(path, load_file(path), {**model.sizes, **model.shape})
-    with pytest.raises(ValueError, match=words) as raised:
+    save_file(model.state_dict(), path, header)
+    with pytest.raises(ValueError, match=r"model\.safetensors is no forward model"):
         ForwardModel.load(path)
-    assert str(path) in str(raised.value)
 
 
-def test_a_flipped_bit_anywhere_in_a_model_is_noticed(tmp_path):
-    path = tmp_path / "model.safetensors"
-    saved = ForwardModel(1, 2, 1, members=1, hidden=(2,))
-    saved.save(path)
-    content = path.read_bytes()
-    for place in range(len(content)):
-        path.write_bytes(content[:place] + bytes([content[place] ^ 1 << place % 8]) + content[place + 1 :])
-        try:
-            loaded = ForwardModel.load(path)
-        except ValueError as error:
-            loaded, message = None, str(error)
-        if loaded is None:
-            assert str(path) in message
-        else:  # a space of the header, say
-            assert (loaded.sizes, loaded.shape) == (saved.sizes, saved.shape)
-            assert all(torch.equal(loaded.state_dict()[name], kept) for name, kept in saved.state_dict().items())
-
-
-def test_a_slip_in_the_options_of_a_model_to_be_loaded_is_not_blamed_on_the_file(tmp_path, model):
+def test_a_misspelt_option_of_a_model_to_be_loaded_is_not_blamed_on_the_file(tmp_path, model):
     model.save(tmp_path / "model.safetensors")
     with pytest.raises(TypeError, match="ratee"):
         ForwardModel.load(tmp_path / "model.safetensors", ratee=3)
@@ -384,13 +285,8 @@ def test_a_loaded_model_learns_on(tmp_path):
     assert (refresh.first, refresh.steps, len(refresh.predicted.mean)) == (100, 20, 20)
 
 
-def test_a_file_that_does_not_exist_is_called_missing(tmp_path):
-    with pytest.raises(FileNotFoundError, match="no forward model"):
-        ForwardModel.load(tmp_path / "model.safetensors")
-
-
 def test_before_it_has_learnt_it_predicts_nothing():
-    with pytest.raises(RuntimeError, match="50 exemplars"):
+    with pytest.raises(RuntimeError, match="not trained"):
         ForwardModel(0, 3, 2).predict(NO_CONTEXT, np.full(3, 0.5))
 
 
@@ -400,7 +296,7 @@ def test_another_robots_memory_or_another_runs_is_refused():
         model.refresh(Memory(0, 4, 2))
     with pytest.raises(ValueError, match="another run's"):
         model.refresh(remembered(60))
-    with pytest.raises(ValueError, match="were outcomes passed instead"):
+    with pytest.raises(ValueError, match="thetas"):
         model.predict(NO_CONTEXT, np.zeros(2))
 
 
@@ -412,13 +308,8 @@ def test_another_robots_memory_or_another_runs_is_refused():
         {"hidden": (0,)},
         {"every": 0},
         {"rate": 0.0},
-        {"lr": np.nan},
-        {"recent": 1.5},
         {"focus": -0.1},
         {"focus": 0.8},  # with the quarter that is recent more than a batch
-        {"beta": -0.1},
-        {"batch": 0},
-        {"batch": 2.5},
         {"every": 2.5},
         {"hidden": 64},
     ],

@@ -86,13 +86,6 @@ def test_goals_stay_in_a_task_space_of_any_size_even_when_progress_is_in_its_cor
     assert np.mean((samples == box.high).any(axis=1)) < 0.02  # drawn again, hardly ever clipped
 
 
-def test_goals_that_coincide_are_fitted_without_a_warning():
-    goals = AlpGmm(LINE, SQUARE, stream(8, "goals"))
-    for index in range(120):
-        assert SQUARE.contains(goals.sample([0.5]))
-        goals.add([0.5], [0.25, 0.75], -(index % 2))
-
-
 @pytest.mark.parametrize(
     ("options", "message"),
     [

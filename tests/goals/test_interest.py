@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 
 from sgimd_torch.goals.interest_map import InterestMap
-from sgimd_torch.goals.regions import absolute_progress, gained_progress, paired_progress
+from sgimd_torch.goals.regions import absolute_progress, gained_progress
 from sgimd_torch.spaces import Array, Box, stream
 
 NO_CONTEXTS, LINE, SQUARE = Box.cube(0, 1, 0), Box.cube(0, 1, 1), Box.cube(0, 1, 2)
@@ -89,13 +89,6 @@ def test_goals_are_uniform_in_every_context_while_all_interests_are_equal():
         assert chi_square(counts, np.full(10, 0.1)) < 27.9  # 9 degrees of freedom: odds 1 in 1000, three times
 
 
-def test_a_new_map_draws_goals_from_the_whole_task_space():
-    for modes in ((1, 0, 0), (0, 1, 0), (0, 0, 1)):  # mode 3 has no worst goal yet
-        goals = InterestMap(NO_CONTEXTS, LINE, stream(4, "goals"), modes=modes)
-        counts = np.histogram([goals.sample(NO_CONTEXT) for _ in range(2000)], 10, (0, 1))[0]
-        assert chi_square(counts, np.full(10, 0.1)) < 27.9  # 9 degrees of freedom: odds 1 in 1000, three times
-
-
 def test_only_regions_that_contain_the_context_are_chosen():
     goals = InterestMap(LINE, LINE, stream(5, "goals"), modes=(1, 0, 0), **BY_EQ_3)
     rng, n_late = stream(5, "planted"), 0
@@ -117,14 +110,6 @@ def test_mode_3_stays_near_the_least_competent_goal():
     away = np.abs(np.array([goals.sample(NO_CONTEXT) for _ in range(500)]) - [0.5, 50]).max(axis=0)
     assert (away <= [0.05, 5]).all()
     assert (away > [0.049, 4.9]).all()  # 500 draws all miss the last 2 % with odds .98^500 = 4e-5
-
-
-def test_mode_3_does_not_leave_the_region():
-    goals = InterestMap(NO_CONTEXTS, LINE, stream(7, "goals"), modes=(0, 0, 1))
-    goals.add(NO_CONTEXT, [0.01], -1)
-    samples = np.array([goals.sample(NO_CONTEXT) for _ in range(200)])
-    assert samples.min() == 0
-    assert 0.05 < samples.max() <= 0.06
 
 
 def test_mode_3_does_not_cross_a_cut():
@@ -207,14 +192,6 @@ def test_a_region_is_cut_where_gains_end_whatever_the_competences(axis):
     assert cut == (axis, pytest.approx(8 / 21))  # 20 * 31 * .2 = 124; a place lower 17 * 34 * .19, higher 22 * 29 * .18
 
 
-def test_a_region_is_cut_where_paired_progress_ends():
-    points, along = evenly_spaced(0)
-    competences = np.where((along < 0.39) & (np.arange(51) % 2 == 0), 0.0, -1.0)  # flickers below .39
-    axis, cut = cut_of(points, competences, progress=paired_progress)
-    assert axis == 0
-    assert 0.3 < cut < 0.5
-
-
 def test_a_small_part_of_great_progress_does_not_outweigh_a_balanced_cut():
     points, along = evenly_spaced(0)
     early = np.arange(51) < 26
@@ -255,16 +232,6 @@ def test_a_cut_leaves_a_twentieth_of_g_max_on_both_sides():
         for goal in [0.2] * (51 - n_right) + [0.8] * n_right:
             goals.add(NO_CONTEXT, [goal], -1)
         assert [len(region.goals) for region in goals.regions] == n_goals
-
-
-def test_a_goal_on_a_cut_belongs_above_it():
-    goals = InterestMap(NO_CONTEXTS, LINE, stream(15, "goals"), g_max=50)
-    for index in range(51):
-        goals.add(NO_CONTEXT, [index / 50], -1)
-    below, above = goals.regions
-    assert below.high == above.low
-    goals.add(NO_CONTEXT, above.low, -0.5)
-    assert [-0.5 in region.competences for region in goals.regions] == [False, True]
 
 
 COORDINATE = st.one_of(st.sampled_from([-1.0, -0.5, 0.0, 0.5, 1.0]), st.floats(-1, 1))
@@ -353,12 +320,6 @@ def test_goals_are_chosen_where_attempts_gain_and_not_where_all_is_hopeless():
     assert np.mean([by_eq_3.sample(NO_CONTEXT)[0] > 0.5 for _ in range(500)]) < 0.5  # it takes places for times
 
 
-def test_a_region_of_hopeless_goals_keeps_the_goals_that_may_lie_anywhere():
-    goals = half_hopeless(0)
-    share = np.mean([goals.sample(NO_CONTEXT)[0] < 0.5 for _ in range(2000)])
-    assert share == pytest.approx(0.1, abs=0.05)  # half of mode 2's fifth, and of the region across .5 a part
-
-
 def test_sides_are_not_cut_much_shorter_than_others_beyond_the_largest_aspect():
     goals = InterestMap(NO_CONTEXTS, SQUARE, stream(16, "goals"), **{**BY_EQ_3, "max_aspect": 2})
     rng = stream(16, "planted")
@@ -375,33 +336,6 @@ def test_a_context_that_never_changes_is_never_cut():
         goals.add([0.3], [goal], -goal)
     assert len(goals.regions) > 8
     assert all(region.low[0] == 0 and region.high[0] == 1 for region in goals.regions)
-
-
-def test_only_sampling_draws():
-    rngs = [stream(18, "goals") for _ in range(2)]
-    maps = [InterestMap(NO_CONTEXTS, SQUARE, rng) for rng in rngs]
-    for index in range(150):
-        goal = maps[0].sample(NO_CONTEXT)
-        np.testing.assert_array_equal(goal, maps[1].sample(NO_CONTEXT))
-        for goals in maps:
-            goals.add(NO_CONTEXT, goal, -index / 150)
-        assert all(region.interest() >= 0 for region in maps[0].regions)  # one looks, the other does not
-    assert len(maps[0].regions) > 2
-    state = rngs[0].bit_generator.state
-    maps[0].add(NO_CONTEXT, [0.5, 0.5], -1)
-    assert rngs[0].bit_generator.state == state
-
-
-def test_what_is_read_is_a_snapshot_that_cannot_be_written_to():
-    goals = InterestMap(NO_CONTEXTS, LINE, stream(19, "goals"))
-    goals.add(NO_CONTEXT, [0.5], -1, gain=0.25)
-    (region,) = goals.regions
-    goals.add(NO_CONTEXT, [0.6], -1)
-    assert region.goals.tolist() == [[0.5]]
-    assert region.gains.tolist() == [0.25]
-    assert goals.regions[0].goals.tolist() == [[0.5], [0.6]]
-    for name in ("low", "high", "points", "goals", "contexts", "competences", "gains", "strategies"):
-        assert not getattr(region, name).flags.writeable
 
 
 @pytest.mark.parametrize(

@@ -103,14 +103,6 @@ def test_a_cost_makes_no_loss_smaller():
     assert choices(goals, {"autonomous": 1.0, "imitate": 4.0})["imitate"] / 2000 == pytest.approx(0.084, abs=0.03)
 
 
-def test_a_share_of_the_choices_is_by_chance_if_it_is_wanted():
-    goals = interest(by_chance=0.5, greatest=1)
-    told(goals, "autonomous", 0.1)
-    told(goals, "imitate", 0.9)
-    drawn = choices(goals, {"autonomous": 1.0, "imitate": 1.0})
-    assert drawn["autonomous"] / 2000 == pytest.approx(0.25, abs=0.04)  # half of those by chance, none of the others
-
-
 def test_only_the_greatest_are_drawn_from():
     goals = interest(greatest=1, anywhere=0.0)
     told(goals, "imitate", 0.6)
@@ -131,11 +123,7 @@ def test_goals_come_from_the_region_that_was_drawn_and_contains_the_context():
         assert np.mean(drawn) > 0.8
 
 
-@pytest.mark.parametrize(
-    "options", [{"by_chance": 1.1}, {"anywhere": 1.1}, {"anywhere": -0.1}, {"greatest": 0}, {"temperature": 0.0}]
-)
+@pytest.mark.parametrize("options", [{"anywhere": 1.1}, {"anywhere": -0.1}, {"greatest": 0}, {"temperature": 0.0}])
 def test_numbers_out_of_range_are_refused(options):
-    with pytest.raises(
-        ValueError, match=r"anywhere must lie in \[0, 1\], greatest be at least 1 and temperature above 0"
-    ):
+    with pytest.raises(ValueError, match=next(iter(options))):
         interest(**options)

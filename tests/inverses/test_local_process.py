@@ -181,20 +181,6 @@ def test_an_input_far_from_0_is_told_apart_as_well() -> None:
         assert far(NO_CONTEXT, goal).theta - 2.0**26 == pytest.approx(inverse(NO_CONTEXT, goal).theta, abs=1e-3)
 
 
-def test_movements_nearly_alike_far_from_0_end_nothing() -> None:
-    rng = np.random.default_rng(0)
-    weights = rng.normal(size=(7, 2))
-    memory = Memory(0, 7, 2)
-    inverse = LocalProcess(memory)
-    for row in range(260):
-        theta = rng.uniform(size=7)
-        if row < 120:  # a demonstration is repeated with small variations
-            theta = 0.5 + 1e-4 * (theta - 0.5)
-        memory.add(NO_CONTEXT, 100 + theta, np.sin(theta @ weights))
-        if row % 13 == 0:
-            inverse(NO_CONTEXT, np.sin(rng.uniform(size=7) @ weights))
-
-
 @pytest.mark.parametrize("far", [25.0, 50.0])
 def test_a_wide_movement_after_many_nearly_alike_is_answered(far: float) -> None:
     rng = np.random.default_rng(0)
@@ -226,12 +212,6 @@ def test_outcomes_that_are_all_the_same_teach_it_nothing() -> None:
     predicted = inverse.predict(NO_CONTEXT, thetas[0])
     assert predicted is not None
     assert predicted.tolist() == [1, 1]
-
-
-@pytest.mark.parametrize("noise", [-1.0, np.nan, np.inf])
-def test_noise_that_is_no_standard_deviation_is_refused(noise: float) -> None:
-    with pytest.raises(ValueError, match="noise must be"):
-        LocalProcess(Memory(0, 1, 1), noise=noise)
 
 
 def test_its_linear_algebra_takes_one_thread_and_leaves_the_others_as_they_were():

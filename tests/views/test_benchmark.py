@@ -6,9 +6,9 @@ import pytest
 from sgimd_torch.evaluation import SIDES, load_benchmark, tile_side
 from sgimd_torch.runs.command_line import main as live
 from sgimd_torch.runs.process import command
+from sgimd_torch.runs.read import read_run
 from sgimd_torch.spaces import Box, stream
 from sgimd_torch.views.benchmark import main
-from sgimd_torch.views.whole import read_run
 
 
 def run(*options, movements=300, algorithm="random"):

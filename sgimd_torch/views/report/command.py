@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from sgimd_torch.files import write_text
-from sgimd_torch.runs.log import RunError
+from sgimd_torch.record import RunError
 from sgimd_torch.views.report.page import page
 from sgimd_torch.views.variants import Variant, best_first, read
 

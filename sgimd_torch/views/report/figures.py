@@ -23,11 +23,11 @@ from sgimd_torch.figures.predictions import coverage_over_time, error_over_time
 from sgimd_torch.figures.results import Difference, forest
 from sgimd_torch.figures.sections import Section, of_regions, sections
 from sgimd_torch.forward_model.diagnostics import LEVELS, TRUSTED_UP_TO, running
+from sgimd_torch.runs.read import Run
 from sgimd_torch.spaces import Array, Box
 from sgimd_torch.views.comparison import Comparison
 from sgimd_torch.views.model_run import model_run
 from sgimd_torch.views.variants import Variant
-from sgimd_torch.views.whole import Run
 
 P = ParamSpec("P")
 TILES: Final = 50  # along the longer side of a map, at most

@@ -13,9 +13,9 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from sgimd_torch.runs.config import words
+from sgimd_torch.runs.read import Run
 from sgimd_torch.views.statistics import LEAST_SEEDS
 from sgimd_torch.views.variants import Variant
-from sgimd_torch.views.whole import Run
 
 AGAIN: Final = "runs/again"  # a folder that holds no run yet
 PLACE: Final = {"seed", "name", "out", "board", "threads", "environment.threads"}  # settings that no learner notices
@@ -63,7 +63,7 @@ def by_context(variants: Sequence[Variant]) -> Table:
     for variant in variants:
         for found in [run.by_context for run in variant.used if run.by_context]:
             now = (found["movements"] == variant.last) & (found["answer"] == "own")
-            columns = [found[name][now].tolist() for name in ("part", "low", "high", "mean_error")]
+            columns = [found[name][now].tolist() for name in ("context", "low", "high", "mean_error")]
             for dim, low, high, error in zip(*columns, strict=True):
                 part = f"context {dim:.0f}: {low:.3g} to {high:.3g}"
                 table.setdefault(variant.label, {}).setdefault(part, []).append(error)

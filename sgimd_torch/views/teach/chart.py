@@ -68,9 +68,8 @@ def chart_of(
     cells = cells_of(outcomes)
     everywhere = np.concatenate([cells, benchmark.goals])
     if len(memory):
-        weight = memory.context_weight
-        near = KDTree(np.concatenate([weight * memory.contexts, memory.outcomes], axis=1))
-        rows = np.concatenate([np.tile(weight * context, (len(everywhere), 1)), everywhere], axis=1)
+        near = KDTree(np.concatenate([memory.contexts, memory.outcomes], axis=1))
+        rows = np.concatenate([np.tile(context, (len(everywhere), 1)), everywhere], axis=1)
         nearest = memory.outcomes[near.query(rows)[1]]
     else:
         nearest = np.tile(rest, (len(everywhere), 1))

@@ -1,0 +1,132 @@
+"""Replaying a life: a learner of the same parts that lives through the same events becomes the same learner.
+
+It draws the same numbers again, so its goals, its searches and its memory come out the same, in the middle of an
+attempt, too. So nothing but events has to be kept; ``record.py`` keeps them.
+    for episode in replay(learner, record.events(), teacher=teacher): ...
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterable
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+from sgimd_torch.record import Event, Kind
+from sgimd_torch.spaces import Array, Demonstration, Episode, Request
+from sgimd_torch.teachers import Teacher
+
+if TYPE_CHECKING:
+    from sgimd_torch.learner import Learner
+
+TEACHER: Final = "teacher"
+"""Who has shown what the teacher of a run offered."""
+_HINT: Final = "was it recorded by another version, on another processor or with another configuration?"
+
+
+class ReplayError(RuntimeError):
+    """The learner does not repeat what was recorded: another library version, processor or configuration."""
+
+
+class BeforeMovement(NamedTuple):
+    """What came since the last movement: a demonstration, a request and the reply to it, as in an `Episode`."""
+
+    demonstration: Demonstration | None = None
+    request: Request | None = None
+    reply: str = ""
+
+
+def replay(
+    learner: Learner, events: Iterable[Event], *, teacher: Teacher | None = None
+) -> Generator[Episode, None, BeforeMovement]:
+    """Let ``learner`` live through ``events``. Nothing is executed and nobody is asked for a demonstration.
+
+    Args:
+        learner: freshly built.
+        events: of the record.
+        teacher: freshly built, too: it is asked before each movement what it offers, so that its draws go on as they
+            would have. None for what was recorded alone.
+
+    Yields:
+        The episodes, as `run` has yielded them.
+
+    Returns:
+        What came after the last of them.
+
+    Raises (when iterated):
+        ReplayError: the learner proposes another movement than the recorded one, or the teacher shows something else.
+    """
+    offered: Demonstration | None = None
+    asked_at = -1  # the movement before which the teacher was asked last
+    before = BeforeMovement()
+    for event in events:
+        index = learner.movements
+        if teacher is not None and asked_at < index and event.kind != Kind.INTERRUPTED:
+            asked_at, offered = index, teacher.offer(index, learner.memory)
+        match event.kind:
+            case Kind.SHOWN:
+                if event.who == TEACHER and teacher is not None:
+                    _check_lesson(index, event.lesson, offered)
+                _watch(learner, event)
+                offered, before = None, before._replace(demonstration=event.lesson)
+            case Kind.ASKED:
+                assert event.context is not None
+                learner.request(event.context)
+                if event.who is not None and event.goal is not None:
+                    request = Request(event.who, event.goal, event.strategy or "")
+                    before = before._replace(request=request, reply=event.reply or "")
+            case Kind.INTERRUPTED:
+                learner.interrupt()
+            case _:
+                assert event.context is not None
+                _check_lesson(index, None, offered)
+                move = learner.ask(event.context)
+                _check_repeats(index, "theta", event.theta, None if move is None else move.theta)
+                if event.goal is not None:
+                    _check_repeats(index, "goal", event.goal, None if move is None else move.goal)
+                if event.kind == Kind.FAILED:
+                    learner.interrupt()
+                    asked_at = -1  # the run that went on asked its teacher once more
+                    continue
+                if event.outcome is not None:
+                    learner.tell(event.outcome)
+                yield Episode(index, event.context, move, event.outcome, *before)
+                before = BeforeMovement()
+    return before
+
+
+def _watch(learner: Learner, event: Event) -> None:
+    assert event.lesson is not None
+    if learner.social is None and not learner.waits_for_answer:
+        found = f"before movement {learner.movements} it asked for a demonstration, the learner now does not"
+        raise ReplayError(f"{found}; is it built in the same way, with the same seed?")
+    learner.watch(event.lesson, offered=event.who is not None)
+
+
+def _check_repeats(index: int, name: str, recorded: Array | None, now: Array | None) -> None:
+    """Refuse a learner that proposes another vector than the recorded one; None stands for a rest."""
+    if recorded is None or now is None:
+        if recorded is now:
+            return
+        was, is_now = ("rest", "moves") if recorded is None else ("a movement", "rests")
+        raise ReplayError(f"movement {index} was recorded as {was}, the learner now {is_now}; {_HINT}")
+    differ = np.flatnonzero(recorded != now)
+    if differ.size:
+        k = differ[0]
+        raise ReplayError(
+            f"movement {index} was recorded with another {name}: {name}_{k} was {recorded[k]}, now {now[k]}; "
+            f"{differ.size} of {now.size} entries differ; {_HINT}"
+        )
+
+
+def _check_lesson(index: int, recorded: Demonstration | None, offered: Demonstration | None) -> None:
+    """Refuse a teacher that offers something else than was shown."""
+    fields = ("context", "times", "trajectory", "outcome")
+    if recorded is None or offered is None:
+        same = recorded is offered
+    else:
+        same = all(np.array_equal(getattr(recorded, name), getattr(offered, name)) for name in fields)
+    if not same:
+        was, now = ("nothing" if each is None else "a demonstration" for each in (recorded, offered))
+        other = "another one" if recorded is not None and offered is not None else now
+        raise ReplayError(f"before movement {index} {was} was shown, the teacher now offers {other}; is it built anew?")

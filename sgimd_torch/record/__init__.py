@@ -1,0 +1,347 @@
+"""The record of a life: one SQLite file that says what happened, row by row, and notices whatever was changed in it.
+
+    with Record.make(path, dims, settings) as record: record.add(event); record.commit()  # the only writer
+    with Record(path) as record: list(record.events()); record.rows("evaluations")  # readers, also beside it
+
+Tables (``docs/runs.md`` explains each column):
+    about            what made the run, and its seconds so far, as json
+    events           moved, rested, shown, asked, failed, interrupted, in the order in which they came
+    demonstrations   what was shown, each movement once
+    goals, evaluations, errors, regions     of each evaluation
+    predictions, refreshes                  of a forward model
+    seals            of each table: how many rows it has, and the seal of its last row
+
+Every row ends in a seal, a checksum of the row, of all rows before it, of its table and of the run. So a row that was
+changed, lost, doubled, moved or taken from another run is noticed by whoever reads it.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sqlite3
+import zlib
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any, Final, Self
+
+from sgimd_torch.files import replacing
+from sgimd_torch.record.layout import (
+    DERIVED,
+    HINT,
+    SEALS,
+    Dims,
+    Event,
+    InUseError,
+    Kind,
+    Row,
+    RunError,
+    about_rows,
+    create,
+    demonstration_row,
+    event_reader,
+    event_row,
+    layout,
+    movements_after,
+    plain,
+    read_demonstration,
+    root,
+    row_bytes,
+    sealed,
+)
+from sgimd_torch.spaces import Demonstration
+
+__all__ = ["DERIVED", "Dims", "Event", "InUseError", "Kind", "Record", "RunError", "layout"]
+
+_APPLICATION: Final = 0x5347494D  # SQLite's application_id, so that other programs can tell what the file is
+_PATIENCE: Final = 60.0  # s, that a commit waits for readers
+_AT_ONCE: Final = 4096  # rows that are read together
+
+
+class Record:
+    """A record that is there already, for reading, or for writing too; a context manager.
+
+    Args:
+        path: of the file.
+        write: also write. Until it is closed nobody else can; others may read.
+
+    Attributes:
+        about: what made the run, see ``settle``.
+        dims: of context, theta and outcome.
+
+    Raises:
+        RunError: there is no record at ``path``, it is damaged where all reading begins, or another process writes it.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], *, write: bool = False) -> None:
+        self.path = Path(path)
+        self._waiting: dict[str, list[Row]] = {}
+        self._seals: dict[str, tuple[int, int]] = {}  # of each table: how many rows, the seal of the last
+        self._written: dict[str, tuple[int, int]] = {}
+        self._movements = 0
+        self._shown: dict[bytes, int] = {}
+        self._remade: dict[str, int] = {}
+        self._connection = _connect(self.path, write)
+        try:
+            with self._told():
+                self._lock() if write else self._connection.execute("BEGIN")  # a reader sees one state of the file
+                self._open()
+        except BaseException:
+            self._connection.close()
+            raise
+
+    @classmethod
+    def make(cls, path: str | os.PathLike[str], dims: Dims, about: Mapping[str, Any]) -> Self:
+        """A new record, open for writing; ``about`` is anything that json can hold.
+
+        Raises:
+            OSError: it cannot be written.
+        """
+        path, told = Path(path), {"run": os.urandom(8).hex(), "dims": dims, **about}
+        try:
+            connection = sqlite3.connect(path, isolation_level=None)
+            try:
+                connection.execute(f"PRAGMA application_id = {_APPLICATION}")
+                connection.execute("BEGIN IMMEDIATE")
+                for name, columns in layout(dims).items():
+                    connection.execute(create(name, columns))
+                connection.execute(create("seals", SEALS))
+                rows = sealed(about_rows(told), root("", "about"))
+                connection.executemany("INSERT INTO about VALUES (?, ?, ?)", rows)
+                seals = [(name, 0, root(told["run"], name)) for name in layout(dims)]
+                seals[0] = "about", len(rows), rows[-1][-1]
+                connection.executemany("INSERT INTO seals VALUES (?, ?, ?)", seals)
+                connection.execute("COMMIT")
+            finally:
+                connection.close()
+        except sqlite3.Error as error:
+            raise OSError(f"{path} cannot be written: {error}") from error
+        return cls(path, write=True)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """What was not committed is lost."""
+        self._connection.close()
+
+    @property
+    def movements(self) -> int:
+        """How many movements it holds, rests included, committed or not."""
+        return self._movements
+
+    def rows(self, table: str) -> Iterator[Row]:
+        """The rows of a table that were committed or replaced, in order, without their seals.
+
+        Raises:
+            RunError: one of them is not what was written, or there are more or fewer; those before it were yielded.
+        """
+        n, seal = 0, self._root(table)
+        with self._told():
+            cursor = self._connection.execute(f"SELECT * FROM {table} ORDER BY rowid")
+            while rows := cursor.fetchmany(_AT_ONCE):
+                for *row, found in rows:
+                    seal = zlib.crc32(row_bytes(row), seal)
+                    if seal != found:
+                        raise RunError(f"{self.path}: row {n + 1} of {table} is not what was written; {HINT}")
+                    n += 1
+                    yield tuple(row)
+        if (n, seal) != self._written[table]:
+            raise RunError(f"{self.path}: {table} has {n} rows, {self._written[table][0]} were written; {HINT}")
+
+    def columns(self, table: str) -> list[str]:
+        """Names of the columns, without the seal."""
+        return [column.split()[0] for column in layout(self.dims)[table][:-1]]
+
+    def events(self, shown: Sequence[Demonstration] | None = None) -> Iterator[Event]:
+        """What happened, in order; ``shown`` are its ``demonstrations``, if they were read already.
+
+        Raises:
+            RunError: see ``rows``.
+        """
+        read = event_reader(self.dims, self.demonstrations() if shown is None else shown)
+        yield from map(read, self.rows("events"))
+
+    def demonstrations(self) -> list[Demonstration]:
+        """What was shown, each once, in the order in which it was shown first."""
+        return [read_demonstration(row, self.dims) for row in self.rows("demonstrations")]
+
+    def add(self, event: Event) -> None:
+        """Write down what happened; ``commit`` brings it to the disk."""
+        lesson = None if event.lesson is None else self._demonstration(event.lesson)
+        self._append("events", [event_row(event, self._movements, lesson, self.dims)])
+        self._movements = movements_after(self._movements, event.kind)
+
+    def add_rows(self, table: str, rows: Iterable[Sequence[Any]]) -> None:
+        """More rows of one of the ``DERIVED`` tables; NaN becomes NULL."""
+        self._append(table, [plain(row) for row in rows])
+
+    def remake_rows(self, table: str, rows: Iterable[Sequence[Any]]) -> None:
+        """The same for a table that a replay makes again from its beginning: rows that are there already stay."""
+        for row in rows:
+            made = self._remade[table] = self._remade.get(table, 0) + 1
+            if made > self._written[table][0]:
+                self.add_rows(table, [row])
+
+    def replace_rows(self, table: str, rows: Iterable[Sequence[Any]]) -> None:
+        """Other rows in the place of all rows of a table."""
+        with self._told(writing=True):
+            self._connection.execute(f"DELETE FROM {table}")
+        self._waiting[table] = []
+        self._seals[table] = 0, self._root(table)
+        self._append(table, [plain(row) for row in rows])
+        self._write()
+
+    def settle(self, **about: Any) -> None:
+        """Say more about the run, or something else than before; anything that json can hold."""
+        self.about |= about
+        self.replace_rows("about", about_rows(self.about))
+
+    def commit(self) -> None:
+        """Bring all of it to the disk, or none of it.
+
+        Raises:
+            OSError: the disk is full, or cannot be written; what was committed before is still there.
+            RunError: another process has written in the meantime.
+        """
+        self._write()
+        with self._told(writing=True):
+            self._connection.execute("COMMIT")
+            self._lock()
+
+    def check(self) -> dict[str, str]:
+        """What is wrong with which table; {} if all of it is what was written."""
+        wrong = {}
+        for table in layout(self.dims):
+            try:
+                for _ in self.rows(table):
+                    pass
+            except RunError as error:
+                wrong[table] = str(error)
+        return wrong
+
+    def rewrite(self, *, n_events: int | None = None, keep: Iterable[str] = ()) -> int:
+        """Replace the file by one with the first events of this one, and close this one.
+
+        Args:
+            n_events: how many; None for all up to the first that is damaged.
+            keep: names of ``DERIVED`` tables that are kept, too.
+
+        Returns:
+            The number of movements in it.
+
+        Raises:
+            OSError: it cannot be written.
+        """
+        about = {name: value for name, value in self.about.items() if name not in ("run", "dims")}
+        with replacing(self.path) as partial:
+            with Record.make(partial, self.dims, about) as new:
+                shown = new._take(self, "demonstrations")
+                lesson = self.columns("events").index("demonstration")
+                new._take(self, "events", lambda n, row: n != n_events and (row[lesson] or 0) < shown)
+                for table in keep:
+                    new._take(self, table)
+                last = new._waiting.get("events", [(0, "")])[-1]
+                new.commit()
+            self.close()
+        return movements_after(*last[:2])
+
+    def _take(self, other: Record, table: str, while_: Callable[[int, Row], bool] | None = None) -> int:
+        """Copy rows of another record while ``while_`` is true of their place and content; how many were whole."""
+        n = 0
+        with suppress(RunError):
+            for row in other.rows(table):
+                if while_ is not None and not while_(n, row):
+                    break
+                self._append(table, [row])
+                n += 1
+        return n
+
+    def _demonstration(self, shown: Demonstration) -> int:
+        """The row of a demonstration; a new one is added."""
+        row = demonstration_row(shown, self.dims)
+        if not self._shown:
+            self._shown = {row_bytes(each): k for k, each in enumerate(self.rows("demonstrations"))}
+        key = row_bytes(row)
+        if key not in self._shown:
+            self._shown[key] = len(self._shown)
+            self._append("demonstrations", [row])
+        return self._shown[key]
+
+    def _append(self, table: str, rows: Sequence[Row]) -> None:
+        n, seal = self._seals[table]
+        if rows:
+            new = sealed(rows, seal)
+            self._waiting.setdefault(table, []).extend(new)
+            self._seals[table] = n + len(new), new[-1][-1]
+
+    def _write(self) -> None:
+        """Hand waiting rows to SQLite."""
+        with self._told(writing=True):
+            for table, rows in self._waiting.items():
+                marks = ", ".join("?" * len(layout(self.dims)[table]))
+                self._connection.executemany(f"INSERT INTO {table} VALUES ({marks})", rows)
+            seals = [(*self._seals[table], table) for table in self._waiting]
+            self._connection.executemany("UPDATE seals SET n_rows = ?, seal = ? WHERE name = ?", seals)
+        self._waiting.clear()
+        self._written = dict(self._seals)
+
+    def _root(self, table: str) -> int:
+        return root("" if table == "about" else self.about["run"], table)
+
+    def _open(self) -> None:
+        found = dict(self._connection.execute("SELECT name, sql FROM sqlite_schema").fetchall())
+        if not found:
+            raise RunError("it holds nothing yet")
+        self._written = {name: (n, seal) for name, n, seal in self._connection.execute("SELECT * FROM seals")}
+        self._seals = dict(self._written)
+        self.about: dict[str, Any] = {name: json.loads(value) for name, value in self.rows("about")}
+        self.dims: Dims = tuple(self.about["dims"])
+        wanted = {name: create(name, columns) for name, columns in {**layout(self.dims), "seals": SEALS}.items()}
+        if found != wanted or self._seals.keys() != layout(self.dims).keys():
+            raise RunError(f"its tables are not those of a record; {HINT}")
+        last = self._connection.execute("SELECT movement, kind FROM events ORDER BY rowid DESC LIMIT 1").fetchone()
+        self._movements = 0 if last is None else movements_after(*last)
+
+    def _lock(self) -> None:
+        """Keep other writers away until this one is closed; readers are let in."""
+        before = getattr(self, "_version", None)
+        self._connection.execute("BEGIN IMMEDIATE")
+        self._version = self._connection.execute("PRAGMA data_version").fetchone()
+        if before not in (None, self._version):
+            raise RunError("another process has written to it")
+        self._connection.execute(f"PRAGMA busy_timeout = {int(1000 * _PATIENCE)}")
+
+    @contextmanager
+    def _told(self, *, writing: bool = False) -> Iterator[None]:
+        """Errors of SQLite, and of what it gives, as ours, with the path."""
+        try:
+            yield
+        except RunError as error:
+            raise error if str(self.path) in str(error) else RunError(f"{self.path}: {error}") from error
+        except (sqlite3.Error, ValueError, TypeError, KeyError, AttributeError, OverflowError) as error:
+            if isinstance(error, sqlite3.OperationalError) and "locked" in str(error):
+                wait = "wait for it, or choose another --out"
+                raise InUseError(f"{self.path} is in use by another process; {wait}") from error
+            if writing:
+                raise OSError(f"{self.path} cannot be written: {error}") from error
+            raise RunError(f"{self.path} cannot be read as a record: {error}; {HINT}") from error
+
+
+def _connect(path: Path, write: bool) -> sqlite3.Connection:
+    # Nothing here may open the file: to close it again would give up the locks that this process has on it.
+    if not path.is_file():
+        raise RunError(f"there is no record {path}")
+    if not path.stat().st_size:
+        raise RunError(f"{path} holds nothing yet")
+    place = path.resolve().as_uri()
+    try:
+        mode = "rw" if os.access(path, os.W_OK) and os.access(path.parent, os.W_OK) else "ro"
+        # Read-only, SQLite could not clean up after a writer that was killed.
+        return sqlite3.connect(f"{place}?mode={mode}", uri=True, isolation_level=None, timeout=0.5 if write else 10.0)
+    except (sqlite3.Error, OSError) as error:
+        raise RunError(f"{path} cannot be opened: {error}") from error

@@ -1,0 +1,202 @@
+"""How a record is laid out: what an event is, the columns of every table, cells of vectors, and seals of rows."""
+
+from __future__ import annotations
+
+import json
+import marshal
+import zlib
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from enum import StrEnum
+from itertools import accumulate, pairwise
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from sgimd_torch.spaces import Array, Demonstration
+
+_WIDEST: Final = 400  # a longer vector is one blob: SQLite has at most 2,000 columns
+DERIVED: Final = ("goals", "evaluations", "errors", "regions", "predictions", "refreshes")  # a replay makes them again
+SEALS: Final = ["name TEXT", "n_rows INTEGER", "seal INTEGER"]  # columns of the table of seals
+HINT: Final = "was it damaged or edited?"
+
+Dims = tuple[int, int, int]
+"""Of context, theta and outcome."""
+
+Row = tuple[Any, ...]
+
+
+class RunError(ValueError):
+    """A record cannot be used: it is damaged, of another run, in use, or there is none."""
+
+
+class InUseError(RunError):
+    """Another process writes it."""
+
+
+class Kind(StrEnum):
+    """What happened."""
+
+    MOVED = "moved"
+    RESTED = "rested"
+    SHOWN = "shown"
+    ASKED = "asked"  # an attempt began that may ask for a demonstration; what is shown next by that teacher answers it
+    FAILED = "failed"  # a movement was proposed and never got an outcome
+    INTERRUPTED = "interrupted"
+
+
+class Event(NamedTuple):
+    """Something that happened to a learner, with what belongs to its kind; ``who`` has shown something or was asked."""
+
+    kind: Kind
+    context: Array | None = None
+    theta: Array | None = None
+    goal: Array | None = None
+    outcome: Array | None = None
+    origin: str | None = None
+    lesson: Demonstration | None = None
+    who: str | None = None
+    strategy: str | None = None
+    reply: str | None = None
+
+
+_COUNTED: Final = (Kind.MOVED, Kind.RESTED)
+_IN_CONTEXT: Final = (*_COUNTED, Kind.ASKED, Kind.FAILED)
+
+
+def layout(dims: Dims) -> dict[str, list[str]]:
+    """The columns of every table, as SQL declares them."""
+    c, p, t = dims
+    context, theta, goal, outcome = (
+        _vector(name, dim) for name, dim in (("context", c), ("theta", p), ("goal", t), ("outcome", t))
+    )
+    words = ["demonstration INTEGER", "who TEXT", "strategy TEXT", "reply TEXT"]
+    evaluated = ["movements INTEGER", "answer TEXT"]
+    numbers = ["mean_error REAL", "median_error REAL", "p90_error REAL", "noise_floor REAL", "goals_met INTEGER"]
+    predicted = [column for name in ("predicted", "epistemic", "aleatoric") for column in _vector(name, t)]
+    learnt = ["held_out REAL", "relative_error REAL", "diverged INTEGER"]
+    corners = [column for name in ("low", "high") for column in _vector(name, c + t)]
+    interest = ["competence REAL", "interest REAL"]
+    columns = {
+        "about": ["name TEXT", "value TEXT"],
+        "events": ["movement INTEGER", "kind TEXT", "origin TEXT", *context, *theta, *goal, *outcome, *words],
+        "demonstrations": [*context, *outcome, "n_joints INTEGER", "times BLOB", "trajectory BLOB"],
+        "goals": ["goal INTEGER", *goal],
+        "evaluations": [*evaluated, *numbers],
+        "errors": [*evaluated, "goal INTEGER", "error REAL", "noise REAL", *context],
+        "regions": ["movements INTEGER", "path TEXT", *corners, "attempts INTEGER", "goals INTEGER", *interest],
+        "predictions": ["exemplar INTEGER", *outcome, *predicted],
+        "refreshes": ["movements INTEGER", "exemplars INTEGER", "steps INTEGER", *learnt],
+    }
+    return {table: [*each, "seal INTEGER"] for table, each in columns.items()}
+
+
+def event_row(event: Event, movement: int, lesson: int | None, dims: Dims) -> Row:
+    """An event before the ``movement``-th movement; ``lesson`` is the row of its demonstration."""
+    c, p, t = dims
+    vectors = (
+        *_cells(event.context, c),
+        *_cells(event.theta, p),
+        *_cells(event.goal, t),
+        *_cells(event.outcome, t),
+    )
+    return movement, str(event.kind), event.origin, *vectors, lesson, event.who, event.strategy, event.reply
+
+
+def event_reader(dims: Dims, shown: Sequence[Demonstration]) -> Callable[[Row], Event]:
+    """What makes an event of such a row, ``shown`` being the demonstrations."""
+    every = (*dims, dims[2])
+    ends = list(accumulate(map(_width, every), initial=3))
+    parts = [(slice(a, b), dim) for (a, b), dim in zip(pairwise(ends), every, strict=True)]
+
+    def read(row: Row) -> Event:
+        context, theta, goal, outcome = (_array(row[part], dim) for part, dim in parts)
+        lesson, who, strategy, reply = row[-4:]
+        kind = Kind(row[1])
+        if kind not in _IN_CONTEXT:
+            context = None
+        told = None if lesson is None else shown[lesson]
+        return Event(kind, context, theta, goal, outcome, row[2], told, who, strategy, reply)
+
+    return read
+
+
+def movements_after(movement: int, kind: str) -> int:
+    """How many movements were made once an event has come, rests included."""
+    return movement + (kind in _COUNTED)
+
+
+def demonstration_row(shown: Demonstration, dims: Dims) -> Row:
+    """A demonstration.
+
+    Raises:
+        ValueError: its times do not fit its trajectory.
+    """
+    if shown.trajectory.ndim != 2 or shown.times.shape != shown.trajectory.shape[:1]:
+        raise ValueError("a lesson needs (n_times,) times and a (n_times, n_joints) trajectory to be recorded")
+    times, trajectory = (np.asarray(each, dtype=np.float64).tobytes() for each in (shown.times, shown.trajectory))
+    vectors = *_cells(shown.context, dims[0]), *_cells(shown.outcome, dims[2])
+    return *vectors, shown.trajectory.shape[1], times, trajectory
+
+
+def read_demonstration(row: Row, dims: Dims) -> Demonstration:
+    """The demonstration of such a row."""
+    width, (*vectors, n_joints, times, trajectory) = _width(dims[0]), row
+    context, outcome = _array(tuple(vectors[:width]), dims[0]), _array(tuple(vectors[width:]), dims[2])
+    assert context is not None
+    assert outcome is not None
+    return Demonstration(context, np.frombuffer(times), np.frombuffer(trajectory).reshape(-1, n_joints), outcome)
+
+
+def root(run: str, table: str) -> int:
+    """The seal before the first row of a table."""
+    return zlib.crc32(f"{run} {table}".encode())
+
+
+def create(name: str, columns: Sequence[str]) -> str:
+    return f"CREATE TABLE {name} ({', '.join(columns)})"
+
+
+def about_rows(about: Mapping[str, Any]) -> list[Row]:
+    return [(name, json.dumps(value)) for name, value in about.items()]
+
+
+def row_bytes(row: Sequence[Any]) -> bytes:
+    """Of a row, for its seal: floats in binary, so this takes a fifth of the time of their text."""
+    return marshal.dumps(tuple(row), 2)
+
+
+def sealed(rows: Iterable[Row], seal: int) -> list[Row]:
+    found = []
+    for row in rows:
+        seal = zlib.crc32(row_bytes(row), seal)
+        found.append((*row, seal))
+    return found
+
+
+def _vector(name: str, dim: int) -> list[str]:
+    return [f"{name} BLOB"] if dim > _WIDEST else [f"{name}_{k} REAL" for k in range(dim)]
+
+
+def _width(dim: int) -> int:
+    return 1 if dim > _WIDEST else dim
+
+
+def _cells(values: Array | None, dim: int) -> list[Any]:
+    """The cells of a vector; NULL for None. -0.0 becomes 0.0, as in SQLite."""
+    if values is None:
+        return [None] * _width(dim)
+    numbers = np.asarray(values, dtype=np.float64) + 0.0
+    return [numbers.tobytes()] if dim > _WIDEST else numbers.tolist()
+
+
+def _array(cells: Row, dim: int) -> Array | None:
+    """The vector in these cells, None where they are NULL."""
+    if dim > _WIDEST:
+        return None if cells[0] is None else np.frombuffer(cells[0])
+    return None if None in cells else np.array(cells, dtype=np.float64)
+
+
+def plain(row: Sequence[Any]) -> Row:
+    """As SQLite gives it back: NaN is NULL, numbers of numpy are Python's."""
+    values = (value.item() if isinstance(value, np.generic) else value for value in row)
+    return tuple((None if value != value else value + 0.0) if isinstance(value, float) else value for value in values)

@@ -1,0 +1,124 @@
+"""The forward model of a run: it is trained, its predictions are recorded, and a message says when it is not asked.
+
+A replay makes its tables again, so a resumed run has them as if it had never stopped.
+    model = ModelListener(record, parts.model, trust, memory, seconds); model.episode(episode, replayed=False)
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from sgimd_torch.evaluation import Evaluation
+from sgimd_torch.forward_model.diagnostics import coverage, improvements
+from sgimd_torch.memory import Memory
+from sgimd_torch.record import Record
+from sgimd_torch.runs.clock import Seconds
+from sgimd_torch.runs.process import say
+from sgimd_torch.spaces import Array, Episode
+
+if TYPE_CHECKING:
+    from sgimd_torch.forward_model.model import ForwardModel, Prediction
+
+LEVEL: Final = 0.8  # of the regions whose coverage the board shows
+LATELY: Final = 500  # movements, over which the board shows how often refining a guess helped
+NOT_ASKED: Final = "the forward model is not asked, the local inverse model answers and the simplex searches instead"
+
+
+class ModelListener:
+    """Refreshes the model after every movement and records what it predicts.
+
+    Args:
+        record: of the run.
+        model: of the run.
+        trust: relative error above which the model is not asked.
+        memory: of the learner.
+        seconds: of the run; those spent here are counted since movement 0, because a replay spends them again.
+    """
+
+    def __init__(self, record: Record, model: ForwardModel, trust: float, memory: Memory, seconds: Seconds) -> None:
+        self._model, self._trust, self._memory, self._seconds = model, trust, memory, seconds
+        self._record = record
+        self._asked = False
+        self._lately: deque[tuple[Array, Array, str]] = deque(maxlen=LATELY)
+        self._news: list[str] = []
+        self._curves: dict[str, float] = {}
+
+    def episode(self, episode: Episode, replayed: bool) -> None:
+        """Refresh after a movement; say what is new."""
+        self._refresh(episode)
+        if not replayed:
+            say(*self._news)
+            self._news.clear()
+
+    def evaluated(self, movements: int, found: Mapping[str, Evaluation]) -> None:
+        """Nothing to do."""
+
+    def begin(self) -> None:
+        """Nothing to do: what a replay makes again is there."""
+
+    def flush(self) -> None:
+        """Nothing to do: the record is flushed by the run."""
+
+    def close(self) -> None:
+        """Say so if the model is not asked."""
+        if not self._asked:
+            trained = self._model.trained
+            why = self._how_wrong(self._model.relative_error) if trained else "there were too few exemplars to train it"
+            say(f"{NOT_ASKED}: {why}")
+
+    def new_curves(self) -> dict[str, float]:
+        """For the board, by tag: what the last refresh left, none where they were given already."""
+        curves, self._curves = self._curves, {}
+        return curves
+
+    def _refresh(self, episode: Episode) -> None:
+        memory = self._memory
+        movements, move = episode.index + 1, episode.move
+        if move is not None and move.goal is not None and episode.outcome is not None:
+            self._lately.append((move.goal, episode.outcome, move.origin))
+        with self._seconds.of("model"):
+            refresh = self._model.refresh(memory, None if move is None else move.goal)
+        if refresh is None:
+            return
+        error = self._model.relative_error
+        learnt = refresh.steps, refresh.held_out, error, int(refresh.diverged)
+        self._record.remake_rows("refreshes", [(movements, len(memory), *learnt)])
+        self._curves = {
+            "model/relative_error": error,
+            "model/held_out": refresh.held_out,
+            "model/steps": refresh.steps,
+            "model/improved": self._improved(),
+        }
+        if refresh.predicted is not None:
+            self._predicted(refresh.first, memory.outcomes[refresh.first :], refresh.predicted)
+        if refresh.diverged:
+            self._news.append(f"movement {movements}: training diverged; the forward model keeps its last good weights")
+        self._say_whether_asked(movements, error)
+
+    def _predicted(self, first: int, outcomes: Array, predicted: Prediction) -> None:
+        values = np.hstack((outcomes, *predicted)).tolist()
+        self._record.remake_rows("predictions", ((row, *each) for row, each in enumerate(values, first)))
+        spread = np.hypot(predicted.epistemic, predicted.aleatoric)
+        self._curves["model/error"] = float(np.linalg.norm(outcomes - predicted.mean, axis=1).mean())
+        self._curves["model/coverage"] = float(coverage(outcomes, predicted.mean, spread, (LEVEL,))[0])
+
+    def _improved(self) -> float:
+        if not self._lately:
+            return float("nan")
+        goals, outcomes, origins = zip(*self._lately, strict=True)
+        found = improvements(np.stack(goals), np.stack(outcomes), np.array(origins))
+        return found.share
+
+    def _say_whether_asked(self, movements: int, error: float) -> None:
+        asked = error <= self._trust
+        if asked != self._asked:
+            who = "the forward model is asked from here on" if asked else NOT_ASKED
+            self._news.append(f"movement {movements}: {who}: {self._how_wrong(error)}")
+        self._asked = asked
+
+    def _how_wrong(self, error: float) -> str:
+        return f"its relative error is {error:.3f}, it is trusted up to {self._trust:g}"
