@@ -27,9 +27,8 @@ from pathlib import Path
 import numpy as np
 
 from sgimd_torch.evaluation import TILES, Benchmark, save_benchmark, tile_goals, tile_side
-from sgimd_torch.runs.build import task_of
 from sgimd_torch.runs.process import say
-from sgimd_torch.runs.read import Run, config_of, find_runs, read_run
+from sgimd_torch.runs.read import Run, find_runs, read_run
 from sgimd_torch.spaces import Box, check_count, stream
 
 
@@ -69,16 +68,14 @@ def _reached_by(runs: Sequence[Run]) -> tuple[str, Box]:
     Raises:
         ValueError: they have different ones.
     """
-    found: dict[str, tuple[Run, str, Box]] = {}
+    found: dict[str, Run] = {}
     for run in runs:
-        robot = task_of(config_of(run)).environment
-        name, box = type(robot).__name__, robot.outcomes
-        found.setdefault(f"{name}, {box.low.tolist()} to {box.high.tolist()}", (run, name, box))
+        space = run.spaces["outcomes"]
+        found.setdefault(f"{run.robot}, {space.low.tolist()} to {space.high.tolist()}", run)
     if len(found) > 1:
-        apart = ", ".join(f"{run.path} is of {words}" for words, (run, _, _) in found.items())
+        apart = ", ".join(f"{run.path} is of {words}" for words, run in found.items())
         raise ValueError(f"all runs must be of one environment with one T: {apart}; make a benchmark for each")
-    (_, name, box), *_ = found.values()
-    return name, box
+    return runs[0].robot, runs[0].spaces["outcomes"]
 
 
 def parser() -> argparse.ArgumentParser:

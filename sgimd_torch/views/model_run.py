@@ -49,11 +49,6 @@ class ModelRun:
         return coverage(observed, mean, spread, levels) if len(observed) else np.full(np.shape(levels), np.nan)
 
 
-def has_predictions(run: Run) -> bool:
-    """Whether a run has a forward model that has predicted a movement."""
-    return run.predictions is not None and len(run.predictions["exemplar"]) > 0
-
-
 def read_model_run(path: Path) -> ModelRun:
     """The forward model of the run at a path; see `model_run`."""
     return model_run(read_run(path))
@@ -66,9 +61,10 @@ def model_run(run: Run) -> ModelRun:
         RunError: it has no model, or its model has predicted nothing yet.
     """
     if run.predictions is None or run.refreshes is None:
-        raise RunError(f"{run.path} ran without a forward model; see --inverse model of sgimd run")
-    if not has_predictions(run):
-        raise RunError(f"{run.path} holds no prediction of a movement yet; the model learns from 50 before its first")
+        raise RunError(
+            f"{run.path} holds no prediction of a forward model: it ran without one (--inverse model of sgimd run), or "
+            "is too short for one, which learns from 50 movements before its first prediction"
+        )
     exemplars, *columns = run.predictions.values()
     executed = np.flatnonzero(np.isfinite(run.outcomes).all(axis=1))
     observed, mean, epistemic, aleatoric = np.split(np.stack(columns, axis=1), 4, axis=1)

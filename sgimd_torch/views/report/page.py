@@ -14,7 +14,6 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from sgimd_torch.runs.read import Run
 from sgimd_torch.views import comparison
-from sgimd_torch.views.model_run import has_predictions
 from sgimd_torch.views.report import figures, record
 from sgimd_torch.views.statistics import LEAST_SEEDS, Interval, show
 from sgimd_torch.views.variants import Variant
@@ -57,7 +56,6 @@ def page(place: Path, variants: Sequence[Variant], baseline: str | None = None) 
         figures=figures,
         record=record,
         requested=requested,
-        has_predictions=has_predictions,
     )
     return html.encode(errors="backslashreplace").decode()  # a name may not be valid text
 
