@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sgimd_torch.views.teach.page import Page
-from sgimd_torch.views.teach.serving import serving
+from sgimd_torch.views.teach.page import Page, serving
 from sgimd_torch.views.teach.session import Session
 
 CHROMIUM = next((path for path in map(Path, ("/usr/bin/chromium", "/usr/bin/chromium-browser")) if path.exists()), None)
@@ -133,7 +132,7 @@ class Tab:
 
     def hand(self):
         """Where on the screen the hand is."""
-        return self.at(self.page.hanging.hand)
+        return self.at(self.page.arm.hanging.hand)
 
     def watch(self, side=240):
         """Note where the hand is drawn, in a square around it, from now on."""

@@ -21,7 +21,6 @@ from sgimd_torch.runs.tasks import Task, benchmark_of, correspondence_of, demons
 from sgimd_torch.spaces import Array, Demonstration, Estimate, stream
 from sgimd_torch.teachers import Teacher
 from sgimd_torch.teachers.answering import Demonstrator
-from sgimd_torch.teachers.by_hand import FOLDER, ByHand, read_lessons
 
 if TYPE_CHECKING:
     from sgimd_torch.forward_model.anchored import Trust
@@ -35,7 +34,7 @@ class RunParts:
     """What a run needs. ``config`` is what it was made from. ``answers`` are the inverses to evaluate by, the run's own
     first; they read the learner's memory. ``model`` is refreshed after each movement; it and its ``trust`` are None for
     a run without a model. ``teacher`` demonstrates, ``teachers`` are asked for it; without any of them there are no
-    ``demonstrations``: those of the file, what teachers have besides, then a person's lessons, which ``hand`` gives.
+    ``demonstrations``: those of the file, and what teachers have besides.
     ``data`` holds checksums of the files that were read, ``notes`` messages for the user. ``record`` gives a movement
     to be filmed, None if the task has no picture of its own."""
 
@@ -53,7 +52,6 @@ class RunParts:
     record: Record | None = None
     teachers: Mapping[str, Demonstrator] = field(default_factory=dict)
     task: Task | None = None
-    hand: ByHand | None = None
 
     @property
     def inverse(self) -> Callable[[Array, Array], Estimate]:
@@ -89,10 +87,6 @@ def build(config: Config, directory: Path | None = None) -> RunParts:
         teacher = parts["teacher"](demonstrations, stream(config.seed, "teacher"))
     teachers = parts.asked(demonstrations) if "teachers" in parts.used else {}
     demonstrations = [*demonstrations, *_others(demonstrations, teachers)]
-    lessons = read_lessons((directory or config.directory) / FOLDER)
-    hand = next((each for each in teachers.values() if isinstance(each, ByHand)), ByHand(teacher=teacher))
-    for lesson in lessons:
-        hand.add(lesson)
     learner = parts["algorithm"](task.environment, config.seed)
     words = {answer: config.inverse if answer == OWN else answer for answer in config.answered}
     if "inverse" in config.entry("algorithm").options and config.entry("inverse").learns_with is None:
@@ -105,8 +99,8 @@ def build(config: Config, directory: Path | None = None) -> RunParts:
         config=config,
         environment=task.environment,
         learner=learner,
-        teacher=hand if lessons or "by-hand" in (config.teacher, *config.teachers) else teacher,
-        demonstrations=[*demonstrations, *(lesson.demonstration for lesson in lessons)],
+        teacher=teacher,
+        demonstrations=demonstrations,
         answers={answer: inverses[word] for answer, word in words.items()},
         benchmark=benchmark,
         data={"demonstrations_crc32": demonstrations_crc32, "benchmark_crc32": benchmark_crc32},
@@ -116,7 +110,6 @@ def build(config: Config, directory: Path | None = None) -> RunParts:
         record=task.picture,
         teachers=teachers,
         task=task,
-        hand=hand,
     )
 
 

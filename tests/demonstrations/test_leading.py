@@ -7,7 +7,7 @@ import pytest
 from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.demonstrations.hand import STEP
 from sgimd_torch.demonstrations.leading import Leading
-from sgimd_torch.demonstrations.recording import Recording
+from sgimd_torch.demonstrations.lessons import LedMovement
 from sgimd_torch.environments.fishing_rod import JOINTS, FishingRod
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.environments.planar_model import planar_model

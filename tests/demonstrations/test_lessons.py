@@ -7,7 +7,7 @@ from sgimd_torch.algorithms import observation
 from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
 from sgimd_torch.demonstrations.leading import Leading
 from sgimd_torch.demonstrations.lessons import lesson_by_hand
-from sgimd_torch.demonstrations.recording import Recording
+from sgimd_torch.demonstrations.lessons import LedMovement
 from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.spaces import stream

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sgimd_torch.demonstrations import load_demonstrations
-from sgimd_torch.demonstrations.recording import Recording
+from sgimd_torch.demonstrations.lessons import LedMovement
 
 
 @pytest.fixture

@@ -40,12 +40,11 @@ def main(argv: Sequence[str] | None = None) -> int:
             from sgimd_torch.runs.build import task_of
             from sgimd_torch.runs.process import Failed
             from sgimd_torch.runs.tasks import hand_led_of
-            from sgimd_torch.views.teach.page import Page
-            from sgimd_torch.views.teach.serving import serving
+            from sgimd_torch.views.teach.page import Page, serving
             from sgimd_torch.views.teach.session import Session
     except ModuleNotFoundError as error:
-        slip = "pip install 'sgimd-torch[teach]' installs it"
-        raise ImportError(f"sgimd teach needs {error.name}, which is not installed; {slip}") from error
+        hint = "pip install 'sgimd-torch[teach]' installs it"
+        raise ImportError(f"sgimd teach needs {error.name}, which is not installed; {hint}") from error
     hand_led_of(task_of(config))  # what cannot be led is refused before anything is made
     session = Session(config)
     with serving(port) as server:
