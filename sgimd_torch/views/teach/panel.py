@@ -50,6 +50,7 @@ LEAD: Final = "Press **Record**, **drag the orange ball** (or any part of the ar
 REMARKS: Final = 3  # that are shown
 LOOK: Final = "Nothing recorded yet."
 CLICK: Final = "**Click anywhere on the map**: the learner does its best to land there."
+ORANGE: Final = "#f0781e"
 _STATUS: Final = (
     '<div style="padding:0 .6em;line-height:1.5"><b style="font-size:1.1em">{0}</b><br>{1} of {2} movements, {3}<br>'
     'predicted error <b>{4}</b><br>{5}</div><p style="color:#a33;padding:0 .6em">{6}</p>'
@@ -110,7 +111,12 @@ class Panel:
                 (
                     {"label": "movements"},
                     {"label": "error (m)", "stroke": "#3c46be", "width": 2},
-                    {"label": "lesson", "stroke": "#f0781e", "width": 0, "points": {"show": True, "size": 9, "fill": "#f0781e"}},
+                    {
+                        "label": "lesson",
+                        "stroke": "#f0781e",
+                        "width": 0,
+                        "points": {"show": True, "size": 9, "fill": "#f0781e"},
+                    },
                 ),
                 scales={"x": {"time": False}},
                 legend={"show": False},
