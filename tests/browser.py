@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sgimd_torch.views.teach.page import Page, serving
+from sgimd_torch.views.teach import serving
+from sgimd_torch.views.teach.page import Page
 
 CHROMIUM = next((path for path in map(Path, ("/usr/bin/chromium", "/usr/bin/chromium-browser")) if path.exists()), None)
 # Without the first one there is no WebGL, and so no picture; the second is for machines where tests run as root.

@@ -1,4 +1,4 @@
-"""What a learner can do by now, as a map of T: how near it has come to each place, and what a lesson changed there.
+"""How a session stands, and what its learner can do by now: how near it has come to each place of T, as a map.
 
     before = run.chart(); ...; after = run.chart(); by_change(before, after, outcomes)
 The predicted error at a goal is the distance from it to the nearest place where a movement landed. Nothing is executed,
@@ -16,7 +16,7 @@ from scipy.spatial import KDTree
 
 from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.memory import Memory
-from sgimd_torch.spaces import Array, Box
+from sgimd_torch.spaces import Array, Box, Episode
 
 CELLS: Final = 60  # of the map, along each side
 FAR: Final = 0.25  # of T's longer side: a predicted error that is drawn as hopeless
@@ -41,6 +41,30 @@ class Chart:
     error: Array
     mean_error: float
     met: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """How it stands: after how many ``movements`` of ``total``, and before which of them a lesson was given.
+
+    ``busy`` says what it does if it neither learns nor pauses; ``problem`` what ended it. ``asked`` ``(outcome_dim,)``
+    is a goal that the learner would like to be shown, and ``waiting`` whether it waits for an answer. ``latest`` are
+    the last episodes. ``chart`` is the newest map, ``before`` that from before the last lesson, ``curve`` movements and
+    mean predicted error (m) of all maps.
+    """
+
+    total: int
+    movements: int = 0
+    lessons: tuple[int, ...] = ()
+    paused: bool = False
+    busy: str = "starting"
+    problem: str = ""
+    asked: Array | None = None
+    waiting: bool = False
+    latest: tuple[Episode, ...] = ()
+    chart: Chart | None = None
+    before: Chart | None = None
+    curve: tuple[tuple[int, float], ...] = ()
 
 
 def chart_of(

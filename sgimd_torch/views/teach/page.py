@@ -8,9 +8,8 @@ by one of them at a time.
 from __future__ import annotations
 
 import contextlib
-import io
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import Future
 from html import escape
 from queue import Empty, SimpleQueue
@@ -23,13 +22,12 @@ from sgimd_torch.demonstrations.lessons import HandLesson, LedMovement
 from sgimd_torch.environments.protocol import Recorded
 from sgimd_torch.runs.tasks import hand_led_of
 from sgimd_torch.spaces import Array
-from sgimd_torch.views.teach.arm import STILL, LedArm
-from sgimd_torch.views.teach.chart import Chart, by_change, by_error
+from sgimd_torch.views.teach.arm import LedArm
+from sgimd_torch.views.teach.chart import Chart, State, by_change, by_error
 from sgimd_torch.views.teach.panel import MAPS, SPEEDS, Panel
 from sgimd_torch.views.teach.scene import Scene
-from sgimd_torch.views.teach.session import Session, State
+from sgimd_torch.views.teach.session import Session
 from sgimd_torch.views.teach.taught import Trial
-from sgimd_torch.views.watch import free_port
 
 TICK: Final = 1 / 30  # s, from one picture to the next
 MOVEMENT: Final = 2.0  # s, from one movement of the learner to the next in real time
@@ -39,22 +37,6 @@ ENDED: Final = (
     '<div style="padding:0 .6em;color:#a33"><b>This session has ended.</b> '
     "All of it is kept; to go on: <code>sgimd teach {0}</code></div>"
 )
-
-
-@contextlib.contextmanager
-def serving(port: int) -> Iterator[viser.ViserServer]:
-    """A server on 127.0.0.1, at the first free port from ``port`` on.
-
-    Raises:
-        ValueError: no such port, or none is free.
-    """
-    with contextlib.redirect_stdout(io.StringIO()):  # a banner, and where it listens
-        server = viser.ViserServer(host="127.0.0.1", port=free_port(port), verbose=False)
-    try:
-        yield server
-    finally:
-        with contextlib.redirect_stdout(io.StringIO()):
-            server.stop()
 
 
 class Page:
@@ -83,7 +65,6 @@ class Page:
         """What the map shows."""
         self._tasks: SimpleQueue[Callable[[], object]] = SimpleQueue()
         self._judging = self._trimmed = False  # a lesson is being made of the recording; it was trimmed since
-        self._ghost: tuple[Recorded, float, float] | None = None  # what the learner did; since when, how fast
         self._fetching, self._last = False, -1  # the next ghost; the last movement of which there was one
         self._seen: State | None = None
         self._which = ""
@@ -122,14 +103,14 @@ class Page:
         async def _(event: Any) -> None:
             place = self.scene.place(np.array(event.ray_origin), np.array(event.ray_direction))
             if place is not None:
-                self._later(event.client, lambda: self._then(event.client, self.session.try_goal(place), self._tried))
+                self._later(event.client, lambda: self._try(event.client, place))
 
         @self.panel.speed.on_click
         async def _(event: Any) -> None:
             self._later(event.client, lambda: self._set_speed(event.target.value))
 
-        @self.panel.start.on_update
-        @self.panel.end.on_update
+        @self.panel.start.on_update  # type: ignore[untyped-decorator]
+        @self.panel.end.on_update  # type: ignore[untyped-decorator]
         async def _(event: Any) -> None:
             if event.client is not None:
                 self._later(event.client, self._trim)
@@ -188,7 +169,7 @@ class Page:
             self.arm.record()
         finally:
             self.panel.say_recording(self.arm.leading.recording)
-        if not self.arm.leading.recording:
+        if not self.arm.leading.recording and self.arm.recording is not None:
             self.panel.set_trim(self.arm.recording.duration)
             self._trim()
 
@@ -209,11 +190,12 @@ class Page:
             return
         self._trimmed = False
         try:
-            future = self.session.lesson_of(self.trimmed())
+            trimmed = self.trimmed()
         except ValueError as error:
             self._say(None, str(error))
             return
         self._judging = True
+        future = self.session.do(lambda: self.session.run.lesson_of(trimmed))
         future.add_done_callback(lambda done: self._tasks.put(lambda: self._judged(done)))
 
     def _judged(self, done: Future[HandLesson]) -> None:
@@ -253,11 +235,14 @@ class Page:
         text = f"{self.session.run.path.parent} is as it was before; a copy of what was taken back is beside it."
         client.add_notification("The last lesson is taken back", text, auto_close_seconds=8.0)
 
+    def _try(self, client: viser.ClientHandle, goal: Array) -> None:
+        self._then(client, self.session.do(lambda: self.session.run.try_goal(goal)), self._tried)
+
     def _tried(self, trial: Trial) -> None:
         self.panel.say_trial(trial)
         self.scene.mark("goal", trial.goal)
         self.scene.mark("landed", trial.outcome, f"missed by {trial.missed:.2f} m")
-        self._ghost = None if trial.recorded is None else (trial.recorded, time.monotonic(), 1.0)
+        self.scene.play(trial.recorded, time.monotonic(), 1.0)
 
     def _set_speed(self, word: str) -> None:
         """One of ``SPEEDS``; the learner moves as often as its movements can be played."""
@@ -268,13 +253,7 @@ class Page:
         """The led arm and what hangs on it, and the learner's newest movement."""
         self.arm.move(now, seconds)
         self.scene.draw_arm(self.arm.hanging.data, self.arm.hanging.hand)
-        if self._ghost is not None:
-            recorded, begun, speed = self._ghost
-            played = (now - begun) * speed
-            self.scene.draw_ghost(recorded, min(played, recorded.landed))
-            if played > recorded.landed + STILL:
-                self._ghost = None
-        elif not self._fetching and self.server.get_clients():
+        if not (self.scene.draw_ghost(now) or self._fetching) and self.server.get_clients():
             self._fetch()
 
     def _fetch(self) -> None:
@@ -286,10 +265,10 @@ class Page:
 
         def begin(done: Future[Recorded | None]) -> None:
             self._fetching = False
-            recorded = None if done.exception() else done.result()
-            self._ghost = None if recorded is None else (recorded, time.monotonic(), self._speed)
+            self.scene.play(None if done.exception() else done.result(), time.monotonic(), self._speed)
 
-        self.session.recorded(latest[0]).add_done_callback(lambda done: self._tasks.put(lambda: begin(done)))
+        future = self.session.do(lambda: self.session.run.recorded(latest[0]))
+        future.add_done_callback(lambda done: self._tasks.put(lambda: begin(done)))
 
     def _tell(self, now: float) -> None:
         """Whatever has changed since the last picture."""
@@ -307,11 +286,8 @@ class Page:
         which = self.panel.maps.value
         if state.chart is not None and (self.drawn is not state.chart or self._which != which):
             self.drawn, self._which = state.chart, which
-            changed = which == MAPS[1] and state.before is not None
-            colours = (
-                by_change(state.before, state.chart, self._outcomes)
-                if changed
-                else by_error(state.chart, self._outcomes)
-            )
+            before = state.before if which == MAPS[1] else None
+            outcomes = self._outcomes
+            colours = by_error(state.chart, outcomes) if before is None else by_change(before, state.chart, outcomes)
             self.scene.draw_map(colours, state.chart.met)
-            self.panel.say_map(MAPS[1] if changed else MAPS[0])
+            self.panel.say_map(which if before is not None else MAPS[0])

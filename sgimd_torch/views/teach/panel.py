@@ -15,8 +15,7 @@ import viser
 
 from sgimd_torch.demonstrations.lessons import HandLesson
 from sgimd_torch.spaces import Array
-from sgimd_torch.views.teach.chart import CHANGE, SKILL, Chart
-from sgimd_torch.views.teach.session import State
+from sgimd_torch.views.teach.chart import CHANGE, SKILL, Chart, State
 from sgimd_torch.views.teach.taught import Trial
 
 Act = Callable[[str, viser.ClientHandle], None]
@@ -53,10 +52,14 @@ CLICK: Final = "**Click anywhere on the map**: the learner does its best to land
 ORANGE: Final = "#f0781e"
 _STATUS: Final = (
     '<div style="padding:0 .6em;line-height:1.5"><b style="font-size:1.1em">{0}</b><br>{1} of {2} movements, {3}<br>'
-    'predicted error <b>{4}</b><br>{5}</div><p style="color:#a33;padding:0 .6em">{6}</p>'
+    'predicted error <b>{4}</b><br>{5}</div><div style="color:#a33;padding:0 .6em">{6}</div>'
     '<div style="padding:0 .6em;font-size:.85em;line-height:1.5"><b style="color:#f0781e">●</b> you &nbsp; '
     '<b style="color:#3c46be">●</b> the learner, and where it landed<br><b style="color:#0a6e32">●</b> goals within '
     'reach &nbsp; <b style="color:#788ca0">●</b> goals still too far</div>'
+)
+_CURVE: Final = (
+    '<div style="padding:0 .6em;font-size:.85em">Predicted error (m) over movements, '
+    '<b style="color:#f0781e">●</b> lessons</div>'
 )
 _LEGEND: Final = (
     '<div style="display:flex;gap:.5em;align-items:center;padding:0 .6em;font-size:.85em">{0}<div style="flex:1;'
@@ -82,8 +85,8 @@ class Panel:
             self._add_buttons("record", "home")
         with gui.add_folder("2 · Look at what you recorded"):
             self.lesson = gui.add_markdown(LOOK)
-            self.start = gui.add_slider("From (s)", 0.0, 1.0, 0.01, 0.0, visible=False)
-            self.end = gui.add_slider("To (s)", 0.0, 1.0, 0.01, 1.0, visible=False)
+            self.start: Any = gui.add_slider("From (s)", 0.0, 1.0, 0.01, 0.0, visible=False)
+            self.end: Any = gui.add_slider("To (s)", 0.0, 1.0, 0.01, 1.0, visible=False)
             self._add_buttons("play", "discard")
         with gui.add_folder("3 · Teach it"):
             self._add_buttons("show", "alone")
@@ -101,22 +104,16 @@ class Panel:
             self.status = gui.add_html("")
             self._add_buttons("pause")
             self.speed = gui.add_button_group("Speed", tuple(SPEEDS))
-            self.maps = gui.add_dropdown("Map shows", MAPS, initial_value=MAPS[0])
+            self.maps: Any = gui.add_dropdown("Map shows", MAPS, initial_value=MAPS[0])
             self.legend = gui.add_html("")
             empty = np.zeros(1)
-            gui.add_html('<div style="padding:0 .6em;font-size:.85em">Predicted error (m) over movements, '
-                         '<b style="color:#f0781e">●</b> lessons</div>')  # fmt: skip
+            gui.add_html(_CURVE)
             self.curve = gui.add_uplot(
                 (empty, empty, empty),
                 (
                     {"label": "movements"},
                     {"label": "error (m)", "stroke": "#3c46be", "width": 2},
-                    {
-                        "label": "lesson",
-                        "stroke": "#f0781e",
-                        "width": 0,
-                        "points": {"show": True, "size": 9, "fill": "#f0781e"},
-                    },
+                    {"label": "lesson", "stroke": ORANGE, "width": 0, "points": {"size": 9, "fill": ORANGE}},
                 ),
                 scales={"x": {"time": False}},
                 legend={"show": False},
@@ -133,13 +130,13 @@ class Panel:
 
     def _add_button(self, name: str, action: Action) -> None:
         """A button, and the key that does the same as long as it can be pressed."""
-        gui = self._server.gui
+        gui: Any = self._server.gui
         button = gui.add_button(action.label, icon=action.icon, color=action.colour, hint=f"key {action.key}")
         self.buttons[name] = button
         command = gui.add_command(action.label, hotkey=action.key, icon=action.icon)
 
-        @button.on_click
-        @command.on_trigger
+        @button.on_click  # type: ignore[untyped-decorator]
+        @command.on_trigger  # type: ignore[untyped-decorator]
         async def _(event: Any) -> None:
             if button.visible and not button.disabled:
                 self._act(name, event.client)

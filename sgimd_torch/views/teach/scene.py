@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from sgimd_torch.environments.protocol import HandLed, Recorded, Sketch
 from sgimd_torch.spaces import Array, Box
+from sgimd_torch.views.teach.arm import STILL
 from sgimd_torch.views.teach.chart import CELLS, SKILL, Colours
 
 THIN: Final = 0.003  # m: geoms with a smaller radius are drawn as lines
@@ -55,6 +56,7 @@ class Scene:
         self._hand = self._ball("/hand", HAND, 0.026 * self.size)
         self._chain = np.array([(model.body_parentid[k], k) for k in range(1, model.nbody) if model.body_parentid[k]])
         self._ghost_data = mujoco.MjData(model)
+        self._played: tuple[Recorded, float, float] | None = None  # by the ghost: since when, how fast
         self._ghost = self._lines("/ghost", len(self._chain), LEARNER, 0.005 * self.size)
         self._ghost_end = self._ball("/ghost_end", LEARNER, 0.014 * self.size)
         self._marks = {name: self._ring(name, colour, radius) for name, (colour, radius) in RINGS.items()}
@@ -104,8 +106,19 @@ class Scene:
         if self.hint.visible:
             self.hint.position = hand + np.array([0, 0, 0.04 * self.size])
 
-    def draw_ghost(self, recorded: Recorded, seconds: float) -> None:
-        """The learner's robot as lines, and where its end or float is, at ``seconds`` of a movement."""
+    def play(self, recorded: Recorded | None, now: float, speed: float) -> None:
+        """Let the learner's robot do a movement from ``now`` (s) on, ``speed`` times as fast as it was."""
+        self._played = None if recorded is None else (recorded, now, speed)
+
+    def draw_ghost(self, now: float) -> bool:
+        """The learner's robot as lines, and where its end or float is; whether it still moves."""
+        if self._played is None:
+            return False
+        recorded, begun, speed = self._played
+        played = (now - begun) * speed
+        seconds = min(played, recorded.landed)
+        if played > recorded.landed + STILL:
+            self._played = None
         if isinstance(recorded, Sketch):
             row = min(round(seconds / recorded.step), len(recorded.chains) - 1)
             points = np.pad(recorded.chains[row], ((0, 0), (0, 1)), constant_values=0.02)
@@ -117,6 +130,7 @@ class Scene:
             mujoco.mj_kinematics(self._model, self._ghost_data)
             lines, end = self._ghost_data.xpos[self._chain], found.float_at(seconds)
         self._ghost.points, self._ghost_end.position = np.asarray(lines, dtype=np.float32), end
+        return True
 
     def draw_map(self, colours: Colours, met: NDArray[np.bool_]) -> None:
         """Another picture on the ground, and on it the goals of the benchmark; ``met`` ``(n,)`` are within reach."""

@@ -1,7 +1,7 @@
 """A run that goes on by itself and takes lessons in between: what the page shows and changes, without any page.
 
     with Session(config) as session:
-        session.show(demonstration).result(); session.try_goal(goal).result().missed; session.take_back().result()
+        session.show(demonstration).result(); session.do(lambda: session.run.try_goal(goal)).result().missed
 The learner lives in a thread of its own and never waits for a browser: what a page wants is done between two movements.
 The run directory is that of ``sgimd run``, which can go on with it.
 """
@@ -13,19 +13,18 @@ import traceback
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from queue import Empty, SimpleQueue
 from threading import Condition, Thread
 from typing import Any, Final, Self, TypeVar
 
-from sgimd_torch.demonstrations.lessons import HandLesson, LedMovement
-from sgimd_torch.environments.protocol import Recorded, SimulationError
+from sgimd_torch.environments.protocol import SimulationError
 from sgimd_torch.memory import Memory
 from sgimd_torch.runs.config import Config
 from sgimd_torch.session import ReplayError
 from sgimd_torch.spaces import Array, Demonstration, Episode
-from sgimd_torch.views.teach.chart import Chart
-from sgimd_torch.views.teach.taught import TaughtRun, Trial
+from sgimd_torch.views.teach.chart import State
+from sgimd_torch.views.teach.taught import TaughtRun
 
 LATEST: Final = 60  # movements that a page shows
 CHART_EVERY: Final = 1.0  # s, from one map to the next while the learner moves by itself
@@ -40,30 +39,6 @@ class _Ended(BaseException):
 
 class _GoBack(BaseException):
     """The run is to go back to the state before its last lesson."""
-
-
-@dataclass(frozen=True, eq=False)
-class State:
-    """How it stands: after how many ``movements`` of ``total``, and before which of them a lesson was given.
-
-    ``busy`` says what it does if it neither learns nor pauses; ``problem`` what ended it. ``asked`` ``(outcome_dim,)``
-    is a goal that the learner would like to be shown, and ``waiting`` whether it waits for an answer. ``latest`` are
-    the last episodes. ``chart`` is the newest map, ``before`` that from before the last lesson, ``curve`` movements and
-    mean predicted error (m) of all maps.
-    """
-
-    total: int
-    movements: int = 0
-    lessons: tuple[int, ...] = ()
-    paused: bool = False
-    busy: str = "starting"
-    problem: str = ""
-    asked: Array | None = None
-    waiting: bool = False
-    latest: tuple[Episode, ...] = ()
-    chart: Chart | None = None
-    before: Chart | None = None
-    curve: tuple[tuple[int, float], ...] = ()
 
 
 class Session:
@@ -99,7 +74,7 @@ class Session:
 
     def __exit__(self, *_: object) -> None:
         self._closing = True
-        self._do(lambda: None)
+        self.do(lambda: None)
         self._thread.join()
 
     @property
@@ -122,23 +97,15 @@ class Session:
 
     def pause(self, paused: bool) -> Future[None]:
         """Stop after the movement under way, or go on."""
-        return self._do(lambda: self._tell(paused=paused))
+        return self.do(lambda: self._tell(paused=paused))
 
     def pace(self, interval: float) -> Future[None]:
         """Let ``interval`` s pass from one movement to the next, at least."""
-        return self._do(lambda: setattr(self, "_interval", interval))
+        return self.do(lambda: setattr(self, "_interval", interval))
 
     def advance(self, movements: int) -> Future[None]:
         """Let it make so many movements at once, also while it is paused."""
-        return self._do(lambda: self._hurry(self.run.life.movements + movements), later=True)
-
-    def lesson_of(self, recording: LedMovement) -> Future[HandLesson]:
-        """What a recording would teach: nobody is shown it yet.
-
-        Raises (as its result):
-            ValueError: the robot cannot make this movement.
-        """
-        return self._do(lambda: self.run.lesson_of(recording))
+        return self.do(lambda: self._hurry(self.run.life.movements + movements), later=True)
 
     def show(self, demonstration: Demonstration) -> Future[None]:
         """Show the learner a lesson. It answers at once; the new map is there when this is done.
@@ -146,11 +113,11 @@ class Session:
         Raises (as its result):
             ValueError: the learner cannot be taught, or cannot use it; nothing has happened then.
         """
-        return self._do(lambda: self._show(demonstration), later=True)
+        return self.do(lambda: self._show(demonstration), later=True)
 
     def decline(self) -> Future[None]:
         """Let a learner that waits for an answer go on alone."""
-        return self._do(lambda: self._tell(waiting=False))
+        return self.do(lambda: self._tell(waiting=False))
 
     def take_back(self) -> Future[None]:
         """Go back to the state before the last lesson; a copy of the record as it was is kept.
@@ -158,22 +125,15 @@ class Session:
         Raises (as its result):
             ValueError: there is no lesson.
         """
-        return self._do(self._take_back, later=True)
+        return self.do(self._take_back, later=True)
 
-    def try_goal(self, goal: Array) -> Future[Trial]:
-        """Let the learner do its best at ``goal`` ``(outcome_dim,)``; it learns nothing from it.
+    def do(self, what: Callable[[], Result], *, later: bool = False) -> Future[Result]:
+        """Have something done between two movements, such as ``lambda: session.run.try_goal(goal)``.
 
-        Raises (as its result):
-            ValueError: it remembers nothing yet, or the goal is not one of T.
+        Args:
+            what: to be done in the learner's thread; what it gives, or raises, is the result.
+            later: the result comes when the movements are made for which ``what`` has asked.
         """
-        return self._do(lambda: self.run.try_goal(goal))
-
-    def recorded(self, episode: Episode) -> Future[Recorded | None]:
-        """A movement that was made, to be shown; None if the task has no picture, or the learner rested."""
-        return self._do(lambda: self.run.recorded(episode))
-
-    def _do(self, what: Callable[[], Result], *, later: bool = False) -> Future[Result]:
-        """Have something done in the learner's thread; ``later``: and wait for the movements that it needs."""
         future: Future[Result] = Future()
         with self._changed:
             if self._state.problem:
