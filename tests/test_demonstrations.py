@@ -145,7 +145,6 @@ def test_a_file_written_by_hand_as_documented_is_read(tmp_path: Path) -> None:
         (changed("lengths", np.zeros(0, dtype=int)), "no demonstration"),
         (changed("lengths", [2, 2, 1]), "fewer than 2"),
         (changed("lengths", np.ones(100_000, dtype=int)), "fewer than 2"),
-        (changed("lengths", np.ones(100_001, dtype=int)), "at most 100000 are read"),
         (changed("outcomes", np.zeros((3, 2))), "3 outcomes"),
         (changed("contexts", np.zeros((1, 0))), "1 contexts"),
         (changed("trajectories", np.zeros((4, 6))), "truncated"),
@@ -159,7 +158,7 @@ def test_a_file_written_by_hand_as_documented_is_read(tmp_path: Path) -> None:
         (changed("times", [0.0, 0.02, 0.0, 0.02, 0.02]), "recording 1 must increase"),
         (changed("times", [0.5, 0.6, 0.0, 0.02, 0.04]), "recording 0 must increase"),
         (shuffled, "shuffled"),
-        (changed("trajectories", np.full((5, 6), "far")), "must be floating-point"),
+        (changed("trajectories", np.full((5, 6), "far")), "trajectories must be numbers"),
         (changed("trajectories", np.full((5, 6), None)), "no demonstration file"),  # objects would need pickle
         (changed("times", np.array([{}] * 5)), "no demonstration file"),
         (lambda these: these.pop("outcomes"), "lacks"),
@@ -223,6 +222,14 @@ def test_what_cannot_be_saved_leaves_nothing_behind(tmp_path: Path) -> None:
 def test_recordings_of_another_robot_are_refused(robot: dict[str, int], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         load_demonstrations(**robot)
+
+
+def test_recordings_of_whole_numbers_are_saved_as_floating_point_ones(tmp_path: Path) -> None:
+    whole = Demonstration(np.zeros(0, int), np.arange(3), np.arange(6).reshape(3, 2), np.array([1, 2]))
+    save_demonstrations(tmp_path / "whole.npz", [whole])
+    (loaded,) = load_demonstrations(tmp_path / "whole.npz")
+    assert loaded.trajectory.dtype == np.float64
+    assert loaded.trajectory.tolist() == [[0, 1], [2, 3], [4, 5]]
 
 
 def spoilt(name: str, value: Array) -> list[Demonstration]:

@@ -22,7 +22,6 @@ import numpy as np
 from sgimd_torch.spaces import Array, Demonstration, check_vector
 
 _NAME: Final = re.compile(r"(?P<name>[^\[\]]+)(\[(?P<first>\d+)(?P<slice>:(?P<end>\d+)?)?\])?")
-_MOST_BYTES: Final = 1 << 30  # of a csv file
 
 
 @dataclass(frozen=True)
@@ -103,13 +102,10 @@ def recordings(source: str, table: Mapping[str, np.ndarray], columns: Columns) -
     joints = np.deg2rad(joints) if columns.degrees else joints
     outcomes, contexts = _values(source, table, columns.outcome), _values(source, table, columns.context)
     found: list[Demonstration] = []
-    for name, rows in _groups(source, table, columns.recording, len(times)):
-        what = source if name is None else f"{source}: recording {name}"
+    for what, rows in _groups(source, table, columns.recording, len(times)):
         since = times[rows, 0] - times[rows.start, 0]
         if len(since) < 2:
-            raise ValueError(
-                f"{what} has {len(since)} sample, at least 2 are needed; does {columns.recording} name rows?"
-            )
+            raise ValueError(f"{what} has 1 sample, at least 2 are needed; does {columns.recording} name rows?")
         if not (np.diff(since) > 0).all():
             raise ValueError(f"{what}: {columns.time} must increase from row to row; were the rows shuffled?")
         found.append(Demonstration(contexts[rows.start], since, joints[rows], outcomes[rows.stop - 1]))
@@ -117,16 +113,9 @@ def recordings(source: str, table: Mapping[str, np.ndarray], columns: Columns) -
 
 
 def _table(file: Path, names: Sequence[str]) -> dict[str, np.ndarray]:
-    """Columns of a CSV file, as numbers where they all are."""
-    if file.stat().st_size > _MOST_BYTES:
-        raise ValueError(f"{file} is larger than {_MOST_BYTES} bytes; split it")
+    """Columns of a CSV file, as text."""
     with open(file, encoding="utf-8-sig", errors="replace", newline="") as text:
-        lines = csv.reader(text)
-        try:
-            heads = [head.strip() for head in next(lines, [])]
-            rows = [line for line in lines if line]
-        except csv.Error as error:
-            raise ValueError(f"{file}: line {lines.line_num} is no CSV: {error}") from error
+        heads, *rows = [[field.strip() for field in row] for row in csv.reader(text) if row] or [[]]
     missing = [name for name in names if name not in heads]
     if missing:
         raise ValueError(f"{file} has no column {', '.join(missing)}; it has {', '.join(heads[:20])}")
@@ -135,14 +124,7 @@ def _table(file: Path, names: Sequence[str]) -> dict[str, np.ndarray]:
     for number, row in enumerate(rows, 1):
         if len(row) != len(heads):
             raise ValueError(f"{file}: row {number} has {len(row)} fields, {len(heads)} were wanted; is it cut short?")
-    found = {}
-    for name in names:
-        fields = [row[heads.index(name)].strip() for row in rows]
-        try:
-            found[name] = np.array([float(field) for field in fields])
-        except ValueError:
-            found[name] = np.array(fields)
-    return found
+    return {name: np.array([row[heads.index(name)] for row in rows]) for name in names}
 
 
 def _values(source: str, table: Mapping[str, np.ndarray], names: Sequence[str]) -> Array:
@@ -151,10 +133,10 @@ def _values(source: str, table: Mapping[str, np.ndarray], names: Sequence[str]) 
     for written in names:
         match = _NAME.fullmatch(written)
         assert match is not None
-        values = table[match["name"]]
-        if values.dtype.kind == "U":
-            wrong = next(text for text in values.tolist() if not _is_number(text))
-            raise ValueError(f"{source}: {match['name']} must be numbers, got {wrong[:40]!r}; is a field missing?")
+        try:
+            values = np.array(table[match["name"]].tolist(), dtype=np.float64)
+        except ValueError as error:
+            raise ValueError(f"{source}: {match['name']} must be numbers: {error}; is a field missing?") from error
         vectors = values.reshape(len(values), -1)
         if match["first"] is not None:
             first = int(match["first"])
@@ -166,24 +148,15 @@ def _values(source: str, table: Mapping[str, np.ndarray], names: Sequence[str]) 
     return np.concatenate(parts, axis=1)
 
 
-def _groups(source: str, table: Mapping[str, np.ndarray], recording: str | None, n: int) -> list[tuple[object, slice]]:
-    """Name and rows of each recording, in order."""
+def _groups(source: str, table: Mapping[str, np.ndarray], recording: str | None, n: int) -> list[tuple[str, slice]]:
+    """What to call each recording in errors, and its rows, in order."""
     if recording is None:
-        return [(None, slice(0, n))]
+        return [(source, slice(0, n))]
     names = table[recording].tolist()
     starts = [row for row in range(n) if row == 0 or names[row] != names[row - 1]]
-    groups = [(names[row], slice(row, end)) for row, end in zip(starts, [*starts[1:], n], strict=True)]
-    seen: set[object] = set()
-    for name, _ in groups:
-        if name in seen:
-            raise ValueError(f"{source}: the rows of recording {name} are apart; sort them by {recording} and time")
-        seen.add(name)
-    return groups
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
+    found = [names[row] for row in starts]
+    if len(set(found)) < len(found):
+        twice = next(name for k, name in enumerate(found) if name in found[:k])
+        raise ValueError(f"{source}: the rows of recording {twice} are apart; sort them by {recording} and time")
+    ends = [*starts[1:], n]
+    return [(f"{source}: recording {names[row]}", slice(row, end)) for row, end in zip(starts, ends, strict=True)]

@@ -3,30 +3,56 @@
 Section 5.3 of Nguyen & Oudeyer (2014): demonstrator 3 led the arm by the hand. Here the arm is a MuJoCo model without
 weight. It follows the point at which it is held, by damped least squares, never beyond its joints' ranges, speeds and
 accelerations; where it is let go, it stays.
-    leading = Leading.of(rod.hand_led); leading.grab("hand"); leading.record()
+    leading = Leading(rod.hand_led); leading.grab("hand"); leading.record()
     for point in path: leading.drag(point); leading.step(0.02)
     leading.release(); recording = leading.stop()
-Joints can be moved one by one, too: ``leading.set_joints(q)``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, Final
+from collections import deque
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from sgimd_torch.demonstrations.arm import Arm
-from sgimd_torch.demonstrations.hand import FOLLOW, STEP, Hand
-from sgimd_torch.demonstrations.recording import Recording
+from sgimd_torch.demonstrations.lessons import LedMovement
 from sgimd_torch.environments.protocol import HandLed
-from sgimd_torch.spaces import Array, Box, check_point, read_only
+from sgimd_torch.spaces import Array, check_point, read_only
 
+STEP: Final = 0.01  # s, from one posture of the arm to the next
+FOLLOW: Final = 15.0  # 1/s, how quickly a held point follows: nearly all of a jump within 5 / FOLLOW
+RECENT: Final = 0.4  # s: how long ago the hand may have been where the held point is now
 SUPPLE: Final = 0.03  # s, in which a joint takes up a speed: a hand's trembling does not become the arm's
 DAMPING: Final = 0.1  # of the least squares, relative to the arm's levers: near a stretched posture joints stay slow
 BRAKES: Final = 0.88  # of the acceleration, to stop before a range ends: the last step may take 9/8 of it
 CROSSING: Final = 1.0  # s, in which a joint of unknown speed crosses its range
+
+
+class _Hand:
+    """Holds a ``place`` ``(3,)`` m on a ``body``, in its frame, and wants it at ``target`` ``(3,)`` m in the world.
+
+    A browser tells of a hand about 20 times a second, so it jumps. What the arm is asked to follow, ``_wanted`` (m),
+    goes after the target in a critically damped motion of velocity ``_pull`` (m/s).
+    """
+
+    def __init__(self, body: int, place: Array, target: Array) -> None:
+        self.body, self.place, self.target = body, place, target
+        self._wanted, self._pull = target, np.zeros(3)
+        self._lately = deque([target], maxlen=round(RECENT / STEP))  # targets
+
+    def follow(self, point: Array) -> Array:
+        """``(3,)`` m/s, the velocity that the held ``point`` should have in the next step."""
+        self._pull = self._pull + STEP * FOLLOW**2 * (self.target - self._wanted - 2 / FOLLOW * self._pull)
+        self._wanted = self._wanted + STEP * self._pull
+        self._lately.append(self.target)
+        velocity: Array = self._pull + FOLLOW * (self._wanted - point)
+        return velocity
+
+    def gap(self, point: Array) -> float:
+        """m, from the held ``point`` to the nearest target of the last moments."""
+        return float(np.linalg.norm(np.stack(self._lately) - point, axis=1).min())
 
 
 class Leading:
@@ -35,49 +61,30 @@ class Leading:
     ``data`` is the model in the posture of now, to be drawn; ``links`` are the bodies that can be grabbed, by name.
 
     Args:
-        model: a ``mujoco.MjModel``; what is not led in it keeps its posture relative to the link that carries it.
-        joints: names of the hinge and slide joints that are led, in the order of a recording's columns.
-        hand: name of the body or site that ``grab()`` takes.
-        ranges: ``(n_joints,)`` rad; None for those of the model.
-        start: ``(n_joints,)`` rad, the posture at the beginning, see ``home``; None for the model's.
-        speeds, accelerations: ``(n_joints,)`` rad/s, rad/s^2, above 0, never exceeded; None for a joint that crosses
-            its range in a second, smoothly.
+        led: the arm, as an environment gives it as ``hand_led``; what is not led in its model keeps its posture
+            relative to the link that carries it.
 
     Raises:
         ValueError: a name that the model does not have, a joint that is no hinge or slide, no range, a start outside
             the ranges, or a limit that is not above 0.
     """
 
-    def __init__(
-        self,
-        model: Any,
-        joints: Sequence[str],
-        hand: str,
-        *,
-        ranges: Box | None = None,
-        start: ArrayLike | None = None,
-        speeds: ArrayLike | None = None,
-        accelerations: ArrayLike | None = None,
-    ) -> None:
-        self._arm = arm = Arm(model, joints, ranges)
-        self.data, self.joints, self.ranges, self.links = arm.data, arm.joints, arm.ranges, arm.links
-        n = len(self.joints)
+    def __init__(self, led: HandLed) -> None:
+        self._arm = arm = Arm(led.model, led.joints, led.ranges)
+        self.data, self.ranges, self.links = arm.data, arm.ranges, arm.links
         whole = self.ranges.sides / CROSSING
-        self.speeds = _limits("speeds", 1.5 * whole if speeds is None else speeds, n)
-        self.accelerations = _limits("accelerations", 6 * whole if accelerations is None else accelerations, n)
-        posture = self.ranges.clip(arm.posture) if start is None else start
-        self.start = read_only(self.ranges.check("start", check_point("start", posture, n), "are they in rad?"))
-        self._hand = arm.place_of(hand)
-        self._held: Hand | None = None
-        self._goal: Array | None = None
+        self.speeds = _limits("speeds", 1.5 * whole if led.speeds is None else led.speeds, len(whole))
+        self.accelerations = _limits(
+            "accelerations", 6 * whole if led.accelerations is None else led.accelerations, len(whole)
+        )
+        posture = self.ranges.clip(arm.posture) if led.start is None else led.start
+        self.start = read_only(
+            self.ranges.check("start", check_point("start", posture, len(whole)), "are they in rad?")
+        )
+        self._hand = arm.place_of(led.hand)
+        self._held: _Hand | None = None
         self._rows: list[tuple[Array, float]] | None = None
         self.home()
-
-    @classmethod
-    def of(cls, led: HandLed) -> Leading:
-        """The arm that an environment gives as ``hand_led``."""
-        limits = {"speeds": led.speeds, "accelerations": led.accelerations}
-        return cls(led.model, led.joints, led.hand, ranges=led.ranges, start=led.start, **limits)
 
     @property
     def q(self) -> Array:
@@ -88,11 +95,6 @@ class Leading:
     def point(self) -> Array:
         """``(3,)`` m, where the point is at which the arm is held; without a hand on it, its own hand."""
         return self._arm.where(*((self._held.body, self._held.place) if self._held else self._hand))
-
-    @property
-    def target(self) -> Array | None:
-        """``(3,)`` m, where the hand wants the held point to be; None if nothing is held."""
-        return self._held.target.copy() if self._held else None
 
     @property
     def gap(self) -> float:
@@ -119,9 +121,9 @@ class Leading:
             RuntimeError: a recording is under way, which must not jump.
         """
         if self.recording:
-            raise RuntimeError("the arm cannot jump home during a recording; stop() it first, or set_joints(start)")
-        self._q, self._speed, self._since = self.start.copy(), np.zeros(len(self.joints)), 0.0
-        self._held = self._goal = None
+            raise RuntimeError("the arm cannot jump home during a recording; stop() it first")
+        self._q, self._speed, self._since = self.start.copy(), np.zeros(len(self.start)), 0.0
+        self._held = None
         self._arm.pose(self._q)
 
     def grab(self, body: str | None = None, point: ArrayLike | None = None) -> None:
@@ -137,7 +139,7 @@ class Leading:
         number, place = self._hand if body is None else self._arm.place_of(body)
         if point is not None:
             place = self._arm.place_at(number, check_point("point", point, 3, "in m"))
-        self._held, self._goal = Hand(number, place, self._arm.where(number, place)), None
+        self._held = _Hand(number, place, self._arm.where(number, place))
 
     def drag(self, target: ArrayLike) -> None:
         """Pull the held point towards ``target``, ``(3,)`` m, from the next step on.
@@ -153,16 +155,6 @@ class Leading:
     def release(self) -> None:
         """Let go: the arm comes to rest, within a tenth of a second or so, and stays there."""
         self._held = None
-
-    def set_joints(self, q: ArrayLike) -> None:
-        """Move all joints towards ``q``, ``(n_joints,)`` rad, from the next step on; a hand lets go.
-
-        Raises:
-            ValueError: not one posture within the ranges.
-        """
-        goal = check_point("q", q, len(self.joints), "one angle for each joint, in rad")
-        self._goal = self.ranges.check("q", goal, "are they in rad?").copy()
-        self.release()
 
     def step(self, dt: float) -> None:
         """Let ``dt`` (s) pass, in steps of ``STEP``; what is left of it counts for the next call.
@@ -187,35 +179,31 @@ class Leading:
             raise RuntimeError("a recording is under way; stop() it first")
         self._rows = [(self.q, self.gap)]
 
-    def stop(self) -> Recording:
+    def stop(self) -> LedMovement:
         """End the recording and give it.
 
         Raises:
             RuntimeError: none is under way.
-            ValueError: it holds one posture only, as no time has passed.
+            ValueError: it holds one posture only, as no time has passed; it is over all the same.
         """
         if self._rows is None:
             raise RuntimeError("nothing is being recorded; record() comes first")
         rows, self._rows = self._rows, None
+        if len(rows) < 2:
+            raise ValueError("a recording needs 2 postures or more; was it too short?")
         postures, gaps = zip(*rows, strict=True)
         times = np.arange(len(rows), dtype=np.float64) * STEP
-        return Recording(times, np.stack(postures), np.array(gaps))
+        return LedMovement(times, np.stack(postures), np.array(gaps))
 
     def _advance(self) -> None:
-        speed = self._within(self._wish())
+        held = self._held
+        wish = np.zeros(len(self.start)) if held is None else self._towards(held.follow(self.point), held.body)
+        speed = self._within(wish)
         q = self.ranges.clip(self._q + speed * STEP)  # rounding
         self._speed, self._q = (q - self._q) / STEP, q
         self._arm.pose(self._q)
         if self._rows is not None:
             self._rows.append((self.q, self.gap))
-
-    def _wish(self) -> Array:
-        """``(n_joints,)`` rad/s, the speeds that would follow hand or joint goal."""
-        if self._held is not None:
-            return self._towards(self._held.follow(self.point), self._held.body)
-        if self._goal is not None:
-            return FOLLOW / 2 * (self._goal - self._q)
-        return np.zeros(len(self.joints))
 
     def _towards(self, velocity: Array, body: int) -> Array:
         """``(n_joints,)`` rad/s that move the held point with this ``velocity`` ``(3,)`` m/s, by damped least squares.
@@ -230,7 +218,7 @@ class Leading:
             return np.asarray(columns.T @ np.linalg.solve(columns @ columns.T + damping, velocity))
 
         velocity = velocity * self._slower(solve(levers, velocity))
-        speed, free = np.zeros(len(self.joints)), np.ones(len(self.joints), dtype=bool)
+        speed, free = np.zeros(len(self.start)), np.ones(len(self.start), dtype=bool)
         low, high = self._brakes()
         while free.any():
             speed[free] = solve(levers[:, free], velocity - levers[:, ~free] @ speed[~free])

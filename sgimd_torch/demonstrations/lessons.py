@@ -16,13 +16,44 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sgimd_torch.demonstrations.recording import Recording
 from sgimd_torch.environments.protocol import Environment, HandLed
 from sgimd_torch.spaces import Array, Demonstration, read_only
 
-BEYOND: Final = 0.03  # m: what a hand asked for and did not get is told from here on
-FASTER: Final = 1.02  # so is a joint that would be so many times faster than the robot's movements
-AWAY: Final = 0.05  # rad: so is a start that is this far from where movements start
+RATE: Final = 50.0  # Hz, of the shipped demonstrations and of motor primitives
+LAG: Final = 0.03  # m: warn when the arm lags the hand by more
+FASTER: Final = 1.02  # warn when a joint would be so many times faster than in the robot's own movements
+AWAY: Final = 0.05  # rad: warn when it starts farther than this from where movements start
+
+
+@dataclass(frozen=True, eq=False)
+class LedMovement:
+    """What a hand did with an arm, before anybody knows where the movement lands.
+
+    ``times`` ``(n_times,)`` s, increasing from 0; ``joints`` ``(n_times, n_joints)`` rad; ``gaps`` ``(n_times,)`` m,
+    how far the led point stayed from the way that the hand wanted it to go, 0 where nothing was held.
+    """
+
+    times: Array
+    joints: Array
+    gaps: Array
+
+    @property
+    def duration(self) -> float:
+        """s."""
+        return float(self.times[-1])
+
+    def trim(self, start: float, end: float) -> LedMovement:
+        """What happened from ``start`` to ``end`` (s), its times from 0.
+
+        Raises:
+            ValueError: fewer than two samples lie between them.
+        """
+        kept = (self.times >= start - 1e-9) & (self.times <= end + 1e-9)
+        if kept.sum() < 2:
+            found = f"from {start:g} s to {end:g} s there are {int(kept.sum())} samples"
+            raise ValueError(f"{found}, at least 2 are needed; were the ends swapped?")
+        times = self.times[kept]
+        return LedMovement(times - times[0], self.joints[kept], self.gaps[kept])
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,31 +63,19 @@ class HandLesson:
     Args:
         demonstration: the trajectory, and the outcome of ``theta_d`` executed once.
         theta_d: ``(theta_dim,)`` in Pi, what the trajectory corresponds to.
-        played: ``(n_times, n_joints)`` rad, what the robot plays in its place; None if it cannot tell.
+        misfit: rad, d of eq. (6): the root mean square over time and joints of what the robot plays minus what was led;
+            NaN if it cannot tell.
         remarks: what could not be followed, a sentence each; none if all could.
     """
 
     demonstration: Demonstration
     theta_d: Array
-    played: Array | None
+    misfit: float
     remarks: tuple[str, ...]
-
-    @property
-    def misfits(self) -> Array:
-        """``(n_joints,)`` rad, root mean squares over time of what is played minus what was led; NaN if unknown."""
-        led = self.demonstration.trajectory
-        if self.played is None:
-            return np.full(led.shape[1], np.nan)
-        return np.asarray(np.sqrt(np.mean((self.played - led) ** 2, axis=0)))
-
-    @property
-    def misfit(self) -> float:
-        """rad, d of eq. (6): the root mean square of ``misfits``."""
-        return float(np.sqrt(np.mean(self.misfits**2)))
 
 
 def lesson_by_hand(
-    recording: Recording,
+    recording: LedMovement,
     environment: Environment,
     correspondence: Callable[[Array, Array], Array],
     led: HandLed,
@@ -82,25 +101,27 @@ def lesson_by_hand(
     """
     middle = (environment.contexts.low + environment.contexts.high) / 2
     context = environment.contexts.check("context", middle if context is None else context)
-    player = player_of(environment)
-    longest = max(getattr(player, "durations", (getattr(player, "duration", np.inf),)))
-    paced = recording.within(longest).resampled()
-    theta_d = environment.policies.check("theta_d", correspondence(paced.times, paced.joints))
-    outcome = environment.execute(context, theta_d.copy(), rng)
-    shown = Demonstration(context, paced.times, paced.joints, outcome)
-    remarks = (*_as_led(recording, led, longest), *beyond_limits(environment, shown))
-    return HandLesson(shown, read_only(theta_d), played(environment, theta_d, shown), remarks)
+    _, longest = _durations(environment)
+    slower = recording.duration > longest
+    times = recording.times / recording.duration * longest if slower else recording.times  # ends exactly at longest
+    even, joints = resampled(times, recording.joints)
+    theta_d = environment.policies.check("theta_d", correspondence(even, joints))
+    shown = Demonstration(context, even, joints, environment.execute(context, theta_d.copy(), rng))
+    instead = played(environment, theta_d, shown)
+    misfit = np.nan if instead is None else float(np.sqrt(np.mean((instead - joints) ** 2)))
+    remarks = (*_as_led(recording, times, led), *beyond_limits(environment, shown))
+    return HandLesson(shown, read_only(theta_d), misfit, remarks)
 
 
-def player_of(environment: Environment) -> Any:
-    """What turns theta into joint angles or commands: ``primitive`` or ``controller`` of a robot that has one."""
-    player = getattr(environment, "primitive", None) or getattr(environment, "controller", None)
-    return player if hasattr(player, "at") else None
+def resampled(times: Array, joints: Array) -> tuple[Array, Array]:
+    """The same movement at equal steps, at least ``RATE`` of them a second."""
+    even = np.linspace(0.0, times[-1], max(2, int(np.ceil(times[-1] * RATE - 1e-9)) + 1))
+    return even, np.stack([np.interp(even, times, column) for column in joints.T], axis=1)
 
 
 def played(environment: Environment, theta: Array, shown: Demonstration) -> Array | None:
     """``(n_times, n_joints)`` that the robot plays in the place of a recording; None for one that cannot tell."""
-    player = player_of(environment)
+    player = _player_of(environment)
     if player is None:
         return None
     found: Array = player.at(theta, np.asarray(shown.times - shown.times[0]))
@@ -109,17 +130,15 @@ def played(environment: Environment, theta: Array, shown: Demonstration) -> Arra
 
 def beyond_limits(environment: Environment, shown: Demonstration) -> list[str]:
     """What of a recording lies outside the limits of the robot, as far as it tells them."""
-    remarks, player = [], player_of(environment)
+    remarks, player = [], _player_of(environment)
     box = getattr(player, "joints", getattr(player, "commands", None))
     if box is not None and shown.trajectory.ndim == 2 and shown.trajectory.shape[1] == box.dim:
         outside = (shown.trajectory < box.low) | (shown.trajectory > box.high)
         for joint in np.flatnonzero(outside.any(axis=0)):
             sample = int(outside[:, joint].argmax())
-            remarks.append(
-                f"joint {joint} is {shown.trajectory[sample, joint]:.3g} at sample {sample}, its range "
-                f"[{box.low[joint]:g}, {box.high[joint]:g}]"
-            )
-    shortest, longest = getattr(player, "durations", (0.0, getattr(player, "duration", np.inf)))
+            found = f"joint {joint} is {shown.trajectory[sample, joint]:.3g} at sample {sample}"
+            remarks.append(f"{found}, its range [{box.low[joint]:g}, {box.high[joint]:g}]")
+    shortest, longest = _durations(environment)
     lasts = float(shown.times[-1] - shown.times[0])
     if not shortest * (1 - 1e-9) <= lasts <= longest * (1 + 1e-9):
         remarks.append(f"too {'fast' if lasts < shortest else 'long'}: movements last {shortest:g} to {longest:g} s")
@@ -128,16 +147,29 @@ def beyond_limits(environment: Environment, shown: Demonstration) -> list[str]:
     return remarks
 
 
-def _as_led(recording: Recording, led: HandLed, longest: float) -> list[str]:
-    """What of a recording the robot cannot do as the hand led it."""
+def _player_of(environment: Environment) -> Any:
+    """What turns theta into joint angles or commands: ``primitive`` or ``controller`` of a robot that has one."""
+    player = getattr(environment, "primitive", None) or getattr(environment, "controller", None)
+    return player if hasattr(player, "at") else None
+
+
+def _durations(environment: Environment) -> tuple[float, float]:
+    """s, how long the robot's movements last, at least and at most."""
+    player = _player_of(environment)
+    shortest, *_, longest = getattr(player, "durations", (0.0, getattr(player, "duration", np.inf)))
+    return shortest, longest
+
+
+def _as_led(recording: LedMovement, times: Array, led: HandLed) -> list[str]:
+    """What of a recording, played at ``times``, the robot cannot do as the hand led it."""
     remarks = []
-    if recording.duration > longest:
-        faster = recording.duration / longest
-        remarks.append(f"it is played {faster:.3g} times faster: movements last {longest:g} s at most")
-    if recording.gaps is not None and recording.gaps.max() > BEYOND:
+    if recording.duration > times[-1]:
+        faster = recording.duration / times[-1]
+        remarks.append(f"it is played {faster:.3g} times faster: movements last {times[-1]:g} s at most")
+    if recording.gaps.max() > LAG:
         far = f"up to {recording.gaps.max():.2g} m"
         remarks.append(f"the arm stayed {far} behind the hand, which went too far or too fast for it")
-    speeds = recording.within(longest).speeds
+    speeds = np.abs(np.diff(recording.joints, axis=0) / np.diff(times)[:, None]).max(axis=0)
     for name, speed, most in zip(led.joints, speeds, speeds if led.speeds is None else led.speeds, strict=True):
         if speed > most * FASTER:
             remarks.append(f"{name} would turn at {speed:.2g} rad/s, its movements at {most:.2g} rad/s at most")

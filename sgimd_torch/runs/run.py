@@ -90,8 +90,12 @@ class Life:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        self.close(commit=kind is None or not issubclass(kind, OSError))  # else it would fail once more
+
+    def close(self, *, commit: bool = True) -> None:
+        """Bring to the disk what was lived, and let others have the record."""
         try:
-            if not self.replaying and not (kind is not None and issubclass(kind, OSError)):
+            if commit and not self.replaying:
                 self.commit()
         finally:
             self.record.close()

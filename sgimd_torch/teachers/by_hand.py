@@ -1,7 +1,8 @@
-"""Lessons by hand: a person shows something now and then; the record of the run keeps it.
+"""A person who teaches by hand: what they give is shown at once, and a learner that asks can ask them.
 
 Section 2.3 of Nguyen & Oudeyer (2014): kinesthetic demonstrations.
-    hand = ByHand(teacher); hand.give(demonstration); hand.offer(120, memory)
+    teacher = ByHand(teacher); teacher.give(demonstration); teacher.offer(120, memory)
+Nothing is drawn here, and the record of a run keeps what was shown, so a replay needs no person.
 """
 
 from __future__ import annotations
@@ -16,32 +17,33 @@ from sgimd_torch.spaces import Array, Demonstration
 from sgimd_torch.teachers import Teacher
 
 BY_HAND: Final = "by-hand"
-"""Who has shown a lesson, in the record of a run."""
+"""Who has shown a lesson by hand, in the record; also the word of the command line."""
 
 Ask = Callable[[Array, Array, Memory], Demonstration | None]
-"""(context, goal, memory) -> what a person shows when the learner asks, or None."""
+"""(context, goal, memory) -> what a person shows to a learner that asks, or None."""
 
 
 class ByHand:
-    """Gives the lessons of a person; where there is none, what another teacher offers.
+    """Offers what a person gives; otherwise, what another teacher offers.
 
     That teacher is asked before each movement, also where a person shows something, so that its draws stay the same.
 
     Args:
         teacher: another one, None if there is none.
+
+    Attributes:
+        ask: asks the person who is there; None if nobody is.
+        who: showed what was offered last, as the record has it.
     """
 
     def __init__(self, teacher: Teacher | None = None) -> None:
-        self.teacher = teacher
+        self.teacher, self.who = teacher, "teacher"
         self.ask: Ask | None = None
-        """Asks the person who is there; None if nobody is."""
-        self.who = "teacher"
-        """Who made the last offer, for the record."""
         self._given: Demonstration | None = None
 
-    def give(self, lesson: Demonstration) -> None:
-        """Show this before the next movement."""
-        self._given = lesson
+    def give(self, demonstration: Demonstration) -> None:
+        """Have this offered before the next movement for which the learner takes an offer."""
+        self._given = demonstration
 
     def offer(self, index: int, memory: Memory) -> Demonstration | None:
         """See ``Teacher``."""
@@ -56,5 +58,5 @@ class ByHand:
 
 
 def nobody(demonstrations: Sequence[Demonstration], rng: np.random.Generator) -> ByHand:
-    """A person who has shown nothing yet."""
+    """A person who has nothing prepared; ``sgimd teach`` brings what they show."""
     return ByHand()

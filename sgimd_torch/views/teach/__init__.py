@@ -10,16 +10,22 @@ Examples:
 from __future__ import annotations
 
 import argparse
+import contextlib
+import io
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from sgimd_torch.runs.command_line import parse
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.process import loading
 from sgimd_torch.runs.read import config_of, read_run
+from sgimd_torch.views.watch import free_port
+
+if TYPE_CHECKING:
+    from viser import ViserServer
 
 NAME: Final = "taught"  # of the run, if no other is given
 WHERE: Final = """
@@ -41,11 +47,10 @@ def main(argv: Sequence[str] | None = None) -> int:
             from sgimd_torch.runs.process import Failed
             from sgimd_torch.runs.tasks import hand_led_of
             from sgimd_torch.views.teach.page import Page
-            from sgimd_torch.views.teach.serving import serving
             from sgimd_torch.views.teach.session import Session
     except ModuleNotFoundError as error:
-        slip = "pip install 'sgimd-torch[teach]' installs it"
-        raise ImportError(f"sgimd teach needs {error.name}, which is not installed; {slip}") from error
+        hint = "pip install 'sgimd-torch[teach]' installs it"
+        raise ImportError(f"sgimd teach needs {error.name}, which is not installed; {hint}") from error
     hand_led_of(task_of(config))  # what cannot be led is refused before anything is made
     session = Session(config)
     with serving(port) as server:
@@ -57,6 +62,24 @@ def main(argv: Sequence[str] | None = None) -> int:
     if session.state.problem:
         raise Failed(session.state.problem)
     return 0
+
+
+@contextlib.contextmanager
+def serving(port: int) -> Iterator[ViserServer]:
+    """A web server on 127.0.0.1, at the first free port from ``port`` on.
+
+    Raises:
+        ValueError: no such port, or none is free.
+    """
+    import viser  # only when it is needed
+
+    with contextlib.redirect_stdout(io.StringIO()):  # a banner, and where it listens
+        server = viser.ViserServer(host="127.0.0.1", port=free_port(port), verbose=False)
+    try:
+        yield server
+    finally:
+        with contextlib.redirect_stdout(io.StringIO()):
+            server.stop()
 
 
 def parser() -> argparse.ArgumentParser:

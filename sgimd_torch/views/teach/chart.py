@@ -1,8 +1,8 @@
-"""What a learner can do by now, as a map of T: how near it has come to each place, and what a lesson changed there.
+"""How a session stands, and what its learner can do by now: how near it has come to each place of T, as a map.
 
-    before = run.chart(lessons=0); ...; after = run.chart(lessons=1); by_change(before, after, outcomes)
-Competence is that of section 4.3 of Nguyen & Oudeyer (2014), by memory; the predicted error at a goal is the distance
-from it to the nearest place where a movement landed. Nothing is executed, so a map takes milliseconds.
+    before = run.chart(); ...; after = run.chart(); by_change(before, after, outcomes)
+The predicted error at a goal is the distance from it to the nearest place where a movement landed. Nothing is executed,
+so a map takes milliseconds.
 """
 
 from __future__ import annotations
@@ -14,13 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from sgimd_torch.competence import performance
 from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.memory import Memory
-from sgimd_torch.spaces import Array, Box
+from sgimd_torch.spaces import Array, Box, Episode
 
 CELLS: Final = 60  # of the map, along each side
-LEAST: Final = 0.02  # m, of the distances in eq. (7), as learners have it
 FAR: Final = 0.25  # of T's longer side: a predicted error that is drawn as hopeless
 Colours = NDArray[np.uint8]
 
@@ -34,22 +32,39 @@ CHANGE: Final = np.array([[150, 60, 130], [214, 170, 205], [236, 241, 244], [160
 class Chart:
     """What it can do after ``movements`` and ``lessons``.
 
-    ``error`` ``(CELLS, CELLS)`` m, predicted, by row of y and column of x; ``competence`` likewise, in [-1, 0].
-    ``goals_error`` ``(n,)`` m is predicted at the goals of the benchmark, and ``met`` says which of them are near
-    enough to count as reached.
+    ``error`` ``(CELLS, CELLS)`` m, predicted, by row of y and column of x; ``mean_error`` m is that at the goals of the
+    benchmark, and ``met`` ``(n,)`` says which of them are near enough to count as reached.
     """
 
     movements: int
     lessons: int
     error: Array
-    competence: Array
-    goals_error: Array
+    mean_error: float
     met: NDArray[np.bool_]
 
-    @property
-    def mean_error(self) -> float:
-        """m, predicted, over the goals of the benchmark; NaN before the first movement."""
-        return float(self.goals_error.mean())
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """How it stands: after how many ``movements`` of ``total``, and before which of them a lesson was given.
+
+    ``busy`` says what it does if it neither learns nor pauses; ``problem`` what ended it. ``asked`` ``(outcome_dim,)``
+    is a goal that the learner would like to be shown, and ``waiting`` whether it waits for an answer. ``latest`` are
+    the last episodes. ``chart`` is the newest map, ``before`` that from before the last lesson, ``curve`` movements and
+    mean predicted error (m) of all maps.
+    """
+
+    total: int
+    movements: int = 0
+    lessons: tuple[int, ...] = ()
+    paused: bool = False
+    busy: str = "starting"
+    problem: str = ""
+    asked: Array | None = None
+    waiting: bool = False
+    latest: tuple[Episode, ...] = ()
+    chart: Chart | None = None
+    before: Chart | None = None
+    curve: tuple[tuple[int, float], ...] = ()
 
 
 def chart_of(
@@ -65,7 +80,7 @@ def chart_of(
         context: ``(context_dim,)`` in which it is drawn.
         movements, lessons: so far.
     """
-    cells = cells_of(outcomes)
+    cells = _cells(outcomes)
     everywhere = np.concatenate([cells, benchmark.goals])
     if len(memory):
         near = KDTree(np.concatenate([memory.contexts, memory.outcomes], axis=1))
@@ -74,13 +89,11 @@ def chart_of(
     else:
         nearest = np.tile(rest, (len(everywhere), 1))
     distances = np.linalg.norm(nearest - everywhere, axis=1)
-    reached = performance(everywhere, nearest, rest, LEAST)
-    shape, n = (CELLS, CELLS), len(cells)
-    error, competence = distances[:n].reshape(shape), reached[:n].reshape(shape)
-    return Chart(movements, lessons, error, competence, distances[n:], distances[n:] <= benchmark.side / 2)
+    error, at_goals = distances[: len(cells)].reshape(CELLS, CELLS), distances[len(cells) :]
+    return Chart(movements, lessons, error, float(at_goals.mean()), at_goals <= benchmark.side / 2)
 
 
-def cells_of(outcomes: Box) -> Array:
+def _cells(outcomes: Box) -> Array:
     """``(CELLS**2, outcome_dim)``, the middles of the map's cells, row by row from the least y on."""
     low, sides = outcomes.low, outcomes.sides
     steps = (np.arange(CELLS) + 0.5) / CELLS
@@ -94,11 +107,6 @@ def cells_of(outcomes: Box) -> Array:
 def by_error(chart: Chart, outcomes: Box) -> Colours:
     """The predicted error as a picture: light where it can, dark where it cannot."""
     return _painted(_skill(chart, outcomes), SKILL)
-
-
-def by_competence(chart: Chart) -> Colours:
-    """The competence as a picture, light at 0 and dark at -1."""
-    return _painted(1 + chart.competence, SKILL)
 
 
 def by_change(before: Chart, after: Chart, outcomes: Box) -> Colours:

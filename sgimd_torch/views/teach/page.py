@@ -1,44 +1,41 @@
 """The page: one loop that moves the led arm, plays movements and shows how the session stands; nobody waits for it.
 
-    with Session(config) as session: Page(server, session).run()
-What viewers do comes in as errands for this loop, in order. One viewer teaches at a time: whoever begins, until they
-leave, hand over, or do nothing for a while.
+    with serving(8080) as server, Session(config) as session: Page(server, session).run()
+What viewers do is put into a queue for this loop. All viewers see the same, and each may do everything; the arm is held
+by one of them at a time.
 """
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Callable
 from concurrent.futures import Future
 from html import escape
+from queue import Empty, SimpleQueue
 from typing import Any, Final
 
 import numpy as np
 import viser
 
-from sgimd_torch.demonstrations.leading import Leading
+from sgimd_torch.demonstrations.lessons import HandLesson, LedMovement
+from sgimd_torch.environments.protocol import Recorded
 from sgimd_torch.runs.tasks import hand_led_of
 from sgimd_torch.spaces import Array
-from sgimd_torch.views.teach.chart import Chart, Colours, by_change, by_competence, by_error
-from sgimd_torch.views.teach.desk import Desk
-from sgimd_torch.views.teach.drawing import MAPS
-from sgimd_torch.views.teach.errands import Errands
-from sgimd_torch.views.teach.hanging import Hanging
-from sgimd_torch.views.teach.panel import Panel, put
-from sgimd_torch.views.teach.playing import Outline
-from sgimd_torch.views.teach.scene import Grip, Scene
-from sgimd_torch.views.teach.serving import Seat
+from sgimd_torch.views.teach.arm import LedArm
+from sgimd_torch.views.teach.chart import Chart, State, by_change, by_error
+from sgimd_torch.views.teach.panel import MAPS, SPEEDS, Panel
+from sgimd_torch.views.teach.scene import Scene
 from sgimd_torch.views.teach.session import Session
-from sgimd_torch.views.teach.stage import Stage
-from sgimd_torch.views.teach.state import State
+from sgimd_torch.views.teach.taught import Trial
 
 TICK: Final = 1 / 30  # s, from one picture to the next
-SHOWS_CHANGE: Final = 6.0  # s, how long what a lesson changed is shown on the map
-LANDINGS: Final = 60  # of the last movements, that are shown
+MOVEMENT: Final = 2.0  # s, from one movement of the learner to the next in real time
+FASTEST: Final = 4.0  # times as fast as they are, movements of a learner that goes as fast as it can
 FAREWELL: Final = 0.3  # s, in which the last words reach the viewers
 ENDED: Final = (
     '<div style="padding:0 .6em;color:#a33"><b>This session has ended.</b> '
-    "All of it is kept; to go on: <code>{0}</code></div>"
+    "All of it is kept; to go on: <code>sgimd teach {0}</code></div>"
 )
 
 
@@ -59,223 +56,238 @@ class Page:
         assert parts.task is not None
         led = hand_led_of(parts.task)
         self._outcomes = parts.environment.outcomes
-        self.leading = Leading.of(led)
-        self.hanging = Hanging(led.model, led.joints, led.hand, self.leading.q)
-        self.errands = Errands()
-        self.seat = Seat()
+        self.arm = LedArm(led)
         self.scene = Scene(server, led, self._outcomes, parts.benchmark.goals)
-        self.panel = Panel(server, self.leading, self._act, lambda client: self._as_teacher(client, self._joints))
-        self.desk = Desk(session, self.leading, self.panel, self.scene)
-        self.stage = Stage(session, self.scene, self.panel, Outline(led.model, self.scene.chain))
-        self._seen: State | None = None
+        self.panel = Panel(server, self._act)
+        self.lesson: HandLesson | None = None
+        """What the recording teaches, as it is trimmed now; None until that is known."""
         self.drawn: Chart | None = None
         """What the map shows."""
+        self._tasks: SimpleQueue[Callable[[], object]] = SimpleQueue()
+        self._judging = self._trimmed = False  # a lesson is being made of the recording; it was trimmed since
+        self._fetching, self._last = False, -1  # the next ghost; the last movement of which there was one
+        self._seen: State | None = None
         self._which = ""
-        self._changed = -np.inf  # when the last lesson's change came
+        self._set_speed("1 x")
         self._listen()
 
     def run(self, stopped: Callable[[], bool] = lambda: False) -> None:
         """Until the session ends; whoever still looks is told."""
+        last = time.monotonic()
         try:
-            self._run(stopped)
+            while not stopped() and not self.session.state.problem:
+                self._carry_out(until=last + TICK)
+                now = time.monotonic()
+                with self.server.atomic():
+                    self._move(now, now - last)
+                    self._tell(now)
+                self.server.flush()
+                last = now
         finally:
-            self.panel.status.content = ENDED.format(escape(f"sgimd teach {self.session.run.directory.path}"))
+            self.panel.status.content = ENDED.format(escape(str(self.session.run.path.parent)))
             self.server.flush()
             time.sleep(FAREWELL)
 
-    def _run(self, stopped: Callable[[], bool]) -> None:
-        last = time.monotonic()
-        while not stopped():
-            self.errands.wait(max(0.0, last + TICK - time.monotonic()))
-            self.errands.carry_out()
-            now = time.monotonic()
-            with self.server.atomic():
-                self._move(now - last)
-                self.stage.play(now, watched=bool(self.server.get_clients()))
-                self._tell(now)
-            self.server.flush()
-            last = now
-            if self.session.state.problem:
-                return
+    def _carry_out(self, until: float) -> None:
+        """What viewers want, until the next picture is due."""
+        with contextlib.suppress(Empty):
+            while True:
+                self._tasks.get(timeout=max(0.0, until - time.monotonic()))()
 
     def _listen(self) -> None:
-        for grip in self.scene.grips:
-            self._listen_to(grip)
-        errands, server = self.errands, self.server
+        """Callbacks are coroutines; others run out of order."""
+        for body, handle in self.scene.grips:
+            self._listen_to(body, handle)
 
-        @server.scene.on_click()  # type: ignore[arg-type]
+        @self.server.scene.on_click()  # type: ignore[arg-type]
         async def _(event: Any) -> None:
             place = self.scene.place(np.array(event.ray_origin), np.array(event.ray_direction))
             if place is not None:
-                errands.ask(lambda: self.stage.try_goal(place))
+                self._later(event.client, lambda: self._try(event.client, place))
 
         @self.panel.speed.on_click
         async def _(event: Any) -> None:
-            self._as_teacher(event.client, lambda: self.stage.set_speed(event.target.value))
+            self._later(event.client, lambda: self._set_speed(event.target.value))
 
-        @self.panel.more.on_click
+        @self.panel.start.on_update  # type: ignore[untyped-decorator]
+        @self.panel.end.on_update  # type: ignore[untyped-decorator]
         async def _(event: Any) -> None:
-            self._act({"Play": "play", "Save": "save", "Throw away": "discard"}[event.target.value], event.client)
+            if event.client is not None:
+                self._later(event.client, self._trim)
 
-        @self.panel.maps.on_update
-        async def _(event: Any) -> None:
-            errands.wake()
-
-        for slider in (self.panel.start, self.panel.end):
-
-            @slider.on_update
-            async def _(event: Any) -> None:
-                if event.client is not None:
-                    errands.ask(self.desk.trim)
-
-        @server.on_client_connect
+        @self.server.on_client_disconnect
         async def _(client: viser.ClientHandle) -> None:
-            errands.ask(lambda: self._count())
+            self._tasks.put(lambda: self.arm.let_go(client.client_id))
 
-        @server.on_client_disconnect
-        async def _(client: viser.ClientHandle) -> None:
-            errands.ask(lambda: self._left(client.client_id))
-
-    def _listen_to(self, grip: Grip) -> None:
-        """Drag callbacks have to be coroutines: others run out of order."""
-
-        @grip.handle.on_drag("left")  # type: ignore[untyped-decorator]
+    def _listen_to(self, body: str, handle: Any) -> None:
+        @handle.on_drag("left")  # type: ignore[untyped-decorator]
         async def _(event: Any) -> None:
             client, phase = event.client, event.phase
             start, end = np.array(event.start_position), np.array(event.end_position)
-            self.errands.ask(lambda: self._drag(client, phase, grip, start, end))
+            self._later(client, lambda: self._drag(client.client_id, phase, body, start, end))
 
-    def _drag(self, client: viser.ClientHandle, phase: str, grip: Grip, start: Array, end: Array) -> None:
-        if phase == "start" and self._may(client):
-            self.scene.hide_hint()
-            self.desk.grab(grip, start)
-        if not self.leading.held or not self.seat.is_held_by(client.client_id):
-            return
-        if phase == "end":
-            self.leading.release()
-        else:
-            self.seat.busy(time.monotonic())
-            self.leading.drag(end + self.desk.offset)
+    def _later(self, client: viser.ClientHandle, what: Callable[[], object]) -> None:
+        """Have the loop do what a viewer wants; if it cannot be done, they are told why."""
+
+        def carefully() -> None:
+            try:
+                what()
+            except (ValueError, RuntimeError, OSError) as error:
+                client.add_notification("That did not work", str(error), color="red", auto_close_seconds=8.0)
+
+        self._tasks.put(carefully)
+
+    def _then(self, client: viser.ClientHandle, future: Future[Any], what: Callable[[Any], object]) -> None:
+        """The same, with what comes of ``future``."""
+        future.add_done_callback(lambda done: self._later(client, lambda: what(done.result())))
 
     def _act(self, name: str, client: viser.ClientHandle) -> None:
         actions: dict[str, Callable[[], object]] = {
-            "record": self.desk.record,
-            "home": self.desk.home,
-            "play": self.desk.play,
+            "record": self._record,
+            "home": self.arm.home,
+            "play": lambda: self.arm.play(self.trimmed(), time.monotonic()),
+            "discard": self._discard,
             "show": lambda: self._show(client),
-            "save": lambda: self.desk.save(client),
-            "discard": self.desk.discard,
-            "undo": lambda: self._undo(client),
+            "undo": lambda: self._then(client, self.session.take_back(), lambda _: self._taken_back(client)),
             "alone": self.session.decline,
             "pause": lambda: self.session.pause(not self.session.state.paused),
-            "map": self._next_map,
-            "seat": lambda: self.seat.leave(client.client_id),
         }
-        self._as_teacher(client, actions[name])
+        self._later(client, actions[name])
 
-    def _as_teacher(self, client: viser.ClientHandle, what: Callable[[], object]) -> None:
-        """Do something that one viewer at a time may do."""
+    def _drag(self, viewer: int, phase: str, body: str, start: Array, end: Array) -> None:
+        if phase == "start":
+            self.scene.hint.visible = False
+            self.arm.grab(viewer, body, start)
+        if phase == "end":
+            self.arm.let_go(viewer)
+        else:
+            self.arm.drag(viewer, end)
 
-        def carefully() -> None:
-            if self._may(client):
-                try:
-                    what()
-                except (ValueError, RuntimeError, OSError) as error:
-                    self._complain(client, str(error))
+    def _record(self) -> None:
+        """Begin a recording, or end the one under way and look at it."""
+        try:
+            self.arm.record()
+        finally:
+            self.panel.say_recording(self.arm.leading.recording)
+        if not self.arm.leading.recording and self.arm.recording is not None:
+            self.panel.set_trim(self.arm.recording.duration)
+            self._trim()
 
-        self.errands.ask(carefully)
+    def trimmed(self) -> LedMovement:
+        """What the sliders leave of the recording.
 
-    def _may(self, client: viser.ClientHandle) -> bool:
-        if self.seat.take(client.client_id, time.monotonic()):
-            return True
-        self._complain(client, "Someone else is teaching now. You can watch; they hand over with key L.")
-        return False
+        Raises:
+            ValueError: there is none, or they leave nothing of it.
+        """
+        if self.arm.recording is None:
+            raise ValueError("there is no recording yet")
+        return self.arm.recording.trim(self.panel.start.value, self.panel.end.value)
 
-    def _complain(self, client: viser.ClientHandle, why: str) -> None:
-        client.add_notification("That did not work", why, color="red", auto_close_seconds=8.0)
+    def _trim(self) -> None:
+        """Find out what the recording teaches as it is trimmed now; one after the other, however fast sliders move."""
+        self.lesson, self._trimmed = None, True
+        if self._judging or self.arm.recording is None:
+            return
+        self._trimmed = False
+        try:
+            trimmed = self.trimmed()
+        except ValueError as error:
+            self._say(None, str(error))
+            return
+        self._judging = True
+        future = self.session.do(lambda: self.session.run.lesson_of(trimmed))
+        future.add_done_callback(lambda done: self._tasks.put(lambda: self._judged(done)))
 
-    def _count(self) -> None:
-        self.session.answered = bool(self.server.get_clients()) and bool(self.panel.wait.value)
-
-    def _left(self, client_id: int) -> None:
-        """A viewer has gone: what they held is let go."""
-        if self.seat.is_held_by(client_id):
-            self.leading.release()
-            self.seat.leave(client_id)
-        self._count()
-
-    def _joints(self) -> None:
-        self.desk.set_joints(np.array([slider.value for slider in self.panel.joints]))
-
-    def _next_map(self) -> None:
-        put(self.panel.maps, MAPS[(MAPS.index(self.panel.maps.value) + 1) % len(MAPS)])
-
-    def _undo(self, client: viser.ClientHandle) -> None:
-        def told(done: Future[None]) -> None:
+    def _judged(self, done: Future[HandLesson]) -> None:
+        self._judging = False
+        if self._trimmed:
+            self._trim()
+        elif self.arm.recording is not None:
             error = done.exception()
-            if error is not None:
-                self._complain(client, str(error))
-                return
-            text = f"{self.session.run.directory.path} is as it was before; what was taken back is kept in it."
-            client.add_notification("The last lesson is taken back", text, auto_close_seconds=8.0)
+            self._say(*((done.result(), "") if error is None else (None, str(error))))
 
-        self.session.take_back().add_done_callback(told)
+    def _say(self, lesson: HandLesson | None, problem: str = "") -> None:
+        self.lesson = lesson
+        self.panel.say_lesson(lesson, problem)
+        self.scene.mark("lesson", None if lesson is None else lesson.demonstration.outcome, "your throw lands here")
+
+    def _discard(self) -> None:
+        self.arm.recording, self._trimmed = None, False
+        self._say(None)
 
     def _show(self, client: viser.ClientHandle) -> None:
-        def told(done: Future[None]) -> None:
-            error = done.exception()
-            self.errands.ask(lambda: self._after_lesson(client, error))
+        if self.lesson is None:
+            raise ValueError("there is no lesson to show yet; record one first")
+        self.panel.buttons["show"].disabled = True
+        self._then(client, self.session.show(self.lesson.demonstration), lambda _: self._shown())
 
-        self.desk.show().add_done_callback(told)
-
-    def _after_lesson(self, client: viser.ClientHandle, error: BaseException | None) -> None:
+    def _shown(self) -> None:
         """What a lesson changed, now that the learner has answered it."""
-        if error is not None:
-            self._complain(client, str(error))
-            return
-        before, after = self.session.state.before, self.session.state.chart
-        if before is not None and after is not None:
-            self.panel.say_effect(before, after)
-        self._changed = time.monotonic()
-        self.desk.discard()
+        state = self.session.state
+        assert state.before is not None
+        assert state.chart is not None
+        self.panel.say_effect(state.before, state.chart)
+        self.panel.maps.value = MAPS[1]
+        self._discard()
 
-    def _move(self, seconds: float) -> None:
-        """The led arm, and what hangs on it."""
-        self.leading.step(seconds)
-        q = self.desk.posture(time.monotonic())
-        self.hanging.follow(q, seconds)
-        self.scene.draw_arm(self.hanging.data, self.hanging.hand)
-        self.desk.look_again()
-        if not (self.leading.held or self.desk.by_joints):
-            for slider, angle in zip(self.panel.joints, np.round(q, 2), strict=True):
-                if abs(slider.value - angle) > 0.02:
-                    put(slider, float(angle))
+    def _taken_back(self, client: viser.ClientHandle) -> None:
+        self.panel.maps.value = MAPS[0]
+        text = f"{self.session.run.path.parent} is as it was before; a copy of what was taken back is beside it."
+        client.add_notification("The last lesson is taken back", text, auto_close_seconds=8.0)
+
+    def _try(self, client: viser.ClientHandle, goal: Array) -> None:
+        self._then(client, self.session.do(lambda: self.session.run.try_goal(goal)), self._tried)
+
+    def _tried(self, trial: Trial) -> None:
+        self.panel.say_trial(trial)
+        self.scene.mark("goal", trial.goal)
+        self.scene.mark("landed", trial.outcome, f"missed by {trial.missed:.2f} m")
+        self.scene.play(trial.recorded, time.monotonic(), 1.0)
+
+    def _set_speed(self, word: str) -> None:
+        """One of ``SPEEDS``; the learner moves as often as its movements can be played."""
+        self._speed = min(SPEEDS[word], FASTEST)
+        self.session.pace(MOVEMENT / SPEEDS[word])
+
+    def _move(self, now: float, seconds: float) -> None:
+        """The led arm and what hangs on it, and the learner's newest movement."""
+        self.arm.move(now, seconds)
+        self.scene.draw_arm(self.arm.hanging.data, self.arm.hanging.hand)
+        if not (self.scene.draw_ghost(now) or self._fetching) and self.server.get_clients():
+            self._fetch()
+
+    def _fetch(self) -> None:
+        """The learner's last movement is to be played, if it was not yet."""
+        latest = self.session.state.latest[-1:]
+        if not latest or latest[0].index == self._last:
+            return
+        self._last, self._fetching = latest[0].index, True
+
+        def begin(done: Future[Recorded | None]) -> None:
+            self._fetching = False
+            self.scene.play(None if done.exception() else done.result(), time.monotonic(), self._speed)
+
+        future = self.session.do(lambda: self.session.run.recorded(latest[0]))
+        future.add_done_callback(lambda done: self._tasks.put(lambda: begin(done)))
 
     def _tell(self, now: float) -> None:
         """Whatever has changed since the last picture."""
-        state = self.session.state
-        if state is not self._seen:
+        state, seen = self.session.state, self._seen
+        self.session.answered = bool(self.server.get_clients())
+        if state is not seen:
             self.panel.say_state(state, self.session.run.cannot_be_taught)
-            if self._seen is None or state.curve is not self._seen.curve:
-                self.panel.say_curve(state, sorted(self.session.run.hand.lessons))
-            if self._seen is None or state.asked is not self._seen.asked:
+            if state.curve and (seen is None or state.curve is not seen.curve):
+                self.panel.say_curve(state)
+            if seen is None or state.asked is not seen.asked:
                 self.scene.mark("asked", state.asked, "show me how to get here")
-                self.stage.show_best(state.best, now)
             landed = [episode.outcome for episode in state.latest if episode.outcome is not None]
-            self.scene.draw_landings(
-                np.array(landed[-60:]).reshape(-1, self.session.run.parts.environment.outcomes.dim)
-            )
+            self.scene.draw_landings(np.array(landed).reshape(-1, self._outcomes.dim))
             self._seen = state
-        self._count()
-        which = MAPS[2] if now < self._changed + SHOWS_CHANGE else self.panel.maps.value
+        which = self.panel.maps.value
         if state.chart is not None and (self.drawn is not state.chart or self._which != which):
             self.drawn, self._which = state.chart, which
-            self.scene.draw_map(self._colours(which, state), state.chart.met)
-            self.panel.say_map(which)
-
-    def _colours(self, which: str, state: State) -> Colours:
-        outcomes = self._outcomes
-        assert state.chart is not None
-        if which == MAPS[2]:
-            return by_change(state.before or state.chart, state.chart, outcomes)
-        return by_competence(state.chart) if which == MAPS[1] else by_error(state.chart, outcomes)
+            before = state.before if which == MAPS[1] else None
+            outcomes = self._outcomes
+            colours = by_error(state.chart, outcomes) if before is None else by_change(before, state.chart, outcomes)
+            self.scene.draw_map(colours, state.chart.met)
+            self.panel.say_map(which if before is not None else MAPS[0])

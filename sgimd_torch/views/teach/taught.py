@@ -1,6 +1,6 @@
-"""The run that is taught: its parts and its directory, what can be asked of it, and how it is taken back.
+"""The run that is taught: its parts and its record, what can be asked of it, and how a lesson is taken back.
 
-    run = TaughtRun(config, ask); run.keep(lesson); run.chart(lessons=1).mean_error; run.go_back(); run.close()
+    run = TaughtRun(config, ask); run.give(demonstration); run.chart().mean_error; run.take_back(); run.close()
 All of it happens in one thread, that of the learner; ``session.py`` says when.
 """
 
@@ -8,32 +8,44 @@ from __future__ import annotations
 
 import os
 import shutil
-from dataclasses import replace
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from itertools import count
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
-from sgimd_torch.demonstrations.lessons import HandLesson, lesson_by_hand
-from sgimd_torch.demonstrations.recording import Recording
+from sgimd_torch.demonstrations.lessons import HandLesson, LedMovement, lesson_by_hand
 from sgimd_torch.environments.protocol import Recorded
-from sgimd_torch.files import write_bytes, write_json
-from sgimd_torch.memory import Memory
 from sgimd_torch.runs.build import RunParts, build
-from sgimd_torch.runs.clock import Seconds
+from sgimd_torch.record import Record
 from sgimd_torch.runs.config import Config
-from sgimd_torch.runs.directory import RunDirectory
-from sgimd_torch.runs.process import Stopping, say
+from sgimd_torch.runs.directory import FILE, holds_run
+from sgimd_torch.runs.process import Stopping
 from sgimd_torch.runs.run import Life
 from sgimd_torch.runs.tasks import correspondence_of, hand_led_of
 from sgimd_torch.spaces import Array, Demonstration, Episode, stream
-from sgimd_torch.teachers.by_hand import FOLDER, Ask, ByHand, GivenLesson, keep_lesson, lesson_path
+from sgimd_torch.teachers.by_hand import BY_HAND, Ask, ByHand
 from sgimd_torch.views.teach.chart import Chart, chart_of
-from sgimd_torch.views.teach.trial import Trial, try_goal
 
-KEPT: Final = "taken-back-"  # and a number: a copy of the run directory, as it was when a lesson was taken back
 NO_MORE: Final = "it has made all its {0} movements; end this session, and go on with --movements {1}"
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """``goal`` and ``outcome`` ``(outcome_dim,)`` of the movement ``theta``, from which nothing was learnt;
+    ``recorded`` is the movement itself, None if the task has no picture."""
+
+    goal: Array
+    theta: Array
+    outcome: Array
+    recorded: Recorded | None
+
+    @property
+    def missed(self) -> float:
+        """The distance from the goal to the outcome, m."""
+        return float(np.linalg.norm(self.outcome - self.goal))
 
 
 class TaughtRun:
@@ -53,6 +65,24 @@ class TaughtRun:
         self._trials = 0
         self.open()
 
+    def open(self) -> None:
+        """Take the run as it is on disk; its movements are lived through again by ``life.episodes()``."""
+        parts = build(self.config)
+        asked = (each for each in parts.teachers.values() if isinstance(each, ByHand))
+        self.hand = next(asked, ByHand(parts.teacher))
+        self.hand.ask = self._ask
+        self.parts: RunParts = replace(parts, teacher=self.hand)
+        self.life = Life(self.parts, Stopping(), resume=holds_run(self.path))
+        with Record(self.path) as record:
+            places = lessons_among(record.events())
+        self.lessons = [movement for movement, _ in places]
+        """Before which movements a lesson was given by hand."""
+
+    @property
+    def path(self) -> Path:
+        """Of the record."""
+        return self.config.directory / FILE
+
     @property
     def context(self) -> Array:
         """``(context_dim,)`` of maps, lessons and trials: the middle of C."""
@@ -67,37 +97,9 @@ class TaughtRun:
         can = "sgim-d, practice-taught, imitation, observation and sgim-im can"
         return f"{self.config.algorithm} learns alone and cannot be shown anything; {can}: --algorithm sgim-d"
 
-    def open(self) -> None:
-        """Take the run as it is on disk; its movements are lived through again by ``life.episodes()``."""
-        parts = build(self.config)
-        assert parts.hand is not None
-        self.hand: ByHand = parts.hand
-        self.hand.ask = self._ask
-        self.parts: RunParts = replace(parts, teacher=self.hand)
-        self.directory = RunDirectory(self.parts, resume=(self.config.directory / "config.json").exists())
-        say(*parts.notes, *self.directory.notes)
-        self.life = Life(self.directory, self.parts, Stopping(), Seconds(self.directory.summary), None)
-
     def close(self) -> None:
         """Write what is left to write, and let others have the directory."""
-        try:
-            if not self.life.replaying:
-                self.life.summarise(finished=self.life.movements == self.config.movements)
-        finally:
-            self.directory.__exit__()
-
-    def flush(self) -> None:
-        """Bring all movements to the disk, if any are not there yet."""
-        if self.directory.summary.get("movements") != self.life.movements:
-            self.life.summarise()
-
-    def go_back(self) -> int:
-        """Close the run, take back its last lesson, and open it again; the movements that are left."""
-        last = self.hand.lessons[max(self.hand.lessons)]
-        self.close()
-        take_back(self.directory, last)
-        self.open()
-        return last.index
+        self.life.close()
 
     def check(self, demonstration: Demonstration, *, asked: bool) -> None:
         """Refuse what cannot be shown now; ``asked``: the learner waits for an answer.
@@ -111,26 +113,42 @@ class TaughtRun:
         if self.life.movements >= total:
             raise ValueError(NO_MORE.format(total, 2 * total))
         if self.parts.teachers and not asked:
-            raise ValueError("this learner takes a lesson only when it asks for one; wait until it asks, or save it")
+            raise ValueError("this learner takes a lesson only when it asks for one; wait until it asks")
         self.parts.environment.contexts.check("context of the lesson", demonstration.context)
         if asked:
             self.parts.environment.outcomes.check("outcome of the lesson", demonstration.outcome)
         self.parts.learner.translate(demonstration)
 
-    def keep(self, lesson: GivenLesson) -> None:
-        """Have a lesson shown: on disk first, so that a process that is killed now shows it when it goes on."""
-        keep_lesson(self.directory.path / FOLDER, lesson)
-        self.hand.add(lesson)
-        self.life.add_demonstration(lesson.demonstration)
-        self.life.summarise()
+    def give(self, demonstration: Demonstration, *, asked: bool) -> None:
+        """Have a lesson shown before the next movement; one that was ``asked`` for goes to who has asked."""
+        self.lessons.append(self.life.movements)
+        if not asked:
+            self.hand.give(demonstration)
 
-    def chart(self, lessons: int) -> Chart:
-        """The map of what the learner can do now, after so many ``lessons``."""
-        memory, robot = self.parts.learner.memory, self.parts.environment
-        so_far = {"movements": self.life.movements, "lessons": lessons}
+    def take_back(self) -> None:
+        """Close the run, let its record end before the last lesson by hand, and open it again.
+
+        A copy of the record as it was stays beside it. Killed on the way, the run is as before.
+
+        Raises:
+            OSError: the record cannot be written.
+        """
+        self.close()
+        copy = next(place for n in count() if not (place := self.path.with_name(f"run.taken-back-{n}.sqlite")).exists())
+        partial = copy.with_suffix(".part")
+        shutil.copy(self.path, partial)
+        os.replace(partial, copy)
+        with Record(self.path, write=True) as record:
+            record.rewrite(n_events=lessons_among(record.events())[-1][1])
+        self.open()
+
+    def chart(self) -> Chart:
+        """The map of what the learner can do now."""
+        robot, memory = self.parts.environment, self.parts.learner.memory
+        so_far = {"movements": self.life.movements, "lessons": len(self.lessons)}
         return chart_of(memory, robot.outcomes, robot.rest, self.parts.benchmark, self.context, **so_far)
 
-    def lesson_of(self, recording: Recording) -> HandLesson:
+    def lesson_of(self, recording: LedMovement) -> HandLesson:
         """What a recording would teach.
 
         Raises:
@@ -138,13 +156,25 @@ class TaughtRun:
         """
         task, robot = self.parts.task, self.parts.environment
         assert task is not None
-        rng = stream(self.config.seed, "lessons", len(self.hand.lessons))
+        rng = stream(self.config.seed, "lessons", len(self.lessons))
         return lesson_by_hand(recording, robot, correspondence_of(task), hand_led_of(task), rng, context=self.context)
 
     def try_goal(self, goal: Array) -> Trial:
-        """See `sgimd_torch.views.teach.trial`; each trial has a noise of its own."""
+        """Execute once what the run's inverse model infers for ``goal`` ``(outcome_dim,)``, with its own noise.
+
+        Raises:
+            ValueError: nothing is remembered yet, or the goal is not one of T.
+        """
+        parts = self.parts
+        goal = parts.environment.outcomes.check("goal", goal, "a click beside the map?")
+        if not len(parts.learner.memory):
+            raise ValueError("it remembers no movement yet; let it move, or show it something first")
         self._trials += 1
-        return try_goal(self.parts, self.context, goal, stream(self.config.seed, "trials", self._trials))
+        theta, rng = parts.inverse(self.context, goal).theta, stream(self.config.seed, "trials", self._trials)
+        if parts.record is None:
+            return Trial(goal, theta, parts.environment.execute(self.context, theta.copy(), rng), None)
+        recorded = parts.record(self.context, theta, rng)
+        return Trial(goal, theta, np.asarray(recorded.outcome), recorded)
 
     def recorded(self, episode: Episode) -> Recorded | None:
         """A movement that was made, as it was; None if the task has no picture, or the learner rested."""
@@ -153,33 +183,14 @@ class TaughtRun:
         rng = stream(self.config.seed, "environment", episode.index)
         return self.parts.record(episode.context, episode.move.theta, rng)
 
-    def best_try(self, context: Array, goal: Array, memory: Memory) -> Recorded | None:
-        """The remembered movement that came nearest to a goal; None without any, or without a picture."""
-        if not len(memory) or self.parts.record is None:
-            return None
-        row = int(memory.near_outcomes(context, goal, 1)[0])
-        return self.parts.record(memory.contexts[row], memory.thetas[row], stream(self.config.seed, "best try", row))
 
-
-def take_back(directory: RunDirectory, lesson: GivenLesson) -> Path:
-    """Let a run end before a lesson; the copy of what was there.
-
-    Killed on the way, the run is as before, or it goes on with that lesson once more.
-
-    Args:
-        directory: of the run, which nobody writes in now.
-        lesson: the last one.
-
-    Raises:
-        OSError: it cannot be written.
-    """
-    path, log = directory.path, directory.log
-    copy = next(place for n in count() if not os.path.lexists(place := path / f"{KEPT}{n}"))
-    partial = copy.with_name(f"{copy.name}.part")
-    shutil.rmtree(partial, ignore_errors=True)
-    shutil.copytree(path, partial, ignore=shutil.ignore_patterns("lock", f"{KEPT}*"))
-    os.replace(partial, copy)
-    write_json(path / "summary.json", {**directory.summary, "movements": lesson.index, "finished": False})
-    write_bytes(log.path, log.header + b"".join(log.read().lines[: lesson.index]))
-    lesson_path(path / FOLDER, lesson).unlink()
-    return copy
+def lessons_among(events: Iterable[Any]) -> list[tuple[int, int]]:
+    """For each lesson by hand the numbers of movements, and of events, that came before it and the question for it."""
+    found, movements, asked = list[tuple[int, int]](), 0, 0
+    for k, event in enumerate(events):
+        if event.kind in ("moved", "rested"):
+            movements += 1
+        elif event.kind == "shown" and event.who == BY_HAND:
+            found.append((movements, k - asked))
+        asked = event.kind == "asked"
+    return found
