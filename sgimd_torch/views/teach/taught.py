@@ -18,8 +18,8 @@ import numpy as np
 
 from sgimd_torch.demonstrations.lessons import HandLesson, LedMovement, lesson_by_hand
 from sgimd_torch.environments.protocol import Recorded
-from sgimd_torch.runs.build import RunParts, build
 from sgimd_torch.record import Record
+from sgimd_torch.runs.build import RunParts, build
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.directory import FILE, holds_run
 from sgimd_torch.runs.process import Stopping
