@@ -22,7 +22,6 @@ from sgimd_torch.runs.command_line import parse
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.process import loading
 from sgimd_torch.runs.read import config_of, read_run
-from sgimd_torch.views.watch import free_port
 
 if TYPE_CHECKING:
     from viser import ViserServer
@@ -41,16 +40,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         ValueError: the request is wrong, or this task cannot be led by the hand.
     """
     config, port = options_of(sys.argv[1:] if argv is None else argv)
-    try:
-        with loading():
-            from sgimd_torch.runs.build import task_of
-            from sgimd_torch.runs.process import Failed
-            from sgimd_torch.runs.tasks import hand_led_of
-            from sgimd_torch.views.teach.page import Page
-            from sgimd_torch.views.teach.session import Session
-    except ModuleNotFoundError as error:
-        hint = "pip install 'sgimd-torch[teach]' installs it"
-        raise ImportError(f"sgimd teach needs {error.name}, which is not installed; {hint}") from error
+    with loading():
+        from sgimd_torch.runs.build import task_of
+        from sgimd_torch.runs.process import Failed
+        from sgimd_torch.runs.tasks import hand_led_of
+        from sgimd_torch.views.teach.page import Page
+        from sgimd_torch.views.teach.session import Session
     hand_led_of(task_of(config))  # what cannot be led is refused before anything is made
     session = Session(config)
     with serving(port) as server:
@@ -74,7 +69,7 @@ def serving(port: int) -> Iterator[ViserServer]:
     import viser  # only when it is needed
 
     with contextlib.redirect_stdout(io.StringIO()):  # a banner, and where it listens
-        server = viser.ViserServer(host="127.0.0.1", port=free_port(port), verbose=False)
+        server = viser.ViserServer(host="127.0.0.1", port=port, verbose=False)
     try:
         yield server
     finally:

@@ -1,6 +1,5 @@
 """A session without a page: lessons enter the run, which goes on, back and again without anybody."""
 
-import importlib.util
 import json
 import shutil
 import signal
@@ -27,9 +26,6 @@ from sgimd_torch.views.teach.taught import Record, lessons_among
 
 SHOWN = arm_demonstrations(PlanarArm())
 GOAL = np.array([0.3, 0.4])
-needs_the_record = pytest.mark.skipif(
-    importlib.util.find_spec("sgimd_torch.views.teach.until_merged") is not None, reason="a run is not yet one record"
-)
 
 
 def taught(out, **options):
@@ -148,7 +144,6 @@ def test_a_session_goes_on_where_it_was_stopped(paused, teacher):
     assert_same(before, lived(path), 50)
 
 
-@needs_the_record
 @pytest.mark.parametrize("teacher", ["by-hand", "periodic"])
 def test_a_run_that_was_taught_goes_on_without_a_page(paused, teacher):
     session = paused(teacher=teacher)
