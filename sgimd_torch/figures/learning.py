@@ -60,7 +60,7 @@ def landing_points(
         metric = box.dim == 2 and alike(box.sides)
         count_bar([ax], mesh, f"movements on a tile of {100 * side:.3g} cm" if metric else "movements on a tile")
     if demonstrated is not None:
-        different = each_once(demonstrated)
+        different = np.unique(demonstrated, axis=0)
         crosses, label = section.points(different), f"{len(different)} demonstrated outcomes"
         ax.plot(*crosses.T, "x", color=COLOURS["sgim-d"], markersize=5, markeredgewidth=1.3, label=label)
     outside = outcomes[~box.contains(outcomes)]
@@ -70,12 +70,6 @@ def landing_points(
         note(ax, f"{len(outside)} of {len(outcomes)} landed outside: squares at the edge")
     section.frame(ax)
     return mesh
-
-
-def each_once(demonstrated: Array) -> Array:
-    """``(m, dim)`` the demonstrated outcomes: of those of all demonstrations ``(n, dim)``, in order, each once."""
-    _, first = np.unique(demonstrated, axis=0, return_index=True)
-    return demonstrated[np.sort(first)]
 
 
 def histogram(ax: Axes, points: Array, box: Box, *, side: float | Array, most: float | None = None) -> QuadMesh:
@@ -108,13 +102,7 @@ def tile_counts(outcomes: Array, box: Box, side: float | Array = 0.05) -> Array:
 
 
 def interest_map(
-    ax: Axes,
-    lows: Array,
-    highs: Array,
-    interests: Array,
-    *,
-    goals: Array | None = None,
-    section: Section | None = None,
+    ax: Axes, lows: Array, highs: Array, interests: Array, *, goals: Array | None = None, section: Section | None = None
 ) -> PatchCollection:
     """The regions of the interest map, coloured by interest, eq. (3); recent goals as points.
 
@@ -129,8 +117,7 @@ def interest_map(
         One rectangle for each region that is shown, in their order; their array holds the interests.
 
     Raises:
-        ValueError: numbers that do not match; without a ``section``, regions not in the plane, such as those that
-            include contexts.
+        ValueError: without a ``section``, regions not in the plane, such as those that include contexts.
     """
     most = max(float(interests.max()), 1e-6)
     drawn = regions_in(ax, lows, highs, interests, "Oranges", (0, most), section)
@@ -143,13 +130,7 @@ def interest_map(
 
 
 def competence_map(
-    ax: Axes,
-    lows: Array,
-    highs: Array,
-    competences: Array,
-    *,
-    worst: float = -1.0,
-    section: Section | None = None,
+    ax: Axes, lows: Array, highs: Array, competences: Array, *, worst: float = -1.0, section: Section | None = None
 ) -> PatchCollection:
     """Like ``interest_map``, but coloured by mean competence, eqs. (2) and (7): 0 met, -1 no better than rest.
 
@@ -175,15 +156,11 @@ def regions_in(
 ) -> PatchCollection:
     """The regions that a ``section`` meets as rectangles, coloured by their ``values`` ``(n_regions,)``; nothing else.
 
-    Other arguments, result and errors as for ``interest_map``.
+    Other arguments and result as for ``interest_map``.
     """
-    if lows.shape != highs.shape or len(lows) != len(values):
-        raise ValueError(f"regions need two corners and a value each, got {lows.shape}, {highs.shape}, {values.shape}")
     lows, highs, met = _section_of(lows, highs, section).cut(lows, highs)
     patches = [Rectangle((low[0], low[1]), *(high - low)) for low, high in zip(lows, highs, strict=True)]
-    drawn = PatchCollection(patches, cmap=colours, edgecolor="0.35", linewidth=0.8)
-    drawn.set_array(values[met])
-    drawn.set_clim(*limits)
+    drawn = PatchCollection(patches, cmap=colours, edgecolor="0.35", linewidth=0.8, array=values[met], clim=limits)
     ax.add_collection(drawn)
     return drawn
 

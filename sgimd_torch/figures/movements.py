@@ -7,22 +7,21 @@ Sections 5.3 and 6 of Nguyen & Oudeyer (2014). Each function draws on the axes i
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PatchCollection
 from matplotlib.lines import Line2D
 
-from sgimd_torch.figures.axes import colour_bar
+from sgimd_torch.figures.axes import GREY, colour_bar
 from sgimd_torch.figures.learning import frame_regions, map_after, regions_in
 from sgimd_torch.figures.sections import Section
 from sgimd_torch.spaces import Demonstration
 
-_DEMONSTRATED = "0.55"
-
 
 def trajectories(
-    axes: Iterable[Axes], demonstrations: Sequence[Demonstration], *, names: Sequence[str] | None = None
+    axes: Sequence[Axes], demonstrations: Sequence[Demonstration], *, names: Sequence[str] | None = None
 ) -> list[list[Line2D]]:
     """Joint angles (rad) against time (s), as demonstrated, thin and grey, on top of each other.
 
@@ -33,28 +32,17 @@ def trajectories(
 
     Returns:
         For each joint a line for each demonstration.
-
-    Raises:
-        ValueError: no demonstration, or numbers of axes, names and joints that do not match.
     """
-    axes = list(axes)
-    joints = {demonstration.trajectory.shape[1] for demonstration in demonstrations} | {len(axes)}
-    if not demonstrations or len(joints) != 1 or len(names or axes) != len(axes):
-        raise ValueError(f"needs demonstrations, an axis and a name for each joint, got {sorted(joints)} of them")
     faint = max(0.15, min(1.0, 5 / len(demonstrations)))
+    style: dict[str, Any] = {"color": GREY, "linewidth": 2.5}
     drawn = []
     for joint, ax in enumerate(axes):
-        drawn.append(
-            [
-                ax.plot(shown.times, shown.trajectory[:, joint], color=_DEMONSTRATED, linewidth=2.5, alpha=faint)[0]
-                for shown in demonstrations
-            ]
-        )
+        drawn.append([ax.plot(d.times, d.trajectory[:, joint], alpha=faint, **style)[0] for d in demonstrations])
         ax.set(title=names[joint] if names else f"joint {joint + 1}", xlabel="time (s)", ylabel="angle (rad)")
         ax.set_xlim(left=0)
         ax.grid(alpha=0.3)
-    line = Line2D([], [], color=_DEMONSTRATED, linewidth=2.5, label=f"demonstrated ({len(demonstrations)})")
-    axes[0].legend(handles=[line], loc="best", fontsize="small")
+    line = Line2D([], [], label=f"demonstrated ({len(demonstrations)})", **style)
+    axes[0].legend(handles=[line], loc="upper right", fontsize="small")
     return drawn
 
 

@@ -36,17 +36,11 @@ def predictions(ax: Axes, observed: Array, mean: Array, box: Box) -> LineCollect
 
     Returns:
         The lines; their array holds the distances (m).
-
-    Raises:
-        ValueError: outcomes that are not in the plane, or another number of predictions.
     """
-    if observed.ndim != 2 or observed.shape[1] != 2 or observed.shape != mean.shape or not len(observed):
-        raise ValueError(f"needs (n, 2) outcomes and as many predictions, n > 0, got {observed.shape}, {mean.shape}")
     distances = np.linalg.norm(observed - mean, axis=1)
     most = _end(distances)
-    lines = LineCollection(list(np.stack([mean, observed], axis=1)), cmap=_ERRORS, linewidths=0.8)
-    lines.set_array(distances)
-    lines.set_clim(0, most)
+    ends = list(np.stack([mean, observed], axis=1))
+    lines = LineCollection(ends, cmap=_ERRORS, linewidths=0.8, array=distances, clim=(0, most))
     ax.add_collection(lines)
     ax.scatter(observed[:, 0], observed[:, 1], c=distances, s=7, cmap=_ERRORS, vmin=0, vmax=most, linewidths=0)
     outside = len(observed) - int(box.contains(observed).sum())
@@ -67,13 +61,8 @@ def error_map(ax: Axes, cells: CellErrors, box: Box) -> QuadMesh:
 
     Returns:
         The cells; their array holds the errors (m), ``(n_y, n_x)``, masked where a cell is empty.
-
-    Raises:
-        ValueError: a grid that is not in the plane.
     """
     errors, counts = np.ma.masked_invalid(cells.errors.T), cells.counts.T
-    if errors.ndim != 2 or box.dim != 2:
-        raise ValueError(f"needs a grid of the plane, got one of shape {errors.shape} over {box.dim} dimensions")
     most = _end(errors.compressed()) if counts.any() else 1.0
     x, y = (np.linspace(low, high, n + 1) for low, high, n in zip(box.low, box.high, cells.counts.shape, strict=True))
     mesh = ax.pcolormesh(x, y, errors, cmap=_ERRORS, vmin=0, vmax=most, edgecolors="white", linewidth=0.5)
@@ -96,12 +85,7 @@ def calibration(ax: Axes, levels: Array, coverages: Mapping[str, Array]) -> dict
 
     Returns:
         The line of each label.
-
-    Raises:
-        ValueError: more lines than there are colours.
     """
-    if len(coverages) > len(_LINES):
-        raise ValueError(f"calibration shows at most {len(_LINES)} lines, got {len(coverages)}")
     marked = [k for k, level in enumerate(levels) if np.isclose(level, LEVELS).any()]
     ax.plot([0, 1], [0, 1], "--", color=GREY, linewidth=1.2, label="ideal")
     for level in levels[marked]:
@@ -150,7 +134,7 @@ def held_out_over_time(ax: Axes, movements: Array, held_out: Array, diverged: ND
     (line,) = ax.plot(movements, held_out, "o-", color=COLOURS["sgim-d"], markersize=3, linewidth=1.2)
     if diverged.any():
         ax.plot(movements[diverged], held_out[diverged], "X", color="black", label=f"{diverged.sum()} diverged")
-        ax.legend()
+        ax.legend(loc="upper right")
     over_movements(ax, "held-out negative log likelihood")
     lower, upper = np.quantile(held_out, (0.25, 0.75))
     above = held_out[held_out > upper + 3 * (upper - lower)]  # Tukey's outer fence

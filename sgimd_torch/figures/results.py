@@ -51,13 +51,10 @@ def seed_curves(ax: Axes, runs: Sequence[SeedCurves]) -> list[Line2D]:
 
     Returns:
         The thick lines, in the order of ``runs``.
-
-    Raises:
-        ValueError: an algorithm that has no colour.
     """
     lines = []
     for run in runs:
-        colour, style = _colour(run.algorithm), "--" if run.dashed else "-"
+        colour, style = COLOURS[run.algorithm], "--" if run.dashed else "-"
         if len(run.errors) > 1:
             ax.plot(run.movements, run.errors.T, style, color=colour, linewidth=0.7, alpha=0.35)
             ax.fill_between(run.movements, run.low, run.high, color=colour, alpha=0.22, linewidth=0)
@@ -70,7 +67,7 @@ def seed_curves(ax: Axes, runs: Sequence[SeedCurves]) -> list[Line2D]:
     handles = list(lines)
     if any(run.floors is not None for run in runs):
         handles.append(Line2D([], [], color="black", linestyle="--", linewidth=1.2, label="noise floor of each"))
-    ax.legend(handles=handles)
+    ax.legend(handles=handles, loc="upper right")
     return lines
 
 
@@ -95,13 +92,10 @@ def goal_distances(ax: Axes, runs: Mapping[str, Sequence[Array]], *, reach: floa
 
     Returns:
         The thick lines, in the order of ``runs``.
-
-    Raises:
-        ValueError: an algorithm that has no colour.
     """
     lines = []
     for algorithm, seeds in runs.items():
-        colour = _colour(algorithm)
+        colour = COLOURS[algorithm]
         for goals in seeds:
             ax.step(*_shares(goals), where="post", color=colour, linewidth=0.7, alpha=0.35)
         label = f"{NAMES[algorithm]} ({_seeds(len(seeds))})"
@@ -153,9 +147,3 @@ def _shares(goals: Array) -> tuple[Array, Array]:
 
 def _seeds(n: int) -> str:
     return f"{n} seed{'s' * (n != 1)}"
-
-
-def _colour(algorithm: str) -> str:
-    if algorithm not in COLOURS:
-        raise ValueError(f"algorithm must be one of {sorted(COLOURS)}, got {algorithm!r}")
-    return COLOURS[algorithm]

@@ -34,19 +34,6 @@ def test_joints_without_names_are_counted_from_one():
     assert [ax.get_title() for ax in axes] == ["joint 1", "joint 2"]
 
 
-@pytest.mark.parametrize(
-    ("n_axes", "shown", "names"),
-    [
-        (2, [], None),
-        (3, [demonstration()], None),  # of two joints
-        (2, [demonstration()], ("yaw",)),
-    ],
-)
-def test_trajectories_that_do_not_match_are_refused(n_axes, shown, names):
-    with pytest.raises(ValueError, match="needs"):
-        trajectories(Figure().subplots(1, n_axes), shown, names=names)
-
-
 def history(*moments):
     """One region at the first moment, one more at each that follows, of interest moment / 1000."""
     rows = [(moment, k, k + 1.0, moment / 1000) for n, moment in enumerate(moments, 1) for k in range(n)]

@@ -39,8 +39,6 @@ def test_curves_of_one_colour_are_told_apart_by_their_dashes(ax):
     lines = seed_curves(ax, [curves_of("random", [[0.4, 0.2]]), curves_of("random", [[0.5, 0.3]], dashed=True)])
     assert [line.get_linestyle() for line in lines] == ["-", "--"]
     assert lines[0].get_label() == "Mine (1 seed)"
-    with pytest.raises(ValueError, match="got 'grid'"):
-        seed_curves(ax, [curves_of("grid", [[0.4, 0.2]])])
 
 
 def test_a_single_seed_has_no_band_and_its_noise_floor_is_dashed_in_its_colour(ax):

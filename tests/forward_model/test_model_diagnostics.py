@@ -154,8 +154,6 @@ def test_lines_go_from_prediction_to_outcome_and_tell_their_length(ax):
     np.testing.assert_array_equal(lines.get_segments()[0], [[0.3, 0.1], [0.0, 0.5]])
     np.testing.assert_allclose(lines.get_array(), [0.5, 0.0, 0.1])
     assert [text.get_text() for text in ax.texts] == ["1 of 3 landed outside"]
-    with pytest.raises(ValueError, match=r"\(n, 2\) outcomes"):
-        predictions(ax, np.zeros((4, 3)), np.zeros((4, 3)), T)
 
 
 def test_cells_lie_where_their_outcomes_did_and_show_their_number(ax):
@@ -167,8 +165,6 @@ def test_cells_lie_where_their_outcomes_did_and_show_their_number(ax):
     assert 0 == exact.norm.vmin < exact.norm.vmax < 1e-3  # m
     empty = error_map(Figure().add_subplot(), error_by_cell(observed + 9, observed, T, 2), T)
     assert empty.get_array().mask.all()
-    with pytest.raises(ValueError, match=r"shape \(2, 2, 2\) over 3 dimensions"):
-        error_map(ax, error_by_cell(np.zeros((1, 3)), np.zeros((1, 3)), Box.cube(-1, 1, 3), 2), Box.cube(-1, 1, 3))
 
 
 def test_calibration_is_drawn_beside_the_ideal_and_told_at_50_80_and_95(ax):
@@ -181,8 +177,6 @@ def test_calibration_is_drawn_beside_the_ideal_and_told_at_50_80_and_95(ax):
     ideal = ax.lines[0]
     assert ideal.get_linestyle() == "--"
     np.testing.assert_array_equal(ideal.get_xdata(), ideal.get_ydata())
-    with pytest.raises(ValueError, match="at most 4 lines, got 5"):
-        calibration(ax, levels, dict.fromkeys("abcde", levels))
 
 
 def test_curves_over_time_show_what_they_are_given_and_the_band_that_will_do(ax):

@@ -382,12 +382,9 @@ def test_a_picture_of_ones_own_is_filmed_for_outcomes_of_any_dimension(own, caps
     live(f"--environment sliders:{word} --algorithm random --movements 30 --evaluate-at [] --out runs")
     run = "runs/random/seed-000"
     assert command(film.main, f"{run} --out one.mp4 --goals {goal}".split()) == 0
-    assert command(film.main, f"{run} --out six.mp4".split()) == 0
-    one, six = (len(decoded(own / name, 480, 640 + 360)[0]) for name in ("one.mp4", "six.mp4"))
-    assert one == np.ceil((1.0 + PAUSE) * RATE)
-    assert six == 6 * one
+    assert len(decoded(own / "one.mp4", 480, 640 + 360)[0]) == np.ceil((1.0 + PAUSE) * RATE)
     assert command(film.main, f"{run} --goals 0.1,0.2,0.3,0.4".split()) == 2
-    assert "number" in capsys.readouterr().err
+    assert "--goals must have shape" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
