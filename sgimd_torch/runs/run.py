@@ -89,10 +89,10 @@ class Life:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+    def __exit__(self, *_: object) -> None:
         try:
-            if not self.replaying and not (kind is not None and issubclass(kind, OSError)):
-                self.commit()
+            if not self.replaying and not self.record.failed:
+                self._settle()
         finally:
             self.record.close()
             for each in self.listeners:
@@ -124,6 +124,7 @@ class Life:
                 if self.movements == self.recorded < total:
                     progress.begin(title, total, self.movements)
                 self.stopping.check()
+        self.commit()
 
     def episodes(self) -> Iterator[Episode]:
         """The same, one movement after the other: first those that were recorded, then new ones."""
@@ -147,11 +148,14 @@ class Life:
 
     def commit(self) -> None:
         """Bring everything to the disk."""
+        self._settle()
         for each in self.listeners:
             each.flush()
+        self._committed = time.monotonic()
+
+    def _settle(self) -> None:
         self.record.settle(seconds=self.seconds.summary())
         self.record.commit()
-        self._committed = time.monotonic()
 
     def _awaited(self, name: str, teacher: Demonstrator) -> Demonstrator:
         """A person who teaches by hand is waited for by the page that they see."""
