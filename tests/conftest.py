@@ -1,4 +1,4 @@
-"""A tiny benchmark, a short run on it, and what that run writes when nothing disturbs it."""
+"""A tiny benchmark, a short run on it, and what that run records when nothing disturbs it."""
 
 import sys
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from own import MODULE
-from runs import arguments, csv_of
+from runs import arguments, content_of
 from sgimd_torch.evaluation import Benchmark, save_benchmark
 from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.process import command
@@ -30,11 +30,17 @@ def go(benchmark):
 
 
 @pytest.fixture(scope="session")
-def reference(tmp_path_factory, go):
-    """The files of the uninterrupted run, by name."""
-    out = tmp_path_factory.mktemp("reference")
+def undisturbed(tmp_path_factory, go):
+    """Directory of the uninterrupted run."""
+    out = tmp_path_factory.mktemp("undisturbed")
     assert go(out) == 0
-    return csv_of(out / "sgim-d" / "seed-003")
+    return out / "sgim-d" / "seed-003"
+
+
+@pytest.fixture(scope="session")
+def reference(undisturbed):
+    """The content of the uninterrupted run."""
+    return content_of(undisturbed)
 
 
 @pytest.fixture

@@ -1,28 +1,33 @@
-"""What the tests of whole runs share: how a run is started, also in another process, and what it left."""
+"""What the tests of runs share: how a run is started, stopped at a movement or edited, and what it has recorded."""
 
 import os
 import shlex
+import signal
+import sqlite3
 import subprocess
 import sys
-import time
+from contextlib import closing
 from pathlib import Path
 
 import sgimd_torch
-from sgimd_torch.runs.build import build
-from sgimd_torch.runs.command_line import parse
-from sgimd_torch.runs.directory import RunDirectory
-from sgimd_torch.runs.engines.local import local
-from sgimd_torch.runs.engines.loop import sweep
-from sgimd_torch.runs.process import Stopping
-from sgimd_torch.runs.run import live_in
+from sgimd_torch.record import Record, layout
+from sgimd_torch.runs.directory import FILE
 
 ROOT = Path(sgimd_torch.__file__).parents[1]
 MOVEMENTS = 90
-CSV = ("episodes.csv", "evaluation.csv", "regions.csv")
 RUN = "import sys; from sgimd_torch.runs import command_line, process"
 LIVE = f"{RUN}; sys.exit(process.command(command_line.main, sys.argv[1:]))"
-# Every movement goes to disk at once, so that a test can wait for the k-th.
-EAGER = LIVE.replace("process;", "process, run; run.FLUSH_EVERY = 0;")
+# It stops itself once movement {0} is done; every movement is brought to the disk at once.
+STOPS = f"""
+import os, signal
+from sgimd_torch.runs import run
+run.COMMIT_EVERY, after = 0, run.Life._after
+def stop(life, episode):
+    after(life, episode)
+    if life.movements == {{0}}:
+        os.kill(os.getpid(), signal.SIGSTOP)
+run.Life._after = stop
+{LIVE}"""
 
 
 def arguments(out, benchmark):
@@ -30,21 +35,41 @@ def arguments(out, benchmark):
     return [*fixed, "--benchmark", str(benchmark), "--out", str(out)]
 
 
-def csv_of(directory):
-    return {name: (directory / name).read_bytes() for name in CSV if (directory / name).exists()}
+def content_of(directory):
+    """The rows of all tables but ``about``, which has seconds and versions."""
+    with Record(directory / FILE) as record:
+        return {table: list(record.rows(table)) for table in layout(record.dims) if table != "about"}
 
 
-def accept_loss(out, benchmark, *options):
-    """Go on with a run whose log lacks movements; returns the notes on it."""
-    config, _ = parse([*arguments(out, benchmark), *map(str, options)], "")
-    parts = build(config)
-    with Stopping() as stopping, RunDirectory(parts, resume=True, accept_loss=True) as directory:
-        live_in(directory, parts, stopping)
-    return directory.notes
+def about_of(directory):
+    """What made the run."""
+    with Record(directory / FILE) as record:
+        return record.about
+
+
+def settle(directory, **about):
+    """Write down something else about what made the run."""
+    with Record(directory / FILE, write=True) as record:
+        record.settle(**about)
+        record.commit()
+
+
+def edit(path, *statements):
+    """Change a record behind its back, by SQL."""
+    with closing(sqlite3.connect(path)) as connection, connection:
+        for statement in statements:
+            connection.execute(statement)
+
+
+def files_of(directory):
+    return {path.name: path.read_bytes() for path in directory.iterdir()}
 
 
 def sweep_here(configs, processes=1, **options):
     """On this machine; the failures."""
+    from sgimd_torch.runs.engines.local import local
+    from sgimd_torch.runs.engines.loop import sweep
+
     with local(processes) as submit:
         return sweep(configs, submit, **options)
 
@@ -62,11 +87,22 @@ def start(program, *options, limit=""):
     )
 
 
-def signal_after(process, log, lines, signum):
-    """Send ``signum`` once the log has so many ``lines``; returns (exit code, stderr)."""
-    while process.poll() is None and not (log.exists() and log.read_bytes().count(b"\n") >= lines):
-        time.sleep(0.001)
-    assert process.poll() is None, process.communicate()
+def stopped(program, *options):
+    """Another process, once it has stopped itself."""
+    process = start(program, *options)
+    _, status = os.waitpid(process.pid, os.WUNTRACED)
+    assert os.WIFSTOPPED(status), process.communicate()
+    return process
+
+
+def stopped_at(movements, *options):
+    """``sgimd run``, stopped after so many movements."""
+    return stopped(STOPS.format(movements), *options)
+
+
+def end(process, signum=signal.SIGKILL):
+    """Send a stopped process a signal and let it go on; returns (exit code, stderr)."""
     process.send_signal(signum)
+    process.send_signal(signal.SIGCONT)
     _, errors = process.communicate()
     return process.returncode, errors

@@ -69,6 +69,7 @@ class Record:
     Attributes:
         about: what made the run, see ``settle``.
         dims: of context, theta and outcome.
+        failed: whether something could not be written; then nothing more is.
 
     Raises:
         RunError: there is no record at ``path``, it is damaged where all reading begins, or another process writes it.
@@ -82,6 +83,7 @@ class Record:
         self._movements = 0
         self._shown: dict[bytes, int] = {}
         self._remade: dict[str, int] = {}
+        self.failed = False
         self._connection = _connect(self.path, write)
         try:
             with self._told():
@@ -319,17 +321,27 @@ class Record:
     @contextmanager
     def _told(self, *, writing: bool = False) -> Iterator[None]:
         """Errors of SQLite, and of what it gives, as ours, with the path."""
+        if self.failed:
+            raise OSError(f"{self.path} could not be written; what came since the last commit is lost")
         try:
             yield
         except RunError as error:
+            self._fail(writing)
             raise error if str(self.path) in str(error) else RunError(f"{self.path}: {error}") from error
         except (sqlite3.Error, ValueError, TypeError, KeyError, AttributeError, OverflowError) as error:
+            self._fail(writing)
             if isinstance(error, sqlite3.OperationalError) and "locked" in str(error):
                 wait = "wait for it, or choose another --out"
                 raise InUseError(f"{self.path} is in use by another process; {wait}") from error
             if writing:
                 raise OSError(f"{self.path} cannot be written: {error}") from error
             raise RunError(f"{self.path} cannot be read as a record: {error}; {HINT}") from error
+
+    def _fail(self, writing: bool) -> None:
+        """Rows that could not be written are missing, so none may come after them."""
+        if writing:
+            self.failed = True
+            self._connection.close()
 
 
 def _connect(path: Path, write: bool) -> sqlite3.Connection:

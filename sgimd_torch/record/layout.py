@@ -174,7 +174,7 @@ def sealed(rows: Iterable[Row], seal: int) -> list[Row]:
 
 
 def _vector(name: str, dim: int) -> list[str]:
-    return [f"{name} BLOB"] if dim > _WIDEST else [f"{name}_{k} REAL" for k in range(dim)]
+    return [f"{name}_values BLOB"] if dim > _WIDEST else [f"{name}_{k} REAL" for k in range(dim)]
 
 
 def _width(dim: int) -> int:
@@ -182,10 +182,10 @@ def _width(dim: int) -> int:
 
 
 def _cells(values: Array | None, dim: int) -> list[Any]:
-    """The cells of a vector; NULL for None. -0.0 becomes 0.0, as in SQLite."""
-    if values is None:
+    """The cells of a vector; NULL for None, or with a NaN in it. -0.0 becomes 0.0, as in SQLite."""
+    numbers = None if values is None else np.asarray(values, dtype=np.float64) + 0.0
+    if numbers is None or np.isnan(numbers).any():
         return [None] * _width(dim)
-    numbers = np.asarray(values, dtype=np.float64) + 0.0
     return [numbers.tobytes()] if dim > _WIDEST else numbers.tolist()
 
 

@@ -25,6 +25,7 @@ from sgimd_torch.runs.config import EVALUATES, MAY_CHANGE, Config
 
 FILE: Final = "run.sqlite"
 _LASTING: Final = ("events", "demonstrations")  # tables that only a new life would make again
+_EVALUATED: Final = ("evaluations", "errors", "regions")  # an evaluation has rows in all of them, or in none
 _SOURCE: Final = "source of "  # among the versions, before the word that names a part of a user's own
 LIBRARIES: Final = {"numpy": "numpy", "scipy": "scipy", "faiss": "faiss-cpu", "mujoco": "mujoco"}
 FORWARD: Final = ("torch", "lightning", "safetensors")  # of runs with a forward model
@@ -123,7 +124,8 @@ def _whole(path: Path, accept_loss: bool, notes: list[str]) -> Record | None:
         _accept(path, "; ".join(lost), "keep those before and make the others", accept_loss, notes)
         record = Record(path, write=True)
     try:
-        whole = () if lost else [table for table in DERIVED if table not in wrong]
+        dropped = {*wrong, *(_EVALUATED if wrong.keys() & {*_EVALUATED} else ())}
+        whole = () if lost else [table for table in DERIVED if table not in dropped]
         notes += [f"{message}; it is made again" for message in wrong.values() if message not in lost]
         kept = record.rewrite(keep=whole)
     finally:
@@ -174,7 +176,7 @@ def _keep_evaluations(record: Record, parts: RunParts, about: Mapping[str, Any])
     now = {**about["settings"], **about["files"]}
     alike = all(before.get(name) == now.get(name) for name in EVALUATES)
     wanted = {*parts.config.evaluations} if alike else set()
-    for table in ("evaluations", "errors", "regions"):
+    for table in _EVALUATED:
         rows = list(record.rows(table))
         kept = [row for row in rows if row[0] in wanted]
         if len(kept) < len(rows):

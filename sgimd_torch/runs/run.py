@@ -89,14 +89,14 @@ class Life:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        self.close(commit=kind is None or not issubclass(kind, OSError))  # else it would fail once more
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
-    def close(self, *, commit: bool = True) -> None:
+    def close(self) -> None:
         """Bring to the disk what was lived, and let others have the record."""
         try:
-            if commit and not self.replaying:
-                self.commit()
+            if not self.replaying and not self.record.failed:
+                self._settle()
         finally:
             self.record.close()
             for each in self.listeners:
@@ -128,6 +128,7 @@ class Life:
                 if self.movements == self.recorded < total:
                     progress.begin(title, total, self.movements)
                 self.stopping.check()
+        self.commit()
 
     def episodes(self) -> Iterator[Episode]:
         """The same, one movement after the other: first those that were recorded, then new ones."""
@@ -151,11 +152,14 @@ class Life:
 
     def commit(self) -> None:
         """Bring everything to the disk."""
+        self._settle()
         for each in self.listeners:
             each.flush()
+        self._committed = time.monotonic()
+
+    def _settle(self) -> None:
         self.record.settle(seconds=self.seconds.summary())
         self.record.commit()
-        self._committed = time.monotonic()
 
     def _awaited(self, name: str, teacher: Demonstrator) -> Demonstrator:
         """A person who teaches by hand is waited for by the page that they see."""
