@@ -167,7 +167,7 @@ def asked_rows(config: Config, run: Run) -> list[Row]:
         return []
     task = task_of(config)
     dim, contexts = task.environment.contexts.dim, task.environment.contexts
-    nothing: Any = {name: () for name in ("index", "reply", "teacher", "wanted_0", f"wanted_{dim}")}
+    nothing: Any = dict.fromkeys(("index", "reply", "teacher", "wanted_0", f"wanted_{dim}"), ())
     asked = pd.DataFrame(run.requests or nothing)
     low_half = asked[f"wanted_{dim}"] < middle(demonstrations_of(task, config.demonstrations)[0])
     border = (2 * (asked["wanted_0"] - contexts.low[0]) / contexts.sides[0] - 1).abs() if dim else 0 * asked["index"]
