@@ -81,11 +81,14 @@ def read_table(folder: Path, name: str = FILE) -> pd.DataFrame:
     types = {column: TYPES.get(column, "float64") for column in columns}
     if not path.exists():
         return pd.DataFrame({column: pd.Series(dtype=kind) for column, kind in types.items()})
-    empty = {column: [""] for column, kind in types.items() if kind in ("float64", "Int64")}
+    exact = {
+        column: lambda text: float(text or "nan") for column, kind in types.items() if kind in ("float64", "Int64")
+    }
+    others = {column: kind for column, kind in types.items() if column not in exact}
     try:
         if (header := path.read_text(encoding="utf-8").partition("\n")[0]) != ",".join(columns):
             raise ValueError(f"it must begin with {','.join(columns)}, got {header[:100]!r}; is it another table?")
-        table = pd.read_csv(path, dtype=types, keep_default_na=False, na_values=empty, float_precision="round_trip")
+        table = pd.read_csv(path, dtype=others, converters=exact, keep_default_na=False).astype(types)
     except ValueError as error:
         raise ResultsError(f"{path} cannot be read: {error}") from error
     numbers = table.drop(columns=["low", "high"], errors="ignore").select_dtypes("number").astype(float)
