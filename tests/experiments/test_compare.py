@@ -9,9 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from read_results import GOALS_HEADER, HEADER, read_goals, read_results
+from tables import RESULTS, Table, goal_rows, goals_claimed, result_rows, tiles_reached
 
 from compare import collect, compared, last_rows, main, runs_of, table_in
-from read_results import GOALS_HEADER, HEADER, read_goals, read_results
 from runs import ROOT, signal_after, start, sweep_here
 from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.evaluation import Benchmark
@@ -21,7 +22,6 @@ from sgimd_torch.runs.config import Config, words
 from sgimd_torch.runs.log import RunError
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import Run, read_run
-from tables import RESULTS, Table, goal_rows, goals_claimed, result_rows, tiles_reached
 from variants import ARMS, EXPERIMENTS, make_subsets, shipped, tables_of, teacher_of
 
 # Two variants that live for 40 movements, and one, of an experiment of its own, whose demonstrations are missing.
