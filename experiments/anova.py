@@ -23,10 +23,9 @@ from judging import NotRun
 from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.environments.fishing_rod import JOINTS, FishingRod
 from sgimd_torch.runs.process import say
-from sgimd_torch.runs.read import find_runs, read_run
 from sgimd_torch.spaces import Array, stream
 from sgimd_torch.views.statistics import LEVEL, SEED
-from table import merge, read_table
+from table import merge, read_seeds, read_table
 from variants import shipped
 
 TAUGHT: Final = {1: "sgim-d-teacher-1", 2: "sgim-d-teacher-2", 3: "sgim-d"}  # SGIM-D, by its demonstrator
@@ -122,8 +121,7 @@ def mean_thetas(folder: Path, variant: str) -> Array:
         NotRun: fewer than 2 runs are finished.
         RunError: one is damaged.
     """
-    found = [read_run(path) for path in find_runs(folder / variant)] if (folder / variant).is_dir() else []
-    runs = [run for run in found if run.summary.get("finished")]
+    runs = [run for run in read_seeds(folder, variant) if run.summary.get("finished")]
     if len(runs) < 2:
         raise NotRun(f"{variant}, {len(runs)} finished in {folder}, at least 2 are needed")
     return np.stack([run.thetas[np.isfinite(run.thetas).all(axis=1)].mean(axis=0) for run in runs])

@@ -44,9 +44,10 @@ with loading():  # Ctrl-C shows no traceback
     from sgimd_torch.figures.save import save_figure
     from sgimd_torch.files import make_folder
     from sgimd_torch.runs.config import OWN
-    from sgimd_torch.runs.read import Run, find_runs, read_run
+    from sgimd_torch.runs.read import Run
     from sgimd_torch.spaces import Array, Box
     from sgimd_torch.views.statistics import Interval, iqm_interval, paired_differences, rng
+    from table import read_seeds
     from variants import EXPERIMENTS, PAPER, SWIMMERS, shipped
 
 BAND = "thick: interquartile mean, band: its 95 % interval, thin: seeds"
@@ -93,9 +94,9 @@ class Data:
 
     def runs(self, variant: str) -> list[Run]:
         """All seeds; raises ``NotRun`` if there is none, ``RunError`` if one is damaged."""
-        if not (self.folder / variant).is_dir():
-            raise NotRun(f"run directories {self.folder}/{variant}/seed-*")
-        return [read_run(path) for paths in find_runs(self.folder / variant).values() for path in paths]
+        if runs := read_seeds(self.folder, variant):
+            return runs
+        raise NotRun(f"run directories {self.folder}/{variant}/seed-*")
 
 
 def errors(data: Data) -> Figure:

@@ -23,7 +23,7 @@ from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.files import lock, make_folder, write_text
 from sgimd_torch.runs.build import task_of
 from sgimd_torch.runs.config import OWN, Config
-from sgimd_torch.runs.read import Run
+from sgimd_torch.runs.read import Run, find_runs, read_run
 from sgimd_torch.runs.tasks import benchmark_of, demonstrations_of
 from sgimd_torch.spaces import Array
 from sgimd_torch.teachers.answering import middle
@@ -122,6 +122,17 @@ def merge(folder: Path, name: str, rows: Sequence[Row]) -> None:
 def write_table(folder: Path, name: str, table: pd.DataFrame) -> None:
     """Replace a table. Numbers read back exactly; NaN is left empty."""
     write_text(folder / name, table.to_csv(index=False, lineterminator="\n"))
+
+
+def read_seeds(folder: Path, variant: str) -> list[Run]:
+    """All runs of a variant in a folder of run directories, finished or not; there may be none.
+
+    Raises:
+        RunError: one is damaged.
+    """
+    if not (folder / variant).is_dir():
+        return []
+    return [read_run(path) for paths in find_runs(folder / variant).values() for path in paths]
 
 
 def result_rows(experiment: str, config: Config, run: Run) -> list[Row]:

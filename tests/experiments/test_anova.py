@@ -38,15 +38,13 @@ def demonstrators(tmp_path, monkeypatch):
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory, go):
-    """Two seeds of 12 movements each; of the pupil of demonstrator 2 only one, and one that was stopped."""
+    """Two seeds of 12 movements each; of the pupil of demonstrator 2 only one."""
     out = tmp_path_factory.mktemp("runs")
     for name in ("random", "sgim-d", "sgim-d-teacher-1", "sgim-d-teacher-2"):
         algorithm = "random" if name == "random" else "sgim-d"
-        for seed in (0, 1):
+        for seed in (0,) if name == "sgim-d-teacher-2" else (0, 1):
             options = f"--algorithm {algorithm} --name {name} --seed {seed} --movements 12 --evaluate_at []"
             assert go(out, *options.split()) == 0
-    summary = out / "sgim-d-teacher-2/seed-001/summary.json"
-    summary.write_text(summary.read_text().replace('"finished": true', '"finished": false'))
     return out
 
 
