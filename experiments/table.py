@@ -151,7 +151,17 @@ def result_rows(experiment: str, config: Config, run: Run) -> list[Row]:
         for movements, error, floor, met in zip(*(column.tolist() for column in columns), strict=True):
             landed = run.outcomes[:movements]
             reached = tiles_reached(landed, benchmark, corner), goals_claimed(landed, benchmark)
-            values = (*run_of, movements, name, int(answer == OWN), *place, error, floor, *reached, met)
+            values = (
+                *run_of,
+                movements,
+                name,
+                int(answer == OWN),
+                *place,
+                error,
+                floor,
+                *reached,
+                None if np.isnan(met) else int(met),
+            )
             rows[movements, name] = dict(zip(TABLES[FILE][1], values, strict=True))
     return [*rows.values()]
 

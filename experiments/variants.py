@@ -2,7 +2,7 @@
 
 Section 6 of Nguyen & Oudeyer (2014) first, then what the paper lacks. A variant of SGIM-D changes one option.
     EXPERIMENTS["ablations"]["uniform-goals"]        # {"algorithm": "sgim-d", "goals": "uniform"}
-A variant in two experiments has the same line in both; it is run once, and has its rows in both tables.
+A variant in two experiments has the same line in both; it is run once, and has its rows for each.
 """
 
 from __future__ import annotations
