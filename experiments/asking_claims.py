@@ -1,19 +1,17 @@
 """What the learners that ask have to show: when, how few, whom, where, at which cost; and how each bar is judged.
 
-    asking = read_asking(Path("results")); judge(ASKING_CLAIMS, asking)
+    results = Results.of(Path("results"), ["asking"], ["asked.csv"]); judge(ASKING_CLAIMS, results, "process")
 All are answered by `process`, whatever they explored with. Seeds are paired.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 import numpy as np
 
-from judging import Claim, Judged, NotRun, Results, all_of, at_least, at_most, below_zero, shared
-from read_results import LAST, read_asked, read_contexts, read_results
+from judging import LAST, Claim, Judged, NotRun, Results, all_of, at_least, at_most, below_zero, shared
 from sgimd_torch.spaces import Array
 from sgimd_torch.views.statistics import Interval, difference_interval, interquartile_mean, interval, metres, rng, show
 from variants import FOUR, HALVES
@@ -28,56 +26,47 @@ MOST: Final = 127  # demonstrations that there are
 WRONG: Final = "mislabelling"
 
 
-def read_asking(folder: Path) -> Results:
-    """The results in asking.csv, with the requests in asked.csv.
-
-    Raises:
-        ResultsError: there is no such table, or a line of it makes no sense.
-    """
-    path = folder / "asking.csv"
-    return Results(read_results(path), same=read_results(path, "process"), asked=read_asked(folder / "asked.csv"))
-
-
 def counts(results: Results, variant: str, what: str, teachers: Sequence[str] = ()) -> dict[int, float]:
-    """Seed -> requests of a kind, see `Asked`, to these ``teachers``, all unless given.
+    """Seed -> requests of a kind, a column of asked.csv, to these ``teachers``, all unless given.
 
     Raises:
         NotRun: fewer than 2 seeds.
     """
-    found = {
-        seed: sum(float(getattr(each, what)) for name, each in by_teacher.items() if not teachers or name in teachers)
-        for seed, by_teacher in sorted(results.asked.get(variant, {}).items())
-    }
+    table = results.small["asked.csv"]
+    mine = table[(table.variant == variant) & (table.teacher.isin(teachers) | (len(teachers) == 0))]
+    found = mine.groupby("seed")[what].sum()
     if len(found) < 2:
         raise NotRun(f"requests of {variant}")
-    return found
+    return {int(seed): float(count) for seed, count in found.items()}
 
 
-def difference_at(
-    ours: str, theirs: str, times: Sequence[int], most_shown: float = np.inf
-) -> Callable[[Results], Judged]:
-    """Judges whether our error is smaller than theirs at each time, with at most so many demonstrations."""
+def _less(
+    text: str, ours: str, theirs: str, times: tuple[int, ...], more: str = "", most_shown: float = np.inf
+) -> Claim:
+    """The claim that our error is smaller than theirs at each time, with at most so many demonstrations."""
 
     def judged(results: Results) -> Judged:
         found = {when: results.difference(ours, theirs, when) for when in times}
         said = ", ".join(f"{metres(each)} at {when}" for when, each in found.items())
         return _with_shown(results, ours, said, all_of(*map(below_zero, found.values())), most_shown)
 
-    return judged
+    on = "on the toss " if "toss" in ours else ""
+    bar = f"difference {on}at {' and '.join(map(str, times))} < 0{more}"
+    return Claim(text, bar, judged, [(ours, theirs)], times[-1])
 
 
-def no_more_than(ours: str, theirs: str, most_shown: float = np.inf) -> Callable[[Results], Judged]:
-    """Judges whether our error at the end is at most theirs, with at most so many demonstrations."""
+def _no_more(text: str, bar: str, ours: str, theirs: str, most_shown: float = np.inf) -> Claim:
+    """The claim that our error at the end is at most theirs, with at most so many demonstrations."""
 
     def judged(results: Results) -> Judged:
         found = results.difference(ours, theirs)
         return _with_shown(results, ours, metres(found), at_most(found, 0.0), most_shown)
 
-    return judged
+    return Claim(text, bar, judged, [(ours, theirs)])
 
 
-def share_of(results: Results, parts: Mapping[int, float], wholes: Mapping[int, float]) -> Interval:
-    """All ``parts`` over all ``wholes``, seeds drawn together.
+def _share_of(results: Results, parts: Mapping[int, float], wholes: Mapping[int, float]) -> tuple[str, Interval]:
+    """All ``parts`` over all ``wholes``, seeds drawn together, in words and in numbers.
 
     Raises:
         NotRun: there are none.
@@ -90,7 +79,9 @@ def share_of(results: Results, parts: Mapping[int, float], wholes: Mapping[int, 
         return found
 
     samples = (np.array(list(each.values())) for each in (parts, wholes))
-    return interval(share, *samples, rng=rng(), paired=True, level=results.level)
+    found = interval(share, *samples, rng=rng(), paired=True, level=results.level)
+    percent = show(Interval(*(100 * each for each in found)), ".0f", "%")
+    return f"{percent} of {sum(wholes.values()):.0f} late requests", found
 
 
 def _like_the_best(results: Results) -> Judged:
@@ -100,15 +91,14 @@ def _like_the_best(results: Results) -> Judged:
 
 
 def _seldom_wrong(results: Results) -> Judged:
-    wrong, late = (counts(results, "sgim-acts-four", "late", of) for of in ((WRONG,), FOUR))
-    found = share_of(results, wrong, late)
-    return f"{_percent(found)} of {sum(late.values()):.0f} late requests", at_most(found, 0.1)
+    said, found = _share_of(results, *(counts(results, "sgim-acts-four", "late", of) for of in ((WRONG,), FOUR)))
+    return said, at_most(found, 0.1)
 
 
 def _in_their_half(results: Results) -> Judged:
     own, late = (counts(results, "sgim-acts-halves", what, HALVES) for what in ("late_own", "late"))
-    found = share_of(results, own, late)
-    return f"{_percent(found)} of {sum(late.values()):.0f} late requests", at_least(found, 0.8)
+    said, found = _share_of(results, own, late)
+    return said, at_least(found, 0.8)
 
 
 def _asks_less(results: Results) -> Judged:
@@ -120,14 +110,13 @@ def _asks_less(results: Results) -> Judged:
 def _less_at_equal_cost(results: Results) -> Judged:
     """SGIM-D at the movement at which it has cost as much, on straight lines between its evaluations."""
     ours, shown = shared(results.at(DEAR), counts(results, DEAR, "shown"))
-    curve = results.variants[SGIM_D] if results.at(SGIM_D) else None
+    curves = results.rows["error"].loc[results.answer, SGIM_D].unstack("seed") if results.at(SGIM_D) else None
     theirs: dict[int, float] = {}
     for seed, demonstrations in shown.items():
-        points = sorted((at, row.errors) for (each, at), row in curve.rows.items() if each == seed) if curve else []
-        if points:
+        if curves is not None and seed in curves:
+            curve = curves[seed].dropna()
             same = (LAST + COST * demonstrations) / (1 + COST / EVERY)
-            when, errors = np.array(points).T
-            theirs[seed] = float(np.interp(same, when, errors))
+            theirs[seed] = float(np.interp(same, curve.index.to_numpy(np.float64), curve.to_numpy()))
     found = _paired(results, *shared(ours, theirs))
     return metres(found), below_zero(found)
 
@@ -139,31 +128,34 @@ def _in_strong_wind(results: Results) -> Judged:
     return said, below_zero(found)
 
 
+def _with_shown(results: Results, variant: str, said: str, verdict: str, most: float) -> Judged:
+    if most == np.inf:
+        return said, verdict
+    shown = max(counts(results, variant, "shown").values())
+    return f"{said}, {shown:.0f} demonstrations at most", all_of(verdict, at_most(Interval(shown, shown, shown), most))
+
+
+def _paired(results: Results, ours: Mapping[int, float], theirs: Mapping[int, float]) -> Interval:
+    return difference_interval(ours, theirs, rng=rng(), level=results.level)
+
+
 ASKING_CLAIMS: Final = (
-    Claim(
+    _less(
         "When: SGIM-IM errs less than SGIM-D early",
-        "difference at 1000 < 0, with at most 127 demonstrations",
-        difference_at(IM, SGIM_D, (1000,), MOST),
-        [(IM, SGIM_D)],
-        1000,
+        *(IM, SGIM_D, (1000,), ", with at most 127 demonstrations", MOST),
     ),
-    Claim(
+    _no_more(
         "... and late no more than SGIM-D that was shown all at the start",
         "difference at 5000 ≤ 0, with at most 127 demonstrations",
-        no_more_than(IM, AT_START, MOST),
-        [(IM, AT_START)],
+        *(IM, AT_START, MOST),
     ),
-    Claim(
-        "... nor than practice that was shown all at the start",
-        "the same; ours, not asked for",
-        no_more_than(IM, AT_ONCE, MOST),
-        [(IM, AT_ONCE)],
+    _no_more(
+        "... nor than practice that was shown all at the start", "the same; ours, not asked for", IM, AT_ONCE, MOST
     ),
-    Claim(
+    _no_more(
         "How few: with half of the demonstrations it errs no more than SGIM-D",
         "difference at 5000 ≤ 0, with at most 83 demonstrations",
-        no_more_than(CHEAP, SGIM_D, 83),
-        [(CHEAP, SGIM_D)],
+        *(CHEAP, SGIM_D, 83),
     ),
     Claim(
         "Whom: of four teachers, one of them mislabelling, SGIM-ACTS learns as from the best one alone",
@@ -184,81 +176,18 @@ ASKING_CLAIMS: Final = (
         _less_at_equal_cost,
         [(DEAR, SGIM_D)],
     ),
-    Claim(
+    _less(
         "Against information: asking by progress errs less than asking by the entropy of a process",
-        "difference at 1000 and 5000 < 0, whatever it is",
-        difference_at(IM, "sgim-eer", (1000, LAST)),
-        [(IM, "sgim-eer")],
+        *(IM, "sgim-eer", (1000, LAST), ", whatever it is"),
     ),
-    Claim(
-        "... and than by that of a mixture",
-        "difference at 1000 and 5000 < 0, whatever it is",
-        difference_at(IM, "sgim-eer-mixture", (1000, LAST)),
-        [(IM, "sgim-eer-mixture")],
-    ),
-    Claim(
+    _less(
         "Contexts: it learns to use the wind, and errs less than who does not feel it",
-        "difference on the toss at 1000 and 2000 < 0",
-        difference_at(ON_TOSS[1], BLIND, (1000, 2000)),
-        [(ON_TOSS[1], BLIND)],
-        2000,
+        *(ON_TOSS[1], BLIND, (1000, 2000)),
     ),
-    Claim(
-        "... and less than without a teacher",
-        "difference on the toss at 1000 and 2000 < 0",
-        difference_at(ON_TOSS[1], ON_TOSS[0], (1000, 2000)),
-        [(ON_TOSS[1], ON_TOSS[0])],
-        2000,
-    ),
+    _less("... and less than without a teacher", ON_TOSS[1], ON_TOSS[0], (1000, 2000)),
     Claim(
         "... and asks more in a strong wind than in a weak one",
         "requests in the outer third > in the inner third",
         _in_strong_wind,
     ),
 )
-
-
-def teachers_rows(results: Results) -> list[list[str]]:
-    """Requests to each teacher, means over seeds: variant, teacher, all, answered, late, late in their own half."""
-    rows = []
-    for variant, by_seed in results.asked.items():
-        for teacher in dict.fromkeys(name for each in by_seed.values() for name in each):
-            found = [each[teacher] for each in by_seed.values() if teacher in each]
-            means = [float(np.mean([getattr(each, what) for each in found])) for what in ("requests", "shown", "late")]
-            own = float(np.mean([each.late_own for each in found]))
-            rows.append(
-                [f"`{variant}`", teacher, *(f"{mean:.1f}" for mean in means), f"{own:.1f}" if teacher in HALVES else ""]
-            )
-    return rows
-
-
-def contexts_rows(folder: Path, at: int = 2000) -> list[list[str]]:
-    """The error (m) by third of the wind, by `process`, interquartile means over seeds; none without a table."""
-    found = read_contexts(folder / "contexts.csv")
-    rows = []
-    for variant in ON_TOSS:
-        parts = {
-            part: errors
-            for (name, when, answer, part), errors in found.items()
-            if (name, when, answer) == (variant, at, "process")
-        }
-        rows += [
-            [f"`{variant}`", f"{low:.3g} to {high:.3g}", f"{interquartile_mean(np.array([*errors.values()])):.4f}"]
-            for (low, high), errors in sorted(parts.items())
-        ]
-    return rows
-
-
-def _with_shown(results: Results, variant: str, said: str, verdict: str, most: float) -> Judged:
-    if most == np.inf:
-        return said, verdict
-    shown = max(counts(results, variant, "shown").values())
-    return f"{said}, {shown:.0f} demonstrations at most", all_of(verdict, at_most(Interval(shown, shown, shown), most))
-
-
-def _paired(results: Results, ours: Mapping[int, float], theirs: Mapping[int, float]) -> Interval:
-    return difference_interval(ours, theirs, rng=rng(), level=results.level)
-
-
-def _percent(found: Interval) -> str:
-    return show(Interval(*(100 * each for each in found)), ".0f", "%")

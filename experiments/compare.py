@@ -1,10 +1,9 @@
-"""Run the paper's experiments, every variant with several seeds, and collect the results in tables.
+"""Run the experiments, every variant with several seeds, and collect the results in tables.
 
 variants.py says which variants there are. A run goes to OUT/VARIANT/seed-003. When it ends, each of its evaluations
-becomes lines of a table in RESULTS, one for each inverse model that answers: forward_model.csv for forward-model and
-planar-arm-*, gymnasium.csv for swimmer, one of its own name for asking, by-hand, learning, settings and suite (such as
-by_hand.csv), paper.csv for all others. Requests and errors by context of asking are in asked.csv and contexts.csv, the
-goals chosen in the large task space in goals.csv. A variant in two experiments is run once.
+becomes rows of results.csv in RESULTS, one for each inverse model that answers. Requests and errors by context of
+asking are in asked.csv and contexts.csv, the goals chosen in the large task space in goals.csv. A variant in two
+experiments is run once, and has rows for each.
 
 Start the same command again after Ctrl-C or a power cut, or with more seeds: what is in the tables is not run again,
 and a run that was stopped goes on. If a run fails, the others go on.
@@ -18,23 +17,23 @@ from collections.abc import Collection, Sequence
 from dataclasses import replace
 from itertools import chain
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from sgimd_torch.runs.process import command, loading, say
 
 with loading():  # Ctrl-C shows no traceback
     import numpy as np
+    import pandas as pd
 
-    from read_results import HEADER
     from sgimd_torch.catalogue import unknown
     from sgimd_torch.files import make_folder
-    from sgimd_torch.runs.config import Config
+    from sgimd_torch.runs.config import OWN, Config
     from sgimd_torch.runs.engines.loop import sweep
     from sgimd_torch.record import RunError
     from sgimd_torch.runs.read import finished, read_run
     from sgimd_torch.runs.sweep import add_engines, add_options, engine_of
-    from tables import COLUMNS, RESULTS, ROWS, Key, Table, as_text, result_rows
-    from variants import EXPERIMENTS, MADE, SEEDS, Variant, make_subsets, seeds_of, tables_of
+    from table import FILE, ROWS, Row, merge, own_answer, read_table, result_rows
+    from variants import EXPERIMENTS, MADE, SEEDS, Variant, make_subsets, seeds_of, small_tables
 
 EXAMPLES: Final = f"""experiments: {", ".join(EXPERIMENTS)}
 
@@ -51,9 +50,11 @@ Exit code: 0 all runs are in the tables, 1 some failed, 2 the request is wrong, 
 # These measure the noise floor, which takes as long as everything else.
 FLOORS: Final = ("learners", "teachers", "long", "letter", "ladder", "forward-model")
 FLOOR_AT: Final = (5000, 10_000)
-ANSWERS: Final = ("own", "nearest", "linear", "model", "process")  # every run is evaluated by each of them
-ANSWER: Final = HEADER.index("answer")
+ANSWERS: Final = (OWN, "linear", "process")  # every run is evaluated by each of them, unless its variant says otherwise
+RUN: Final = ["experiment", "variant", "seed", "movements", "answer"]
+NUMBERS: Final = ["error", "floor", "tiles", "claimed", "met"]
 ROUNDING: Final = 1e-5  # relative; another processor rounds differently, and errors grow over thousands of movements
+Wanted = tuple[str, Config]  # a run, and the experiment that its rows are for
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -67,21 +68,20 @@ def main(argv: Sequence[str] | None = None) -> int:
     runs = list(dict.fromkeys(config for _, config in whole))
     mine = {*options.shard.of(runs)}
     wanted = [(name, config) for name, config in whole if config in mine]
+    table = read_table(options.results)
     if options.verify:
-        return verify(wanted, options)
-    names = dict.fromkeys(table for name, _ in wanted for table in tables_of(name))
-    rows = {table: table_in(options.results, table).rows() for table in names}
-    left = [(name, config) for name, config in wanted if not last_rows(config) <= rows[tables_of(name)[0]].keys()]
-    where = " and ".join(str(options.results / table) for table in names)
+        return verify(wanted, table, options)
+    known = {*table[RUN].itertuples(index=False, name=None)}
+    left = [(name, config) for name, config in wanted if not last_rows(name, config) <= known]
+    where = options.results / FILE
     say(f"{len(wanted)} runs{options.shard.note(runs)}, {len(wanted) - len(left)} of them in {where} already")
     if wanted and not left:
         say("nothing is left to run: --verify 10 makes ten of these rows again, --results FOLDER all of them")
-        return 0
     if options.dry_run:
         print("".join(f"{name}: {config.title}\n" for name, config in left), end="")
+    if options.dry_run or not left:
         return 0
     make_folder(options.results)
-    make_subsets(options.out / "demonstrations", by_hand="by-hand" in options.experiments)
     homes: dict[Config, list[str]] = {}  # the experiments that a run belongs to
     for name, config in left:
         homes.setdefault(config, []).append(name)
@@ -90,74 +90,56 @@ def main(argv: Sequence[str] | None = None) -> int:
         for name in homes[config]:
             collect(name, config, options.results)
 
-    with engine_of(options, list(homes)) as engine:
-        failures = sweep(list(homes), engine, on_end=on_end)
+    failures = _run([*homes], options, on_end)
     say(f"{len(homes) - len(failures)} runs ended well, {len(failures)} failed: {where}", *failures)
     return 1 if failures else 0
 
 
-def verify(wanted: Sequence[tuple[str, Config]], options: argparse.Namespace) -> int:
-    """Draw rows of the tables by lot, make each again by a run of its own, and compare.
+def verify(wanted: Sequence[Wanted], table: pd.DataFrame, options: argparse.Namespace) -> int:
+    """Draw rows of the table by lot, make each again by a run of its own, and compare.
 
     Such a run has as many movements as its row says and is evaluated only at the end, which does not change it.
 
     Returns:
         0 if all are equal, except for rounding, else 1.
     """
-    shipped = {table: table_in(options.results, table).rows() for name, _ in wanted for table in tables_of(name)[:1]}
-    found = [
-        (name, config, row)
-        for name, config in wanted
-        for row in shipped[tables_of(name)[0]].values()
-        if row[:2] == [name, config.variant] and row[4] == str(config.seed) and row[ANSWER] in config.answered
-    ]
-    drawn = sorted(np.random.default_rng(options.lot).permutation(len(found))[: options.verify].tolist())
-    again = {}
-    for number in drawn:
-        name, config, row = found[number]
-        movements = int(row[5])
-        out = options.out / f"verify-{options.lot}" / f"{name}-{movements}"
-        again[number] = replace(config, movements=movements, evaluate_at=(movements,), out=out)
-    say(f"{len(again)} rows of {len(found)}, made again in {options.out}/verify-{options.lot}")
+    configs = {(name, config.variant, config.seed): config for name, config in wanted}
+    rows = [row for row in table.to_dict("records") if (row["experiment"], row["variant"], row["seed"]) in configs]
+    drawn = [rows[k] for k in sorted(np.random.default_rng(options.lot).permutation(len(rows))[: options.verify])]
+    folder, again = options.out / f"verify-{options.lot}", list[Config]()
+    for row in drawn:
+        config, movements = configs[row["experiment"], row["variant"], row["seed"]], row["movements"]
+        out = folder / f"{row['experiment']}-{movements}"
+        again.append(replace(config, movements=movements, evaluate_at=(movements,), out=out))
+    say(f"{len(again)} rows of {len(rows)}, made again in {folder}")
     if options.dry_run:
-        print("".join(f"{config.title} at {config.movements}\n" for config in again.values()), end="")
+        print("".join(f"{config.title} at {config.movements}\n" for config in again), end="")
         return 0
-    make_subsets(options.out / "demonstrations", by_hand="by-hand" in options.experiments)
-    configs = list(dict.fromkeys(again.values()))
-    with engine_of(options, configs) as engine:
-        failures = sweep(configs, engine)
-    found_now = {
-        number: row_now(found[number][0], config, found[number][2][ANSWER]) for number, config in again.items()
-    }
-    verdicts = {number: compared(found[number][2], now) for number, now in found_now.items()}
-    for number, verdict in verdicts.items():
-        now = "" if verdict == "equal" else f"  now {','.join(found_now[number])}"
-        print(f"{verdict:8} {','.join(found[number][2])}{now}")
-    counts = [list(verdicts.values()).count(verdict) for verdict in ("equal", "rounding", "DIFFERS")]
+    failures = _run([*dict.fromkeys(again)], options)
+    verdicts = []
+    for row, config in zip(drawn, again, strict=True):
+        made = result_rows(row["experiment"], config, read_run(config.directory)) if finished(config) else []
+        now = next((each for each in made if each["answer"] == row["answer"]), {})
+        verdicts.append(compared(row, now))
+        print(f"{verdicts[-1]:8} {_in_words(row)}" + ("" if verdicts[-1] == "equal" else f"  now {_in_words(now)}"))
+    counts = [verdicts.count(verdict) for verdict in ("equal", "rounding", "DIFFERS")]
     say("{} equal, {} equal but for rounding (made on another processor?), {} differ".format(*counts), *failures)
     return 1 if counts[-1] else 0
 
 
-def row_now(experiment: str, config: Config, answer: str) -> list[str]:
-    """The last row of a run with this ``answer``; [] if the run is not finished."""
-    made = result_rows(experiment, config, read_run(config.directory)) if finished(config) else []
-    return next(([as_text(value) for value in row] for row in reversed(made) if row[ANSWER] == answer), [])
-
-
-def compared(shipped: Sequence[str], now: Sequence[str]) -> str:
+def compared(shipped: Row, now: Row) -> str:
     """Compare two rows: "equal", "rounding" if only that differs (it grows while a learner learns), or "DIFFERS"."""
-    if list(shipped) == list(now):
-        return "equal"
-    n = ANSWER + 1
-    if len(shipped) != len(now) or shipped[:n] != now[:n] or [bool(field) for field in shipped] != list(map(bool, now)):
+    if {name: shipped[name] for name in RUN} != {name: now.get(name) for name in RUN}:
         return "DIFFERS"
-    pairs = [(float(then), float(field)) for then, field in zip(shipped[n:], now[n:], strict=True) if then]
-    return "rounding" if all(abs(then - field) <= ROUNDING * abs(then) for then, field in pairs) else "DIFFERS"
+    then, found = (
+        np.array([row[name] for name in NUMBERS], dtype=np.float64) for row in (_plain(shipped), _plain(now))
+    )
+    if np.array_equal(then, found, equal_nan=True):
+        return "equal"
+    return "rounding" if np.allclose(found, then, rtol=ROUNDING, atol=0, equal_nan=True) else "DIFFERS"
 
 
-def runs_of(
-    experiments: Sequence[str], only: Sequence[str], seeds: Sequence[int] | None, out: Path
-) -> list[tuple[str, Config]]:
+def runs_of(experiments: Sequence[str], only: Sequence[str], seeds: Sequence[int] | None, out: Path) -> list[Wanted]:
     """All runs, each with its experiment, seed by seed, so that every variant gets its first seeds early.
 
     Args:
@@ -169,17 +151,16 @@ def runs_of(
     found = []
     for seed in sorted({*chain(*SEEDS.values())}) if seeds is None else seeds:
         for experiment in experiments:
+            floors = FLOOR_AT if experiment in FLOORS else ()
             for variant, line in EXPERIMENTS[experiment].items():
-                if only and variant not in only:
-                    continue
-                if seeds is None and seed not in seeds_of(experiment, variant):
+                if (only and variant not in only) or (seeds is None and seed not in seeds_of(experiment, variant)):
                     continue
                 run: Variant = {
                     "seed": seed,
                     "out": out,
                     "name": variant,
                     "answers": ANSWERS,
-                    "floor_at": FLOOR_AT if experiment in FLOORS else (),
+                    "floor_at": floors,
                     **line,
                 }
                 if run.get("demonstrations") in MADE:
@@ -188,30 +169,41 @@ def runs_of(
     return found
 
 
-def last_rows(config: Config) -> set[Key]:
-    """Keys of the rows of a run's last evaluation; if they are in a table, so are the others."""
-    return {(config.variant, str(config.seed), str(config.movements), answer) for answer in config.answered}
-
-
-def table_in(results: Path, name: str) -> Table:
-    """A table of results, by the name of its file."""
-    return Table(results / name, *COLUMNS.get(name, RESULTS))
+def last_rows(experiment: str, config: Config) -> set[tuple[Any, ...]]:
+    """Keys of the rows of a run's last evaluation; if they are in the table, so are the others."""
+    answers = {own_answer(config) if answer == OWN else answer for answer in config.answered}
+    return {(experiment, config.variant, config.seed, config.movements, answer) for answer in answers}
 
 
 def collect(experiment: str, config: Config, results: Path) -> None:
     """Merge the rows of a finished run, read from its directory, into the tables of its experiment.
 
     Raises:
-        RunError: its files are damaged, or it was not evaluated at its end.
-        OSError: a table cannot be written.
+        RunError: it is damaged, or it was not evaluated at its end.
+        ResultsError, OSError: a table cannot be read or written.
     """
     run = read_run(config.directory)
-    if config.movements not in run.evaluation["movements"]:
+    rows = result_rows(experiment, config, run)
+    if config.movements not in {row["movements"] for row in rows}:
         raise RunError(f"{run.path} has no evaluation after {config.movements} movements, though it ended")
-    evaluations, *others = tables_of(experiment)
-    for name in others:
-        table_in(results, name).merge(ROWS[name](config, run))
-    table_in(results, evaluations).merge(result_rows(experiment, config, run))  # last: now the run counts as done
+    for name in small_tables(experiment):
+        merge(results, name, ROWS[name](config, run))
+    merge(results, FILE, rows)  # last: now the run counts as done
+
+
+def _run(configs: Sequence[Config], options: argparse.Namespace, on_end: Any = None) -> list[str]:
+    """The failures."""
+    make_subsets(options.out / "demonstrations", by_hand="by-hand" in options.experiments)
+    with engine_of(options, configs) as engine:
+        return sweep(configs, engine, on_end=on_end)
+
+
+def _plain(row: Row) -> dict[str, Any]:
+    return {name: np.nan if pd.isna(value) else value for name, value in row.items()}
+
+
+def _in_words(row: Row) -> str:
+    return ",".join("" if pd.isna(value) else str(value) for value in row.values())
 
 
 def _options(argv: Sequence[str] | None) -> argparse.Namespace:
@@ -221,47 +213,34 @@ def _options(argv: Sequence[str] | None) -> argparse.Namespace:
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+    results = "folder of the tables (default: %(default)s)"
     parser.add_argument("experiments", nargs="*", metavar="EXPERIMENT", help="which; all if none is named")
     parser.add_argument("--only", nargs="+", default=[], metavar="VARIANT", help="only these of their variants")
     add_options(parser, seeds=None, default="those of the page of each experiment")
     add_engines(parser)
     parser.add_argument("--out", type=Path, default=Path("runs"), help="where the runs go (default: %(default)s)")
+    parser.add_argument("--results", type=Path, default=Path("results"), help=results)
     parser.add_argument(
-        "--results", type=Path, default=Path("results"), help="folder of the tables (default: %(default)s)"
-    )
-    parser.add_argument(
-        "--verify", type=int, default=0, metavar="N", help="make N rows of the tables again, in a folder of their own"
+        "--verify", type=int, default=0, metavar="N", help="make N rows again, in a folder of their own"
     )
     parser.add_argument("--lot", type=int, default=0, help="seed for drawing them (default: %(default)s)")
     options = parser.parse_args(argv)
     options.experiments = list(dict.fromkeys(options.experiments)) or list(EXPERIMENTS)
-    _check_names(options.experiments, options.only)
+    for name in options.experiments:
+        _check_known("experiment", name, EXPERIMENTS)
+    for name in options.only:
+        _check_known("variant", name, [*chain(*(EXPERIMENTS[each] for each in options.experiments))])
     return options
 
 
-def _check_names(experiments: Sequence[str], only: Sequence[str]) -> None:
-    homes: dict[str, list[str]] = {}
-    for experiment, variants in EXPERIMENTS.items():
-        for variant in variants:
-            homes.setdefault(variant, []).append(experiment)
-    for name in experiments:
-        if name in homes and name not in EXPERIMENTS:
-            where = " and ".join(homes[name])
-            raise ValueError(f"{name} is a variant, of {where}; write {homes[name][0]} --only {name}")
-        _check_known("experiment", name, EXPERIMENTS)
-    known = [variant for variant, where in homes.items() if {*where} & {*experiments}]
-    for name in only:
-        if name in EXPERIMENTS and name not in homes:
-            raise ValueError(f"{name} is an experiment, no variant; experiments go before --only")
-        if name in homes and name not in known:
-            where = " and ".join(homes[name])
-            raise ValueError(f"{name} is a variant of {where}, you named {', '.join(experiments)}")
-        _check_known("variant", name, known)
-
-
 def _check_known(what: str, name: str, known: Collection[str]) -> None:
-    if name not in known:
-        raise unknown(what, name, known)
+    if name in known:
+        return
+    if homes := [experiment for experiment, variants in EXPERIMENTS.items() if name in variants]:
+        raise ValueError(f"{name} is a variant of {' and '.join(homes)}; write {homes[0]} --only {name}")
+    if name in EXPERIMENTS:
+        raise ValueError(f"{name} is an experiment, no variant; experiments go before --only")
+    raise unknown(what, name, known)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""The figures of the paper's results, from results/paper.csv and, for figures of movements, from run directories.
+"""The figures of the paper's results, from results/results.csv and, for figures of movements, from run directories.
 
 All errors are those of ``LocallyLinear``'s answers, so that learners are compared by what they have explored.
 
@@ -11,7 +11,7 @@ Each is written as png and svg. A figure without its data is left out, and a mes
   large_space    error where the task space is 10^4 times larger   (e)
   goals          the goals chosen there                            (f, needs RUNS)
   variants       what each change of SGIM-D, and each rival, makes
-  swimmer        error on a robot of gymnasium, by who explored and who answered (from results/gymnasium.csv)
+  swimmer        error on a robot of gymnasium, by who explored and who answered
 
 Example:
   python experiments/figures.py --results results --runs runs --out results/figures
@@ -21,8 +21,8 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -34,8 +34,7 @@ with loading():  # Ctrl-C shows no traceback
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
-    from judging import NotRun, Results
-    from read_results import LAST, LEARNERS, read_results, read_seeds
+    from judging import LAST, LEARNERS, NotRun, Results
     from sgimd_torch.catalogue import label
     from sgimd_torch.demonstrations import SHIPPED, load_demonstrations
     from sgimd_torch.environments.fishing_rod import JOINTS
@@ -44,10 +43,12 @@ with loading():  # Ctrl-C shows no traceback
     from sgimd_torch.figures.results import Difference, SeedCurves, forest, goal_distances, goal_histogram, seed_curves
     from sgimd_torch.figures.save import save_figure
     from sgimd_torch.files import make_folder
+    from sgimd_torch.runs.config import OWN
     from sgimd_torch.runs.read import Run
     from sgimd_torch.spaces import Array, Box
     from sgimd_torch.views.statistics import Interval, iqm_interval, paired_differences, rng
-    from variants import SWIMMERS, shipped
+    from table import read_seeds
+    from variants import EXPERIMENTS, PAPER, SWIMMERS, shipped
 
 BAND = "thick: interquartile mean, band: its 95 % interval, thin: seeds"
 DEMONSTRATORS = {
@@ -68,33 +69,28 @@ SWIMMER_ANSWERS = {
     "process": "LocalProcess",
     "model": "the forward model",
 }
-APART = ("learners", "teachers", "large-space", "ladder-large", "long")  # experiments without a panel of their own
 MOVING = (("random", "sagg-riac"), ("imitation", "sgim-d"))  # the paper's learners that execute movements
 REACH = 1.5  # m; the float hardly ever lands farther from the base
 
 
 @dataclass(frozen=True, eq=False)
 class Data:
-    """The data of figures: the results, the folder of run directories, and what came of the swimmer."""
+    """The data of figures: the results, and the folder of run directories."""
 
     results: Results
     folder: Path
-    swimmer: Mapping[str, Results] = field(default_factory=dict)  # by answer
 
     def curves(self, variant: str, algorithm: str, label: str, *, dashed: bool = False) -> SeedCurves:
         """Error curves up to the paper's 5000 movements; raises ``NotRun`` if no seed has a whole one."""
-        if variant not in self.results.variants:
-            raise NotRun(variant)
-        movements, errors = self.results.variants[variant].curves()
+        movements, errors = self.results.curves(variant)
         if not errors.size:
             raise NotRun(f"whole curves of {variant}")
         centre, low, high = np.array([_interval(column) for column in errors.T]).T
         return SeedCurves(algorithm, label, movements, errors, centre, low, high, dashed)
 
     def last(self, variant: str, values: str) -> Array:
-        """``(n_seeds,)`` "floors" or "tiles" after the paper's 5000 movements; empty for a variant that was not run."""
-        found = self.results.variants[variant].at(LAST, values) if variant in self.results.variants else {}
-        return np.array(list(found.values()))
+        """``(n_seeds,)`` "floor" or "tiles" after the paper's 5000 movements; empty for a variant that was not run."""
+        return np.array([*self.results.by(OWN).some(variant, LAST, values).values()])
 
     def runs(self, variant: str) -> list[Run]:
         """All seeds; raises ``NotRun`` if there is none, ``RunError`` if one is damaged."""
@@ -109,11 +105,13 @@ def errors(data: Data) -> Figure:
     ax = figure.subplots()
     lines = seed_curves(ax, [data.curves(name, name, NAMES[name]) for name in LEARNERS])
     for name in LEARNERS:
-        floors = data.last(name, "floors")
+        floors = data.last(name, "floor")
         if len(floors):
             ax.plot(LAST, _interval(floors).value, "_", color=COLOURS[name], markersize=20, markeredgewidth=2.5)
     bar = Line2D([], [], color="black", marker="_", linestyle="", markersize=14, markeredgewidth=2.5)
-    ax.legend([*lines, bar], [*(str(line.get_label()) for line in lines), f"noise floor of each at {LAST}"])
+    ax.legend(
+        [*lines, bar], [*(str(line.get_label()) for line in lines), f"noise floor of each at {LAST}"], loc="upper right"
+    )
     ax.set_title(f"Five learners ({BAND})", fontsize=11)
     return figure
 
@@ -123,7 +121,7 @@ def demonstrators(data: Data) -> Figure:
     panels = {}
     for teacher in DEMONSTRATORS:
         suffix = "" if teacher == 3 else f"-teacher-{teacher}"
-        names = [name for name in ("observation", "imitation", "sgim-d") if name + suffix in data.results.variants]
+        names = [name for name in ("observation", "imitation", "sgim-d") if data.results.known([name + suffix])]
         if names:
             panels[teacher] = [data.curves(name + suffix, name, NAMES[name]) for name in names]
     if not panels:
@@ -221,11 +219,12 @@ def goals(data: Data) -> Figure:
 def variants(data: Data) -> Figure:
     """The error when SGIM-D is changed, taught differently or replaced; one panel for each experiment."""
     panels: dict[str, list[Difference]] = {}
-    for name, variant in data.results.variants.items():
-        if variant.experiment not in APART and len(variant.at(LAST)) > 1:
-            seeds = paired_differences(*data.results.pairs(name, "sgim-d"))
-            row = Difference(name, seeds, *data.results.difference(name, "sgim-d"))
-            panels.setdefault(variant.experiment, []).append(row)
+    for experiment in PANELS:
+        for name in EXPERIMENTS[experiment]:
+            if len(data.results.some(name)) > 1:
+                seeds = paired_differences(*data.results.pairs(name, "sgim-d"))
+                row = Difference(name, seeds, *data.results.difference(name, "sgim-d"))
+                panels.setdefault(experiment, []).append(row)
     if not panels:
         raise NotRun("any variant of SGIM-D")
     rows = [len(panel) for panel in panels.values()]
@@ -233,7 +232,7 @@ def variants(data: Data) -> Figure:
     axes = figure.subplots(len(rows), 1, sharex=True, squeeze=False, height_ratios=rows)[:, 0]
     for ax, (experiment, panel) in zip(axes, panels.items(), strict=True):
         forest(ax, panel, reference="SGIM-D")
-        ax.set_title(PANELS.get(experiment, experiment), loc="left")
+        ax.set_title(PANELS[experiment], loc="left")
         ax.label_outer()
     figure.suptitle(
         f"Error after {LAST} movements: ← better than SGIM-D | worse →\n"
@@ -245,12 +244,10 @@ def variants(data: Data) -> Figure:
 
 def swimmer(data: Data) -> Figure:
     """A robot that nobody here wrote: the same movements, answered in four ways; practice has no model."""
-    if not data.swimmer:
-        raise NotRun("the swimmer")
     figure = _figure(16, 4.6)
     axes = figure.subplots(1, len(SWIMMER_ANSWERS), sharey=True)
     for ax, (answer, title) in zip(axes, SWIMMER_ANSWERS.items(), strict=True):
-        answered = replace(data, results=data.swimmer[answer])
+        answered = replace(data, results=data.results.by(answer))
         explored = [*SWIMMERS, *(["practice"] if answer != "model" else [])]
         seed_curves(ax, [answered.curves(f"{name}-swimmer", name, label(name)) for name in explored])
         ax.set_title(f"answered by {title}", fontsize=11)
@@ -305,9 +302,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, default=Path("results/figures"), help="default: %(default)s")
     parser.add_argument("--only", choices=FIGURES, help="only this figure")
     options = parser.parse_args(argv)
-    path = options.results / "gymnasium.csv"
-    swimmer = {answer: Results(read_results(path, answer)) for answer in SWIMMER_ANSWERS} if path.exists() else {}
-    data = Data(Results(read_results(options.results / "paper.csv", "linear")), options.runs, swimmer)
+    data = Data(Results.of(options.results, (*PAPER, "swimmer")).by("linear"), options.runs)
     make_folder(options.out)
     for name in FIGURES if options.only is None else [options.only]:
         try:

@@ -2,19 +2,21 @@
 
 A bar counts as cleared only if the whole interval clears it, at the confidence that Holm's method asks for so many
 claims. If the interval straddles the bar, or runs are missing, the verdict is "cannot say".
-    results = Results(read_results("results/paper.csv"))
-    judge([Claim("half of Random's error", "ratio ≤ 0.50", ratio_at_most("sgim-d", "random", 0.5))], results)
+    results = Results.of(Path("results"), ["learners"])
+    judge([Claim("half of Random's error", "ratio ≤ 0.50", ratio_at_most("sgim-d", "random", 0.5))], results, "linear")
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Final, NamedTuple
 
 import numpy as np
+import pandas as pd
 
-from read_results import FIRST, LAST, Asked, Evaluated
+from sgimd_torch.runs.config import OWN
 from sgimd_torch.spaces import Array
 from sgimd_torch.views.statistics import (
     LEVEL,
@@ -32,11 +34,16 @@ from sgimd_torch.views.statistics import (
     rng,
     show,
 )
+from table import read_table
 
 HOLDS: Final = "holds"
 FAILS: Final = "does not hold"
 OPEN: Final = "cannot say"
+FIRST: Final = 250  # movements before the first evaluation
+LAST: Final = 5000  # movements in the life of a learner of the paper
+LEARNERS: Final = ("random", "sagg-riac", "observation", "imitation", "sgim-d")  # the paper's five
 Judged = tuple[str, str]  # our number in words, and the verdict
+Judge = Callable[["Results"], Judged]
 
 
 class NotRun(LookupError):
@@ -45,32 +52,58 @@ class NotRun(LookupError):
 
 @dataclass(frozen=True, eq=False)
 class Results:
-    """The data that claims are judged on.
-
-    ``variants`` from ``read_results``, with their own answers, and ``same``, with those of one inverse for all; for
-    some claims ``goals`` from ``read_goals``, ``coverages`` from ``read_coverages`` and ``asked`` from ``read_asked``.
+    """The data that claims are judged on: evaluations by one ``answer``, "own" for that of each learner itself.
 
     Errors are in metres; intervals are over seeds, of confidence ``level``. All methods raise ``NotRun`` if fewer than
     two seeds have what they need; of fewer than `LEAST_SEEDS` there are points, which decide nothing.
+
+    Args:
+        rows: error, floor, tiles, claimed and met by answer, variant, movements and seed.
+        small: some of goals.csv, asked.csv and model/table.csv by name.
     """
 
-    variants: Mapping[str, Evaluated]
-    goals: Mapping[str, Array] = field(default_factory=dict)
-    coverages: Mapping[str, Mapping[int, Array]] = field(default_factory=dict)
-    same: Mapping[str, Evaluated] = field(default_factory=dict)
+    rows: pd.DataFrame
+    answer: str = OWN
+    small: Mapping[str, pd.DataFrame] = field(default_factory=dict)
     level: float = LEVEL
-    asked: Mapping[str, Mapping[int, Mapping[str, Asked]]] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, folder: Path, experiments: Collection[str], small: Sequence[str] = ()) -> Results:
+        """Those of some experiments, which share no variant.
+
+        Raises:
+            ResultsError: a table makes no sense.
+        """
+        table = read_table(folder)
+        table = table[table.experiment.isin([*experiments])]
+        both = pd.concat([table, table[table.own == 1].assign(answer=OWN)])
+        rows = both.set_index(["answer", "variant", "movements", "seed"])[["error", "floor", "tiles", "claimed", "met"]]
+        return cls(rows.astype(float).sort_index(), small={name: read_table(folder, name) for name in small})
+
+    def by(self, answer: str) -> Results:
+        """The same with all variants answered by the same inverse model, or by "own"."""
+        return replace(self, answer=answer)
 
     @property
-    def alike(self) -> Results:
-        """The same with all variants answered by the same inverse, for a comparison of what they have explored."""
-        return replace(self, variants=self.same)
+    def seeds(self) -> list[int]:
+        """All of them, in order."""
+        return sorted(self.rows.index.unique("seed"))
 
-    def at(self, variant: str, movements: int = LAST, values: str = "errors") -> dict[int, float]:
-        """Seed -> value of "errors", "floors", "tiles", "claimed" or "met"."""
-        found = self.variants[variant].at(movements, values) if variant in self.variants else {}
+    def known(self, variants: Iterable[str]) -> list[str]:
+        """Those that have any rows."""
+        return [variant for variant in variants if (self.answer, variant) in self.rows.index]
+
+    def some(self, variant: str, movements: int = LAST, values: str = "error") -> dict[int, float]:
+        """Seed -> value of a column, for as many seeds as there are."""
+        place = self.answer, variant, movements
+        found = self.rows[values].loc[place].dropna() if place in self.rows.index else pd.Series(dtype=float)
+        return {int(seed): float(value) for seed, value in found.items()}
+
+    def at(self, variant: str, movements: int = LAST, values: str = "error") -> dict[int, float]:
+        """Seed -> value of a column."""
+        found = self.some(variant, movements, values)
         if len(found) < 2:
-            what = f": {len(found)} seeds with {values} at {movements}" if variant in self.variants else ""
+            what = f": {len(found)} seeds with {values} at {movements}" if self.known([variant]) else ""
             raise NotRun(f"{variant}{what}")
         return found
 
@@ -79,21 +112,22 @@ class Results:
         return _array(self.at(variant, movements))
 
     def curves(self, variant: str) -> tuple[Array, Array]:
-        """``(n,)`` movements and ``(n_seeds, n)`` errors, of the seeds that were evaluated at each of them."""
-        self.at(variant)
-        movements, errors = self.variants[variant].curves()
-        if len(errors) < 2 or len(movements) < 2:
-            raise NotRun(f"{variant}: {len(errors)} whole curves")
-        return movements, errors
+        """``(n,)`` movements and ``(n_seeds, n)`` errors, of the seeds that were evaluated at each of them up to the
+        paper's 5000; there may be none."""
+        if not self.known([variant]):
+            raise NotRun(variant)
+        table = self.rows["error"].loc[self.answer, variant].unstack("movements")
+        whole = table[[when for when in table.columns if when <= LAST]].dropna()
+        return whole.columns.to_numpy(np.float64), whole.to_numpy()
 
     def lives(self, variant: str) -> Array:
         """``(n_seeds,)``, the mean of each error curve over its movements; none of curves that begin late."""
-        movements, errors = self.curves(variant)
+        movements, errors = self._several_curves(variant)
         if movements[0] > FIRST:
             raise NotRun(f"{variant}: no evaluation at {FIRST}")
         return mean_over_life(movements, errors)
 
-    def iqm(self, variant: str, movements: int = LAST, values: str = "errors") -> Interval:
+    def iqm(self, variant: str, movements: int = LAST, values: str = "error") -> Interval:
         """The interquartile mean over seeds."""
         return iqm_interval(_array(self.at(variant, movements, values)), rng=rng(), level=self.level)
 
@@ -110,30 +144,30 @@ class Results:
         errors = self.errors(ours, movements), self.errors(theirs, movements)
         return ratio_interval(*errors, rng=rng(), level=self.level)
 
-    def over_alike(self, variant: str, movements: int = LAST) -> Interval:
-        """Errors of these answers / those of the same inverse for all, on the same memories."""
-        ours, same = shared(self.at(variant, movements), self.alike.at(variant, movements))
-        return ratio_interval(_array(ours), _array(same), rng=rng(), paired=True, level=self.level)
-
     def improvement(self, ours: str, theirs: str, movements: int = LAST) -> Interval:
         """The probability that a run of ours has a smaller error than one of theirs."""
         return improvement_interval(self.errors(ours, movements), self.errors(theirs, movements), level=self.level)
 
     def floor_ratio(self, ours: str, theirs: str) -> Interval:
         """Our errors / their noise floors, paired by seed."""
-        errors, floors = shared(self.at(ours), self.at(theirs, values="floors"))
-        return ratio_interval(_array(errors), _array(floors), rng=rng(), paired=True, level=self.level)
+        return self.paired_ratio(self.at(ours), self.at(theirs, values="floor"))
+
+    def paired_ratio(self, ours: Mapping[int, float], theirs: Mapping[int, float]) -> Interval:
+        """Ours / theirs on common seeds."""
+        errors = map(_array, shared(ours, theirs))
+        return ratio_interval(*errors, rng=rng(), paired=True, level=self.level)
 
     def near_goals(self, variant: str) -> Array:
         """``(n_seeds, 2)``: how many goals a run chose for itself, and how many of them can be reached."""
-        found = self.goals.get(variant, np.zeros((0, 2)))
+        table = self.small["goals.csv"]
+        found = table.loc[table.variant == variant, ["n_goals", "n_near"]].to_numpy(np.float64)
         if len(found) < 2:
             raise NotRun(f"goals of {variant}")
         return found
 
     def time_to_reach(self, ours: str, theirs: str, *, unit: float = 1.0, at_most: float) -> Interval:
         """When our mean curve falls to the end of theirs, in movements / ``unit``; ``at_most`` if later."""
-        movements, curves = self.curves(ours)
+        movements, curves = self._several_curves(ours)
 
         def time(curves: Array, errors: Array) -> Array:
             means = interquartile_mean(np.swapaxes(curves, -1, -2))
@@ -141,8 +175,15 @@ class Results:
 
         return interval(time, curves, self.errors(theirs), rng=rng(), level=self.level)
 
+    def _several_curves(self, variant: str) -> tuple[Array, Array]:
+        self.at(variant)
+        movements, errors = self.curves(variant)
+        if min(errors.shape) < 2:
+            raise NotRun(f"{variant}: {len(errors)} whole curves")
+        return movements, errors
 
-def shared(ours: dict[int, float], theirs: dict[int, float]) -> tuple[dict[int, float], dict[int, float]]:
+
+def shared(ours: Mapping[int, float], theirs: Mapping[int, float]) -> tuple[dict[int, float], dict[int, float]]:
     """Both, restricted to common seeds.
 
     Raises:
@@ -164,7 +205,7 @@ class Claim(NamedTuple):
 
     text: str
     bar: str
-    judged: Callable[[Results], Judged]
+    judged: Judge
     pairs: Sequence[tuple[str, str]] = ()
     movements: int = LAST
     own: bool = False
@@ -181,29 +222,38 @@ class Verdict(NamedTuple):
     alone: str
 
 
-def judge(claims: Iterable[Claim], results: Results) -> list[Verdict]:
+def judge(claims: Iterable[Claim], results: Results, answer: str) -> list[Verdict]:
     """All claims in order, together, by Holm's method: were each claim one interval, the chance that any verdict is
     wrong would be 5 % at most. Of several intervals the worst decides. Intervals of few seeds are too narrow: where n
     paired differences all have one sign, their bootstrap interval excludes 0 at any level, however strict, and by
     chance alone they have one sign with probability 2^(1 - n).
     "Cannot say" if something was not run, or with fewer than `LEAST_SEEDS`, or if only a single claim could be so sure.
 
+    Args:
+        claims: each with a text of its own.
+        results: of all variants that they name.
+        answer: the inverse model that answers for all, unless a claim is about their own.
+
     Raises:
         ValueError: errors that have no ratio, such as 0.
     """
     seen = {claim.text: claim for claim in claims}
 
-    def decides(text: str, level: float) -> bool:
-        return _judged(seen[text], replace(results, level=level))[1] != OPEN
+    def judged(text: str, level: float = LEVEL) -> Judged:
+        claim = seen[text]
+        try:
+            return claim.judged(replace(results, answer=OWN if claim.own else answer, level=level))
+        except NotRun as missing:
+            return f"not run: {missing}", OPEN
 
-    alone = {text: _judged(claim, results) for text, claim in seen.items()}
-    standing = holm(seen, lambda text, level: alone[text][1] != OPEN and decides(text, level))
+    alone = {text: judged(text) for text in seen}
+    standing = holm(seen, lambda text, level: alone[text][1] != OPEN and judged(text, level)[1] != OPEN)
     return [
         Verdict(
             claim.text,
             claim.bar,
             alone[claim.text][0],
-            _effect(claim, results),
+            _effect(claim, results.by(OWN if claim.own else answer)),
             alone[claim.text][1] if claim.text in standing else OPEN,
             alone[claim.text][1],
         )
@@ -211,22 +261,14 @@ def judge(claims: Iterable[Claim], results: Results) -> list[Verdict]:
     ]
 
 
-def _judged(claim: Claim, results: Results) -> Judged:
-    try:
-        return claim.judged(results if claim.own else results.alike)
-    except NotRun as missing:
-        return f"not run: {missing}", OPEN
-
-
 def _effect(claim: Claim, results: Results) -> str:
     """Differences of errors in metres, ours minus theirs."""
     found = {}
     for ours, theirs in claim.pairs:
         try:
-            difference = (results if claim.own else results.alike).difference(ours, theirs, claim.movements)
+            found[f"{ours} − {theirs}"] = metres(results.difference(ours, theirs, claim.movements), "+.3f")
         except NotRun:
             continue
-        found[f"{ours} − {theirs}"] = metres(difference, "+.3f")
     return "; ".join(f"{names}: {each}" for names, each in found.items())
 
 
@@ -255,9 +297,7 @@ def all_of(*verdicts: str) -> str:
     return next((verdict for verdict in (FAILS, OPEN) if verdict in verdicts), HOLDS)
 
 
-def ratio_at_most(
-    ours: str, theirs: str, bar: float, *, upper: float | None = None, movements: int = LAST
-) -> Callable[[Results], Judged]:
+def ratio_at_most(ours: str, theirs: str, bar: float, *, upper: float | None = None, movements: int = LAST) -> Judge:
     """Judges our error over theirs; ``upper`` as in ``at_most``."""
 
     def judged(results: Results) -> Judged:
@@ -267,15 +307,5 @@ def ratio_at_most(
     return judged
 
 
-def errs_less(ours: str, theirs: str) -> Callable[[Results], Judged]:
-    """Judges our error minus theirs, paired by seed, at the end."""
-
-    def judged(results: Results) -> Judged:
-        difference, better = results.difference(ours, theirs), results.improvement(ours, theirs)
-        return f"P(improvement) {show(better)}", below_zero(difference)
-
-    return judged
-
-
-def _array(values: dict[int, float]) -> Array:
-    return np.array(list(values.values()))
+def _array(values: Mapping[int, float]) -> Array:
+    return np.array([*values.values()])

@@ -17,8 +17,6 @@ Example:
 from __future__ import annotations
 
 import argparse
-import csv
-import io
 import math
 import sys
 from collections.abc import Sequence
@@ -30,19 +28,21 @@ from sgimd_torch.runs.process import command, loading
 
 with loading():  # Ctrl-C shows no traceback
     import numpy as np
+    import pandas as pd
     from matplotlib.figure import Figure
     from tqdm import tqdm
 
     from figures import REACH
-    from read_results import MODEL_HEADER
     from sgimd_torch.figures import predictions as plots
     from sgimd_torch.figures.save import save_figure
-    from sgimd_torch.files import make_folder, write_text
+    from sgimd_torch.files import make_folder
     from sgimd_torch.forward_model.diagnostics import LEVELS, error_by_cell, improvements, running
     from sgimd_torch.record import RunError
     from sgimd_torch.spaces import Box
     from sgimd_torch.views.model_run import ModelRun, read_model_run
+    from table import TABLES, write_table
 
+TABLE: Final = "model/table.csv"
 NEWEST: Final = 1000  # predictions
 LATE: Final = 2000  # movements, from which on the spread must be honest
 HEAD: Final = (
@@ -67,7 +67,7 @@ def row(model_run: ModelRun) -> dict[str, Any]:
         int(model_run.refreshes["diverged"].sum()),
         1e3 * seconds / refreshes if isinstance(seconds, int | float) else math.nan,
     )
-    return dict(zip(MODEL_HEADER, values, strict=True))
+    return dict(zip(TABLES[TABLE][1], values, strict=True))
 
 
 def figure_of(model_run: ModelRun) -> Figure:
@@ -111,7 +111,7 @@ def _printed(cells: dict[str, Any]) -> list[str]:
     ]
     learnt = f"{cells['refreshes']}, {cells['diverged']} diverged", shown(cells["ms_per_refresh"], ".1f")
     improved = shown(100 * cells["improved"], ".0f")
-    return [cells["run"], str(cells["predicted"]), f"{cells['error_m']:.3f}", *inside, improved, *learnt]
+    return [cells["run"], str(cells["predicted"]), f"{cells['error']:.3f}", *inside, improved, *learnt]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -128,9 +128,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     for name in tqdm(first.values(), "drawing", disable=None):
         save_figure(partial(figure_of, found[name]), options.out / name.replace("/", "-"), "png")
     rows = [row(run) for run in found.values()]
-    table = io.StringIO()
-    csv.writer(table, lineterminator="\n").writerows([MODEL_HEADER, *(each.values() for each in rows)])
-    write_text(options.out / "table.csv", table.getvalue())
+    write_table(options.out, "table.csv", pd.DataFrame(rows))
     lines = [HEAD, *map(_printed, rows)]
     widths = [max(map(len, cells)) for cells in zip(*lines, strict=True)]
     for cells in lines:

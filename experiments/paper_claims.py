@@ -1,11 +1,12 @@
-"""The claims of section 6 of Nguyen & Oudeyer (2014), each with the bar that it has to clear and how it is judged.
+"""The claims of section 6 of Nguyen & Oudeyer (2014) and those about the forward model, each with its bar.
 
-for verdict in judge(PAPER_CLAIMS, results): print(verdict.claim, verdict.verdict)
+for verdict in judge(PAPER_CLAIMS, results, "linear"): print(verdict.claim, verdict.verdict)
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -13,19 +14,21 @@ import numpy as np
 from judging import (
     FAILS,
     HOLDS,
+    LAST,
+    LEARNERS,
     OPEN,
     Claim,
+    Judge,
     Judged,
+    NotRun,
     Results,
     all_of,
     at_least,
     at_most,
     below_zero,
-    errs_less,
     ratio_at_most,
     shared,
 )
-from read_results import LAST, LEARNERS
 from sgimd_torch.spaces import Array
 from sgimd_torch.views.statistics import (
     Interval,
@@ -33,6 +36,7 @@ from sgimd_torch.views.statistics import (
     improvement_interval,
     interquartile_mean,
     interval,
+    iqm_interval,
     metres,
     rng,
     show,
@@ -41,6 +45,9 @@ from sgimd_torch.views.statistics import (
 OTHERS: Final = tuple(learner for learner in LEARNERS if learner != "sgim-d")
 DAMAGE: Final = 0.005  # m; what later movements may cost, a tenth of the error
 ROBUST: Final = "SGIM-D − SAGG-RIAC, and SGIM-D − Imitation taught alike, at 5000 < 0"
+SIMPLEX: Final = "sgim-d"  # with Nelder & Mead's simplex and no model, what learners with a model are compared with
+JUDGED: Final = ("model", "gradient")
+REGIONS: Final = (50, 80, 95)  # percent of the outcomes that a region of the model should hold
 
 
 def _sagg_riac_beats_random(results: Results) -> Judged:
@@ -53,7 +60,7 @@ def _imitation_beats_random(results: Results) -> Judged:
     return f"{show(ratio)} times sagg-riac", below_zero(difference)
 
 
-def _beats_the_others(errors: Callable[[Results, str], Array]) -> Callable[[Results], Judged]:
+def _beats_the_others(errors: Callable[[Results, str], Array]) -> Judge:
     def judged(results: Results) -> Judged:
         ours, theirs = errors(results, "sgim-d"), {other: errors(results, other) for other in OTHERS}
         found = {other: improvement_interval(ours, each, level=results.level) for other, each in theirs.items()}
@@ -72,7 +79,7 @@ def _fast(results: Results) -> Judged:
     return f"{show(found, '.0f')} movements", at_most(found, np.nextafter(1000, 0))
 
 
-def _robust_to(teacher: int) -> tuple[Callable[[Results], Judged], list[tuple[str, str]]]:
+def _robust_to(teacher: int) -> tuple[Judge, list[tuple[str, str]]]:
     """How it is judged, and the pairs that are compared."""
     taught = "" if teacher == 3 else f"-teacher-{teacher}"
     pairs = [(f"sgim-d{taught}", other) for other in ("sagg-riac", f"imitation{taught}")]
@@ -112,9 +119,14 @@ def _goals_are_near(results: Results) -> Judged:
 
 
 def _range(results: Results) -> Judged:
+    def apart(lower: Interval, upper: Interval) -> str:
+        if lower.high < upper.low:
+            return HOLDS
+        return FAILS if upper.high < lower.low else OPEN
+
     found = {learner: results.iqm(learner, values="tiles") for learner in ("random", "sagg-riac", "sgim-d")}
     random, sagg_riac, sgim_d = found.values()
-    return _listed(found, ".0f"), all_of(_apart(random, sagg_riac), _apart(sagg_riac, sgim_d))
+    return _listed(found, ".0f"), all_of(apart(random, sagg_riac), apart(sagg_riac, sgim_d))
 
 
 def _no_late_damage(results: Results) -> Judged:
@@ -123,18 +135,18 @@ def _no_late_damage(results: Results) -> Judged:
     return metres(found), at_most(found, DAMAGE)
 
 
-def _apart(lower: Interval, upper: Interval) -> str:
-    if lower.high < upper.low:
-        return HOLDS
-    return FAILS if upper.high < lower.low else OPEN
-
-
 def _listed(found: Mapping[str, Interval], form: str = ".2f") -> str:
     return "; ".join(f"{variant} {show(each, form)}" for variant, each in found.items())
 
 
 def _less(text: str, ours: str, theirs: str) -> Claim:
-    return Claim(text, f"{ours} − {theirs} at 5000 < 0", errs_less(ours, theirs), [(ours, theirs)])
+    """The claim that our error at the end is smaller than theirs, paired by seed."""
+
+    def judged(results: Results) -> Judged:
+        difference, better = results.difference(ours, theirs), results.improvement(ours, theirs)
+        return f"P(improvement) {show(better)}", below_zero(difference)
+
+    return Claim(text, f"{ours} − {theirs} at 5000 < 0", judged, [(ours, theirs)])
 
 
 PAPER_CLAIMS: Final = (
@@ -200,4 +212,68 @@ PAPER_CLAIMS: Final = (
         "sgim-d-absolute-large",
         "sgim-d-uniform-large",
     ),
+)
+
+
+def _fewer_movements(name: str, results: Results) -> Judged:
+    share = results.time_to_reach(name, SIMPLEX, unit=LAST, at_most=2.0)
+    return f"{100 * share.value:.0f} % [{100 * share.low:.0f}, {100 * share.high:.0f}]", at_most(share, 0.6)
+
+
+def _lower_error(name: str, results: Results) -> Judged:
+    found = {when: results.difference(name, SIMPLEX, when) for when in (1000, 2000, LAST)}
+    below = [below_zero(each) for each in found.values()]
+    verdict = next((each for each in (HOLDS, FAILS) if below.count(each) >= 2), OPEN)
+    return "; ".join(f"{when}: {metres(each)}" for when, each in found.items()), verdict
+
+
+def _below_the_floor(name: str, results: Results) -> Judged:
+    ratio = results.floor_ratio(name, SIMPLEX)
+    return f"{show(results.iqm(name), '.4f')} m, {show(ratio)} times the floor", at_most(ratio, 1.0)
+
+
+def _half_on_fifty_joints(name: str, results: Results) -> Judged:
+    return ratio_at_most(f"{name}-arm-50", f"{SIMPLEX}-arm-50", 0.5, movements=2000)(results)
+
+
+def _calibrated(region: int, least: float, most: float, name: str, results: Results) -> Judged:
+    """Judges the share of late outcomes in the model's regions of so many percent, of the table of model_figures.py."""
+    table = results.small["model/table.csv"]
+    late = table.loc[table.run.str.startswith(f"{name}/"), [f"inside_{each}_late" for each in REGIONS]].dropna()
+    if len(late) < 2:
+        raise NotRun(f"{name} in the table of model_figures.py")
+    shares = late[f"inside_{region}_late"].to_numpy()
+    found = iqm_interval(shares, rng=rng(), level=results.level)
+    number = f"{show(found)}, single runs {shares.min():.2f} to {shares.max():.2f}"
+    return number, all_of(at_least(found, least), at_most(found, most))
+
+
+# What, the bar, how it is judged, the end of the names of what is compared, and after how many movements.
+BARS: Final[tuple[tuple[str, str, Callable[[str, Results], Judged], str | None, int], ...]] = (
+    ("fewer movements", "SGIM-D's error at 5000 in ≤ 60 % of the movements", _fewer_movements, "", LAST),
+    ("lower error", "difference at 1000, 2000, 5000 < 0 at two of them", _lower_error, "", LAST),
+    ("below the noise of typical movements", "error at 5000 ≤ noise floor of SGIM-D", _below_the_floor, "", LAST),
+    ("planar arm, 50 joints", "error at 2000 ≤ half of SGIM-D's", _half_on_fifty_joints, "-arm-50", 2000),
+    *(
+        (
+            f"calibration, {region} %",
+            f"{region} % regions hold {100 * least:.0f} to {100 * most:.0f} % from 2000 movements on",
+            partial(_calibrated, region, least, most),
+            None,
+            LAST,
+        )
+        for region, least, most in ((50, 0.4, 0.6), (80, 0.7, 0.9), (95, 0.91, 0.99))
+    ),
+)
+MODEL_CLAIMS: Final = tuple(
+    Claim(
+        f"{text}: `{name}`",
+        bar,
+        partial(judged, name),
+        [] if ending is None else [(f"{name}{ending}", f"{SIMPLEX}{ending}")],
+        movements,
+        own=True,
+    )
+    for text, bar, judged, ending, movements in BARS
+    for name in JUDGED
 )

@@ -1,6 +1,6 @@
 """Pages from their templates; figures that prose quotes are computed from the rows, so that they cannot drift.
 
-A template has two of these, ``own`` and ``alike`` (every variant answered by ``LocallyLinear``), and some have more:
+A template has the results by each of the answers that its page compares:
     SGIM-D ends at {{ alike.error("sgim-d") }} m, {{ alike.less("sgim-d", "imitation") }} m below Imitation.
 What was not run is quoted as "(not run)".
 """
@@ -11,23 +11,24 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple, ParamSpec
 
 import jinja2
 
-from judging import NotRun, Results, Verdict
-from read_results import LAST, ResultsError
+from judging import LAST, NotRun, Results, Verdict
 from sgimd_torch.views.statistics import Interval, show
+from table import ResultsError
 
+Arguments = ParamSpec("Arguments")
 MISSING: Final = "(not run)"
 TEMPLATES: Final = Path(__file__).with_name("pages")
 MADE: Final = "<!-- Made by experiments/claims.py"
 BEGIN, END = "<!-- results: made by experiments/claims.py from experiments/pages/README.md.j2 -->", "<!-- end -->"
 
 
-def _or_missing(figure: Callable[..., str]) -> Callable[..., str]:
+def _or_missing(figure: Callable[Arguments, str]) -> Callable[Arguments, str]:
     @wraps(figure)
-    def quoted(*arguments: Any, **options: Any) -> str:
+    def quoted(*arguments: Arguments.args, **options: Arguments.kwargs) -> str:
         try:
             return figure(*arguments, **options)
         except NotRun:
@@ -45,11 +46,7 @@ class Quoted:
     @property
     def range(self) -> str:
         """The first and the last seed: ``100 to 119``."""
-        return f"{min(self._seeds)} to {max(self._seeds)}"
-
-    @property
-    def _seeds(self) -> set[int]:
-        return {seed for each in self.results.variants.values() for seed, _ in each.rows}
+        return f"{self.results.seeds[0]} to {self.results.seeds[-1]}"
 
     @_or_missing
     def error(self, name: str, at: int = LAST, form: str = ".3f") -> str:
@@ -57,8 +54,8 @@ class Quoted:
         return f"{self.results.iqm(name, at).value:{form}}"
 
     @_or_missing
-    def interval(self, name: str, at: int = LAST, form: str = ".3f", values: str = "errors") -> str:
-        """The same with its interval, or another of the ``values`` of an evaluation."""
+    def interval(self, name: str, at: int = LAST, form: str = ".3f", values: str = "error") -> str:
+        """The same with its interval, or another column of an evaluation."""
         return show(self.results.iqm(name, at, values), form)
 
     @_or_missing
@@ -75,14 +72,13 @@ class Quoted:
     @_or_missing
     def percent_more(self, ours: str, theirs: str, at: int = LAST) -> str:
         """How many percent larger our error is, with its interval."""
-        found = self.results.ratio(ours, theirs, at)
-        value, low, high = (100 * (each - 1) for each in found)
+        value, low, high = (100 * (each - 1) for each in self.results.ratio(ours, theirs, at))
         return f"{value:.0f} % [{low:.0f}, {high:.0f}]"
 
     @_or_missing
     def floor(self, name: str, form: str = ".3f") -> str:
         """The noise floor (m) of a variant's own answers."""
-        return f"{self.results.iqm(name, LAST, 'floors').value:{form}}"
+        return f"{self.results.iqm(name, LAST, 'floor').value:{form}}"
 
     @_or_missing
     def times_the_floor(self, ours: str, theirs: str) -> str:
@@ -123,22 +119,21 @@ class Quoted:
 
 
 class Page(NamedTuple):
-    """What is put into a template: verdicts, tables by name, the results that both come from, and others by name."""
+    """What is put into a template: verdicts, tables by name, and results by the names that its text has for them."""
 
-    verdicts: list[Verdict]
-    tables: dict[str, str]
-    results: Results
-    more: Mapping[str, Results] = {}
+    verdicts: Sequence[Verdict]
+    tables: Mapping[str, str]
+    quoted: Mapping[str, Results]
 
 
 def render(name: str, page: Page) -> str:
-    """The text of a page: its template with the ``tables`` and the figures of its prose put in."""
+    """The text of a page: its template with the tables and the figures of its prose put in."""
     made = f"{MADE} from experiments/pages/{name}.md.j2; change that file, not this one. -->"
     return f"{made}\n\n{_filled(name, page)}"
 
 
-def into_readme(text: str, paper: Page, **more: Results) -> str:
-    """A README with its section of results made again from the page of the paper and ``more`` results.
+def into_readme(text: str, page: Page) -> str:
+    """A README with its section of results made again.
 
     Raises:
         ResultsError: it has no such section.
@@ -147,12 +142,11 @@ def into_readme(text: str, paper: Page, **more: Results) -> str:
     _, end, after = rest.partition(END)
     if not begin or not end:
         raise ResultsError(f"the README must have a section from {BEGIN} to {END}; was it edited?")
-    return f"{before}{BEGIN}\n{_filled('README', paper, **more)}{END}{after}"
+    return f"{before}{BEGIN}\n{_filled('README', page)}{END}{after}"
 
 
-def _filled(name: str, page: Page, **more: Results) -> str:
-    quoted = {"own": page.results, "alike": page.results.alike, **page.more, **more}
+def _filled(name: str, page: Page) -> str:
     loader = jinja2.FileSystemLoader(TEMPLATES)
     environment = jinja2.Environment(loader=loader, undefined=jinja2.StrictUndefined, keep_trailing_newline=True)
-    figures = {each: Quoted(results) for each, results in quoted.items()}
+    figures = {each: Quoted(results) for each, results in page.quoted.items()}
     return environment.get_template(f"{name}.md.j2").render(tables=page.tables, **figures)

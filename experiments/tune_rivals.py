@@ -20,12 +20,14 @@ from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from functools import partial
 from itertools import product
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 from sgimd_torch.runs.process import command, loading, say
 
 with loading():  # Ctrl-C shows no traceback
-    from rivals_table import COLUMNS, KEY, in_words, means
+    import pandas as pd
+
+    from page_tables import DEFAULT
     from sgimd_torch import (
         FishingRod,
         InitialTeacher,
@@ -45,13 +47,13 @@ with loading():  # Ctrl-C shows no traceback
     from sgimd_torch.rivals.quality_diversity import cma_mae, cma_me, isoline, map_elites
     from sgimd_torch.runs.sweep import add_options
     from sgimd_torch.searches.perturb import perturb
-    from tables import Key, Table
+    from table import Row, merge, read_table
 
-FIRST_TUNING_SEED: Final = 1000
+TABLE, FIRST_TUNING_SEED = "rivals.csv", 1000
 Setting = dict[str, Any]
-NOBODY: Final = None
-EVERY_30: Final = partial(PeriodicTeacher, every=30)
-AT_ONCE: Final = partial(InitialTeacher, every=1)
+NOBODY = None
+EVERY_30 = partial(PeriodicTeacher, every=30)
+AT_ONCE = partial(InitialTeacher, every=1)
 
 
 class Rival(NamedTuple):
@@ -81,9 +83,9 @@ def one_by_one(**values: Sequence[Any]) -> list[Setting]:
     return [{}, *({name: value} for name, found in values.items() for value in found)]
 
 
-_TEAM: Final = one_by_one(emitters=(1, 3, 10, 15), sd=(0.05, 0.2, 0.3), batch=(8, 30), cells=(10, 40))
-_ELITES: Final = one_by_one(first=(30, 300), batch=(5, 30), cells=(10, 40))
-RIVALS: Final = {
+_TEAM = one_by_one(emitters=(1, 3, 10, 15), sd=(0.05, 0.2, 0.3), batch=(8, 30), cells=(10, 40))
+_ELITES = one_by_one(first=(30, 300), batch=(5, 30), cells=(10, 40))
+RIVALS = {
     "cma-mae": Rival(cma_mae, NOBODY, [*_TEAM, *({"learning_rate": rate} for rate in (0.001, 0.1, 0.5))]),
     "cma-mae-demonstrations": Rival(
         cma_mae, EVERY_30, [*_TEAM, *one_by_one(imitations=(3, 20), epsilon=(0.02, 0.1))[1:]]
@@ -99,7 +101,6 @@ RIVALS: Final = {
         map_elites, EVERY_30, one_by_one(first=(10, 300), batch=(30,), cells=(10,), imitations=(3, 20))
     ),
     "isoline": Rival(isoline, NOBODY, [*_ELITES, *one_by_one(sd=(0.01, 0.05), line=(0.1, 0.4))[1:]]),
-    "isoline-again": Rival(isoline, NOBODY, [{"again": share} for share in (0.1, 0.2, 0.4)]),
     "isoline-demonstrations": Rival(isoline, EVERY_30, one_by_one(sd=(0.01, 0.05), first=(10,), imitations=(3, 20))),
     "random-goals-demonstrations": Rival(baseline, EVERY_30, one_by_one(sd=(0.02, 0.1), budget=(1, 2, 4, 8, 30))),
 }
@@ -125,6 +126,20 @@ def errors_of(
     return found
 
 
+def in_words(setting: Setting) -> str:
+    """A setting as a field of the table: ``sd=0.2``; ``default`` for none."""
+    return " ".join(f"{name}={value}" for name, value in setting.items()) or DEFAULT
+
+
+def means(table: pd.DataFrame, names: Sequence[str], last: int) -> pd.DataFrame:
+    """Errors (m) of each setting of each rival after the ``last`` movements, over its seeds; the best first."""
+    table = table[table.rival.isin(names) & (table.movements == last)]
+    found = table.groupby(["rival", "setting"], as_index=False).agg(
+        linear=("linear", "mean"), process=("process", "mean"), seeds=("seed", "count")
+    )
+    return found.assign(both=found.linear + found.process).sort_values(["rival", "both"]).drop(columns="both")
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run what is missing in the table, then print the mean of each setting over its seeds, the best first.
 
@@ -136,35 +151,38 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--benchmark", type=Path, required=True, help="goals to tune on, of scripts/make_benchmark.py")
     parser.add_argument("--only", nargs="+", choices=RIVALS, default=list(RIVALS), help="only these rivals")
     add_options(parser, seeds="1000-1001")
-    parser.add_argument(
-        "--best", type=int, default=0, metavar="N", help="only the default and the N best settings of other seeds"
-    )
+    parser.add_argument("--best", type=int, metavar="N", help="only the default and the N best settings of other seeds")
     parser.add_argument("--times", type=int, nargs="+", default=[1000, 5000], help="movements before evaluations")
-    parser.add_argument("--table", type=Path, default=Path("results/rivals.csv"), help="default: %(default)s")
+    parser.add_argument(
+        "--results", type=Path, default=Path("results"), help="folder of rivals.csv (default: %(default)s)"
+    )
     options = parser.parse_args(argv)
     if min(options.seeds) < FIRST_TUNING_SEED:
-        raise ValueError(
-            f"seeds must be {FIRST_TUNING_SEED} or more, got {min(options.seeds)}; the others are judged by"
-        )
-    table, benchmark = Table(options.table, COLUMNS, KEY), load_benchmark(options.benchmark)
+        raise ValueError(f"seeds must be {FIRST_TUNING_SEED} or more, got {min(options.seeds)}; others are judged by")
+    table, benchmark, times = (
+        read_table(options.results, TABLE),
+        load_benchmark(options.benchmark),
+        sorted(options.times),
+    )
     benchmark.check(FishingRod())
-    known, times = table.rows().keys(), sorted(options.times)
-    found = means(table, options.only, times[-1], options.seeds)
-    good = {name: [in_words({}), *(each.setting for each in found[name][: options.best])] for name in options.only}
+    known = {*table[["rival", "setting", "seed", "movements"]].itertuples(index=False, name=None)}
+    others = means(table[~table.seed.isin(options.seeds)], options.only, times[-1])
+    good = {*others.groupby("rival").head(options.best)[["rival", "setting"]].itertuples(index=False, name=None)}
+    good |= {(name, DEFAULT) for name in options.only}
     with ProcessPoolExecutor(options.processes) as pool:
-        waiting: dict[Future[list[tuple[float, float]]], list[Key]] = {}
+        waiting: dict[Future[list[tuple[float, float]]], list[Row]] = {}
         for seed, name in product(options.seeds, options.only):
             for setting in RIVALS[name].settings:
-                keys: list[Key] = [(name, in_words(setting), str(seed), str(when)) for when in times]
-                if not {*keys} <= known and (not options.best or in_words(setting) in good[name]):
-                    waiting[pool.submit(errors_of, name, setting, seed, benchmark, times)] = keys
+                words = in_words(setting)
+                missing = not {(name, words, seed, when) for when in times} <= known
+                if missing and (options.best is None or (name, words) in good):
+                    rows = [{"rival": name, "setting": words, "seed": seed, "movements": when} for when in times]
+                    waiting[pool.submit(errors_of, name, setting, seed, benchmark, times)] = rows
         for made in as_completed(waiting):
-            rows = [[*key, *errors] for key, errors in zip(waiting[made], made.result(), strict=True)]
-            table.merge(rows)
-            say(" ".join(map(str, rows[-1])))
-    for name, settings in means(table, options.only, times[-1]).items():
-        for each in settings:
-            print(f"{name:28} {each.setting:20} {each.linear:.4f} {each.process:.4f} m, {each.seeds} seeds")
+            found = zip(waiting[made], made.result(), strict=True)
+            merge(options.results, TABLE, [{**row, "linear": one, "process": other} for row, (one, other) in found])
+            say(", ".join(map(str, waiting[made][-1].values())))
+    print(means(read_table(options.results, TABLE), options.only, times[-1]).to_string(index=False))
     return 0
 
 

@@ -2,7 +2,7 @@
 
 Section 6 of Nguyen & Oudeyer (2014) first, then what the paper lacks. A variant of SGIM-D changes one option.
     EXPERIMENTS["ablations"]["uniform-goals"]        # {"algorithm": "sgim-d", "goals": "uniform"}
-A variant in two experiments has the same line in both; it is run once, and has its rows in both tables.
+A variant in two experiments has the same line in both; it is run once, and has its rows for each.
 """
 
 from __future__ import annotations
@@ -40,9 +40,10 @@ STEPS: Final[tuple[tuple[str, Variant, Variant], ...]] = (
 LETTER: Final[Variant] = {option: value for _, was, _ in reversed(STEPS) for option, value in was.items()}
 INVERSE: Final[Variant] = {"inverse": "paper"}  # all that the letter changes in a learner without goals
 PROVED: Final = ("own", "nearest", "linear", "process")  # the answers of experiments on learning from few movements
+EVERY: Final = (*PROVED, "model")  # on the swimmer
 LARGE: Final[Variant] = {"task_space": 100.0}
 BASELINE: Final[Variant] = {"goals": "uniform", "inverse": "nearest", "search": "perturb"}  # the field's standard one
-SCHOOL: Final = ("map-elites", "isoline", "isoline-again", "cma-me", "cma-mae")  # quality diversity
+SCHOOL: Final = ("map-elites", "isoline", "cma-me", "cma-mae")  # quality diversity
 # Made by ``make_subsets``: from the shipped demonstrations, and lessons by hand.
 FEW, MANY, HALF, CORNER, SHUFFLED, TEN, HAND = MADE = tuple(
     Path(f"{name}.npz") for name in ("few", "many", "half", "corner", "shuffled", "ten", "hand")
@@ -60,13 +61,9 @@ REFINING: Final[dict[str, Variant]] = {
     "model": MODEL,
     "gradient": GRADIENT,
     "gauss-newton": {**MODEL, "search": "gauss-newton"},
-    "screened": {**MODEL, "search": "screened"},
-    "polished": {**MODEL, "search": "nelder-mead-polished"},
     "sagg-riac-model": ALONE,
     "sagg-riac-gradient": {**ALONE, "search": "gradient"},
     "sagg-riac-gauss-newton": {**ALONE, "search": "gauss-newton"},
-    "sagg-riac-screened": {**ALONE, "search": "screened"},
-    "sagg-riac-polished": {**ALONE, "search": "nelder-mead-polished"},
     "imitation": {"algorithm": "imitation"},
     "imitation-model": {"algorithm": "imitation", "inverse": "model"},
     "gradient-linear": {**GRADIENT, "inverse": "linear"},
@@ -81,8 +78,9 @@ REFINING: Final[dict[str, Variant]] = {
 SWIMMER: Final[Variant] = {
     "environment": "swimmer",
     "movements": 2000,
-    "evaluate_at": (250, 500, 1000),
-}  # and at the end
+    "evaluate_at": (250, 500, 1000),  # and at the end
+    "answers": EVERY,
+}
 # What a learner of the suite has to beat, and the rivals there.
 SUITED: Final[dict[str, Variant]] = {
     **REFERENCES,
@@ -112,10 +110,10 @@ LEARNING: Final[dict[str, Variant]] = {
     }.items()
 }
 # Ten lessons, as a person gives them in a session: all of them early, in a short life.
-SESSION: Final[Variant] = {"movements": 1000, "evaluate_at": (300, 500), "answers": PROVED}  # and at the end
+SESSION: Final[Variant] = {"movements": 1000, "evaluate_at": (300, 500), "answers": ("own",)}  # and at the end
 SHOWN: Final[dict[str, Variant]] = {"goals": {**SGIM_D, "teacher": "initial"}, "practice": TAUGHT}
 # Movements of an arm take no time, so training may take more.
-ON_ARMS: Final[Variant] = {"movements": 2000, "evaluate_at": (250, 500, 1000, 1500)}  # and at the end
+ON_ARMS: Final[Variant] = {"movements": 2000, "evaluate_at": (250, 500, 1000)}  # and at the end
 LONGER: Final[Variant] = {"training": 2.0}
 
 
@@ -139,9 +137,8 @@ ASKING: Final[dict[str, Variant]] = {
     "sgim-acts-four-search": {**ACTS, "teachers": FOUR, "base": "search"},
     "sgim-acts-halves": {**ACTS, "teachers": HALVES},
     "sgim-eer": {"algorithm": "sgim-eer"},
-    "sgim-eer-mixture": {"algorithm": "sgim-eer", "doubt": "mixture"},
     "alone-toss": {"algorithm": "practice", **TOSS},
-    "alone-toss-blind": {"algorithm": "practice", **TOSS, "environment": "experiments.blind_toss:blind_toss"},
+    "alone-toss-blind": {"algorithm": "practice", **TOSS, "environment": "experiments.parts:blind_toss"},
     "sgim-im-toss": {**IM, **TOSS},
 }
 
@@ -178,7 +175,7 @@ TAUGHT_ALIKE: Final[dict[str, Variant]] = {
     "sgim-d-model": {**SGIM_D, **PROVED_MODEL},
     "practice-taught": TAUGHT,
 }
-EVERYWHERE: Final[Variant] = {"movements": 2000, "evaluate_at": (500, 1000), "answers": ("own", "linear", "process")}
+EVERYWHERE: Final[Variant] = {"movements": 2000, "evaluate_at": (500,), "answers": ("own", "process")}
 
 
 def shipped(teacher: int) -> Path:
@@ -255,9 +252,9 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
         "demonstrations-noise": {"algorithm": "imitation", "choice": "random"},
         **{name: {"algorithm": name} for name in SCHOOL},
         **{f"{name}-demonstrations": {"algorithm": f"{name}-taught"} for name in SCHOOL},
-        "map-elites-tuned": {"algorithm": "experiments.tuned_rivals:map_elites"},
-        "cma-me-tuned": {"algorithm": "experiments.tuned_rivals:cma_me"},
-        "cma-mae-demonstrations-tuned": {"algorithm": "experiments.tuned_rivals:cma_mae_taught"},
+        "map-elites-tuned": {"algorithm": "experiments.parts:map_elites"},
+        "cma-me-tuned": {"algorithm": "experiments.parts:cma_me"},
+        "cma-mae-demonstrations-tuned": {"algorithm": "experiments.parts:cma_mae_taught"},
     },
     "teaching": {
         "every-10": {**SGIM_D, "every": 10},
@@ -267,7 +264,7 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
         "few-demonstrations": {**SGIM_D, "demonstrations": FEW},
         "half-plane": {**SGIM_D, "demonstrations": HALF},
     },
-    "asking": {name: {**line, "answers": PROVED} for name, line in ASKING.items()},
+    "asking": {name: {**line, "answers": ("own", "process")} for name, line in ASKING.items()},
     "forward-model": REFINING,
     **{arm: _on_arm(arm) for arm in ARMS},
     "swimmer": {
@@ -306,6 +303,11 @@ SEEDS: Final[dict[str, range]] = {
     "asking": range(140, 160),
     "by-hand": range(150, 160),
 }
+# The experiments of the page of the paper.
+PAPER: Final = (
+    *("learners", "teachers", "large-space", "long", "letter", "ladder", "ladder-large", "ablations", "baselines"),
+    "teaching",
+)
 MAIN: Final = ("sgim-d", "sagg-riac", "model", "gradient")  # of the forward model, with as many seeds as learners
 
 
@@ -314,17 +316,11 @@ def seeds_of(experiment: str, variant: str) -> range:
     return SEEDS["learners" if experiment == "forward-model" and variant in MAIN else experiment]
 
 
-def tables_of(experiment: str) -> list[str]:
-    """The tables of results that its runs write rows to; the first has their evaluations."""
-    if experiment in ("by-hand", "learning", "settings", "suite"):
-        return [f"{experiment.replace('-', '_')}.csv"]
-    if experiment in ("forward-model", *ARMS):
-        return ["forward_model.csv"]
-    if experiment == "swimmer":
-        return ["gymnasium.csv"]
+def small_tables(experiment: str) -> list[str]:
+    """The tables besides results.csv that its runs write rows to."""
     if experiment == "asking":
-        return ["asking.csv", "asked.csv", "contexts.csv"]
-    return ["paper.csv", *(["goals.csv"] if experiment in ("large-space", "ladder-large") else [])]
+        return ["asked.csv", "contexts.csv"]
+    return ["goals.csv"] if experiment in ("large-space", "ladder-large") else []
 
 
 def make_subsets(folder: Path, *, by_hand: bool = False) -> None:
@@ -347,7 +343,7 @@ def make_subsets(folder: Path, *, by_hand: bool = False) -> None:
     for name, chosen in (*first, (HALF, right), (CORNER, corner), (SHUFFLED, shuffled)):
         save_demonstrations(folder / name, chosen)
     if by_hand:
-        from by_hand import lessons_of_a_script  # MuJoCo is loaded only when it is needed
+        from parts import lessons_of_a_script  # MuJoCo is loaded only when it is needed
 
         save_demonstrations(folder / HAND, [lesson.demonstration for lesson in lessons_of_a_script()])
 

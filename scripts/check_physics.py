@@ -11,9 +11,9 @@ import time
 
 import mujoco
 import numpy as np
+from jsonargparse.typing import PositiveInt
 from tqdm import tqdm
 
-from options import at_least
 from sgimd_torch.environments.fishing_rod import JOINT_RANGES, FishingRod
 from sgimd_torch.environments.protocol import SimulationError
 from sgimd_torch.evaluation import load_benchmark
@@ -94,7 +94,7 @@ def main() -> int:
     """Measure all properties and judge them."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument(
-        "--movements", type=at_least(10), default=100_000, help="random movements, at least 10 (default: %(default)s)"
+        "--movements", type=PositiveInt, default=100_000, help="random movements (default: %(default)s)"
     )
     parser.add_argument("--time-steps", action="store_true", help="only compare time steps; 200 movements are enough")
     options = parser.parse_args()

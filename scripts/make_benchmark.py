@@ -14,8 +14,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
+from jsonargparse.typing import NonNegativeInt, Path_fc, PositiveInt
 
-from options import at_least, writable_file
 from sgimd_torch.evaluation import SHIPPED
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.engines.local import local
@@ -54,14 +54,14 @@ def pooled(learners: Iterable[tuple[str, int]], movements: int, processes: int) 
 def main() -> None:
     """Run the learners and make the goals from what they reached."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=writable_file, default=SHIPPED, help="file to write (default: the shipped one)")
+    parser.add_argument("--out", type=Path_fc, default=SHIPPED, help="file to write (default: the shipped one)")
     parser.add_argument(
-        "--seed", type=at_least(0), default=2000, help="of the first run and of the draw (default: %(default)s)"
+        "--seed", type=NonNegativeInt, default=2000, help="of the first run and of the draw (default: %(default)s)"
     )
-    parser.add_argument("--runs", type=at_least(1), default=4, help="runs of each learner (default: %(default)s)")
-    parser.add_argument("--movements", type=at_least(1), default=5000, help="of each run (default: %(default)s)")
-    parser.add_argument("--tiles", type=at_least(1), default=358, help="about how many (default: %(default)s)")
-    parser.add_argument("--processes", type=at_least(1), default=2, help="(default: %(default)s)")
+    parser.add_argument("--runs", type=PositiveInt, default=4, help="runs of each learner (default: %(default)s)")
+    parser.add_argument("--movements", type=PositiveInt, default=5000, help="of each run (default: %(default)s)")
+    parser.add_argument("--tiles", type=PositiveInt, default=358, help="about how many (default: %(default)s)")
+    parser.add_argument("--processes", type=PositiveInt, default=2, help="(default: %(default)s)")
     options = parser.parse_args()
     learners = product(("random", "sagg-riac", "sgim-d"), range(options.seed, options.seed + options.runs))
     with TemporaryDirectory() as folder:

@@ -11,9 +11,9 @@ from __future__ import annotations
 import argparse
 
 import numpy as np
+from jsonargparse.typing import NonNegativeInt, Path_fc, PositiveInt
 from tqdm import tqdm
 
-from options import at_least, writable_file
 from sgimd_torch.demonstrations import SHIPPED, save_demonstrations
 from sgimd_torch.environments.fishing_rod import JOINT_RANGES, FishingRod
 from sgimd_torch.spaces import Array, Demonstration, stream
@@ -62,14 +62,14 @@ def farthest_points(points: Array, n: int) -> list[int]:
 def main() -> None:
     """Record many movements, and keep those that spread evenly."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=writable_file, default=SHIPPED, help="file to write (default: the shipped one)")
+    parser.add_argument("--out", type=Path_fc, default=SHIPPED, help="file to write (default: the shipped one)")
     parser.add_argument(
-        "--n", type=at_least(1), default=127, help="demonstrations, 127 in the paper (default: %(default)s)"
+        "--n", type=PositiveInt, default=127, help="demonstrations, 127 in the paper (default: %(default)s)"
     )
     parser.add_argument(
-        "--candidates", type=at_least(1), default=4000, help="recordings to choose from (default: %(default)s)"
+        "--candidates", type=PositiveInt, default=4000, help="recordings to choose from (default: %(default)s)"
     )
-    parser.add_argument("--seed", type=at_least(0), default=2014, help="(default: %(default)s)")
+    parser.add_argument("--seed", type=NonNegativeInt, default=2014, help="(default: %(default)s)")
     options = parser.parse_args()
     if options.n > options.candidates:
         parser.error(f"--n must be at most --candidates, {options.candidates}, got {options.n}")

@@ -12,10 +12,10 @@ import argparse
 from pathlib import Path
 
 import numpy as np
+from jsonargparse.typing import NonNegativeInt, PositiveInt
 from tqdm import tqdm
 
 from make_demonstrations import farthest_points
-from options import at_least
 from sgimd_torch.demonstrations import save_demonstrations
 from sgimd_torch.environments.swimmer import STEPS, Swimmer
 from sgimd_torch.evaluation import Benchmark, save_benchmark, tile_goals
@@ -42,10 +42,10 @@ def main() -> None:
     """Write both files."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, default=DATA, help="folder of the two files (default: the shipped ones)")
-    parser.add_argument("--movements", type=at_least(1), default=2500, help="random ones (default: %(default)s)")
-    parser.add_argument("--candidates", type=at_least(1), default=600, help="recordings (default: %(default)s)")
-    parser.add_argument("--n", type=at_least(1), default=100, help="demonstrations (default: %(default)s)")
-    parser.add_argument("--seed", type=at_least(0), default=2015, help="(default: %(default)s)")
+    parser.add_argument("--movements", type=PositiveInt, default=2500, help="random ones (default: %(default)s)")
+    parser.add_argument("--candidates", type=PositiveInt, default=600, help="recordings (default: %(default)s)")
+    parser.add_argument("--n", type=PositiveInt, default=100, help="demonstrations (default: %(default)s)")
+    parser.add_argument("--seed", type=NonNegativeInt, default=2015, help="(default: %(default)s)")
     options = parser.parse_args()
     if options.n > options.candidates:
         parser.error(f"--n must be at most --candidates, {options.candidates}, got {options.n}")

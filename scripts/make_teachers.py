@@ -14,10 +14,10 @@ import os
 from pathlib import Path
 
 import numpy as np
+from jsonargparse.typing import NonNegativeInt, PositiveInt
 
 from make_benchmark import pooled
 from make_demonstrations import farthest_points
-from options import at_least
 from sgimd_torch.demonstrations import SHIPPED, save_demonstrations
 from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.environments.protocol import execute_many
@@ -81,11 +81,11 @@ def main() -> None:
         default=SHIPPED.parent,
         help="folder for demonstrator_1.npz and _2.npz (default: the shipped)",
     )
-    parser.add_argument("--n", type=at_least(1), default=127, help="demonstrations of each (default: %(default)s)")
-    parser.add_argument("--runs", type=at_least(1), default=4, help="SAGG-RIAC learners (default: %(default)s)")
-    parser.add_argument("--movements", type=at_least(1), default=5000, help="of each learner (default: %(default)s)")
-    parser.add_argument("--seed", type=at_least(0), default=4000, help="of the first learner (default: %(default)s)")
-    parser.add_argument("--processes", type=at_least(1), default=2, help="(default: %(default)s)")
+    parser.add_argument("--n", type=PositiveInt, default=127, help="demonstrations of each (default: %(default)s)")
+    parser.add_argument("--runs", type=PositiveInt, default=4, help="SAGG-RIAC learners (default: %(default)s)")
+    parser.add_argument("--movements", type=PositiveInt, default=5000, help="of each learner (default: %(default)s)")
+    parser.add_argument("--seed", type=NonNegativeInt, default=4000, help="of the first learner (default: %(default)s)")
+    parser.add_argument("--processes", type=PositiveInt, default=2, help="(default: %(default)s)")
     options = parser.parse_args()
     if not options.out.is_dir() or not os.access(options.out, os.W_OK):
         parser.error(f"--out must be a folder that exists and may be written, got {options.out}")

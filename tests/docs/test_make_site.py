@@ -19,7 +19,7 @@ def test_pages_lie_as_in_the_repository_with_the_files_that_they_link_to(copied)
         "README.md",
         "docs/own-robot.md",
         "results/RESULTS.md",
-        "results/paper.csv",
+        "results/results.csv",
         "results/figures/errors.png",
         "LICENSE",
     ):

@@ -1,28 +1,24 @@
 """The comparison with tiny variants, in real processes: what is run, what is collected, what happens when runs fail."""
 
-import csv
 import re
-import signal
-import time
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from compare import collect, compared, last_rows, main, runs_of, table_in
-from read_results import GOALS_HEADER, HEADER, read_goals, read_results
-from runs import ROOT, signal_after, start, sweep_here
+from compare import collect, compared, last_rows, main, runs_of
+from made_up import row, write
+from runs import ROOT, start, sweep_here
 from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.evaluation import Benchmark
-from sgimd_torch.files import locked
 from sgimd_torch.runs.command_line import parse
 from sgimd_torch.runs.config import Config, words
 from sgimd_torch.record import RunError
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import Run, read_run
-from tables import RESULTS, Table, goal_rows, goals_claimed, result_rows, tiles_reached
-from variants import ARMS, EXPERIMENTS, make_subsets, shipped, tables_of, teacher_of
+from table import ERROR, goal_rows, goals_claimed, merge, read_table, result_rows, tiles_reached
+from variants import EXPERIMENTS, make_subsets, shipped, teacher_of
 
 # Two variants that live for 40 movements, and one, of an experiment of its own, whose demonstrations are missing.
 TINY = """
@@ -61,77 +57,55 @@ def ended(process):
     return process.returncode, said, errors
 
 
-def table(path):
-    with path.open(newline="") as file:
-        header, *rows = csv.reader(file)
-    return tuple(header), rows
+ANSWERS = {"random": ["linear", "process"], "sgim-d-large": ["linear", "process"]}  # `process` is their own
+WHOLE = [(name, when, answer) for name in ANSWERS for when in (20, 40) for answer in ANSWERS[name]]
 
 
-def keys_of(path, name="paper.csv"):
-    """(variant, movements) of each run's own answers; the others have a row for each of them, too."""
-    rows = table(path / "results" / name)[1]
-    own, *others = ([(row[1], int(row[5])) for row in rows if row[6] == each] for each in ANSWERS)
-    assert others == [own, own, own]
-    assert 4 * len(own) == len(rows)
-    return own
-
-
-ANSWERS = ("own", "nearest", "linear", "process")  # of runs without a forward model
-WHOLE = [("random", 20), ("random", 40), ("sgim-d-large", 20), ("sgim-d-large", 40)]
+def rows_of(path):
+    return [*read_table(path / "results")[["variant", "movements", "answer"]].itertuples(index=False, name=None)]
 
 
 def test_each_evaluation_is_a_row_the_failed_are_reported_and_a_second_start_does_nothing(compare, tmp_path):
     code, _, errors = ended(compare("learners", "large-space", "broken"))
     assert code == 1
-    assert sorted(keys_of(tmp_path)) == WHOLE
+    assert sorted(rows_of(tmp_path)) == WHOLE
     assert "untaught seed 0 failed: demonstrations: there is no file nowhere.npz" in errors
     assert "2 runs ended well, 1 failed" in errors
     assert "Traceback" not in errors
-    header, rows = table(tmp_path / "results/paper.csv")
-    assert header == HEADER
-    for variant, experiment, teacher, space in (
-        ("random", "learners", "", "1.0"),
-        ("sgim-d-large", "large-space", "3", "100.0"),
-    ):
-        run = read_run(tmp_path / "runs" / variant / "seed-000")
-        for answer in ANSWERS:
-            theirs = [row for row in rows if row[1] == variant and row[6] == answer]
-            assert [row[:5] for row in theirs] == 2 * [[experiment, variant, teacher, space, "0"]]
-            assert [float(row[7]) for row in theirs] == run.answers[answer]["mean_error_m"].tolist()
-            assert [row[8] for row in theirs] == ["", ""]  # the noise floor is measured at 5000 only
-            assert [int(row[11]) for row in theirs] == run.answers[answer]["goals_met"].tolist()
-    run = read_run(tmp_path / "runs/sgim-d-large/seed-000")
-    header, rows = table(tmp_path / "results/goals.csv")
-    assert header == GOALS_HEADER
-    assert rows == [["sgim-d-large", "0", str(len(run.chosen_goals())), "0"]]  # of 40000 m², 7 are near
-    assert set(read_results(tmp_path / "results/paper.csv")) == {"random", "sgim-d-large"}
-    assert read_goals(tmp_path / "results/goals.csv")["sgim-d-large"].shape == (1, 2)
+    table = read_table(tmp_path / "results")
+    for variant, teacher, space in (("random", "", 1.0), ("sgim-d-large", "3", 100.0)):
+        run, theirs = read_run(tmp_path / "runs" / variant / "seed-000"), table[table.variant == variant]
+        assert ({*theirs.teacher}, {*theirs.task_space}, {*theirs.environment}) == ({teacher}, {space}, {"fishing-rod"})
+        for answer, own in (("linear", 0), ("process", 1)):
+            found, at = theirs[theirs.answer == answer], run.answers["own" if own else answer]
+            assert [*found.own] == [own] * 2
+            assert [*found.error] == at[ERROR].tolist()
+            assert [*found.met] == at["goals_met"].tolist()
+            assert found.floor.isna().all()  # the noise floor is measured at 5000 only
+    (goals,) = read_table(tmp_path / "results", "goals.csv").to_dict("records")
+    n_goals = len(read_run(tmp_path / "runs/sgim-d-large/seed-000").chosen_goals())
+    assert goals == {"variant": "sgim-d-large", "seed": 0, "n_goals": n_goals, "n_near": 0}  # of 40000 m², 7 are near
 
-    files = [*tmp_path.glob("runs/*/*/e*.csv"), *tmp_path.glob("results/*")]
-    contents = [path.read_bytes() for path in files]
+    contents = [path.read_bytes() for path in tmp_path.glob("results/*.csv")]
     code, _, errors = ended(compare("learners", "large-space"))
     assert code == 0
     assert "2 runs, 2 of them in" in errors
     assert "nothing is left to run: --verify 10 makes ten of these rows again" in errors
-    assert [path.read_bytes() for path in files] == contents
+    assert [path.read_bytes() for path in tmp_path.glob("results/*.csv")] == contents
 
 
-def test_a_variant_of_two_experiments_is_one_run_in_the_table_of_each(compare, tmp_path):
+def test_a_variant_of_two_experiments_is_one_run_with_rows_for_each(compare, tmp_path):
     code, _, errors = ended(compare("learners", "forward-model", "planar-arm-7"))
     assert code == 0, errors
-    assert {path.name for path in (tmp_path / "results").glob("*.csv")} == {"paper.csv", "forward_model.csv"}
-    run, arm = (read_run(tmp_path / "runs" / name / "seed-000") for name in ("random", "sgim-d-arm-7"))
-    header, rows = table(tmp_path / "results/forward_model.csv")
-    assert header == HEADER
-    for experiment, teacher, theirs in (("forward-model", "", run), ("planar-arm-7", "structured", arm)):
-        variant, errors_m = theirs.path.parent.name, theirs.evaluation["mean_error_m"].tolist()
-        run_0 = [experiment, variant, teacher, "1.0", "0"]
-        wanted = [[*run_0, str(20 * k), "own", str(errors_m[k - 1]), ""] for k in (1, 2)]
-        assert [row[:9] for row in rows if row[1] == variant and row[6] == "own"] == wanted
-    tiles = [int(row[9]) for row in rows if row[1] == "sgim-d-arm-7"]
-    assert 0 < tiles[0] <= tiles[1] <= 40  # at most one a movement
-    again = table(tmp_path / "results/paper.csv")[1]
-    assert again == [["learners", *row[1:]] for row in rows if row[1] == "random"]
+    table = read_table(tmp_path / "results")
+    assert {*table.experiment} == {"learners", "forward-model", "planar-arm-7"}
+    first, second = (
+        table[table.experiment == each].drop(columns="experiment") for each in ("learners", "forward-model")
+    )
+    assert first.to_csv(index=False) == second.to_csv(index=False)
+    arm = table[table.experiment == "planar-arm-7"]
+    assert {*arm.teacher} == {"structured"}
+    assert (arm.tiles <= 40).all()  # at most one a movement
 
 
 def test_shards_share_out_the_runs_and_one_of_two_experiments_stays_together(tmp_path, monkeypatch, capsys):
@@ -147,76 +121,36 @@ def test_shards_share_out_the_runs_and_one_of_two_experiments_stays_together(tmp
     assert len(set.union(*runs)) == sum(map(len, runs)) < len(whole)
 
 
-def test_what_is_in_one_table_is_still_to_be_done_for_the_other(tmp_path, monkeypatch, capsys):
-    rows = [["learners", "sgim-d", 3, 1.0, 0, 5000, answer, 0.1, "", 7, "", ""] for answer in ANSWERS]
-    Table(tmp_path / "paper.csv", *RESULTS).merge(rows)
-    monkeypatch.chdir(tmp_path)
-    assert (
-        command(main, ["learners", "forward-model", "--only", "sgim-d", "--seeds", "0", "--dry-run", "--results", "."])
-        == 0
+def test_rows_of_one_experiment_are_still_to_be_made_for_the_other(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(
+        write(tmp_path, [row("learners", "sgim-d", 0, 5000, each, 0.1) for each in ("linear", "process")])
     )
+    words = ["learners", "forward-model", "--only", "sgim-d", "--seeds", "0", "--dry-run", "--results", "."]
+    assert command(main, words) == 0
     said = capsys.readouterr()
     assert said.out == "forward-model: sgim-d seed 0\n"
-    assert "2 runs, 1 of them in paper.csv and forward_model.csv already" in said.err
-
-
-def test_after_ctrl_c_it_goes_on(compare, tmp_path):
-    log = tmp_path / "runs/long-life/seed-000/episodes.csv"
-    code, errors = signal_after(compare("long", "learners"), log, 5, signal.SIGINT)
-    assert code == 130, errors
-    assert "the same command goes on from here" in errors
-    assert "Traceback" not in errors
-    assert not locked(log.parent / "lock")
-    lived = log.read_bytes()
-    assert 0 < lived.count(b"\n") < 601
-    code, _, errors = ended(compare("long", "learners"))
-    assert code == 0, errors
-    assert log.read_bytes().startswith(lived)
-    assert sorted(keys_of(tmp_path)) == [("long-life", 20), ("long-life", 600), ("random", 20), ("random", 40)]
-
-
-def test_killed_it_leaves_a_run_that_the_next_start_waits_for_and_collects_once(compare, tmp_path):
-    log = tmp_path / "runs/long-life/seed-000/episodes.csv"
-    first = compare("long", "--processes", 1)
-    while first.poll() is None and not (log.exists() and log.read_bytes().count(b"\n") >= 5):
-        time.sleep(0.01)
-    first.kill()
-    ended(first)
-    assert locked(log.parent / "lock")
-    code, _, errors = ended(compare("long"))
-    assert code == 0, errors
-    assert "long-life seed 0: waiting for another process" in errors
-    assert keys_of(tmp_path) == [("long-life", 20), ("long-life", 600)]
+    assert "2 runs, 1 of them in results.csv already" in said.err
 
 
 def test_a_run_that_lost_its_rows_is_collected_again_and_no_goal_is_counted_twice(go, benchmark, tmp_path):
     name = "sgim-d-large"
     config = Config("sgim-d", seed=3, movements=30, name=name, task_space=100.0, benchmark=benchmark, out=tmp_path)
     assert go(tmp_path, "--movements", 30, "--evaluate_at", "20", "--name", name, "--task_space", 100) == 0
-    paths = [tmp_path / "paper.csv", tmp_path / "goals.csv"]
+    paths = [tmp_path / "results.csv", tmp_path / "goals.csv"]
 
     def collected():
-        known = last_rows(config) <= Table(paths[0], *RESULTS).rows().keys()
+        known = {*read_table(tmp_path).iloc[:, :5].itertuples(index=False, name=None)}
+        before = last_rows("large-space", config) <= known
         collect("large-space", config, tmp_path)
-        return known
+        return before
 
     assert not collected()
     whole = [path.read_bytes() for path in paths]
     assert collected()
     assert [path.read_bytes() for path in paths] == whole
-    paths[0].write_bytes(whole[0][: whole[0].rindex(b"sgim-d-large") + 5])  # an earlier version was killed as it wrote
+    paths[0].unlink()
     assert not collected()
     assert [path.read_bytes() for path in paths] == whole
-
-
-def test_a_run_that_is_whole_on_disk_is_collected_without_being_run_again(compare, tmp_path):
-    assert ended(compare("learners"))[0] == 0
-    run, results = tmp_path / "runs/random/seed-000", tmp_path / "results/paper.csv"
-    whole, before = results.read_bytes(), {path: path.stat().st_mtime_ns for path in run.iterdir()}
-    results.unlink()
-    assert ended(compare("learners"))[0] == 0
-    assert results.read_bytes() == whole
-    assert {path: path.stat().st_mtime_ns for path in run.iterdir()} == before
 
 
 def test_a_run_that_ended_without_its_last_evaluation_is_no_result(go, benchmark, tmp_path):
@@ -238,29 +172,24 @@ def test_looking_at_what_is_to_be_done_writes_nothing(tmp_path, monkeypatch, cap
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["learnres"], "unknown experiment 'learnres'; did you mean learners? Known are learners, "),
-        (["grid"], "grid is a variant, of ablations; write ablations --only grid"),
-        (["ablations", "--only", "gird"], "unknown variant 'gird'; did you mean grid?"),
-        (["learners", "--only", "grid"], "grid is a variant of ablations, you named learners"),
-        (["sgim-d"], "sgim-d is a variant, of learners and forward-model; write learners --only sgim-d"),
-        (
-            ["long", "--only", "sgim-d"],
-            "sgim-d is a variant of learners and forward-model, you named long",
-        ),
-        (["--only", "grid", "ablations"], "ablations is an experiment, no variant; experiments go before --only"),
+        (["learnres"], "learnres.*learners"),
+        (["grid"], "grid is a variant of ablations; write ablations --only grid"),
+        (["ablations", "--only", "gird"], "gird.*grid"),
+        (["learners", "--only", "grid"], "grid is a variant of ablations"),
+        (["--only", "grid", "ablations"], "ablations is an experiment"),
         (["--seeds", ""], "--seeds: must be like 5, 0-19 or 0,3,7-9, got ''"),
         (["--seeds=-1"], "--seeds: must be like 5, 0-19 or 0,3,7-9, got '-1'"),
         (["--processes", "0"], "--processes: must be a whole number of at least 1, got '0'"),
         (["--out", "file/runs"], "file/runs/demonstrations cannot be made: file is no folder"),
         (["--results", "file"], "file cannot be made: file is no folder"),
-        (["--results", "foreign"], "foreign/paper.csv must begin with experiment,variant"),
+        (["--results", "foreign"], "foreign/results.csv.*must begin with experiment,variant"),
     ],
 )
 def test_impossible_requests_are_refused_with_their_reason(tmp_path, monkeypatch, capsys, options, message):
     monkeypatch.chdir(tmp_path)
     Path("file").write_text("")
     Path("foreign").mkdir()
-    Path("foreign/paper.csv").write_text("my,thesis\n")
+    Path("foreign/results.csv").write_text("my,thesis\n")
     before = sorted(tmp_path.rglob("*"))
     assert command(main, options) == 2
     said = capsys.readouterr().err
@@ -276,16 +205,15 @@ def test_a_run_that_cannot_start_fails_alone(compare, tmp_path):
     code, _, errors = ended(compare("learners", "planar-arm-7"))
     assert code == 1
     assert re.search("random seed 0 failed: .*random is no folder", errors)
-    assert keys_of(tmp_path, "forward_model.csv") == [("sgim-d-arm-7", 20), ("sgim-d-arm-7", 40)]
+    assert {name for name, *_ in rows_of(tmp_path)} == {"sgim-d-arm-7"}
 
 
 def test_every_variant_is_a_valid_run_with_its_own_name_in_its_table(tmp_path):
     wanted = runs_of(list(EXPERIMENTS), [], range(1), tmp_path)
-    assert len({(tables_of(name)[0], *sorted(last_rows(config))) for name, config in wanted}) == len(wanted)
+    assert len({tuple(sorted(last_rows(name, config))) for name, config in wanted}) == len(wanted)
     assert not [note for _, config in wanted for note in config.without_effect if "--budget" in note]
     configs = {config.directory: config for _, config in wanted}
     assert all(config == configs[config.directory] for _, config in wanted)  # one directory, one run
-    assert {name for name, _ in wanted if tables_of(name)[0] == "forward_model.csv"} == {"forward-model", *ARMS}
     for _, config in wanted:
         assert parse(words(vars(config)))[0] == config
 
@@ -296,10 +224,10 @@ def test_without_seeds_each_experiment_has_those_that_its_shipped_rows_are_of(tm
         wanted.setdefault((name, config.variant), []).append(config.seed)
     assert wanted["learners", "sgim-d"] == wanted["forward-model", "sgim-d"] == [*range(100, 120)]
     assert wanted["forward-model", "model-5"] == [*range(100, 110)]
-    tables = {tables_of(name)[0] for name in EXPERIMENTS}
-    rows = [row for name in tables for row in table(ROOT / "results" / name)[1]]
-    assert {row[0] for row in rows} == {*EXPERIMENTS}
-    assert not [row for row in rows if int(row[4]) not in wanted[row[0], row[1]]]
+    table = read_table(ROOT / "results")
+    assert {*table.experiment} == {*EXPERIMENTS}
+    runs = {*table[["experiment", "variant", "seed"]].itertuples(index=False, name=None)}
+    assert runs == {(*names, seed) for names, seeds in wanted.items() for seed in seeds}
 
 
 def test_teachers_have_the_number_of_the_demonstrator_or_the_name_of_the_file(tmp_path):
@@ -379,38 +307,32 @@ def test_a_goal_counts_once_imitation_and_rest_not_at_all_and_near_is_within_a_m
     origins = ["babble", "local", "global", "imitate", "imitate", "local", "local", "local", ""]
     run = run_with(origins, [none, near, near, shown, shown, edge, far, near, none])
     np.testing.assert_array_equal(run.chosen_goals(), [near, edge, far, near])
-    assert goal_rows(Config(name="sgim-d-large", seed=7), run) == [["sgim-d-large", 7, 4, 3]]
+    assert goal_rows(Config(name="sgim-d-large", seed=7), run) == [
+        {"variant": "sgim-d-large", "seed": 7, "n_goals": 4, "n_near": 3}
+    ]
     assert goal_rows(Config(name="random", seed=7), run_with(["babble"], [none])) == []
 
 
 def test_rows_made_again_are_equal_but_for_rounding_or_differ():
-    row = ["learners", "sgim-d", "3", "1.0", "0", "5000", "own", "0.0426", "", "342"]
-    assert compared(row, list(row)) == "equal"
-    assert compared(row, [*row[:7], "0.04260000000001", "", "342"]) == "rounding"
-    for other in (
-        [*row[:7], "0.0427", "", "342"],
-        [*row[:7], "0.0426", "0.03", "342"],
-        [*row[:7], "0.0426", "", "343"],
-        [*row[:5], "4000", *row[6:]],
-        [*row[:6], "linear", *row[7:]],
-        [],
-    ):
-        assert compared(row, other) == "DIFFERS"
+    shipped_row = row("learners", "sgim-d", 0, 5000, "process", 0.0426, tiles=342)
+    assert compared(shipped_row, dict(shipped_row)) == "equal"
+    assert compared(shipped_row, {**shipped_row, "error": 0.04260000000001}) == "rounding"
+    changes = [{"error": 0.0427}, {"floor": 0.03}, {"tiles": 343}, {"movements": 4000}, {"answer": "linear"}]
+    for now in (*({**shipped_row, **change} for change in changes), {}):
+        assert compared(shipped_row, now) == "DIFFERS"
 
 
 def test_rows_are_drawn_by_lot_and_made_again_in_a_folder_of_their_own(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    results = table_in(tmp_path, "forward_model.csv")
     config = Config(algorithm="sgim-d", environment="planar-arm-7", name="sgim-d-arm-7", movements=20)
-    again = replace(config, evaluate_at=(20,), floor_at=(), answers=("own", "nearest"), out=tmp_path / "first")
+    again = replace(config, evaluate_at=(20,), floor_at=(), answers=("own", "linear"), out=tmp_path / "first")
     assert sweep_here([again]) == []
-    _, row = result_rows("planar-arm-7", again, read_run(again.directory))
-    results.merge([row, [*row[:4], 1, 20, "nearest", 0.5, "", 7, 7, 7]])
+    made = result_rows("planar-arm-7", again, read_run(again.directory))
+    merge(tmp_path, "results.csv", [made[-1], {**made[-1], "seed": 1, "error": 0.5}])
     words = ["planar-arm-7", "--only", "sgim-d-arm-7", "--seeds", "0-1", "--results", ".", "--processes", "1"]
     code = command(main, [*words, "--verify", "2"])
     said = capsys.readouterr()
-    lines = sorted(said.out.splitlines())
     assert code == 1
-    assert [line.split()[0] for line in lines] == ["DIFFERS", "equal"]  # the second row was made up
+    assert sorted(line.split()[0] for line in said.out.splitlines()) == ["DIFFERS", "equal"]  # the second was made up
     assert "1 equal, 0 equal but for rounding" in said.err
     assert {path.name for path in (tmp_path / "runs").iterdir()} == {"demonstrations", "verify-0"}

@@ -81,7 +81,7 @@ def test_the_table_tells_error_coverage_refinements_and_refreshes(honest, tmp_pa
     (told,) = table_of(tmp_path / "out")
     assert told["run"] == "sgim-d/seed-000"
     assert told["predicted"] == 3000 - FIRST
-    assert told["error_m"] == pytest.approx(SPREAD * math.sqrt(math.pi / 2), rel=0.07)  # Rayleigh, 4 standard errors
+    assert told["error"] == pytest.approx(SPREAD * math.sqrt(math.pi / 2), rel=0.07)  # Rayleigh, 4 standard errors
     for level in (50, 80, 95):  # 4 standard errors of a share of 1000
         assert told[f"inside_{level}_last"] == pytest.approx(level / 100, abs=0.064)
         assert told[f"inside_{level}_late"] == pytest.approx(level / 100, abs=0.064)

@@ -25,7 +25,7 @@ from sgimd_torch.views.film import command as film
 from sgimd_torch.views.memories import remember
 from sgimd_torch.views.report import command as report
 from sgimd_torch.views.report.data import demonstrated, read_life
-from tables import tiles_reached
+from table import tiles_reached
 
 NO_CONTEXT = np.empty(0)
 ALGORITHMS = CATALOGUE["algorithm"]

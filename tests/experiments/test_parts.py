@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-import by_hand
+import parts
 from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.environments.fishing_rod import JOINT_RANGES
 from sgimd_torch.spaces import Demonstration, stream
@@ -11,14 +11,14 @@ from sgimd_torch.spaces import Demonstration, stream
 
 @pytest.fixture(scope="module")
 def lessons():
-    return by_hand.lessons_of_a_script()
+    return parts.lessons_of_a_script()
 
 
 def test_a_sweep_goes_around_the_base_and_ends_near_the_place_that_was_meant():
     tip, end = np.array([0.0, 0.43, 0.85]), np.array([-0.5, -0.3, 0.5])
-    hand = by_hand.sweep(tip, end, stream(0, "hand"))
+    hand = parts.sweep(tip, end, stream(0, "hand"))
     np.testing.assert_array_equal(hand[0], tip)
-    assert np.linalg.norm(hand[-1] - end) < 4 * by_hand.BESIDE * np.sqrt(3)
+    assert np.linalg.norm(hand[-1] - end) < 4 * parts.BESIDE * np.sqrt(3)
     away = np.linalg.norm(hand[:, :2], axis=1)
     assert away.min() > 0.2  # the straight way would pass the base at .14 m
     speed = np.linalg.norm(np.diff(hand, axis=0), axis=1)
@@ -42,17 +42,17 @@ def test_lessons_land_on_all_sides_and_none_twice_in_one_place(lessons):
 
 
 def test_the_same_lessons_are_made_again(lessons, tmp_path, capsys):
-    by_hand.main(["--out", str(tmp_path / "again.npz")])
+    parts.main(["--out", str(tmp_path / "again.npz")])
     for lesson, again in zip(lessons, load_demonstrations(tmp_path / "again.npz"), strict=True):
         np.testing.assert_array_equal(again.trajectory, lesson.demonstration.trajectory)
         np.testing.assert_array_equal(again.outcome, lesson.demonstration.outcome)
     said = capsys.readouterr().out.splitlines()
-    assert len(said) == 1 + 10 + 1
-    assert said[-1].startswith("jerk: ")
+    assert len(said) == 10 + 2
+    assert said[-1].startswith("jerk, shipped: ")
 
 
 def test_jerk_is_that_of_a_cubic():
     """The third derivative of 2 t^3 is 12; of two joints one does not move."""
     times = np.arange(51) / 50
     cubic = Demonstration(np.zeros(0), times, np.stack([2 * times**3, 0 * times], axis=1), np.zeros(2))
-    assert by_hand.jerk(cubic) == pytest.approx(12 / np.sqrt(2))
+    assert parts.jerk(cubic) == pytest.approx(12 / np.sqrt(2))
