@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sgimd_torch.environments.toys import toss
-from sgimd_torch.runs.tasks import Task, toy_benchmark
+from sgimd_torch.runs.tasks import Task
+from sgimd_torch.runs.tasks.robots import toy_benchmark
 from sgimd_torch.spaces import Array, Box
 
 

@@ -178,13 +178,13 @@ def runs_of(
                     "seed": seed,
                     "out": out,
                     "name": variant,
-                    "answers": ANSWERS,
+                    "evaluated_by": ANSWERS,
                     "floor_at": FLOOR_AT if experiment in FLOORS else (),
                     **line,
                 }
                 if run.get("demonstrations") in MADE:
                     run["demonstrations"] = out / "demonstrations" / run["demonstrations"]
-                found.append((experiment, Config(**run)))
+                found.append((experiment, Config.from_settings(run)))
     return found
 
 

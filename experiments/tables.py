@@ -103,15 +103,16 @@ class Table:
 
 def result_rows(experiment: str, config: Config, run: Run) -> list[list[object]]:
     """A row of ``RESULTS`` for each evaluation of a finished run and each of its answers."""
-    benchmark, low = _benchmark(config.environment, config.benchmark)
-    corner = CORNER if config.environment in (ROD, *ARMS) else low
+    benchmark, low = _benchmark(config["environment"], config.benchmark)
+    corner = CORNER if config["environment"] in (ROD, *ARMS) else low
     columns = ("movements", "mean_error_m", "noise_floor_m", "goals_met")
     found = {
         (int(movements), answer): (float(error), float(floor), float(met))
         for answer, each in run.answers.items()
         for movements, error, floor, met in zip(*(each[name] for name in columns), strict=True)
     }
-    first = (experiment, config.variant, teacher_of(config), config.task_space, config.seed)
+    space = config.values.get("environment.task_space", 1.0)
+    first = (experiment, config.variant, teacher_of(config), space, config.seed)
     rows: list[list[object]] = []
     for movements in run.evaluation["movements"].tolist():
         landed = run.outcomes[:movements]
@@ -132,13 +133,13 @@ def goal_rows(config: Config, run: Run) -> list[list[object]]:
 
 def asked_rows(config: Config, run: Run) -> list[list[object]]:
     """A row for each teacher that could be asked: how often, and where; none for a learner that does not ask."""
-    if "teachers" not in config.used:
+    if "teachers" not in config:
         return []
     task = task_of(config)
     dim, contexts = task.environment.contexts.dim, task.environment.contexts
     asked = run.requests or {"teacher": np.empty(0, dtype=np.str_)}
     rows: list[list[object]] = []
-    for teacher in config.teachers:
+    for teacher in config["teachers"]:
         mine = asked["teacher"] == teacher
         if not mine.any():
             rows.append([config.variant, config.seed, teacher, 0, 0, 0, 0, 0, 0])
@@ -202,7 +203,7 @@ def goals_claimed(outcomes: Array, benchmark: Benchmark) -> int:
 @cache
 def _benchmark(environment: str, path: Path | None) -> tuple[Benchmark, Array]:
     """With the lower corner of T."""
-    task = task_of(Config(environment=environment))
+    task = task_of(Config(parts={"environment": environment}))
     return benchmark_of(task, path)[0], task.environment.outcomes.low
 
 

@@ -99,7 +99,6 @@ RIVALS: Final = {
         map_elites, EVERY_30, one_by_one(first=(10, 300), batch=(30,), cells=(10,), imitations=(3, 20))
     ),
     "isoline": Rival(isoline, NOBODY, [*_ELITES, *one_by_one(sd=(0.01, 0.05), line=(0.1, 0.4))[1:]]),
-    "isoline-again": Rival(isoline, NOBODY, [{"again": share} for share in (0.1, 0.2, 0.4)]),
     "isoline-demonstrations": Rival(isoline, EVERY_30, one_by_one(sd=(0.01, 0.05), first=(10,), imitations=(3, 20))),
     "random-goals-demonstrations": Rival(baseline, EVERY_30, one_by_one(sd=(0.02, 0.1), budget=(1, 2, 4, 8, 30))),
 }
@@ -119,7 +118,10 @@ def errors_of(
     for episode in run(learner, rod, seed, movements=max(times), teacher=teacher):
         if episode.index + 1 in times:
             judged = (rod, benchmark.goals, seed, episode.index + 1)
-            linear, process = LocallyLinear(learner.memory), LocalProcess(learner.memory, noise=rod.outcome_noise)
+            linear, process = (
+                LocallyLinear(learner.memory),
+                LocalProcess(learner.memory, outcome_noise=rod.outcome_noise),
+            )
             linear_error, process_error = (evaluate(each, *judged, repeats=0).mean_error for each in (linear, process))
             found.append((linear_error, process_error))
     return found

@@ -32,6 +32,7 @@ from sgimd_torch.catalogue import CATALOGUE, ROD
 from sgimd_torch.runs import command_line
 from sgimd_torch.runs.board import RunBoard
 from sgimd_torch.runs.build import build
+from sgimd_torch.runs.chosen import part_of
 from sgimd_torch.runs.config import Config
 from sgimd_torch.session import live, run
 from sgimd_torch.spaces import Array, Estimate
@@ -119,7 +120,8 @@ def model(options: argparse.Namespace) -> int:
 
 def measure(search: str, movements: int, seed: int, steps: float) -> tuple[float, float, float, float]:
     """Seconds of physics, training and searching, and of answering a goal."""
-    parts = build(Config(search=search, inverse="model", movements=movements, seed=seed, training=steps))
+    chosen = {"search": search, "inverse": "model", "model.rate": steps}
+    parts = build(Config(movements=movements, seed=seed, parts=chosen))
     physics, training, searching, answering = Clock(), Clock(), Clock(), Clock()
     autonomous, model, memory = parts.learner.autonomous, parts.model, parts.learner.memory
     assert isinstance(autonomous, GoalBabbling)
@@ -136,7 +138,7 @@ def measure(search: str, movements: int, seed: int, steps: float) -> tuple[float
 
 def searches() -> list[str]:
     """The searches through the model."""
-    return [word for word, entry in CATALOGUE["search"].items() if "model" in entry.uses.values()]
+    return [word for word in CATALOGUE["search"] if "model" in part_of("search", "search", word).takes]
 
 
 def main() -> int:
@@ -152,7 +154,10 @@ def main() -> int:
             command.add_argument("--environment", default=ROD, help="of the run (%(default)s)")
         else:
             command.add_argument(
-                "--training", type=float, default=Config.training, help="steps a movement (%(default)g)"
+                "--training",
+                type=float,
+                default=Config(parts={"inverse": "model"})["model.rate"],
+                help="steps a movement (%(default)g)",
             )
             command.add_argument("--search", choices=searches(), help="only this one and the simplex")
     options = parser.parse_args()

@@ -96,7 +96,9 @@ def test_which_movement_reaches_a_goal_is_one_call_for_all_of_them(name):
     found = evaluate(learner.inverse, arm, goal[None], seed=2, movements=60)
     context = found.contexts[0]
     assert arm.policies.contains(learner.inverse(context, goal).theta)
-    assert np.array_equal(found.thetas[0], LocalProcess(learner.memory, noise=arm.outcome_noise)(context, goal).theta)
+    assert np.array_equal(
+        found.thetas[0], LocalProcess(learner.memory, outcome_noise=arm.outcome_noise)(context, goal).theta
+    )
 
 
 def test_the_builders_inverse_is_the_one_that_it_is_given():

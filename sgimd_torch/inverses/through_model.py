@@ -43,6 +43,8 @@ class ModelInverse:
         ValueError: a number out of its range, or a model of other dimensions.
     """
 
+    learns_with = LocallyLinear  # the inverse of a learner whose evaluations are answered by this one
+
     def __init__(
         self,
         memory: Memory,

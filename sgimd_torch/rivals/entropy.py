@@ -3,28 +3,27 @@
 After Kulak & Calinon (2023), "Combining social and intrinsically-motivated learning for multi-task robot skill
 acquisition": the expected epistemic entropy over goals, and how much each mode should reduce it; a demonstration is
 asked for where the epistemic entropy is greatest.
-    learner = sgim_eer(environment, seed, correspondence=..., teachers={"ann": ann})              # by a process
-    learner = sgim_eer(environment, seed, correspondence=..., teachers={"ann": ann}, doubt=ByMixture)
+    learner = sgim_eer(environment, seed, correspondence=..., teachers={"ann": ann})
 Ours: what is known of the policy for a goal is linear in features of the goal, so that reductions have a closed form;
 and where a movement of one's own would land is told by the earlier attempt that was nearest.
 """
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import partial
-from typing import Any, Final, Unpack
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sgimd_torch.algorithms import Correspondence, Parts, start_memory
+from sgimd_torch.algorithms import Correspondence, MakeInverse, start_memory
 from sgimd_torch.algorithms.asking import MakeBase, imitating_only, practised, strategic
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.goals.protocol import check_attempt, check_in
 from sgimd_torch.goals.strategic import AUTONOMOUS
 from sgimd_torch.inverses.gaussian_process import Kernel, one_thread, squared_distances
+from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Learner
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, Box
@@ -36,54 +35,25 @@ _NOISE: Final = 0.1  # variance of what one exemplar says, in units of the doubt
 _LENGTH: Final = 0.1  # of the sides of C x T: how far an exemplar says something
 _KERNEL: Final = Kernel(1 / _LENGTH, 1.0, 0.0, _NOISE)
 
-Doubt = Callable[[Array, Array], Array]
-"""(known, points): exemplars ``(n, dim)`` and points ``(m, dim)`` of C x T in its sides -> ``(m, m)`` covariances of
-the policies for the points, given the exemplars. 1 on the diagonal: nothing is known."""
 
+@one_thread
+def doubt(known: Array, points: Array) -> Array:
+    """What is not known about the policies for points, by a Gaussian process from outcomes to policies.
 
-class ByProcess:
-    """The doubt of a Gaussian process from outcomes to policies."""
+    Deviation: Kulak & Calinon take a Bayesian mixture of Gaussians.
 
-    @one_thread
-    def __call__(self, known: Array, points: Array) -> Array:
-        """See ``Doubt``."""
-        known = _thinned(known)
-        across = _KERNEL(squared_distances(points, known))
-        inner = _KERNEL(squared_distances(known, known)) + _NOISE * np.eye(len(known))
-        found: Array = _KERNEL(squared_distances(points, points)) - across @ np.linalg.solve(inner, across.T)
-        return found
+    Args:
+        known: ``(n, dim)`` exemplars, in sides of C x T.
+        points: ``(m, dim)``.
 
-
-class ByMixture:
-    """The doubt of a Bayesian mixture of Gaussians, scikit-learn's (extra rivals): the policy of a component is known
-    the better, the more exemplars the component has; far from all of them nothing is known. It is fitted anew when
-    there are a tenth more exemplars."""
-
-    def __init__(self, components: int = 20) -> None:
-        self.components, self._fitted = components, 0
-        self._mixture: Any = None
-
-    def __call__(self, known: Array, points: Array) -> Array:
-        """See ``Doubt``."""
-        prior = _KERNEL(squared_distances(points, points))
-        if len(known) < 2 * self.components:
-            return prior
-        if len(known) >= 1.1 * self._fitted:
-            from sklearn.mixture import BayesianGaussianMixture
-
-            self._fitted = len(known)
-            self._mixture = BayesianGaussianMixture(n_components=self.components, random_state=0, reg_covar=_LENGTH**2)
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # that it has not converged
-                self._mixture.fit(_thinned(known))
-        mixture = self._mixture
-        apart = points[:, None] - mixture.means_  # (m, components, dim)
-        squared = np.einsum("mki,kij,mkj->mk", apart, mixture.precisions_, apart).min(axis=1)
-        within = np.exp(-squared / 2)
-        features = mixture.predict_proba(points) * np.sqrt(within)[:, None]
-        outside = np.sqrt(1 - within)
-        found: Array = (features / mixture.mean_precision_) @ features.T + np.outer(outside, outside) * prior
-        return found
+    Returns:
+        ``(m, m)`` covariances, given the exemplars. 1 on the diagonal: nothing is known.
+    """
+    known = _thinned(known)
+    across = _KERNEL(squared_distances(points, known))
+    inner = _KERNEL(squared_distances(known, known)) + _NOISE * np.eye(len(known))
+    found: Array = _KERNEL(squared_distances(points, points)) - across @ np.linalg.solve(inner, across.T)
+    return found
 
 
 class EntropyGoals:
@@ -92,11 +62,10 @@ class EntropyGoals:
     Args:
         contexts, outcomes, rng: as in `InterestMap`.
         memory: of the learner; only read.
-        doubt: what is not known about the policies for goals.
     """
 
-    def __init__(self, contexts: Box, outcomes: Box, rng: np.random.Generator, *, memory: Memory, doubt: Doubt) -> None:
-        self.contexts, self.outcomes, self.memory, self.doubt, self._rng = contexts, outcomes, memory, doubt, rng
+    def __init__(self, contexts: Box, outcomes: Box, rng: np.random.Generator, *, memory: Memory) -> None:
+        self.contexts, self.outcomes, self.memory, self._rng = contexts, outcomes, memory, rng
         self._box = Box(np.concatenate((contexts.low, outcomes.low)), np.concatenate((contexts.high, outcomes.high)))
         self._tried: dict[str, list[tuple[Array, Array]]] = {}  # goals, and by how much they were missed, in sides
 
@@ -111,7 +80,7 @@ class EntropyGoals:
         points = self._scaled(np.tile(context, (_GOALS, 1)), goals)
         places = [points, *(self._landing(points, name) for name in costs)]
         known = self._scaled(self.memory.contexts, self.memory.outcomes)
-        covariance = self.doubt(known, np.concatenate(places))
+        covariance = doubt(known, np.concatenate(places))
         entropies = _entropy(np.diag(covariance)[:_GOALS])
         doubtful = int(entropies.argmax())
         found = dict[str, float]()
@@ -167,19 +136,18 @@ def sgim_eer(
     teachers: Mapping[str, Demonstrator],
     cost: float = 1.0,
     base: MakeBase = practised,
-    doubt: Callable[[], Doubt] = ByProcess,
+    inverse: MakeInverse = LocalProcess,
     memory: Memory | None = None,
-    **parts: Unpack[Parts],
+    **parts: Any,
 ) -> Learner:
     """SGIM-IM with the choice of Kulak & Calinon.
 
     Args:
-        environment, seed, correspondence, teachers, cost, base, parts: as in `sgim_im`.
-        doubt: what the entropy is measured by: `ByProcess`, or `ByMixture` as in the paper.
+        environment, seed, correspondence, teachers, cost, base, inverse, parts: as in `sgim_acts`.
         memory: to start from; None for an empty one.
     """
     memory, base = start_memory(environment, memory), partial(imitating_only, base)
-    chosen: Parts = {"goals": partial(EntropyGoals, memory=memory, doubt=doubt()), **parts}
+    chosen = {"goals": partial(EntropyGoals, memory=memory), "inverse": inverse, **parts}
     return strategic(environment, seed, memory, correspondence, teachers, cost, base, **chosen)
 
 

@@ -32,21 +32,14 @@ class QualityDiversity:
             clipped, but told as it was proposed, and its effort counts. CMA-ES itself would draw again, and never end
             once its mean lies in a corner of many dimensions.
         origin: of the movements, for the log.
-        again: share of the movements that repeat elites.
         start: its exemplars are in the archive from the start; None for an empty one.
     """
 
-    def __init__(
-        self, policies: Box, scheduler: Scheduler, origin: str, again: float = 0.0, start: Memory | None = None
-    ) -> None:
-        if not 0 <= again < 1:
-            raise ValueError(f"again must lie in [0, 1), got {again}; it is a share of the movements")
+    def __init__(self, policies: Box, scheduler: Scheduler, origin: str, start: Memory | None = None) -> None:
         self.policies = policies
         self.archive = scheduler.archive
         self._scheduler = scheduler
         self._origin = origin
-        self._again = again
-        self._landed: dict[bytes, list[Array]] = {}  # outcomes of each movement, where elites are repeated
         if start is not None and len(start):
             self.add(start.thetas, start.outcomes)
         self._ask()
@@ -63,31 +56,14 @@ class QualityDiversity:
     def add(self, thetas: Array, outcomes: Array) -> None:
         """Movements ``(n, theta_dim)`` in Pi that were not its own, with their outcomes, for the archive."""
         batch = (thetas - self.policies.low) / self.policies.sides
-        self._remember(batch, outcomes)
         self.archive.add(batch, objectives_of(batch), outcomes)
 
     def _ask(self) -> None:
-        new = self._scheduler.ask()
-        n = 0 if self.archive.empty else round(len(new) * self._again / (1 - self._again))
-        repeated = [self.archive.sample_elites(n)["solution"]] if n else []
-        self._batch: Array = np.concatenate([new, *repeated])  # (n, theta_dim)
-        self._new = len(new)
+        self._batch: Array = self._scheduler.ask()  # (n, theta_dim)
         self._outcomes: list[Array] = []
 
     def _tell(self) -> None:
-        outcomes, new = np.stack(self._outcomes), slice(self._new)
-        self._remember(self._batch, outcomes)
-        self._scheduler.tell(objectives_of(self._batch[new]), outcomes[new])
-        if len(self._batch) > self._new:
-            elites = self.archive.data("solution")
-            means = np.stack([np.mean(self._landed[elite.tobytes()], axis=0) for elite in elites])
-            self.archive.clear()
-            self.archive.add(elites, objectives_of(elites), means)
-
-    def _remember(self, batch: Array, outcomes: Array) -> None:
-        if self._again:
-            for theta, outcome in zip(batch, outcomes, strict=True):
-                self._landed.setdefault(theta.tobytes(), []).append(outcome)
+        self._scheduler.tell(objectives_of(self._batch), np.stack(self._outcomes))
 
 
 class Shown:

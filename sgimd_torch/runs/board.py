@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Mapping
-from dataclasses import Field, fields
-from typing import Any, Final, Self
+from typing import Final, Self
 
 import numpy as np
 
@@ -18,7 +17,7 @@ from sgimd_torch.evaluation import Evaluation
 from sgimd_torch.runs import model_record
 from sgimd_torch.runs.build import RunParts
 from sgimd_torch.runs.clock import Seconds
-from sgimd_torch.runs.config import OWN, having
+from sgimd_torch.runs.config import LEADS, OWN
 from sgimd_torch.runs.directory import RunDirectory
 from sgimd_torch.spaces import Array, Box, Episode
 
@@ -66,8 +65,8 @@ class RunBoard:
             layout=layout_of(_places(cells, parts.benchmark.goals), near, _has(parts), charts),
             replace=True,
         )
-        settings = {field.name: _plain(field, getattr(parts.config, field.name)) for field in fields(parts.config)}
-        self._board.settings(settings, first=having("leads"))
+        settings = {name: _plain(value) for name, value in parts.config.settings.items()}
+        self._board.settings(settings, first=LEADS)
 
     def __enter__(self) -> Self:
         return self
@@ -189,12 +188,12 @@ def _has(parts: RunParts) -> set[str]:
         "goals": getattr(parts.learner.autonomous, "goals", None) is not None,
         "regions": len(parts.regions) > 0,
         "teacher": parts.teacher is not None or len(parts.teachers) > 0,
-        "imitates": (parts.teacher is not None and "epsilon" in parts.config.used) or len(parts.teachers) > 0,
+        "imitates": (parts.teacher is not None and parts.config.algorithm != "observation") or len(parts.teachers) > 0,
         "asks": len(parts.teachers) > 0,
     }
     return {name for name, there in found.items() if there}
 
 
-def _plain(field: Field[Any], value: object) -> bool | float | str:
-    """A value of the same type in all runs: an option that may be null is text."""
-    return value if isinstance(value, bool | int | float) and "None" not in str(field.type) else str(value)
+def _plain(value: object) -> bool | float | str:
+    """A setting as TensorBoard takes it."""
+    return value if isinstance(value, bool | int | float) else str(value)

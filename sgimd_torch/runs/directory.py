@@ -19,17 +19,17 @@ import sgimd_torch
 from sgimd_torch.catalogue import source
 from sgimd_torch.files import checksum, lock, make_folder, write_bytes, write_json
 from sgimd_torch.runs.build import RunParts
-from sgimd_torch.runs.config import Config, before_there_was_a_choice, having, plain
+from sgimd_torch.runs.config import EVALUATES, ON_RESUME, Config, plain
 from sgimd_torch.runs.evaluations import Evaluations
 from sgimd_torch.runs.log import Columns, RunError, read_json
 
 _SOURCE: Final = "source of "  # in versions.json, before the word that names a thing of a user's own
 _UNFINISHED = ("lock", "versions.json")  # what a run killed before its config.json may have left, besides *.part
 # Files count by their content, of which a checksum is recorded; a benchmark may be another one when a run is resumed.
-MAY_CHANGE: Final = (*having("on_resume"), "benchmark_crc32")
+MAY_CHANGE: Final = (*ON_RESUME, "benchmark_crc32")
 LIBRARIES: Final = {"numpy": "numpy", "scipy": "scipy", "faiss": "faiss-cpu", "mujoco": "mujoco"}
 FORWARD: Final = ("torch", "lightning", "safetensors")  # of runs with a forward model
-EVALUATION_SETTINGS: Final = (*having("evaluates"), "benchmark_crc32")  # all evaluations of a run share these
+EVALUATION_SETTINGS: Final = (*EVALUATES, "benchmark_crc32")  # all evaluations of a run share these
 
 
 class RunDirectory:
@@ -62,7 +62,7 @@ class RunDirectory:
         self.log = self.columns.table(path)
         self.notes: list[str] = []
         self.summary: dict[str, Any] = {}
-        self._settings: dict[str, Any] = plain({**vars(config), **parts.data})
+        self._settings: dict[str, Any] = {**config.settings, **plain(parts.data)}
         self._versions = {**versions(forward=parts.model is not None), **sources(config)}
         _refuse_foreign(path)
         make_folder(path)
@@ -123,7 +123,6 @@ class RunDirectory:
             return None
         if not resume:
             raise RunError(f"{self.path} holds a run already; go on with it by --resume, or choose another --out")
-        before = {**before_there_was_a_choice(), **before}
         differ = [
             f"{name} was {before.get(name)}, now {settings.get(name)}"
             for name in dict.fromkeys((*settings, *before))

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sgimd_torch.files import checksum
-from sgimd_torch.runs.config import FILES, OWN, Config, before_there_was_a_choice, from_settings, having, options
+from sgimd_torch.runs.config import FILES, OWN, PLACE, Config
 from sgimd_torch.runs.log import Columns, RunError, read_json
 from sgimd_torch.runs.tables import EVALUATION, SMALL, small_table
 from sgimd_torch.spaces import Array
@@ -145,7 +145,7 @@ def config_of(run: Run) -> Config:
         RunError: it makes no sense today.
     """
     try:
-        return from_settings(run.config)
+        return Config.from_settings(run.config)
     except (TypeError, ValueError) as error:
         raise RunError(f"{run.path}/config.json does not describe a run of this version: {error}") from error
 
@@ -182,8 +182,10 @@ def finished(config: Config) -> bool:
         whole = len(run.index) == config.movements and not run.damage
         last = [run.answers.get(answer, {}).get("movements", ()) for answer in config.answered]
         evaluated = not config.evaluations or all(config.movements in movements for movements in last)
-        found, place = from_settings({**before_there_was_a_choice(), **settings}), having("place")
-        same = all(getattr(found, name) == getattr(config, name) for name in options() if name not in place)
+        found, wanted = Config.from_settings(settings).settings, config.settings
+        same = {name: found[name] for name in found if name not in PLACE} == {
+            name: wanted[name] for name in wanted if name not in PLACE
+        }
         files = [(name, getattr(config, name)) for name in FILES]
         return (whole and evaluated and same) and all(
             file is None or settings.get(f"{name}_crc32") in (None, checksum(file)) for name, file in files

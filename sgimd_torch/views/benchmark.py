@@ -95,7 +95,7 @@ def _reached_by(runs: Sequence[Run]) -> tuple[str, Box]:
     found: dict[str, tuple[Run, str, Box]] = {}
     for run in runs:
         config = config_of(run)
-        options = {name: getattr(config, name) for name in ("environment", *config.entry("environment").options)}
+        options = {name: value for name, value in config.settings.items() if name.partition(".")[0] == "environment"}
         if str(options) not in found:
             robot = task_of(config).environment
             found[str(options)] = run, type(robot).__name__, robot.outcomes

@@ -19,7 +19,7 @@ from sgimd_torch.runs import command_line
 from sgimd_torch.runs.config import Config
 
 SHELLS: Final = tuple(shtab.SUPPORTED_SHELLS)
-TAKE_OPTIONS_OF_RUN: Final = ("sweep", "suite", "teach")
+TAKE_OPTIONS_OF_RUN: Final = ("run", "sweep", "suite", "teach")
 KINDS: Final = {"task": "environment"}  # an option that is called otherwise in a command than in ``sgimd run``
 
 
@@ -40,7 +40,7 @@ def script(commands: Mapping[str, tuple[str, str, str]], shell: str) -> str:
     whole.add_argument("--completion", choices=SHELLS, help="print a script that completes commands in this shell")
     parsers = whole.add_subparsers()
     for name, (module, about, extra) in commands.items():
-        parents = [command_line.parser()] if name in TAKE_OPTIONS_OF_RUN else []
+        parents = [_of_run()] if name in TAKE_OPTIONS_OF_RUN else []
         try:
             parents.append(importlib.import_module(f"sgimd_torch.{module}").parser())
         except ImportError:
@@ -49,6 +49,15 @@ def script(commands: Mapping[str, tuple[str, str, str]], shell: str) -> str:
         each = parsers.add_parser(name, help=about, parents=parents, add_help=False, conflict_handler="resolve")
         _name_choices(each)
     return shtab.complete(whole, shell)
+
+
+def _of_run() -> argparse.ArgumentParser:
+    """The options that every run has, and the kinds of its parts."""
+    found = command_line.parser()
+    for kind in CATALOGUE:
+        if kind != "algorithm":
+            found.add_argument(f"--{kind}")
+    return found
 
 
 def _name_choices(parser: argparse.ArgumentParser) -> None:

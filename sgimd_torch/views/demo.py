@@ -12,7 +12,7 @@ Start it again after Ctrl-C or a power cut, and it goes on where it stopped; fin
   sgimd demo                                       the paper's 5000 movements, seed 0
   sgimd demo --movements 1000                      a first look, in less than a minute
   sgimd demo --seed 1                              another seed
-  sgimd demo --out runs/quiet -- --noise 0         options after -- go to all runs; sgimd run --help lists them
+  sgimd demo --out runs/quiet -- --environment.noise 0   options after -- go to all runs; sgimd run --help lists them
 """
 
 from __future__ import annotations
@@ -44,10 +44,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the learners, draw the figure, print the table; returns the exit code."""
     options = _options(argv)
     place = [f"--seed={options.seed}", f"--movements={options.movements}", f"--out={options.out}"]
-    place += ["--answers=own", f"--floor-at={options.movements}"]  # measuring the noise takes longer than all the rest
+    place += [
+        "--evaluated-by=own",
+        f"--floor-at={options.movements}",
+    ]  # measuring the noise takes longer than all the rest
     configs = {algorithm: parse([*place, f"--algorithm={algorithm}", *options.more])[0] for algorithm in ALGORITHMS}
     base = configs["sgim-d"]
-    if base.environment != ROD:
+    if base["environment"] != ROD:
         raise ValueError("--environment cannot be given here: the demo shows the fishing rod")
     if not base.evaluations:
         raise ValueError("--evaluate-at [] leaves nothing to draw; choose some movements, or omit it")

@@ -47,7 +47,7 @@ class Cast:
 def answers(directory: Path) -> list[Cast]:
     """What a run of the fishing rod answers to ``GOALS`` after its last movement; all runs have the same noise."""
     run = read_run(directory)
-    parts = build(config_of(run), run.path)
+    parts = build(config_of(run))
     remember(run, parts, 0, len(run.index))
     rod: Any = parts.environment
     context, found = (rod.contexts.low + rod.contexts.high) / 2, []

@@ -29,7 +29,7 @@ def draw(runs: Mapping[str, Life]) -> Figure:
     for run in runs.values():
         if not run.evaluated:
             raise RunError(f"{run.path} was never evaluated, so there is no curve to draw; was --evaluate_at [] given?")
-    sgim_d, half_side = runs["sgim-d"], float(runs["sgim-d"].config["task_space"])
+    sgim_d, half_side = runs["sgim-d"], float(runs["sgim-d"].config["environment.task_space"])
     task_space = Box.cube(-half_side, half_side, 2)
     tile = 0.05 * half_side
     most = max(float(tile_counts(run.landed, task_space, tile).max()) for run in runs.values())

@@ -94,7 +94,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         save_demonstrations(options.out, shown)
         print(f"{options.out}: {len(shown)} recordings, {shown[0].trajectory.shape[1]} joints")
         return 0
-    task = task_of(Config(environment=options.task))
+    task = task_of(Config(parts={"environment": options.task}))
     found = [check(task, each, row) for row, each in enumerate(shown)]
     print("\n".join(table(found)))
     if options.figure is not None:

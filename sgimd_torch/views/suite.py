@@ -57,7 +57,7 @@ TASKS: Final[dict[str, Suited]] = {
     "toss": _robot("toss"),
     "two-elbows": _robot("two-elbows"),
     "half-reached": _robot("half-reached"),
-    "rod-large": Suited({"environment": ROD, "task_space": 100.0}, new=True, quick=False),
+    "rod-large": Suited({"environment": ROD, "environment.task_space": 100.0}, new=True, quick=False),
     "swimmer": Suited({"environment": "swimmer"}, new=True, quick=False),
     "planar-arm-7": _robot("planar-arm-7", new=True),
     "crawler": _robot("crawler", new=True),
@@ -74,8 +74,14 @@ REFERENCES: Final[dict[str, dict[str, Any]]] = {
         "budget": 1,
     },
 }
-DEFAULTS: Final = {"algorithm": "practice", "movements": "1000", "repeats": "0", "answers": "own", "out": "runs/suite"}
-OWN: Final = ("environment", "task-space", "benchmark", "demonstrations", "name")
+DEFAULTS: Final = {
+    "algorithm": "practice",
+    "movements": "1000",
+    "repeats": "0",
+    "evaluated-by": "own",
+    "out": "runs/suite",
+}
+OWN: Final = ("environment", "benchmark", "demonstrations", "name")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -123,11 +129,18 @@ def runs_of(options: argparse.Namespace, rest: Sequence[str]) -> tuple[list[Conf
     learners, flags = variants_of(options.vary, words)
     first = learners[0]
     shared = {
-        name: getattr(first, name) for name in ("movements", "evaluate_at", "answers", "repeats", "floor_at", "out")
+        name: getattr(first, name)
+        for name in ("movements", "evaluate_at", "evaluated_by", "repeats", "floor_at", "out")
     }
-    others = [Config(name=name, **line, **shared) for name, line in REFERENCES.items()]
+    others = [Config.from_settings({"name": name, **line, **shared}) for name, line in REFERENCES.items()]
     configs = [
-        replace(each, seed=seed, name=each.variant, out=each.out / task, **TASKS[task].options)
+        replace(
+            each,
+            seed=seed,
+            name=each.variant,
+            out=each.out / task,
+            parts={**dict(each.parts), **TASKS[task].options},
+        )
         for seed in options.seeds
         for task in options.tasks
         for each in [*others, *learners]

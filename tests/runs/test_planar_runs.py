@@ -18,7 +18,7 @@ from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
-from sgimd_torch.runs.tasks import arm_benchmark, arm_demonstrations
+from sgimd_torch.runs.tasks.robots import arm_benchmark, arm_demonstrations
 from sgimd_torch.spaces import Demonstration, stream
 from sgimd_torch.views import demo
 from sgimd_torch.views.film import command as film

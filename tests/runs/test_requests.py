@@ -13,7 +13,7 @@ from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
-from sgimd_torch.runs.tasks import toy_demonstrations
+from sgimd_torch.runs.tasks.robots import toy_demonstrations
 from sgimd_torch.spaces import stream
 from sgimd_torch.teachers.answering import AnsweringTeacher, mislabelled
 

@@ -134,7 +134,7 @@ class Job:
 
     def _process(self, stopped: Callable[[], bool]) -> tuple[int, bool]:
         """Start its process, wait for it, stop it where asked to; its exit code, and whether it was stopped."""
-        command = [sys.executable, *self.program, "run", "--resume", *self.flags, *words(vars(self.config))]
+        command = [sys.executable, *self.program, "run", "--resume", *self.flags, *words(self.config)]
         with self.log.open("wb") as log:
             process = subprocess.Popen(
                 command,

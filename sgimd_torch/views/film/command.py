@@ -87,7 +87,7 @@ def _parts(run: Run) -> RunParts:
     except (ImportError, AttributeError, RuntimeError) as error:  # each kind of OpenGL fails in its own way
         problem = error
     try:
-        return build(config_of(run), run.path)
+        return build(config_of(run))
     except (ImportError, AttributeError, RuntimeError) as error:
         if problem is None:
             raise

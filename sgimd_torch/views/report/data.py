@@ -303,7 +303,7 @@ def _recorded(environment: str, file: str, checksum: str) -> list[Array]:
     if environment not in CATALOGUE["environment"]:  # what a config.json names is not executed
         raise ValueError(f"they are not known without running {environment}")
     path = None if file == "None" else Path(file)
-    found, _, now = demonstrations_of(task_of(Config(environment=environment)), path)
+    found, _, now = demonstrations_of(task_of(Config(parts={"environment": environment})), path)
     if str(now) != checksum:
         raise ValueError(f"the demonstrations of {environment} have changed")
     return [demonstration.outcome for demonstration in found]

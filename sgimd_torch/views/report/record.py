@@ -13,7 +13,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from sgimd_torch.runs.config import before_there_was_a_choice, having, options, words
+from sgimd_torch.runs.config import PLACE, Config, words
 from sgimd_torch.runs.directory import FORWARD
 from sgimd_torch.views.report.data import Life, Variant
 
@@ -108,11 +108,10 @@ def commands(lives: Sequence[Life]) -> list[str]:
     """A line of shell for each configuration of these runs, nearly always one; defaults are left out."""
     groups: dict[str, list[int]] = {}
     for life in lives:
-        config = {**before_there_was_a_choice(), **life.config}
-        if config.get("name") == config["algorithm"]:
-            del config["name"]  # a run is named after its algorithm anyway
-        own = {name: value for name, value in config.items() if name == "name" or name not in having("place")}
-        groups.setdefault(shlex.join(words(own)), []).append(life.seed)
+        own = {name: value for name, value in life.config.items() if name == "name" or name not in PLACE}
+        if own.get("name") == own["algorithm"]:
+            del own["name"]  # a run is named after its algorithm anyway
+        groups.setdefault(shlex.join(words(Config.from_settings(own))), []).append(life.seed)
     lines = []
     for given, seeds in groups.items():
         line = f"sgimd run {given} --seed={'$seed' if len(seeds) > 1 else seeds[0]} --out={AGAIN}"
@@ -120,16 +119,11 @@ def commands(lives: Sequence[Life]) -> list[str]:
     return lines
 
 
-def unknown(lives: Sequence[Life]) -> list[str]:
-    """Options of the runs that this version of ``sgimd run`` does not have."""
-    return sorted({name for life in lives for name in life.config if not name.endswith("_crc32")} - options().keys())
-
-
 def differing(variants: Sequence[Variant]) -> dict[str, list[str]]:
     """Option -> for each variant its values as text, for options in which runs differ, without seed and place."""
     every = [life.config for variant in variants for life in variant.lives]
     found = {}
-    for name in dict.fromkeys(name for config in every for name in config if name not in having("place")):
+    for name in dict.fromkeys(name for config in every for name in config if name not in PLACE):
         values = [dict.fromkeys(_shown(life.config.get(name)) for life in variant.lives) for variant in variants]
         if len(set().union(*values)) > 1:
             found[name] = [" or ".join(each) for each in values]

@@ -22,7 +22,7 @@ from sgimd_torch.runs.config import Config, plain, words
 from sgimd_torch.runs.log import RunError
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
-from sgimd_torch.runs.tasks import arm_demonstrations
+from sgimd_torch.runs.tasks.robots import arm_demonstrations
 from sgimd_torch.teachers.by_hand import ByHand, GivenLesson, keep_lesson, read_lessons
 from sgimd_torch.views.report.command import main as report
 from sgimd_torch.views.report.data import demonstrated, read_life
