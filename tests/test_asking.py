@@ -308,7 +308,7 @@ def test_a_run_that_was_killed_goes_on_to_the_same_files(tmp_path):
     run = read_run(tmp_path / "whole" / log.parent)
     assert (run.demonstration >= 0).sum() > 3
     assert (run.origin == "").any()  # it rested for the slow one
-    assert len(build(Config(algorithm="sgim-acts", environment="planar-arm-7")).teachers) == 1
+    assert len(build(Config(algorithm="sgim-acts", parts={"environment": "planar-arm-7"})).teachers) == 1
 
 
 @pytest.mark.parametrize(
@@ -317,7 +317,7 @@ def test_a_run_that_was_killed_goes_on_to_the_same_files(tmp_path):
         (("--teachers", "low-haf"), "unknown teachers 'low-haf'; did you mean low-half"),
         (("--teachers", "all,all"), "teachers must name at least one, and each once, got all,all"),
         (("--teachers", "all,slow"), "sgim_im asks one teacher, got 2"),
-        (("--cost", "0"), "cost must be above 0"),
+        (("--cost", "0"), "costs must be positive"),
         (("--environment", "crawler"), "comes without demonstrations"),
     ],
 )

@@ -117,8 +117,7 @@ def task_of(config: Config) -> Task:
         ValueError: it cannot be made, or is not an environment.
     """
     part = part_of("environment", "environment", config["environment"])
-    options = {name: config[part.full(name)] for name in part.takes if part.full(name) in part.options}
-    task = checked(part.kind, part.word, partial(part.make, **options))()
+    task = checked(part.kind, part.word, partial(part.make, **part.set_by(config.values)))()
     return task if isinstance(task, Task) else Task(task)
 
 
@@ -184,7 +183,7 @@ class _Maker:
         return self._with_options(self.parts["trust"])(noise=max(self._task.environment.outcome_noise, LEAST_NOISE))
 
     def _with_options(self, part: Part) -> Callable[..., Any]:
-        values = {name: self._config[part.full(name)] for name in part.takes if part.full(name) in part.options}
+        values = part.set_by(self._config.values)
         return self._given(partial(part.make, **values) if values else part.make, part)
 
     def _given(self, make: Callable[..., Any], part: Part) -> Callable[..., Any]:

@@ -54,6 +54,14 @@ class Part:
         """The name of a parameter in the run."""
         return f"{self.name}.{parameter}" if self.name else parameter
 
+    def set_by(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """The keywords that it gets from what a run has set."""
+        return {
+            each: values[self.full(each)]
+            for each in self.takes
+            if self.full(each) in self.options and each != "teachers"
+        }
+
     def leads_to(self, name: str) -> bool:
         """Whether an option or another part of this name belongs to it; without its own prefix."""
         own = (*self.choices, *(name for name in SHARED if name in self.takes), self.teaching)

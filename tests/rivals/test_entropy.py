@@ -1,14 +1,12 @@
 """Learners that ask where they expect to lose most doubt: doubts by hand, the choice of mode and goal, a whole life."""
 
-from functools import partial
-
 import numpy as np
 import pytest
 
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.goals.strategic import AUTONOMOUS
 from sgimd_torch.memory import Memory
-from sgimd_torch.rivals.entropy import ByMixture, ByProcess, EntropyGoals, sgim_eer
+from sgimd_torch.rivals.entropy import EntropyGoals, doubt, sgim_eer
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Box, stream
 from sgimd_torch.teachers.answering import AnsweringTeacher
@@ -17,7 +15,6 @@ from worlds import NO_CONTEXT, demonstrations, last_posture
 ARM = PlanarArm(4, noise=0.02)
 SHOWN = demonstrations(PlanarArm(4))
 SQUARE = Box.cube(-1, 1, 2)
-DOUBTS = pytest.mark.parametrize("doubt", [ByProcess, partial(ByMixture, components=5)], ids=["process", "mixture"])
 IMITATE = "imitate all"
 SHARED = 0.5240  # (1 + sqrt(5) + 5/3) e^-sqrt(5)
 COSTS = {AUTONOMOUS: 1.0, IMITATE: 1.0}
@@ -28,9 +25,9 @@ def cluster(n=40):
     return 0.5 + 0.02 * stream(0, "cluster").standard_normal((n, 2))
 
 
-def taught(doubt=ByProcess, seed=0, **options):
+def taught(seed=0, **options):
     teachers = {"all": AnsweringTeacher(SHOWN, stream(0, "t"))}
-    return sgim_eer(ARM, seed, correspondence=last_posture, teachers=teachers, doubt=doubt, **options), teachers
+    return sgim_eer(ARM, seed, correspondence=last_posture, teachers=teachers, **options), teachers
 
 
 def live(learner, teachers, movements=60, seed=0, **options):
@@ -44,48 +41,44 @@ def lines(episodes):
     ]
 
 
-@DOUBTS
-def test_where_nothing_is_known_doubt_is_one_and_two_places_have_less_in_common_the_farther_they_are(doubt):
+def test_where_nothing_is_known_doubt_is_one_and_two_places_have_less_in_common_the_farther_they_are():
     points = np.array([[0.5, 0.5], [0.5, 0.6], [0.9, 0.9]])
-    found = doubt()(np.empty((0, 2)), points)
+    found = doubt(np.empty((0, 2)), points)
     # Matern 5/2: places a length of .1 apart share (1 + sqrt(5) + 5/3) e^-sqrt(5) of their doubt.
     assert found == pytest.approx(np.array([[1, SHARED, 0], [SHARED, 1, 0], [0, 0, 1]]), abs=1e-2)
 
 
 def test_doubt_after_one_exemplar_by_hand():
-    found = ByProcess()(np.array([[0.5, 0.5]]), np.array([[0.5, 0.5], [0.5, 0.6]]))
+    found = doubt(np.array([[0.5, 0.5]]), np.array([[0.5, 0.5], [0.5, 0.6]]))
     # Its noise has a variance of .1.
     assert np.diag(found) == pytest.approx([1 - 1 / 1.1, 1 - SHARED**2 / 1.1], abs=1e-4)
 
 
-@DOUBTS
-def test_doubt_is_small_among_exemplars_and_whole_far_from_them(doubt):
+def test_doubt_is_small_among_exemplars_and_whole_far_from_them():
     points = np.array([[0.5, 0.5], [0.95, 0.05]])
-    near, far = np.diag(doubt()(cluster(), points))
+    near, far = np.diag(doubt(cluster(), points))
     assert near < 0.1
     assert far == pytest.approx(1.0, abs=0.01)
 
 
-@DOUBTS
-def test_covariances_are_symmetric_and_no_variance_is_negative_or_above_one(doubt):
+def test_covariances_are_symmetric_and_no_variance_is_negative_or_above_one():
     points = stream(0, "points").random((30, 2))
-    found = doubt()(cluster(60), points)
+    found = doubt(cluster(60), points)
     assert found == pytest.approx(found.T, abs=1e-9)
     assert ((np.diag(found) >= -1e-9) & (np.diag(found) <= 1 + 1e-9)).all()
 
 
-def goals_with(outcomes, doubt=ByProcess, seed=0):
+def goals_with(outcomes, seed=0):
     """A choice of a learner whose memory has these outcomes."""
     memory = Memory(0, 1, 2)
     for outcome in outcomes:
         memory.add(NO_CONTEXT, np.zeros(1), outcome)
-    return EntropyGoals(Box.cube(0, 1, 0), SQUARE, stream(seed, "goals"), memory=memory, doubt=doubt()), memory
+    return EntropyGoals(Box.cube(0, 1, 0), SQUARE, stream(seed, "goals"), memory=memory), memory
 
 
-@DOUBTS
-def test_it_asks_for_a_goal_far_from_what_is_known(doubt):
+def test_it_asks_for_a_goal_far_from_what_is_known():
     known = np.column_stack((stream(0, "left").uniform(-1, 0, 300), stream(0, "up").uniform(-1, 1, 300)))
-    goals, _ = goals_with(known, doubt)
+    goals, _ = goals_with(known)
     asked = [goal for name, goal in (goals.choose(NO_CONTEXT, COSTS) for _ in range(20)) if name == IMITATE]
     assert len(asked) > 10  # a goal of its own is anywhere, and half of T is known
     assert all(goal[0] > 0 for goal in asked)
@@ -110,9 +103,8 @@ def test_who_shows_what_is_known_already_is_asked_no_more():
     assert {goals.choose(NO_CONTEXT, COSTS)[0] for _ in range(20)} == {AUTONOMOUS}
 
 
-@DOUBTS
-def test_a_life_goes_on_as_if_it_had_never_stopped_and_equal_seeds_live_alike(doubt, tmp_path):
-    whole, teachers = taught(doubt)
+def test_a_life_goes_on_as_if_it_had_never_stopped_and_equal_seeds_live_alike(tmp_path):
+    whole, teachers = taught()
     episodes = []
     for episode in run(whole, ARM, 0, movements=60, teachers=teachers):
         episodes.append(episode)
@@ -121,9 +113,9 @@ def test_a_life_goes_on_as_if_it_had_never_stopped_and_equal_seeds_live_alike(do
     asked = [e for e in episodes if e.reply == "shown"]
     assert len(asked) > 3
     assert all(e.move.origin == "imitate" for e in asked)
-    assert lines(live(*taught(doubt))) == lines(episodes)
-    assert lines(live(*taught(doubt, seed=1), seed=1)) != lines(episodes)
+    assert lines(live(*taught())) == lines(episodes)
+    assert lines(live(*taught(seed=1), seed=1)) != lines(episodes)
     for last in (11, 40):
-        again, _ = taught(doubt)
+        again, _ = taught()
         again.load(tmp_path / f"{last}.npz")  # asks nobody
         assert lines(live(again, teachers, first=last + 1)) == lines(episodes[last + 1 :])

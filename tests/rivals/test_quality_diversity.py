@@ -115,8 +115,6 @@ def test_what_makes_no_sense_is_refused(make):
         make(Elsewhere(ARM.policies, Box.cube(2, 3, 2), ARM.contexts), 0)
     with pytest.raises(ValueError, match="must be a whole number"):
         make(ARM, 0, **({"first": 0} if make in ELITES else {"emitters": 0}))
-    with pytest.raises(ValueError, match=r"again must lie in \[0, 1\), got 1"):
-        make(ARM, 0, again=1)
 
 
 def test_a_learning_rate_is_a_share():
@@ -147,17 +145,3 @@ def test_what_is_demonstrated_is_imitated_and_enters_the_archive(make):
     elites = learner.autonomous.archive.data("solution")
     assert 1 <= len(elites) <= 4
     assert np.abs(elites - theta_d).max() <= 0.01
-
-
-def test_elites_that_are_repeated_stand_where_they_land_in_the_mean():
-    noisy = PlanarArm(6, noise=0.05)
-    learner = map_elites(noisy, 1, first=20, batch=20, again=0.5)
-    for _ in run(learner, noisy, 0, movements=20 + 6 * 40):
-        pass
-    thetas, outcomes = learner.memory.thetas, learner.memory.outcomes
-    _, counts = np.unique(thetas, axis=0, return_counts=True)
-    assert 0.3 < (counts - 1).sum() / len(thetas) < 0.5  # the first batch has none to repeat
-    archive = learner.autonomous.archive
-    assert counts.max() > 2
-    for theta, measures in zip(archive.data("solution"), archive.data("measures"), strict=True):
-        np.testing.assert_allclose(measures, outcomes[(thetas == theta).all(axis=1)].mean(axis=0))

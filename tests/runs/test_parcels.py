@@ -18,7 +18,7 @@ FRESH = "holds no run yet"  # what a run says that does not go on from somewhere
 
 def arm(out, **changes):
     settings = {"movements": 300, "evaluate_at": (50, 150), "repeats": 0, **changes}
-    return Config("sgim-d", environment="planar-arm-7", out=out, **settings)
+    return Config.from_settings({"algorithm": "sgim-d", **settings, "out": out, "environment": "planar-arm-7"})
 
 
 def task(keeper, config, every=0.0):

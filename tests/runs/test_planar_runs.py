@@ -121,7 +121,7 @@ def test_demonstrations_for_an_arm_lead_from_rest_to_equal_bends_all_over_its_re
 
 
 def test_an_imitating_arm_varies_the_posture_that_it_was_shown(tmp_path):
-    assert live(tmp_path, "--algorithm", "imitation", "--epsilon", 0.03) == 0
+    assert live(tmp_path, "--algorithm", "imitation", "--social.epsilon", 0.03) == 0
     run, arm = read_run(tmp_path / "imitation" / "seed-003"), PlanarArm()
     assert np.flatnonzero(run.demonstration >= 0).tolist() == [30, 60]
     shown = arm_demonstrations(arm)[run.demonstration[30]]
@@ -167,12 +167,12 @@ def test_files_of_another_robot_are_refused(tmp_path, benchmark, capsys, environ
 
 
 def test_noise_and_task_space_are_the_rods(tmp_path, reference, capsys):
-    assert live(tmp_path, "--noise", 0.5, "--task_space", 100) == 0
+    assert live(tmp_path, "--environment.noise", 0.5, "--environment.task_space", 100) == 0
     said = capsys.readouterr().err
-    assert "--noise has no effect with --environment planar-arm-7\n" in said
-    assert "--task-space has no effect with --environment planar-arm-7\n" in said
+    assert "--environment.noise has no effect with --environment planar-arm-7\n" in said
+    assert "--environment.task_space has no effect with --environment planar-arm-7\n" in said
     assert csv_of(tmp_path / "sgim-d" / "seed-003") == csv_of(reference)
-    assert not Config(noise=0.5, task_space=100.0).without_effect
+    assert not Config(parts={"environment.noise": 0.5, "environment.task_space": 100.0}).without_effect
 
 
 def test_a_run_on_an_arm_made_longer_equals_a_long_run(tmp_path, reference):

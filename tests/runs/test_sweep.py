@@ -32,11 +32,11 @@ LONG = ["--algorithm", "random", "--movements", "1000", "--evaluate-at", "[]"]
 
 def short(out, **changes):
     changes = {"environment": "planar-arm-7", "algorithm": "random", "movements": 40, **changes}
-    return Config(repeats=0, evaluate_at=(20,), out=out, **changes)
+    return Config.from_settings({**changes, "repeats": 0, "evaluate_at": (20,), "out": out})
 
 
 def long(out, **changes):
-    return Config(algorithm="random", movements=1000, evaluate_at=(), out=out, **changes)
+    return Config.from_settings({**changes, "algorithm": "random", "movements": 1000, "evaluate_at": (), "out": out})
 
 
 def swept(*options):
@@ -96,7 +96,7 @@ def test_values_and_further_options_become_those_of_the_runs():
         ("--address auto", "--address auto is of a Ray cluster; it needs --engine ray"),
         ("--engine ray --address auto --processes 2", "--processes cannot be given with --address: a cluster runs as"),
         ("--vary goals=grid --vary goals=uniform", "--goals is there twice"),
-        ("--vary task_space=1,2 --task-space 3", "--task-space is there twice"),
+        ("--vary task_space=1,2 --environment.task_space 3", "--environment.task_space is there twice"),
         ("--gaols uniform", "unknown option --gaols; did you mean --goals?"),
         ("--movements many", "--movements must be a whole number, got many"),
         ("stray", "'stray' belongs to no option"),
@@ -206,7 +206,7 @@ def test_a_run_is_finished_when_it_has_all_movements_and_evaluations_with_these_
     out = copied.out
     for changes in ({"movements": 50}, {"goals": "uniform"}, {"seed": 1}, {"floor_at": ()}, {"noise": 0.5}):
         assert not finished(short(out, **changes)), changes
-    assert not finished(Config(**{**vars(copied), "evaluate_at": (30,)}))
+    assert not finished(Config.from_settings({**{**vars(copied), "evaluate_at": (30,)}}))
     assert finished(short(out, threads=2))  # the same results
 
 

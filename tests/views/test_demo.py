@@ -159,7 +159,7 @@ def test_stopped_it_says_how_to_go_on_and_leaves_no_process(benchmark_file, tmp_
     [
         (("--seed", "-1"), (), "seed must be at least 0"),
         (("--movements", "0"), (), "movements must be at least 1"),
-        ((), ("--noise", "-1"), "noise must be finite and at least 0"),
+        ((), ("--environment.noise", "-1"), "noise must be finite and at least 0"),
         ((), ("--evaluate_at", "[]"), "leaves nothing to draw"),
         ((), ("--environment", "planar-arm-7"), "--environment cannot be given here"),
         ((), ("--seed", "3"), "--seed is the demo's own"),

@@ -12,7 +12,7 @@ from sgimd_torch.views.report import asking
 from sgimd_torch.views.report import command as report
 from sgimd_torch.views.report.data import Variant, demonstrated, read_life
 
-ASKS = "--environment planar-arm-7 --evaluate-at 40 --repeats 0 --answers own --movements 60"
+ASKS = "--environment planar-arm-7 --evaluate-at 40 --repeats 0 --evaluated-by own --movements 60"
 
 
 @pytest.fixture(scope="module")
@@ -20,7 +20,7 @@ def runs(tmp_path_factory):
     """One that searches and waits for a slow teacher, one that practises on the toss, one that asks nobody."""
     out = tmp_path_factory.mktemp("asking")
     for options in (
-        "--algorithm sgim-acts --teachers low-half,slow --base search --imitations 3 --name acts",
+        "--algorithm sgim-acts --teachers low-half,slow --base search --social.repeats 3 --name acts",
         "--algorithm sgim-im --environment toss --name toss",
         "--algorithm practice --name alone",
     ):

@@ -115,7 +115,7 @@ def modelled(tmp_path_factory, go):
     arm = (
         "--environment",
         "planar-arm-7",
-        "--training",
+        "--model.rate",
         2,
         "--evaluate_at",
         120,
@@ -197,7 +197,7 @@ def test_board_and_report_show_the_same_demonstrated_outcomes(tmp_path, go, monk
     save_demonstrations(path, load_demonstrations()[:3])
     drawn = pictures.landing_points
     monkeypatch.setattr(pictures, "landing_points", lambda ax, *a, **k: (drawn(ax, *a, **k), outcomes.append(ax))[0])
-    assert go(tmp_path, "--every", 10, "--demonstrations", path, "--board", "true") == 0
+    assert go(tmp_path, "--teacher.every", 10, "--demonstrations", path, "--board", "true") == 0
     run = tmp_path / "sgim-d" / "seed-003"
     on_board = outcomes[-1].lines[0]
     life, figure = read_life(run), Figure()

@@ -37,7 +37,7 @@ def test_half_of_the_tasks_and_no_more_are_used_to_choose_defaults():
 
 @pytest.mark.parametrize("name", [name for name, task in TASKS.items() if task.quick])
 def test_a_task_states_its_noise_and_has_goals_of_its_own(name):
-    task = task_of(Config(algorithm="random", **TASKS[name].options))
+    task = task_of(Config.from_settings({**TASKS[name].options, "algorithm": "random"}))
     assert task.benchmark is not None
     assert len(goals_all_over(task.environment).goals)
     assert task.environment.outcome_noise >= 0
@@ -65,7 +65,7 @@ def test_what_is_varied_gives_a_learner_for_each_value():
     ("words", "message"),
     [
         ("--environment toss", "--environment cannot be given here: each task has its own"),
-        ("--task_space=2", "--task-space cannot be given here"),
+        ("--environment.task_space=2", "--environment.task_space cannot be given here"),
         ("--vary environment=toss,crawler", "--environment cannot be given here"),
         ("--tasks tos", "invalid choice: 'tos'"),
         ("--tasks crawler --algorithm imitation", "comes without demonstrations"),

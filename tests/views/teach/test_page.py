@@ -35,7 +35,7 @@ def open_tab(browser):
 @pytest.fixture
 def rod(tmp_path):
     """A served session on the fishing rod, paused after its first movements."""
-    config = Config(teacher="by-hand", name="taught", out=tmp_path, repeats=0, movements=400, evaluate_at=())
+    config = Config(name="taught", out=tmp_path, repeats=0, movements=400, evaluate_at=(), parts={"teacher": "by-hand"})
     with served(config) as page:
         until(lambda: page.session.state.movements >= 5)
         page.session.pause(True)
@@ -183,13 +183,12 @@ def test_keys_and_joints_do_what_the_mouse_does(open_tab, rod):
 
 def test_a_page_whose_server_has_stopped_says_so_and_the_run_is_whole(open_tab, tmp_path):
     config = Config(
-        environment="planar-arm-7",
-        teacher="by-hand",
         name="taught",
         out=tmp_path,
         repeats=0,
         movements=400,
         evaluate_at=(),
+        parts={"environment": "planar-arm-7", "teacher": "by-hand"},
     )
     with served(config) as page:
         tab = open_tab(page)

@@ -38,7 +38,7 @@ FAST = 0.005  # s, from one movement to the next: time to pause before all movem
 def taught(out, **options):
     """A run on the small arm."""
     given = {"algorithm": "sgim-d", "teacher": "by-hand", "movements": 300, "evaluate_at": (20,), **options}
-    return Config(environment="planar-arm-7", name="taught", out=out, repeats=0, **given)
+    return Config.from_settings({**given, "name": "taught", "out": out, "repeats": 0, "environment": "planar-arm-7"})
 
 
 def until(condition, seconds=20.0):
