@@ -60,7 +60,18 @@ PRACTICE = {
     "social.repeats": 1,
     "teacher": "at-once",
 }
-ONCE = ("budget", "give_up", "global_range", "g_max", "max_aspect", "min_side", "task_space", "rate", "ridge", "refit")
+ONCE = (
+    "budget",
+    "give_up",
+    "global_range",
+    "g_max",
+    "max_aspect",
+    "min_side",
+    "task_space",
+    "temperature",
+    "ridge",
+    "refit",
+)
 
 
 def test_the_defaults_are_those_that_results_were_made_with():

@@ -42,7 +42,7 @@ class LocalProcess:
         outcome_noise: standard deviation of each outcome dimension, ``outcome_noise`` of the environment.
 
     Raises:
-        ValueError: ``noise`` is negative or not finite.
+        ValueError: ``outcome_noise`` is negative or not finite.
     """
 
     def __init__(self, memory: Memory, *, outcome_noise: float = 0.0) -> None:

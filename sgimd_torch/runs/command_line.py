@@ -207,6 +207,8 @@ class _Parser(jsonargparse.ArgumentParser):
 
     def _listed(self, name: str, text: str) -> str:
         """A list may be typed without brackets."""
+        if not text and "Path" in str(self._kinds[name]):
+            raise ValueError(f"--{dashed(name)} must be a path, got an empty one")
         is_list = "tuple" in str(self._kinds[name]) and text != "null" and not text.startswith("[")
         return f"[{text}]" if is_list else text
 

@@ -206,7 +206,7 @@ def test_a_run_is_finished_when_it_has_all_movements_and_evaluations_with_these_
     out = copied.out
     for changes in ({"movements": 50}, {"goals": "uniform"}, {"seed": 1}, {"floor_at": ()}, {"noise": 0.5}):
         assert not finished(short(out, **changes)), changes
-    assert not finished(Config.from_settings({**{**vars(copied), "evaluate_at": (30,)}}))
+    assert not finished(replace(copied, evaluate_at=(30,)))
     assert finished(short(out, threads=2))  # the same results
 
 

@@ -193,7 +193,7 @@ def test_the_commands_make_the_same_runs_again(pages, runs):
         config, _ = parse(words[2:])
         assert str(config.out) == AGAIN
         recorded = read_run(runs / config.variant / "seed-003").config
-        again = json.loads(json.dumps(vars(config), default=str))
+        again = json.loads(json.dumps(config.settings, default=str))
         ignored = ("out", "name", "demonstrations_crc32", "benchmark_crc32")
         assert {k: v for k, v in again.items() if k not in ignored} == {
             k: v for k, v in recorded.items() if k not in ignored

@@ -18,7 +18,7 @@ from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.runs.build import build
 from sgimd_torch.runs.command_line import main as run
-from sgimd_torch.runs.config import Config, plain, words
+from sgimd_torch.runs.config import Config, words
 from sgimd_torch.runs.log import RunError
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
@@ -261,12 +261,12 @@ import sys; sys.path.insert(0, {str(ROOT / "tests")!r})
 import os, time
 from pathlib import Path
 from sgimd_torch.demonstrations import load_demonstrations
-from sgimd_torch.runs.config import from_settings
+from sgimd_torch.runs.config import Config
 from sgimd_torch.views.teach.hanging import Hanging
 from sgimd_torch.views.teach.serving import PATIENCE, Seat
 from sgimd_torch.views.teach.session import Session
 import json
-session = Session(from_settings(json.loads(sys.argv[1])))
+session = Session(Config.from_settings(json.loads(sys.argv[1])))
 session.interval = 0.02
 session.__enter__()
 for shown in load_demonstrations(sys.argv[2])[5:7]:
@@ -275,7 +275,7 @@ for shown in load_demonstrations(sys.argv[2])[5:7]:
 print("shown", session.state.movements, flush=True)
 time.sleep(60)
 """
-    settings = json.dumps(plain(vars(config)))
+    settings = json.dumps(config.settings)
     arguments = [sys.executable, "-c", program, settings, str(tmp_path / "shown.npz")]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     process = subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True, env=environment)
@@ -334,9 +334,9 @@ def test_a_task_without_anything_to_lead_says_why(capsys):
 
 def test_a_run_that_is_taught_has_a_person_as_its_teacher(tmp_path, going):
     config, port = options_of(["--seed", "4", "--port", "9000", "--out", str(tmp_path)])
-    assert (config.directory, config.teacher, port) == (tmp_path / "taught" / "seed-004", "by-hand", 9000)
+    assert (config.directory, config["teacher"], port) == (tmp_path / "taught" / "seed-004", "by-hand", 9000)
     config, _ = options_of(["--algorithm", "sgim-im"])
-    assert config.teachers == ("by-hand",)
+    assert config["teachers"] == ("by-hand",)
     session = going()
     session.__exit__()
     config, _ = options_of([str(session.run.directory.path)])
