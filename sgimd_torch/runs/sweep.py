@@ -210,7 +210,7 @@ def variants_of(varied: Sequence[str], options: Sequence[str]) -> tuple[list[Con
     for combination in itertools.product(*values.values()):
         chosen = dict(zip(values, combination, strict=True))
         config, flags = parse([*options, *(f"--{option}={value}" for option, value in chosen.items())])
-        in_order = sorted(chosen, key=lambda option: option != "algorithm")
+        in_order = sorted(chosen, key=lambda option: (option != "algorithm", option))
         found.append(replace(config, name=",".join(_in_name(option, chosen[option]) for option in in_order) or None))
     return found, [f"--{dashed(flag)}" for flag, on in flags.items() if on]
 

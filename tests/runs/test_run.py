@@ -296,10 +296,6 @@ def test_the_model_that_proves_itself_lives_as_the_process_and_answers_no_worse(
     assert errors[0] != errors[1] < 1.03 * errors[0]
 
 
-BABBLING = {"window": 4, "progress": "signed", "competence": "attempt", "search": "perturb", "budget": 3}
-TEACHING = {"every": 7, "choice": "random", "imitations": 3, "epsilon": 0.2}
-
-
 def test_of_options_without_effect_only_the_changed_ones_are_named(tmp_path, go, capsys):
     budget = str(Config("random").budget)
     assert go(tmp_path, "--algorithm", "random", "--budget", budget, "--inverse", "nearest", "--movements", 5) == 0

@@ -47,17 +47,18 @@ def test_each_task_is_run_with_the_learner_and_with_the_two_that_it_has_to_beat(
     configs = configs_of("--tasks", "toss", "rod-large", "--seeds", "3,4", "--budget", "7", "--out", "here", *SHORT)
     assert len({config.directory for config in configs}) == 2 * 2 * 3
     ours = [config for config in configs if config.variant == "practice"]
-    assert {(config.environment, config.task_space, config.seed) for config in ours} == {
-        (word, side, seed) for word, side in (("toss", 1.0), ("fishing-rod", 100.0)) for seed in (3, 4)
+    assert {(config["environment"], config.values.get("environment.task_space"), config.seed) for config in ours} == {
+        (word, side, seed) for word, side in (("toss", None), ("fishing-rod", 100.0)) for seed in (3, 4)
     }
-    assert {(config.variant, config.budget) for config in configs} == {(RANDOM, 15), (UNIFORM, 1), ("practice", 7)}
+    budgets = {(config.variant, config.values.get("budget")) for config in configs}
+    assert budgets == {(RANDOM, None), (UNIFORM, 1), ("practice", 7)}
     assert {config.movements for config in configs} == {40}
     assert {config.evaluate_at for config in configs} == {(20,)}
 
 
 def test_what_is_varied_gives_a_learner_for_each_value():
     configs = configs_of("--tasks", "toss", "--vary", "inverse=process,nearest", *LEARNER)
-    assert [config.inverse for config in configs[2:]] == ["process", "nearest"]
+    assert [config["inverse"] for config in configs[2:]] == ["process", "nearest"]
     assert [config.variant for config in configs] == [RANDOM, UNIFORM, "inverse=process", "inverse=nearest"]
 
 
