@@ -27,9 +27,9 @@ with loading():  # Ctrl-C shows no traceback
 
     from sgimd_torch.catalogue import unknown
     from sgimd_torch.files import make_folder
+    from sgimd_torch.record import RunError
     from sgimd_torch.runs.config import OWN, Config
     from sgimd_torch.runs.engines.loop import sweep
-    from sgimd_torch.record import RunError
     from sgimd_torch.runs.read import finished, read_run
     from sgimd_torch.runs.sweep import add_engines, add_options, engine_of
     from table import FILE, ROWS, Row, merge, own_answer, read_table, result_rows
@@ -159,13 +159,13 @@ def runs_of(experiments: Sequence[str], only: Sequence[str], seeds: Sequence[int
                     "seed": seed,
                     "out": out,
                     "name": variant,
-                    "answers": ANSWERS,
+                    "evaluated_by": ANSWERS,
                     "floor_at": floors,
                     **line,
                 }
                 if run.get("demonstrations") in MADE:
                     run["demonstrations"] = out / "demonstrations" / run["demonstrations"]
-                found.append((experiment, Config(**run)))
+                found.append((experiment, Config.from_settings(run)))
     return found
 
 

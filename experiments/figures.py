@@ -200,7 +200,7 @@ def goals(data: Data) -> Figure:
     """(f): goals that learners chose themselves in the large task space, and their distance from the base."""
     runs = {name: data.runs(f"{name}-large") for name in ("sagg-riac", "sgim-d")}
     chosen = {name: [run.chosen_goals() for run in found] for name, found in runs.items()}
-    half_side = max(float(run.config["task_space"]) for found in runs.values() for run in found)
+    half_side = max(float(run.config["environment.task_space"]) for found in runs.values() for run in found)
     box, side = Box.cube(-half_side, half_side, 2), half_side / 20
     pooled = {name: np.concatenate(seeds) for name, seeds in chosen.items()}
     most = max(float(tile_counts(each, box, side).max()) for each in pooled.values())

@@ -79,7 +79,7 @@ def figure_of(model_run: ModelRun) -> Figure:
     rows: Any = [["map", "cells", "calibration"], over_time] if is_plane else [["calibration", "error"], over_time[1:]]
     axes = figure.subplot_mosaic(rows)
     if is_plane:
-        half_side = model_run.run.config.get("task_space")
+        half_side = model_run.run.config.get("environment.task_space")
         reach = min(half_side, REACH) if isinstance(half_side, int | float) else REACH
         box = Box.cube(-reach, reach, 2)
         plots.predictions(axes["map"], observed[last], mean[last], box)

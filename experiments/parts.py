@@ -23,8 +23,7 @@ from numpy.typing import ArrayLike
 from sgimd_torch.algorithms import Correspondence
 from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
 from sgimd_torch.demonstrations.leading import Leading
-from sgimd_torch.demonstrations.lessons import HandLesson, lesson_by_hand
-from sgimd_torch.demonstrations.recording import Recording
+from sgimd_torch.demonstrations.lessons import HandLesson, LedMovement, lesson_by_hand, resampled
 from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.environments.toys import toss
@@ -32,7 +31,8 @@ from sgimd_torch.learner import Learner
 from sgimd_torch.memory import Memory
 from sgimd_torch.rivals import quality_diversity
 from sgimd_torch.runs.process import command
-from sgimd_torch.runs.tasks import Task, toy_benchmark
+from sgimd_torch.runs.tasks import Task
+from sgimd_torch.runs.tasks.robots import toy_benchmark
 from sgimd_torch.spaces import Array, Box, Demonstration, stream
 
 LESSONS: Final = 10
@@ -44,6 +44,7 @@ REACHES: Final = (0.25, 0.7)  # m, how far from the base a sweep ends
 HEIGHTS: Final = (0.6, 0.8)  # m, and how high; it begins at .85
 BESIDE: Final = 0.03  # m, standard deviation of where it ends
 ARCH: Final = 0.05  # m, the same of how far the middle of a sweep lies off the way
+STILL: Final = 0.05  # of the largest speed: all joints slower than this is a pause
 TREMBLE: Final = 0.004  # m, the same of the hand's trembling where it is fastest; a mouse at rest does not tremble
 
 
@@ -108,7 +109,7 @@ def sweep(tip: Array, end: Array, rng: np.random.Generator) -> Array:
     return np.asarray(hand + bell * rng.normal(0, TREMBLE, hand.shape))
 
 
-def lead(leading: Leading, end: Array, rng: np.random.Generator) -> Recording:
+def lead(leading: Leading, end: Array, rng: np.random.Generator) -> LedMovement:
     """The arm taken by the hand's place on it, led from its start to ``end``, and let go."""
     leading.home()
     leading.grab()
@@ -118,13 +119,20 @@ def lead(leading: Leading, end: Array, rng: np.random.Generator) -> Recording:
         leading.step(HEARD)
     leading.release()
     leading.step(WAITS)
-    return leading.stop().without_pauses()
+    return without_pauses(leading.stop())
+
+
+def without_pauses(recording: LedMovement) -> LedMovement:
+    """Without the time before the first motion and after the last one."""
+    speeds = np.abs(np.diff(recording.joints, axis=0) / np.diff(recording.times)[:, None]).max(axis=1)
+    rows = np.flatnonzero(speeds > STILL * speeds.max())
+    return recording.trim(recording.times[rows[0]], recording.times[rows[-1] + 1])
 
 
 def lessons_of_a_script() -> list[HandLesson]:
     """Ten lessons on the rod; their sweeps end all around the base, nearer and farther."""
     rod = FishingRod()
-    leading, found = Leading.of(rod.hand_led), list[HandLesson]()
+    leading, found = Leading(rod.hand_led), list[HandLesson]()
     for number in range(LESSONS):
         rng = stream(SEED, "hand", number)
         turn = np.pi * (2 * (number * (3 - np.sqrt(5)) / 2 % 1) - 1)  # golden angle: never twice the same side
@@ -139,8 +147,8 @@ def lessons_of_a_script() -> list[HandLesson]:
 
 def jerk(shown: Demonstration) -> float:
     """Root mean square over time and joints (rad/s^3) of a recording's third derivative, at 50 samples a second."""
-    even = Recording(shown.times, shown.trajectory).resampled()
-    return float(np.sqrt(np.mean((np.diff(even.joints, 3, axis=0) / even.times[1] ** 3) ** 2)))
+    times, joints = resampled(shown.times, shown.trajectory)
+    return float(np.sqrt(np.mean((np.diff(joints, 3, axis=0) / times[1] ** 3) ** 2)))
 
 
 def _around(place: Array) -> Array:

@@ -31,7 +31,7 @@ from variants import ARMS, teacher_of
 
 Row = dict[str, Any]
 FILE: Final = "results.csv"
-ERROR, FLOOR, MET = "mean_error_m", "noise_floor_m", "goals_met"  # columns of a run's record
+ERROR, FLOOR, MET = "mean_error", "noise_floor", "goals_met"  # columns of a run's record
 _ASKED: Final = ("requests", "shown", "late", "late_own", "strong", "weak")
 _INSIDE: Final = tuple(f"inside_{share}_{when}" for when in ("last", "late") for share in (50, 80, 95))
 # The columns of each table, and how many of them make its key, which no two rows share.
@@ -140,10 +140,10 @@ def result_rows(experiment: str, config: Config, run: Run) -> list[Row]:
 
     The answer of the learner's own inverse model goes by the name of that model, with 1 in the column ``own``.
     """
-    benchmark, low = _benchmark(config.environment, config.benchmark)
-    corner = CORNER if config.environment in (ROD, *ARMS) else low
+    benchmark, low = _benchmark(config["environment"], config.benchmark)
+    corner = CORNER if config["environment"] in (ROD, *ARMS) else low
     run_of = (experiment, config.variant, config.seed)
-    place = (config.environment, teacher_of(config), config.task_space)
+    place = (config["environment"], teacher_of(config), config.values.get("environment.task_space", 1.0))
     rows: dict[tuple[int, str], Row] = {}
     for answer, found in sorted(run.answers.items(), key=lambda each: each[0] == OWN):  # own last: it has the floor
         name = own_answer(config) if answer == OWN else answer
@@ -168,7 +168,7 @@ def result_rows(experiment: str, config: Config, run: Run) -> list[Row]:
 
 def own_answer(config: Config) -> str:
     """The name of the inverse model by which a learner answers."""
-    return config.inverse
+    return str(config.values.get("inverse", "process"))
 
 
 def goal_rows(config: Config, run: Run) -> list[Row]:
@@ -187,7 +187,7 @@ def asked_rows(config: Config, run: Run) -> list[Row]:
     ``late``: from movement 1000 on, ``late_own``: of these in the teacher's half (if teachers have one); ``strong`` and
     ``weak``: where the first context is in the outer and in the inner third of its range.
     """
-    if "teachers" not in config.used:
+    if "teachers" not in config:
         return []
     task = task_of(config)
     dim, contexts = task.environment.contexts.dim, task.environment.contexts
@@ -197,7 +197,7 @@ def asked_rows(config: Config, run: Run) -> list[Row]:
     border = (2 * (asked["wanted_0"] - contexts.low[0]) / contexts.sides[0] - 1).abs() if dim else 0 * asked["index"]
     late = asked["index"] >= LATE
     rows: list[Row] = []
-    for teacher in config.teachers:
+    for teacher in config["teachers"]:
         own = low_half if teacher == "low-half" else ~low_half
         mine, shown, near = asked["teacher"] == teacher, asked["reply"] == "shown", (border < 1 / 3) & bool(dim)
         counted = (mine, mine & shown, mine & late, mine & late & own, mine & (border > 2 / 3), mine & near)
@@ -255,7 +255,7 @@ def goals_claimed(outcomes: Array, benchmark: Benchmark) -> int:
 @cache
 def _benchmark(environment: str, path: Path | None) -> tuple[Benchmark, Array]:
     """With the lower corner of T."""
-    task = task_of(Config(environment=environment))
+    task = task_of(Config(parts={"environment": environment}))
     return benchmark_of(task, path)[0], task.environment.outcomes.low
 
 

@@ -120,7 +120,10 @@ def errors_of(
     for episode in run(learner, rod, seed, movements=max(times), teacher=teacher):
         if episode.index + 1 in times:
             judged = (rod, benchmark.goals, seed, episode.index + 1)
-            linear, process = LocallyLinear(learner.memory), LocalProcess(learner.memory, noise=rod.outcome_noise)
+            linear, process = (
+                LocallyLinear(learner.memory),
+                LocalProcess(learner.memory, outcome_noise=rod.outcome_noise),
+            )
             linear_error, process_error = (evaluate(each, *judged, repeats=0).mean_error for each in (linear, process))
             found.append((linear_error, process_error))
     return found

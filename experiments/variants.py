@@ -31,17 +31,17 @@ STEPS: Final[tuple[tuple[str, Variant, Variant], ...]] = (
     ("simplex", {"search": "nelder-mead-complete"}, {"search": "nelder-mead-exact"}),
     ("budget", {"budget": 60}, {"budget": 15}),
     ("noise", {}, {"search": "nelder-mead"}),
-    ("progress", {"progress": "absolute"}, {"progress": "gained"}),
+    ("progress", {"goals.progress": "absolute"}, {"goals.progress": "gained"}),
     ("giving-up", {"give_up": -1.0}, {"give_up": -0.5}),
-    ("regions", {"g_max": 50}, {"g_max": 30}),
-    ("slivers", {"max_aspect": 1e9}, {"max_aspect": 5.0}),
+    ("regions", {"goals.g_max": 50}, {"goals.g_max": 30}),
+    ("slivers", {"goals.max_aspect": 1e9}, {"goals.max_aspect": 5.0}),
     ("proof", {"inverse": "linear"}, {"inverse": "process"}),  # the last one: our defaults
 )
 LETTER: Final[Variant] = {option: value for _, was, _ in reversed(STEPS) for option, value in was.items()}
 INVERSE: Final[Variant] = {"inverse": "paper"}  # all that the letter changes in a learner without goals
 PROVED: Final = ("own", "nearest", "linear", "process")  # the answers of experiments on learning from few movements
 EVERY: Final = (*PROVED, "model")  # on the swimmer
-LARGE: Final[Variant] = {"task_space": 100.0}
+LARGE: Final[Variant] = {"environment.task_space": 100.0}
 BASELINE: Final[Variant] = {"goals": "uniform", "inverse": "nearest", "search": "perturb"}  # the field's standard one
 SCHOOL: Final = ("map-elites", "isoline", "cma-me", "cma-mae")  # quality diversity
 # Made by ``make_subsets``: from the shipped demonstrations, and lessons by hand.
@@ -67,19 +67,19 @@ REFINING: Final[dict[str, Variant]] = {
     "imitation": {"algorithm": "imitation"},
     "imitation-model": {"algorithm": "imitation", "inverse": "model"},
     "gradient-linear": {**GRADIENT, "inverse": "linear"},
-    "model-unanchored": {**MODEL, "anchored": False},
-    "gradient-unanchored": {**GRADIENT, "anchored": False},
-    "gradient-no-residual": {**GRADIENT, "residual": False},
-    "model-one-noise": {**MODEL, "noise_heads": False},
-    "model-1": {**MODEL, "members": 1},
-    "model-5": {**MODEL, "members": 5},
+    "model-unanchored": {**MODEL, "trust.anchors": False},
+    "gradient-unanchored": {**GRADIENT, "trust.anchors": False},
+    "gradient-no-residual": {**GRADIENT, "search.residual": False},
+    "model-one-noise": {**MODEL, "model.noise_heads": False},
+    "model-1": {**MODEL, "model.members": 1},
+    "model-5": {**MODEL, "model.members": 5},
 }
 # A robot that nobody here wrote. Evaluated by every answer, so that one run serves learners with and without a model.
 SWIMMER: Final[Variant] = {
     "environment": "swimmer",
     "movements": 2000,
     "evaluate_at": (250, 500, 1000),  # and at the end
-    "answers": EVERY,
+    "evaluated_by": EVERY,
 }
 # What a learner of the suite has to beat, and the rivals there.
 SUITED: Final[dict[str, Variant]] = {
@@ -88,12 +88,15 @@ SUITED: Final[dict[str, Variant]] = {
     "cma-mae": {"algorithm": "cma-mae"},
     "map-elites": {"algorithm": "map-elites"},
 }
-IN_SUITE: Final[Variant] = {"movements": 2000, "evaluate_at": (250, 500, 1000), "answers": PROVED}
-ONCE: Final[Variant] = {"teacher": "initial", "every": 1}  # all demonstrations at the start, one for each movement
+IN_SUITE: Final[Variant] = {"movements": 2000, "evaluate_at": (250, 500, 1000), "evaluated_by": PROVED}
+ONCE: Final[Variant] = {
+    "teacher": "initial",
+    "teacher.every": 1,
+}  # all demonstrations at the start, one for each movement
 TAUGHT: Final[Variant] = {"algorithm": "practice-taught", **ONCE}
 # The rod, by the inverse model whose answers prove themselves; rivals with and without the demonstrations.
 LEARNING: Final[dict[str, Variant]] = {
-    f"{name}.rod": {**line, "evaluate_at": (250, 500, 1000, 2000), "answers": PROVED, "floor_at": (5000,)}
+    f"{name}.rod": {**line, "evaluate_at": (250, 500, 1000, 2000), "evaluated_by": PROVED, "floor_at": (5000,)}
     for name, line in {
         **SUITED,
         "practice-taught": TAUGHT,
@@ -110,11 +113,12 @@ LEARNING: Final[dict[str, Variant]] = {
     }.items()
 }
 # Ten lessons, as a person gives them in a session: all of them early, in a short life.
-SESSION: Final[Variant] = {"movements": 1000, "evaluate_at": (300, 500), "answers": ("own",)}  # and at the end
+SESSION: Final[Variant] = {"movements": 1000, "evaluate_at": (300, 500), "evaluated_by": ("own",)}  # and at the end
 SHOWN: Final[dict[str, Variant]] = {"goals": {**SGIM_D, "teacher": "initial"}, "practice": TAUGHT}
 # Movements of an arm take no time, so training may take more.
 ON_ARMS: Final[Variant] = {"movements": 2000, "evaluate_at": (250, 500, 1000)}  # and at the end
-LONGER: Final[Variant] = {"training": 2.0}
+LONGER: Final[Variant] = {"model.rate": 2.0}
+BY_MODEL: Final = frozenset({"model", "gradient", "gauss-newton"})  # words of what learns a forward model
 
 
 # Learners that ask. All are answered by ``process``, too, the answer of those that practise.
@@ -146,8 +150,8 @@ ASKING: Final[dict[str, Variant]] = {
 # a name of their own in each: sgim-d@noise-twice.
 ROBOTS: Final[dict[str, Variant]] = {
     "as-it-is": {},
-    "noise-none": {"noise": 0.0},
-    "noise-twice": {"noise": 0.064},
+    "noise-none": {"environment.noise": 0.0},
+    "noise-twice": {"environment.noise": 0.064},
     "longer-line": {"environment": "rod-long"},
     "swimmer": {"environment": "swimmer"},
 }
@@ -175,7 +179,7 @@ TAUGHT_ALIKE: Final[dict[str, Variant]] = {
     "sgim-d-model": {**SGIM_D, **PROVED_MODEL},
     "practice-taught": TAUGHT,
 }
-EVERYWHERE: Final[Variant] = {"movements": 2000, "evaluate_at": (500,), "answers": ("own", "process")}
+EVERYWHERE: Final[Variant] = {"movements": 2000, "evaluate_at": (500,), "evaluated_by": ("own", "process")}
 
 
 def shipped(teacher: int) -> Path:
@@ -194,7 +198,12 @@ def _of_teacher(teacher: int) -> dict[str, Variant]:
 def _on_arm(arm: str) -> dict[str, Variant]:
     short = arm.removeprefix("planar-")
     return {
-        f"{name}-{short}": {**(LONGER if Config(**line).uses_model else {}), **line, "environment": arm, **ON_ARMS}
+        f"{name}-{short}": {
+            **(LONGER if BY_MODEL.intersection(line.values()) else {}),
+            **line,
+            "environment": arm,
+            **ON_ARMS,
+        }
         for name, line in REFINING.items()
     }
 
@@ -219,8 +228,8 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
         "sagg-riac-large": {**SAGG_RIAC, **LARGE},
         "sgim-d-large": {**SGIM_D, **LARGE},
         "sgim-d-uniform-large": {**SGIM_D, **LARGE, "goals": "uniform"},
-        "sagg-riac-absolute-large": {**SAGG_RIAC, **LARGE, "progress": "absolute"},
-        "sgim-d-absolute-large": {**SGIM_D, **LARGE, "progress": "absolute"},
+        "sagg-riac-absolute-large": {**SAGG_RIAC, **LARGE, "goals.progress": "absolute"},
+        "sgim-d-absolute-large": {**SGIM_D, **LARGE, "goals.progress": "absolute"},
         "random-goals-demonstrations-large": {**SGIM_D, **BASELINE, **LARGE},
         "cma-mae-large": {"algorithm": "cma-mae", **LARGE},
         "sagg-riac-letter-large": {**SAGG_RIAC, **LETTER, **LARGE},
@@ -237,9 +246,9 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
         "uniform-goals": {**SGIM_D, "goals": "uniform"},
         "grid": {**SGIM_D, "goals": "grid"},
         "alp-gmm": {**SGIM_D, "goals": "alp-gmm"},
-        "absolute-progress": {**SGIM_D, "progress": "absolute"},
-        "paired-progress": {**SGIM_D, "progress": "paired"},
-        "attempt-competence": {**SGIM_D, "progress": "absolute", "competence": "attempt"},
+        "absolute-progress": {**SGIM_D, "goals.progress": "absolute"},
+        "paired-progress": {**SGIM_D, "goals.progress": "paired"},
+        "attempt-competence": {**SGIM_D, "goals.progress": "absolute", "judge": "attempt"},
         "inverse-paper": {**SGIM_D, "inverse": "paper"},
         "inverse-nearest": {**SGIM_D, "inverse": "nearest"},
         "search-nelder-mead-exact": {**SGIM_D, "search": "nelder-mead-exact"},
@@ -249,7 +258,7 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
     "baselines": {
         "random-goals": {**SAGG_RIAC, **BASELINE},
         "random-goals-demonstrations": {**SGIM_D, **BASELINE},
-        "demonstrations-noise": {"algorithm": "imitation", "choice": "random"},
+        "demonstrations-noise": {"algorithm": "imitation", "teacher.choose": "random"},
         **{name: {"algorithm": name} for name in SCHOOL},
         **{f"{name}-demonstrations": {"algorithm": f"{name}-taught"} for name in SCHOOL},
         "map-elites-tuned": {"algorithm": "experiments.parts:map_elites"},
@@ -257,14 +266,14 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
         "cma-mae-demonstrations-tuned": {"algorithm": "experiments.parts:cma_mae_taught"},
     },
     "teaching": {
-        "every-10": {**SGIM_D, "every": 10},
-        "every-100": {**SGIM_D, "every": 100},
+        "every-10": {**SGIM_D, "teacher.every": 10},
+        "every-100": {**SGIM_D, "teacher.every": 100},
         "initial": {**SGIM_D, "teacher": "initial"},
         "asked": {**SGIM_D, "teacher": "asked"},
         "few-demonstrations": {**SGIM_D, "demonstrations": FEW},
         "half-plane": {**SGIM_D, "demonstrations": HALF},
     },
-    "asking": {name: {**line, "answers": ("own", "process")} for name, line in ASKING.items()},
+    "asking": {name: {**line, "evaluated_by": ("own", "process")} for name, line in ASKING.items()},
     "forward-model": REFINING,
     **{arm: _on_arm(arm) for arm in ARMS},
     "swimmer": {
@@ -351,12 +360,12 @@ def make_subsets(folder: Path, *, by_hand: bool = False) -> None:
 def teacher_of(config: Config) -> str:
     """Who demonstrates: the number of the demonstrator, the file's name, "structured" for the postures that an arm is
     shown, "scripted" for the swimmer's teacher; who can be asked; "" for a learner without a teacher."""
-    if "teachers" in config.used:
-        return "+".join(config.teachers)
-    if "teacher" not in config.used:
+    if "teachers" in config:
+        return "+".join(config["teachers"])
+    if "teacher" not in config:
         return ""
-    if config.environment in ARMS and config.demonstrations is None:
+    if config["environment"] in ARMS and config.demonstrations is None:
         return "structured"
-    if config.environment == "swimmer" and config.demonstrations is None:
+    if config["environment"] == "swimmer" and config.demonstrations is None:
         return "scripted"
     return (config.demonstrations or SHIPPED).stem.removeprefix("demonstrator_")

@@ -1,9 +1,8 @@
-"""Everything that a word of the command line can name, one record each, and anything else as package.module:attribute.
+"""A list of words: everything that the command line can name, one record each, and where it is.
 
     find("goals", "grid").load()                    # ProgressGrid; imported now
     find("goals", "mypackage.goals:Curious")        # of your own
-A record says which options of a run go to which parameter. This decides how a run is put together, which options
-have no effect in it, what ``--help`` says and what figures call it. There is no other list of names.
+What can be set of a thing is told by its own signature, see `sgimd_torch.options`; nothing here repeats it.
 """
 
 from __future__ import annotations
@@ -27,85 +26,43 @@ class Entry:
     Args:
         at: where it is, ``package.module:attribute``.
         about: what it is, for ``--help``.
-        uses: its parameter -> the option of a run that it takes, or the part that a run shares with it: "model",
-            "trust", "policies", "outcome_noise", "correspondence". An option that is None leaves the parameter at its
-            own default.
-        fixed: its parameter -> value; a text with a colon is an attribute, loaded like ``at``.
-        also: options that matter with it, but are used by another part.
-        ignores: options that have no effect with it, though others use them.
-        own: of an algorithm: what options are that nobody set, where it is not their ``standard`` (see ``Option``).
-        learns_with: of an inverse: the one to use while learning, if it is another one.
-        label, colour: what figures call it, and how they draw it.
+        fixed: its parameter -> value, where the word is a preset of something more general; a text with a colon is an
+            attribute, loaded like ``at``.
+        hidden: parameters that are no options of it, besides those that are fixed.
+        label, colour: what figures call an algorithm, and how they draw it.
+        teacher: of an algorithm that is shown something: when, unless a run says otherwise.
         filmed: of an environment: whether `sgimd film` shows it.
     """
 
     at: str
     about: str
-    uses: Mapping[str, str] = field(default_factory=dict)
     fixed: Mapping[str, object] = field(default_factory=dict)
-    also: tuple[str, ...] = ()
-    ignores: tuple[str, ...] = ()
-    own: Mapping[str, object] = field(default_factory=dict)
-    learns_with: str | None = None
+    hidden: tuple[str, ...] = ()
     label: str = ""
     colour: str = "black"
+    teacher: str = "periodic"
     filmed: bool = False
 
-    @property
-    def options(self) -> list[str]:
-        """Names of all options and shared parts that matter with it."""
-        return [*self.uses.values(), *self.also]
-
     def load(self) -> Any:
-        """The thing itself.
+        """The thing itself, with what is fixed.
 
         Raises:
             ValueError: a package that it needs is not installed, or broken.
         """
-        return load(self.at)
-
-    def bind(self, value: Callable[[str], Any]) -> Callable[..., Any]:
-        """The thing with its parameters: ``value`` gives that of an option, or a shared part, by name."""
         fixed = {
-            name: load(given) if isinstance(given, str) and ":" in given else given
-            for name, given in self.fixed.items()
+            name: load(value) if isinstance(value, str) and ":" in value else value
+            for name, value in self.fixed.items()
         }
-        given = {name: value(option) for name, option in self.uses.items()}
-        options = fixed | {name: each for name, each in given.items() if each is not None}
-        return partial(self.load(), **options) if options else self.load()
+        return partial(load(self.at), **fixed) if fixed else load(self.at)
 
 
-_PURSUES: Final = {
-    "goals": "goals",
-    "inverse": "inverse",
-    "search": "search",
-    "judge": "competence",
-    "budget": "budget",
-    "give_up": "give_up",
-}
-_PRACTISED: Final = {"goals": "uniform", "search": "practice", "budget": 1}
-_TAUGHT: Final = ("teacher", "demonstrations")
-_ANSWERED: Final = ("demonstrations", "patience")
-_SHOWN: Final = {"correspondence": "correspondence"}
-_ASKS: Final = {
-    **_SHOWN,
-    "teachers": "teachers",
-    "base": "base",
-    "inverse": "inverse",
-    "cost": "cost",
-}
-_PROGRESS: Final = {"window": "window", "progress": "progress"}
-_REGIONS: Final = {**_PROGRESS, "g_max": "g_max", "max_aspect": "max_aspect"}
-_MODEL: Final = {"model": "model", "trust": "trust"}
-_REFINED: Final = {**_MODEL, "residual": "residual"}
-_AIM: Final = ("focus",)  # it is the share near the goal pursued: no effect without goals
 _IN_THE_PACKAGE: Final = "sgimd_torch"
-_IMITATED: Final = {**_SHOWN, "imitations": "imitations", "epsilon": "epsilon"}
-_SCHOOL: Final[tuple[tuple[str, str, dict[str, object], str, str, tuple[str, str]], ...]] = (  # of quality diversity
-    ("map-elites", "map_elites", {}, "fills an archive of outcomes", "MAP-Elites", ("#56b4e9", "#1f78a8")),
-    ("isoline", "isoline", {}, "the same along lines between elites", "Isoline", ("#999933", "#5c5c1f")),
-    ("cma-me", "cma_me", {}, "the same with evolution strategies", "CMA-ME", ("#e69f00", "#8f6300")),
-    ("cma-mae", "cma_mae", {}, "the same with thresholds that rise slowly", "CMA-MAE", ("#882255", "#4d1330")),
+_ALONE: Final = ("correspondence", "imitations", "epsilon")  # hidden: a learner without a teacher
+_SCHOOL: Final = (  # of quality diversity
+    ("map-elites", "fills an archive of outcomes", "MAP-Elites", ("#56b4e9", "#1f78a8")),
+    ("isoline", "the same along lines between elites", "Isoline", ("#999933", "#5c5c1f")),
+    ("cma-me", "the same with evolution strategies", "CMA-ME", ("#e69f00", "#8f6300")),
+    ("cma-mae", "the same with thresholds that rise slowly", "CMA-MAE", ("#882255", "#4d1330")),
 )
 
 
@@ -113,107 +70,72 @@ def _at(place: str, about: str, **more: Any) -> Entry:
     return Entry(f"{_IN_THE_PACKAGE}.{place}", about, **more)
 
 
-def _toy(name: str, side: float, about: str, **more: object) -> Entry:
-    make = f"{_IN_THE_PACKAGE}.environments.toys:{name}"
-    return _at("runs.tasks:toy", about, fixed={"make": make, "side": side, **more})
+def _learner(place: str, about: str, label: str, colour: str, **more: Any) -> Entry:
+    return _at(place, about, label=label, colour=colour, **more)
 
 
 def _rod(about: str, **fixed: object) -> Entry:
-    uses = {"noise": "noise", "task_space": "task_space", "threads": "threads"}
-    return _at("runs.tasks:fishing_rod", about, uses=uses, fixed=fixed, filmed=True)
+    return _at("runs.tasks.rods:fishing_rod", about, fixed=fixed, filmed=True)
 
 
-def _answering(about: str, **fixed: object) -> Entry:
-    return _at("teachers.answering:AnsweringTeacher", about, fixed=fixed)
+def _toy(name: str, side: float, about: str, **more: object) -> Entry:
+    make = f"{_IN_THE_PACKAGE}.environments.toys:{name}"
+    return _at("runs.tasks.robots:toy", about, fixed={"make": make, "side": side, **more}, hidden=("taught",))
 
 
-ROD: Final = "fishing-rod"  # the environment of all runs before there was a choice
+def _answering(about: str, knows: str = "", **fixed: object) -> Entry:
+    known = {"knows": f"{_IN_THE_PACKAGE}.teachers.answering:{knows}"} if knows else {}
+    return _at("teachers.answering:AnsweringTeacher", about, fixed={**known, **fixed})
+
+
+ROD: Final = "fishing-rod"
 # Colours after Okabe & Ito: distinct with any colour vision, and in grey.
 CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
     "algorithm": {
-        "random": _at(
-            "algorithms:random_exploration", "uniform movements", ignores=_AIM, label="Random", colour="#7f7f7f"
+        "random": _learner("algorithms:random_exploration", "uniform movements", "Random", "#7f7f7f"),
+        "sagg-riac": _learner("algorithms:sagg_riac", "goal babbling", "SAGG-RIAC", "#0072b2"),
+        "practice": _learner(
+            "algorithms:practice", "one movement a goal, as a local process answers", "Practice", "#332288"
         ),
-        "sagg-riac": _at("algorithms:sagg_riac", "goal babbling", uses=_PURSUES, label="SAGG-RIAC", colour="#0072b2"),
-        "practice": _at(
-            "algorithms:practice",
-            "one movement a goal, as a local process answers",
-            uses=_PURSUES,
-            own=_PRACTISED,
-            label="Practice",
-            colour="#332288",
-        ),
-        "practice-taught": _at(
+        "practice-taught": _learner(
             "algorithms:practice_taught",
             "the same, and does once what it is shown",
-            uses={**_PURSUES, **_SHOWN},
-            also=_TAUGHT,
-            own={**_PRACTISED, "teacher": "at-once"},
-            label="Practice, taught",
-            colour="#aa4499",
+            "Practice, taught",
+            "#aa4499",
+            teacher="at-once",
         ),
-        "observation": _at(
-            "algorithms:observation",
-            "watches and remembers, never moves",
-            uses=_SHOWN,
-            also=_TAUGHT,
-            ignores=_AIM,
-            label="Observation",
-            colour="#cc79a7",
+        "observation": _learner(
+            "algorithms:observation", "watches and remembers, never moves", "Observation", "#cc79a7"
         ),
-        "imitation": _at(
-            "algorithms:imitation",
-            "repeats the last demonstration with variations",
-            uses={**_SHOWN, "epsilon": "epsilon"},
-            also=_TAUGHT,
-            label="Imitation",
-            colour="#009e73",
+        "imitation": _learner(
+            "algorithms:imitation", "repeats the last demonstration with variations", "Imitation", "#009e73"
         ),
-        "sgim-d": _at(
-            "algorithms:sgim_d",
-            "goal babbling and short imitations",
-            uses={**_PURSUES, **_SHOWN, "social": "social"},
-            also=_TAUGHT,
-            label="SGIM-D",
-            colour="#d55e00",
+        "sgim-d": _learner("algorithms:sgim_d", "goal babbling and short imitations", "SGIM-D", "#d55e00"),
+        "sgim-im": _learner(
+            "algorithms.asking:sgim_im", "decides when to ask the one teacher of --teachers", "SGIM-IM", "#661100"
         ),
-        "sgim-im": _at(
-            "algorithms.asking:sgim_im",
-            "decides when to ask the one teacher of --teachers",
-            uses=_ASKS,
-            also=_ANSWERED,
-            label="SGIM-IM",
-            colour="#661100",
-        ),
-        "sgim-acts": _at(
+        "sgim-acts": _learner(
             "algorithms.asking:sgim_acts",
             "decides when to ask which of --teachers for what, and how to use the answer",
-            uses=_ASKS,
-            also=_ANSWERED,
-            label="SGIM-ACTS",
-            colour="#cc6677",
+            "SGIM-ACTS",
+            "#cc6677",
         ),
-        "sgim-eer": _at(
+        "sgim-eer": _learner(
             "rivals.entropy:sgim_eer",
             "asks the one teacher of --teachers when that should take away more doubt",
-            uses=_ASKS,
-            also=_ANSWERED,
-            label="By entropy",
-            colour="#117733",
+            "By entropy",
+            "#117733",
         ),
         **{
-            f"{name}{ending}": _at(
-                f"rivals.quality_diversity:{place}",
+            f"{name}{ending}": _learner(
+                f"rivals.quality_diversity:{name.replace('-', '_')}",
                 f"{about}{shown} (extra rivals)",
-                uses=_IMITATED if shown else {},
-                fixed=fixed,
-                also=_TAUGHT if shown else (),
-                ignores=_AIM,
-                label=f"{label}, taught" if shown else label,
-                colour=colours[bool(shown)],
+                f"{label}, taught" if shown else label,
+                colours[bool(shown)],
+                hidden=() if shown else _ALONE,
             )
             for ending, shown in (("", ""), ("-taught", ", and imitates what it is shown"))
-            for name, place, fixed, about, label, colours in _SCHOOL
+            for name, about, label, colours in _SCHOOL
         },
     },
     "environment": {
@@ -221,11 +143,13 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
         "rod-wind": _rod("the same in a side wind, up to a quarter of the float's weight: a context", max_wind=0.05),
         "rod-yaw": _rod("the same with its base turned by up to half a radian: a context", max_yaw=0.5),
         "rod-long": _rod("the same with a line half as long again, taught with the shorter one", line=1.5),
-        "planar-arm-7": _at("runs.tasks:planar_arm", "7 joints, no noise", fixed={"n_joints": 7}, filmed=True),
-        "planar-arm-50": _at("runs.tasks:planar_arm", "50 joints, no noise", fixed={"n_joints": 50}, filmed=True),
-        "swimmer": _at("runs.tasks:swimmer", "gymnasium's Swimmer-v5: three links, two motors (extra gym)"),
+        "planar-arm-7": _at("runs.tasks.robots:planar_arm", "7 joints, no noise", fixed={"n_joints": 7}, filmed=True),
+        "planar-arm-50": _at(
+            "runs.tasks.robots:planar_arm", "50 joints, no noise", fixed={"n_joints": 50}, filmed=True
+        ),
+        "swimmer": _at("runs.tasks.robots:swimmer", "gymnasium's Swimmer-v5: three links, two motors (extra gym)"),
         "half-reached": _at(
-            "runs.tasks:half_reached", "7 joints, and a T of which less than half can be reached", filmed=True
+            "runs.tasks.robots:half_reached", "7 joints, and a T of which less than half can be reached", filmed=True
         ),
         "toss": _toy("toss", 0.4, "a ball in the wind, which is the context", taught=True),
         "crawler": _toy("crawler", 0.1, "four legs, whose phases are periodic parameters"),
@@ -233,20 +157,16 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
         "spatial-arm": _toy("spatial_arm", 25.0, "six joints, three outcomes, in cm"),
     },
     "goals": {
-        "interest-map": _at("goals.interest_map:InterestMap", "where competence changes, in regions", uses=_REGIONS),
-        "grid": _at("goals.progress_grid:ProgressGrid", "the same in cells that never split", uses=_PROGRESS),
+        "interest-map": _at("goals.interest_map:InterestMap", "where competence changes, in regions"),
+        "grid": _at("goals.progress_grid:ProgressGrid", "the same in cells that never split"),
         "alp-gmm": _at("goals.alp_gmm:AlpGmm", "Gaussians of high progress (extra rivals)"),
-        "uniform": _at("goals.uniform:UniformGoals", "the same everywhere", ignores=("competence",)),
+        "uniform": _at("goals.uniform:UniformGoals", "anywhere in T, all equally likely"),
     },
     "progress": {
         "gained": _at("goals.regions:gained_progress", "how much attempts raise the competence at their own goals"),
         "absolute": _at("goals.regions:absolute_progress", "newer competences against older ones, the paper's eq. (3)"),
         "signed": _at("goals.regions:signed_progress", "the same, but falling competence does not count"),
         "paired": _at("goals.regions:paired_progress", "difference from the competence at the nearest earlier goal"),
-    },
-    "competence": {
-        "memory": _at("algorithms:remembered", "by all movements ever made, as in the paper"),
-        "attempt": _at("algorithms:attempted", "by those made for this goal"),
     },
     "search": {
         "nelder-mead": _at("searches.simplex:nelder_mead", "a simplex of neighbours, a little noise on every movement"),
@@ -260,16 +180,17 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
         "practice": _at("searches.perturb:practise", "what the inverse model infers plus a little noise"),
         "cma-es": _at("searches.cma_es:cma_es", "an evolution strategy (extra rivals)"),
         "gradient": _at(
-            "searches.through_model:gradient_search",
-            "down the gradient of a forward model (extra forward, like those below)",
-            uses=_REFINED,
+            "searches.through_model:gradient_search", "down the gradient of a forward model (extra forward)"
         ),
         "gauss-newton": _at(
             "searches.through_model:gradient_search",
-            "a new plan for each movement",
-            uses=_REFINED,
+            "a new plan through it for each movement (extra forward)",
             fixed={"propose": "sgimd_torch.searches.through_model:gauss_newton"},
         ),
+    },
+    "explore": {
+        "anywhere": _at("algorithms:anywhere", "uniformly from Pi"),
+        "widening": _at("searches.widening:Widening", "around the middle of Pi, as wide as can be predicted"),
     },
     "inverse": {
         "linear": _at("inverses.locally_linear:LocallyLinear", "eq. (9) corrected to first order"),
@@ -278,108 +199,77 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
         "process": _at(
             "inverses.local_process:LocalProcess",
             "what a local Gaussian process proposes, if it should beat the nearest",
-            uses={"noise": "outcome_noise"},
         ),
         "model": _at(
             "inverses.through_model:ModelInverse",
-            "linear when learning, through a forward model in evaluations (extra forward); it helps late in life "
-            "where movements are noisy, and errs more than process where they are not",
-            uses={**_MODEL, "policies": "policies"},
-            learns_with="linear",
+            "linear when learning, through a forward model in evaluations (extra forward)",
         ),
         "model-proved": _at(
             "inverses.proved:ProvedInverse",
-            "process when learning; in evaluations the forward model's answer, where the process expects no more "
-            "error of it",
-            uses={**_MODEL, "policies": "policies", "noise": "outcome_noise"},
-            learns_with="process",
+            "process when learning; in evaluations the forward model's answer where the process expects no more error",
         ),
+    },
+    "judge": {
+        "memory": _at("algorithms:remembered", "competence by all movements ever made, as in the paper"),
+        "attempt": _at("algorithms:attempted", "by those made for this goal"),
+    },
+    "social": {
+        "imitate": _at("algorithms:imitating", "repeat a demonstration a few times", hidden=("strategy",)),
+        "emulate": _at("algorithms:emulating", "pursue its outcome in the learner's own way", hidden=("strategy",)),
     },
     "base": {
         "practice": _at("algorithms.asking:practised", "one movement a goal, and once what is shown"),
-        "search": _at(
-            "algorithms.asking:searched",
-            "a search at each goal and short imitations, as in the papers",
-            uses={
-                **{name: option for name, option in _PURSUES.items() if name not in ("goals", "judge", "inverse")},
-                "repeats": "imitations",
-                "epsilon": "epsilon",
-            },
-        ),
-    },
-    "social": {
-        "imitate": _at(
-            "algorithms:imitating", "repeat it a few times", uses={"repeats": "imitations", "epsilon": "epsilon"}
-        ),
-        "emulate": _at("algorithms:emulating", "pursue its outcome in the learner's own way"),
+        "search": _at("algorithms.asking:searched", "a search at each goal and short imitations, as in the papers"),
     },
     "teacher": {
-        "periodic": _at(
-            "teachers:PeriodicTeacher", "one every so many movements", uses={"every": "every", "choose": "choice"}
-        ),
-        "initial": _at(
-            "teachers:InitialTeacher", "all at the start, one every so many movements", uses={"every": "every"}
-        ),
+        "periodic": _at("teachers:PeriodicTeacher", "one every so many movements"),
+        "initial": _at("teachers:InitialTeacher", "all at the start, one every so many movements"),
         "at-once": _at("teachers:InitialTeacher", "all at the start, one for each movement", fixed={"every": 1}),
-        "asked": _at(
-            "teachers:AskedTeacher", "when the learner stalls", uses={"patience": "every", "choose": "choice"}
-        ),
-        "by-hand": _at(
-            "teachers.by_hand:nobody", "a person, whenever they like: sgimd teach", ignores=("demonstrations",)
-        ),
+        "asked": _at("teachers:AskedTeacher", "when the learner stalls"),
+        "by-hand": _at("teachers.by_hand:nobody", "a person, whenever they like: sgimd teach"),
+    },
+    "choose": {
+        "least-explored": _at("teachers:least_explored", "the one whose outcome the learner has reached least"),
+        "random": _at("teachers:at_random", "any"),
     },
     "teachers": {
         "all": _answering("shows the nearest of all demonstrations"),
         **{
             f"demonstrator-{number}": _answering(
-                f"has the recordings of the rod's demonstrator {number}",
-                knows=f"sgimd_torch.teachers.answering:demonstrator_{number}",
+                f"has the recordings of the rod's demonstrator {number}", f"demonstrator_{number}"
             )
             for number in (1, 2, 3)
         },
-        "low-half": _answering(
-            "has those of the lower half of the first outcome", knows="sgimd_torch.teachers.answering:low_half"
-        ),
-        "high-half": _answering("has those of the upper half", knows="sgimd_torch.teachers.answering:high_half"),
-        "mislabelling": _answering(
-            "shows something else than is said", knows="sgimd_torch.teachers.answering:mislabelled"
-        ),
+        "low-half": _answering("has those of the lower half of the first outcome", "low_half"),
+        "high-half": _answering("has those of the upper half", "high_half"),
+        "mislabelling": _answering("shows something else than is said", "mislabelled"),
         "slow": _answering("the nearest of all, for which the learner rests 10 movements", takes=10),
-        "by-hand": _at(
-            "teachers.by_hand:nobody", "a person, if there is one: sgimd teach", ignores=("demonstrations",)
-        ),
-    },
-    "choice": {
-        "least-explored": _at("teachers:least_explored", "the one whose outcome the learner has reached least"),
-        "random": _at("teachers:at_random", "any"),
+        "by-hand": _at("teachers.by_hand:nobody", "a person, if there is one: sgimd teach"),
     },
 }
-# Shared parts: built once for a run, and only if something uses them.
+# Parts that several others share: made once for a run, and only if something takes a parameter of this name.
 SHARED: Final = {
-    "model": _at(
-        "forward_model.model:ForwardModel",
-        "the forward model",
-        uses={"members": "members", "noise_heads": "noise_heads", "rate": "training", "focus": "focus"},
-    ),
-    "trust": _at("forward_model.anchored:Trust", "how far to trust it", uses={"anchors": "anchored"}),
+    "model": _at("forward_model.model:ForwardModel", "the forward model (extra forward)", hidden=("seed",)),
+    "trust": _at("forward_model.anchored:Trust", "how far to trust the forward model", hidden=("noise",)),
 }
 # What a thing of your own must have: how it is called, and the members of what it returns.
 _WANTED: Final[dict[str, tuple[str, tuple[str, ...]]]] = {
-    "algorithm": ("(environment, seed, ...) -> a Learner", ("ask", "tell", "watch", "memory")),
+    "algorithm": ("(environment, seed, ...) -> a Learner", ("ask", "tell", "watch", "memory", "inverse")),
     "environment": (
         "() -> an environment or a Task",
         ("contexts", "policies", "outcomes", "rest", "outcome_noise", "observe", "execute"),
     ),
     "goals": ("(contexts, outcomes, rng) -> a goal model", ("sample", "add")),
     "progress": ("(goals, competences, gains) of a region -> its interest", ()),
-    "competence": ("(memory, measure) -> a judge of competence", ("__call__",)),
+    "judge": ("(memory, measure) -> a judge of competence", ("__call__",)),
     "search": ("(policies, rng) -> a search", ("__call__",)),
+    "explore": ("(policies, memory, inverse, rng) -> an explorer", ("__call__",)),
     "inverse": ("(memory) -> an inverse model", ("__call__",)),
     "base": ("(environment) -> what a learner that asks does on its own, and how it answers", ("parts", "ways")),
     "social": ("(goal babbling, outcomes, rng) -> a social strategy", ("attempt",)),
     "teacher": ("(demonstrations, rng) -> a teacher", ("offer",)),
     "teachers": ("(demonstrations, rng) -> a teacher who answers", ("demonstrate",)),
-    "choice": ("(demonstrations, memory, rng) -> a demonstration", ()),
+    "choose": ("(demonstrations, memory, rng) -> a demonstration", ()),
 }
 
 
@@ -395,18 +285,17 @@ def find(kind: str, word: str) -> Entry:
     if ":" not in word:
         raise unknown(kind, word, known, ", and package.module:attribute for one of your own")
     made = load(word, f"{kind} {word}")
-    call, _ = _WANTED[kind]
     if not callable(made):
-        raise ValueError(f"{kind} {word} must be called as {call}, but it is a {type(made).__name__}")
-    try:
-        parameters = list(inspect.signature(made).parameters.values())
-    except (TypeError, ValueError):  # a builtin may not name its parameters
-        parameters = []
-    named = {each.name for each in parameters if each.kind is not each.POSITIONAL_ONLY}
-    possible = {name: option for entry in known.values() for name, option in entry.uses.items()}
-    uses = {name: option for name, option in possible.items() if name in named}
-    also = _TAUGHT if kind == "algorithm" and "correspondence" in uses else ()
-    return Entry(word, "of your own", uses=uses, also=also)
+        raise ValueError(f"{kind} {word} must be called as {_WANTED[kind][0]}, but it is a {type(made).__name__}")
+    return Entry(word, "of your own")
+
+
+def word_of(kind: str, made: Callable[..., Any]) -> str:
+    """What a default is called: a word of the catalogue, or package.module:attribute; "" if it has no such name."""
+    made = made.func if isinstance(made, partial) else made
+    place = f"{made.__module__}:{made.__qualname__}"
+    words = (word for word, entry in CATALOGUE[kind].items() if entry.at == place and not entry.fixed)
+    return next(words, "" if "<" in place else place)
 
 
 def checked(kind: str, word: str, make: Callable[..., Any]) -> Callable[..., Any]:

@@ -22,7 +22,7 @@ Judge = Callable[[Array, Array, Array], float]
 """(context, goal, outcomes of the attempt) -> the competence at the goal when the attempt has ended, in [-1, 0]."""
 
 
-Look = Callable[[Array], Array]
+Explore = Callable[[Array], Array]
 """context -> the next theta of global exploration."""
 
 
@@ -77,7 +77,7 @@ class GoalBabbling:
         rng: draws the regimes.
         budget: the most movements for one goal.
         tolerance: distance (m) at which a goal counts as reached.
-        look: draws the movements of the global regime; None: uniformly from Pi, by ``rng``.
+        explore: draws the movements of the global regime; None: uniformly from Pi, by ``rng``.
         global_range: least and greatest probability of the global exploration regime.
         give_up: a goal with competence below this is given up at the first movement that does not raise it; -1 never
             gives up. Deviation: the paper spends the whole budget on every goal. But in a task space far larger than
@@ -100,7 +100,7 @@ class GoalBabbling:
         *,
         budget: int = 15,
         tolerance: float = 0.02,
-        look: Look | None = None,
+        explore: Explore | None = None,
         global_range: tuple[float, float] = (0.05, 0.95),
         give_up: float = -0.5,
     ) -> None:
@@ -120,7 +120,7 @@ class GoalBabbling:
         self.rng = rng
         self.budget = check_count("budget", budget, 1)
         self.tolerance = tolerance
-        self.look: Look = look if look is not None else lambda context: policies.sample(rng)
+        self.explore: Explore = explore if explore is not None else lambda context: policies.sample(rng)
         self.global_range = global_range
         self.give_up = give_up
 
@@ -167,7 +167,7 @@ class GoalBabbling:
         while True:
             if self.rng.random() < self._global_probability(context, goal):
                 # Deviation: the paper prints "theta in T", which must be Pi.
-                yield Move(self.look(context), goal, "global")
+                yield Move(self.explore(context), goal, "global")
             else:
                 yield from self._optimise(context, goal)
 

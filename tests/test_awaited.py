@@ -151,7 +151,7 @@ def mine(tmp_path, monkeypatch):
     """The options of a run with a teacher who gives three answers at first; its directory."""
     (tmp_path / "mine.py").write_text(STUCK)
     monkeypatch.chdir(tmp_path)
-    options = "--environment planar-arm-7 --algorithm sgim-im --evaluate-at [] --answers own"
+    options = "--environment planar-arm-7 --algorithm sgim-im --evaluate-at [] --evaluated-by own"
     yield [*options.split(), "--repeats", "0", "--out", str(tmp_path)], tmp_path / "sgim-im" / "seed-000"
     sys.path[:] = [place for place in sys.path if place != str(tmp_path)]
     sys.modules.pop("mine", None)

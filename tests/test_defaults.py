@@ -1,57 +1,97 @@
 """The numbers that everything runs with unless somebody asks for others: those of the paper, and those of results/.
 
-Whoever changes one changes every run that does not name it. So it stands here a second time, and what was measured
-with it (results/, the README) has to be made anew.
+Whoever changes one changes every run that does not name it. So they stand here a second time, and what was measured
+with them (results/, the README) has to be made anew.
 """
 
-import inspect
-import math
+import ast
+from collections import defaultdict
+from pathlib import Path
 
-import pytest
+import sgimd_torch
+from sgimd_torch.runs.config import Config
 
-from sgimd_torch.catalogue import load
-
-TREE = {"window": 24, "modes": (0.7, 0.2, 0.1), "near": 0.05}  # of section 3.2
-PURSUIT = {"budget": 15, "global_range": (0.05, 0.95), "give_up": -0.5}
-NETWORKS = {"members": 3, "hidden": (64, 64), "lr": 0.01, "beta": 0.5}
-ONLINE = {"seed": 0, "every": 50, "rate": 0.3, "focus": 0.0}
-DEFAULTS = {
-    "algorithms:goal_babbling": PURSUIT,
-    "algorithms:imitation": {"epsilon": 0.05},
-    "algorithms:imitating": {"repeats": 10, "epsilon": 0.05},
-    "algorithms.asking:searched": {"repeats": 10, "epsilon": 0.05},
-    "algorithms.asking:sgim_acts": {"cost": 1.0},
-    "environments.fishing_rod:FishingRod": {"noise": 0.032, "max_yaw": 0.0, "max_wind": 0.0, "line": 1.0},
-    "environments.motor_primitives:GaussianPrimitive": {"n_knots": 4, "sharpness": 9.0},
-    "environments.planar_arm:PlanarArm": {"n_joints": 7, "length": 1.0, "noise": 0.0},
-    "evaluation:evaluate": {"repeats": 3},
-    "forward_model.anchored:Trust": {"noise": 0.04, "share": 0.1, "doubt": 0.06, "caution": 10.0, "error": 0.25},
-    "forward_model.ensemble:Ensemble": NETWORKS,
-    "forward_model.model:ForwardModel": {"members": 3, "hidden": (64, 64), **ONLINE},
-    "goals.alp_gmm:AlpGmm": {"refit": 50, "memory": 250, "components": 10, "uniform": 0.2},
-    "goals.interest_map:InterestMap": {**TREE, "g_max": 30, "cuts": 20, "min_side": 1 / 15, "max_aspect": 5.0},
-    "goals.progress_grid:ProgressGrid": TREE,
-    "goals.strategic:StrategicInterest": {"anywhere": 0.5, "greatest": 10, "temperature": 0.03},
-    "inverses.local:LocalInverse": {"h_max": 10, "k_max": 10, "alpha": 0.5, "width": 0.25},
-    "inverses.local:NearestNeighbour": {"k": 10},
-    "inverses.locally_linear:LocallyLinear": {"ridge": 0.001},
-    "rivals.quality_diversity:map_elites": {"first": 100, "sd": 0.05, "batch": 10},
-    "rivals.quality_diversity:cma_me": {"emitters": 5, "sd": 0.1},
-    "searches.cma_es:cma_es": {"sd": 0.05, "population": 4},
-    "searches.perturb:perturb": {"sd": 0.05},
-    "searches.simplex:nelder_mead": {"noise": 0.05, "step": 0.1, "xatol": 0.1, "fatol": 0.05},
-    "searches.through_model:gradient_search": {"noise": 0.05},
-    "strategies:GoalBabbling": {**PURSUIT, "tolerance": 0.02},
-    "teachers.answering:AnsweringTeacher": {"within": math.inf, "takes": 0},
-    "teachers:AskedTeacher": {"patience": 30},
-    "teachers:InitialTeacher": {"every": 10},
-    "teachers:PeriodicTeacher": {"every": 30},
-    "teachers:least_explored": {"tiles": 10},
+SGIM_D = {
+    "environment": "fishing-rod",
+    "environment.line": 1.0,
+    "environment.max_wind": 0.0,
+    "environment.max_yaw": 0.0,
+    "environment.noise": 0.032,
+    "environment.task_space": 1.0,
+    "environment.threads": 1,
+    "budget": 15,
+    "give_up": -0.5,
+    "global_range": (0.05, 0.95),
+    "tolerance": None,
+    "explore": "anywhere",
+    "goals": "interest-map",
+    "goals.cuts": 20,
+    "goals.g_max": 30,
+    "goals.max_aspect": 5.0,
+    "goals.min_side": 1 / 15,
+    "goals.modes": (0.7, 0.2, 0.1),
+    "goals.near": 0.05,
+    "goals.progress": "gained",
+    "goals.window": 24,
+    "inverse": "process",
+    "judge": "memory",
+    "search": "nelder-mead",
+    "search.adaptive": False,
+    "search.complete": False,
+    "search.fatol": 0.05,
+    "search.noise": 0.05,
+    "search.step": 0.1,
+    "search.xatol": 0.1,
+    "social": "imitate",
+    "social.epsilon": 0.05,
+    "social.repeats": 10,
+    "teacher": "periodic",
+    "teacher.choose": "least-explored",
+    "teacher.choose.tiles": 10,
+    "teacher.every": 30,
 }
+PRACTICE = {
+    "budget": 1,
+    "global_range": (0.02, 0.3),
+    "explore": "widening",
+    "goals": "uniform",
+    "search": "practice",
+    "search.sd": 0.02,
+    "social.repeats": 1,
+    "teacher": "at-once",
+}
+ONCE = (
+    "budget",
+    "give_up",
+    "global_range",
+    "g_max",
+    "max_aspect",
+    "min_side",
+    "task_space",
+    "temperature",
+    "ridge",
+    "refit",
+)
 
 
-@pytest.mark.parametrize(("place", "numbers"), DEFAULTS.items(), ids=DEFAULTS)
-def test_a_default_is_the_number_that_results_were_made_with(place, numbers):
-    parameters = inspect.signature(load(f"sgimd_torch.{place}")).parameters.values()
-    given = {each.name: each.default for each in parameters if type(each.default) in (int, float, tuple)}
-    assert given == numbers
+def test_the_defaults_are_those_that_results_were_made_with():
+    assert Config(algorithm="sgim-d").values == SGIM_D
+    left = {name: value for name, value in SGIM_D.items() if name.split(".")[0] not in ("goals", "search", "teacher")}
+    assert Config(algorithm="practice-taught").values == {**left, **PRACTICE}
+    learnt = Config(algorithm="sgim-d", parts={"search": "gradient"})
+    model = {name.removeprefix("model."): value for name, value in learnt.values.items() if name.startswith("model.")}
+    assert {"members": 3, "noise_heads": True, "rate": 0.3, "focus": 0.0, "every": 50}.items() <= model.items()
+    assert learnt["trust.anchors"] is learnt["search.residual"] is True
+
+
+def test_ten_default_values_stand_once_in_the_tree():
+    found = defaultdict(list)
+    for path in Path(sgimd_torch.__path__[0]).rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.arguments):
+                named = [*node.posonlyargs, *node.args][-len(node.defaults) :] if node.defaults else []
+                pairs = [*zip(named, node.defaults, strict=True), *zip(node.kwonlyargs, node.kw_defaults, strict=True)]
+                for argument, default in pairs:
+                    if default is not None:
+                        found[argument.arg].append(path.name)
+    assert {name: found[name] for name in ONCE if len(found[name]) != 1} == {}

@@ -4,6 +4,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from sgimd_torch.learner.life import Kind, read_life
 
 from sgimd_torch.algorithms import observation, random_exploration, sagg_riac, sgim_d
 from sgimd_torch.environments.planar_arm import PlanarArm
@@ -14,7 +15,6 @@ from sgimd_torch.goals.alp_gmm import AlpGmm
 from sgimd_torch.inverses.local import NearestNeighbour
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Learner, ReplayError
-from sgimd_torch.learner.life import Kind, read_life
 from sgimd_torch.memory import Memory
 from sgimd_torch.rivals.quality_diversity import cma_mae, cma_me, isoline, map_elites
 from sgimd_torch.searches.cma_es import cma_es
@@ -96,7 +96,9 @@ def test_which_movement_reaches_a_goal_is_one_call_for_all_of_them(name):
     found = evaluate(learner.inverse, arm, goal[None], seed=2, step=60)
     context = found.contexts[0]
     assert arm.policies.contains(learner.inverse(context, goal).theta)
-    assert np.array_equal(found.thetas[0], LocalProcess(learner.memory, noise=arm.outcome_noise)(context, goal).theta)
+    assert np.array_equal(
+        found.thetas[0], LocalProcess(learner.memory, outcome_noise=arm.outcome_noise)(context, goal).theta
+    )
 
 
 def test_the_builders_inverse_is_the_one_that_it_is_given():

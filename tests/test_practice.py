@@ -10,7 +10,7 @@ from sgimd_torch.goals.uniform import UniformGoals
 from sgimd_torch.inverses.local import NearestNeighbour
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Learner
-from sgimd_torch.runs.tasks import toy_benchmark
+from sgimd_torch.runs.tasks.robots import toy_benchmark
 from sgimd_torch.searches.perturb import perturb
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Demonstration
@@ -34,7 +34,7 @@ def test_practice_beats_uniform_goals_with_the_nearest_and_noise(make, side):
         theirs = sagg_riac(robot, seed, goals=UniformGoals, inverse=NearestNeighbour, search=perturb, budget=1)
         after(theirs, robot, seed)
         for row, inverse in enumerate(
-            (LocalProcess(ours.memory, noise=robot.outcome_noise), NearestNeighbour(theirs.memory))
+            (LocalProcess(ours.memory, outcome_noise=robot.outcome_noise), NearestNeighbour(theirs.memory))
         ):
             errors[row, k] = evaluate(inverse, robot, goals, seed, 200, repeats=0).mean_error
     assert (errors[0] < 0.75 * errors[1]).all()

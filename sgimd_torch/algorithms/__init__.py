@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any, TypedDict, Unpack
+from typing import Any, Final
 
 import numpy as np
 
@@ -24,38 +24,123 @@ from sgimd_torch.goals.uniform import UniformGoals
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Learner
 from sgimd_torch.memory import Memory
+from sgimd_torch.options import given, hands_on
 from sgimd_torch.searches.perturb import practise
 from sgimd_torch.searches.simplex import nelder_mead
-from sgimd_torch.searches.widening import Widening, Width
+from sgimd_torch.searches.widening import Widening
 from sgimd_torch.spaces import Array, Box, Estimate, Search, stream
-from sgimd_torch.strategies import Babble, Emulate, GoalBabbling, Imitate, Judge, Look, Remember, Rest, SocialStrategy
+from sgimd_torch.strategies import (
+    Babble,
+    Emulate,
+    Explore,
+    GoalBabbling,
+    Imitate,
+    Judge,
+    Remember,
+    Rest,
+    SocialStrategy,
+)
 
 Correspondence = Callable[[Array, Array], Array]
 MakeGoals = Callable[[Box, Box, np.random.Generator], Goals]
 MakeInverse = Callable[[Memory], Callable[[Array, Array], Estimate]]
 MakeSearch = Callable[[Box, np.random.Generator], Search]
 MakeJudge = Callable[[Memory, Performance], Judge]
-MakeLook = Callable[[Box, Memory, Any, np.random.Generator], Look]
+MakeExplore = Callable[[Box, Memory, Any, np.random.Generator], Explore | None]
 MakeSocial = Callable[[GoalBabbling, Box, np.random.Generator], SocialStrategy]
 
 
-class Parts(TypedDict, total=False):
-    """The keywords of ``goal_babbling``, which explains them."""
+def remembered(memory: Memory, measure: Performance) -> Judge:
+    """The paper's reading of competence, eq. (2): the best that memory holds."""
+    return Competence(memory, measure)
 
-    goals: MakeGoals
-    inverse: MakeInverse | None
-    search: MakeSearch
-    judge: MakeJudge
-    measure: Performance | None
-    budget: int
-    tolerance: float | None
-    look: MakeLook | None
-    global_range: tuple[float, float]
-    give_up: float
+
+def attempted(memory: Memory, measure: Performance) -> Judge:
+    """SAGG-RIAC's own reading: the best of this attempt."""
+    return AttemptCompetence(measure)
+
+
+def anywhere(policies: Box, memory: Memory, inverse: object, rng: np.random.Generator) -> None:
+    """Global exploration of all of Pi, uniformly: what `GoalBabbling` does without an explorer."""
+
+
+@hands_on(Imitate, "repeats", "epsilon")
+def imitating(
+    babbling: GoalBabbling, outcomes: Box, rng: np.random.Generator, *, strategy: str = "social", **variations: Any
+) -> Imitate:
+    """How SGIM-D answers a demonstration: a short imitation, then emulation of the goal."""
+    return Imitate(babbling.policies, rng, babbling=babbling, outcomes=outcomes, strategy=strategy, **variations)
+
+
+def emulating(babbling: GoalBabbling, outcomes: Box, rng: np.random.Generator, *, strategy: str = "social") -> Emulate:
+    """A swap for ``imitating``: the teacher's goals without the teacher's movements."""
+    return Emulate(babbling, outcomes, strategy=strategy)
+
+
+@hands_on(GoalBabbling, "budget", "global_range", "give_up")
+def goal_babbling(
+    environment: Environment,
+    seed: int,
+    memory: Memory,
+    *,
+    goals: MakeGoals = InterestMap,
+    inverse: MakeInverse = LocalProcess,
+    search: MakeSearch = nelder_mead,
+    explore: MakeExplore = anywhere,
+    judge: MakeJudge = remembered,
+    measure: Performance | None = None,
+    tolerance: float | None = None,
+    **pursuit: Any,
+) -> GoalBabbling:
+    """The paper's autonomous strategy, built from its parts.
+
+    Args:
+        environment: its boxes, rest and outcome noise are read; it is not executed.
+        seed: of all streams of this learner.
+        memory: of the learner.
+        goals: (contexts, outcomes, rng) -> the goal model.
+        inverse: (memory) -> the inverse model, where searches begin and by which the learner answers; it is given
+            ``outcome_noise`` if it has such a keyword. Deviation: the paper infers by eq. (9) alone, which is
+            `LocalInverse`; the answers of `LocalProcess` have to prove themselves.
+        search: (policies, rng) -> the refinement of its estimate; it is given the ``width`` of the explorer, if it has
+            such a keyword and the explorer has one.
+        explore: (policies, memory, inverse, rng) -> how the global regime draws movements; None: uniformly from Pi.
+        judge: (memory, measure) -> the competence that the goal model is told.
+        measure: J; None for eq. (7), relative to the distance from rest.
+        tolerance: distance (m) at which a goal counts as reached; None for the outcome noise, but at least .02 m.
+        budget: the most movements for one goal. Deviation: the paper has no such number; with a complete simplex of 26
+            movements a goal would take 60 or so, and a learner with the rod would come to a hundred goals in its life.
+        global_range: least and greatest probability of the global exploration regime.
+        give_up: below this competence a goal is given up when a movement does not raise it; -1 never gives up.
+
+    Raises:
+        ValueError: a number out of its range.
+    """
+    noise = max(environment.outcome_noise, 0.02)
+    if measure is None:
+        measure = partial(performance, rest=environment.rest, d_min=noise)
+    made = answering(environment, memory, inverse)
+    explorer = explore(environment.policies, memory, made, stream(seed, "look"))
+    width = getattr(explorer, "width", None)
+    if width is not None:  # how far to look, which both of them go by
+        search = given(search, width=width)
+    return GoalBabbling(
+        environment.policies,
+        memory,
+        goals(environment.contexts, environment.outcomes, stream(seed, "goals")),
+        made,
+        search(environment.policies, stream(seed, "search")),
+        Competence(memory, measure),
+        judge(memory, measure),
+        stream(seed, "regime"),
+        tolerance=noise if tolerance is None else tolerance,
+        explore=explorer,
+        **pursuit,
+    )
 
 
 def random_exploration(
-    environment: Environment, seed: int, *, inverse: MakeInverse | None = None, memory: Memory | None = None
+    environment: Environment, seed: int, *, inverse: MakeInverse = LocalProcess, memory: Memory | None = None
 ) -> Learner:
     """Random: uniform movements."""
     memory = start_memory(environment, memory)
@@ -64,61 +149,12 @@ def random_exploration(
     )
 
 
-def sagg_riac(environment: Environment, seed: int, *, memory: Memory | None = None, **parts: Unpack[Parts]) -> Learner:
-    """SAGG-RIAC: active goal babbling, without a teacher."""
-    memory = start_memory(environment, memory)
-    babbling = goal_babbling(environment, seed, memory, **parts)
-    return Learner(memory, babbling, inverse=babbling.inverse)
-
-
-def practice(environment: Environment, seed: int, *, memory: Memory | None = None, **parts: Unpack[Parts]) -> Learner:
-    """Practice, which is ours: goals anywhere in T, and at each one movement, the answer of a local process plus noise.
-
-    It has no teacher, and nothing in it knows a unit or a robot. What the answer gets wrong is what it learns next.
-    T should not be much larger than what can be reached: its goals are drawn from all of it.
-    """
-    return sagg_riac(environment, seed, memory=memory, **practising(parts))
-
-
-def practice_taught(
-    environment: Environment,
-    seed: int,
-    *,
-    correspondence: Correspondence,
-    memory: Memory | None = None,
-    **parts: Unpack[Parts],
-) -> Learner:
-    """The same with a teacher: what is shown is executed once, exactly. Best when all is shown at the start."""
-    return sgim_d(
-        environment,
-        seed,
-        correspondence=correspondence,
-        social=partial(imitating, repeats=1),
-        memory=memory,
-        **practising(parts),
-    )
-
-
-def practising(changed: Parts) -> Parts:
-    """The parts of `practice`, some of them ``changed``."""
-    width = Width()
-    parts: Parts = {
-        "goals": UniformGoals,
-        "search": partial(practise, width=width),
-        "budget": 1,
-        "look": partial(Widening, width=width),
-        "global_range": (0.02, 0.3),
-    }
-    parts.update(changed)
-    return parts
-
-
 def observation(
     environment: Environment,
     seed: int,
     *,
     correspondence: Correspondence,
-    inverse: MakeInverse | None = None,
+    inverse: MakeInverse = LocalProcess,
     memory: Memory | None = None,
 ) -> Learner:
     """Observation: watches and remembers, never moves."""
@@ -133,53 +169,37 @@ def observation(
     )
 
 
+@hands_on(Imitate, "epsilon")
 def imitation(
     environment: Environment,
     seed: int,
     *,
     correspondence: Correspondence,
-    epsilon: float = 0.05,
-    inverse: MakeInverse | None = None,
+    inverse: MakeInverse = LocalProcess,
     memory: Memory | None = None,
+    **variations: Any,
 ) -> Learner:
     """Imitation: repeats the last demonstration with small variations until the next one."""
     memory = start_memory(environment, memory)
     return Learner(
         memory,
         Rest(),
-        social=Imitate(environment.policies, stream(seed, "imitate"), repeats=None, epsilon=epsilon),
+        social=Imitate(environment.policies, stream(seed, "imitate"), repeats=None, **variations),
         correspondence=correspondence,
         inverse=answering(environment, memory, inverse),
         policies=environment.policies,
     )
 
 
-def imitating(
-    babbling: GoalBabbling,
-    outcomes: Box,
-    rng: np.random.Generator,
-    *,
-    repeats: int = 10,
-    epsilon: float = 0.05,
-    strategy: str = "social",
-) -> Imitate:
-    """How SGIM-D answers a demonstration: a short imitation, then emulation of the goal."""
-    return Imitate(
-        babbling.policies,
-        rng,
-        repeats=repeats,
-        epsilon=epsilon,
-        babbling=babbling,
-        outcomes=outcomes,
-        strategy=strategy,
-    )
+@hands_on(goal_babbling)
+def sagg_riac(environment: Environment, seed: int, *, memory: Memory | None = None, **parts: Any) -> Learner:
+    """SAGG-RIAC: active goal babbling, without a teacher."""
+    memory = start_memory(environment, memory)
+    babbling = goal_babbling(environment, seed, memory, **parts)
+    return Learner(memory, babbling, inverse=babbling.inverse)
 
 
-def emulating(babbling: GoalBabbling, outcomes: Box, rng: np.random.Generator, *, strategy: str = "social") -> Emulate:
-    """A swap for ``imitating``: the teacher's goals without the teacher's movements."""
-    return Emulate(babbling, outcomes, strategy=strategy)
-
-
+@hands_on(goal_babbling)
 def sgim_d(
     environment: Environment,
     seed: int,
@@ -187,7 +207,7 @@ def sgim_d(
     correspondence: Correspondence,
     social: MakeSocial = imitating,
     memory: Memory | None = None,
-    **parts: Unpack[Parts],
+    **parts: Any,
 ) -> Learner:
     """SGIM-D: SAGG-RIAC, interrupted by a short imitation whenever the teacher demonstrates.
 
@@ -210,81 +230,37 @@ def sgim_d(
     )
 
 
-def remembered(memory: Memory, measure: Performance) -> Judge:
-    """The paper's reading of competence, eq. (2): the best that memory holds."""
-    return Competence(memory, measure)
+PRACTICE: Final[dict[str, Any]] = {
+    "goals": UniformGoals,
+    "search": practise,
+    "explore": Widening,
+    "budget": 1,
+    "global_range": (0.02, 0.3),
+}
+"""What makes a learner practise, in keywords of ``goal_babbling``."""
 
 
-def attempted(memory: Memory, measure: Performance) -> Judge:
-    """SAGG-RIAC's own reading: the best of this attempt."""
-    return AttemptCompetence(measure)
+@hands_on(sagg_riac, **PRACTICE)
+def practice(environment: Environment, seed: int, **parts: Any) -> Learner:
+    """Practice, which is ours: goals anywhere in T, and at each one movement, the answer of a local process plus noise.
 
-
-def goal_babbling(
-    environment: Environment,
-    seed: int,
-    memory: Memory,
-    *,
-    goals: MakeGoals = InterestMap,
-    inverse: MakeInverse | None = None,
-    search: MakeSearch = nelder_mead,
-    judge: MakeJudge = remembered,
-    measure: Performance | None = None,
-    budget: int = 15,
-    tolerance: float | None = None,
-    look: MakeLook | None = None,
-    global_range: tuple[float, float] = (0.05, 0.95),
-    give_up: float = -0.5,
-) -> GoalBabbling:
-    """The paper's autonomous strategy, built from its parts.
-
-    Args:
-        environment: its boxes, rest and outcome noise are read; it is not executed.
-        seed: of all streams of this learner.
-        memory: of the learner.
-        goals: (contexts, outcomes, rng) -> the goal model.
-        inverse: (memory) -> the inverse model, where searches begin and by which the learner answers; None for a
-            `LocalProcess`, whose answers have to prove themselves. Deviation: the paper infers by eq. (9) alone, which
-            is `LocalInverse`.
-        search: (policies, rng) -> the refinement of its estimate.
-        judge: (memory, measure) -> the competence that the goal model is told.
-        measure: J; None for eq. (7), relative to the distance from rest.
-        budget: the most movements for one goal. Deviation: the paper has no such number; with a complete simplex of 26
-            movements a goal would take 60 or so, and a learner with the rod would come to a hundred goals in its life.
-        tolerance: distance (m) at which a goal counts as reached; None for the outcome noise, but at least .02 m.
-        look: (policies, memory, inverse, rng) -> how the global regime draws movements; None: uniformly from Pi.
-        global_range: least and greatest probability of the global exploration regime.
-        give_up: below this competence a goal is given up when a movement does not raise it; -1 never gives up.
-
-    Raises:
-        ValueError: a number out of its range.
+    It has no teacher, and nothing in it knows a unit or a robot. What the answer gets wrong is what it learns next.
+    T should not be much larger than what can be reached: its goals are drawn from all of it.
     """
-    noise = max(environment.outcome_noise, 0.02)
-    if measure is None:
-        measure = partial(performance, rest=environment.rest, d_min=noise)
-    made = answering(environment, memory, inverse)
-    return GoalBabbling(
-        environment.policies,
-        memory,
-        goals(environment.contexts, environment.outcomes, stream(seed, "goals")),
-        made,
-        search(environment.policies, stream(seed, "search")),
-        Competence(memory, measure),
-        judge(memory, measure),
-        stream(seed, "regime"),
-        budget=budget,
-        tolerance=noise if tolerance is None else tolerance,
-        look=None if look is None else look(environment.policies, memory, made, stream(seed, "look")),
-        global_range=global_range,
-        give_up=give_up,
-    )
+    return sagg_riac(environment, seed, **parts)
 
 
-def answering(
-    environment: Environment, memory: Memory, inverse: MakeInverse | None
-) -> Callable[[Array, Array], Estimate]:
-    """The inverse model of a learner; without a choice one whose answers have to prove themselves."""
-    return LocalProcess(memory, noise=environment.outcome_noise) if inverse is None else inverse(memory)
+@hands_on(sgim_d, **PRACTICE, social=partial(imitating, repeats=1))
+def practice_taught(environment: Environment, seed: int, *, correspondence: Correspondence, **parts: Any) -> Learner:
+    """The same with a teacher: what is shown is executed once, exactly. Best when all is shown at the start."""
+    return sgim_d(environment, seed, correspondence=correspondence, **parts)
+
+
+def answering(environment: Environment, memory: Memory, inverse: MakeInverse) -> Callable[[Array, Array], Estimate]:
+    """The inverse model of a learner, with what it names of its robot."""
+    made: Callable[[Array, Array], Estimate]
+    made = given(inverse, outcome_noise=environment.outcome_noise, policies=environment.policies)(memory)
+    return made
 
 
 def start_memory(environment: Environment, start: Memory | None) -> Memory:

@@ -4,7 +4,7 @@ Our addition, not in the paper. The process learns from the movements near the g
 are found by Gauss-Newton steps through it, from the nearest exemplars, and there is the answer of `LocallyLinear`. Each
 is judged by the squared error that the process expects of it, its own uncertainty included; where it was surprised by
 exemplars near the goal, it counts as less sure. If no candidate is clearly better, the nearest exemplar answers.
-    inverse = LocalProcess(memory, noise=environment.outcome_noise); estimate = inverse(context, goal)
+    inverse = LocalProcess(memory, outcome_noise=environment.outcome_noise); estimate = inverse(context, goal)
 """
 
 from __future__ import annotations
@@ -39,16 +39,16 @@ class LocalProcess:
 
     Args:
         memory: of the learner.
-        noise: standard deviation of each outcome dimension, ``outcome_noise`` of the environment.
+        outcome_noise: standard deviation of each outcome dimension, ``outcome_noise`` of the environment.
 
     Raises:
-        ValueError: ``noise`` is negative or not finite.
+        ValueError: ``outcome_noise`` is negative or not finite.
     """
 
-    def __init__(self, memory: Memory, *, noise: float = 0.0) -> None:
-        if not 0 <= noise < np.inf:
-            raise ValueError(f"noise must be a standard deviation, finite and >= 0, got {noise}")
-        self.memory, self.noise = memory, noise
+    def __init__(self, memory: Memory, *, outcome_noise: float = 0.0) -> None:
+        if not 0 <= outcome_noise < np.inf:
+            raise ValueError(f"outcome_noise must be a standard deviation, finite and >= 0, got {outcome_noise}")
+        self.memory, self.noise = memory, outcome_noise
         self._nearest, self._linear = NearestNeighbour(memory, _NEAR), LocallyLinear(memory)
         self._fitted = 0  # exemplars at the last fit
         self._kernel: Kernel | None = None  # None: outcomes are all the same

@@ -2,7 +2,7 @@
 
 Our addition, not in the paper. A model that was trained on few kinds of movements, those around what was demonstrated
 say, predicts others with confidence and wrongly. The process, which knows the movements near the goal, does not.
-    inverse = ProvedInverse(memory, model, environment.policies, noise=environment.outcome_noise)
+    inverse = ProvedInverse(memory, model, environment.policies, outcome_noise=environment.outcome_noise)
 """
 
 from __future__ import annotations
@@ -22,16 +22,18 @@ class ProvedInverse:
 
     Args:
         memory, model, policies, trust: as for `ModelInverse`.
-        noise: as for `LocalProcess`.
+        outcome_noise: as for `LocalProcess`.
 
     Raises:
         ValueError: ``noise`` out of its range, or a model of other dimensions.
     """
 
+    learns_with = LocalProcess  # the inverse of a learner whose evaluations are answered by this one
+
     def __init__(
-        self, memory: Memory, model: ForwardModel, policies: Box, *, noise: float = 0.0, trust: Trust = TRUST
+        self, memory: Memory, model: ForwardModel, policies: Box, *, outcome_noise: float = 0.0, trust: Trust = TRUST
     ) -> None:
-        self.process = LocalProcess(memory, noise=noise)
+        self.process = LocalProcess(memory, outcome_noise=outcome_noise)
         self.through_model = ModelInverse(memory, model, policies, trust=trust)
 
     def __call__(self, context: Array, goal: Array) -> Estimate:

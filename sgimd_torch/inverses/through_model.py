@@ -42,6 +42,8 @@ class ModelInverse:
         ValueError: a model of other dimensions.
     """
 
+    learns_with = LocallyLinear  # the inverse of a learner whose evaluations are answered by this one
+
     def __init__(self, memory: Memory, model: ForwardModel, policies: Box, *, trust: Trust = TRUST) -> None:
         model.check_fits("memory", **{name: getattr(memory, name) for name in model.sizes})
         model.check_fits("policies", theta_dim=policies.dim)

@@ -4,25 +4,26 @@ After Kulak & Calinon (2023), "Combining social and intrinsically-motivated lear
 acquisition": the expected epistemic entropy over goals, and how much each mode should reduce it; a demonstration is
 asked for where the epistemic entropy is greatest.
     learner = sgim_eer(environment, seed, correspondence=..., teachers={"ann": ann})
-Ours: a Gaussian process says what is not known of the policy for a goal, instead of a Bayesian mixture, so that
-reductions have a closed form; the nearest earlier attempt says where a movement of one's own would land.
+Ours: what is known of the policy for a goal is linear in features of the goal, so that reductions have a closed form;
+and where a movement of one's own would land is told by the earlier attempt that was nearest.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import partial
-from typing import Final, Unpack
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sgimd_torch.algorithms import Correspondence, Parts, start_memory
+from sgimd_torch.algorithms import Correspondence, MakeInverse, start_memory
 from sgimd_torch.algorithms.asking import MakeBase, imitating_only, practised, strategic
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.goals.protocol import check_attempt, check_in
 from sgimd_torch.goals.strategic import AUTONOMOUS
 from sgimd_torch.inverses.gaussian_process import Kernel, one_thread, squared_distances
+from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Learner
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, Box
@@ -33,6 +34,26 @@ _KNOWN: Final = 400  # exemplars that a doubt is made from, spread over the memo
 _NOISE: Final = 0.1  # variance of what one exemplar says, in units of the doubt before there was any
 _LENGTH: Final = 0.1  # of the sides of C x T: how far an exemplar says something
 _KERNEL: Final = Kernel(1 / _LENGTH, 1.0, 0.0, _NOISE)
+
+
+@one_thread
+def doubt(known: Array, points: Array) -> Array:
+    """What is not known about the policies for points, by a Gaussian process from outcomes to policies.
+
+    Deviation: Kulak & Calinon take a Bayesian mixture of Gaussians.
+
+    Args:
+        known: ``(n, dim)`` exemplars, in sides of C x T.
+        points: ``(m, dim)``.
+
+    Returns:
+        ``(m, m)`` covariances, given the exemplars. 1 on the diagonal: nothing is known.
+    """
+    known = _thinned(known)
+    across = _KERNEL(squared_distances(points, known))
+    inner = _KERNEL(squared_distances(known, known)) + _NOISE * np.eye(len(known))
+    found: Array = _KERNEL(squared_distances(points, points)) - across @ np.linalg.solve(inner, across.T)
+    return found
 
 
 class EntropyGoals:
@@ -83,11 +104,13 @@ class EntropyGoals:
             ValueError: see `Goals.add`.
         """
         point = check_attempt(self.contexts, self.outcomes, context, goal, competence, gain)
-        goal = (point - self._box.low) / self._box.sides
-        landed = self._scaled(self.memory.contexts[-1:], self.memory.outcomes[-1:])
+        goals, last = (
+            (point - self._box.low) / self._box.sides,
+            self._scaled(self.memory.contexts, self.memory.outcomes),
+        )
         # Without an answer nothing is learnt: as if it had landed where something has landed before.
-        missed = np.full(len(point), np.nan) if gain == -1.0 else landed[0] - goal
-        self._tried.setdefault(strategy, []).append((goal, missed))
+        missed = np.full(len(point), np.nan) if gain == -1.0 else last[-1] - goals
+        self._tried.setdefault(strategy, []).append((goals, missed))
 
     def _landing(self, points: Array, strategy: str) -> Array:
         """Where attempts at ``points`` should end: they miss as the nearest earlier one did; at first not at all."""
@@ -113,36 +136,23 @@ def sgim_eer(
     teachers: Mapping[str, Demonstrator],
     cost: float = 1.0,
     base: MakeBase = practised,
+    inverse: MakeInverse = LocalProcess,
     memory: Memory | None = None,
-    **parts: Unpack[Parts],
+    **parts: Any,
 ) -> Learner:
     """SGIM-IM with the choice of Kulak & Calinon.
 
     Args:
-        environment, seed, correspondence, teachers, cost, base, parts: as in `sgim_im`.
+        environment, seed, correspondence, teachers, cost, base, inverse, parts: as in `sgim_acts`.
         memory: to start from; None for an empty one.
     """
     memory, base = start_memory(environment, memory), partial(imitating_only, base)
-    chosen: Parts = {"goals": partial(EntropyGoals, memory=memory), **parts}
+    chosen = {"goals": partial(EntropyGoals, memory=memory), "inverse": inverse, **parts}
     return strategic(environment, seed, memory, correspondence, teachers, cost, base, **chosen)
 
 
-@one_thread
-def doubt(known: Array, points: Array) -> Array:
-    """How little is known about the policies for goals, by a Gaussian process from outcomes to policies.
-
-    Args:
-        known: ``(n, dim)`` exemplars in C x T, in its sides.
-        points: ``(m, dim)`` likewise.
-
-    Returns:
-        ``(m, m)`` covariances of the policies for the points, given the exemplars; 1 on the diagonal: nothing is known.
-    """
-    known = known[:: 1 + len(known) // _KNOWN]
-    across = _KERNEL(squared_distances(points, known))
-    inner = _KERNEL(squared_distances(known, known)) + _NOISE * np.eye(len(known))
-    found: Array = _KERNEL(squared_distances(points, points)) - across @ np.linalg.solve(inner, across.T)
-    return found
+def _thinned(known: Array) -> Array:
+    return known[:: 1 + len(known) // _KNOWN]
 
 
 def _entropy(variances: Array) -> Array:

@@ -50,7 +50,7 @@ class QualityDiversity:
         outcome = yield Move(self.policies.clip(theta), None, self._origin)
         self._outcomes.append(outcome)
         if len(self._outcomes) == len(self._batch):
-            self._scheduler.tell(objectives_of(self._batch), np.stack(self._outcomes))
+            self._tell()
             self._ask()
 
     def add(self, thetas: Array, outcomes: Array) -> None:
@@ -61,6 +61,9 @@ class QualityDiversity:
     def _ask(self) -> None:
         self._batch: Array = self._scheduler.ask()  # (n, theta_dim)
         self._outcomes: list[Array] = []
+
+    def _tell(self) -> None:
+        self._scheduler.tell(objectives_of(self._batch), np.stack(self._outcomes))
 
 
 class Shown:

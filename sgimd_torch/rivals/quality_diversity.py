@@ -9,14 +9,16 @@ they found, but without goals: they vary movements that led somewhere new.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, TypedDict, Unpack
+from typing import Any
 
 import numpy as np
 
-from sgimd_torch.algorithms import Correspondence, answering, start_memory
+from sgimd_torch.algorithms import Correspondence, MakeInverse, answering, start_memory
 from sgimd_torch.environments.protocol import Environment
+from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Learner
 from sgimd_torch.memory import Memory
+from sgimd_torch.options import hands_on
 from sgimd_torch.rivals.explorer import QualityDiversity, Shown
 from sgimd_torch.spaces import check_count, stream
 from sgimd_torch.strategies import Imitate
@@ -31,24 +33,74 @@ except ImportError as error:
 _DEFAULT_CELLS = 400  # 20 x 20, of .1 m in the fishing task, like the tiles of its benchmark
 _MAX_CELLS = 1_000_000  # ribs keeps an array of all of them
 _LEAST_OBJECTIVE = -0.35  # of CMA-MAE's cells at the start: below the effort of the corners of Pi, .25
+_SHARED = ("cells", "correspondence", "imitations", "epsilon", "inverse", "memory")
 MakeEmitters = Callable[[GridArchive, np.random.Generator], Sequence[EmitterBase]]
 
 
-class Options(TypedDict, total=False):
-    """The keywords that all of them have.
+def quality_diversity(
+    environment: Environment,
+    seed: int,
+    origin: str,
+    emitters: MakeEmitters,
+    annealed: dict[str, Any] | None = None,
+    *,
+    cells: int | None = None,
+    correspondence: Correspondence | None = None,
+    imitations: int = 10,
+    epsilon: float = 0.05,
+    inverse: MakeInverse = LocalProcess,
+    memory: Memory | None = None,
+) -> Learner:
+    """What all of them share.
 
-    ``cells`` for each dimension of T, None for about 400 in all. ``correspondence``, eq. (6): what is demonstrated is
-    imitated as by SGIM-D, ``imitations`` times with variations up to ``epsilon``, and enters the archive; None learns
-    alone. ``memory`` to start from: its exemplars enter the archive, and take the place of first movements.
+    Args:
+        environment: its boxes are read; it is not executed.
+        seed: of this learner's stream.
+        origin: name of that stream, and of the movements in the log.
+        emitters: (archive, rng) -> what proposes movements.
+        annealed: keywords of the archive of CMA-MAE.
+        cells: for each dimension of T; None for about 400 in all.
+        correspondence: eq. (6): what is demonstrated is imitated as by SGIM-D, and enters the archive; None learns
+            alone.
+        imitations: movements that are spent on imitating a demonstration.
+        epsilon: bound of the variation in each parameter of theta when imitating.
+        inverse: (memory) -> the inverse model by which it answers.
+        memory: to start from: its exemplars enter the archive, and take the place of first movements.
+
+    Raises:
+        ValueError: a number out of its range, or an environment with contexts.
     """
+    if environment.contexts.dim:
+        raise ValueError(f"quality diversity knows one context only, got contexts of dim {environment.contexts.dim}")
+    memory = start_memory(environment, memory)
+    outcomes, rng = environment.outcomes, stream(seed, origin)
+    cells = max(2, round(_DEFAULT_CELLS ** (1 / outcomes.dim))) if cells is None else check_count("cells", cells, 1)
+    if cells**outcomes.dim > _MAX_CELLS:
+        raise ValueError(f"cells must be {_MAX_CELLS} in all at most, got {cells} in {outcomes.dim} dimensions")
+    archive = GridArchive(
+        solution_dim=environment.policies.dim,
+        dims=[cells] * outcomes.dim,
+        ranges=list(zip(outcomes.low, outcomes.high, strict=True)),
+        seed=_seed(rng),
+        **(annealed or {}),
+    )
+    scheduler = Scheduler(archive, emitters(archive, rng))
+    explorer = QualityDiversity(environment.policies, scheduler, origin, start=memory)
+    answer = answering(environment, memory, inverse)
+    if correspondence is None:
+        return Learner(memory, explorer, inverse=answer)
+    imitate = Imitate(environment.policies, stream(seed, "imitate"), repeats=imitations, epsilon=epsilon)
+    return Learner(
+        memory,
+        explorer,
+        social=Shown(explorer, imitate),
+        correspondence=correspondence,
+        inverse=answer,
+        policies=environment.policies,
+    )
 
-    cells: int | None
-    correspondence: Correspondence | None
-    imitations: int
-    epsilon: float
-    memory: Memory | None
 
-
+@hands_on(quality_diversity, *_SHARED)
 def map_elites(
     environment: Environment,
     seed: int,
@@ -56,7 +108,7 @@ def map_elites(
     first: int = 100,
     sd: float = 0.05,
     batch: int = 10,
-    **options: Unpack[Options],
+    **options: Any,
 ) -> Learner:
     """MAP-Elites: Gaussian variations of elites, which are drawn evenly from the cells of T that were reached.
 
@@ -66,7 +118,7 @@ def map_elites(
         first: number of uniform movements at the start.
         sd: standard deviation of the variations, in sides of Pi, as in `perturb`; what leaves Pi is clipped.
         batch: movements between two looks at the archive.
-        options: see `Options`.
+        options: see `quality_diversity`.
 
     Raises:
         ValueError: a number out of its range, or an environment with contexts, which an archive over T does not know.
@@ -77,9 +129,10 @@ def map_elites(
     def emitters(archive: GridArchive, rng: np.random.Generator) -> list[EmitterBase]:
         return [GaussianEmitter(archive, sigma=sd, **_begun(environment, rng, *sizes))]
 
-    return _learner(environment, seed, "map-elites", emitters, **options)
+    return quality_diversity(environment, seed, "map-elites", emitters, **options)
 
 
+@hands_on(quality_diversity, *_SHARED)
 def isoline(
     environment: Environment,
     seed: int,
@@ -88,7 +141,7 @@ def isoline(
     sd: float = 0.02,
     line: float = 0.2,
     batch: int = 10,
-    **options: Unpack[Options],
+    **options: Any,
 ) -> Learner:
     """MAP-Elites with the line operator: an elite, a step along the line to another one, and a little noise.
 
@@ -106,9 +159,10 @@ def isoline(
     def emitters(archive: GridArchive, rng: np.random.Generator) -> list[EmitterBase]:
         return [IsoLineEmitter(archive, iso_sigma=sd, line_sigma=line, **_begun(environment, rng, *sizes))]
 
-    return _learner(environment, seed, "isoline", emitters, **options)
+    return quality_diversity(environment, seed, "isoline", emitters, **options)
 
 
+@hands_on(quality_diversity, *_SHARED)
 def cma_me(
     environment: Environment,
     seed: int,
@@ -116,7 +170,7 @@ def cma_me(
     emitters: int = 5,
     sd: float = 0.1,
     batch: int | None = None,
-    **options: Unpack[Options],
+    **options: Any,
 ) -> Learner:
     """CMA-ME: CMA-ES that climbs towards new cells of the archive, and restarts from an elite when it finds none.
 
@@ -133,9 +187,10 @@ def cma_me(
         ValueError: as in `map_elites`.
     """
     team = _team(environment, emitters, sd, batch, ranker="2imp")
-    return _learner(environment, seed, "cma-me", team, **options)
+    return quality_diversity(environment, seed, "cma-me", team, **options)
 
 
+@hands_on(quality_diversity, *_SHARED)
 def cma_mae(
     environment: Environment,
     seed: int,
@@ -144,7 +199,7 @@ def cma_mae(
     sd: float = 0.1,
     batch: int | None = None,
     learning_rate: float = 0.01,
-    **options: Unpack[Options],
+    **options: Any,
 ) -> Learner:
     """CMA-MAE: as CMA-ME, but what an elite has to beat rises slowly, so that a cell stays worth improving.
 
@@ -159,7 +214,7 @@ def cma_mae(
         raise ValueError(f"learning_rate must lie in (0, 1], got {learning_rate}; 1 is CMA-ME's archive")
     team = _team(environment, emitters, sd, batch, ranker="imp", selection_rule="mu", restart_rule="basic")
     annealed = {"learning_rate": learning_rate, "threshold_min": _LEAST_OBJECTIVE}
-    return _learner(environment, seed, "cma-mae", team, annealed, **options)
+    return quality_diversity(environment, seed, "cma-mae", team, annealed, **options)
 
 
 def _check_sd(sd: float) -> None:
@@ -195,49 +250,6 @@ def _team(environment: Environment, emitters: int, sd: float, batch: int | None,
         ]
 
     return make
-
-
-def _learner(
-    environment: Environment,
-    seed: int,
-    origin: str,
-    emitters: MakeEmitters,
-    annealed: dict[str, Any] | None = None,
-    *,
-    cells: int | None = None,
-    correspondence: Correspondence | None = None,
-    imitations: int = 10,
-    epsilon: float = 0.05,
-    memory: Memory | None = None,
-) -> Learner:
-    if environment.contexts.dim:
-        raise ValueError(f"quality diversity knows one context only, got contexts of dim {environment.contexts.dim}")
-    memory = start_memory(environment, memory)
-    outcomes, rng = environment.outcomes, stream(seed, origin)
-    cells = max(2, round(_DEFAULT_CELLS ** (1 / outcomes.dim))) if cells is None else check_count("cells", cells, 1)
-    if cells**outcomes.dim > _MAX_CELLS:
-        raise ValueError(f"cells must be {_MAX_CELLS} in all at most, got {cells} in {outcomes.dim} dimensions")
-    archive = GridArchive(
-        solution_dim=environment.policies.dim,
-        dims=[cells] * outcomes.dim,
-        ranges=list(zip(outcomes.low, outcomes.high, strict=True)),
-        seed=_seed(rng),
-        **(annealed or {}),
-    )
-    scheduler = Scheduler(archive, emitters(archive, rng))
-    explorer = QualityDiversity(environment.policies, scheduler, origin, memory)
-    inverse = answering(environment, memory, None)
-    if correspondence is None:
-        return Learner(memory, explorer, inverse=inverse)
-    imitate = Imitate(environment.policies, stream(seed, "imitate"), repeats=imitations, epsilon=epsilon)
-    return Learner(
-        memory,
-        explorer,
-        social=Shown(explorer, imitate),
-        correspondence=correspondence,
-        inverse=inverse,
-        policies=environment.policies,
-    )
 
 
 def _seed(rng: np.random.Generator) -> int:

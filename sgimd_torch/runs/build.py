@@ -1,4 +1,4 @@
-"""The composition root: makes the parts of a run from a ``Config``, as the catalogue describes each choice.
+"""The composition root: makes the parts of a run from a ``Config``.
 
 parts = build(Config(seed=3)); for episode in run(parts.learner, parts.environment, 3, teacher=parts.teacher, ...): ...
 """
@@ -7,15 +7,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
-from pathlib import Path
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Final
 
-from sgimd_torch.catalogue import CATALOGUE, SHARED, checked, find
+from sgimd_torch.catalogue import checked
 from sgimd_torch.environments.protocol import Environment, Record
 from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.goals.regions import Region
 from sgimd_torch.learner import Learner
+from sgimd_torch.options import given
+from sgimd_torch.runs.chosen import ALGORITHM, Part, chosen, part_of
 from sgimd_torch.runs.config import OWN, Config
 from sgimd_torch.runs.tasks import Task, benchmark_of, correspondence_of, demonstrations_of
 from sgimd_torch.spaces import Array, Demonstration, Estimate, stream
@@ -35,9 +36,9 @@ class RunParts:
     """What a run needs. ``config`` is what it was made from. ``answers`` are the inverses to evaluate by, the run's own
     first; they read the learner's memory. ``model`` is refreshed after each movement; it and its ``trust`` are None for
     a run without a model. ``teacher`` demonstrates, ``teachers`` are asked for it; without any of them there are no
-    ``demonstrations``: those of the file, what teachers have besides, then a person's lessons, which ``hand`` gives.
-    ``data`` holds checksums of the files that were read, ``notes`` messages for the user. ``record`` gives a movement
-    to be filmed, None if the task has no picture of its own."""
+    ``demonstrations``: those of the file, and what teachers have besides. ``hand`` gives a person's lessons, and what
+    ``teacher`` offers at other times. ``data`` holds checksums of the files that were read, ``notes`` messages for the
+    user. ``record`` gives a movement to be filmed, None if the task has no picture of its own."""
 
     config: Config
     environment: Environment
@@ -66,55 +67,63 @@ class RunParts:
         return list(getattr(getattr(self.learner.autonomous, "goals", None), "regions", ()))
 
 
-def build(config: Config, directory: Path | None = None) -> RunParts:
+def build(config: Config) -> RunParts:
     """Put a run together; nothing is executed yet.
-
-    Args:
-        config: its choices.
-        directory: where the lessons of a person are, if there are any; None for where the run is written.
 
     Raises:
         ValueError: a part refuses its option, or a file does not fit the robot.
         FileNotFoundError: there is no such file.
     """
     task = task_of(config)
-    parts = _Parts(config, task)
+    make = _Maker(config, task)
     benchmark, notes, benchmark_crc32 = benchmark_of(task, config.benchmark)
     demonstrations: Sequence[Demonstration] = []
-    teacher, demonstrations_crc32 = None, None
-    if parts.used & {"teacher", "teachers"} and "demonstrations" in parts.used:
+    demonstrations_crc32 = None
+    if make.parts[ALGORITHM].teaching and _shown(config):
         demonstrations, about_them, demonstrations_crc32 = demonstrations_of(task, config.demonstrations)
         notes += about_them
-    if "teacher" in parts.used:
-        teacher = parts["teacher"](demonstrations, stream(config.seed, "teacher"))
-    teachers = parts.asked(demonstrations) if "teachers" in parts.used else {}
-    demonstrations = [*demonstrations, *_others(demonstrations, teachers)]
-    hand = next((each for each in teachers.values() if isinstance(each, ByHand)), ByHand(teacher=teacher))
-    learner = parts["algorithm"](task.environment, config.seed)
-    words = {answer: config.inverse if answer == OWN else answer for answer in config.answered}
-    if "inverse" in config.entry("algorithm").options and config.entry("inverse").learns_with is None:
-        words = {answer: OWN if word == config.inverse else word for answer, word in words.items()}  # it learns with it
-    inverses = {
-        word: learner.inverse if word == OWN else parts.maker("inverse", word, learning=False)(learner.memory)
-        for word in dict.fromkeys(words.values())
+    teacher: Teacher | None = None
+    if "teacher" in make.parts:
+        teacher = make("teacher")(demonstrations, stream(config.seed, "teacher"))
+    teachers = {
+        word: make.other("teachers", word)(demonstrations, stream(config.seed, f"teacher {word}"))
+        for word in config.values.get("teachers", ())
     }
+    learner = make(ALGORITHM, teachers=teachers)(task.environment, config.seed)
+    hands = [each for each in (teacher, *teachers.values()) if isinstance(each, ByHand)]
     return RunParts(
         config=config,
         environment=task.environment,
         learner=learner,
-        teacher=hand if "by-hand" in (config.teacher, *config.teachers) else teacher,
-        demonstrations=demonstrations,
-        answers={answer: inverses[word] for answer, word in words.items()},
+        teacher=teacher,
+        demonstrations=[*demonstrations, *_others(demonstrations, teachers)],
+        answers=make.answers(learner),
         benchmark=benchmark,
         data={"demonstrations_crc32": demonstrations_crc32, "benchmark_crc32": benchmark_crc32},
-        model=parts["model"] if "model" in parts.used else None,
-        trust=parts["trust"] if "model" in parts.used else None,
-        notes=[*config.without_effect, *notes],
+        model=make.model if config.uses_model else None,
+        trust=make.trust if config.uses_model else None,
+        notes=notes,
         record=task.picture,
         teachers=teachers,
         task=task,
-        hand=hand,
+        hand=hands[0] if hands else ByHand(teacher=teacher),
     )
+
+
+def task_of(config: Config) -> Task:
+    """The environment of a run, with what belongs to it.
+
+    Raises:
+        ValueError: it cannot be made, or is not an environment.
+    """
+    part = part_of("environment", "environment", config["environment"])
+    task = checked(part.kind, part.word, partial(part.make, **part.set_by(config.values)))()
+    return task if isinstance(task, Task) else Task(task)
+
+
+def _shown(config: Config) -> bool:
+    """Whether its teachers need demonstrations, as a person does not."""
+    return {config.values.get("teacher"), *config.values.get("teachers", ())} - {None} != {"by-hand"}
 
 
 def _others(demonstrations: Sequence[Demonstration], teachers: Mapping[str, Demonstrator]) -> list[Demonstration]:
@@ -126,62 +135,64 @@ def _others(demonstrations: Sequence[Demonstration], teachers: Mapping[str, Demo
     return [shown for trajectory, shown in known.items() if trajectory not in played]
 
 
-def task_of(config: Config) -> Task:
-    """The environment of a run, with what belongs to it.
-
-    Raises:
-        ValueError: it cannot be made, or is not an environment.
-    """
-    made = config.entry("environment").bind(partial(getattr, config))
-    task = checked("environment", config.environment, made)()
-    return task if isinstance(task, Task) else Task(task)
-
-
-class _Parts:
-    """Makes the parts of one run by name, each once."""
+class _Maker:
+    """Makes the parts of one run: each as something to be called, with its options and the parts that it leads to."""
 
     def __init__(self, config: Config, task: Task) -> None:
-        self.used = config.used
+        self.parts = chosen(config.algorithm, dict(config.parts))
         self._config, self._task = config, task
-        self._made: dict[str, Any] = {}
 
-    def __getitem__(self, name: str) -> Any:
-        """A shared part, a choice of the catalogue as something to be called, or the value of an option."""
-        if name not in self._made:
-            self._made[name] = self._make(name)
-        return self._made[name]
+    def __call__(self, name: str, **shared: Any) -> Callable[..., Any]:
+        """The part of this name; ``shared`` is what it gets if it asks for it."""
+        part = self.parts[name]
+        made = self._with_options(part)
+        for parameter in part.choices:
+            child = self(part.full(parameter))
+            if parameter == "inverse":
+                child = getattr(self.parts[part.full(parameter)].make, "learns_with", child)
+            made = partial(made, **{parameter: child})
+        if "correspondence" in part.takes:
+            shared["correspondence"] = correspondence_of(self._task)
+        return self._checked(part, given(made, **shared))
 
-    def asked(self, demonstrations: Sequence[Demonstration]) -> dict[str, Demonstrator]:
-        """The teachers by name; an algorithm is told of the same ones."""
-        made: dict[str, Demonstrator] = {}
-        for word in self._config.teachers:
-            rng = stream(self._config.seed, f"teacher {word}")
-            made[word] = self.maker("teachers", word)(demonstrations, rng)
-        self._made["teachers"] = made
-        return made
+    def other(self, kind: str, word: str) -> Callable[..., Any]:
+        """Another word of a kind, with its defaults."""
+        part = part_of(kind, kind, word)
+        return self._checked(part, self._given(part.make, part))
 
-    def maker(self, kind: str, word: str | None = None, *, learning: bool = True) -> Callable[..., Any]:
-        """The choice of a kind, or another ``word`` of it, with its options. ``learning`` False: for evaluations, where
-        the inverse may differ."""
-        word = getattr(self._config, kind) if word is None else word
-        entry = find(kind, word)
-        if learning and entry.learns_with is not None:
-            word, entry = entry.learns_with, CATALOGUE[kind][entry.learns_with]
-        made = entry.bind(self.__getitem__)
-        return made if word in CATALOGUE[kind] else checked(kind, word, made)
+    def answers(self, learner: Learner) -> dict[str, Callable[[Array, Array], Estimate]]:
+        """The inverses to evaluate by; what the learner infers by answers as its own, but for one by a model."""
+        own = self.parts.get("inverse")
+        through_model = own is not None and hasattr(own.make, "learns_with")
+        found = {OWN: self("inverse")(learner.memory) if through_model else learner.inverse}
+        for word in self._config.answered[1:]:
+            same = own is not None and word == own.word
+            found[word] = found[OWN] if same else self.other("inverse", word)(learner.memory)
+        return found
 
-    def _make(self, name: str) -> Any:
-        robot, algorithm = self._task.environment, self._config.entry("algorithm")
-        if name in algorithm.uses.values() and algorithm.own.get(name) == getattr(self._config, name, None) is not None:
-            return None  # the algorithm makes its own
-        match name:
-            case "policies" | "outcome_noise":
-                return getattr(robot, name)
-            case "correspondence":
-                return correspondence_of(self._task)
-            case "model":
-                dims = robot.contexts.dim, robot.policies.dim, robot.outcomes.dim
-                return SHARED[name].bind(self.__getitem__)(*dims, seed=self._config.seed)
-            case "trust":
-                return SHARED[name].bind(self.__getitem__)(noise=max(robot.outcome_noise, LEAST_NOISE))
-        return self.maker(name) if name in CATALOGUE else getattr(self._config, name)
+    @cached_property
+    def model(self) -> Any:
+        """The forward model of the run."""
+        robot = self._task.environment
+        dims = robot.contexts.dim, robot.policies.dim, robot.outcomes.dim
+        return self._with_options(self.parts["model"])(*dims, seed=self._config.seed)
+
+    @cached_property
+    def trust(self) -> Any:
+        """How far the run trusts its model."""
+        return self._with_options(self.parts["trust"])(noise=max(self._task.environment.outcome_noise, LEAST_NOISE))
+
+    def _with_options(self, part: Part) -> Callable[..., Any]:
+        values = part.set_by(self._config.values)
+        return self._given(partial(part.make, **values) if values else part.make, part)
+
+    def _given(self, make: Callable[..., Any], part: Part) -> Callable[..., Any]:
+        """With the things of the run that it names."""
+        robot = self._task.environment
+        things = {name: getattr(self, name) for name in ("model", "trust") if name in part.takes}
+        if part.kind == "inverse":
+            things |= {"policies": robot.policies, "outcome_noise": robot.outcome_noise}
+        return given(make, **things)
+
+    def _checked(self, part: Part, make: Callable[..., Any]) -> Callable[..., Any]:
+        return checked(part.kind, part.word, make) if ":" in part.word else make

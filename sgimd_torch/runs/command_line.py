@@ -3,7 +3,7 @@
 Examples:
   sgimd run --algorithm sgim-d --seed 3
   sgimd run --algorithm sgim-d --seed 3 --resume              after Ctrl-C, or with more --movements
-  sgimd run --algorithm sagg-riac --goals uniform --name uniform-goals --movements 2000
+  sgimd run --algorithm sagg-riac --goals grid --goals.window 12 --name grid --movements 2000
   sgimd run --environment mypackage.toss:make                 on a robot of your own
 """
 
@@ -15,30 +15,27 @@ import re
 import shlex
 import sys
 import textwrap
+import typing
 from collections.abc import Mapping, Sequence
-from dataclasses import Field, fields
+from dataclasses import fields
 from pathlib import Path
 from typing import Any, Final, NoReturn, get_type_hints
 
 import jsonargparse
 
-from sgimd_torch.catalogue import CATALOGUE, did_you_mean
-from sgimd_torch.runs.config import Config, dashed, default, options
+from sgimd_torch.catalogue import CATALOGUE
+from sgimd_torch.options import help_of
+from sgimd_torch.runs.chosen import ALGORITHM, Part, chosen, refused, standards
+from sgimd_torch.runs.config import RUN, Config, dashed, plain
 from sgimd_torch.runs.process import Stopping, loading
 
 FLAGS: Final = {
-    "resume": "Go on with a stopped or killed run, or lengthen a finished one.",
-    "accept_loss": "With --resume: go on even if the log has lost movements; a copy of it is kept.",
+    "resume": "go on with a stopped or killed run, or lengthen a finished one.",
+    "accept_loss": "with --resume: go on even if the log has lost movements; a copy of it is kept.",
 }
-_WANTED: Final = {
-    "int": "a whole number",
-    "float": "a number",
-    "bool": "true or false",
-    "int | None": "a whole number, or null",
-    "tuple[int, ...] | None": "whole numbers such as 250,500, or [], or null",
-    "tuple[str, ...]": "words such as own,nearest",
-}
-_BOOL: Final = ("true", "false")
+_WANTED: Final = {int: "a whole number", float: "a number", bool: "true or false", str: "a word", Path: "a path"}
+_MANY: Final = {int: "whole numbers such as 250,500", float: "numbers such as .1,.2", str: "words such as own,nearest"}
+_WIDTH: Final = 120
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -59,112 +56,174 @@ def main(argv: Sequence[str] | None = None) -> int:
 def parse(argv: Sequence[str], description: str | None = None) -> tuple[Config, dict[str, bool]]:
     """The run that a command line asks for, and its flags.
 
+    The choices are read first; they decide which options there are.
+
     Raises:
         SystemExit: with code 2 and a message on stderr when it makes no sense, 0 after ``--help``.
     """
-    reader = parser(description)
-    values = reader.parse_args(reader.joined(argv)).as_dict()
-    flags = {flag: bool(values.pop(flag)) for flag in FLAGS}
     try:
-        return Config(**values), flags
+        given, asked = _read(argv)
+        flags = {flag: flag in asked for flag in FLAGS}
+        if "help" in asked and not given:
+            print(overview(description))
+            raise SystemExit(0)
+        algorithm = given.get("algorithm", Config.algorithm)
+        choices = {name: text for name, text in given.items() if name != "teachers"}
+        parts = chosen(algorithm, choices)
+        for name in given:
+            if name not in RUN and name not in standards(parts):
+                raise refused(name, parts, (*RUN, *FLAGS))
+        reader = parser(parts, description)
+        if "help" in asked:
+            reader.print_help()
+            raise SystemExit(0)
+        values = reader.values({name: text for name, text in given.items() if name not in parts})
+        own = {name: value for name, value in values.items() if name in RUN}
+        others = {name: value for name, value in values.items() if name not in RUN}
+        return Config(**own, parts={**{name: given[name] for name in parts if name in given}, **others}), flags
     except ValueError as error:
-        reader.error(str(error))
+        print(f"error: {error}\n--help explains all options", file=sys.stderr)
+        raise SystemExit(2) from None
 
 
-def parser(description: str | None = None) -> _Parser:
-    """The options of ``sgimd run``."""
-    parser = _Parser(
-        prog="sgimd run",
-        usage="%(prog)s [--OPTION VALUE ...] [--resume]",
-        description=description,
-        epilog="null means no value. Options may be typed with underscores instead of dashes.",
-        formatter_class=_Help,
-    )
-    hints, groups = get_type_hints(Config), dict[str, Any]()
+def parser(parts: Mapping[str, Part] | None = None, description: str | None = None) -> _Parser:
+    """The options that every run has, and those of these parts."""
+    found = _Parser(prog="sgimd run", usage="%(prog)s [--OPTION VALUE ...] [--resume]", description=description)
+    hints, about = get_type_hints(Config), help_of(Config)
+    group = found.add_argument_group("The run")
     for each in fields(Config):
-        about = options()[each.name]
-        group = groups.get(about.group) or groups.setdefault(about.group, parser.add_argument_group(about.group))
-        wanted = _WANTED.get(str(each.type), "")
-        text = f"{about.about} ({wanted}{wanted and '; '}default: {_default(each)}){_choices(each.name)}"
-        metavar = f"{{{','.join(_BOOL)}}}" if each.type == "bool" else each.name.upper()
-        group.add_argument(
-            f"--{dashed(each.name)}", type=hints[each.name], default=each.default, metavar=metavar, help=text
-        )
+        if each.name in RUN:
+            found.take(group, each.name, hints[each.name], each.default, about[each.name])
     for flag, text in FLAGS.items():
-        groups[next(iter(groups))].add_argument(f"--{dashed(flag)}", action="store_true", help=text)
-    return parser
+        group.add_argument(f"--{dashed(flag)}", action="store_true", help=text)
+    for part in (parts or {}).values():
+        about = help_of(part.make)
+        named = part.kind if part.name == ALGORITHM else part.name
+        group = found.add_argument_group(f"--{named} {part.word}", _choices(part, parts or {}))
+        for name, option in part.options.items():
+            found.take(group, name, option.kind, option.default, about.get(name.rpartition(".")[2], ""))
+    return found
 
 
-def _default(each: Field[Any]) -> str:
-    """Of all algorithms, and of those that have one of their own."""
-    standard = default(each, "")
-    own = {word: entry.own[each.name] for word, entry in CATALOGUE["algorithm"].items() if each.name in entry.own}
-    return "; ".join([_typed(standard), *(f"{word}: {_typed(value)}" for word, value in own.items())])
+def overview(description: str | None = None) -> str:
+    """What ``sgimd run --help`` prints: the options of every run, and the words for its parts."""
+    about = help_of(Config)
+    shown = {name: _shown(getattr(Config, name)) for name in RUN}
+    run = {name: about[name] + f" ({text})" * (text != "null") for name, text in shown.items()} | FLAGS
+    algorithms = {word: entry.about for word, entry in CATALOGUE["algorithm"].items() if "rivals" not in entry.about}
+    rivals = [word for word in CATALOGUE["algorithm"] if word not in algorithms]
+    kinds = {kind: ", ".join(words) for kind, words in CATALOGUE.items() if kind != "algorithm"}
+    lines = [
+        "usage: sgimd run [--OPTION VALUE ...] [--resume]",
+        "",
+        *(description or "").splitlines(),
+        "the run, with defaults (null, for no value, where there is none):",
+        *(_line(f"--{dashed(name)}", text) for name, text in run.items()),
+        "algorithms (--algorithm):",
+        *(_line(word, text) for word, text in algorithms.items()),
+        _line("extra rivals", ", ".join(rivals)),
+        "parts, each a word of these or package.module:attribute, one of your own:",
+        *(_line(f"--{_PLACES.get(kind, kind)}", words) for kind, words in kinds.items()),
+        "",
+        "Parts have options of their own: sgimd run --goals interest-map --help shows those of the parts that are",
+        "chosen, such as --goals.window 12.",
+    ]
+    return "\n".join(lines)
 
 
-def _typed(value: Any) -> str:
-    """A default, as one types it."""
-    return str(value) if isinstance(value, str | Path) else json.dumps(value)
+_PLACES: Final = {"progress": "goals.progress", "choose": "teacher.choose"}  # of kinds that another part chooses
 
 
-def _choices(name: str) -> str:
-    """The choices that the catalogue has for an option, one per line."""
-    entries = CATALOGUE.get(name, {})
-    lines = [f"\n  {word}: {entry.about}" for word, entry in entries.items()]
-    return "".join([*lines, "\n  or package.module:attribute, one of your own"]) if lines else ""
+def _line(name: str, text: str) -> str:
+    return textwrap.fill(text, _WIDTH, initial_indent=f"  {name:17} ", subsequent_indent=" " * 20)
 
 
-class _Help(argparse.RawTextHelpFormatter):
-    """Keeps the lines of a text and wraps each by itself."""
+def _choices(part: Part, parts: Mapping[str, Part]) -> str:
+    """What a part is, and which words could stand for it and for the parts that it leads to."""
+    words = CATALOGUE.get(part.kind, {})
+    about = words[part.word].about if part.word in words else "of your own" if ":" in part.word else ""
+    found = [f"--{part.full(each)}={parts[part.full(each)].word}" for each in part.choices]
+    return f"{about}{'; its parts: ' if found else ''}{' '.join(found)}"
 
-    def _split_lines(self, text: str, width: int) -> list[str]:
-        lines: list[str] = []
-        for line in text.splitlines():
-            indent = len(line) - len(line.lstrip())
-            lines += textwrap.wrap(line, width, subsequent_indent=" " * (indent and indent + 2))
-        return lines
+
+def _read(argv: Sequence[str]) -> tuple[dict[str, str], set[str]]:
+    """The values that were typed, by the names of their options, and the flags.
+
+    Raises:
+        ValueError: a word belongs to no option, or an option has no value.
+    """
+    given, asked, waiting = dict[str, str](), set[str](), list(reversed(argv))
+    while waiting:
+        typed, equals, value = waiting.pop().partition("=")
+        name = typed.removeprefix("--").replace("-", "_")
+        if typed in ("-h", "--help"):
+            asked.add("help")
+        elif not typed.startswith("--"):
+            raise ValueError(f"{typed!r} belongs to no option; an option begins with -- and takes one value")
+        elif name in FLAGS:
+            if equals:
+                raise ValueError(f"{typed} takes no value, got {value!r}")
+            asked.add(name)
+        elif equals:
+            given[name] = value
+        elif waiting and not waiting[-1].startswith("--"):
+            given[name] = waiting.pop()
+        else:
+            raise ValueError(f"{typed} needs a value")
+    return given, asked
 
 
 class _Parser(jsonargparse.ArgumentParser):
+    """Reads values by the types of their options, and says in one line what was wanted."""
+
     def __init__(self, **arguments: Any) -> None:
-        super().__init__(**arguments)
-        self.typed: dict[str, tuple[str, str, str]] = {}  # by field: the option as it was typed, its value, its type
+        super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, **arguments)
+        self._kinds: dict[str, Any] = {}
+        self._given: Mapping[str, str] = {}
 
-    def joined(self, argv: Sequence[str]) -> list[str]:
-        """Each option and its value as one word, spelt with dashes; a word that belongs to no option is refused."""
-        names = {f"--{dashed(each.name)}": each for each in fields(Config)}
-        words: list[str] = []
-        for word in argv:
-            if words and dashed(words[-1]) in names and not word.startswith("--"):  # the value that it waits for
-                words[-1] += f"={word}"
-            else:
-                words.append(word)
-        return [self._spelt(word, names) for word in words]
+    def take(self, group: Any, name: str, kind: Any, default: Any, about: str) -> None:
+        """Add an option to a group."""
+        self._kinds[name] = kind
+        text = f"{about} ({_wanted(kind)}; default: {_shown(default)})".replace("%", "%%")
+        group.add_argument(f"--{dashed(name)}", type=kind, default=default, metavar="X", help=text)
 
-    def _spelt(self, word: str, names: Mapping[str, Field[Any]]) -> str:
-        typed, equals, value = word.partition("=")
-        option, flags = dashed(typed), {*(f"--{dashed(flag)}" for flag in FLAGS), "--help"}
-        if option in names:
-            kind = str(names[option].type)
-            self.typed[names[option].name] = typed, value, kind
-            if equals and not value and "Path" in kind:
-                self.error(f"{typed} must be a path, got an empty one")
-            item = r"\d+" if "int" in kind else r"[^\[\],]+"
-            if "tuple" in kind and re.fullmatch(f"{item}(,{item})*", value):
-                value = f"[{value}]"
-            return f"{option}={value}" if equals else option
-        if word != "-h" and not typed.startswith("--"):
-            self.error(f"{word!r} belongs to no option; an option begins with -- and takes one value")
-        if word != "-h" and option not in flags:
-            self.error(f"unknown option {word}{did_you_mean(option, {*names, *flags})}")
-        if equals:
-            self.error(f"{typed} takes no value, got {value!r}")
-        return option
+    def values(self, given: Mapping[str, str]) -> dict[str, Any]:
+        """What was typed, as values of their types.
+
+        Raises:
+            ValueError: one is of another type.
+        """
+        self._given = given
+        known = vars(
+            self.parse_args([f"--{dashed(name)}={self._listed(name, text)}" for name, text in given.items()]).as_flat()
+        )
+        return {name: known[name] for name in given}
 
     def error(self, message: str, ex: Exception | None = None) -> NoReturn:
-        key = re.search(r'[Kk]ey "(\w+)"', message)
-        if key and key[1] in self.typed:
-            typed, value, kind = self.typed[key[1]]
-            message = f"{typed} must be {_WANTED.get(kind, 'text')}, got {value}"
-        print(f"error: {message}\n--help lists all options", file=sys.stderr)
-        raise SystemExit(2)
+        key = re.search(r'key "([\w.]+)"', message)
+        if key is None or key[1] not in self._given:
+            raise ValueError(message)
+        raise ValueError(f"--{dashed(key[1])} must be {_wanted(self._kinds[key[1]])}, got {self._given[key[1]]}")
+
+    def _listed(self, name: str, text: str) -> str:
+        """A list may be typed without brackets."""
+        if not text and "Path" in str(self._kinds[name]):
+            raise ValueError(f"--{dashed(name)} must be a path, got an empty one")
+        is_list = "tuple" in str(self._kinds[name]) and text != "null" and not text.startswith("[")
+        return f"[{text}]" if is_list else text
+
+
+def _wanted(kind: Any) -> str:
+    """A type in words."""
+    parts = typing.get_args(kind)
+    if typing.get_origin(kind) is tuple:
+        many = _MANY.get(parts[0], "values")
+        return f"{many}, or []" if ... in parts else f"{len(parts)} {many}"
+    if parts:  # of a union
+        return " or ".join("null" if each is type(None) else _wanted(each) for each in parts)
+    return _WANTED.get(kind, "a value")
+
+
+def _shown(default: Any) -> str:
+    """A default, as one types it."""
+    return str(default) if isinstance(default, str | Path) else json.dumps(plain(default))

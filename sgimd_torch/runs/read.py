@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from sgimd_torch.evaluation import Evaluation, Part
 from sgimd_torch.files import checksum
 from sgimd_torch.record import Event, Kind, Record, RunError
-from sgimd_torch.runs.config import FILES, OWN, Config, from_settings, having, options
+from sgimd_torch.runs.config import FILES, OWN, PLACE, Config
 from sgimd_torch.runs.directory import FILE
 from sgimd_torch.spaces import Array, Box, Demonstration
 
@@ -244,7 +244,7 @@ def config_of(run: Run) -> Config:
         RunError: it makes no sense today.
     """
     try:
-        return from_settings(run.config)
+        return Config.from_settings(run.config)
     except (TypeError, ValueError) as error:
         raise RunError(f"the settings of {run.path} do not describe a run of this version: {error}") from error
 
@@ -274,8 +274,8 @@ def finished(config: Config) -> bool:
     """Whether this run is on disk with these options, whole, to its last movement and its last evaluation."""
     try:
         run = read_run(config.directory)
-        found, place = from_settings(run.config), having("place")
-        same = all(getattr(found, name) == getattr(config, name) for name in options() if name not in place)
+        found, wanted = run.config, config.settings
+        same = all(found.get(name) == wanted.get(name) for name in found.keys() | wanted.keys() if name not in PLACE)
         files = [(name, getattr(config, name)) for name in FILES]
         return bool(run.summary["finished"] and same) and all(
             file is None or run.files.get(f"{name}_crc32") in (None, checksum(file)) for name, file in files

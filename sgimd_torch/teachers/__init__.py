@@ -89,7 +89,14 @@ _REACHED: WeakKeyDictionary[Memory, _Reached] = WeakKeyDictionary()
 
 
 class PeriodicTeacher:
-    """Demonstrates regularly, as in the paper: before the movements ``every``, 2 ``every``, ..."""
+    """Demonstrates regularly, as in the paper: before the movements ``every``, 2 ``every``, ...
+
+    Args:
+        demonstrations: that it has.
+        rng: draws what ``choose`` draws.
+        every: movements from one demonstration to the next.
+        choose: which demonstration comes.
+    """
 
     def __init__(
         self,
@@ -112,7 +119,13 @@ class PeriodicTeacher:
 
 
 class InitialTeacher:
-    """Gives each demonstration once, at the start, in random order: one before the movements 0, ``every``, ..."""
+    """Gives each demonstration once, at the start, in random order: one before the movements 0, ``every``, ...
+
+    Args:
+        demonstrations: that it has.
+        rng: draws their order.
+        every: movements from one demonstration to the next.
+    """
 
     def __init__(self, demonstrations: Sequence[Demonstration], rng: np.random.Generator, *, every: int = 10) -> None:
         self.demonstrations = check_demonstrations(demonstrations)
@@ -132,6 +145,12 @@ class AskedTeacher:
 
     Every ``patience`` movements it looks how near the learner has come to each demonstrated outcome. It demonstrates if
     the mean distance fell by less than a hundredth since the last look.
+
+    Args:
+        demonstrations: that it has.
+        rng: draws what ``choose`` draws.
+        patience: movements from one look at the learner to the next.
+        choose: which demonstration comes.
     """
 
     def __init__(

@@ -58,7 +58,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     options = parser().parse_args(argv)
     check_count("--movements", options.movements, 1)
-    config = Config(environment=options.environment)
+    config = Config(parts={"environment": options.environment})
     try:
         task = task_of(config)
     except (ValueError, OSError):

@@ -30,7 +30,7 @@ class Cast(NamedTuple):
 
 def draw(runs: Mapping[str, Run]) -> Figure:
     """The figure: error curves; four goals and how each learner answers them; where the float landed in each run."""
-    half_side = float(runs["sgim-d"].config["task_space"])
+    half_side = float(runs["sgim-d"].config["environment.task_space"])
     box, tile = Box.cube(-half_side, half_side, 2), 0.05 * half_side
     figure = Figure(figsize=(7 * len(runs), 12.6), layout="constrained")
     axes: dict[str, Axes] = figure.subplot_mosaic([["curves", "above", "side"], [*runs]])

@@ -98,7 +98,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 0
     if options.figure is not None and options.figure.suffix not in (".png", ".svg", ".pdf"):
         raise ValueError(f"--figure must end in .png, .svg or .pdf, got {options.figure}")
-    task = task_of(Config(environment=options.task))
+    task = task_of(Config(parts={"environment": options.task}))
     found = [check(task, each, row) for row, each in enumerate(shown)]
     print_table([HEADS, *(_cells(row, each) for row, each in enumerate(found))])
     apart = [each.apart for each in found if each.lands is not None]

@@ -50,7 +50,7 @@ TASKS: Final[dict[str, Suited]] = {
     "toss": Suited({"environment": "toss"}),
     "two-elbows": Suited({"environment": "two-elbows"}),
     "half-reached": Suited({"environment": "half-reached"}),
-    "rod-large": Suited({"environment": ROD, "task_space": 100.0}, new=True, quick=False),
+    "rod-large": Suited({"environment": ROD, "environment.task_space": 100.0}, new=True, quick=False),
     "swimmer": Suited({"environment": "swimmer"}, new=True, quick=False),
     "planar-arm-7": Suited({"environment": "planar-arm-7"}, new=True),
     "crawler": Suited({"environment": "crawler"}, new=True),
@@ -67,8 +67,14 @@ REFERENCES: Final[dict[str, dict[str, Any]]] = {
         "budget": 1,
     },
 }
-DEFAULTS: Final = {"algorithm": "practice", "movements": "1000", "repeats": "0", "answers": "own", "out": "runs/suite"}
-OWN: Final = ("environment", "task-space", "benchmark", "demonstrations", "name")
+DEFAULTS: Final = {
+    "algorithm": "practice",
+    "movements": "1000",
+    "repeats": "0",
+    "evaluated-by": "own",
+    "out": "runs/suite",
+}
+OWN: Final = ("environment", "benchmark", "demonstrations", "name")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -105,12 +111,17 @@ def runs_of(options: argparse.Namespace, rest: Sequence[str]) -> tuple[list[Conf
     words = [*(f"--{name}={value}" for name, value in DEFAULTS.items() if name not in given), *rest]
     learners, flags = variants_of(options.vary, words)
     first = learners[0]
-    shared = {
-        name: getattr(first, name) for name in ("movements", "evaluate_at", "answers", "repeats", "floor_at", "out")
-    }
-    others = [Config(name=name, **line, **shared) for name, line in REFERENCES.items()]
+    same = ("movements", "evaluate_at", "evaluated_by", "repeats", "floor_at", "out")
+    shared = {name: getattr(first, name) for name in same}
+    others = [Config.from_settings({"name": name, **line, **shared}) for name, line in REFERENCES.items()]
     configs = [
-        replace(each, seed=seed, name=each.variant, out=each.out / task, **TASKS[task].options)
+        replace(
+            each,
+            seed=seed,
+            name=each.variant,
+            out=each.out / task,
+            parts={**dict(each.parts), **TASKS[task].options},
+        )
         for seed in options.seeds
         for task in options.tasks
         for each in [*others, *learners]

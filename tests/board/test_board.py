@@ -402,7 +402,9 @@ class Slider:
 
 def live_as(out, robot, make, **options):
     """A watched run of a user's robot and learner; returns its directory."""
-    config = Config(environment="planar-arm-7", movements=120, evaluate_at=(60,), repeats=0, board=True, out=out)
+    config = Config(
+        movements=120, evaluate_at=(60,), repeats=0, board=True, out=out, parts={"environment": "planar-arm-7"}
+    )
     goals = np.linspace(0.2, 0.9, 5)[:, None].repeat(robot.outcomes.dim, axis=1)
     learner = make(robot, 0, **options)
     alone = {"teacher": None, "demonstrations": [], "model": None, "trust": None}

@@ -264,7 +264,7 @@ def test_a_wave_along_its_body_moves_the_swimmer_and_the_opposite_one_moves_it_b
 
 
 def test_the_swimmer_is_a_task_with_goals_and_demonstrations():
-    task = task_of(Config(environment="swimmer"))
+    task = task_of(Config(parts={"environment": "swimmer"}))
     benchmark, _, _ = benchmark_of(task, None)
     assert len(benchmark.goals) > 100
     shown, _, _ = demonstrations_of(task, None)

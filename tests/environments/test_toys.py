@@ -78,7 +78,7 @@ def test_the_stretched_spatial_arm_reaches_a_metre_ahead_in_cm():
 @pytest.mark.parametrize("word", ["half-reached", "toss", "crawler", "two-elbows", "spatial-arm"])
 def test_a_toy_comes_with_goals_of_which_each_can_be_reached(word):
     assert word in CATALOGUE["environment"]
-    task = task_of(Config(environment=word, algorithm="random"))
+    task = task_of(Config(algorithm="random", parts={"environment": word}))
     benchmark, *_ = benchmark_of(task, None)
     assert 100 <= len(benchmark.goals) <= 400
     robot, rng = task.environment, stream(0, "reach")

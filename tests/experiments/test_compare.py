@@ -215,7 +215,7 @@ def test_every_variant_is_a_valid_run_with_its_own_name_in_its_table(tmp_path):
     configs = {config.directory: config for _, config in wanted}
     assert all(config == configs[config.directory] for _, config in wanted)  # one directory, one run
     for _, config in wanted:
-        assert parse(words(vars(config)))[0] == config
+        assert parse(words(config))[0] == config
 
 
 def test_without_seeds_each_experiment_has_those_that_its_shipped_rows_are_of(tmp_path):

@@ -26,7 +26,7 @@ def runs(tmp_path_factory, go):
     for algorithm, task_space in LIVED:
         name = algorithm if task_space == 1 else f"{algorithm}-large"
         for seed in (0, 1) if name in ("random", "sgim-d-large") else (0,):
-            options = f"--algorithm {algorithm} --name {name} --task_space {task_space} --seed {seed}"
+            options = f"--algorithm {algorithm} --name {name} --environment.task_space {task_space} --seed {seed}"
             assert go(out, *options.split(), "--movements", "40", "--evaluate_at", "[]") == 0
     return out
 

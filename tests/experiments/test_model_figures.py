@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 import pytest
+from sgimd_torch.runs.log import Columns
 
 from model_figures import LATE, figure_of, main, row
-from sgimd_torch.runs.log import Columns
 from sgimd_torch.runs.process import command
 from sgimd_torch.spaces import Episode, Move, stream
 from sgimd_torch.views.model_run import read_model_run

@@ -138,7 +138,7 @@ def test_stated_noise_is_averaged_out() -> None:
     goals = np.linspace(0.2, 0.8, 30)
     off = {
         make: np.mean([abs(make(memory)(NO_CONTEXT, np.array([goal])).theta[0] - goal) for goal in goals])
-        for make in (NearestNeighbour, lambda memory: LocalProcess(memory, noise=0.2))
+        for make in (NearestNeighbour, lambda memory: LocalProcess(memory, outcome_noise=0.2))
     }
     nearest, process = off.values()
     assert process < 0.4 * nearest
@@ -147,8 +147,8 @@ def test_stated_noise_is_averaged_out() -> None:
 def test_units_do_not_matter() -> None:
     toy = two_elbows()
     memory, goals = played(toy, 120), played(toy, 5, seed=1).outcomes
-    other = LocalProcess(remember(memory.thetas * 7 + 3, memory.outcomes * 1000), noise=10.0)
-    inverse = LocalProcess(memory, noise=0.01)
+    other = LocalProcess(remember(memory.thetas * 7 + 3, memory.outcomes * 1000), outcome_noise=10.0)
+    inverse = LocalProcess(memory, outcome_noise=0.01)
     for goal in goals:
         theta = inverse(NO_CONTEXT, goal).theta
         assert other(NO_CONTEXT, 1000 * goal).theta == pytest.approx(7 * theta + 3, abs=1e-3)

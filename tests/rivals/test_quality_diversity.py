@@ -6,7 +6,7 @@ import pytest
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.learner import Learner
 from sgimd_torch.rivals.quality_diversity import cma_mae, cma_me, isoline, map_elites
-from sgimd_torch.runs.tasks import arm_demonstrations
+from sgimd_torch.runs.tasks.robots import arm_demonstrations
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Array, Box, stream
 from worlds import NO_CONTEXT

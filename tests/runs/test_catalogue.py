@@ -1,28 +1,27 @@
 """The catalogue: what it says of each thing is true, and a user's own parts work like ours."""
 
-import inspect
+import json
 import re
 import subprocess
 import sys
-import typing
-from dataclasses import fields, replace
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from runs import ROOT
-from sgimd_torch.catalogue import CATALOGUE, SHARED, Entry, checked, colour, find, label, load
-from sgimd_torch.goals.interest_map import InterestMap
-from sgimd_torch.goals.uniform import UniformGoals
-from sgimd_torch.inverses.local_process import LocalProcess
+from sgimd_torch.catalogue import CATALOGUE, Entry, checked, colour, find, label, load
+from sgimd_torch.options import parameters_of
+from sgimd_torch.runs import command_line
 from sgimd_torch.runs.build import build, task_of
-from sgimd_torch.runs.command_line import main
-from sgimd_torch.runs.config import Config, dashed, from_settings, words
-from sgimd_torch.runs.config import default as default_of
+from sgimd_torch.runs.command_line import main, overview, parse
+from sgimd_torch.runs.config import Config, words
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.tasks import MOST_GOALS, goals_all_over
-from sgimd_torch.searches.widening import Widening
+from sgimd_torch.session import run
 
 ENTRIES = [(kind, word, entry) for kind, entries in CATALOGUE.items() for word, entry in entries.items()]
 TOSS = '''
@@ -53,6 +52,11 @@ class Half:
     outcomes, policies = Box.cube(0, 1, 1), Box.cube(0, 1, 1)
 
 class Worst:
+    """Goals anywhere.
+
+    Args:
+        window: how many are looked at.
+    """
     def __init__(self, contexts, outcomes, rng, *, window=8):
         self.outcomes, self.rng, self.window = outcomes, rng, window
     def sample(self, context):
@@ -78,37 +82,8 @@ def toss(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(("kind", "word", "entry"), ENTRIES, ids=lambda each: each if isinstance(each, str) else "")
-def test_what_an_entry_takes_its_parameters_are(kind, word, entry):
-    made = entry.load()
-    names = set(inspect.signature(made).parameters)
-    for handed_on in typing.get_type_hints(made).values() if inspect.isfunction(made) else ():
-        if typing.get_origin(handed_on) is typing.Unpack:  # **parts: Unpack[Parts]
-            names |= typing.get_args(handed_on)[0].__annotations__.keys()
-    assert {*entry.uses, *entry.fixed} <= names
-    known = {each.name for each in fields(Config)} | SHARED.keys() | {"policies", "outcome_noise", "correspondence"}
-    assert {*entry.options, *entry.ignores} <= known
-    assert entry.learns_with is None or entry.learns_with in CATALOGUE[kind]
-
-
-def test_defaults_of_options_are_those_of_the_library():
-    """So that help need not load what it explains."""
-    compared, standards = set(), {each.name: default_of(each, "") for each in fields(Config)}
-    for word, entry in [*((word, entry) for _, word, entry in ENTRIES), *SHARED.items()]:
-        parameters = dict(inspect.signature(entry.load()).parameters)
-        if word in ("sgim-d", "sagg-riac"):  # they hand their parts on
-            parameters |= inspect.signature(load("sgimd_torch.algorithms:goal_babbling")).parameters
-        for parameter, option in entry.uses.items():
-            given, ours = parameters.get(parameter), standards.get(option)
-            if given is None or given.default is given.empty or ours is None:
-                continue
-            default = LocalProcess if option == "inverse" and given.default is None else given.default
-            compared.add(option)
-            assert default is (find(option, ours).load() if option in CATALOGUE else ours) or default == ours, option
-    assert compared >= {"goals", "inverse", "search", "competence", "budget", "social", "window", "progress", "choice"}
-    assert compared >= {"imitations", "epsilon", "residual", "members", "noise_heads", "training", "focus", "anchored"}
-    evaluate, rod = (load(at) for at in ("sgimd_torch.evaluation:evaluate", "sgimd_torch:FishingRod"))
-    assert inspect.signature(evaluate).parameters["repeats"].default == Config.repeats
-    assert inspect.signature(rod).parameters["noise"].default == Config.noise
+def test_what_an_entry_fixes_or_hides_its_parameters_are(kind, word, entry):
+    assert {*entry.fixed, *entry.hidden} <= parameters_of(load(entry.at)).keys()
 
 
 def test_algorithms_have_a_name_and_a_colour_and_unknown_ones_their_word():
@@ -175,13 +150,18 @@ def test_a_users_task_comes_with_its_teacher(toss, capsys):
     assert "3 demonstrations" in capsys.readouterr().err
 
 
-def test_a_users_goal_model_gets_the_options_that_it_names(toss):
-    own = Config(environment="toss:Toss", algorithm="sagg-riac", goals="toss:Worst", window=4)
+def test_an_option_of_a_users_goal_model_is_its_parameter_and_nothing_else(toss, capsys):
+    own = Config("sagg-riac", parts={"environment": "toss:Toss", "goals": "toss:Worst", "goals.window": 4})
     goals = build(own).learner.autonomous.goals
     assert type(goals).__name__ == "Worst"
     assert goals.window == 4
-    assert own.without_effect == []
-    assert Config(environment="toss:Toss", algorithm="sagg-riac", goals="toss:Worst", progress="signed").without_effect
+    words_ = ["--algorithm", "sagg-riac", "--goals", "toss:Worst"]
+    with pytest.raises(SystemExit):
+        parse([*words_, "--help"])
+    said = capsys.readouterr().out
+    assert re.search(r"--goals.window .*\n? *how many are .*default: 8", said), said
+    assert command(main, [*words_, "--goals.window", "x"]) == 2
+    assert "--goals.window must be a whole number, got x" in capsys.readouterr().err
 
 
 def test_the_installed_command_finds_modules_in_the_working_directory(toss):
@@ -214,7 +194,7 @@ def test_goals_all_over_a_space_are_at_most_500_and_inside():
 def test_what_is_said_to_be_filmed_brings_a_picture(word):
     if word == "swimmer":
         pytest.importorskip("gymnasium")
-    task = task_of(Config(environment=word))
+    task = task_of(Config(parts={"environment": word}))
     assert CATALOGUE["environment"][word].filmed == (task.picture is not None)
 
 
@@ -223,37 +203,125 @@ def test_a_part_without_its_members_is_refused_by_name():
         checked("goals", "mine:Own", lambda: 7)()
 
 
-def test_the_words_of_a_config_make_it_again():
-    config = Config(algorithm="sagg-riac", goals="uniform", evaluate_at=(5, 6), every=7, board=False, task_space=2.5)
-    from sgimd_torch.runs.command_line import parse
-
-    assert parse(words(vars(config)))[0] == config
-    assert all(word.startswith("--") and "_" not in word.partition("=")[0] for word in words(vars(config)))
-    assert words(vars(Config())) == []
-    assert words({"algorithm": "practice-taught", "no-such-option": 3}) == []
-    assert from_settings({"goals": "grid", "evaluate_at": [5], "out": "x", "commit": "abc"}).goals == "grid"
-    assert dashed("task_space") == "task-space"
+CHANGED = [
+    Config(),
+    Config("sagg-riac", evaluate_at=(5, 6), parts={"goals": "grid", "goals.progress": "signed", "goals.window": 8}),
+    Config("sgim-d", parts={"environment.task_space": 2.5, "global_range": (0.1, 0.2), "goals.modes": (1.0, 0.0, 0.0)}),
+    Config("sgim-acts", name="x", parts={"teachers": ("low-half", "slow"), "base": "search", "base.budget": 3}),
+    Config("imitation", out=Path("here"), patience=2.5, parts={"teacher": "asked", "teacher.choose": "random"}),
+]
 
 
-def test_an_option_that_nobody_set_is_what_the_algorithm_has_for_it():
-    plain, own = Config(algorithm="sagg-riac"), Config(algorithm="practice-taught")
-    assert (plain.goals, plain.search, plain.budget, plain.teacher) == ("interest-map", "nelder-mead", 15, "periodic")
-    assert (own.goals, own.search, own.budget, own.teacher) == ("uniform", "practice", 1, "at-once")
-    assert words(vars(own)) == own.without_effect == []
-    assert words(vars(plain)) == ["--algorithm=sagg-riac"]
-    assert Config(algorithm="practice-taught", goals="uniform", budget=1) == own
-    assert words(vars(replace(own, goals="interest-map"))) == ["--goals=interest-map"]
-    assert from_settings(vars(own)) == own
+@pytest.mark.parametrize("config", CHANGED)
+def test_the_words_and_the_settings_of_a_config_make_it_again(config):
+    assert parse(words(config))[0] == config
+    assert hash(parse(words(config))[0]) == hash(config)
+    settings = json.loads(json.dumps(config.settings))
+    assert settings == config.settings
+    assert Config.from_settings({**settings, "benchmark_crc32": "1"}) == config
+    assert all(word.startswith("--") and "_" not in word.partition("=")[0] for word in words(config))
 
 
-def test_practice_is_made_of_options_that_can_be_changed_one_by_one():
-    learner = build(Config(algorithm="practice", environment="two-elbows")).learner
-    other = build(Config(algorithm="practice", environment="two-elbows", goals="interest-map", budget=3)).learner
-    assert isinstance(learner.autonomous.goals, UniformGoals)
-    assert isinstance(other.autonomous.goals, InterestMap)
-    assert (learner.autonomous.budget, other.autonomous.budget) == (1, 3)
-    assert isinstance(other.autonomous.look, Widening)
-    assert learner.autonomous.search.__qualname__ == other.autonomous.search.__qualname__
+def test_what_a_part_is_anyway_is_no_difference():
+    own = Config("practice-taught")
+    assert (own["goals"], own["search"], own["budget"], own["teacher"]) == ("uniform", "practice", 1, "at-once")
+    assert Config("practice-taught", parts={"goals": "uniform", "budget": 1}) == own
+    assert words(own) == []
+    assert words(replace(own, parts={"goals": "interest-map"})) == ["--goals=interest-map"]
+    assert "goals.window" not in own
+    assert own["movements"] == 5000
+
+
+def test_dashes_and_underscores_mean_the_same():
+    assert parse(["--goals", "grid", "--goals.window=8", "--give-up", "-1"]) == parse(
+        ["--goals=grid", "--goals.window", "8", "--give_up=-1"]
+    )
+
+
+@pytest.mark.parametrize(
+    ("options", "wanted"),
+    [
+        ("--goals.window 12", "--goals.window: goals uniform has no such option; goals interest-map, grid have it"),
+        ("--goals grid --goals.windwo 12", "did you mean goals.window"),
+        ("--window 12", r"no such option; goals interest-map, grid \(goals.window\) have it"),
+        ("--algorithm random --budget 5", "--budget: algorithm random has .* sagg-riac, practice, .* have it"),
+        ("--algorithm random --goals.window 5", "--goals.window: algorithm random .* sagg-riac, .* have it"),
+        ("--algorithm random --teacher.every 5", "--teacher.every: algorithm random .* sgim-d.* have it"),
+        ("--model.members 5", "--model.members: .*search gradient, gauss-newton and inverse model, model-proved"),
+        ("--search nelder-mead-exact --search.noise 0.1", "search nelder-mead-exact has no such option; .*nelder-mead"),
+        ("--algorithm map-elites --epsilon 0.1", "--epsilon: algorithm map-elites .* map-elites-taught"),
+        ("--sead 3", "did you mean seed"),
+        ("--goals grit", "unknown goals 'grit'; did you mean grid"),
+        ("--teachers al --algorithm sgim-im", "unknown teachers 'al'; did you mean all"),
+        ("--evaluated-by own,nearst", "unknown inverse 'nearst'; did you mean nearest"),
+        ("--evaluated-by nearest", "evaluated_by must begin with own"),
+        ("--seed x", "--seed must be a whole number, got x"),
+        ("--seed -1", "seed must be at least 0"),
+        ("--movements 0", "movements must be at least 1"),
+        ("--repeats 1", "repeats must be 0 or at least 2"),
+        ("--evaluate-at 5,x", "--evaluate-at must be whole numbers such as 250,500, or .* or null, got 5,x"),
+        ("--evaluate-at 0", "evaluate_at must be numbers of movements"),
+        ("--patience 0", "patience must be above 0 s"),
+        ("--budget 1.5", "--budget must be a whole number, got 1.5"),
+        ("--global-range 1", "--global-range must be 2 numbers such as"),
+        ("--board perhaps", "--board must be true or false, got perhaps"),
+        ("--resume=3", "--resume takes no value"),
+        ("--seed", "--seed needs a value"),
+        ("x", "'x' belongs to no option"),
+        ("--name ..", "name must be that of one directory"),
+        ("--search.sd -1", "sd must be positive"),  # from here on by the part itself, before anything is written
+        ("--algorithm sgim-d --goals.window 7", "window must be even"),
+        ("--environment.task_space 0", "task_space must be above 0"),
+        ("--environment.noise .nan", "noise must be finite"),
+        ("--give-up 1", "give_up must be"),
+        ("--social.epsilon -1", "epsilon must be"),
+        ("--algorithm sgim-d --teacher.every 0", "every must be"),
+    ],
+)
+def test_what_makes_no_sense_is_refused_on_one_line_and_nothing_is_written(options, wanted, tmp_path, capsys):
+    out = tmp_path / "runs"
+    with suppress(SystemExit):
+        assert command(main, ["--out", str(out), *options.split()]) == 2
+    said = capsys.readouterr().err
+    line = next(line for line in said.splitlines() if line.startswith("error: "))
+    assert re.search(wanted, line), said
+    assert not out.exists()
+
+
+def test_help_is_one_screen_and_a_parts_options_are_shown_once_it_is_chosen(capsys):
+    for argv in (["--help"], ["--goals", "grid", "--help"]):
+        with pytest.raises(SystemExit) as stop:
+            parse(argv, "What it does.")
+        assert stop.value.code == 0
+    assert len(overview(command_line.__doc__).splitlines()) <= 60
+    said = capsys.readouterr().out
+    assert said.count("--goals.window X") == 1
+    assert "how many recent goals the interest looks at" in " ".join(said.split())
+
+
+PARTS_OF_PRACTICE = {
+    "goals": "uniform",
+    "search": "practice",
+    "explore": "widening",
+    "budget": 1,
+    "global_range": (0.02, 0.3),
+}
+
+
+def test_sagg_riac_with_every_part_of_practice_by_name_is_practice():
+    def lived(config):
+        parts = build(config)
+        episodes = run(parts.learner, parts.environment, 7, movements=80)
+        return np.concatenate([each.move.theta for each in episodes])
+
+    def with_parts(algorithm, **changed):
+        return lived(Config(algorithm, parts={"environment": "two-elbows", **changed}))
+
+    practice = with_parts("practice")
+    assert np.array_equal(with_parts("sagg-riac", **PARTS_OF_PRACTICE), practice)
+    for name in PARTS_OF_PRACTICE:
+        fewer = {each: value for each, value in PARTS_OF_PRACTICE.items() if each != name}
+        assert not np.array_equal(with_parts("sagg-riac", **fewer), practice), name
 
 
 def test_an_entry_that_is_not_installed_names_its_extra(monkeypatch):
@@ -264,16 +332,5 @@ def test_an_entry_that_is_not_installed_names_its_extra(monkeypatch):
 
 
 def test_the_environment_of_a_config_is_the_task_it_names():
-    assert len(task_of(Config(environment="planar-arm-50")).environment.policies.low) == 50
+    assert len(task_of(Config(parts={"environment": "planar-arm-50"})).environment.policies.low) == 50
     assert isinstance(find("environment", "planar-arm-7"), Entry)
-
-
-@pytest.mark.parametrize("kind", CATALOGUE)
-def test_the_order_of_the_catalogue_means_nothing(kind, monkeypatch):
-    given = {"algorithm": "sagg-riac", "search": "gradient", "residual": False, "epsilon": 0.2, "every": 7}
-    before = Config(**given).without_effect, Config(**{**given, "search": "perturb"}).without_effect
-    monkeypatch.setitem(CATALOGUE, kind, dict(reversed(CATALOGUE[kind].items())))
-    after = Config(**given).without_effect, Config(**{**given, "search": "perturb"}).without_effect
-    assert after == before
-    assert not any("residual" in note for note in after[0])
-    assert any("--residual has no effect with --search perturb" in note for note in after[1])

@@ -6,6 +6,7 @@ import shutil
 
 import numpy as np
 import pytest
+from sgimd_torch.views.report.data import demonstrated, read_life
 
 from runs import csv_of
 from sgimd_torch.catalogue import CATALOGUE
@@ -15,16 +16,14 @@ from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import Benchmark, save_benchmark
 from sgimd_torch.runs.build import build
 from sgimd_torch.runs.command_line import main
-from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
-from sgimd_torch.runs.tasks import arm_benchmark, arm_demonstrations
+from sgimd_torch.runs.tasks.robots import arm_benchmark, arm_demonstrations
 from sgimd_torch.spaces import Demonstration, stream
 from sgimd_torch.views import demo
 from sgimd_torch.views.film import command as film
 from sgimd_torch.views.memories import remember
 from sgimd_torch.views.report import command as report
-from sgimd_torch.views.report.data import demonstrated, read_life
 from table import tiles_reached
 
 NO_CONTEXT = np.empty(0)
@@ -121,7 +120,7 @@ def test_demonstrations_for_an_arm_lead_from_rest_to_equal_bends_all_over_its_re
 
 
 def test_an_imitating_arm_varies_the_posture_that_it_was_shown(tmp_path):
-    assert live(tmp_path, "--algorithm", "imitation", "--epsilon", 0.03) == 0
+    assert live(tmp_path, "--algorithm", "imitation", "--social.epsilon", 0.03) == 0
     run, arm = read_run(tmp_path / "imitation" / "seed-003"), PlanarArm()
     assert np.flatnonzero(run.demonstration >= 0).tolist() == [30, 60]
     shown = arm_demonstrations(arm)[run.demonstration[30]]
@@ -164,15 +163,6 @@ def test_files_of_another_robot_are_refused(tmp_path, benchmark, capsys, environ
     assert re.search(message, errors)
     assert "Traceback" not in errors
     assert not (tmp_path / "out").exists()
-
-
-def test_noise_and_task_space_are_the_rods(tmp_path, reference, capsys):
-    assert live(tmp_path, "--noise", 0.5, "--task_space", 100) == 0
-    said = capsys.readouterr().err
-    assert "--noise has no effect with --environment planar-arm-7\n" in said
-    assert "--task-space has no effect with --environment planar-arm-7\n" in said
-    assert csv_of(tmp_path / "sgim-d" / "seed-003") == csv_of(reference)
-    assert not Config(noise=0.5, task_space=100.0).without_effect
 
 
 def test_a_run_on_an_arm_made_longer_equals_a_long_run(tmp_path, reference):

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from sgimd_torch.runs.tables import sealed
 
 from runs import EAGER, MOVEMENTS, accept_loss, arguments, csv_of, signal_after, start
 from sgimd_torch.evaluation import evaluate
@@ -16,7 +17,6 @@ from sgimd_torch.inverses.locally_linear import LocallyLinear
 from sgimd_torch.runs import run as run_script
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.read import finished, read_run
-from sgimd_torch.runs.tables import sealed
 from sgimd_torch.spaces import stream
 
 
@@ -303,7 +303,7 @@ def test_an_evaluation_that_lost_an_answer_is_done_again(tmp_path, go, reference
 
 def test_evaluations_from_before_there_were_answers_are_the_runs_own(tmp_path, go, benchmark, reference):
     path = tmp_path / "sgim-d" / "seed-003" / "evaluation.csv"
-    assert go(tmp_path, "--movements", 60, "--answers", "own") == 0
+    assert go(tmp_path, "--movements", 60, "--evaluated-by", "own") == 0
     today = read_run(path.parent).evaluation
     rows = [line.split(",") for line in path.read_text().splitlines()]
     rows = [[row[0], *row[2:-2]] for row in rows]  # as they were, before answers, goals met and checksums

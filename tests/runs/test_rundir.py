@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-
 from sgimd_torch.runs.log import Columns, RunError
-from sgimd_torch.runs.read import find_runs, read_run
 from sgimd_torch.runs.tables import sealed, small_table
+
+from sgimd_torch.runs.read import find_runs, read_run
 from sgimd_torch.spaces import Demonstration, Episode, Move
 
 COLUMNS = Columns(1, 2, 1)

@@ -66,7 +66,9 @@ def test_every_part_of_ones_own_counts_and_none_of_ours(own):
         "def make(memory, k): return NearestNeighbour(memory)\nnearest = partial(make, k=1)\n"
     )
     try:
-        config = Config(environment="sliders:Slider", algorithm="random", answers=("own", "kit.answers:nearest"))
+        config = Config(
+            algorithm="random", evaluated_by=("own", "kit.answers:nearest"), parts={"environment": "sliders:Slider"}
+        )
         assert sorted(sources(config)) == ["source of kit.answers:nearest", "source of sliders:Slider"]
         assert sources(config)["source of kit.answers:nearest"].startswith("kit/answers.py, crc32 ")
         assert source("kit:nearest") == own / "kit/answers.py"

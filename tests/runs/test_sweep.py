@@ -29,7 +29,7 @@ SHORT = [*ALONE, "--algorithm", "random"]
 
 def short(out, **changes):
     changes = {"environment": "planar-arm-7", "algorithm": "random", "movements": 40, **changes}
-    return Config(repeats=0, evaluate_at=(20,), out=out, **changes)
+    return Config.from_settings({**changes, "repeats": 0, "evaluate_at": (20,), "out": out})
 
 
 def swept(*options):
@@ -51,8 +51,8 @@ def listed(capsys, *options):
 
 def test_options_are_crossed_and_each_combination_has_its_name():
     assert names(["goals=interest-map,uniform", "budget=5,15"]) == [
-        *("goals=interest-map,budget=5", "goals=interest-map,budget=15"),
-        *("goals=uniform,budget=5", "goals=uniform,budget=15"),
+        *("budget=5,goals=interest-map", "budget=15,goals=interest-map"),
+        *("budget=5,goals=uniform", "budget=15,goals=uniform"),
     ]
     assert names(["algorithm=random,sgim-d"]) == ["random", "sgim-d"]
     assert names([], "--algorithm", "sagg-riac") == ["sagg-riac"]
@@ -203,8 +203,8 @@ def test_a_run_is_finished_when_it_has_all_movements_and_evaluations_with_these_
     out = copied.out
     for changes in ({"movements": 50}, {"inverse": "nearest"}, {"seed": 1}, {"floor_at": ()}, {"noise": 0.5}):
         assert not finished(short(out, **changes)), changes
-    assert not finished(Config(**{**vars(copied), "evaluate_at": (30,)}))
-    assert finished(short(out, threads=2))  # the same results
+    assert not finished(replace(copied, evaluate_at=(30,)))
+    assert finished(short(out, **{"environment.threads": 2}))  # the same results
 
 
 def test_a_file_of_goals_that_has_changed_makes_a_run_unfinished(benchmark, tmp_path, go):

@@ -27,13 +27,13 @@ class Oracle:
 
 def live(inverse, movements: int = 60, *, told: bool = True) -> tuple[Widening, np.ndarray]:
     memory = Memory(0, 2, 2)
-    look = Widening(POLICIES, memory, inverse, stream(0, "look"))
+    explore = Widening(POLICIES, memory, inverse, stream(0, "look"))
     thetas = []
     for _ in range(movements):
-        thetas.append(look(np.empty(0)))
+        thetas.append(explore(np.empty(0)))
         if told:
             memory.add(np.empty(0), thetas[-1], thetas[-1])
-    return look, np.array(thetas)
+    return explore, np.array(thetas)
 
 
 def test_it_begins_around_the_middle():
@@ -44,8 +44,8 @@ def test_it_begins_around_the_middle():
 
 @pytest.mark.parametrize(("error", "width"), [(0.0, 0.3), (100.0, 0.03)])
 def test_good_predictions_widen_it_and_bad_ones_narrow_it(error, width):
-    look, thetas = live(Oracle(error))
-    assert look.width.sd == width
+    explore, thetas = live(Oracle(error))
+    assert explore.width.sd == width
     spread = thetas[30:].std(axis=0) / POLICIES.sides
     assert (spread > 0.15).all() if width > 0.1 else (spread < 0.05).all()
     assert POLICIES.contains(thetas).all()
@@ -61,7 +61,7 @@ def test_it_looks_wide_where_movements_are_alike_and_near_where_they_are_not(mak
     learner = practice(robot, 0)
     for _ in run(learner, robot, 0, movements=150):
         pass
-    assert least <= learner.autonomous.look.width.sd <= most
+    assert least <= learner.autonomous.explore.width.sd <= most
 
 
 class Ball:
@@ -95,5 +95,5 @@ def test_around_a_copied_movement_practice_looks_half_as_wide():
     executed = np.array([next(search), *(search.send(np.zeros(2)) for _ in range(1999))])
     inside = np.abs(known[0] - 0.5) < 0.2  # where the bounds cut nothing off
     assert inside.any()
-    assert babbling.look.width.sd > 0.25
-    assert executed[:, inside].std(axis=0) == pytest.approx(babbling.look.width.sd / 2, rel=0.1)
+    assert babbling.explore.width.sd > 0.25
+    assert executed[:, inside].std(axis=0) == pytest.approx(babbling.explore.width.sd / 2, rel=0.1)

@@ -39,7 +39,7 @@ def runs(tmp_path_factory, go):
     short = ("--movements", 60, "--evaluate_at", 30)
     for seed in (3, 4):
         assert go(out, *short, "--seed", seed) == 0
-        assert go(out, *short, "--seed", seed, "--name", ODD, "--goals", "uniform", "--every", 10) == 0
+        assert go(out, *short, "--seed", seed, "--name", ODD, "--goals", "uniform", "--teacher.every", 10) == 0
     assert go(out, *short, "--algorithm", "observation", "--repeats", 0) == 0
     return out
 

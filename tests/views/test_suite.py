@@ -36,7 +36,7 @@ def test_half_of_the_tasks_and_no_more_are_used_to_choose_defaults():
 
 @pytest.mark.parametrize("name", [name for name, task in TASKS.items() if task.quick])
 def test_a_task_states_its_noise_and_has_goals_of_its_own(name):
-    task = task_of(Config(algorithm="random", **TASKS[name].options))
+    task = task_of(Config.from_settings({**TASKS[name].options, "algorithm": "random"}))
     assert task.benchmark is not None
     assert len(goals_all_over(task.environment).goals)
     assert task.environment.outcome_noise >= 0
@@ -46,8 +46,8 @@ def test_each_task_is_run_with_the_learner_and_with_the_two_that_it_has_to_beat(
     configs = configs_of("--tasks", "toss", "rod-large", "--seeds", "3,4", "--budget", "7", "--out", "here", *SHORT)
     assert len({config.directory for config in configs}) == 2 * 2 * 3
     ours = [config for config in configs if config.variant == "practice"]
-    assert {(config.environment, config.task_space, config.seed) for config in ours} == {
-        (word, side, seed) for word, side in (("toss", 1.0), ("fishing-rod", 100.0)) for seed in (3, 4)
+    assert {(config["environment"], config.values.get("environment.task_space"), config.seed) for config in ours} == {
+        (word, side, seed) for word, side in (("toss", None), ("fishing-rod", 100.0)) for seed in (3, 4)
     }
     assert {(config.variant, config.budget) for config in configs} == {(RANDOM, 15), (UNIFORM, 1), ("practice", 7)}
     assert {(config.movements, config.evaluate_at) for config in configs} == {(40, (20,))}
@@ -55,7 +55,7 @@ def test_each_task_is_run_with_the_learner_and_with_the_two_that_it_has_to_beat(
 
 def test_what_is_varied_gives_a_learner_for_each_value():
     configs = configs_of("--tasks", "toss", "--vary", "inverse=process,nearest", *LEARNER)
-    assert [config.inverse for config in configs[2:]] == ["process", "nearest"]
+    assert [config["inverse"] for config in configs[2:]] == ["process", "nearest"]
     assert [config.variant for config in configs] == [RANDOM, UNIFORM, "inverse=process", "inverse=nearest"]
 
 
@@ -63,7 +63,7 @@ def test_what_is_varied_gives_a_learner_for_each_value():
     ("words", "message"),
     [
         ("--environment toss", "--environment cannot be given here: each task has its own"),
-        ("--task_space=2", "--task-space cannot be given here"),
+        ("--environment.task_space=2", "--environment.task_space cannot be given here"),
         ("--vary environment=toss,crawler", "--environment cannot be given here"),
         ("--tasks tos", "invalid choice: 'tos'"),
         ("--tasks crawler --algorithm imitation", "comes without demonstrations"),

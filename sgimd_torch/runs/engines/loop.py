@@ -78,7 +78,7 @@ def sweep(
 
 def run_words(config: Config, flags: Sequence[str]) -> list[str]:
     """The command line of a run after ``sgimd``."""
-    return ["run", "--resume", *flags, *words(vars(config))]
+    return ["run", "--resume", *flags, *words(config)]
 
 
 def log_of(config: Config) -> Path:

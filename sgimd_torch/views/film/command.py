@@ -83,7 +83,7 @@ def _parts(run: Run) -> RunParts:
     if sys.platform == "linux":
         os.environ.setdefault("MUJOCO_GL", "egl")  # draws without a display
     try:
-        return build(config_of(run), run.path)
+        return build(config_of(run))
     except (AttributeError, RuntimeError) as error:  # each kind of OpenGL fails in its own way
         if "mujoco" in sys.modules:
             raise

@@ -8,17 +8,17 @@ from __future__ import annotations
 import json
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from sgimd_torch.runs.config import words
-from sgimd_torch.runs.read import Run
+from sgimd_torch.runs.config import PLACE, Config, words
+from sgimd_torch.runs.read import Run, config_of
 from sgimd_torch.views.statistics import LEAST_SEEDS
 from sgimd_torch.views.variants import Variant
 
 AGAIN: Final = "runs/again"  # a folder that holds no run yet
-PLACE: Final = {"seed", "name", "out", "board", "threads", "environment.threads"}  # settings that no learner notices
 
 
 class Table(NamedTuple):
@@ -95,9 +95,9 @@ def commands(runs: Sequence[Run]) -> list[str]:
     """A line of shell for all runs of the same settings, defaults left out."""
     groups: dict[str, list[int]] = {}
     for run in runs:
-        own = {name: value for name, value in run.config.items() if name == "name" or name not in PLACE}
-        if own.get("name") == own["algorithm"]:
-            del own["name"]  # a run is named after its algorithm anyway
+        config = config_of(run)
+        name = None if config.name == config.algorithm else config.name  # a run is named after its algorithm anyway
+        own = replace(config, seed=Config.seed, out=Config.out, name=name, board=False)
         groups.setdefault(shlex.join(words(own)), []).append(int(run.config["seed"]))
     lines = []
     for given, seeds in groups.items():

@@ -51,7 +51,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     with serving(port) as server:
         page = Page(server, session)
         print(WHERE.format(port=server.get_port(), path=config.directory), flush=True)
-        session.pause("teachers" in config.used)  # who asks in vain soon asks no more: it waits for somebody
+        session.pause("teachers" in config)  # who asks in vain soon asks no more: it waits for somebody
         with session:
             page.run()
     if session.state.problem:
@@ -103,7 +103,7 @@ def options_of(argv: Sequence[str]) -> tuple[Config, int]:
             raise ValueError(f"{path} must be called {config.directory.name}, as sgimd run calls it; was it renamed?")
         return config, options.port
     config, _ = parse([f"--name={NAME}", "--repeats=0", *words])
-    asked = ["--teachers=by-hand"] if "teachers" in config.used else []
-    shown = ["--teacher=by-hand"] if "teacher" in config.used else []
+    asked = ["--teachers=by-hand"] if "teachers" in config else []
+    shown = ["--teacher=by-hand"] if "teacher" in config else []
     config, _ = parse([f"--name={NAME}", "--repeats=0", *asked, *shown, *words])
     return config, options.port

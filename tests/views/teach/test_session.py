@@ -31,7 +31,7 @@ GOAL = np.array([0.3, 0.4])
 def taught(out, **options):
     """A run on the small arm."""
     given = {"algorithm": "sgim-d", "teacher": "by-hand", "movements": 300, "evaluate_at": (20,), **options}
-    return Config(environment="planar-arm-7", name="taught", out=out, repeats=0, **given)
+    return Config.from_settings({**given, "name": "taught", "out": out, "repeats": 0, "environment": "planar-arm-7"})
 
 
 @pytest.fixture
@@ -303,7 +303,7 @@ def test_a_task_without_anything_to_lead_says_why(capsys):
 
 def test_a_run_that_is_taught_has_a_person_as_its_teacher(tmp_path, paused):
     config, port = options_of(["--seed", "4", "--port", "9000", "--out", str(tmp_path)])
-    assert (config.directory, config.teacher, port) == (tmp_path / "taught" / "seed-004", "by-hand", 9000)
+    assert (config.directory, config["teacher"], port) == (tmp_path / "taught" / "seed-004", "by-hand", 9000)
     config, _ = options_of(["--algorithm", "sgim-im"])
     assert config.teachers == ("by-hand",)
     session = paused()

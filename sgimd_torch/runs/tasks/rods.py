@@ -1,0 +1,73 @@
+"""The fishing rod as a task: its benchmark and its demonstrations are shipped files."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from typing import Any, Final
+
+import numpy as np
+
+from sgimd_torch.demonstrations import SHIPPED as SHIPPED_DEMONSTRATIONS
+from sgimd_torch.demonstrations import load_demonstrations
+from sgimd_torch.environments.fishing_rod import JOINTS, FishingRod
+from sgimd_torch.evaluation import SHIPPED as SHIPPED_BENCHMARK
+from sgimd_torch.options import hands_on
+from sgimd_torch.runs.tasks import Task
+from sgimd_torch.spaces import Box, Demonstration
+
+LARGEST: Final = 1e6  # m, of T
+STRETCH: Final = 3.0  # a demonstration this many times slower or faster than the robot can move has wrong times
+MISFIT: Final = 0.5  # rad; a larger misfit means that this robot cannot make the movement
+
+
+@hands_on(FishingRod, "noise", "max_yaw", "max_wind", "line")
+def fishing_rod(*, task_space: float = 1.0, threads: int = 1, **physics: Any) -> Task:
+    """The paper's task; goals come from a square of half side ``task_space`` m.
+
+    With a context, ``max_yaw`` or ``max_wind`` above 0, what was demonstrated was demonstrated in the context
+    0, and the goals are those that can be reached in it. So, too, with another ``line``: both are those of the
+    paper's rod.
+
+    Args:
+        task_space: half the side (m) of the square that goals come from; 100 in the paper's large-space experiment.
+        threads: that an evaluation may use; results do not depend on it.
+
+    Raises:
+        ValueError: a number out of its range.
+    """
+    if not 0 < task_space <= LARGEST:
+        raise ValueError(
+            f"task_space must be above 0 and at most {LARGEST:g}, got {task_space}; it is a length in metres"
+        )
+    rod = FishingRod(outcomes=Box.cube(-task_space, task_space, 2), threads=threads, **physics)
+    return Task(
+        rod,
+        SHIPPED_BENCHMARK,
+        partial(_in_context_zero, rod.contexts.dim) if rod.contexts.dim else SHIPPED_DEMONSTRATIONS,
+        rod.primitive.correspondence,
+        partial(_misfit, rod),
+        len(JOINTS),
+    )
+
+
+def _in_context_zero(context_dim: int) -> list[Demonstration]:
+    """The shipped demonstrations, for a rod with contexts."""
+    return [replace(shown, context=np.zeros(context_dim)) for shown in load_demonstrations()]
+
+
+def _misfit(rod: FishingRod, demonstration: Demonstration) -> float:
+    times, trajectory = demonstration.times, demonstration.trajectory
+    duration, (shortest, longest) = times[-1] - times[0], rod.primitive.durations
+    if not shortest / STRETCH <= duration <= longest * STRETCH:
+        raise ValueError(
+            f"it lasts {duration:g} s, the robot's movements {shortest:g} to {longest:g} s; "
+            "was it recorded in milliseconds?"
+        )
+    residual = rod.primitive.residual(rod.primitive.correspondence(times, trajectory), times, trajectory)
+    if residual > MISFIT:
+        raise ValueError(
+            f"it is {residual:.2f} rad (root mean square) away from anything that the robot can play; "
+            "was it recorded in degrees, or with the joints in another order?"
+        )
+    return residual
