@@ -137,11 +137,13 @@ class Record:
         return self._movements
 
     def rows(self, table: str) -> Iterator[Row]:
-        """The rows of a table that were committed or replaced, in order, without their seals.
+        """The rows of a table, in order, without their seals.
 
         Raises:
             RunError: one of them is not what was written, or there are more or fewer; those before it were yielded.
         """
+        if self._waiting:
+            self._write()
         n, seal = 0, self._root(table)
         with self._told():
             cursor = self._connection.execute(f"SELECT * FROM {table} ORDER BY rowid")
@@ -244,7 +246,7 @@ class Record:
             with Record.make(partial, self.dims, about) as new:
                 shown = new._take(self, "demonstrations")
                 lesson = self.columns("events").index("demonstration")
-                new._take(self, "events", lambda n, row: n != n_events and (row[lesson] or 0) < shown)
+                new._take(self, "events", lambda n, row: n != n_events and (row[lesson] is None or row[lesson] < shown))
                 for table in keep:
                     new._take(self, table)
                 last = new._waiting.get("events", [(0, "")])[-1]
