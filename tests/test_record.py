@@ -456,7 +456,7 @@ SHORT = "--movements 110 --evaluate_at 60 --repeats 2 --training 0.5 --members 2
 def lives(tmp_path_factory):
     """How to go on with such a run, the file of it, and that of the next seed."""
     out = tmp_path_factory.mktemp("all")
-    save_benchmark(out / "toss.npz", Benchmark("Toss", np.array([[0.5, 0.5], [1.0, 0.5], [0.8, 0.2]]), 0.1))
+    save_benchmark(out / "toss.npz", Benchmark("Toy", np.array([[0.5, 0.5], [1.0, 0.5], [0.8, 0.2]]), 0.1))
     words = [*ALL.split(), *SHORT.split(), "--benchmark", str(out / "toss.npz"), "--name", "run"]
 
     def live(place, *options):
