@@ -144,11 +144,13 @@ class Record:
         """
         if self._waiting:
             self._write()
-        n, seal = 0, self._root(table)
+        n, seal, last = 0, self._root(table), -(2**63)
+        # No cursor stays open from one yield to the next: it would keep a lock on the file, also after an error.
+        next_rows = f"SELECT rowid, * FROM {table} WHERE rowid > ? ORDER BY rowid LIMIT {_AT_ONCE}"
         with self._told():
-            cursor = self._connection.execute(f"SELECT * FROM {table} ORDER BY rowid")
-            while rows := cursor.fetchmany(_AT_ONCE):
-                for *row, found in rows:
+            while rows := self._connection.execute(next_rows, (last,)).fetchall():
+                last = rows[-1][0]
+                for _, *row, found in rows:
                     seal = zlib.crc32(row_bytes(row), seal)
                     if seal != found:
                         raise RunError(f"{self.path}: row {n + 1} of {table} is not what was written; {HINT}")
