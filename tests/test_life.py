@@ -4,19 +4,24 @@ from functools import partial
 
 import numpy as np
 import pytest
-from sgimd_torch.learner.life import Kind, read_life
 
+from runs import edit, files_of
 from sgimd_torch.algorithms import observation, random_exploration, sagg_riac, sgim_d
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import evaluate
-from sgimd_torch.files import write_npz
 from sgimd_torch.forward_model.model import ForwardModel
 from sgimd_torch.goals.alp_gmm import AlpGmm
 from sgimd_torch.inverses.local import NearestNeighbour
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Learner, ReplayError
 from sgimd_torch.memory import Memory
+from sgimd_torch.record import Kind, Record, RunError
 from sgimd_torch.rivals.quality_diversity import cma_mae, cma_me, isoline, map_elites
+from sgimd_torch.runs.build import build
+from sgimd_torch.runs.command_line import main
+from sgimd_torch.runs.directory import FILE
+from sgimd_torch.runs.process import command
+from sgimd_torch.runs.read import config_of, read_run
 from sgimd_torch.searches.cma_es import cma_es
 from sgimd_torch.searches.through_model import gradient_search
 from sgimd_torch.session import run
@@ -55,6 +60,11 @@ def line(episode):
     )
 
 
+def events_of(path):
+    with Record(path) as record:
+        return list(record.rows("events"))
+
+
 def step(robot, outcome=(0.1, 0.2)):
     move = robot.ask(NO_CONTEXT)
     if move is not None:
@@ -70,7 +80,7 @@ def test_a_loaded_learner_goes_on_as_if_it_had_never_stopped(name, tmp_path):
     for episode in run(whole, arm, 1, movements=130, teacher=teacher):
         lines.append(line(episode))
         if episode.index + 1 in (1, 23, 50, 77, 96):  # of which some are in the middle of an attempt
-            path = saved[episode.index + 1] = tmp_path / f"{episode.index}.npz"
+            path = saved[episode.index + 1] = tmp_path / f"{episode.index}.sqlite"
             whole.save(path)
     for movements, path in saved.items():
         learner, again = build(seed=1), teacher_for(name)
@@ -80,10 +90,9 @@ def test_a_loaded_learner_goes_on_as_if_it_had_never_stopped(name, tmp_path):
         assert rest == lines[movements:]
         for part in ("contexts", "thetas", "outcomes"):
             assert getattr(learner.memory, part).tobytes() == getattr(whole.memory, part).tobytes()
-        again_saved = tmp_path / "again.npz"
-        learner.save(again_saved)
-        whole.save(tmp_path / "whole.npz")
-        assert read_life(again_saved, learner.memory).memory_crc32 == read_life(again_saved, whole.memory).memory_crc32
+        learner.save(tmp_path / "again.sqlite")
+        whole.save(tmp_path / "whole.sqlite")
+        assert events_of(tmp_path / "again.sqlite") == events_of(tmp_path / "whole.sqlite")
 
 
 @every_learner
@@ -102,8 +111,8 @@ def test_which_movement_reaches_a_goal_is_one_call_for_all_of_them(name):
 
 
 def test_the_builders_inverse_is_the_one_that_it_is_given():
-    for build in (partial(observation, correspondence=last_posture), random_exploration, sagg_riac):
-        assert isinstance(build(ARM, 0, inverse=NearestNeighbour).inverse, NearestNeighbour)
+    for make in (partial(observation, correspondence=last_posture), random_exploration, sagg_riac):
+        assert isinstance(make(ARM, 0, inverse=NearestNeighbour).inverse, NearestNeighbour)
     learner = sagg_riac(ARM, 0, inverse=NearestNeighbour)
     assert learner.inverse is learner.autonomous.inverse
 
@@ -124,11 +133,11 @@ def test_a_learner_that_was_interrupted_asked_in_vain_and_rested_is_the_same_aga
 
     whole, moves = sgim_d(ARM, 3, correspondence=last_posture), []
     live(whole, moves)
-    whole.save(tmp_path / "life.npz")
-    kinds = {event.kind for event in read_life(tmp_path / "life.npz", whole.memory).events}
-    assert kinds == {Kind.MOVED, Kind.SHOWN, Kind.DROPPED, Kind.INTERRUPTED}
+    whole.save(tmp_path / "life.sqlite")
+    kinds = {row[1] for row in events_of(tmp_path / "life.sqlite")}
+    assert kinds == {Kind.MOVED, Kind.SHOWN, Kind.FAILED, Kind.INTERRUPTED}
     again = sgim_d(ARM, 3, correspondence=last_posture)
-    again.load(tmp_path / "life.npz")
+    again.load(tmp_path / "life.sqlite")
     assert again.movements == whole.movements == 40
     for _ in range(30):
         assert np.array_equal(step(again).theta, step(whole).theta)
@@ -139,16 +148,16 @@ def test_a_movement_that_was_asked_for_and_not_told_is_asked_for_again(tmp_path)
     for _ in range(10):
         step(robot)
     move = robot.ask(NO_CONTEXT)
-    robot.save(tmp_path / "life.npz")
-    again.load(tmp_path / "life.npz")
+    robot.save(tmp_path / "life.sqlite")
+    again.load(tmp_path / "life.sqlite")
     assert again.movements == 10
     assert np.array_equal(again.ask(NO_CONTEXT).theta, move.theta)
 
 
 def test_a_learner_without_a_life_is_saved_and_loaded(tmp_path):
-    sagg_riac(ARM, 4).save(tmp_path / "life.npz")
+    sagg_riac(ARM, 4).save(tmp_path / "life.sqlite")
     again = sagg_riac(ARM, 5)  # it has not moved yet, so nobody can tell
-    again.load(tmp_path / "life.npz")
+    again.load(tmp_path / "life.sqlite")
     assert again.movements == 0
 
 
@@ -164,10 +173,10 @@ def test_a_search_through_a_model_goes_on_when_the_model_is_refreshed_as_the_loo
         lines.append(line(episode))
         model.refresh(whole.memory, episode.move.goal)
         if episode.index == 99:
-            whole.save(tmp_path / "life.npz")
+            whole.save(tmp_path / "life.sqlite")
     assert model.trained
     model, again = build()
-    again.load(tmp_path / "life.npz", after=lambda move: model.refresh(again.memory, move.goal))
+    again.load(tmp_path / "life.sqlite", after=lambda move: model.refresh(again.memory, move.goal))
     rest = []
     for episode in run(again, ARM, 5, movements=140, first=100):
         rest.append(line(episode))
@@ -181,8 +190,8 @@ def saved(tmp_path):
     learner = sgim_d(ARM, 6, correspondence=last_posture)
     for _ in run(learner, ARM, 6, movements=50, teacher=teacher_for("sgim-d")):
         pass
-    learner.save(tmp_path / "life.npz")
-    return tmp_path / "life.npz"
+    learner.save(tmp_path / "life.sqlite")
+    return tmp_path / "life.sqlite"
 
 
 @pytest.mark.parametrize(
@@ -202,7 +211,7 @@ def saved(tmp_path):
         ),
         (
             lambda: sgim_d(ARM, 6, correspondence=last_posture, memory=exemplars(3)),
-            r"life\.npz began with 0 exemplars in memory, this learner with 3",
+            r"life\.sqlite began with 0 exemplars in memory, this learner with 3",
         ),
     ],
 )
@@ -233,9 +242,9 @@ def test_exemplars_that_were_added_by_hand_are_noticed(tmp_path):
     robot = random_exploration(ARM, 8)
     step(robot)
     robot.memory.add(NO_CONTEXT, np.full(4, 0.5), [0.0, 0.0])
-    robot.save(tmp_path / "life.npz")
+    robot.save(tmp_path / "life.sqlite")
     with pytest.raises(ReplayError, match="ended with another memory"):
-        random_exploration(ARM, 8).load(tmp_path / "life.npz")
+        random_exploration(ARM, 8).load(tmp_path / "life.sqlite")
 
 
 def test_only_a_learner_freshly_built_can_load(saved):
@@ -246,48 +255,65 @@ def test_only_a_learner_freshly_built_can_load(saved):
 
 
 def test_a_life_of_another_robot_and_other_files_are_refused(saved, tmp_path):
-    with pytest.raises(ValueError, match=r"thetas must be float64 \(50, 5\), got float64 \(50, 4\); .*another robot"):
-        sagg_riac(PlanarArm(5), 6).load(saved)
-    with pytest.raises(FileNotFoundError):
-        sagg_riac(ARM, 6).load(tmp_path / "nothing.npz")
-    arrays = dict(np.load(saved))
-    for changes, message in (
-        ({"kinds": arrays["kinds"] + 5}, "events of an unknown kind"),
-        ({"kinds": arrays["kinds"].astype(float)}, "kinds must be integers"),
-        ({"thetas": arrays["thetas"][:-1]}, r"thetas must be float64 \(50, 4\)"),
-        ({"outcomes": arrays["outcomes"] * np.nan}, "outcomes must be finite"),
-        ({"lesson_times": arrays["lesson_times"][:-1]}, "lesson_times must be"),
+    with pytest.raises(
+        RunError, match=r"has dims \(0, 4, 2\) of context, theta, outcome, got \(0, 5, 2\); another robot"
     ):
-        write_npz(tmp_path / "other.npz", {**arrays, **changes})
+        sagg_riac(PlanarArm(5), 6).load(saved)
+    np.savez(tmp_path / "memory.npz", thetas=np.zeros((3, 4)))
+    edit(saved, "UPDATE events SET theta_1 = 0.5 WHERE movement = 30")
+    for name in ("memory.npz", "nothing.sqlite", "life.sqlite"):
         learner = sgim_d(ARM, 6, correspondence=last_posture)
-        with pytest.raises(ValueError, match=message):
-            learner.load(tmp_path / "other.npz")
+        with pytest.raises(RunError, match=name):
+            learner.load(tmp_path / name)
         assert learner.movements == 0
 
 
-def test_the_file_holds_no_pickle_and_nothing_but_what_happened(saved):
-    with np.load(saved, allow_pickle=False) as arrays:
-        assert sorted(arrays) == [
-            *("begun", "contexts", "kinds", "lesson_contexts", "lesson_lengths", "lesson_outcomes", "lesson_times"),
-            *("lesson_trajectories", "memory_crc32", "outcomes", "thetas", "version"),
-        ]
-        assert arrays["kinds"].tolist() == [0] * 20 + [3] + [0] * 20 + [3] + [0] * 10
+def test_the_file_holds_nothing_but_what_happened(saved):
+    with Record(saved) as record:
+        assert record.about.keys() == {"run", "dims", "begun", "exemplars"}
+        kinds = [event.kind for event in record.events()]
+        assert kinds == 2 * (20 * [Kind.MOVED] + [Kind.SHOWN]) + 10 * [Kind.MOVED]
+        assert record.check() == {}
 
 
-def test_lessons_that_differ_in_shape_cannot_be_saved_and_leave_the_old_file(tmp_path):
+def test_a_lesson_that_cannot_be_recorded_leaves_the_old_file(tmp_path):
     robot = observation(ARM, 0, correspondence=lambda times, trajectory: np.full(4, 0.5))
-    robot.save(tmp_path / "life.npz")
-    before = (tmp_path / "life.npz").read_bytes()
-    for n_joints in (2, 3):
-        robot.watch(Demonstration(NO_CONTEXT, np.arange(5.0), np.zeros((5, n_joints)), np.zeros(2)))
-    with pytest.raises(ValueError, match="differ in their number of joints"):
-        robot.save(tmp_path / "life.npz")
-    robot = observation(ARM, 0, correspondence=lambda times, trajectory: np.full(4, 0.5))
+    robot.save(tmp_path / "life.sqlite")
+    before = files_of(tmp_path)
     robot.watch(Demonstration(NO_CONTEXT, np.arange(5.0), np.zeros(5), np.zeros(2)))
-    with pytest.raises(ValueError, match=r"it needs \(n_times,\) times and a"):
-        robot.save(tmp_path / "life.npz")
-    assert (tmp_path / "life.npz").read_bytes() == before
-    assert len(list(tmp_path.iterdir())) == 1
+    with pytest.raises(ValueError, match=r"needs \(n_times,\) times and a"):
+        robot.save(tmp_path / "life.sqlite")
+    assert files_of(tmp_path) == before
+
+
+def test_lessons_of_different_shape_are_saved(tmp_path):
+    """Of a glove with more joints, or of another length: a correspondence may take any."""
+    robot, again = (observation(ARM, 0, correspondence=lambda times, trajectory: np.full(4, 0.5)) for _ in range(2))
+    for n_times, n_joints in ((5, 2), (7, 3)):
+        robot.watch(Demonstration(NO_CONTEXT, np.arange(1.0 * n_times), np.ones((n_times, n_joints)), np.zeros(2)))
+    robot.save(tmp_path / "life.sqlite")
+    again.load(tmp_path / "life.sqlite")
+    with Record(tmp_path / "life.sqlite") as record:
+        assert [each.trajectory.shape for each in record.demonstrations()] == [(5, 2), (7, 3)]
+
+
+@pytest.mark.parametrize(
+    ("algorithm", "more"),
+    [("sgim-d", ()), ("sgim-acts", ("--teachers", "low-half,mislabelling")), ("practice", ()), ("imitation", ())],
+)
+def test_the_file_of_a_run_is_loaded_by_a_learner_of_a_program_of_ones_own(tmp_path, algorithm, more):
+    words = f"--algorithm {algorithm} --environment planar-arm-7 --evaluate_at [] --seed 4 --name run".split()
+    for movements in (50, 70):
+        options = [*words, *more, "--movements", str(movements), "--out", str(tmp_path / str(movements))]
+        assert command(main, options) == 0
+    run_of_50, run_of_70 = (read_run(tmp_path / f"{movements}/run/seed-004") for movements in (50, 70))
+    parts = build(config_of(run_of_50))
+    parts.learner.load(run_of_50.path / FILE, teacher=parts.teacher)
+    lived = {"movements": 70, "first": 50, "teacher": parts.teacher, "teachers": parts.teachers}
+    episodes = list(run(parts.learner, parts.environment, 4, **lived))
+    assert [e.move and e.move.theta.tolist() for e in episodes] == [
+        None if np.isnan(theta).any() else theta.tolist() for theta in run_of_70.thetas[50:]
+    ]
 
 
 @pytest.mark.parametrize("build", [random_exploration, sagg_riac, map_elites, cma_me, cma_mae, isoline])
@@ -326,12 +352,12 @@ def test_a_life_that_started_from_a_memory_is_loaded_by_one_that_starts_from_the
     whole = sagg_riac(ARM, 0, memory=exemplars(30))
     for _ in range(10):
         step(whole)
-    whole.save(tmp_path / "life.npz")
+    whole.save(tmp_path / "life.sqlite")
     again = sagg_riac(ARM, 0, memory=exemplars(30))
-    again.load(tmp_path / "life.npz")
+    again.load(tmp_path / "life.sqlite")
     assert np.array_equal(step(again).theta, step(whole).theta)
     with pytest.raises(ReplayError, match="began with 30 exemplars in memory, this learner with 0"):
-        sagg_riac(ARM, 0).load(tmp_path / "life.npz")
+        sagg_riac(ARM, 0).load(tmp_path / "life.sqlite")
 
 
 def test_a_memory_of_another_robot_is_no_start():
@@ -372,10 +398,10 @@ def test_a_strategy_without_a_builder_is_saved_too(tmp_path):
     whole, again = (Learner(Memory(0, 4, 2), Sweep()) for _ in range(2))
     moves = [step(whole) for _ in range(6)]
     assert [move is None for move in moves] == [False, False, False, True, False, False]
-    whole.save(tmp_path / "life.npz")
-    again.load(tmp_path / "life.npz")
+    whole.save(tmp_path / "life.sqlite")
+    again.load(tmp_path / "life.sqlite")
     assert again.movements == 6
     assert step(again).theta[0] == step(whole).theta[0] == 0.2
     other = Learner(Memory(0, 4, 2), Babble(ARM.policies, stream(0, "babble")))
     with pytest.raises(ReplayError, match="movement 0 was recorded with another theta"):
-        other.load(tmp_path / "life.npz")
+        other.load(tmp_path / "life.sqlite")

@@ -291,6 +291,19 @@ def test_a_record_of_more_than_a_life_says_what_else_is_in_it_only_where_it_is_r
         assert record.check().keys() == {"errors"}
 
 
+def test_who_stopped_reading_keeps_nobody_from_writing(tmp_path):
+    path = fill(tmp_path / "run.sqlite")
+    edit(path, "UPDATE events SET theta_1 = 0.5 WHERE rowid = 9")
+    with Record(path) as record:
+        events, rows = record.events(), record.rows("goals")
+        assert next(events).kind == Kind.MOVED
+        assert len(next(rows)) == 3
+        with pytest.raises(RunError, match="row 9 of events") as caught:
+            list(events)
+    edit(path, "DELETE FROM events")
+    assert caught.value.__traceback__ is not None  # the frames are still there
+
+
 class Damage:
     """Something that happens to a file, drawn at random; ``other`` is the file of another run of the same layout."""
 
@@ -456,7 +469,7 @@ SHORT = "--movements 110 --evaluate_at 60 --repeats 2 --training 0.5 --members 2
 def lives(tmp_path_factory):
     """How to go on with such a run, the file of it, and that of the next seed."""
     out = tmp_path_factory.mktemp("all")
-    save_benchmark(out / "toss.npz", Benchmark("Toss", np.array([[0.5, 0.5], [1.0, 0.5], [0.8, 0.2]]), 0.1))
+    save_benchmark(out / "toss.npz", Benchmark("Toy", np.array([[0.5, 0.5], [1.0, 0.5], [0.8, 0.2]]), 0.1))
     words = [*ALL.split(), *SHORT.split(), "--benchmark", str(out / "toss.npz"), "--name", "run"]
 
     def live(place, *options):

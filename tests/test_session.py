@@ -14,8 +14,9 @@ from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import evaluate
 from sgimd_torch.goals.uniform import UniformGoals
 from sgimd_torch.inverses.local import LocalInverse, NearestNeighbour
+from sgimd_torch.record import Kind, Record
 from sgimd_torch.searches.perturb import perturb
-from sgimd_torch.session import Recorded, ReplayError, live, replay, run
+from sgimd_torch.session import ReplayError, run
 from sgimd_torch.spaces import Array, Episode, stream
 from sgimd_torch.teachers import InitialTeacher, PeriodicTeacher
 from worlds import ALGORITHMS, TAUGHT, demonstrations, last_posture, make
@@ -51,10 +52,6 @@ def summary(episodes: Sequence[Episode]) -> list[tuple[object, ...]]:
         (e.index, e.context.tobytes(), e.move and e.move.theta.tobytes(), e.outcome is not None and e.outcome.tobytes())
         for e in episodes
     ]
-
-
-def recorded(episodes: Sequence[Episode]) -> list[Recorded]:
-    return [Recorded(e.move.theta if e.move is not None else None, e.outcome) for e in episodes]
 
 
 @every_algorithm
@@ -142,48 +139,78 @@ def test_evaluating_does_not_disturb_learning(name: str) -> None:
     assert watched(every=None) == watched(every=10)
 
 
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    """Of an empty record of five joints."""
+    Record.make(tmp_path / "life.sqlite", (0, 5, 2), {}).close()
+    return tmp_path / "life.sqlite"
+
+
+def recorded(path: Path, name: str, arm: PlanarArm, movements: int, seed: int = 0) -> list[Episode]:
+    """A life that goes on with what ``path`` holds."""
+    with Record(path, write=True) as record:
+        episodes = life(name, arm, movements, seed, record=record)
+        record.commit()
+    return episodes
+
+
 @every_algorithm
-def test_a_replay_proposes_every_theta_again_without_executing(name: str) -> None:
+def test_a_replay_proposes_every_theta_again_without_executing(name: str, path: Path) -> None:
     arm = CountingArm(noise=0.01)
-    first = life(name, arm, 150)
+    first = recorded(path, name, arm, 150)
     arm.executed.clear()
     teacher_of(arm)
     n_for_the_teacher = len(arm.executed)
     arm.executed.clear()
-    again = life(name, arm, 150, execute=replay(recorded(first), live(arm, 0)))
-    assert summary(again) == summary(first)
+    assert summary(recorded(path, name, arm, 150)) == summary(first)
     assert len(arm.executed) == (n_for_the_teacher if name in TAUGHT else 0)
 
 
 @every_algorithm
-@pytest.mark.parametrize("stopped", [1, 37, 95])
-def test_a_run_resumed_from_its_record_ends_as_if_never_stopped(name: str, stopped: int) -> None:
+@pytest.mark.parametrize("stopped", [1, 30, 37, 95])
+def test_a_run_resumed_from_its_record_ends_as_if_never_stopped(name: str, stopped: int, path: Path) -> None:
     arm = PlanarArm(5, noise=0.01)
-    whole = life(name, arm, 150)
-    resumed = life(name, arm, 150, execute=replay(recorded(whole)[:stopped], live(arm, 0)))
-    assert summary(resumed) == summary(whole)
+    recorded(path, name, arm, stopped)
+    resumed = recorded(path, name, arm, 150)
+    assert summary(resumed) == summary(life(name, arm, 150))
+    assert [e.demonstration and e.demonstration.outcome.tolist() for e in resumed] == [
+        e.demonstration and e.demonstration.outcome.tolist() for e in life(name, arm, 150)
+    ]
 
 
-def test_a_replay_that_proposes_another_theta_is_an_error() -> None:
+def changed(path: Path, row: int, **values: object) -> None:
+    """A record of the same life but for one event."""
+    with Record(path) as record:
+        events = list(record.events())
+    path.unlink()
+    with Record.make(path, (0, 5, 2), {}) as record:
+        for k, event in enumerate(events):
+            record.add(event._replace(**values) if k == row else event)  # type: ignore[arg-type]
+        record.commit()
+
+
+def test_a_replay_that_proposes_another_theta_is_an_error(path: Path) -> None:
     arm = PlanarArm(5)
-    record = recorded(life("sgim-d", arm, 50))
-    record[20] = Recorded(record[20].theta + 1e-15, record[20].outcome)
+    episodes = recorded(path, "sgim-d", arm, 50)
+    assert episodes[20].move is not None
+    changed(path, 20, theta=episodes[20].move.theta + 1e-15)
     learner = make("sgim-d", arm)
-    with pytest.raises(ReplayError, match="movement 20"):
-        list(run(learner, arm, 0, movements=50, teacher=teacher_of(arm), execute=replay(record, live(arm, 0))))
+    with Record(path) as record, pytest.raises(ReplayError, match="movement 20"):
+        list(run(learner, arm, 0, movements=50, teacher=teacher_of(arm), record=record))
     assert len(learner.memory) == 20
 
 
-def test_a_replay_of_another_seed_is_an_error_from_the_first_movement_on() -> None:
-    arm = PlanarArm(5)
+def test_a_replay_of_another_seed_is_an_error_from_the_first_movement_on(path: Path) -> None:
+    recorded(path, "random", PlanarArm(5), 10, seed=1)
     with pytest.raises(ReplayError, match="movement 0"):
-        life("random", arm, 10, seed=2, execute=replay(recorded(life("random", arm, 10, seed=1)), live(arm, 2)))
+        recorded(path, "random", PlanarArm(5), 10, seed=2)
 
 
-def test_a_movement_where_the_record_has_rest_is_an_error() -> None:
-    arm = PlanarArm(5)
-    with pytest.raises(ReplayError, match="movement 0"):
-        life("random", arm, 10, execute=replay([Recorded(None, None)] * 10, live(arm, 0)))
+def test_a_movement_where_the_record_has_rest_is_an_error(path: Path) -> None:
+    recorded(path, "random", PlanarArm(5), 10)
+    changed(path, 0, kind=Kind.RESTED, theta=None, goal=None, outcome=None, origin=None)
+    with pytest.raises(ReplayError, match="movement 0 was recorded as rest"):
+        recorded(path, "random", PlanarArm(5), 10)
 
 
 def test_a_movement_meets_the_same_noise_whatever_was_done_before_it() -> None:
@@ -317,13 +344,13 @@ def test_a_life_saved_where_a_movement_was_broken_off_goes_on_as_if_it_never_was
     learner = make("sgim-d", arm)
     with pytest.raises(ConnectionError):
         list(run(learner, arm, 0, movements=60, teacher=teacher_of(other, 5)))
-    learner.save(tmp_path / "life.npz")
+    learner.save(tmp_path / "life.sqlite")
     again, teacher = make("sgim-d", arm), teacher_of(other, 5)
-    again.load(tmp_path / "life.npz", teacher=teacher)
+    again.load(tmp_path / "life.sqlite", teacher=teacher)
     rest = list(run(again, arm, 0, movements=60, first=again.movements, teacher=teacher))
     assert summary(rest) == summary(whole[after:])
-    again.save(tmp_path / "later.npz")
-    make("sgim-d", arm).load(tmp_path / "later.npz", teacher=teacher_of(other, 5))
+    again.save(tmp_path / "later.sqlite")
+    make("sgim-d", arm).load(tmp_path / "later.sqlite", teacher=teacher_of(other, 5))
 
 
 def test_after_a_movement_that_was_broken_off_a_run_goes_on_when_it_is_given_up() -> None:
@@ -346,8 +373,8 @@ def test_a_lesson_whose_answer_was_given_up_is_offered_again_and_such_a_life_can
     learner.interrupt()
     rest = list(run(learner, arm, 0, movements=40, first=15, teacher=teacher))
     assert [e.index for e in rest if e.demonstration is not None] == [15, 20, 25, 30, 35]
-    learner.save(tmp_path / "life.npz")
-    make("sgim-d", arm).load(tmp_path / "life.npz", teacher=teacher_of(other, 5))
+    learner.save(tmp_path / "life.sqlite")
+    make("sgim-d", arm).load(tmp_path / "life.sqlite", teacher=teacher_of(other, 5))
 
 
 def test_a_lesson_of_ones_own_before_a_run_takes_none_of_the_teachers_away() -> None:

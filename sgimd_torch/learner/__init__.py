@@ -290,6 +290,8 @@ class Learner:
             raise RuntimeError("load() needs a learner freshly built; this one has lived already")
         dims = self.memory.context_dim, self.memory.theta_dim, self.memory.outcome_dim
         with Record(path) as record:
+            for damage in record.check().values():
+                raise RunError(damage)
             if record.dims != dims:
                 raise RunError(f"{path} has dims {record.dims} of context, theta, outcome, got {dims}; another robot?")
             begun, exemplars = record.about.get("begun", 0), record.about.get("exemplars")

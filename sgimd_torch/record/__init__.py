@@ -137,16 +137,20 @@ class Record:
         return self._movements
 
     def rows(self, table: str) -> Iterator[Row]:
-        """The rows of a table that were committed or replaced, in order, without their seals.
+        """The rows of a table, in order, without their seals.
 
         Raises:
             RunError: one of them is not what was written, or there are more or fewer; those before it were yielded.
         """
-        n, seal = 0, self._root(table)
+        if self._waiting:
+            self._write()
+        n, seal, last = 0, self._root(table), -(2**63)
+        # No cursor stays open from one yield to the next: it would keep a lock on the file, also after an error.
+        next_rows = f"SELECT rowid, * FROM {table} WHERE rowid > ? ORDER BY rowid LIMIT {_AT_ONCE}"
         with self._told():
-            cursor = self._connection.execute(f"SELECT * FROM {table} ORDER BY rowid")
-            while rows := cursor.fetchmany(_AT_ONCE):
-                for *row, found in rows:
+            while rows := self._connection.execute(next_rows, (last,)).fetchall():
+                last = rows[-1][0]
+                for _, *row, found in rows:
                     seal = zlib.crc32(row_bytes(row), seal)
                     if seal != found:
                         raise RunError(f"{self.path}: row {n + 1} of {table} is not what was written; {HINT}")
@@ -244,7 +248,7 @@ class Record:
             with Record.make(partial, self.dims, about) as new:
                 shown = new._take(self, "demonstrations")
                 lesson = self.columns("events").index("demonstration")
-                new._take(self, "events", lambda n, row: n != n_events and (row[lesson] or 0) < shown)
+                new._take(self, "events", lambda n, row: n != n_events and (row[lesson] is None or row[lesson] < shown))
                 for table in keep:
                     new._take(self, table)
                 last = new._waiting.get("events", [(0, "")])[-1]

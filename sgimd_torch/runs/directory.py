@@ -22,10 +22,10 @@ from sgimd_torch.files import checksum, make_folder
 from sgimd_torch.record import DERIVED, InUseError, Record, RunError
 from sgimd_torch.runs.build import RunParts
 from sgimd_torch.runs.config import EVALUATES, MAY_CHANGE, Config
+from sgimd_torch.runs.evaluations import EVALUATED
 
 FILE: Final = "run.sqlite"
 _LASTING: Final = ("events", "demonstrations")  # tables that only a new life would make again
-_EVALUATED: Final = ("evaluations", "errors", "regions")  # an evaluation has rows in all of them, or in none
 _SOURCE: Final = "source of "  # among the versions, before the word that names a part of a user's own
 LIBRARIES: Final = {"numpy": "numpy", "scipy": "scipy", "faiss": "faiss-cpu", "mujoco": "mujoco"}
 FORWARD: Final = ("torch", "lightning", "safetensors")  # of runs with a forward model
@@ -124,7 +124,7 @@ def _whole(path: Path, accept_loss: bool, notes: list[str]) -> Record | None:
         _accept(path, "; ".join(lost), "keep those before and make the others", accept_loss, notes)
         record = Record(path, write=True)
     try:
-        dropped = {*wrong, *(_EVALUATED if wrong.keys() & {*_EVALUATED} else ())}
+        dropped = {*wrong, *(EVALUATED if wrong.keys() & {*EVALUATED} else ())}
         whole = () if lost else [table for table in DERIVED if table not in dropped]
         notes += [f"{message}; it is made again" for message in wrong.values() if message not in lost]
         kept = record.rewrite(keep=whole)
@@ -176,7 +176,7 @@ def _keep_evaluations(record: Record, parts: RunParts, about: Mapping[str, Any])
     now = {**about["settings"], **about["files"]}
     alike = all(before.get(name) == now.get(name) for name in EVALUATES)
     wanted = {*parts.config.evaluations} if alike else set()
-    for table in _EVALUATED:
+    for table in EVALUATED:
         rows = list(record.rows(table))
         kept = [row for row in rows if row[0] in wanted]
         if len(kept) < len(rows):

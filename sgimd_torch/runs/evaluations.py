@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
 from sgimd_torch.evaluation import Evaluation
 from sgimd_torch.goals.regions import Region
 from sgimd_torch.record import Record
+
+EVALUATED: Final = ("evaluations", "errors", "regions")
+"""Tables of evaluations; in each, rows begin with the number of movements."""
 
 
 def write_evaluation(
@@ -40,6 +43,15 @@ def read_evaluations(record: Record) -> dict[int, dict[str, Evaluation]]:
         movements: {answer: _evaluation(np.array(each, dtype=np.float64)) for answer, each in answers.items()}
         for movements, answers in rows.items()
     }
+
+
+def sort_evaluations(record: Record) -> None:
+    """Bring evaluations that a replay has added to where they belong."""
+    for table in EVALUATED:
+        rows = list(record.rows(table))
+        ordered = sorted(rows, key=lambda row: row[0])
+        if ordered != rows:
+            record.replace_rows(table, ordered)
 
 
 def _evaluation(numbers: np.ndarray) -> Evaluation:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from typing import Any, Final, Self
 
 from sgimd_torch.environments.protocol import SimulationError
@@ -17,7 +18,7 @@ from sgimd_torch.runs.build import RunParts
 from sgimd_torch.runs.clock import Seconds
 from sgimd_torch.runs.config import OWN
 from sgimd_torch.runs.directory import open_run
-from sgimd_torch.runs.evaluations import read_evaluations, write_evaluation
+from sgimd_torch.runs.evaluations import read_evaluations, sort_evaluations, write_evaluation
 from sgimd_torch.runs.listeners import listeners_of
 from sgimd_torch.runs.process import Failed, Progress, Stopped, Stopping, say
 from sgimd_torch.session import ReplayError, live, run
@@ -89,10 +90,10 @@ class Life:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self.close()
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        self.close(failed=kind is not None)
 
-    def close(self) -> None:
+    def close(self, *, failed: bool = False) -> None:
         """Bring to the disk what was lived, and let others have the record."""
         try:
             if not self.replaying and not self.record.failed:
@@ -100,7 +101,8 @@ class Life:
         finally:
             self.record.close()
             for each in self.listeners:
-                each.close()
+                with suppress(*([OSError] if failed else [])):  # of a full disk the first error is told
+                    each.close()
 
     @property
     def replaying(self) -> bool:
@@ -204,6 +206,7 @@ class Life:
         """The replay is over: from now on files change."""
         for each in self.listeners:
             each.begin()
+        sort_evaluations(self.record)
         self.commit()
 
 

@@ -12,9 +12,9 @@ from made_up import row, write
 from runs import ROOT, start, sweep_here
 from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.evaluation import Benchmark
+from sgimd_torch.record import RunError
 from sgimd_torch.runs.command_line import parse
 from sgimd_torch.runs.config import Config, words
-from sgimd_torch.record import RunError
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import Run, read_run
 from table import ERROR, goal_rows, goals_claimed, merge, read_table, result_rows, tiles_reached

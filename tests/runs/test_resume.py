@@ -1,58 +1,111 @@
 """Runs that are stopped, killed, damaged or made longer: in the end they are as if nothing had happened."""
 
-import json
-import os
+import shutil
 import signal
-import zlib
-from dataclasses import replace
 
 import numpy as np
 import pytest
-from sgimd_torch.runs.tables import sealed
 
-from runs import EAGER, MOVEMENTS, accept_loss, arguments, csv_of, signal_after, start
+from runs import (
+    MOVEMENTS,
+    STOPS,
+    about_of,
+    arguments,
+    content_of,
+    edit,
+    end,
+    files_of,
+    settle,
+    start,
+    stopped,
+    stopped_at,
+)
 from sgimd_torch.evaluation import evaluate
-from sgimd_torch.files import lock
 from sgimd_torch.inverses.locally_linear import LocallyLinear
+from sgimd_torch.record import Kind, Record
 from sgimd_torch.runs import run as run_script
-from sgimd_torch.runs.config import Config
-from sgimd_torch.runs.read import finished, read_run
+from sgimd_torch.runs.directory import FILE
+from sgimd_torch.runs.read import movements_on_disk, read_run
 from sgimd_torch.spaces import stream
+
+LASTING = ("events", "demonstrations")
+# On the arm: a learner with regions, one that asks, one with a model; and one in contexts.
+ARM = "--environment planar-arm-7 --benchmark null --repeats 0 --evaluate_at 50"
+LEARNERS = {
+    "rod": "",
+    "rod, observing": "--algorithm observation",
+    "arm": f"{ARM} --algorithm sagg-riac",
+    "asking": f"{ARM} --algorithm sgim-acts --teachers low-half,mislabelling",
+    "model": f"{ARM} --search gradient --inverse model --model.rate 0.5 --model.members 2 --evaluated-by own",
+    "contexts": f"{ARM} --environment toss --algorithm sgim-im --teachers all",
+}
 
 
 @pytest.mark.parametrize(
-    ("signum", "lines", "code"), [(signal.SIGKILL, 20, -9), (signal.SIGKILL, 64, -9), (signal.SIGINT, 40, 130)]
+    ("name", "movements", "signum", "code"),
+    [("rod", 64, signal.SIGKILL, -9), ("rod", 40, signal.SIGINT, 130), ("asking", 33, signal.SIGKILL, -9)],
 )
 def test_a_run_that_is_stopped_and_resumed_ends_as_if_it_never_was(
-    tmp_path, go, benchmark, reference, capsys, signum, lines, code
+    tmp_path, go, benchmark, capsys, name, movements, signum, code
 ):
-    directory = tmp_path / "sgim-d" / "seed-003"
-    process = start(EAGER, *arguments(tmp_path, benchmark))
-    found, errors = signal_after(process, directory / "episodes.csv", lines, signum)
+    options = [*LEARNERS[name].split(), "--name", "run"]
+    directory = tmp_path / "cut" / "run" / "seed-003"
+    process = stopped_at(movements, *arguments(tmp_path / "cut", benchmark), *options)
+    found, errors = end(process, signum)
     assert found == code
     assert "Traceback" not in errors
     assert ("--resume" in errors) == (signum == signal.SIGINT)
-    before = (directory / "episodes.csv").read_bytes()
-    assert lines <= before.count(b"\n") < MOVEMENTS
-    assert read_run(directory).summary["movements"] < before.count(b"\n")  # the log is the first to know
-    assert go(tmp_path) == 2  # without --resume nothing is touched
+    assert movements_on_disk(directory) == movements
+    assert read_run(directory).summary["finished"] is False
+    before = files_of(directory)
+    assert go(tmp_path / "cut", *options) == 2  # without --resume nothing is touched
     assert "--resume" in capsys.readouterr().err
-    assert (directory / "episodes.csv").read_bytes() == before
-    assert go(tmp_path, "--resume") == 0
-    assert csv_of(directory) == reference
+    assert files_of(directory) == before
+    assert go(tmp_path / "cut", *options, "--resume") == 0
+    assert go(tmp_path / "whole", *options) == 0
+    assert content_of(directory) == content_of(tmp_path / "whole" / "run" / "seed-003")
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("algorithm", ["random", "imitation", "sgim-d"])
-def test_a_run_killed_five_times_at_random_ends_as_if_it_never_was(tmp_path, go, benchmark, algorithm):
-    options = ("--algorithm", algorithm, "--movements", 900, "--evaluate_at", "200,400,600,800")
+@pytest.mark.parametrize("name", LEARNERS)
+def test_a_run_killed_five_times_at_random_ends_as_if_it_never_was(tmp_path, go, benchmark, name):
+    options = [*LEARNERS[name].split(), "--name", "run", "--movements", 160]
     assert go(tmp_path / "whole", *options) == 0
-    directory = tmp_path / "killed" / algorithm / "seed-003"
-    for lines in sorted(stream(0, "kills").integers(2, 880, size=5)):
-        process = start(EAGER, *arguments(tmp_path / "killed", benchmark), *options, "--resume")
-        signal_after(process, directory / "episodes.csv", lines, signal.SIGKILL)
+    for k in sorted(stream(0, "kills").choice(np.arange(2, 160), size=5, replace=False)):
+        end(stopped_at(k, *arguments(tmp_path / "killed", benchmark), *options, "--resume"))
+        assert movements_on_disk(tmp_path / "killed" / "run" / "seed-003") == k
     assert go(tmp_path / "killed", *options, "--resume") == 0
-    assert csv_of(directory) == csv_of(tmp_path / "whole" / algorithm / "seed-003")
+    killed, whole = (content_of(tmp_path / place / "run" / "seed-003") for place in ("killed", "whole"))
+    assert killed == whole
+
+
+def test_a_kill_loses_what_came_since_the_last_commit_and_every_evaluation_is_one(tmp_path, go, benchmark, reference):
+    never = STOPS.format(45).replace("COMMIT_EVERY, after = 0", "COMMIT_EVERY, after = 1e9")
+    end(stopped(never, *arguments(tmp_path, benchmark)))
+    directory = tmp_path / "sgim-d" / "seed-003"
+    run = read_run(directory)
+    assert (len(run.index), run.evaluation["movements"].tolist()) == (30, [30])
+    assert go(tmp_path, "--resume") == 0
+    assert content_of(directory) == reference
+
+
+def test_a_run_killed_before_its_record_was_made_starts_afresh(tmp_path, go, reference, capsys):
+    directory = tmp_path / "sgim-d" / "seed-003"
+    directory.mkdir(parents=True)
+    for name in (FILE, f"{FILE}.7.part"):
+        (directory / name).touch()
+    assert go(tmp_path, "--resume") == 0
+    assert "no run yet" in capsys.readouterr().err
+    assert content_of(directory) == reference
+
+
+def test_a_run_that_another_process_writes_is_left_alone(tmp_path, go, benchmark, reference, capsys):
+    process = stopped_at(20, *arguments(tmp_path, benchmark))
+    assert len(read_run(tmp_path / "sgim-d" / "seed-003").index) == 20  # it may be read
+    assert go(tmp_path, "--resume") == 2
+    assert "in use by another process" in capsys.readouterr().err
+    assert end(process, signal.SIGCONT)[0] == 0
+    assert content_of(tmp_path / "sgim-d" / "seed-003") == reference
 
 
 @pytest.mark.parametrize("algorithm", ["sgim-d", "observation"])
@@ -62,19 +115,20 @@ def test_a_finished_run_made_longer_equals_a_long_run(tmp_path, go, algorithm):
     assert go(tmp_path / "extended", *options, "--movements", 50) == 0  # evaluated after 50, which the long one is not
     assert go(tmp_path / "extended", *options, "--resume") == 0
     extended = tmp_path / "extended" / algorithm / "seed-003"
-    assert csv_of(extended) == csv_of(tmp_path / "long" / algorithm / "seed-003")
+    assert content_of(extended) == content_of(tmp_path / "long" / algorithm / "seed-003")
     assert read_run(extended).config["movements"] == MOVEMENTS
 
 
 def test_resuming_a_finished_run_changes_nothing_but_what_is_asked_of_its_evaluation(tmp_path, go, reference):
     directory = tmp_path / "sgim-d" / "seed-003"
-    assert go(tmp_path) == 0
-    assert go(tmp_path, "--resume") == 0
-    assert csv_of(directory) == reference
+    assert go(tmp_path) == go(tmp_path, "--resume") == 0
+    assert content_of(directory) == reference
     assert go(tmp_path, "--resume", "--evaluate_at", "45", "--repeats", 3) == 0
     assert read_run(directory).evaluation["movements"].tolist() == [45, 90]
+    assert go(tmp_path, "--resume", "--evaluate_at", "45,60", "--repeats", 3) == 0  # one more, between them
+    assert read_run(directory).evaluation["movements"].tolist() == [45, 60, 90]
     assert go(tmp_path, "--resume") == 0
-    assert csv_of(directory) == reference
+    assert content_of(directory) == reference
 
 
 def test_a_resumed_run_keeps_its_evaluations_until_floor_at_changes(tmp_path, go, reference, monkeypatch):
@@ -96,365 +150,163 @@ def test_a_resumed_run_keeps_its_evaluations_until_floor_at_changes(tmp_path, go
     assert evaluated[3:] == [(30, 0), (60, 0), (90, 2)]
     assert go(tmp_path, "--resume") == 0  # null: all of them
     assert evaluated[6:] == [(30, 2), (60, 2), (90, 2)]
-    assert csv_of(tmp_path / "sgim-d" / "seed-003") == reference
+    assert content_of(tmp_path / "sgim-d" / "seed-003") == reference
 
 
-def tear(content):
-    return content[:-100]
+@pytest.fixture
+def copy(tmp_path, undisturbed):
+    """A copy of the uninterrupted run."""
+    return shutil.copytree(undisturbed, tmp_path / "sgim-d" / "seed-003")
 
 
-def zero(content):
-    return content[:-1500] + bytes(1500)
+@pytest.mark.parametrize("table", ["goals", "evaluations", "errors", "regions"])
+@pytest.mark.parametrize("what", ["UPDATE {} SET seal = 0 WHERE rowid = 1", "DELETE FROM {} WHERE rowid = 1"])
+def test_a_damaged_table_that_a_replay_makes_again_is_told_and_made_again(
+    tmp_path, copy, go, reference, capsys, table, what
+):
+    edit(copy / FILE, what.format(table))
+    assert go(tmp_path, "--resume") == 0
+    assert f"row 1 of {table} is not what was written; was it damaged or edited?; it is made again" in (
+        capsys.readouterr().err
+    )
+    assert content_of(copy) == reference
+    assert [path.name for path in copy.iterdir()] == [FILE]
 
 
-def flip(content):
-    digit = content.index(b"\n40,") + 60
-    return content[:digit] + (b"7" if content[digit : digit + 1] != b"7" else b"8") + content[digit + 1 :]
-
-
-def lose_newline(content):
-    return content[:-1]
-
-
-def append_garbage(content):
-    return content + b"\xff\x00 90,,,"
-
-
-def repeat_last_line(content):
-    return content + content.splitlines(keepends=True)[-1]
-
-
-def files_of(directory):
-    return {path.name: path.read_bytes() for path in directory.iterdir()}
+def rows_of_movements(content):
+    """The row, from 1, of each movement among the events."""
+    return [row for row, (_, kind, *_) in enumerate(content["events"], 1) if kind in (Kind.MOVED, Kind.RESTED)]
 
 
 @pytest.mark.parametrize(
     ("damage", "kept"),
     [
-        *[(tear, 89), (zero, 87), (flip, 40), (lose_newline, 89)],
-        (lambda content: b"", 0),
-        (lambda content: None, 0),  # deleted
-        (lambda content: content[:100], 0),  # a part of its first line
-        (lambda content: b"".join(content.splitlines(keepends=True)[:1]), 0),
-        (lambda content: b"".join(content.splitlines(keepends=True)[:31]), 30),  # cut at the end of a line
+        ("UPDATE events SET outcome_0 = 0.5 WHERE movement = 40 AND kind = 'moved'", 40),
+        ("DELETE FROM events WHERE movement = 40 AND kind = 'moved'", 40),
+        ("DELETE FROM events WHERE movement >= 70", 70),
+        ("DELETE FROM events", 0),
+        ("UPDATE events SET rowid = rowid + 1000 WHERE movement = 12", 12),
+        ("INSERT INTO events SELECT * FROM events WHERE movement = 89 AND kind = 'moved'", 90),
+        ("UPDATE demonstrations SET outcome_0 = 0.5 WHERE rowid = 2", 60),
+        ("DELETE FROM demonstrations", 30),
     ],
 )
-def test_a_log_that_lacks_movements_is_continued_only_if_the_loss_is_accepted(
-    tmp_path, go, benchmark, reference, capsys, damage, kept
+def test_damaged_movements_are_made_again_only_if_the_loss_is_accepted(
+    tmp_path, copy, go, reference, capsys, damage, kept
 ):
-    directory = tmp_path / "sgim-d" / "seed-003"
-    assert go(tmp_path) == 0
-    log, damaged = directory / "episodes.csv", damage(reference["episodes.csv"])
-    log.unlink() if damaged is None else log.write_bytes(damaged)
-    run = read_run(directory)
-    assert len(run.index) == kept
-    assert run.damage == ({"episodes.csv": 42} if damage is flip else {})
-    before = files_of(directory)
+    edit(copy / FILE, damage)
+    before = files_of(copy)
     assert go(tmp_path, "--resume") == 2
     message = capsys.readouterr().err
-    assert f"episodes.csv holds {kept} movements" in message
-    assert "summary.json counts 90; was it cut, emptied or deleted?" in message
-    assert ("line 42 is damaged" in message) == (damage is flip)
-    assert f"the {90 - kept} missing ones again with --accept-loss" in message
-    assert files_of(directory) == before
-    notes = "\n".join(accept_loss(tmp_path, benchmark))
-    whole = sum(map(len, reference["episodes.csv"].splitlines(keepends=True)[: kept + 1])) if kept else 0
-    if damaged and len(damaged) not in (whole, reference["episodes.csv"].index(b"\n") + 1):
-        assert f"episodes.csv: dropped {len(damaged) - whole} bytes" in notes
-        assert f"{kept} movements are kept" in notes
-    assert f"episodes.csv lacks {90 - kept} movements: {kept} are kept" in notes
-    assert csv_of(directory) == reference
-    if damaged is None:
-        assert not list(directory.glob("*.lost-*"))
-    else:
-        assert f"as it was found is kept as {log}.lost-0" in notes
-        assert (directory / "episodes.csv.lost-0").read_bytes() == damaged
+    assert "Restore it" in message
+    assert "--accept-loss" in message
+    assert files_of(copy) == before
+    assert go(tmp_path, "--resume", "--accept-loss") == 0
+    assert f"{kept} movements of {copy / FILE} are kept" in capsys.readouterr().err
+    assert content_of(copy) == reference
+    assert files_of(copy).keys() == {FILE, "run.lost-0.sqlite"}
+    assert (copy / "run.lost-0.sqlite").read_bytes() == before[FILE]
     assert go(tmp_path, "--resume") == 0  # nothing is missing any more
 
 
-def test_no_copy_of_a_lost_log_is_overwritten_and_a_loss_is_accepted_once(tmp_path, go, benchmark, reference):
-    directory = tmp_path / "sgim-d" / "seed-003"
-    assert go(tmp_path) == 0
-    lines = reference["episodes.csv"].splitlines(keepends=True)
-    for k, kept in enumerate((31, 51)):
-        (directory / "episodes.csv").write_bytes(b"".join(lines[:kept]))
-        accept_loss(tmp_path, benchmark, "--movements", 70)
-        (directory / "episodes.csv").write_bytes(b"".join(lines[:71]))
-        assert (directory / f"episodes.csv.lost-{k}").read_bytes() == b"".join(lines[:kept])
-    assert go(tmp_path, "--resume") == 0
-    assert csv_of(directory) == reference
-    assert (directory / "episodes.csv.lost-0").read_bytes() == b"".join(lines[:31])
-
-
-def test_a_replay_that_fails_leaves_a_lossy_directory_as_it_was(tmp_path, go, benchmark):
-    assert go(tmp_path) == go(tmp_path, "--seed", 4) == 0
-    directory = tmp_path / "sgim-d" / "seed-003"
-    other = (tmp_path / "sgim-d" / "seed-004" / "episodes.csv").read_bytes()
-    (directory / "episodes.csv").write_bytes(other[: other.index(b"\n40,") + 1])
-    before = files_of(directory)
-    with pytest.raises(run_script.ReplayError, match="movement 0"):
-        accept_loss(tmp_path, benchmark)
-    assert files_of(directory) == before
-
-
-@pytest.mark.parametrize(
-    ("damage", "kept", "copied"), [(append_garbage, 90, False), (repeat_last_line, 90, True), (flip, 40, True)]
-)
-def test_whole_lines_of_a_damaged_log_are_kept_and_the_rest_is_made_again(
-    tmp_path, go, reference, capsys, damage, kept, copied
+@pytest.mark.parametrize("content", [b"index,origin\n" * 300, bytes(8192)])
+def test_of_a_file_that_cannot_be_read_at_all_every_movement_is_made_again(
+    tmp_path, copy, go, reference, capsys, content
 ):
-    """Without asking if nothing shows that movements are missing; an incomplete last line is no damage."""
-    directory = tmp_path / "sgim-d" / "seed-003"
-    assert go(tmp_path) == 0
-    log = directory / "episodes.csv"
-    damaged = damage(log.read_bytes())
-    log.write_bytes(damaged)
-    if kept < 90:
-        (directory / "summary.json").unlink()
-    assert len(read_run(directory).index) == kept
-    assert read_run(directory).damage == ({"episodes.csv": kept + 2} if copied else {})
-    capsys.readouterr()
-    assert go(tmp_path, "--resume") == 0
-    dropped = len(damaged) - sum(map(len, reference["episodes.csv"].splitlines(keepends=True)[: kept + 1]))
-    messages = capsys.readouterr().err
-    assert f"episodes.csv: dropped {dropped} bytes" in messages
-    assert f"from line {kept + 2} on" in messages
-    assert f"{kept} movements are kept" in messages
-    assert csv_of(directory) == reference
-    copies = list(directory.glob("*.lost-*"))
-    assert [copy.read_bytes() for copy in copies] == [damaged] * copied
-    assert ("is kept as" in messages) == copied
+    (copy / FILE).write_bytes(content)
+    (copy / "run.lost-0.sqlite").write_text("an earlier loss")
+    assert go(tmp_path, "--resume") == 2
+    assert "nothing of it can be read" in capsys.readouterr().err
+    assert go(tmp_path, "--resume", "--accept-loss") == 0
+    assert content_of(copy) == reference
+    assert (copy / "run.lost-0.sqlite").read_text() == "an earlier loss"  # no copy is overwritten
+    assert (copy / "run.lost-1.sqlite").read_bytes() == content
 
 
-def test_a_process_killed_between_log_and_summary_loses_nothing_and_asks_nothing(tmp_path, go, benchmark, reference):
-    directory, dying = tmp_path / "sgim-d" / "seed-003", "sgimd_torch.runs.directory"
-    program = (
-        f"import os, signal, {dying} as directory\n"
-        "write = directory.write_json\n"
-        "def write_or_die(path, content):\n"
-        "    if content.get('movements') == 50 and path.name == 'summary.json':\n"
-        "        os.kill(os.getpid(), signal.SIGKILL)\n"
-        "    write(path, content)\n"
-        f"directory.write_json = write_or_die\n{EAGER}"
-    )
-    process = start(program, *arguments(tmp_path, benchmark))
-    process.communicate()
-    assert process.returncode == -signal.SIGKILL
-    run = read_run(directory)
-    assert (len(run.index), run.summary["movements"], run.damage) == (50, 49, {})
-    assert go(tmp_path, "--resume") == 0
-    assert csv_of(directory) == reference
+def rewritten(path, change):
+    """Write a record anew, whole, with ``change(k, event)`` in the place of the k-th event."""
+    with Record(path) as old:
+        about = {name: value for name, value in old.about.items() if name not in ("run", "dims")}
+        events, dims = list(old.events()), old.dims
+    path.unlink()
+    with Record.make(path, dims, about) as new:
+        for k, event in enumerate(events):
+            new.add(change(k, event))
+        new.commit()
 
 
-@pytest.mark.parametrize("checked", [True, False])
-@pytest.mark.parametrize(
-    ("name", "column", "line"), [("evaluation.csv", "mean_error_m", 4), ("regions.csv", "competence", 4)]
-)
-def test_an_edited_row_is_reported_and_made_again(tmp_path, go, reference, capsys, name, column, line, checked):
-    """Also in the tables of earlier versions, which had no checksums, if the number is impossible."""
-    directory = tmp_path / "sgim-d" / "seed-003"
-    assert go(tmp_path) == 0
-    lines = [row.split(",") for row in reference[name].decode().splitlines()]
-    lines[line - 1][lines[0].index(column)] = "-5"
-    text = "".join(",".join(row if checked else row[:-1]) + "\n" for row in lines)
-    (directory / name).write_text(text)
-    run = read_run(directory)
-    first = next(k for k, row in enumerate(lines, 1) if row[0] == lines[line - 1][0])  # of its map
-    assert run.damage == {name: first}
-    assert run.unchecked == (() if checked else (name,))
-    capsys.readouterr()
-    assert go(tmp_path, "--resume") == 0
-    messages = capsys.readouterr().err
-    assert f"{name}: dropped" in messages
-    assert f"from line {first} on, torn or damaged; it will be evaluated again" in messages
-    assert (f"{name} was made without checksums" in messages) == (not checked)
-    assert csv_of(directory) == reference
-    assert read_run(directory).damage == {}
+@pytest.mark.parametrize(("name", "value"), [("theta", 0.1), ("goal", 0.125)])
+def test_a_replay_that_fails_says_where_and_leaves_the_file_as_it_was(
+    tmp_path, copy, go, reference, capsys, name, value
+):
+    row = next(row for row in rows_of_movements(reference) if reference["events"][row - 1][2] == "local")
+    movement = reference["events"][row - 1][0]
 
+    def change(k, event):
+        if k != row - 1:
+            return event
+        vector = getattr(event, name).copy()
+        vector[0] = value
+        return event._replace(**{name: vector})
 
-def test_a_directory_of_an_earlier_version_is_read_resumed_and_gets_checksums(tmp_path, go, reference, capsys):
-    directory = tmp_path / "sgim-d" / "seed-003"
-    assert go(tmp_path, "--movements", 60) == 0
-    for name in ("evaluation.csv", "regions.csv"):
-        lines = (directory / name).read_text().splitlines()
-        (directory / name).write_text("".join(line.rpartition(",")[0] + "\n" for line in lines))
-    old = read_run(directory)
-    assert old.unchecked == ("evaluation.csv", "regions.csv")
-    assert old.evaluation["movements"].tolist() == [30, 60]
-    capsys.readouterr()
-    assert go(tmp_path, "--resume") == 0
-    messages = capsys.readouterr().err
-    assert messages.count("was made without checksums") == 2
-    assert "evaluated again" not in messages
-    assert csv_of(directory) == reference
-    assert read_run(directory).unchecked == ()
-
-
-def test_an_evaluation_that_lost_an_answer_is_done_again(tmp_path, go, reference):
-    path = tmp_path / "sgim-d" / "seed-003" / "evaluation.csv"
-    assert go(tmp_path) == 0
-    lines = path.read_bytes().splitlines(keepends=True)
-    assert lines[4].startswith(b"60,linear")
-    path.write_bytes(b"".join(lines[:4]))
-    assert read_run(path.parent).evaluation["movements"].tolist() == [30, 60]
-    assert go(tmp_path, "--resume") == 0
-    assert csv_of(path.parent) == reference
-
-
-def test_evaluations_from_before_there_were_answers_are_the_runs_own(tmp_path, go, benchmark, reference):
-    path = tmp_path / "sgim-d" / "seed-003" / "evaluation.csv"
-    assert go(tmp_path, "--movements", 60, "--evaluated-by", "own") == 0
-    today = read_run(path.parent).evaluation
-    rows = [line.split(",") for line in path.read_text().splitlines()]
-    rows = [[row[0], *row[2:-2]] for row in rows]  # as they were, before answers, goals met and checksums
-    path.write_bytes(",".join([*rows[0], "crc32\n"]).encode() + b"".join(map(sealed, rows[1:])))
-    settings = json.loads((path.parent / "config.json").read_text())
-    del settings["answers"]
-    (path.parent / "config.json").write_text(json.dumps(settings))
-    before = read_run(path.parent)
-    assert list(before.answers) == ["own"]
-    assert before.damage == {}
-    assert before.evaluation["mean_error_m"].tolist() == today["mean_error_m"].tolist()
-    assert np.isnan(before.evaluation["goals_met"]).all()
-    config = Config("sgim-d", seed=3, movements=60, evaluate_at=(30, 60), repeats=2, benchmark=benchmark, out=tmp_path)
-    assert finished(replace(config, answers=("own",)))
-    assert not finished(config)  # linear did not answer yet
-    assert go(tmp_path, "--resume") == 0
-    assert csv_of(path.parent) == reference
-
-
-@pytest.mark.parametrize("name", ["evaluation.csv", "regions.csv"])
-@pytest.mark.parametrize("damage", [tear, lose_newline, append_garbage, lambda content: bytes(len(content))])
-def test_damaged_evaluations_are_done_again(tmp_path, go, reference, capsys, name, damage):
-    directory = tmp_path / "sgim-d" / "seed-003"
-    assert go(tmp_path) == 0
-    (directory / name).write_bytes(damage((directory / name).read_bytes()))
-    capsys.readouterr()
-    assert go(tmp_path, "--resume") == 0
-    assert f"{name}: dropped" in capsys.readouterr().err
-    assert csv_of(directory) == reference
-
-
-def test_a_run_killed_before_its_config_was_written_starts_afresh(tmp_path, go, reference, capsys):
-    directory = tmp_path / "sgim-d" / "seed-003"
-    directory.mkdir(parents=True)
-    for name in ("lock", "versions.json", "config.json.part"):
-        (directory / name).touch()
-    assert go(tmp_path, "--resume") == 0
-    assert "no run yet" in capsys.readouterr().err
-    assert csv_of(directory) == reference
-    assert not list(directory.glob("*.part"))
-
-
-def test_a_log_that_another_learner_wrote_is_not_continued(tmp_path, go, capsys):
-    assert go(tmp_path) == go(tmp_path, "--seed", 4) == 0
-    directory = tmp_path / "sgim-d" / "seed-003"
-    other = (tmp_path / "sgim-d" / "seed-004" / "episodes.csv").read_bytes()
-    (directory / "episodes.csv").write_bytes(other + b"torn")
-    before = {path.name: path.read_bytes() for path in directory.iterdir()}
-    capsys.readouterr()
+    rewritten(copy / FILE, change)
+    before = files_of(copy)
     assert go(tmp_path, "--resume", "--evaluate_at", "10", "--movements", 95) == 2
     message = capsys.readouterr().err
-    assert "movement 0" in message
+    assert f"movement {movement} was recorded with another {name}: {name}_0 was {value}, now" in message
     assert "Traceback" not in message
-    assert {path.name: path.read_bytes() for path in directory.iterdir()} == before
+    assert files_of(copy) == before
 
 
-def test_a_replay_that_disagrees_names_the_columns(tmp_path, go, capsys):
-    assert go(tmp_path) == 0
-    log = tmp_path / "sgim-d" / "seed-003" / "episodes.csv"
-    header, *lines = log.read_text().splitlines()
-    k = next(k for k, line in enumerate(lines) if line.split(",")[1] == "local")
-    fields = lines[k].split(",")[:-1]
-    column = header.split(",").index("goal_0")
-    goal, fields[column] = fields[column], "0.125"
-    fields[1] = "global"
-    body = ",".join(fields)
-    lines[k] = f"{body},{zlib.crc32(body.encode()):08x}"
-    log.write_text("".join(f"{line}\n" for line in (header, *lines)))
-    capsys.readouterr()
-    assert go(tmp_path, "--resume") == 2
-    message = capsys.readouterr().err
-    assert f"movement {k} " in message
-    assert f"origin was global, now local; goal_0 was 0.125, now {goal}. Was it recorded by another" in message
-    assert len(message) < 300
+def test_another_configuration_a_shorter_one_and_what_is_no_run_are_refused(tmp_path, copy, go, capsys):
+    before = files_of(copy)
+    for options, messages in (
+        (("--budget", 7, "--goals", "uniform"), ("goals was interest-map, now uniform", "budget was", "now 7")),
+        (("--movements", 89), ("90 movements already, 89 were asked for",)),
+    ):
+        assert go(tmp_path, "--resume", *options) == 2
+        said = capsys.readouterr().err
+        assert all(message in said for message in messages)
+        assert "epsilon" not in said
+    assert files_of(copy) == before
 
 
-def test_a_run_is_resumed_with_its_own_configuration_only(tmp_path, go, capsys):
-    assert go(tmp_path, "--movements", 10) == 0
-    before = (tmp_path / "sgim-d" / "seed-003" / "config.json").read_bytes()
-    assert go(tmp_path, "--resume", "--budget", 7, "--goals", "uniform") == 2
-    message = capsys.readouterr().err
-    assert "goals was interest-map, now uniform" in message
-    assert f"budget was {Config('sgim-d').budget}, now 7" in message
-    assert "epsilon" not in message
-    assert (tmp_path / "sgim-d" / "seed-003" / "config.json").read_bytes() == before
-
-
-def test_a_run_is_not_made_shorter(tmp_path, go, capsys):
-    assert go(tmp_path, "--movements", 10) == 0
-    assert go(tmp_path, "--movements", 9, "--resume") == 2
-    assert "10 movements already" in capsys.readouterr().err
-    assert go(tmp_path, "--movements", 10, "--resume") == 0
-
-
-def test_a_run_that_another_process_writes_is_left_alone(tmp_path, go, capsys):
-    assert go(tmp_path, "--movements", 10) == 0
-    held = lock(tmp_path / "sgim-d" / "seed-003" / "lock")
-    assert go(tmp_path, "--resume") == 2
-    os.close(held)
-    assert "in use by another process" in capsys.readouterr().err
-    assert go(tmp_path, "--resume") == 0
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [("thesis.tex", "holds thesis.tex but no run"), ("config.json", "that this version does not read")],
+)
+def test_a_directory_with_other_files_is_left_alone(tmp_path, go, capsys, name, message):
+    directory = tmp_path / "sgim-d" / "seed-003"
+    directory.mkdir(parents=True)
+    (directory / name).touch()
+    assert go(tmp_path) == go(tmp_path, "--resume") == 2
+    assert capsys.readouterr().err.count(message) == 2
+    assert files_of(directory) == {name: b""}
 
 
 @pytest.mark.parametrize("watched", ["false", "true"])
 def test_a_full_disk_is_reported_and_the_run_can_go_on(tmp_path, go, benchmark, reference, watched):
-    directory = tmp_path / "sgim-d" / "seed-003"
-    process = start(EAGER, *arguments(tmp_path, benchmark), "--board", watched, limit="-f 24")  # KiB a file may have
+    words = (*arguments(tmp_path, benchmark), "--board", watched)
+    process = start(STOPS.format(-1), *words, limit="-f 64")  # KiB a file may have
     _, errors = process.communicate()
     assert process.returncode == 1
+    assert errors.count("\nerror: ") == 1
     assert "cannot be written" in errors
     assert "Traceback" not in errors
-    sizes = {path.name.partition(".")[0]: path.stat().st_size for path in directory.iterdir()}
-    assert sizes["events" if watched == "true" else "episodes"] == 24 * 1024
+    directory = tmp_path / "sgim-d" / "seed-003"
+    assert movements_on_disk(directory) < MOVEMENTS
     assert go(tmp_path, "--board", watched, "--resume") == 0
-    assert csv_of(directory) == reference
+    assert content_of(directory) == reference
 
 
-@pytest.mark.parametrize(
-    "damage", ['{"seconds_physics": "x"}', "null", "", '{"seconds_physics": null}', '{"movements": "many"}']
-)
-@pytest.mark.parametrize("name", ["summary.json", "versions.json"])
-def test_a_damaged_note_on_the_run_counts_as_missing(tmp_path, go, reference, capsys, name, damage):
+def test_the_versions_of_each_part_of_a_run_are_kept(tmp_path, go, capsys):
     directory = tmp_path / "sgim-d" / "seed-003"
-    assert go(tmp_path, "--movements", 50) == 0
-    (directory / name).write_text(damage)
-    capsys.readouterr()
-    assert go(tmp_path, "--resume") == 0
-    assert ("it counts as missing" in capsys.readouterr().err) == (name == "summary.json" or damage in ("null", ""))
-    assert csv_of(directory) == reference
-
-
-@pytest.mark.parametrize("line", ["nan,nan,nan,nan,nan", "60.5,1,1,1,1", "4e1,1,1,1,1", "R,1,2,3,4", "60,R,1,1,1"])
-def test_a_line_of_evaluations_that_means_nothing_is_dropped(tmp_path, go, reference, capsys, line):
-    directory = tmp_path / "sgim-d" / "seed-003"
-    assert go(tmp_path) == 0
-    lines = (directory / "evaluation.csv").read_text().splitlines()
-    (directory / "evaluation.csv").write_text("\n".join([*lines[:2], line, ""]))
-    capsys.readouterr()
-    assert read_run(directory).evaluation["movements"].tolist() == [30]
-    assert go(tmp_path, "--resume") == 0
-    assert "evaluation.csv: dropped" in capsys.readouterr().err
-    assert csv_of(directory) == reference
-
-
-def test_the_versions_of_each_part_of_a_run_are_kept(tmp_path, go):
-    path = tmp_path / "sgim-d" / "seed-003" / "versions.json"
     short = ("--movements", 3, "--evaluate_at", "[]")
     assert go(tmp_path, *short) == 0
     for other in ("1.0", "2.0"):
-        path.write_text(json.dumps({**json.loads(path.read_text()), "numpy": other}))
+        settle(directory, versions={**about_of(directory)["versions"], "numpy": other})
         assert go(tmp_path, *short, "--resume") == 0
-    now = json.loads(path.read_text())
+        assert f"resumed with other versions: numpy {other} -> {np.__version__}" in capsys.readouterr().err
+    now = about_of(directory)["versions"]
     assert now["numpy"] == np.__version__
     assert [part["numpy"] for part in now["before"]] == ["1.0", "2.0"]

@@ -8,13 +8,13 @@ import signal
 
 import numpy as np
 import pytest
+from sgimd_torch.runs.model_record import RunModel
 from tensorboard.backend.event_processing.event_file_loader import EventFileLoader
 from tensorboard.plugins.custom_scalar import layout_pb2
 from tensorboard.util.tensor_util import make_ndarray
 
 from runs import EAGER, LIVE, RUN, signal_after, start
 from sgimd_torch.board.legend import LEGEND
-from sgimd_torch.catalogue import CATALOGUE
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import Benchmark, save_benchmark
 from sgimd_torch.forward_model.model import ForwardModel
@@ -22,7 +22,6 @@ from sgimd_torch.memory import Memory
 from sgimd_torch.runs.build import LEAST_NOISE, build
 from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.config import Config
-from sgimd_torch.runs.model_record import RunModel
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.spaces import Episode, Move, stream

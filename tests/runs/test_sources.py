@@ -6,6 +6,7 @@ import sys
 from functools import partial
 
 import pytest
+from sgimd_torch.runs.log import read_json
 
 from runs import ROOT
 from sgimd_torch.catalogue import source
@@ -13,7 +14,6 @@ from sgimd_torch.files import checksum
 from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.directory import sources
-from sgimd_torch.runs.log import read_json
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.sweep import main as sweep
 
