@@ -40,7 +40,7 @@ def script(commands: Mapping[str, tuple[str, str, str]], shell: str) -> str:
     whole.add_argument("--completion", choices=SHELLS, help="print a script that completes commands in this shell")
     parsers = whole.add_subparsers()
     for name, (module, about, extra) in commands.items():
-        parents = [_of_run()] if name in TAKE_OPTIONS_OF_RUN else []
+        parents = [_kinds(), *([command_line.parser()] if name != "run" else [])] if name in TAKE_OPTIONS_OF_RUN else []
         try:
             parents.append(importlib.import_module(f"sgimd_torch.{module}").parser())
         except ImportError:
@@ -51,9 +51,9 @@ def script(commands: Mapping[str, tuple[str, str, str]], shell: str) -> str:
     return shtab.complete(whole, shell)
 
 
-def _of_run() -> argparse.ArgumentParser:
-    """The options that every run has, and the kinds of its parts."""
-    found = command_line.parser()
+def _kinds() -> argparse.ArgumentParser:
+    """The kinds of parts that a run may choose."""
+    found = argparse.ArgumentParser(add_help=False)
     for kind in CATALOGUE:
         if kind != "algorithm":
             found.add_argument(f"--{kind}")

@@ -290,7 +290,6 @@ def test_a_run_that_cannot_start_fails_alone(compare, tmp_path):
 def test_every_variant_is_a_valid_run_with_its_own_name_in_its_table(tmp_path):
     wanted = runs_of(list(EXPERIMENTS), [], range(1), tmp_path)
     assert len({(tables_of(name)[0], *sorted(last_rows(config))) for name, config in wanted}) == len(wanted)
-    assert not [note for _, config in wanted for note in config.without_effect if "--budget" in note]
     configs = {config.directory: config for _, config in wanted}
     assert all(config == configs[config.directory] for _, config in wanted)  # one directory, one run
     assert {name for name, _ in wanted if tables_of(name)[0] == "forward_model.csv"} == {"forward-model", *ARMS}
@@ -315,9 +314,9 @@ def test_teachers_have_the_number_of_the_demonstrator_or_the_name_of_the_file(tm
     assert teacher_of(taught) == "3"
     assert teacher_of(replace(taught, demonstrations=shipped(1))) == "1"
     assert teacher_of(replace(taught, algorithm="sagg-riac", demonstrations=shipped(1))) == ""
-    assert teacher_of(replace(taught, environment="planar-arm-50")) == "structured"
-    assert teacher_of(replace(taught, environment="swimmer")) == "scripted"
-    assert teacher_of(replace(taught, environment="planar-arm-50", demonstrations=shipped(1))) == "1"
+    assert teacher_of(replace(taught, parts={"environment": "planar-arm-50"})) == "structured"
+    assert teacher_of(replace(taught, parts={"environment": "swimmer"})) == "scripted"
+    assert teacher_of(replace(taught, parts={"environment": "planar-arm-50"}, demonstrations=shipped(1))) == "1"
     ((_, few),) = runs_of(["teaching"], ["few-demonstrations"], range(1), tmp_path)
     assert teacher_of(few) == "few"
     assert few.demonstrations == tmp_path / "demonstrations/few.npz"
@@ -410,7 +409,7 @@ def test_rows_are_drawn_by_lot_and_made_again_in_a_folder_of_their_own(tmp_path,
     monkeypatch.chdir(tmp_path)
     results = table_in(tmp_path, "forward_model.csv")
     config = Config(algorithm="sgim-d", name="sgim-d-arm-7", movements=20, parts={"environment": "planar-arm-7"})
-    again = replace(config, evaluate_at=(20,), floor_at=(), answers=("own", "nearest"), out=tmp_path / "first")
+    again = replace(config, evaluate_at=(20,), floor_at=(), evaluated_by=("own", "nearest"), out=tmp_path / "first")
     assert sweep_here([again]) == []
     _, row = result_rows("planar-arm-7", again, read_run(again.directory))
     results.merge([row, [*row[:4], 1, 20, "nearest", 0.5, "", 7, 7, 7]])
