@@ -88,13 +88,13 @@ class Config:
                 raise ValueError(f"{name} must be numbers of movements, at least 1, got {getattr(self, name)}")
         if self.patience is not None and not 0 < self.patience < math.inf:
             raise ValueError(f"patience must be above 0 s and finite, got {self.patience}; null waits for ever")
-        for answer in self.evaluated_by[1:]:
-            find("inverse", answer)
         for name, words in (("evaluated_by", self.evaluated_by), ("teachers", self.values.get("teachers", ("",)))):
             if not words or len({*words}) < len(words):
                 raise ValueError(f"{name} must name at least one, and each once, got {','.join(words)}")
         if self.evaluated_by[0] != OWN:
             raise ValueError(f"evaluated_by must begin with {OWN}, got {','.join(self.evaluated_by)}")
+        for answer in self.evaluated_by[1:]:
+            find("inverse", answer)
         if self.board and importlib.util.find_spec("tensorboard") is None:
             raise ValueError("board true needs tensorboard, which is not installed; pip install 'sgimd-torch[board]'")
         if self.variant in ("", ".", "..") or any(sign in self.variant for sign in "/\\\0"):

@@ -106,7 +106,7 @@ def runs_of(options: argparse.Namespace, rest: Sequence[str]) -> tuple[list[Conf
     """
     given = {word.partition("=")[0].lstrip("-").replace("_", "-") for word in [*rest, *options.vary]}
     for name in OWN:
-        if name in given:
+        if name in {word.partition(".")[0] for word in given}:
             raise ValueError(f"--{name} cannot be given here: each task has its own; --tasks chooses tasks")
     words = [*(f"--{name}={value}" for name, value in DEFAULTS.items() if name not in given), *rest]
     learners, flags = variants_of(options.vary, words)

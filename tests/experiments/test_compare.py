@@ -211,7 +211,6 @@ def test_a_run_that_cannot_start_fails_alone(compare, tmp_path):
 def test_every_variant_is_a_valid_run_with_its_own_name_in_its_table(tmp_path):
     wanted = runs_of(list(EXPERIMENTS), [], range(1), tmp_path)
     assert len({tuple(sorted(last_rows(name, config))) for name, config in wanted}) == len(wanted)
-    assert not [note for _, config in wanted for note in config.without_effect if "--budget" in note]
     configs = {config.directory: config for _, config in wanted}
     assert all(config == configs[config.directory] for _, config in wanted)  # one directory, one run
     for _, config in wanted:
@@ -235,9 +234,9 @@ def test_teachers_have_the_number_of_the_demonstrator_or_the_name_of_the_file(tm
     assert teacher_of(taught) == "3"
     assert teacher_of(replace(taught, demonstrations=shipped(1))) == "1"
     assert teacher_of(replace(taught, algorithm="sagg-riac", demonstrations=shipped(1))) == ""
-    assert teacher_of(replace(taught, environment="planar-arm-50")) == "structured"
-    assert teacher_of(replace(taught, environment="swimmer")) == "scripted"
-    assert teacher_of(replace(taught, environment="planar-arm-50", demonstrations=shipped(1))) == "1"
+    assert teacher_of(replace(taught, parts={"environment": "planar-arm-50"})) == "structured"
+    assert teacher_of(replace(taught, parts={"environment": "swimmer"})) == "scripted"
+    assert teacher_of(replace(taught, parts={"environment": "planar-arm-50"}, demonstrations=shipped(1))) == "1"
     ((_, few),) = runs_of(["teaching"], ["few-demonstrations"], range(1), tmp_path)
     assert teacher_of(few) == "few"
     assert few.demonstrations == tmp_path / "demonstrations/few.npz"
@@ -324,8 +323,8 @@ def test_rows_made_again_are_equal_but_for_rounding_or_differ():
 
 def test_rows_are_drawn_by_lot_and_made_again_in_a_folder_of_their_own(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    config = Config(algorithm="sgim-d", environment="planar-arm-7", name="sgim-d-arm-7", movements=20)
-    again = replace(config, evaluate_at=(20,), floor_at=(), answers=("own", "linear"), out=tmp_path / "first")
+    config = Config(algorithm="sgim-d", name="sgim-d-arm-7", movements=20, parts={"environment": "planar-arm-7"})
+    again = replace(config, evaluate_at=(20,), floor_at=(), evaluated_by=("own", "linear"), out=tmp_path / "first")
     assert sweep_here([again]) == []
     made = result_rows("planar-arm-7", again, read_run(again.directory))
     merge(tmp_path, "results.csv", [made[-1], {**made[-1], "seed": 1, "error": 0.5}])

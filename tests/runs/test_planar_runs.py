@@ -120,7 +120,7 @@ def test_demonstrations_for_an_arm_lead_from_rest_to_equal_bends_all_over_its_re
 
 
 def test_an_imitating_arm_varies_the_posture_that_it_was_shown(tmp_path):
-    assert live(tmp_path, "--algorithm", "imitation", "--social.epsilon", 0.03) == 0
+    assert live(tmp_path, "--algorithm", "imitation", "--epsilon", 0.03) == 0
     run, arm = read_run(tmp_path / "imitation" / "seed-003"), PlanarArm()
     assert np.flatnonzero(run.demonstration >= 0).tolist() == [30, 60]
     shown = arm_demonstrations(arm)[run.demonstration[30]]
@@ -169,17 +169,6 @@ def test_a_run_on_an_arm_made_longer_equals_a_long_run(tmp_path, reference):
     assert live(tmp_path, "--movements", 50) == 0
     assert live(tmp_path, "--resume") == 0
     assert csv_of(tmp_path / "sgim-d" / "seed-003") == csv_of(reference)
-
-
-def test_a_run_older_than_the_option_is_on_the_rod(tmp_path, go, capsys):
-    assert go(tmp_path, "--movements", 5) == 0
-    path = tmp_path / "sgim-d" / "seed-003" / "config.json"
-    config = json.loads(path.read_text())
-    path.write_text(json.dumps({name: value for name, value in config.items() if name != "environment"}))
-    assert go(tmp_path, "--movements", 6, "--resume", "--environment", "planar-arm-7", "--benchmark", "null") == 2
-    assert "environment was fishing-rod, now planar-arm-7" in capsys.readouterr().err
-    assert go(tmp_path, "--movements", 6, "--resume") == 0
-    assert json.loads(path.read_text()) == {**config, "movements": 6}
 
 
 @pytest.mark.parametrize("other", ["fishing-rod", "planar-arm-50"])

@@ -85,7 +85,9 @@ def test_a_killed_run_ends_with_the_same_table(whole, tmp_path):
 
 
 def test_a_run_that_does_not_ask_has_no_table(tmp_path):
-    directory = go(tmp_path, "--algorithm=practice")
+    alone = ("--environment=planar-arm-7", "--algorithm=practice", *SHORT, f"--out={tmp_path}")
+    assert command(main, alone) == 0
+    directory = tmp_path / "practice" / "seed-000"
     assert not (directory / "requests.csv").exists()
     assert read_run(directory).requests is None
 

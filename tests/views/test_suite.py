@@ -63,7 +63,7 @@ def test_what_is_varied_gives_a_learner_for_each_value():
     ("words", "message"),
     [
         ("--environment toss", "--environment cannot be given here: each task has its own"),
-        ("--environment.task_space=2", "--environment.task_space cannot be given here"),
+        ("--environment.task_space=2", "--environment cannot be given here"),
         ("--vary environment=toss,crawler", "--environment cannot be given here"),
         ("--tasks tos", "invalid choice: 'tos'"),
         ("--tasks crawler --algorithm imitation", "comes without demonstrations"),
