@@ -4,7 +4,7 @@ import os
 import subprocess
 import sys
 
-from runs import ROOT, csv_of
+from runs import ROOT, content_of
 
 # An arm that does, before its 20th movement, what the variable AT_20 says.
 ROBOT = """
@@ -68,7 +68,7 @@ def odd_place(place):
 def as_alone(place, out, seeds):
     """Whether the runs in ``out`` are those in ``alone``."""
     places = [f"random/seed-{seed:03d}" for seed in seeds]
-    return [csv_of(out / each) for each in places] == [csv_of(place / "alone" / each) for each in places]
+    return [content_of(out / each) for each in places] == [content_of(place / "alone" / each) for each in places]
 
 
 def said_by(process, code):

@@ -8,9 +8,10 @@ from threading import Event
 import pytest
 
 import sgimd_torch.teachers.awaited
-from runs import EAGER, signal_after, start
+from runs import LIVE, end, stopped
 from sgimd_torch.algorithms.asking import sgim_im
 from sgimd_torch.environments.planar_arm import PlanarArm
+from sgimd_torch.record import Record
 from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
@@ -24,7 +25,7 @@ ARM = PlanarArm(4, noise=0.02)
 SHOWN = demonstrations(PlanarArm(4))
 GOAL = SHOWN[3].outcome
 STUCK = '''
-import os, threading
+import os, signal, threading
 from sgimd_torch import AnsweringTeacher
 
 class Busy(AnsweringTeacher):
@@ -44,6 +45,7 @@ class Busy(AnsweringTeacher):
 
 class Stuck(Busy):
     def give_up(self):
+        os.kill(os.getpid(), signal.SIGSTOP)
         threading.Event().wait()
 '''
 
@@ -133,15 +135,15 @@ def test_without_an_answer_in_time_the_learner_goes_on_alone():
     assert all(e.move is not None and e.move.origin != "imitate" for e in episodes)
 
 
-def test_answers_on_record_are_given_again_and_nobody_is_asked():
+def test_answers_on_record_are_given_again_and_nobody_is_asked(tmp_path):
     teachers = {"ann": AnsweringTeacher(SHOWN, stream(0, "t"))}
-    first = list(
-        run(sgim_im(ARM, 0, correspondence=last_posture, teachers=teachers), ARM, 0, movements=30, teachers=teachers)
-    )
-    answers = {(e.index, "ann"): (e.demonstration, e.reply) for e in first if e.request}
-    assert answers
-    again = sgim_im(ARM, 0, correspondence=last_posture, teachers=teachers)
-    second = list(run(again, ARM, 0, movements=30, teachers={"ann": None}, answers=answers))
+    learner, again = (sgim_im(ARM, 0, correspondence=last_posture, teachers=teachers) for _ in range(2))
+    with Record.make(tmp_path / "life.sqlite", (0, 4, 2), {}) as record:
+        first = list(run(learner, ARM, 0, movements=30, teachers=teachers, record=record))
+        record.commit()
+    assert any(e.request for e in first)
+    with Record(tmp_path / "life.sqlite") as record:
+        second = list(run(again, ARM, 0, movements=30, teachers={"ann": None}, record=record))
     assert [e.move.theta.tolist() for e in second] == [e.move.theta.tolist() for e in first]
     assert [e.reply for e in second] == [e.reply for e in first]
 
@@ -180,9 +182,8 @@ def test_a_resumed_run_agrees_on_who_was_given_up_and_asks_only_what_is_new(mine
 
 
 def test_ctrl_c_ends_the_wait_for_a_teacher(mine):
-    options, directory = mine
-    process = start(EAGER, *options, "--teachers", "mine:Stuck", "--movements", "15")
-    code, errors = signal_after(process, directory / "episodes.csv", 4, signal.SIGINT)
+    options, _ = mine
+    code, errors = end(stopped(LIVE, *options, "--teachers", "mine:Stuck", "--movements", "15"), signal.SIGINT)
     assert code == 130
     assert "Traceback" not in errors
     assert re.search(r"stopped after \d+ movements; to go on", errors)

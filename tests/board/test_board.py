@@ -13,7 +13,7 @@ from tensorboard.plugins.custom_scalar import layout_pb2
 from tensorboard.plugins.hparams import metadata as hparams
 from tensorboard.util.tensor_util import make_ndarray
 
-from runs import EAGER, arguments, csv_of, signal_after, start
+from runs import arguments, content_of, end, stopped_at
 from sgimd_torch import InterestMap, stream
 from sgimd_torch.algorithms import random_exploration, sagg_riac
 from sgimd_torch.board import pictures
@@ -282,7 +282,7 @@ def watched(tmp_path_factory, go):
 
 def test_watching_a_run_changes_no_byte_of_it(tmp_path, go, watched):
     assert go(tmp_path, *OPTIONS, "--board", "false") == 0
-    assert csv_of(tmp_path / "sgim-d" / "seed-003") == csv_of(watched)
+    assert content_of(tmp_path / "sgim-d" / "seed-003") == content_of(watched)
 
 
 def test_the_curves_of_a_run_are_those_of_its_record(watched):
@@ -363,13 +363,12 @@ def assert_same_board(directory, whole):
     assert found == wanted
 
 
-@pytest.mark.parametrize(("signum", "lines"), [(signal.SIGKILL, 40), (signal.SIGINT, 130)])
+@pytest.mark.parametrize(("signum", "movements"), [(signal.SIGKILL, 40), (signal.SIGINT, 130)])
 def test_a_run_that_was_stopped_and_resumed_has_the_board_of_one_that_never_was(
-    tmp_path, go, benchmark, watched, signum, lines
+    tmp_path, go, benchmark, watched, signum, movements
 ):
     directory = tmp_path / "sgim-d" / "seed-003"
-    process = start(EAGER, *arguments(tmp_path, benchmark), *OPTIONS)
-    signal_after(process, directory / "episodes.csv", lines, signum)
+    end(stopped_at(movements, *arguments(tmp_path, benchmark), *OPTIONS), signum)
     assert go(tmp_path, *OPTIONS, "--resume") == 0
     assert_same_board(directory, watched)
 

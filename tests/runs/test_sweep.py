@@ -9,12 +9,13 @@ import re
 import shutil
 import signal
 from concurrent.futures import Future
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from odd import ODD, SWEEP, as_alone, odd_place, said_by
-from runs import csv_of, start, sweep_here
+from runs import content_of, start, sweep_here
 from sgimd_torch.runs.command_line import main as run
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.engines import loop
@@ -172,7 +173,7 @@ def test_every_run_is_what_it_would_be_alone_and_a_second_start_does_nothing(tmp
     for name in ("random", "sagg-riac"):
         assert command(run, [*ALONE, "--algorithm", name, "--out", str(tmp_path / "alone")]) == 0
         place = tmp_path / "study" / name / "seed-000"
-        assert csv_of(place) == csv_of(tmp_path / "alone" / name / "seed-000")
+        assert content_of(place) == content_of(tmp_path / "alone" / name / "seed-000")
         assert f"{place}: 40 movements" in place.with_suffix(".log").read_text()
     before = {path: path.stat().st_mtime_ns for path in (tmp_path / "study").rglob("*")}
     capsys.readouterr()

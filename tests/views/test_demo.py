@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from runs import csv_of, start
+from runs import content_of, start
 from sgimd_torch.__main__ import COMMANDS
 from sgimd_torch.evaluation import Benchmark, save_benchmark
 from sgimd_torch.runs.process import command
@@ -101,10 +101,10 @@ def test_the_figure_shows_the_data_of_the_runs(runs):
 
 def test_a_second_start_uses_what_is_there_and_fewer_movements_are_refused(shown, options, capsys):
     out = shown[0]
-    runs, figure = [csv_of(out / name / "seed-000") for name in LEARNERS], (out / "demo.png").read_bytes()
+    runs, figure = [content_of(out / name / "seed-000") for name in LEARNERS], (out / "demo.png").read_bytes()
     (out / "demo.png").unlink()
     assert command(main, [*options, "--out", str(out)]) == 0
-    assert [csv_of(out / name / "seed-000") for name in LEARNERS] == runs
+    assert [content_of(out / name / "seed-000") for name in LEARNERS] == runs
     assert (out / "demo.png").read_bytes() == figure
     capsys.readouterr()
     assert command(main, [*options, "--movements", "40", "--out", str(out)]) == 1
@@ -118,7 +118,7 @@ def test_a_second_start_uses_what_is_there_and_fewer_movements_are_refused(shown
     [
         ("--seed -1", "seed must be"),
         ("--movements 0", "movements must be"),
-        ("--noise -1", "noise must be"),
+        ("--environment.noise -1", "noise must be"),
         ("--evaluate_at []", "--evaluate-at"),
         ("--environment planar-arm-7", "--environment cannot be given here"),
         ("--algorithm x", "--algorithm cannot be given here"),
