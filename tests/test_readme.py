@@ -34,6 +34,7 @@ HOW_TO = tuple(
     for name in ("own-robot", "reading-runs", "own-demonstrations", "teaching-by-hand", "own-teacher", "asking")
 )
 OTHERS = (  # each in a folder of its own
+    "docs/runs.md",
     *(f"docs/how-to/{name}.md" for name in ("ablations", "gymnasium", "resuming")),
     *(f"docs/explained/{name}.md" for name in ("random-numbers", "noise")),
     pytest.param("docs/tutorial.md", marks=pytest.mark.slow),  # the rod's physics

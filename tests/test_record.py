@@ -419,6 +419,7 @@ TOLD_ALWAYS = {"delete", "double", "swap_rows", "take_table", "take_table_and_se
 
 
 def damaged(path, whole, other, what, k):
+    path.unlink(missing_ok=True)
     shutil.copy(whole, path)
     getattr(Damage(path, other, stream(k, what)), what)()
 

@@ -1,53 +1,34 @@
 """Whole runs on planar arms: the same files as on the rod, goals and a teacher of their own, and what they refuse."""
 
-import json
 import re
-import shutil
 
 import numpy as np
 import pytest
-from sgimd_torch.views.report.data import demonstrated, read_life
 
-from runs import csv_of
+from runs import content_of, files_of
 from sgimd_torch.catalogue import CATALOGUE
 from sgimd_torch.demonstrations import save_demonstrations
 from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import Benchmark, save_benchmark
-from sgimd_torch.runs.build import build
 from sgimd_torch.runs.command_line import main
+from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
-from sgimd_torch.runs.tasks.robots import arm_benchmark, arm_demonstrations
+from sgimd_torch.runs.tasks import arm_benchmark, arm_demonstrations
 from sgimd_torch.spaces import Demonstration, stream
-from sgimd_torch.views import demo
-from sgimd_torch.views.film import command as film
-from sgimd_torch.views.memories import remember
-from sgimd_torch.views.report import command as report
-from table import tiles_reached
 
 NO_CONTEXT = np.empty(0)
 ALGORITHMS = CATALOGUE["algorithm"]
 ARMS = {"planar-arm-7": 7, "planar-arm-50": 50}
 
 
+SHORT = "--algorithm sgim-d --environment planar-arm-7 --seed 3 --movements 70 --evaluate_at 40 --repeats 2"
+
+
 def live(out, *options):
     """The exit code of a short run; later options win."""
-    short = (
-        "--algorithm",
-        "sgim-d",
-        "--environment",
-        "planar-arm-7",
-        "--seed",
-        3,
-        "--movements",
-        70,
-        "--evaluate_at",
-        40,
-        "--repeats",
-        2,
-    )
-    return command(main, [str(word) for word in (*short, "--out", out, *options)])
+    return command(main, [*SHORT.split(), *map(str, ("--out", out, *options))])
 
 
 @pytest.fixture(scope="module")
@@ -67,11 +48,11 @@ def test_every_algorithm_lives_on_every_arm_and_writes_a_whole_run_directory(tmp
     assert run.outcomes.shape == (70, 2)
     assert run.evaluation["movements"].tolist() == [40, 70]
     assert run.config["environment"] == environment
-    assert run.config["benchmark_crc32"] is run.config["demonstrations_crc32"] is None
+    assert run.files["benchmark_crc32"] is run.files["demonstrations_crc32"] is None
     moved, arm = np.flatnonzero(run.origin != ""), PlanarArm(ARMS[environment])
     for k in moved[-3:]:
         assert np.array_equal(arm.execute(NO_CONTEXT, run.thetas[k], stream(0, "any")), run.outcomes[k])
-    assert np.all(run.evaluation["noise_floor_m"] < 1e-12)  # without noise all repetitions end in one point
+    assert np.all(run.evaluation["noise_floor"] < 1e-12)  # without noise all repetitions end in one point
 
 
 @pytest.mark.parametrize("n_joints", ARMS.values())
@@ -82,7 +63,8 @@ def test_goals_for_an_arm_lie_within_reach_one_a_tile_and_evenly(n_joints):
     goals = benchmark.goals
     assert 200 <= len(goals) <= 360
     assert arm.reachable(goals).all()
-    assert tiles_reached(goals, benchmark) == len(goals)
+    tiles = np.floor((goals - arm.outcomes.low) / benchmark.side)
+    assert len(np.unique(tiles, axis=0)) == len(goals)
     quadrants = [((goals * signs) > 0).all(axis=1).sum() for signs in ((1, 1), (1, -1), (-1, 1), (-1, -1))]
     assert min(quadrants) > 0.9 * len(goals) / 4
     # A quarter of a disc's area lies within half its radius. Of its tiles, only those on the border are left to chance.
@@ -93,8 +75,6 @@ def test_goals_for_an_arm_lie_within_reach_one_a_tile_and_evenly(n_joints):
 def test_rod_and_arm_have_one_task_space_so_that_their_tiles_begin_at_one_corner():
     assert FishingRod().outcomes.low.tolist() == PlanarArm().outcomes.low.tolist() == [-1, -1]
     assert FishingRod().outcomes.high.tolist() == PlanarArm().outcomes.high.tolist() == [1, 1]
-    benchmark = Benchmark("PlanarArm", np.array([[-0.95, 0.95], [0.95, 0.05]]), 0.1)
-    assert tiles_reached(np.array([[-0.99, 0.91], [0.85, 0.05], [0.95, -0.05]]), benchmark) == 1
 
 
 @pytest.mark.parametrize("arm", [*map(PlanarArm, ARMS.values()), PlanarArm(3, length=2.0, max_angle=1.5)])
@@ -123,7 +103,8 @@ def test_an_imitating_arm_varies_the_posture_that_it_was_shown(tmp_path):
     assert live(tmp_path, "--algorithm", "imitation", "--epsilon", 0.03) == 0
     run, arm = read_run(tmp_path / "imitation" / "seed-003"), PlanarArm()
     assert np.flatnonzero(run.demonstration >= 0).tolist() == [30, 60]
-    shown = arm_demonstrations(arm)[run.demonstration[30]]
+    shown = run.demonstrations[run.demonstration[30]]
+    assert shown.outcome.tolist() in [each.outcome.tolist() for each in arm_demonstrations(arm)]
     assert np.array_equal(run.goals[30], shown.outcome)
     assert (np.abs(run.thetas[30:60] - arm.correspondence(shown.times, shown.trajectory)) <= 0.03 + 1e-12).all()
 
@@ -131,13 +112,15 @@ def test_an_imitating_arm_varies_the_posture_that_it_was_shown(tmp_path):
 def test_own_demonstrations_and_goals_replace_those_of_the_arm(tmp_path, capsys):
     arm = PlanarArm()
     save_demonstrations(tmp_path / "own.npz", arm_demonstrations(arm)[:2])
+    own = [each.trajectory.tolist() for each in arm_demonstrations(arm)[:2]]
     save_benchmark(tmp_path / "goals.npz", Benchmark("PlanarArm", np.array([[0.1, 0.2]]), 0.1))
     files = ("--demonstrations", tmp_path / "own.npz", "--benchmark", tmp_path / "goals.npz")
     assert live(tmp_path, *files) == 0
     run = read_run(tmp_path / "sgim-d" / "seed-003")
-    assert set(run.demonstration[run.demonstration >= 0].tolist()) == {0, 1}
-    assert run.evaluation["mean_error_m"].tolist() == run.evaluation["median_error_m"].tolist()  # of one goal
-    assert None not in (run.config["benchmark_crc32"], run.config["demonstrations_crc32"])
+    assert {*run.demonstration[run.demonstration >= 0].tolist()} == {0, 1}
+    assert [each.trajectory.tolist() for each in run.demonstrations] in (own, own[::-1])
+    assert run.evaluation["mean_error"].tolist() == run.evaluation["median_error"].tolist()  # of one goal
+    assert None not in (run.files["benchmark_crc32"], run.files["demonstrations_crc32"])
     assert "2 demonstrations; correspondence misses them by 0.0000 rad" in capsys.readouterr().err
 
 
@@ -165,66 +148,26 @@ def test_files_of_another_robot_are_refused(tmp_path, benchmark, capsys, environ
     assert not (tmp_path / "out").exists()
 
 
+def test_noise_and_task_space_are_the_rods(tmp_path, reference, capsys):
+    assert live(tmp_path, "--noise", 0.5, "--task_space", 100) == 0
+    said = capsys.readouterr().err
+    assert "--noise has no effect with --environment planar-arm-7\n" in said
+    assert "--task-space has no effect with --environment planar-arm-7\n" in said
+    assert content_of(tmp_path / "sgim-d" / "seed-003") == content_of(reference)
+    assert not Config(noise=0.5, task_space=100.0).without_effect
+
+
 def test_a_run_on_an_arm_made_longer_equals_a_long_run(tmp_path, reference):
     assert live(tmp_path, "--movements", 50) == 0
     assert live(tmp_path, "--resume") == 0
-    assert csv_of(tmp_path / "sgim-d" / "seed-003") == csv_of(reference)
+    assert content_of(tmp_path / "sgim-d" / "seed-003") == content_of(reference)
 
 
 @pytest.mark.parametrize("other", ["fishing-rod", "planar-arm-50"])
 def test_a_run_of_one_environment_is_not_resumed_in_another(tmp_path, capsys, other):
     assert live(tmp_path, "--movements", 5) == 0
     directory = tmp_path / "sgim-d" / "seed-003"
-    before = {path.name: path.read_bytes() for path in directory.iterdir()}
+    before = files_of(directory)
     assert live(tmp_path, "--environment", other, "--resume") == 2
     assert f"environment was planar-arm-7, now {other}" in capsys.readouterr().err
-    assert {path.name: path.read_bytes() for path in directory.iterdir()} == before
-
-
-def test_a_report_with_films_has_those_of_an_arm_and_leaves_out_a_robot_without_a_picture(tmp_path, reference):
-    shutil.copytree(reference, tmp_path / "sgim-d/seed-003")
-    words = "--environment crawler --algorithm random --movements 20 --evaluate-at [] --out"
-    assert command(main, [*words.split(), str(tmp_path)]) == 0
-    assert report.main([str(tmp_path), "--film", "--out", str(tmp_path / "page.html")]) == 0
-    assert (tmp_path / "page.html").read_text().count("<video") == 1
-    assert [path.parent.name for path in tmp_path.rglob("*.mp4")] == ["sgim-d"]
-
-
-def test_the_demo_is_of_the_rod(capsys):
-    assert command(demo.main, ["--", "--environment", "planar-arm-7"]) == 2
-    assert "the demo shows the fishing rod" in capsys.readouterr().err
-
-
-def test_the_memory_of_an_arm_rebuilt_from_the_log_is_that_of_the_living_one(reference):
-    run = read_run(reference)
-    parts = build(film.config_of(run))
-    remember(run, parts, 0, len(run.index))
-    assert np.array_equal(parts.learner.memory.outcomes, run.outcomes[run.origin != ""])
-
-
-def test_a_report_shows_an_arm_beside_the_rod_with_what_each_was_shown(tmp_path, reference, go):
-    assert go(tmp_path, "--name", "rod") == 0
-    (tmp_path / "arm").symlink_to(reference.parent)
-    assert report.main([str(tmp_path), "--out", str(tmp_path / "page.html")]) == 0
-    page = (tmp_path / "page.html").read_text()
-    assert "planar-arm-7" in page
-    assert "evaluated on different benchmarks" in page
-    assert "left out" not in page[: page.index("<footer>")].lower()
-    assert f"sgimd film {tmp_path / 'rod' / 'seed-003'}" in page
-    assert f"sgimd film {tmp_path / 'arm' / 'seed-003'}" in page
-
-
-def test_a_report_marks_the_postures_that_the_arm_was_shown(reference):
-    life = read_life(reference)
-    shown, missing = demonstrated([life])
-    assert missing == ""
-    wanted = arm_demonstrations(PlanarArm())
-    assert shown.tolist() == [wanted[row].outcome.tolist() for row in sorted(set(life.shown.tolist()))]
-    assert len(shown) == 2
-
-
-def test_a_board_of_an_arm_is_written(tmp_path):
-    assert live(tmp_path, "--board", "true") == 0
-    directory = tmp_path / "sgim-d" / "seed-003"
-    assert list(directory.glob("events.out.tfevents.*"))
-    assert json.loads((directory / "summary.json").read_text())["finished"] is True
+    assert files_of(directory) == before

@@ -1,36 +1,30 @@
-"""Runs that ask: the table of requests, teachers by name, the taught toss; killed runs end with the same tables."""
-
-import shutil
-import signal
+"""Runs that ask: requests, teachers by name, the taught toss; a run that was killed asks nobody again."""
 
 import numpy as np
 import pytest
 
-from runs import EAGER, signal_after, start
+from runs import content_of, end, stopped_at
 from sgimd_torch.demonstrations import SHIPPED, load_demonstrations
+from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.runs.build import build
-from sgimd_torch.runs.command_line import main
+from sgimd_torch.runs.command_line import main, parse
 from sgimd_torch.runs.config import Config
-from sgimd_torch.runs.process import command
-from sgimd_torch.runs.read import read_run
-from sgimd_torch.runs.tasks.robots import toy_demonstrations
+from sgimd_torch.runs.process import Stopping, command
+from sgimd_torch.runs.read import movements_on_disk, read_run
+from sgimd_torch.runs.run import Life
+from sgimd_torch.runs.tasks import toy_demonstrations
 from sgimd_torch.spaces import stream
 from sgimd_torch.teachers.answering import AnsweringTeacher, mislabelled
 
 FOUR = ("demonstrator-1", "demonstrator-2", "demonstrator-3", "mislabelling")
 ACTS = ("--environment=planar-arm-7", "--algorithm=sgim-acts", "--teachers=low-half,mislabelling", "--seed=3")
-SHORT = ("--movements=60", "--evaluate-at=[]", "--evaluated-by=own", "--repeats=0")
-WRITTEN = ("episodes.csv", "requests.csv")
+SHORT = ("--movements=60", "--evaluate-at=[]", "--answers=own", "--repeats=0")
 
 
 def go(out, *options):
     """The directory of a short run."""
     assert command(main, [*ACTS, *SHORT, f"--out={out}", "--name=run", *options]) == 0
     return out / "run" / "seed-003"
-
-
-def tables(directory):
-    return {name: (directory / name).read_bytes() for name in WRITTEN}
 
 
 @pytest.fixture(scope="module")
@@ -42,13 +36,9 @@ def whole(tmp_path_factory):
 def test_each_request_has_a_row_that_says_what_came_of_it(whole):
     run, asked = read_run(whole), read_run(whole).requests
     first = ("index", "teacher", "strategy", "reply", "shown")
-    assert tuple(asked) == (*first, "wanted_0", "wanted_1", "got_0", "got_1", "apart_m", "brought")
+    assert tuple(asked) == (*first, "wanted_0", "wanted_1", "got_0", "got_1", "apart")
     teachers = build(
-        Config(
-            algorithm="sgim-acts",
-            seed=3,
-            parts={"environment": "planar-arm-7", "teachers": ("low-half", "mislabelling")},
-        )
+        Config(algorithm="sgim-acts", environment="planar-arm-7", teachers=("low-half", "mislabelling"), seed=3)
     ).teachers
     assert {*asked["teacher"]} == {"low-half", "mislabelling"}
     assert {*asked["strategy"]} == {"imitate low-half", "imitate mislabelling"}
@@ -59,42 +49,48 @@ def test_each_request_has_a_row_that_says_what_came_of_it(whole):
     assert asked["index"][answered].tolist() == np.flatnonzero(run.demonstration >= 0).tolist()
     assert run.demonstration[asked["index"][answered]].tolist() == asked["shown"][answered].tolist()
     wanted, got = (np.stack([asked[f"{part}_{k}"] for k in range(2)], axis=1) for part in ("wanted", "got"))
-    assert asked["apart_m"][answered] == pytest.approx(np.linalg.norm(wanted - got, axis=1)[answered])
-    assert np.isnan(asked["apart_m"][~answered]).all()
+    assert asked["apart"][answered] == pytest.approx(np.linalg.norm(wanted - got, axis=1)[answered])
+    assert np.isnan(asked["apart"][~answered]).all()
     for teacher, goal, shown in zip(asked["teacher"][answered], wanted[answered], got[answered], strict=True):
         assert shown.tolist() == teachers[teacher].demonstrate(np.zeros(0), goal, None).outcome.tolist()
-    brought = asked["brought"][: answered.nonzero()[0][-1]]  # the last one may still be in use
-    assert ((brought >= 0) & (brought <= 1)).all()
-    assert (asked["brought"][~answered] == 0).all()
 
 
-def test_a_replay_writes_the_same_table_again_whether_it_is_there_or_not(whole, tmp_path):
-    for lost in (False, True):
-        out = tmp_path / str(lost)
-        shutil.copytree(whole, out / "run" / "seed-003")
-        if lost:
-            (out / "run" / "seed-003" / "requests.csv").unlink()
-        assert tables(go(out, "--resume")) == tables(whole)
+@pytest.mark.parametrize("movements", [30, 31, 47])
+def test_a_killed_run_asks_nobody_again_for_what_is_recorded(whole, tmp_path, movements):
+    end(stopped_at(movements, *ACTS, *SHORT, f"--out={tmp_path}", "--name=run"))
+    assert content_of(go(tmp_path, "--resume")) == content_of(whole)
 
 
-def test_a_killed_run_ends_with_the_same_table(whole, tmp_path):
-    process = start(EAGER, *ACTS, *SHORT, f"--out={tmp_path}", "--name=run")
-    signal_after(process, tmp_path / "run" / "seed-003" / "episodes.csv", 30, signal.SIGKILL)
-    assert len(read_run(tmp_path / "run" / "seed-003").index) < 60
-    assert tables(go(tmp_path, "--resume")) == tables(whole)
+def test_a_run_that_lost_its_robot_just_after_it_was_shown_something_has_that_answer(whole, tmp_path, monkeypatch):
+    """What was shown is recorded before the movement that answers it, and is not asked for again."""
+    run = read_run(whole)
+    lost = run.requests["index"][np.flatnonzero(run.requests["reply"] == "shown")[3]]
+    executed = []
+
+    def execute(self, context, theta, rng, really=PlanarArm.execute):
+        executed.append(theta)
+        if len(executed) == lost + 1:
+            raise ConnectionResetError("the robot closed the connection")
+        return really(self, context, theta, rng)
+
+    with monkeypatch.context() as patched:
+        parts = build(parse([*ACTS, *SHORT, f"--out={tmp_path}", "--name=run"])[0])
+        patched.setattr(PlanarArm, "execute", execute)
+        with Stopping() as stopping, pytest.raises(ConnectionResetError), Life(parts, stopping, resume=False) as life:
+            life.go_on()
+    cut = content_of(tmp_path / "run" / "seed-003")["events"]
+    assert [row[1] for row in cut[-2:]] == ["asked", "shown"]
+    assert movements_on_disk(tmp_path / "run" / "seed-003") == lost
+    assert content_of(go(tmp_path, "--resume")) == content_of(whole)
 
 
 def test_a_run_that_does_not_ask_has_no_table(tmp_path):
-    alone = ("--environment=planar-arm-7", "--algorithm=practice", *SHORT, f"--out={tmp_path}")
-    assert command(main, alone) == 0
-    directory = tmp_path / "practice" / "seed-000"
-    assert not (directory / "requests.csv").exists()
-    assert read_run(directory).requests is None
+    assert read_run(go(tmp_path, "--algorithm=practice")).requests is None
 
 
 @pytest.mark.parametrize("environment", ["fishing-rod", "rod-wind"])
 def test_demonstrators_have_their_own_recordings_whatever_is_there(environment):
-    parts = build(Config(algorithm="sgim-acts", parts={"environment": environment, "teachers": FOUR}))
+    parts = build(Config(algorithm="sgim-acts", environment=environment, teachers=FOUR))
     context = np.zeros(parts.environment.contexts.dim)
     for number in (1, 2, 3):
         theirs = load_demonstrations(SHIPPED.with_name(f"demonstrator_{number}.npz"))
@@ -113,11 +109,11 @@ def test_demonstrators_have_their_own_recordings_whatever_is_there(environment):
 
 def test_a_demonstrator_of_the_rod_teaches_no_other_robot():
     with pytest.raises(ValueError, match="demonstrator 2 has shown the fishing rod, and nothing that this robot could"):
-        build(Config(algorithm="sgim-acts", parts={"environment": "planar-arm-7", "teachers": ("demonstrator-2",)}))
+        build(Config(algorithm="sgim-acts", environment="planar-arm-7", teachers=("demonstrator-2",)))
 
 
 def test_the_toss_is_demonstrated_in_winds_all_over_c():
-    robot = build(Config(algorithm="random", parts={"environment": "toss"})).environment
+    robot = build(Config(algorithm="random", environment="toss")).environment
     shown = toy_demonstrations(robot)
     assert len(shown) > 100
     winds = np.array([each.context[0] for each in shown])
@@ -132,28 +128,28 @@ def test_the_toss_is_demonstrated_in_winds_all_over_c():
 def test_a_run_on_the_toss_asks_in_its_own_wind_and_gets_the_nearest_of_goal_and_wind(tmp_path):
     directory = go(tmp_path, "--environment=toss", "--algorithm=sgim-im", "--teachers=all")
     run = read_run(directory)
-    asked, shown = (
-        run.requests,
-        toy_demonstrations(build(Config(algorithm="random", parts={"environment": "toss"})).environment),
-    )
+    asked, shown = run.requests, toy_demonstrations(build(Config(algorithm="random", environment="toss")).environment)
     dim = run.contexts.shape[1] + run.outcomes.shape[1]
     points = np.array([[*each.context, *each.outcome] for each in shown])
     wanted = np.stack([asked[f"wanted_{k}"] for k in range(dim)], axis=1)
     rows = np.array([np.linalg.norm(points - each, axis=1).argmin() for each in wanted])
     answered = asked["reply"] == "shown"
     assert answered.sum() > 5
-    assert asked["shown"][answered].tolist() == rows[answered].tolist()
+    recorded = [run.demonstrations[row].trajectory[-1].tolist() for row in asked["shown"][answered]]
+    assert recorded == [shown[row].trajectory[-1].tolist() for row in rows[answered]]
     assert wanted[:, :1].tolist() == run.contexts[asked["index"]].tolist()
     imitated = asked["index"][answered]
     assert run.thetas[imitated].tolist() == [shown[row].trajectory[-1].tolist() for row in rows[answered]]
 
 
-def test_who_mislabels_says_so_in_the_table_and_the_log_has_the_movement(whole):
+def test_who_mislabels_says_so_and_the_movement_is_recorded(whole):
     asked, run = read_run(whole).requests, read_run(whole)
-    parts = build(Config(algorithm="sgim-acts", parts={"environment": "planar-arm-7", "teachers": ("all",)}))
+    parts = build(Config(algorithm="sgim-acts", environment="planar-arm-7", teachers=("all",)))
     wrong = AnsweringTeacher(parts.demonstrations, stream(3, "teacher mislabelling"), knows=mislabelled).demonstrations
-    labels = {tuple(each.outcome): row for row, each in enumerate(wrong)}
+    said = {tuple(each.outcome): each.trajectory for each in wrong}
     mine = (asked["teacher"] == "mislabelling") & (asked["reply"] == "shown")
     assert mine.sum() > 2
     for index, *got in zip(asked["index"][mine], asked["got_0"][mine], asked["got_1"][mine], strict=True):
-        assert run.demonstration[index] == labels[tuple(got)]  # of the movement, not of what was said
+        shown = run.demonstrations[run.demonstration[index]]
+        assert shown.outcome.tolist() == got  # as the teacher said, and the movement that it had really made
+        assert np.array_equal(shown.trajectory, said[tuple(got)])

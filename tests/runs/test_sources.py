@@ -8,13 +8,14 @@ from functools import partial
 import pytest
 from sgimd_torch.runs.log import read_json
 
-from runs import ROOT
+from runs import ROOT, about_of, content_of
 from sgimd_torch.catalogue import source
 from sgimd_torch.files import checksum
 from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.directory import sources
 from sgimd_torch.runs.process import command
+from sgimd_torch.runs.read import movements_on_disk
 from sgimd_torch.runs.sweep import main as sweep
 
 SHORT = "--environment sliders:Slider --algorithm random --movements 40 --evaluate-at 20 --repeats 0 --out"
@@ -23,15 +24,15 @@ OWN = [*SHORT.split(), "runs"]
 
 def test_the_file_of_ones_own_and_its_checksum_are_kept_with_the_run(own):
     assert command(main, OWN) == 0
-    versions = read_json(own / "runs/random/seed-000/versions.json", missing={})
+    versions = about_of(own / "runs/random/seed-000")["versions"]
     crc32 = checksum(own / "sliders.py")
     assert versions["source of sliders:Slider"] == f"sliders.py, crc32 {crc32}"
-    assert str(own) not in (own / "runs/random/seed-000/versions.json").read_text()
+    assert str(own) not in str(versions)
 
 
 def test_a_changed_file_is_told_on_resume_by_its_name_and_the_replay_decides(own, capsys):
     assert command(main, OWN) == 0
-    before = (own / "runs/random/seed-000/episodes.csv").read_bytes()
+    before = content_of(own / "runs/random/seed-000")["events"]
     was = checksum(own / "sliders.py")
     with (own / "sliders.py").open("a") as file:
         file.write("\n# another remark\n")
@@ -42,8 +43,8 @@ def test_a_changed_file_is_told_on_resume_by_its_name_and_the_replay_decides(own
     assert (
         f"sliders.py has changed since this run was made (sliders.py, crc32 {was} -> sliders.py, crc32 {now})" in said
     )
-    assert (own / "runs/random/seed-000/episodes.csv").read_bytes().startswith(before)
-    versions = read_json(own / "runs/random/seed-000/versions.json", missing={})
+    assert content_of(own / "runs/random/seed-000")["events"][: len(before)] == before
+    versions = about_of(own / "runs/random/seed-000")["versions"]
     assert [each["source of sliders:Slider"] for each in versions["before"]] == [f"sliders.py, crc32 {was}"]
     assert command(main, [*OWN, "--movements", "60", "--resume"]) == 0
     assert "has changed" not in capsys.readouterr().err
@@ -55,7 +56,7 @@ def test_a_robot_that_has_become_another_one_is_refused(own, capsys):
     (own / "sliders.py").write_text(text.replace("dim, context_dim = 1, 0", "dim, context_dim = 2, 0"))
     sys.modules.pop("sliders")
     assert command(main, [*OWN, "--movements", "60", "--resume"]) == 2
-    assert "does not begin with" in capsys.readouterr().err
+    assert "has the robot become another one?" in capsys.readouterr().err
 
 
 def test_every_part_of_ones_own_counts_and_none_of_ours(own):
@@ -100,8 +101,8 @@ def test_processes_of_many_runs_find_the_working_directory(own, module):
         cwd=own,
     )
     assert done.returncode == 0, done.stderr
-    summaries = {path.parent.parent.name for path in own.rglob("summary.json")}
-    assert {"learners:mine", "algorithm=learners:mine"} & summaries
+    names = {path.parent.parent.name for path in own.rglob("run.sqlite")}
+    assert {"learners:mine", "algorithm=learners:mine"} & names
 
 
 def test_a_sweep_says_that_finished_runs_were_made_by_another_file(own, capsys):
@@ -123,7 +124,7 @@ def test_a_robot_that_loses_its_connection_is_told_and_the_run_goes_on(own, caps
         "or the robot failed: ConnectionResetError: the robot closed the connection; --resume"
         in capsys.readouterr().err
     )
-    assert len((own / "runs/random/seed-000/episodes.csv").read_text().splitlines()) == 10
+    assert movements_on_disk(own / "runs/random/seed-000") == 9
     sys.modules.pop("sliders")
     path = own / "sliders.py"
     path.write_text(path.read_text().replace("left = 10", "left = -1"))
@@ -135,5 +136,4 @@ def test_a_run_with_outcomes_of_integers_goes_on_bit_for_bit(own):
     assert command(main, steps) == 0
     assert command(main, [*steps, "--movements", "60", "--resume"]) == 0
     assert command(main, [*steps, "--movements", "60", "--name", "whole"]) == 0
-    there, whole = (own / f"runs/{name}/seed-000/episodes.csv" for name in ("random", "whole"))
-    assert there.read_bytes() == whole.read_bytes()
+    assert content_of(own / "runs/random/seed-000") == content_of(own / "runs/whole/seed-000")

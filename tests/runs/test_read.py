@@ -1,0 +1,124 @@
+"""Reading runs: what was recorded as arrays, whether a run is finished, and what is no run."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from runs import edit, settle
+from sgimd_torch.algorithms import random_exploration
+from sgimd_torch.environments.planar_arm import PlanarArm
+from sgimd_torch.record import Kind, Record, RunError
+from sgimd_torch.runs.command_line import parse
+from sgimd_torch.runs.directory import FILE
+from sgimd_torch.runs.read import config_of, find_runs, finished, movements_on_disk, read_run, variant_of
+
+SHORT = "--algorithm random --environment planar-arm-7 --movements 8 --evaluate_at 5 --repeats 0 --seed 3"
+
+
+@pytest.fixture
+def run(tmp_path, go):
+    """A short run of random movements."""
+    assert go(tmp_path, *SHORT.split(), "--benchmark", "null") == 0
+    return tmp_path / "random" / "seed-003"
+
+
+def config_on(path):
+    return parse([*SHORT.split(), "--out", str(path.parents[1])])[0]
+
+
+def test_the_arrays_of_a_run_are_the_rows_of_its_record(reference, undisturbed):
+    run = read_run(undisturbed)
+    moved = [row for row in reference["events"] if row[1] == Kind.MOVED]
+    found = np.hstack((run.contexts, run.thetas, run.goals, run.outcomes))
+    np.testing.assert_array_equal(found, np.array([row[3:-4] for row in moved], dtype=np.float64))
+    assert run.origin.tolist() == [row[2] for row in moved]
+    assert run.index.tolist() == list(range(90))
+    before = [reference["events"][k - 1] for k, row in enumerate(reference["events"]) if row[1] == Kind.MOVED]
+    shown = [row[-4] if row[1] == Kind.SHOWN else -1 for row in before]
+    assert run.demonstration.tolist() == shown
+    assert run.benchmark.tolist() == [[0.0, 0.6], [0.3, 0.5], [-0.4, 0.4]]
+    assert {name: len(column) for name, column in run.errors.items() if name != "context"} == dict.fromkeys(
+        ("movements", "answer", "goal", "error", "noise"), 3 * 2 * 3
+    )
+    assert run.robot == "FishingRod"
+    assert run.spaces["outcomes"].low.tolist() == [-1, -1]
+
+
+def test_a_column_of_an_evaluation_is_found_by_its_movements(run):
+    found = read_run(run)
+    assert found.at(5) == found.evaluation["mean_error"][0]
+    assert found.at(8, "goals_met") == found.evaluation["goals_met"][1]
+    assert np.isnan([found.at(6), found.at(5, answer="model")]).all()
+    assert found.errors["error"][found.errors["movements"] == 5][: len(found.benchmark)].mean() == found.at(5)
+
+
+def test_whether_a_run_is_finished_is_counted_not_believed(run):
+    config = config_on(run)
+    assert read_run(run).summary["finished"] is True
+    assert finished(config)
+    assert finished(replace(config, board=True))
+    assert not finished(replace(config, movements=9))
+    assert not finished(replace(config, seed=4))
+    assert config_of(read_run(run)).settings == config.settings
+    with Record(run / FILE, write=True) as record:
+        record.replace_rows("evaluations", [row for row in record.rows("evaluations") if row[0] == 5])
+        record.commit()
+    assert read_run(run).summary["finished"] is False
+    edit(run / FILE, "DELETE FROM events WHERE movement = 7")
+    assert not finished(config)
+
+
+def test_a_run_that_has_just_begun_is_read_as_empty(run):
+    with Record(run / FILE, write=True) as record:
+        record.rewrite(n_events=0, keep=("goals",))
+    found = read_run(run)
+    assert found.thetas.shape == (0, 7)
+    assert found.evaluation["mean_error"].shape == (0,)
+    assert found.regions is found.requests is found.predictions is None
+    assert found.summary["finished"] is False
+    assert movements_on_disk(run) == 0
+
+
+def test_what_is_no_run_is_refused(tmp_path, run):
+    (tmp_path / "old").mkdir()
+    (tmp_path / "old" / "config.json").touch()
+    random_exploration(PlanarArm(7), 0).save(tmp_path / "old" / FILE)
+    (tmp_path / "csv").mkdir()
+    (tmp_path / "csv" / "config.json").touch()
+    for path, message in (
+        (tmp_path, "holds no run;"),
+        (tmp_path / "nowhere", "holds no run;"),
+        (tmp_path / "csv", "holds a run of files that this version does not read"),
+        (tmp_path / "old", r"is a life that Learner\.save wrote"),
+    ):
+        with pytest.raises(RunError, match=message):
+            read_run(path)
+        assert movements_on_disk(path) == 0
+    with pytest.raises(RunError, match="holds no runs"):
+        find_runs(tmp_path / "csv")
+    with pytest.raises(RunError, match="does not exist"):
+        find_runs(tmp_path / "nowhere")
+    settle(run, settings={**read_run(run).config, "algorithm": "gone"})
+    with pytest.raises(RunError, match="do not describe a run of this version"):
+        config_of(read_run(run))
+
+
+@pytest.mark.parametrize("table", ["about", "events", "goals", "errors", "seals"])
+def test_a_damaged_run_is_refused_whichever_table_it_is(run, table):
+    edit(run / FILE, f"DELETE FROM {table} WHERE rowid = 2")
+    with pytest.raises(RunError, match=r"run\.sqlite.*was it damaged or edited"):
+        read_run(run)
+    assert not finished(config_on(run))
+
+
+def test_runs_are_found_by_name_and_seed(tmp_path):
+    for name, seed in (("b", 10), ("b", 2), ("a", 0)):
+        (tmp_path / name / f"seed-{seed:03d}").mkdir(parents=True)
+        (tmp_path / name / f"seed-{seed:03d}" / FILE).touch()
+    found = find_runs(tmp_path)
+    assert list(found) == ["a", "b"]
+    assert [path.name for path in found["b"]] == ["seed-002", "seed-010"]
+    assert find_runs(tmp_path / "b") == {"b": found["b"]}
+    assert find_runs(found["b"][1]) == {"b": [found["b"][1]]}
+    assert variant_of(found["b"][1]) == "b"
