@@ -123,11 +123,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     found = {run.name: run for run in map(read_model_run, tqdm(options.runs, "reading", disable=None))}
     if len(found) < len(options.runs):
         raise RunError("two of these runs have the same name; draw them one by one, each with its own --out")
+    rows = [row(run) for run in found.values()]
     make_folder(options.out)
     first = {name.split("/")[0]: name for name in reversed(found)}
     for name in tqdm(first.values(), "drawing", disable=None):
         save_figure(partial(figure_of, found[name]), options.out / name.replace("/", "-"), "png")
-    rows = [row(run) for run in found.values()]
     write_table(options.out, "table.csv", pd.DataFrame(rows))
     lines = [HEAD, *map(_printed, rows)]
     widths = [max(map(len, cells)) for cells in zip(*lines, strict=True)]

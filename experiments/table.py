@@ -7,8 +7,7 @@ A row made again from a run is the row that was there, byte for byte. Small tabl
 
 from __future__ import annotations
 
-import os
-import time
+import fcntl
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
@@ -20,7 +19,7 @@ from scipy.spatial import KDTree
 
 from sgimd_torch.catalogue import ROD
 from sgimd_torch.evaluation import Benchmark
-from sgimd_torch.files import lock, make_folder, write_text
+from sgimd_torch.files import make_folder, write_text
 from sgimd_torch.runs.build import task_of
 from sgimd_torch.runs.config import OWN, Config
 from sgimd_torch.runs.read import Run, find_runs, read_run
@@ -108,15 +107,13 @@ def merge(folder: Path, name: str, rows: Sequence[Row]) -> None:
     """
     make_folder(folder)
     n_key, columns = TABLES[name]
-    held = _lock(folder / ".lock")
-    try:
+    with open(folder / ".lock", "w") as held:
+        fcntl.flock(held, fcntl.LOCK_EX)  # until no other process changes a table of this folder
         table = read_table(folder, name)
         if rows:
             table = pd.concat([table, pd.DataFrame(rows, columns=[*columns]).astype(table.dtypes.to_dict())])
         key = [*columns[:n_key]]
         write_table(folder, name, table.drop_duplicates(key, keep="last").sort_values(key))
-    finally:
-        os.close(held)
 
 
 def write_table(folder: Path, name: str, table: pd.DataFrame) -> None:
@@ -257,12 +254,3 @@ def _benchmark(environment: str, path: Path | None) -> tuple[Benchmark, Array]:
     """With the lower corner of T."""
     task = task_of(Config(parts={"environment": environment}))
     return benchmark_of(task, path)[0], task.environment.outcomes.low
-
-
-def _lock(path: Path) -> int:
-    """Waits until no other process changes a table of this folder."""
-    while True:
-        try:
-            return lock(path)
-        except BlockingIOError:
-            time.sleep(0.05)  # the other process only writes a file

@@ -1,15 +1,13 @@
-"""Files on disk: written whole or not at all, locked by one process at a time, refused by name when they are broken.
+"""Files on disk: written whole or not at all, refused by name when they are broken.
 
-Everything that replaces a file or takes a lock goes through here.
-    write_json(folder / "summary.json", {"movements": 90})
+Everything that replaces a file goes through here.
+    write_text(folder / "report.html", page)
     with replacing(folder / "film.mp4") as partial: encode(frames, partial)
 """
 
 from __future__ import annotations
 
 import io
-import json
-import math
 import os
 import zipfile
 import zlib
@@ -60,12 +58,6 @@ def write_bytes(path: str | os.PathLike[str], content: bytes) -> None:
 def write_text(path: str | os.PathLike[str], content: str) -> None:
     """Replace ``path`` by text in UTF-8, line ends as they are; see ``replacing``."""
     write_bytes(path, content.encode())
-
-
-def write_json(path: str | os.PathLike[str], content: Mapping[str, Any]) -> None:
-    """Replace ``path`` by a json object, see ``replacing``; NaN becomes null, since json has none."""
-    finite = {name: None if isinstance(v, float) and not math.isfinite(v) else v for name, v in content.items()}
-    write_text(path, json.dumps(finite, indent=2, allow_nan=False) + "\n")
 
 
 def write_npz(path: str | os.PathLike[str], arrays: Mapping[str, Any]) -> None:
@@ -125,43 +117,3 @@ def make_folder(path: Path) -> None:
         blocker = next(inside, None)
         why = f"{blocker} is no folder" if blocker else f"{error.strerror}"
         raise OSError(f"{path} cannot be made: {why}; choose another --out") from error
-
-
-def lock(path: str | os.PathLike[str]) -> int:
-    """Open ``path``, which is made where it is missing, and lock it without waiting.
-
-    Returns:
-        The descriptor; the lock is held until it is closed, or the process ends.
-
-    Raises:
-        BlockingIOError: another process holds the lock.
-        OSError: ``path`` cannot be opened, or this system has no such locks.
-    """
-    try:
-        import fcntl  # Windows has none
-    except ImportError as error:
-        raise OSError(f"{path} cannot be locked: this system has no flock; runs need Linux or macOS") from error
-    file = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BaseException:
-        os.close(file)
-        raise
-    return file
-
-
-def locked(path: str | os.PathLike[str]) -> bool:
-    """Whether a process holds the ``lock`` of ``path``; False if there is no such file."""
-    try:
-        import fcntl  # Windows has none, so nobody holds it
-
-        file = os.open(path, os.O_RDONLY)
-    except (FileNotFoundError, NotADirectoryError, ImportError):
-        return False
-    try:
-        fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)  # shared, so that two callers do not block each other
-    except BlockingIOError:
-        return True
-    finally:
-        os.close(file)
-    return False

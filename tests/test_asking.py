@@ -9,7 +9,7 @@ from sgimd_torch.algorithms import sagg_riac
 from sgimd_torch.algorithms.asking import searched, sgim_acts, sgim_im
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.learner import ReplayError
-from sgimd_torch.runs.tasks import arm_demonstrations
+from sgimd_torch.runs.tasks.robots import arm_demonstrations
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Demonstration, Lesson, Request, stream
 from sgimd_torch.teachers.answering import AnsweringTeacher, high_half, low_half, mislabelled

@@ -166,7 +166,7 @@ def understand(name, words):
     elif name == "check":
         assert command(_call, [name, *words]) == 0
     else:  # a parser that refuses words raises SystemExit
-        with pytest.raises((ValueError, OSError), match=r"does not exist|there is no|is no run|No such"):
+        with pytest.raises((ValueError, OSError), match=r"does not exist|there is no|holds no (run|board)|No such"):
             importlib.import_module(f"sgimd_torch.{COMMANDS[name].module}").main(words)
 
 

@@ -12,14 +12,17 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from sgimd_torch.environments.motor_primitives import GaussianPrimitive
 from sgimd_torch.environments.protocol import HandLed, SimulationError, check_movement, check_recording, check_rng
-from sgimd_torch.environments.rod_physics import Caster, Recording
 from sgimd_torch.spaces import Array, Box, check_count
+
+if TYPE_CHECKING:
+    from sgimd_torch.environments.rod_physics import Recording
 
 MODEL = Path(__file__).with_name("fishing_rod.xml")
 JOINTS = ("yaw", "shoulder", "elbow", "forearm_roll", "wrist_pitch", "wrist_yaw")
@@ -62,6 +65,8 @@ class FishingRod:
         line: float = 1.0,
         threads: int | None = None,
     ) -> None:
+        from sgimd_torch.environments.rod_physics import Caster  # MuJoCo is loaded only when a rod is made
+
         for name, value in (("noise", noise), ("max_yaw", max_yaw), ("max_wind", max_wind)):
             if not (np.isfinite(value) and value >= 0):
                 raise ValueError(f"{name} must be finite and >= 0, got {value}")

@@ -164,8 +164,8 @@ def refused(name: str, parts: Mapping[str, Part], others: Iterable[str]) -> Valu
     having = [f"{each} {', '.join(_with(each, last))}" for each in kinds if _with(each, last)]
     if not having and owner == ALGORITHM:  # spelt without its part
         having = [f"{each} {', '.join(_with(each, last))} ({each}.{last})" for each in CATALOGUE if _with(each, last)]
-    said = f"--{spelt}: {part.kind} {part.word} has no such option{near.replace('_', '-')}"
-    return ValueError(f"{said}; {' and '.join(having)} have it" if having else said)
+    said = f"--{spelt}: {part.kind} {part.word} has no such option"
+    return ValueError(f"{said}; {' and '.join(having)} have it" if having else f"{said}{near.replace('_', '-')}")
 
 
 def _has_name(kind: str, default: Any) -> bool:

@@ -6,7 +6,7 @@ varied: sgim-d,goals=uniform if algorithm and goals are. All other options of sg
   sgimd sweep --seeds 0-9                                                  ten runs with the defaults
   sgimd sweep --vary goals=interest-map,uniform --seeds 0-19 --out study   is the interest map worth it?
   sgimd sweep --vary algorithm=sagg-riac,sgim-d --vary budget=5,15 --seeds 0-4 --movements 2000 --out study
-  sgimd sweep --vary noise=0,0.03 --seeds 0,3,7-9 --out study --dry-run    what is still to be done
+  sgimd sweep --vary environment.noise=0,0.03 --seeds 0,3,7-9 --out study --dry-run    what is still to be done
   sgimd sweep --vary goals=interest-map,uniform --seeds 0-19 --shard 2/4   the second quarter of them, see --dry-run
   sgimd sweep --vary goals=interest-map,uniform --seeds 0-999 --engine ray --address auto        on a cluster
   sgimd table study                                                        their results
@@ -25,7 +25,7 @@ import os
 import re
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Final, NamedTuple, TypeVar
 
@@ -222,7 +222,7 @@ def variants_of(varied: Sequence[str], options: Sequence[str]) -> tuple[list[Con
     for combination in itertools.product(*values.values()):
         chosen = dict(zip(values, combination, strict=True))
         config, flags = parse([*options, *(f"--{option}={value}" for option, value in chosen.items())])
-        in_order = [dashed(field.name) for field in fields(Config) if dashed(field.name) in chosen]
+        in_order = sorted(chosen, key=lambda option: (option != "algorithm", option))
         found.append(replace(config, name=",".join(_in_name(option, chosen[option]) for option in in_order) or None))
     return found, [f"--{dashed(flag)}" for flag, on in flags.items() if on]
 

@@ -13,7 +13,7 @@ of sgimd run apply to all three; sgimd run --help lists them.
   sgimd demo                                       the paper's 5000 movements, seed 0
   sgimd demo --movements 1000                      a first look, in less than a minute
   sgimd demo --seed 1                              another seed
-  sgimd demo --out runs/quiet --noise 0            without motor noise
+  sgimd demo --out runs/quiet --environment.noise 0     without motor noise
 
 Exit code: 0 all went well, 1 a run failed, 2 the request is wrong, 130 or 143 stopped by Ctrl-C or SIGTERM.
 """

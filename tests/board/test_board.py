@@ -26,10 +26,9 @@ from sgimd_torch.figures.sections import sections
 from sgimd_torch.inverses.local import LocalInverse
 from sgimd_torch.runs.build import build
 from sgimd_torch.runs.config import Config
-from sgimd_torch.runs.directory import RunDirectory
 from sgimd_torch.runs.process import Stopping
 from sgimd_torch.runs.read import read_run
-from sgimd_torch.runs.run import live_in
+from sgimd_torch.runs.run import Life
 from sgimd_torch.spaces import Box, Demonstration, Episode, Move, Request
 
 PLANE = Box.cube(-1, 1, 2)
@@ -287,7 +286,7 @@ def test_watching_a_run_changes_no_byte_of_it(tmp_path, go, watched):
 
 def test_the_curves_of_a_run_are_those_of_its_record(watched):
     curves, read = curves_of(watched), read_run(watched)
-    for tag, column in {"mean": "mean_error_m", "p90": "p90_error_m", "noise_floor": "noise_floor_m"}.items():
+    for tag, column in {"mean": "mean_error", "p90": "p90_error", "noise_floor": "noise_floor"}.items():
         expected = dict(zip(read.evaluation["movements"], read.evaluation[column], strict=True))
         assert curves[f"error/{tag}"] == pytest.approx(expected, rel=1e-6)
     first = read.origin[:50]
@@ -412,9 +411,9 @@ def live_as(out, robot, make, **options):
         **{**alone, "environment": robot, "learner": learner, "answers": {"own": LocalInverse(learner.memory)}},
         benchmark=Benchmark("Slider", goals, 0.1),
     )
-    with Stopping() as stopping, RunDirectory(parts, resume=False) as directory:
-        live_in(directory, parts, stopping)
-    return directory.path
+    with Stopping() as stopping, Life(parts, stopping, resume=False) as life:
+        life.go_on()
+    return config.directory
 
 
 @pytest.mark.parametrize(("dim", "context_dim"), [(1, 0), (3, 0), (2, 0), (2, 1), (6, 0)])

@@ -227,7 +227,7 @@ def test_damage_ends_with_one_line_and_no_traceback(paper, runs, tmp_path, capsy
     table, folder = tmp_path / "results.csv", tmp_path / "runs"
     table.write_text((paper / "results.csv").read_text() + ("junk\n" if damage == "table" else ""))
     (folder / "random" / "seed-000").mkdir(parents=True)
-    (folder / "random" / "seed-000" / "config.json").write_text("{")
+    (folder / "random" / "seed-000" / "run.sqlite").write_text("{")
     assert draw("--results", tmp_path, "--runs", folder, "--out", tmp_path / "out", "--only", "landing") == 2
     said = capsys.readouterr().err.splitlines()
     assert said[-1].startswith("error: ")

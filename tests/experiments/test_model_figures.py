@@ -1,58 +1,62 @@
-"""Figures and table of forward models, from run directories that are made here file by file."""
+"""Figures and table of forward models, from records that are made here row by row."""
 
 import csv
-import json
 import math
 
 import numpy as np
 import pytest
-from sgimd_torch.runs.log import Columns
 
 from model_figures import LATE, figure_of, main, row
+from runs import edit
+from sgimd_torch.record import Event, Kind, Record
+from sgimd_torch.runs.directory import FILE
 from sgimd_torch.runs.process import command
-from sgimd_torch.spaces import Episode, Move, stream
+from sgimd_torch.spaces import stream
 from sgimd_torch.views.model_run import read_model_run
 
 FIRST = 50  # exemplars that are learnt before anything is predicted
 SPREAD = 0.1
 
 
-def write_run(path, *, movements=120, dim=2, doubt=1.0, rests=0, naive=0, task_space=1.0, summary=None):
+def write_run(
+    path, *, movements=120, dim=2, doubt=1.0, rests=0, naive=0, task_space=1.0, seconds=0.5, first=FIRST, seed=0
+):
     """A run whose outcomes scatter around what was predicted; the spread that it names is ``doubt`` times as large.
 
     The first ``naive`` outcomes scatter ten times as much. It rests first. Then two movements pursue each goal; one
     goal is met by the first of them, the next by the second.
     """
-    rng, columns, n = stream(0, "run"), Columns(0, 1, dim), movements - rests
+    rng, n = stream(0, "run"), movements - rests
     means = rng.uniform(-0.7, 0.7, (n, dim))
     outcomes = means + SPREAD * rng.normal(size=(n, dim))
     outcomes[:naive] += 9 * (outcomes - means)[:naive]
     theta, context, noise = np.zeros(1), np.zeros(0), np.full(dim, doubt * SPREAD)
-    log, predictions = [columns.header], []
-    log += [columns.line(Episode(k, context, None, None, None), None) for k in range(rests)]
-    for exemplar, (mean, outcome) in enumerate(zip(means, outcomes, strict=True)):
-        goal = outcomes[exemplar // 2 * 2 + exemplar // 2 % 2]
-        episode = Episode(rests + exemplar, context, Move(theta, goal, "local"), outcome, None)
-        log.append(columns.line(episode, None))
-        if exemplar >= FIRST:  # spreads in a triangle of sides 3, 4 and 5
-            values = np.concatenate([outcome, mean, 0.6 * noise, 0.8 * noise])
-            predictions.append(",".join([str(exemplar), *map(repr, values.tolist())]))
-    names = (f"{kind}_{k}" for kind in ("outcome", "predicted", "epistemic", "aleatoric") for k in range(dim))
-    refreshes = [f"{at + rests},{at},20,{0.5 - at / 1000!r},0.1,{int(at == 100)}" for at in range(50, n + 1, 50)]
+    spreads = np.tile(np.concatenate([0.6 * noise, 0.8 * noise]), (n, 1))  # sides of 3, 4 and 5
     path.mkdir(parents=True)
-    (path / "episodes.csv").write_bytes(b"".join(log))
-    (path / "predictions.csv").write_text("\n".join([",".join(["exemplar", *names]), *predictions, ""]))
-    (path / "refreshes.csv").write_text(
-        "\n".join(["movements,exemplars,steps,held_out,relative_error,diverged", *refreshes, ""])
-    )
-    (path / "config.json").write_text(json.dumps({"task_space": task_space}))
-    (path / "summary.json").write_text(json.dumps({"seconds_model": 0.5} if summary is None else summary))
+    with Record.make(path / FILE, (0, 1, dim), about_of(movements, dim, task_space, seconds, seed)) as record:
+        for _ in range(rests):
+            record.add(Event(Kind.RESTED, context))
+        for exemplar, outcome in enumerate(outcomes):
+            goal = outcomes[exemplar // 2 * 2 + exemplar // 2 % 2]
+            record.add(Event(Kind.MOVED, context, theta, goal, outcome, "local"))
+        predictions = np.hstack([outcomes, means, spreads])[first:].tolist()
+        record.add_rows("predictions", [(exemplar, *values) for exemplar, values in enumerate(predictions, first)])
+        refreshes = [(at + rests, at, 20, 0.5 - at / 1000, 0.1, int(at == 100)) for at in range(50, n + 1, 50)]
+        record.add_rows("refreshes", refreshes)
+        record.commit()
     return path
+
+
+def about_of(movements, dim, task_space, seconds, seed):
+    settings = {"seed": seed, "movements": movements, "evaluate_at": [], "environment.task_space": task_space}
+    spaces = {name: ([0.0] * n, [1.0] * n) for name, n in (("contexts", 0), ("policies", 1), ("outcomes", dim))}
+    known = {} if seconds is None else {"seconds": {"seconds_model": seconds}}
+    return {"settings": settings, "versions": {}, "files": {}, "robot": "Robot", "spaces": spaces, **known}
 
 
 def table_of(out):
     with open(out / "table.csv", newline="") as file:
-        return [{k: v if k == "run" else float(v) for k, v in told.items()} for told in csv.DictReader(file)]
+        return [{k: v if k == "run" else float(v or "nan") for k, v in told.items()} for told in csv.DictReader(file)]
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +67,7 @@ def honest(tmp_path_factory):
 
 @pytest.fixture
 def short(tmp_path):
-    return write_run(tmp_path / "runs" / "sgim-d" / "seed-001")
+    return write_run(tmp_path / "runs" / "sgim-d" / "seed-001", seed=1)
 
 
 def refused(path, capsys, *options):
@@ -112,11 +116,11 @@ def test_an_overconfident_model_differs_from_an_honest_and_a_cautious_one(tmp_pa
 
 
 def test_what_is_not_known_is_a_dash_and_not_a_number(tmp_path, capsys):
-    path = write_run(tmp_path / "x" / "seed-000", summary={})
+    path = write_run(tmp_path / "x" / "seed-000", seconds=None)
     assert command(main, [str(path), "--out", str(tmp_path / "out")]) == 0
     line = capsys.readouterr().out.splitlines()[1]
     assert "- / - / -" in line  # it never came to 2000 movements
-    assert line.endswith("-")  # nor says its summary how long refreshes took
+    assert line.endswith("-")  # nor is it known how long refreshes took
 
 
 def test_each_run_gets_a_line_and_the_first_of_a_variant_a_figure_the_same_again(short, honest, tmp_path):
@@ -157,68 +161,27 @@ def test_a_task_space_that_nothing_reached_leaves_the_map_empty(tmp_path):
     assert "70 of 70 landed outside" in [text.get_text() for ax in axes for text in ax.texts]
 
 
-def test_a_run_that_is_under_way_is_shown_as_far_as_it_came(short):
-    predictions, log = short / "predictions.csv", short / "episodes.csv"
-    predictions.write_text(predictions.read_text()[:-7])  # its last line is torn
-    assert len(read_model_run(short).movements) == 69
-    log.write_bytes(b"".join(log.read_bytes().splitlines(keepends=True)[:-20]))  # behind the predictions
-    assert read_model_run(short).movements[-1] == 99
-
-
-def test_a_run_without_a_model_says_so(short, capsys):
-    (short / "predictions.csv").unlink()
-    said = refused(short, capsys)
-    assert f"{short} has no predictions.csv: it ran without a forward model" in said
+def test_a_run_without_a_model_says_so(tmp_path, capsys):
+    """Nor can one be shown that has predicted nothing yet."""
+    path = write_run(tmp_path / "runs" / "x" / "seed-000", first=120)
+    said = refused(path, capsys)
+    assert f"{path} holds no prediction of a forward model" in said
+    assert "learns from 50 movements before its first" in said
 
 
 def test_a_folder_that_is_no_run_is_named(tmp_path, capsys):
-    assert "is no run directory" in refused(tmp_path / "a" / "b" / "c", capsys)
+    assert f"{tmp_path / 'a' / 'b' / 'c'} holds no run" in refused(tmp_path / "a" / "b" / "c", capsys)
 
 
-def test_a_run_that_has_predicted_nothing_yet_says_what_it_waits_for(short, capsys):
-    predictions = short / "predictions.csv"
-    predictions.write_text(predictions.read_text().split("\n")[0] + "\n")
-    assert "no prediction of a movement yet; the model learns from 50" in refused(short, capsys)
+@pytest.mark.parametrize("table", ["predictions", "refreshes", "events"])
+def test_a_damaged_row_is_named(short, capsys, table):
+    edit(short / FILE, f"DELETE FROM {table} WHERE rowid = 1")
+    assert f"row 1 of {table} is not what was written" in refused(short, capsys)
 
 
-@pytest.mark.parametrize(
-    ("file", "line", "content", "says"),
-    [
-        ("predictions.csv", 0, "exemplar,outcome_0", "must begin with exemplar,outcome_0,outcome_1,predicted_0"),
-        ("predictions.csv", 3, "53,0.1,0.2", "predictions.csv, line 4: needs 9 numbers, got '53,0.1,0.2'"),
-        ("predictions.csv", 3, "53,0,0,0,0,1,1,1,x", "line 4: needs 9 numbers"),
-        ("predictions.csv", 3, "53,0,0,0,nan,1,1,1,1", "line 4: needs 9 numbers"),
-        ("predictions.csv", 3, "51,0,0,0,0,1,1,1,1", "whole numbers that increase"),
-        (
-            "predictions.csv",
-            3,
-            "52.5,0,0,0,0,1,1,1,1",
-            "line 4: needs 9 numbers, got '52.5,0,0,0,0,1,1,1,1' (whole ones",
-        ),
-        ("predictions.csv", 3, "52,0,0,0,0,1,1,1,1", "exemplar 52 is another one in episodes.csv"),
-        ("refreshes.csv", 0, "movements,steps", "refreshes.csv must begin with movements,exemplars"),
-        ("refreshes.csv", 1, "50,50,20", "refreshes.csv, line 2: needs 6 numbers"),
-        ("refreshes.csv", 1, "50,50,20,0.1,0.1,7", "0 or 1 for diverged"),
-    ],
-)
-def test_a_damaged_line_is_named(short, capsys, file, line, content, says):
-    lines = (short / file).read_text().split("\n")
-    lines[line] = content
-    (short / file).write_text("\n".join(lines))
-    assert says in refused(short, capsys)
-
-
-def test_a_spread_of_nothing_is_refused_by_its_exemplar(tmp_path, capsys):
+def test_a_spread_of_nothing_is_refused_before_anything_is_written(tmp_path, capsys):
     path = write_run(tmp_path / "runs" / "x" / "seed-000", doubt=0.0)
-    assert "exemplar 50 has a spread of 0" in refused(path, capsys)
-
-
-@pytest.mark.parametrize("file", ["refreshes.csv", "predictions.csv"])
-def test_a_file_that_is_missing_or_no_file_is_named(short, capsys, file):
-    (short / file).unlink()
-    assert file in refused(short, capsys)
-    (short / file).mkdir()
-    assert f"{short / file} cannot be read" in refused(short, capsys)
+    assert "spread must be above 0, but entry [0, 0] is 0.0" in refused(path, capsys)
 
 
 def test_two_runs_of_one_name_are_not_drawn_over_each_other(short, capsys):

@@ -13,7 +13,7 @@ from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
 
-TOSS = "--environment toss --algorithm sagg-riac --movements 60 --evaluate-at 30 --repeats 2 --answers own,nearest"
+TOSS = "--environment toss --algorithm sagg-riac --movements 60 --evaluate-at 30 --repeats 2 --evaluated-by own,nearest"
 
 
 def live(out, *options):
@@ -28,7 +28,7 @@ def run(tmp_path_factory):
 
 
 def test_the_errors_by_context_are_those_of_the_evaluation(run):
-    by, n = run.by_context, len(build(Config(environment="toss", algorithm="sagg-riac")).benchmark.goals)
+    by, n = run.by_context, len(build(Config("sagg-riac", parts={"environment": "toss"})).benchmark.goals)
     assert list(by) == ["movements", "answer", "context", "low", "high", "goals", "mean_error"]
     for answer in ("own", "nearest"):
         for k, movements in enumerate((30, 60)):
@@ -56,7 +56,7 @@ def test_a_run_without_contexts_has_no_such_table(tmp_path):
 @pytest.mark.parametrize(("word", "reach"), [("rod-wind", 0.05), ("rod-yaw", 0.5)])
 def test_the_contexts_of_the_rod_are_tasks(word, reach):
     assert word in CATALOGUE["environment"]
-    config = Config(environment=word, algorithm="sgim-d", noise=0.01)
+    config = Config("sgim-d", parts={"environment": word, "environment.noise": 0.01})
     robot = task_of(config).environment
     assert (robot.contexts.low.tolist(), robot.contexts.high.tolist()) == ([-reach], [reach])
     assert robot.noise == 0.01
@@ -68,7 +68,7 @@ def test_the_contexts_of_the_rod_are_tasks(word, reach):
 
 
 def test_the_long_rod_is_a_task_without_context():
-    robot = task_of(Config(environment="rod-long", noise=0.01)).environment
+    robot = task_of(Config(parts={"environment": "rod-long", "environment.noise": 0.01})).environment
     assert (robot.noise, robot.contexts.dim) == (0.01, 0)
     assert robot.model.body("line_07").mass == pytest.approx(1.5 * FishingRod().model.body("line_07").mass)
 

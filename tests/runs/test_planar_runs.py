@@ -12,10 +12,9 @@ from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import Benchmark, save_benchmark
 from sgimd_torch.runs.command_line import main
-from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
-from sgimd_torch.runs.tasks import arm_benchmark, arm_demonstrations
+from sgimd_torch.runs.tasks.robots import arm_benchmark, arm_demonstrations
 from sgimd_torch.spaces import Demonstration, stream
 
 NO_CONTEXT = np.empty(0)
@@ -146,15 +145,6 @@ def test_files_of_another_robot_are_refused(tmp_path, benchmark, capsys, environ
     assert re.search(message, errors)
     assert "Traceback" not in errors
     assert not (tmp_path / "out").exists()
-
-
-def test_noise_and_task_space_are_the_rods(tmp_path, reference, capsys):
-    assert live(tmp_path, "--noise", 0.5, "--task_space", 100) == 0
-    said = capsys.readouterr().err
-    assert "--noise has no effect with --environment planar-arm-7\n" in said
-    assert "--task-space has no effect with --environment planar-arm-7\n" in said
-    assert content_of(tmp_path / "sgim-d" / "seed-003") == content_of(reference)
-    assert not Config(noise=0.5, task_space=100.0).without_effect
 
 
 def test_a_run_on_an_arm_made_longer_equals_a_long_run(tmp_path, reference):

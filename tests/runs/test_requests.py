@@ -12,13 +12,13 @@ from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.process import Stopping, command
 from sgimd_torch.runs.read import movements_on_disk, read_run
 from sgimd_torch.runs.run import Life
-from sgimd_torch.runs.tasks import toy_demonstrations
+from sgimd_torch.runs.tasks.robots import toy_demonstrations
 from sgimd_torch.spaces import stream
 from sgimd_torch.teachers.answering import AnsweringTeacher, mislabelled
 
 FOUR = ("demonstrator-1", "demonstrator-2", "demonstrator-3", "mislabelling")
 ACTS = ("--environment=planar-arm-7", "--algorithm=sgim-acts", "--teachers=low-half,mislabelling", "--seed=3")
-SHORT = ("--movements=60", "--evaluate-at=[]", "--answers=own", "--repeats=0")
+SHORT = ("--movements=60", "--evaluate-at=[]", "--evaluated-by=own", "--repeats=0")
 
 
 def go(out, *options):
@@ -38,7 +38,7 @@ def test_each_request_has_a_row_that_says_what_came_of_it(whole):
     first = ("index", "teacher", "strategy", "reply", "shown")
     assert tuple(asked) == (*first, "wanted_0", "wanted_1", "got_0", "got_1", "apart")
     teachers = build(
-        Config(algorithm="sgim-acts", environment="planar-arm-7", teachers=("low-half", "mislabelling"), seed=3)
+        Config("sgim-acts", seed=3, parts={"environment": "planar-arm-7", "teachers": ("low-half", "mislabelling")})
     ).teachers
     assert {*asked["teacher"]} == {"low-half", "mislabelling"}
     assert {*asked["strategy"]} == {"imitate low-half", "imitate mislabelling"}
@@ -85,12 +85,14 @@ def test_a_run_that_lost_its_robot_just_after_it_was_shown_something_has_that_an
 
 
 def test_a_run_that_does_not_ask_has_no_table(tmp_path):
-    assert read_run(go(tmp_path, "--algorithm=practice")).requests is None
+    words = "--environment=planar-arm-7 --algorithm=practice --name=run"
+    assert command(main, [*words.split(), *SHORT, f"--out={tmp_path}"]) == 0
+    assert read_run(tmp_path / "run" / "seed-000").requests is None
 
 
 @pytest.mark.parametrize("environment", ["fishing-rod", "rod-wind"])
 def test_demonstrators_have_their_own_recordings_whatever_is_there(environment):
-    parts = build(Config(algorithm="sgim-acts", environment=environment, teachers=FOUR))
+    parts = build(Config("sgim-acts", parts={"environment": environment, "teachers": FOUR}))
     context = np.zeros(parts.environment.contexts.dim)
     for number in (1, 2, 3):
         theirs = load_demonstrations(SHIPPED.with_name(f"demonstrator_{number}.npz"))
@@ -109,11 +111,11 @@ def test_demonstrators_have_their_own_recordings_whatever_is_there(environment):
 
 def test_a_demonstrator_of_the_rod_teaches_no_other_robot():
     with pytest.raises(ValueError, match="demonstrator 2 has shown the fishing rod, and nothing that this robot could"):
-        build(Config(algorithm="sgim-acts", environment="planar-arm-7", teachers=("demonstrator-2",)))
+        build(Config("sgim-acts", parts={"environment": "planar-arm-7", "teachers": ("demonstrator-2",)}))
 
 
 def test_the_toss_is_demonstrated_in_winds_all_over_c():
-    robot = build(Config(algorithm="random", environment="toss")).environment
+    robot = build(Config("random", parts={"environment": "toss"})).environment
     shown = toy_demonstrations(robot)
     assert len(shown) > 100
     winds = np.array([each.context[0] for each in shown])
@@ -128,7 +130,7 @@ def test_the_toss_is_demonstrated_in_winds_all_over_c():
 def test_a_run_on_the_toss_asks_in_its_own_wind_and_gets_the_nearest_of_goal_and_wind(tmp_path):
     directory = go(tmp_path, "--environment=toss", "--algorithm=sgim-im", "--teachers=all")
     run = read_run(directory)
-    asked, shown = run.requests, toy_demonstrations(build(Config(algorithm="random", environment="toss")).environment)
+    asked, shown = run.requests, toy_demonstrations(build(Config("random", parts={"environment": "toss"})).environment)
     dim = run.contexts.shape[1] + run.outcomes.shape[1]
     points = np.array([[*each.context, *each.outcome] for each in shown])
     wanted = np.stack([asked[f"wanted_{k}"] for k in range(dim)], axis=1)
@@ -144,7 +146,7 @@ def test_a_run_on_the_toss_asks_in_its_own_wind_and_gets_the_nearest_of_goal_and
 
 def test_who_mislabels_says_so_and_the_movement_is_recorded(whole):
     asked, run = read_run(whole).requests, read_run(whole)
-    parts = build(Config(algorithm="sgim-acts", environment="planar-arm-7", teachers=("all",)))
+    parts = build(Config("sgim-acts", parts={"environment": "planar-arm-7", "teachers": ("all",)}))
     wrong = AnsweringTeacher(parts.demonstrations, stream(3, "teacher mislabelling"), knows=mislabelled).demonstrations
     said = {tuple(each.outcome): each.trajectory for each in wrong}
     mine = (asked["teacher"] == "mislabelling") & (asked["reply"] == "shown")

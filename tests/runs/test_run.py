@@ -23,7 +23,7 @@ from sgimd_torch.runs.process import Stopped, Stopping
 from sgimd_torch.runs.read import config_of, read_run
 from sgimd_torch.spaces import Demonstration, stream
 
-MODEL_SEARCHES = [word for word, entry in CATALOGUE["search"].items() if "model" in entry.uses]
+MODEL_SEARCHES = ["gradient", "gauss-newton"]
 
 
 @pytest.mark.parametrize("algorithm", CATALOGUE["algorithm"])
@@ -102,7 +102,9 @@ def test_an_inverse_answers_alike_whether_it_is_the_runs_own_or_another(tmp_path
     """Imitators with different inverses remember the same, so nearest and linear land at the same places."""
     found, logs = zip(
         *(
-            answers_of(tmp_path / own, go, "--algorithm", "imitation", "--inverse", own, "--answers", f"own,{other}")
+            answers_of(
+                tmp_path / own, go, "--algorithm", "imitation", "--inverse", own, "--evaluated-by", f"own,{other}"
+            )
             for own, other in (("nearest", "linear"), ("linear", "nearest"))
         ),
         strict=True,
@@ -118,7 +120,7 @@ def test_an_inverse_answers_alike_whether_it_is_the_runs_own_or_another(tmp_path
 
 def test_what_a_run_learns_with_answers_once_for_both_of_its_names(tmp_path, go):
     found, _ = answers_of(
-        tmp_path, go, "--algorithm", "sgim-d", "--inverse", "linear", "--answers", "own,nearest,linear"
+        tmp_path, go, "--algorithm", "sgim-d", "--inverse", "linear", "--evaluated-by", "own,nearest,linear"
     )
     assert found["linear"]["mean_error"].tolist() == found["own"]["mean_error"].tolist()
     assert np.isfinite(found["own"]["noise_floor"]).all()
@@ -129,13 +131,13 @@ def test_what_a_run_learns_with_answers_once_for_both_of_its_names(tmp_path, go)
 
 
 def test_a_run_has_the_answers_that_were_asked_for_and_its_movements_do_not_depend_on_them(tmp_path, go, reference):
-    found, log = answers_of(tmp_path, go, "--answers", "own,nearest,paper,model")
+    found, log = answers_of(tmp_path, go, "--evaluated-by", "own,nearest,paper,model")
     assert list(found) == ["own", "nearest", "paper"]  # there is no model
     assert log == reference["events"]
 
 
 def test_threads_change_nothing(tmp_path, go, reference):
-    assert go(tmp_path, "--threads", 2) == 0
+    assert go(tmp_path, "--environment.threads", 2) == 0
     assert content_of(tmp_path / "sgim-d" / "seed-003") == reference
 
 
@@ -159,7 +161,7 @@ def test_a_benchmark_for_another_environment_is_refused(tmp_path, go, capsys):
 
 def test_a_diverging_simulation_is_reported_with_its_theta_and_leaves_a_whole_record(tmp_path, monkeypatch, go, capsys):
     monkeypatch.chdir(tmp_path)  # where MuJoCo writes a log of its own
-    assert go(tmp_path, "--noise", "1e4") == 1  # commands of thousands of rad
+    assert go(tmp_path, "--environment.noise", "1e4") == 1  # commands of thousands of rad
     errors = capsys.readouterr().err
     assert "theta=[0." in errors
     assert "Traceback" not in errors
@@ -171,30 +173,38 @@ def test_a_diverging_simulation_is_reported_with_its_theta_and_leaves_a_whole_re
 
 
 @pytest.mark.parametrize(
-    ("option", "table"), [item for item in CATALOGUE.items() if item[0] not in ("algorithm", "environment")]
+    ("kind", "table"), [item for item in CATALOGUE.items() if item[0] not in ("algorithm", "environment")]
 )
-def test_every_choice_runs_and_differs_from_the_others(tmp_path, go, option, table):
+def test_every_choice_runs_and_differs_from_the_others(tmp_path, go, kind, table):
     logs = set()
+    option = {"progress": "goals.progress", "choose": "teacher.choose"}.get(kind, kind)
     # Short attempts and a short window, so that the map is split, and has its say, before the run is over.
-    common = ("--every", 20, "--budget", 3, "--imitations", 3, "--window", 4, "--movements", 240, "--evaluate_at", "[]")
+    common = ["--movements", 240, "--evaluate_at", "[]"]
+    common += ["--algorithm", "sgim-im"] if kind in ("teachers", "base") else ["--budget", 3]
+    common += ["--teacher.every", 20] if kind == "choose" else []
+    common += ["--goals.window", 4] if kind == "progress" else []
     # See the next two tests; a person who is not there is like no teacher, and demonstrator 3 is all there are.
     left_out = *MODEL_SEARCHES, "model", "model-proved", "by-hand", "demonstrator-3"
     choices = [choice for choice in table if choice not in left_out]
-    asking = {"teachers": "sgim-im", "base": "sgim-im", "doubt": "sgim-eer"}  # the others ask nobody
-    learner = ("--algorithm", asking[option]) if option in asking else ()
     for choice in choices:
-        assert go(tmp_path, "--name", choice, f"--{option}", choice, *common, *learner) == 0
+        assert go(tmp_path, "--name", choice, f"--{option}", choice, *common) == 0
         logs.add(tuple(content_of(tmp_path / choice / "seed-003")["events"]))
     assert len(logs) == len(choices)
 
 
-ON_THE_ARM = "--environment planar-arm-7 --benchmark null --movements 400 --evaluate_at 200 --repeats 0 --training 4"
+ON_THE_ARM = "--environment planar-arm-7 --benchmark null --movements 400 --evaluate_at 200 --repeats 0"
+
+
+def on_the_arm(tmp_path, go, option, word):
+    """A run of 400 movements that is named after what was chosen; its model learns quickly, if it has one."""
+    learning = ("--model.rate", 4) if word in MODEL_SEARCHES or word.startswith("model") else ()
+    return go(tmp_path, "--name", word, option, word, *ON_THE_ARM.split(), *learning)
 
 
 def test_every_search_through_the_model_runs_and_differs_from_the_others(tmp_path, go):
     searches = ("nelder-mead", *MODEL_SEARCHES)
     for search in searches:
-        assert go(tmp_path, "--name", search, "--search", search, *ON_THE_ARM.split()) == 0
+        assert on_the_arm(tmp_path, go, "--search", search) == 0
     runs = [read_run(tmp_path / search / "seed-003") for search in searches]
     assert len({run.thetas.tobytes() for run in runs}) == len(searches)
 
@@ -202,7 +212,7 @@ def test_every_search_through_the_model_runs_and_differs_from_the_others(tmp_pat
 def test_the_inverse_through_the_model_lives_as_the_linear_one_and_answers_better(tmp_path, go):
     runs = {}
     for inverse in ("linear", "model"):
-        assert go(tmp_path, "--name", inverse, "--inverse", inverse, *ON_THE_ARM.split()) == 0
+        assert on_the_arm(tmp_path, go, "--inverse", inverse) == 0
         runs[inverse] = read_run(tmp_path / inverse / "seed-003")
     np.testing.assert_array_equal(runs["model"].thetas, runs["linear"].thetas)
     assert runs["model"].evaluation["mean_error"][-1] < 0.7 * runs["linear"].evaluation["mean_error"][-1]
@@ -211,7 +221,7 @@ def test_the_inverse_through_the_model_lives_as_the_linear_one_and_answers_bette
 def test_the_model_that_proves_itself_lives_as_the_process_and_answers_no_worse(tmp_path, go):
     runs = {}
     for inverse in ("process", "model-proved"):
-        assert go(tmp_path, "--name", inverse, "--inverse", inverse, *ON_THE_ARM.split()) == 0
+        assert on_the_arm(tmp_path, go, "--inverse", inverse) == 0
         runs[inverse] = read_run(tmp_path / inverse / "seed-003")
     np.testing.assert_array_equal(runs["model-proved"].thetas, runs["process"].thetas)
     errors = [run.evaluation["mean_error"][-1] for run in runs.values()]
@@ -349,7 +359,7 @@ def test_small_matrices_get_one_thread_unless_the_user_chose(chosen, threads):
 
 def test_practice_learns_and_answers_by_the_same_inverse(tmp_path):
     learning = ["--algorithm", "practice", "--environment", "two-elbows", "--movements", "60", "--evaluate-at", "60"]
-    options = [*learning, "--repeats", "0", "--answers", "own,process,nearest", "--out", str(tmp_path)]
+    options = [*learning, "--repeats", "0", "--evaluated-by", "own,process,nearest", "--out", str(tmp_path)]
     errors = {}
     for name, more in (("default", []), ("named", ["--inverse", "nearest"])):
         assert main([*options, "--name", name, *more]) == 0

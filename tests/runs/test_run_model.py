@@ -12,7 +12,6 @@ from tensorboard.util.tensor_util import make_ndarray
 
 from runs import LIVE, RUN, about_of, content_of, edit, end, start, stopped_at
 from sgimd_torch.board.legend import LEGEND
-from sgimd_torch.catalogue import CATALOGUE
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import Benchmark, save_benchmark
 from sgimd_torch.forward_model.model import ForwardModel
@@ -29,7 +28,7 @@ from sgimd_torch.runs.read import read_run
 from sgimd_torch.spaces import Episode, Move, stream
 
 MOVEMENTS = 170
-MODEL = ("--inverse", "model", "--search", "gradient")
+MODEL = ("--inverse", "model", "--search", "gradient", "--model.rate", 2)
 TAGS = {tag for tag in LEGEND if tag.startswith("model/")}
 NO_CONTEXT = np.empty(0)
 
@@ -40,7 +39,7 @@ def arguments(tmp_path_factory):
     path = tmp_path_factory.mktemp("benchmark") / "arm.npz"
     save_benchmark(path, Benchmark("PlanarArm", np.array([[0.0, 0.6], [0.3, -0.5], [-0.4, 0.4]]), 0.1))
     short = f"--algorithm sgim-d --environment planar-arm-7 --seed 3 --movements {MOVEMENTS}"
-    short = f"{short} --evaluate_at 120 --repeats 0 --training 2"
+    short = f"{short} --evaluate_at 120 --repeats 0"
 
     def arguments(out, *options):
         return [str(word) for word in (*short.split(), "--benchmark", path, "--out", out, *options)]
@@ -173,7 +172,7 @@ def test_a_model_that_is_asked_is_announced_once(tmp_path, live, capsys):
     ("options", "why", "rows"),
     [
         (("--movements", 40), "there were too few exemplars to train it", 0),
-        (("--movements", 60, "--training", 0.02), r"its relative error is \d\.\d+, it is trusted up to 0\.25", 1),
+        (("--movements", 60, "--model.rate", 0.02), r"its relative error is \d\.\d+, it is trusted up to 0\.25", 1),
     ],
 )
 def test_a_model_that_was_never_asked_is_reported(tmp_path, live, capsys, options, why, rows):
@@ -241,20 +240,22 @@ def test_the_curves_are_those_of_the_newest_refresh(record):
     assert curves["model/coverage"] == (squared < -2 * np.log(0.2)).mean()  # chi-squared, two dimensions
 
 
-@pytest.mark.parametrize("search", [word for word, entry in CATALOGUE["search"].items() if "model" in entry.uses])
+@pytest.mark.parametrize("search", ["gradient", "gauss-newton"])
 def test_a_search_through_the_model_makes_one_of_the_size_of_its_robot(search):
     environments = {"planar-arm-50": (50, LEAST_NOISE), "fishing-rod": (25, None)}
+    networks = {"model.members": 2, "model.rate": 1.5, "model.noise_heads": False}
     for environment, (theta_dim, noise) in environments.items():
-        parts = build(Config(search=search, environment=environment, members=2, training=1.5, noise_heads=False))
+        parts = build(Config(parts={"search": search, "environment": environment, **networks}))
         assert parts.model.sizes == {"context_dim": 0, "theta_dim": theta_dim, "outcome_dim": 2}
         assert (parts.model.members, parts.model.rate, parts.model.noise_heads) == (2, 1.5, False)
         assert parts.trust.noise == (parts.environment.outcome_noise if noise is None else noise)
         assert parts.trust.anchors
-    assert build(Config(search="nelder-mead")).model is None
+    assert build(Config(parts={"search": "nelder-mead"})).model is None
 
 
 @pytest.mark.parametrize(
-    "option", [("--members", 1), ("--noise_heads", "false"), ("--focus", 0.5), ("--anchored", "false")]
+    "option",
+    [("--model.members", 1), ("--model.noise_heads", "false"), ("--model.focus", 0.5), ("--trust.anchors", "false")],
 )
 def test_an_option_of_the_model_changes_the_run(tmp_path, live, reference, option):
     assert live(tmp_path, *MODEL, *option, "--movements", 100) == 0
@@ -264,7 +265,7 @@ def test_an_option_of_the_model_changes_the_run(tmp_path, live, reference, optio
 
 
 def test_the_outcomes_of_a_search_change_its_next_movement_unless_they_are_left_out(tmp_path, live, reference):
-    assert live(tmp_path, *MODEL, "--residual", "false", "--movements", 100) == 0
+    assert live(tmp_path, *MODEL, "--search.residual", "false", "--movements", 100) == 0
     left_out, counted = read_run(tmp_path / "sgim-d" / "seed-003"), read_run(reference)
     first = np.flatnonzero((left_out.thetas != counted.thetas[:100]).any(axis=1))[0]
     assert np.array_equal(left_out.goals[first], left_out.goals[first - 1])  # not the first movement for its goal
@@ -300,14 +301,14 @@ def test_its_libraries_are_recorded(reference):
 
 def test_a_run_is_not_resumed_with_another_model(tmp_path, live, capsys):
     assert live(tmp_path, *MODEL, "--movements", 10) == 0
-    assert live(tmp_path, *MODEL, "--movements", 10, "--resume", "--training", 3, "--anchored", "false") == 2
+    assert live(tmp_path, *MODEL, "--movements", 10, "--resume", "--model.rate", 3, "--trust.anchors", "false") == 2
     message = capsys.readouterr().err
-    assert "training was 2.0, now 3.0" in message
-    assert "anchored was True, now False" in message
+    assert "model.rate was 2.0, now 3.0" in message
+    assert "trust.anchors was True, now False" in message
 
 
 def test_a_run_that_learns_a_model_but_answers_without_it_is_evaluated_by_both(tmp_path, live):
-    options = ("--search", "gradient", "--inverse", "linear", "--answers", "own,nearest,linear,model")
+    options = (*MODEL, "--inverse", "linear", "--evaluated-by", "own,nearest,linear,model")
     assert live(tmp_path, *options) == 0
     answers = read_run(tmp_path / "sgim-d" / "seed-003").answers
     assert list(answers) == ["own", "nearest", "linear", "model"]

@@ -6,7 +6,6 @@ import sys
 from functools import partial
 
 import pytest
-from sgimd_torch.runs.log import read_json
 
 from runs import ROOT, about_of, content_of
 from sgimd_torch.catalogue import source

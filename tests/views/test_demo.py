@@ -65,14 +65,14 @@ def test_the_table_compares_the_learners_in_error_noise_and_seconds(runs):
     assert heads[:4] == ["learner", "error 60 (m)", "of Random's", "noise floor (m)"]
     random = runs["random"].at(60)
     for row, name, run in zip(rows, NAMES, runs.values(), strict=True):
-        error, floor = run.at(60), run.evaluation["noise_floor_m"][-1]
+        error, floor = run.at(60), run.evaluation["noise_floor"][-1]
         assert row[:4] == [name, f"{error:.3f}", f"{error / random:.2f}", f"{floor:.3f}"]
         assert row[4] == f"{run.summary['seconds_physics']:.0f}"
 
 
 def test_the_table_of_long_runs_has_columns_on_the_way_too(runs):
     when = np.array([500, 1000, 2000, 3000])
-    columns = {"movements": when, "mean_error_m": 100.0 / when, "noise_floor_m": np.full(4, 0.01)}
+    columns = {"movements": when, "mean_error": 100.0 / when, "noise_floor": np.full(4, 0.01)}
     longer = {algorithm: replace(run, answers=dict.fromkeys(run.answers, columns)) for algorithm, run in runs.items()}
     heads, random, *_ = table(longer)
     assert [head for head in heads if head.startswith("error")] == [f"error {n} (m)" for n in (1000, 2000, 3000)]
@@ -83,7 +83,7 @@ def test_the_figure_shows_the_data_of_the_runs(runs):
     curves, above, side, *landed = draw(runs).axes[:6]
     for line, run in zip(curves.lines, runs.values(), strict=True):
         np.testing.assert_array_equal(line.get_xdata(), [30, 60])
-        np.testing.assert_array_equal(line.get_ydata(), run.evaluation["mean_error_m"])
+        np.testing.assert_array_equal(line.get_ydata(), run.evaluation["mean_error"])
     paths = [line for line in above.lines if line.get_linestyle() == ":"]
     assert len(paths) == len(GOALS) * len(runs)
     assert len([line for line in side.lines if line.get_linestyle() == ":"]) == len(runs)  # for the first goal
@@ -134,7 +134,7 @@ def test_impossible_requests_are_refused_before_anything_is_written(tmp_path, mo
 
 
 def test_options_of_a_run_are_those_of_all_three():
-    configs = configs_of(["--seed", "4", "--movements=70", "--noise", "0"])
+    configs = configs_of(["--seed", "4", "--movements=70", "--environment.noise", "0"])
     assert [*configs] == [*LEARNERS]
-    assert {(config.seed, config.noise, config.floor_at) for config in configs.values()} == {(4, 0.0, (70,))}
+    assert {(config.seed, config["environment.noise"], config.floor_at) for config in configs.values()} == {(4, 0.0, (70,))}
     assert {config.out for config in configs_of([]).values()} == {Path("runs/demo")}

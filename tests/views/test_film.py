@@ -196,7 +196,7 @@ def test_the_memory_rebuilt_from_the_log_judges_as_the_living_one_did(tmp_path, 
     remember(run, parts, 0, 20)
     remember(run, parts, 20, 35)  # in two steps, as a time lapse does
     seen = evaluate(parts.inverse, parts.environment, parts.benchmark.goals, 3, 35, repeats=0)
-    assert seen.mean_error == run.evaluation["mean_error_m"][0]
+    assert seen.mean_error == run.evaluation["mean_error"][0]
 
 
 def test_a_forward_model_learns_again_what_it_learnt_in_the_run(tmp_path, go):
@@ -205,8 +205,7 @@ def test_a_forward_model_learns_again_what_it_learnt_in_the_run(tmp_path, go):
     parts = build(film.config_of(run))
     remember(run, parts, 0, 60)
     remember(run, parts, 60, 150)
-    errors = [line.split(",")[4] for line in (run.path / "refreshes.csv").read_text().splitlines()]
-    assert errors[-1] == repr(parts.model.relative_error)
+    assert run.refreshes["relative_error"][-1] == parts.model.relative_error
 
 
 @pytest.mark.parametrize(

@@ -14,10 +14,10 @@ from runs import ROOT
 from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.runs.command_line import main as run
-from sgimd_torch.runs.config import Config, plain, words
+from sgimd_torch.runs.config import Config, words
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
-from sgimd_torch.runs.tasks import arm_demonstrations
+from sgimd_torch.runs.tasks.robots import arm_demonstrations
 from sgimd_torch.teachers.by_hand import BY_HAND, ByHand
 from sgimd_torch.views.teach import main, options_of
 from sgimd_torch.views.teach.arm import Hanging
@@ -76,13 +76,13 @@ def test_a_lesson_is_answered_at_once_also_while_the_learner_is_paused(paused):
     session = paused()
     assert session.state.movements == 30
     session.show(SHOWN[7]).result()
-    assert session.state.movements == 30 + session.config.imitations
+    assert session.state.movements == 30 + session.config["imitations"]
     assert session.state.lessons == (30,)
     rows = [episode for episode in session.state.latest if episode.index >= 30]
     assert {episode.move.origin for episode in rows} == {"imitate"}
     assert np.array_equal(rows[0].demonstration.trajectory, SHOWN[7].trajectory)
     try_goal(session, GOAL).result()
-    assert session.state.movements == 30 + session.config.imitations  # and then it waits again
+    assert session.state.movements == 30 + session.config["imitations"]  # and then it waits again
 
 
 def test_a_learner_that_is_not_paused_goes_on_by_itself(paused):
@@ -150,7 +150,7 @@ def test_a_run_that_was_taught_goes_on_without_a_page(paused, teacher):
     session.show(SHOWN[7]).result()
     session.__exit__()
     before = lived(session.run.path)
-    assert command(run, [*words(vars(replace(session.config, movements=60))), "--resume"]) == 0
+    assert command(run, [*words(replace(session.config, movements=60)), "--resume"]) == 0
     assert_same(before, lived(session.run.path), 40)
     found = read_run(session.run.path.parent)
     assert np.array_equal(found.demonstrations[found.demonstration[30]].trajectory, SHOWN[7].trajectory)
@@ -248,10 +248,10 @@ def test_a_learner_that_asks_waits_for_the_answer(paused):
 KILLED = f"""
 import json, sys; sys.path.insert(0, {str(ROOT / "tests")!r})
 from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.runs.config import from_settings
-from sgimd_torch.runs.tasks import arm_demonstrations
+from sgimd_torch.runs.config import Config
+from sgimd_torch.runs.tasks.robots import arm_demonstrations
 from sgimd_torch.views.teach.session import Session
-session = Session(from_settings(json.loads(sys.argv[1])))
+session = Session(Config.from_settings(json.loads(sys.argv[1])))
 session.pause(True)
 session.__enter__()
 for shown in arm_demonstrations(PlanarArm())[5:7]:
@@ -265,7 +265,7 @@ sys.stdin.read()
 def test_a_killed_session_loses_nothing_that_was_shown(tmp_path):
     config = taught(tmp_path)
     process = subprocess.Popen(
-        [sys.executable, "-c", KILLED, json.dumps(plain(vars(config)))],
+        [sys.executable, "-c", KILLED, json.dumps(config.settings)],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
@@ -305,7 +305,7 @@ def test_a_run_that_is_taught_has_a_person_as_its_teacher(tmp_path, paused):
     config, port = options_of(["--seed", "4", "--port", "9000", "--out", str(tmp_path)])
     assert (config.directory, config["teacher"], port) == (tmp_path / "taught" / "seed-004", "by-hand", 9000)
     config, _ = options_of(["--algorithm", "sgim-im"])
-    assert config.teachers == ("by-hand",)
+    assert config["teachers"] == ("by-hand",)
     session = paused()
     session.__exit__()
     config, _ = options_of([str(session.run.path.parent)])
