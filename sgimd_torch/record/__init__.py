@@ -358,6 +358,10 @@ def _connect(path: Path, write: bool) -> sqlite3.Connection:
     try:
         mode = "rw" if os.access(path, os.W_OK) and os.access(path.parent, os.W_OK) else "ro"
         # Read-only, SQLite could not clean up after a writer that was killed.
-        return sqlite3.connect(f"{place}?mode={mode}", uri=True, isolation_level=None, timeout=0.5 if write else 10.0)
+        patience = 0.5 if write else 10.0
+        # One thread opens a run that is taught, and another one then lives it; never two at a time.
+        return sqlite3.connect(
+            f"{place}?mode={mode}", uri=True, isolation_level=None, timeout=patience, check_same_thread=False
+        )
     except (sqlite3.Error, OSError) as error:
         raise RunError(f"{path} cannot be opened: {error}") from error

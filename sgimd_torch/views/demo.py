@@ -54,8 +54,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     configs = configs_of(rest)
     with loading():  # after --help, and before the runs: it may not be installed
         from sgimd_torch.figures.save import save_figure
+        from sgimd_torch.runs.build import build
         from sgimd_torch.views.demo_figure import draw, table
     began, base = time.monotonic(), configs["sgim-d"]
+    for config in configs.values():
+        build(config)  # a wrong option is refused before anything starts
     say(f"{len(configs)} learners, {base.movements} movements each, seed {base.seed}, two at a time: {base.out}")
     say(*(f"{label(algorithm)} {does}" for algorithm, does in LEARNERS.items()))
     longest_first = [config for config in reversed(configs.values()) if not finished(config)]

@@ -136,5 +136,7 @@ def test_impossible_requests_are_refused_before_anything_is_written(tmp_path, mo
 def test_options_of_a_run_are_those_of_all_three():
     configs = configs_of(["--seed", "4", "--movements=70", "--environment.noise", "0"])
     assert [*configs] == [*LEARNERS]
-    assert {(config.seed, config["environment.noise"], config.floor_at) for config in configs.values()} == {(4, 0.0, (70,))}
+    assert {(config.seed, config["environment.noise"], config.floor_at) for config in configs.values()} == {
+        (4, 0.0, (70,))
+    }
     assert {config.out for config in configs_of([]).values()} == {Path("runs/demo")}

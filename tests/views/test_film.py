@@ -14,8 +14,10 @@ from runs import ROOT
 from sgimd_torch.environments.fishing_rod import HOLD, FishingRod
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import evaluate
+from sgimd_torch.record import Record
 from sgimd_torch.runs import command_line
 from sgimd_torch.runs.build import build
+from sgimd_torch.runs.directory import FILE
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.spaces import stream
@@ -233,13 +235,14 @@ def test_what_cannot_be_filmed_is_refused_with_its_reason(run_path, capsys, opti
 
 
 def test_a_run_without_movements_is_refused(run_path, tmp_path, capsys):
-    empty = tmp_path / "seed-000"
+    empty = tmp_path / run_path.name
     empty.mkdir()
     assert command(film.main, [str(empty)]) == 2
-    (empty / "config.json").write_bytes((run_path / "config.json").read_bytes())
+    with Record(run_path / FILE) as whole:
+        Record.make(empty / FILE, whole.dims, whole.about).close()
     assert command(film.main, [str(empty)]) == 2
     said = capsys.readouterr().err
-    assert "is no run directory" in said
+    assert "holds no run;" in said
     assert "has no movements yet" in said
 
 

@@ -49,7 +49,11 @@ def test_each_task_is_run_with_the_learner_and_with_the_two_that_it_has_to_beat(
     assert {(config["environment"], config.values.get("environment.task_space"), config.seed) for config in ours} == {
         (word, side, seed) for word, side in (("toss", None), ("fishing-rod", 100.0)) for seed in (3, 4)
     }
-    assert {(config.variant, config.values.get("budget")) for config in configs} == {(RANDOM, None), (UNIFORM, 1), ("practice", 7)}
+    assert {(config.variant, config.values.get("budget")) for config in configs} == {
+        (RANDOM, None),
+        (UNIFORM, 1),
+        ("practice", 7),
+    }
     assert {(config.movements, config.evaluate_at) for config in configs} == {(40, (20,))}
 
 

@@ -13,6 +13,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from sgimd_torch.record import RunError
 from sgimd_torch.runs.config import PLACE, Config, words
 from sgimd_torch.runs.read import Run, config_of
 from sgimd_torch.views.statistics import LEAST_SEEDS
@@ -92,18 +93,23 @@ def checkout(variants: Sequence[Variant]) -> str:
 
 
 def commands(runs: Sequence[Run]) -> list[str]:
-    """A line of shell for all runs of the same settings, defaults left out."""
+    """A line of shell for all runs of the same settings, defaults left out; a comment for a run of another version."""
     groups: dict[str, list[int]] = {}
+    refused = []
     for run in runs:
-        config = config_of(run)
+        try:
+            config = config_of(run)
+        except RunError as error:  # the report is of what was recorded, whatever can be run today
+            refused.append(f"# {' '.join(str(error).split())}")
+            continue
         name = None if config.name == config.algorithm else config.name  # a run is named after its algorithm anyway
         own = replace(config, seed=Config.seed, out=Config.out, name=name, board=False)
         groups.setdefault(shlex.join(words(own)), []).append(int(run.config["seed"]))
-    lines = []
+    lines = list[str]()
     for given, seeds in groups.items():
         line = f"sgimd run {given} --seed={'$seed' if len(seeds) > 1 else seeds[0]} --out={AGAIN}"
         lines.append(f"for seed in {' '.join(map(str, seeds))}; do\n  {line}\ndone" if len(seeds) > 1 else line)
-    return lines
+    return [*lines, *refused]
 
 
 def settings(config: Mapping[str, Any]) -> str:

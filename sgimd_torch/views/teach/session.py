@@ -184,12 +184,14 @@ class Session:
             traceback.print_exc()
             problem = f"{type(error).__name__}: {error}"
         finally:
-            self.run.close()
-            self._tell(problem=problem, busy="", waiting=False)
-            while not self._tasks.empty():
-                self._later.append(self._tasks.get()[0])
-            for future in self._later:
-                future.set_exception(ValueError(problem))
+            try:
+                self.run.close()
+            finally:  # nobody waits for ever, not even if the disk is full
+                self._tell(problem=problem, busy="", waiting=False)
+                while not self._tasks.empty():
+                    self._later.append(self._tasks.get()[0])
+                for future in self._later:
+                    future.set_exception(ValueError(problem))
 
     def _live(self) -> None:
         """The run from where it is to its end, and then whatever is wanted."""

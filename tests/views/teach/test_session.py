@@ -29,9 +29,10 @@ GOAL = np.array([0.3, 0.4])
 
 
 def taught(out, **options):
-    """A run on the small arm."""
+    """A run on the small arm; ``teacher`` is None for a learner to whom nobody comes."""
     given = {"algorithm": "sgim-d", "teacher": "by-hand", "movements": 300, "evaluate_at": (20,), **options}
-    return Config.from_settings({**given, "name": "taught", "out": out, "repeats": 0, "environment": "planar-arm-7"})
+    settings = {name: value for name, value in given.items() if value is not None}
+    return Config.from_settings({**settings, "name": "taught", "out": out, "repeats": 0, "environment": "planar-arm-7"})
 
 
 @pytest.fixture
@@ -76,13 +77,13 @@ def test_a_lesson_is_answered_at_once_also_while_the_learner_is_paused(paused):
     session = paused()
     assert session.state.movements == 30
     session.show(SHOWN[7]).result()
-    assert session.state.movements == 30 + session.config["imitations"]
+    assert session.state.movements == 30 + session.config["social.repeats"]
     assert session.state.lessons == (30,)
     rows = [episode for episode in session.state.latest if episode.index >= 30]
     assert {episode.move.origin for episode in rows} == {"imitate"}
     assert np.array_equal(rows[0].demonstration.trajectory, SHOWN[7].trajectory)
     try_goal(session, GOAL).result()
-    assert session.state.movements == 30 + session.config["imitations"]  # and then it waits again
+    assert session.state.movements == 30 + session.config["social.repeats"]  # and then it waits again
 
 
 def test_a_learner_that_is_not_paused_goes_on_by_itself(paused):
@@ -198,10 +199,10 @@ def test_a_trial_changes_nothing_and_lands_where_the_arm_without_noise_does(paus
     [
         ({}, lambda session: try_goal(session, np.array([3.0, 0.4])), "goal"),
         ({}, lambda session: session.show(replace(SHOWN[0], trajectory=100 * SHOWN[0].trajectory)), "first joint"),
-        ({"algorithm": "sagg-riac"}, lambda session: session.show(SHOWN[0]), "sagg-riac learns alone"),
+        ({"algorithm": "sagg-riac", "teacher": None}, lambda session: session.show(SHOWN[0]), "sagg-riac learns alone"),
         ({"movements": 30}, lambda session: session.show(SHOWN[0]), "--movements 60"),
         (
-            {"algorithm": "sgim-im", "teachers": ("by-hand",)},
+            {"algorithm": "sgim-im", "teacher": None, "teachers": ("by-hand",)},
             lambda session: session.show(SHOWN[0]),
             "only when it asks",
         ),
@@ -224,7 +225,7 @@ def test_a_session_that_has_ended_says_so_to_whoever_asks(paused):
 
 
 def test_a_learner_that_asks_waits_for_the_answer(paused):
-    session = paused(1, algorithm="sgim-im", teachers=("by-hand",), teacher="periodic")
+    session = paused(1, algorithm="sgim-im", teachers=("by-hand",), teacher=None)
     session.answered = True
     session.pause(False)
     asked = session.when(lambda state: state.waiting)
@@ -314,5 +315,5 @@ def test_a_run_that_is_taught_has_a_person_as_its_teacher(tmp_path, paused):
     shutil.copytree(session.run.path.parent, moved)
     with pytest.raises(ValueError, match="must be called"):
         options_of([str(moved)])
-    with pytest.raises(ValueError, match="no run directory"):
+    with pytest.raises(ValueError, match="holds no run"):
         options_of([str(tmp_path)])
