@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterator, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -73,33 +74,37 @@ def run(
     if record is not None:
         before = yield from replay(learner, record.events(), teacher=teacher)
         first = learner.movements
-    tell = (lambda event: None) if record is None else record.add
+
+    def note(kind: Kind, context: Array | None = None, **more: Any) -> None:
+        if record is not None:
+            record.add(Event(kind, context, **more))
+
     for index in range(first, movements):
         (demonstration, request, reply), before = before, BeforeMovement()
         asks = None if learner.lesson_waits else teacher
         offered = None if asks is None else asks.offer(index, learner.memory)
         if offered is not None:
             learner.watch(offered, offered=True)
-            tell(Event(Kind.SHOWN, lesson=offered, who=getattr(teacher, "who", TEACHER)))
+            note(Kind.SHOWN, lesson=offered, who=getattr(teacher, "who", TEACHER))
             demonstration = offered
         context = read_only(environment.observe(stream(seed, "context", index))) if learner.idle else learner.context
         asked = learner.request(context) if teachers and request is None else None
         if asked is not None and teachers is not None:
             answer, reply = _asked(learner, environment, context, asked, teachers)
             request = asked
-            tell(Event(Kind.ASKED, context, goal=asked.goal, who=asked.teacher, strategy=asked.strategy, reply=reply))
+            note(Kind.ASKED, context, goal=asked.goal, who=asked.teacher, strategy=asked.strategy, reply=reply)
             if answer is not None:
                 learner.watch(answer)
-                tell(Event(Kind.SHOWN, lesson=answer, who=asked.teacher))
+                note(Kind.SHOWN, lesson=answer, who=asked.teacher)
                 demonstration = answer
         move, outcome = learner.ask(context), None
         if move is None:
-            tell(Event(Kind.RESTED, context))
+            note(Kind.RESTED, context)
         else:
             outcome = execute(index, context, move.theta)
             learner.tell(outcome)
             outcome = np.asarray(outcome, dtype=np.float64)  # as memory keeps it, also of integers
-            tell(Event(Kind.MOVED, context, move.theta, move.goal, outcome, move.origin))
+            note(Kind.MOVED, context, theta=move.theta, goal=move.goal, outcome=outcome, origin=move.origin)
         yield Episode(index, context, move, outcome, demonstration, request, reply)
 
 

@@ -39,15 +39,15 @@ BY_HAND = {0: 0, 37: 5, 38: 10, 120: 15, 200: 20}  # before which movement a per
 def config_of(run, movements, out):
     """The configuration of a reference run, of so many movements."""
     name, seed = run.split()
-    return Config(
-        **VARIANTS[name],
-        seed=int(seed),
-        movements=movements,
-        evaluate_at=[] if movements == KEPT else (120,),
-        repeats=2,
-        floor_at=(240,),
-        out=out,
-    )
+    fixed = {
+        "seed": int(seed),
+        "movements": movements,
+        "evaluate_at": [] if movements == KEPT else [120],
+        "repeats": 2,
+        "floor_at": [240],
+        "out": out,
+    }
+    return Config.from_settings({**VARIANTS[name], **fixed})
 
 
 def lived(run, movements, out, *, until=None):

@@ -8,16 +8,14 @@ attempt, too. So nothing but events has to be kept; ``record.py`` keeps them.
 from __future__ import annotations
 
 from collections.abc import Generator, Iterable
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Final, NamedTuple, Protocol
 
 import numpy as np
 
+from sgimd_torch.memory import Memory
 from sgimd_torch.record import Event, Kind
-from sgimd_torch.spaces import Array, Demonstration, Episode, Request
+from sgimd_torch.spaces import Array, Demonstration, Episode, Move, Request
 from sgimd_torch.teachers import Teacher
-
-if TYPE_CHECKING:
-    from sgimd_torch.learner import Learner
 
 TEACHER: Final = "teacher"
 """Who has shown what the teacher of a run offered."""
@@ -36,8 +34,33 @@ class BeforeMovement(NamedTuple):
     reply: str = ""
 
 
+class Lives(Protocol):
+    """What can live through a life again: a `Learner`, which this file cannot import, since that imports this file."""
+
+    memory: Memory
+
+    @property
+    def movements(self) -> int: ...
+
+    @property
+    def social(self) -> object: ...
+
+    @property
+    def waits_for_answer(self) -> bool: ...
+
+    def ask(self, context: Array, /) -> Move | None: ...
+
+    def request(self, context: Array, /) -> Request | None: ...
+
+    def watch(self, demonstration: Demonstration, /, *, offered: bool) -> None: ...
+
+    def tell(self, outcome: Array, /) -> object: ...
+
+    def interrupt(self) -> object: ...
+
+
 def replay(
-    learner: Learner, events: Iterable[Event], *, teacher: Teacher | None = None
+    learner: Lives, events: Iterable[Event], *, teacher: Teacher | None = None
 ) -> Generator[Episode, None, BeforeMovement]:
     """Let ``learner`` live through ``events``. Nothing is executed and nobody is asked for a demonstration.
 
@@ -95,7 +118,7 @@ def replay(
     return before
 
 
-def _watch(learner: Learner, event: Event) -> None:
+def _watch(learner: Lives, event: Event) -> None:
     assert event.lesson is not None
     if learner.social is None and not learner.waits_for_answer:
         found = f"before movement {learner.movements} it asked for a demonstration, the learner now does not"

@@ -30,7 +30,8 @@ from sgimd_torch.runs.process import command
 tiny = dict(movements=40, evaluate_at=(20,), repeats=2, benchmark=Path(sys.argv.pop(1)))
 variants.EXPERIMENTS.clear()
 variants.EXPERIMENTS["learners"] = {"random": dict(algorithm="random", **tiny)}
-variants.EXPERIMENTS["large-space"] = {"sgim-d-large": dict(algorithm="sgim-d", task_space=100.0, **tiny)}
+large = {"algorithm": "sgim-d", "environment.task_space": 100.0, **tiny}
+variants.EXPERIMENTS["large-space"] = {"sgim-d-large": large}
 variants.EXPERIMENTS["broken"] = {"untaught": dict(algorithm="sgim-d", demonstrations=Path("nowhere.npz"), **tiny)}
 variants.EXPERIMENTS["long"] = {"long-life": dict(algorithm="random", **{**tiny, "movements": 600})}
 variants.EXPERIMENTS["forward-model"] = variants.EXPERIMENTS["learners"]
@@ -134,8 +135,10 @@ def test_rows_of_one_experiment_are_still_to_be_made_for_the_other(tmp_path, mon
 
 def test_a_run_that_lost_its_rows_is_collected_again_and_no_goal_is_counted_twice(go, benchmark, tmp_path):
     name = "sgim-d-large"
-    config = Config("sgim-d", seed=3, movements=30, name=name, task_space=100.0, benchmark=benchmark, out=tmp_path)
-    assert go(tmp_path, "--movements", 30, "--evaluate_at", "20", "--name", name, "--task_space", 100) == 0
+    parts = {"environment.task_space": 100.0}
+    config = Config("sgim-d", seed=3, movements=30, name=name, benchmark=benchmark, out=tmp_path, parts=parts)
+    large = ("--environment.task_space", 100)
+    assert go(tmp_path, "--movements", 30, "--evaluate_at", "20", "--name", name, *large) == 0
     paths = [tmp_path / "results.csv", tmp_path / "goals.csv"]
 
     def collected():
@@ -296,8 +299,9 @@ def test_a_goal_is_claimed_where_something_landed_within_half_a_tile():
 def run_with(origins, goals):
     nothing = np.empty((len(goals), 0))
     return Run(
-        *(Path("nowhere"), {}, {}, {}, np.arange(len(goals)), np.array(origins), np.full(len(goals), -1)),
-        *(nothing, nothing, np.array(goals, dtype=np.float64), nothing, {"own": {}}, None),
+        *(Path("nowhere"), {}, {}, {}, "Robot", {}, {}),
+        *(np.arange(len(goals)), np.array(origins), np.full(len(goals), -1)),
+        *(nothing, nothing, np.array(goals, dtype=np.float64), nothing, {"own": {}}),
     )
 
 

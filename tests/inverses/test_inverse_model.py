@@ -212,7 +212,7 @@ def test_the_neighbours_of_another_context_do_not_count() -> None:
     [
         *((LocalInverse, {"width": width}) for width in (0.0, -1.0, np.nan)),
         (LocallyLinear, {"ridge": 0.0}),
-        (LocalProcess, {"noise": -1.0}),
+        (LocalProcess, {"outcome_noise": -1.0}),
     ],
 )
 def test_numbers_out_of_their_range_are_refused(make: Callable[..., Inverse], options: dict[str, float]) -> None:

@@ -29,8 +29,8 @@ SHORT = [*ALONE, "--algorithm", "random"]
 
 
 def short(out, **changes):
-    changes = {"environment": "planar-arm-7", "algorithm": "random", "movements": 40, **changes}
-    return Config.from_settings({**changes, "repeats": 0, "evaluate_at": (20,), "out": out})
+    fixed = {"environment": "planar-arm-7", "algorithm": "random", "movements": 40, "repeats": 0, "evaluate_at": (20,)}
+    return Config.from_settings({**fixed, "out": out, **changes})
 
 
 def swept(*options):

@@ -33,7 +33,7 @@ def open_tab(browser):
 
 def paused(out, **options):
     given = {"teacher": "by-hand", "movements": 400, "evaluate_at": (), **options}
-    session = Session(Config(name="taught", out=out, repeats=0, **given))
+    session = Session(Config.from_settings({**given, "name": "taught", "out": out, "repeats": 0}))
     session.pause(True)
     session.advance(5)
     return session
