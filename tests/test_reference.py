@@ -1,7 +1,7 @@
 """Eighteen runs of which every movement is known: as long as they come out the same, learning has not changed.
 
-``reference.npz`` has their first 60 movements, of 240, and their evaluations after 120 and 240. Another processor rounds
-otherwise, so numbers are compared to nine digits, not to the last bit.
+``reference.npz`` has their first 60 movements, of 240, and their evaluations after 120 and 240. Another processor
+rounds otherwise, so numbers are compared to nine digits, not to the last bit.
 """
 
 from pathlib import Path

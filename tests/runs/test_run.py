@@ -191,6 +191,7 @@ def test_every_choice_runs_and_differs_from_the_others(tmp_path, go, option, tab
 ON_THE_ARM = "--environment planar-arm-7 --benchmark null --movements 400 --evaluate_at 200 --repeats 0 --training 4"
 
 
+@pytest.mark.slow
 def test_every_search_through_the_model_runs_and_differs_from_the_others(tmp_path, go):
     searches = ("nelder-mead", *MODEL_SEARCHES)
     for search in searches:
@@ -199,6 +200,7 @@ def test_every_search_through_the_model_runs_and_differs_from_the_others(tmp_pat
     assert len({run.thetas.tobytes() for run in runs}) == len(searches)
 
 
+@pytest.mark.slow
 def test_the_inverse_through_the_model_lives_as_the_linear_one_and_answers_better(tmp_path, go):
     runs = {}
     for inverse in ("linear", "model"):
@@ -208,6 +210,7 @@ def test_the_inverse_through_the_model_lives_as_the_linear_one_and_answers_bette
     assert runs["model"].evaluation["mean_error"][-1] < 0.7 * runs["linear"].evaluation["mean_error"][-1]
 
 
+@pytest.mark.slow
 def test_the_model_that_proves_itself_lives_as_the_process_and_answers_no_worse(tmp_path, go):
     runs = {}
     for inverse in ("process", "model-proved"):
