@@ -201,6 +201,7 @@ def on_the_arm(tmp_path, go, option, word):
     return go(tmp_path, "--name", word, option, word, *ON_THE_ARM.split(), *learning)
 
 
+@pytest.mark.slow
 def test_every_search_through_the_model_runs_and_differs_from_the_others(tmp_path, go):
     searches = ("nelder-mead", *MODEL_SEARCHES)
     for search in searches:
@@ -209,6 +210,7 @@ def test_every_search_through_the_model_runs_and_differs_from_the_others(tmp_pat
     assert len({run.thetas.tobytes() for run in runs}) == len(searches)
 
 
+@pytest.mark.slow
 def test_the_inverse_through_the_model_lives_as_the_linear_one_and_answers_better(tmp_path, go):
     runs = {}
     for inverse in ("linear", "model"):
@@ -218,6 +220,7 @@ def test_the_inverse_through_the_model_lives_as_the_linear_one_and_answers_bette
     assert runs["model"].evaluation["mean_error"][-1] < 0.7 * runs["linear"].evaluation["mean_error"][-1]
 
 
+@pytest.mark.slow
 def test_the_model_that_proves_itself_lives_as_the_process_and_answers_no_worse(tmp_path, go):
     runs = {}
     for inverse in ("process", "model-proved"):
