@@ -14,7 +14,7 @@ import sgimd_torch
 
 PACKAGE = "sgimd_torch"
 ROWS = [  # a room imports only from the rows before its own
-    {"spaces", "files", "catalogue", "options"},
+    {"spaces", "files", "catalogue"},
     {"memory", "environments", "goals", "record"},
     {"demonstrations"},
     {"competence", "teachers", "evaluation", "forward_model"},
@@ -50,7 +50,7 @@ LIBRARIES = {  # library: the only rooms that may import it; of a folder, where 
     "trimesh": {"views/teach"},
     "jinja2": {"views/report"},
     "jsonargparse": {"runs/command_line"},
-    "docstring_parser": {"options"},
+    "docstring_parser": {"catalogue/options"},
     "tqdm": {"runs/process", "views"},
     "threadpoolctl": {"inverses/gaussian_process"},
     "cma": {"searches/cma_es"},

@@ -16,6 +16,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from sgimd_torch.catalogue.options import given, hands_on
 from sgimd_torch.competence import AttemptCompetence, Competence, Performance, performance
 from sgimd_torch.environments.protocol import Environment, check_rest
 from sgimd_torch.goals.interest_map import InterestMap
@@ -24,7 +25,6 @@ from sgimd_torch.goals.uniform import UniformGoals
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Learner
 from sgimd_torch.memory import Memory
-from sgimd_torch.options import given, hands_on
 from sgimd_torch.searches.perturb import practise
 from sgimd_torch.searches.simplex import nelder_mead
 from sgimd_torch.searches.widening import Widening

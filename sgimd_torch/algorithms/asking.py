@@ -22,13 +22,13 @@ from sgimd_torch.algorithms import (
     goal_babbling,
     start_memory,
 )
+from sgimd_torch.catalogue.options import hands_on
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.goals.strategic import AUTONOMOUS, StrategicInterest
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Learner
 from sgimd_torch.learner.asking import Asking, StrategicBabbling
 from sgimd_torch.memory import Memory
-from sgimd_torch.options import hands_on
 from sgimd_torch.spaces import Box, stream
 from sgimd_torch.strategies import GoalBabbling, Imitate
 from sgimd_torch.teachers.answering import Demonstrator

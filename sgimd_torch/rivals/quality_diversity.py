@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 
 from sgimd_torch.algorithms import Correspondence, MakeInverse, answering, start_memory
+from sgimd_torch.catalogue.options import hands_on
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Learner
 from sgimd_torch.memory import Memory
-from sgimd_torch.options import hands_on
 from sgimd_torch.rivals.explorer import QualityDiversity, Shown
 from sgimd_torch.spaces import check_count, stream
 from sgimd_torch.strategies import Imitate

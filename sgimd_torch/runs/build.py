@@ -11,11 +11,11 @@ from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Final
 
 from sgimd_torch.catalogue import checked
+from sgimd_torch.catalogue.options import given
 from sgimd_torch.environments.protocol import Environment, Record
 from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.goals.regions import Region
 from sgimd_torch.learner import Learner
-from sgimd_torch.options import given
 from sgimd_torch.runs.chosen import ALGORITHM, Part, chosen, part_of
 from sgimd_torch.runs.config import OWN, Config
 from sgimd_torch.runs.tasks import Task, benchmark_of, correspondence_of, demonstrations_of

@@ -15,7 +15,7 @@ from functools import cache
 from typing import Any, Final
 
 from sgimd_torch.catalogue import CATALOGUE, ROD, SHARED, did_you_mean, find, word_of
-from sgimd_torch.options import Option, options_of, parameters_of
+from sgimd_torch.catalogue.options import Option, options_of, parameters_of
 
 ALGORITHM: Final = ""  # the name of this part; its options have no prefix
 _HANDED: Final = "outcome_noise"  # a number, but the environment's

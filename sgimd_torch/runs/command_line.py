@@ -24,7 +24,7 @@ from typing import Any, Final, NoReturn, get_type_hints
 import jsonargparse
 
 from sgimd_torch.catalogue import CATALOGUE
-from sgimd_torch.options import help_of
+from sgimd_torch.catalogue.options import help_of
 from sgimd_torch.runs.chosen import ALGORITHM, Part, chosen, refused, standards
 from sgimd_torch.runs.config import RUN, Config, dashed, plain
 from sgimd_torch.runs.process import Stopping, loading

@@ -2,7 +2,7 @@
 
 Each default is the library's own; a run with one changed option is an ablation.
     config = Config(algorithm="sagg-riac", parts={"goals": "grid", "goals.window": 12}); config["search.noise"]
-A part's options are the keywords of its signature (`sgimd_torch.options`): adding one there is all there is to do.
+A part's options are the keywords of its signature (`sgimd_torch.catalogue.options`): adding one there is all there is to do.
 """
 
 from __future__ import annotations

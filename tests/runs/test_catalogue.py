@@ -13,7 +13,7 @@ import pytest
 
 from runs import ROOT, content_of
 from sgimd_torch.catalogue import CATALOGUE, Entry, checked, colour, find, label, load
-from sgimd_torch.options import parameters_of
+from sgimd_torch.catalogue.options import parameters_of
 from sgimd_torch.runs import command_line
 from sgimd_torch.runs.build import build, task_of
 from sgimd_torch.runs.command_line import main, overview, parse

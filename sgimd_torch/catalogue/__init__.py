@@ -2,7 +2,7 @@
 
     find("goals", "grid").load()                    # ProgressGrid; imported now
     find("goals", "mypackage.goals:Curious")        # of your own
-What can be set of a thing is told by its own signature, see `sgimd_torch.options`; nothing here repeats it.
+What can be set of a thing is told by its own signature, see `sgimd_torch.catalogue.options`; nothing here repeats it.
 """
 
 from __future__ import annotations
