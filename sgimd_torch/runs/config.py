@@ -2,7 +2,7 @@
 
 Each default is the library's own; a run with one changed option is an ablation.
     config = Config(algorithm="sagg-riac", parts={"goals": "grid", "goals.window": 12}); config["search.noise"]
-The keywords of a part's signature are its options (`sgimd_torch.catalogue.options`): one more keyword is one more option.
+The keywords of a part's signature are its options (`sgimd_torch.catalogue.options`): one keyword more, one option more.
 """
 
 from __future__ import annotations
