@@ -175,7 +175,7 @@ def frame_regions(ax: Axes, lows: Array, highs: Array, section: Section | None, 
 
 def map_after(regions: Mapping[str, np.ndarray], movements: int) -> tuple[Array, Array, Array]:
     """Corners ``(n_regions, context_dim + outcome_dim)`` m, twice, and interest ``(n_regions,)``: one map of the
-    columns of regions.csv."""
+    columns of the table ``regions``."""
     now = regions["movements"] == movements
     dims = range(sum(name.startswith("low_") for name in regions))
     lows, highs = (np.stack([regions[f"{side}_{k}"][now] for k in dims], axis=1) for side in ("low", "high"))

@@ -53,7 +53,7 @@ def interest_over_time(
 
     Args:
         axes: at least one; the last gets the colour bar for all, those without a map are hidden.
-        regions: the columns of a run's regions.csv, ``movements``, ``low_0`` to ``high_1`` (m) and ``interest``.
+        regions: the columns of a run's ``regions``, ``movements``, ``low_0`` to ``high_1`` (m) and ``interest``.
         section: which dimensions to show; needed unless regions are of the plane.
 
     Returns:

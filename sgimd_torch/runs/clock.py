@@ -42,5 +42,5 @@ class Seconds:
             yield episode
 
     def summary(self) -> dict[str, float]:
-        """As they go to summary.json."""
+        """By name, as the record has them."""
         return {f"seconds_{part}": round(seconds, 3) for part, seconds in self._spent.items()}

@@ -170,8 +170,8 @@ def engine_of(options: argparse.Namespace, configs: Sequence[Config]) -> Abstrac
         with loading():
             from sgimd_torch.runs.engines.on_ray import on_ray  # takes longer than all else to import
     except ModuleNotFoundError as error:
-        slip = "pip install 'sgimd-torch[ray]' installs it"
-        raise ImportError(f"--engine ray needs {error.name}, which is not installed; {slip}") from error
+        hint = "pip install 'sgimd-torch[ray]' installs it"
+        raise ImportError(f"--engine ray needs {error.name}, which is not installed; {hint}") from error
     return on_ray(options.address, processes, ships=any(config.own for config in configs), out=configs[0].out)
 
 

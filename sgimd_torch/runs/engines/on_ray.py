@@ -164,8 +164,8 @@ def _connect(address: str | None, processes: int, options: Mapping[str, Any]) ->
         try:
             socket.create_connection((host, int(port)), ANSWER_WITHIN).close()  # Ray would try for minutes, then abort
         except (OSError, OverflowError) as error:
-            slip = "is its head running, and is this the port of ray start?"
-            raise ValueError(f"no Ray cluster answers at {address}: {error}; {slip}") from error
+            hint = "is its head running, and is this the port of ray start?"
+            raise ValueError(f"no Ray cluster answers at {address}: {error}; {hint}") from error
     try:
         ray.init(address or "local", log_to_driver=False, configure_logging=False, **options)
     except (ConnectionError, RuntimeError, ValueError, RayError) as error:
