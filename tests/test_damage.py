@@ -175,8 +175,8 @@ def test_no_flipped_byte_reads_as_something_else(tmp_path, two):
 
 
 # Runs with rows in every table: with contexts, a model, and teachers who are asked.
-ALL = "--environment toss --algorithm sgim-acts --teachers all --base search --search gradient --inverse model"
-SHORT = "--movements 110 --evaluate_at 60 --repeats 2 --training 0.5 --members 2"
+ALL = "--environment toss --algorithm sgim-acts --teachers all --base search --inverse model"
+SHORT = "--movements 110 --evaluate_at 60 --repeats 2 --model.rate 0.5 --model.members 2"
 
 
 @pytest.fixture(scope="module")
