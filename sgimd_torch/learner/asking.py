@@ -32,9 +32,6 @@ class Asking(NamedTuple):
 class StrategicBabbling:
     """Goal babbling, or asking a teacher: whatever brings most progress for its cost.
 
-    ``brought``: of each request so far, by how much the best competence at its goal rose, 0 without an answer; the last
-    one is missing while the answer is still being used.
-
     Args:
         babbling: the autonomous strategy; its goal model chooses among the strategies.
         outcomes: T.
@@ -52,7 +49,6 @@ class StrategicBabbling:
             raise ValueError(f"costs must be positive and finite, got {self.costs}")
         self.babbling, self.outcomes, self.asking = babbling, outcomes, asking
         self.goals: StrategicGoals = babbling.goals
-        self.brought: list[float] = []
 
     def attempt(self, context: Array) -> AskingAttempt:
         """Movements by one strategy for one goal; alone if the teacher has no answer.
@@ -69,7 +65,6 @@ class StrategicBabbling:
         before = self.babbling.competence(context, goal)
         if lesson is None:  # no answer counts as no progress
             self.goals.add(context, goal, -1.0, strategy, -1.0)
-            self.brought.append(0.0)
             yield from self.babbling.pursue(context, goal)
             return
         for _ in range(takes):
@@ -84,4 +79,3 @@ class StrategicBabbling:
             self.babbling.conclude(context, goal, outcomes, before, strategy)
             if self.outcomes.contains(shown):
                 self.babbling.conclude(context, shown, outcomes, there, strategy)
-            self.brought.append(max(0.0, self.babbling.competence(context, goal) - before))

@@ -8,7 +8,6 @@ from __future__ import annotations
 import os
 import re
 from array import array
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,7 @@ from numpy.typing import NDArray
 
 from sgimd_torch.evaluation import Evaluation, Part
 from sgimd_torch.files import checksum
-from sgimd_torch.record import Event, Kind, Record, RunError
+from sgimd_torch.record import DERIVED, Event, Kind, Record, RunError
 from sgimd_torch.runs.config import FILES, OWN, PLACE, Config
 from sgimd_torch.runs.directory import FILE
 from sgimd_torch.spaces import Array, Box, Demonstration
@@ -103,12 +102,6 @@ class Run:
         return {name: np.array(column) for name, column in zip(names, columns, strict=True)}
 
 
-def points_of(requests: Mapping[str, np.ndarray], part: str, dim: int) -> Array:
-    """``(n, dim)`` the outcomes that were "wanted" or "got"; contexts come before them in the table."""
-    names = [name for name in requests if name.startswith(f"{part}_")][-dim:]
-    return np.stack([requests[name] for name in names], axis=1)
-
-
 def read_run(path: str | os.PathLike[str]) -> Run:
     """What a run has recorded so far.
 
@@ -134,13 +127,11 @@ def read_run(path: str | os.PathLike[str]) -> Run:
         events = _Movements(record.dims, shown)
         for event in record.events(shown):
             events.add(event)
-        found: dict[str, Columns] = {
-            table: _columns(record, table)
-            for table in ("goals", "evaluations", "errors", "regions", "predictions", "refreshes")
-        }
+        found: dict[str, Columns] = {table: _columns(record, table) for table in DERIVED}
         n = record.movements
     evaluated = found["evaluations"]["movements"]
-    nothing = not shown and not np.isfinite(events.arrays()["outcomes"]).any()  # to infer a movement from
+    arrays = events.arrays()
+    nothing = not shown and not np.isfinite(arrays["outcomes"]).any()  # to infer a movement from
     finished = n == settings["movements"] and (settings["evaluate_at"] == [] or n in evaluated or nothing)
     return Run(
         path=path,
@@ -150,7 +141,7 @@ def read_run(path: str | os.PathLike[str]) -> Run:
         robot=about["robot"],
         spaces={name: Box(np.array(low), np.array(high)) for name, (low, high) in about["spaces"].items()},
         summary={"movements": n, "finished": bool(finished), **about.get("seconds", {})},
-        **events.arrays(),
+        **arrays,
         answers=_by_answer(found["evaluations"]),
         errors=found["errors"],
         benchmark=np.stack(list(found["goals"].values())[1:], axis=1),
