@@ -10,22 +10,29 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from sgimd_torch.environments.protocol import Environment
+from sgimd_torch.environments.protocol import Environment, SimulationError
 from sgimd_torch.learner import Learner, ReplayError
 from sgimd_torch.learner.replay import TEACHER, BeforeMovement, replay
 from sgimd_torch.record import Event, Kind, Record
-from sgimd_torch.spaces import Array, Demonstration, Episode, Request, check_count, read_only, stream
+from sgimd_torch.spaces import Array, Demonstration, Episode, Request, check_count, check_point, read_only, stream
 from sgimd_torch.teachers import Teacher
 from sgimd_torch.teachers.answering import Demonstrator
 
-__all__ = ["Execute", "ReplayError", "live", "run"]
+__all__ = ["FAILURES", "Execute", "NoOutcomeError", "ReplayError", "live", "run"]
 
 Execute = Callable[[int, Array, Array], Array]
 """(index, context, theta) -> outcome of movement ``index``."""
+FAILURES: Final = 10
+"""Failed movements in a row that end a run."""
+
+
+class NoOutcomeError(RuntimeError):
+    """So many movements in a row have failed that somebody should look; ``__cause__`` is what the last one raised."""
 
 
 def run(
@@ -39,8 +46,12 @@ def run(
     teachers: Mapping[str, Demonstrator] | None = None,
     execute: Execute | None = None,
     record: Record | None = None,
+    failures: int = FAILURES,
 ) -> Iterator[Episode]:
-    """Let ``learner`` make ``movements`` movements, counting those at rest.
+    """Let ``learner`` make ``movements`` movements, counting those at rest and those that fail.
+
+    A movement fails if ``environment`` raises, or gives anything else than one finite outcome. The learner remembers
+    nothing of it and ends its attempt; the next movement has the next stream.
 
     A context is observed when an attempt begins, and holds until it ends. The answer to a demonstration takes place in
     the context of the demonstration.
@@ -59,6 +70,7 @@ def run(
         execute: is called instead of the environment's, see ``live``.
         record: what it holds is lived through again first, without executing anything or asking ``teachers``; what
             happens then is added to it. It is for a learner and a teacher freshly built, and ``first`` 0.
+        failures: failed movements in a row that end the run; at least 1.
 
     Yields:
         Every episode, after the learner was told its outcome.
@@ -66,7 +78,9 @@ def run(
     Raises (when iterated):
         ValueError: ``movements`` or ``first`` is not such a number, or ``first`` comes after them all; or the learner
             asks a teacher of another name.
+        NoOutcomeError: ``failures`` movements in a row have failed. They are made; a `run` may go on after them.
     """
+    check_count("failures", failures, 1)
     if check_count("first", first, 0) > check_count("movements", movements, 1):
         raise ValueError(f"first must be at most movements, got {first} of {movements}; movements counts all of a run")
     execute = live(environment, seed) if execute is None else execute
@@ -79,6 +93,7 @@ def run(
         if record is not None:
             record.add(Event(kind, context, **more))
 
+    in_a_row = 0
     for index in range(first, movements):
         (demonstration, request, reply), before = before, BeforeMovement()
         asks = None if learner.lesson_waits else teacher
@@ -87,25 +102,59 @@ def run(
             learner.watch(offered, offered=True)
             note(Kind.SHOWN, lesson=offered, who=getattr(teacher, "who", TEACHER))
             demonstration = offered
-        context = read_only(environment.observe(stream(seed, "context", index))) if learner.idle else learner.context
-        asked = learner.request(context) if teachers and request is None else None
-        if asked is not None and teachers is not None:
-            answer, reply = _asked(learner, environment, context, asked, teachers)
-            request = asked
-            note(Kind.ASKED, context, goal=asked.goal, who=asked.teacher, strategy=asked.strategy, reply=reply)
-            if answer is not None:
-                learner.watch(answer)
-                note(Kind.SHOWN, lesson=answer, who=asked.teacher)
-                demonstration = answer
-        move, outcome = learner.ask(context), None
-        if move is None:
+        context, move = None, None
+        try:
+            if learner.idle:
+                context = _tried("context", environment.contexts.dim, environment.observe, stream(seed, "context", index))
+            else:
+                context = learner.context
+            asked = learner.request(context) if teachers and request is None else None
+            if asked is not None and teachers is not None:
+                answer, reply = _asked(learner, environment, context, asked, teachers)
+                request = asked
+                note(Kind.ASKED, context, goal=asked.goal, who=asked.teacher, strategy=asked.strategy, reply=reply)
+                if answer is not None:
+                    learner.watch(answer)
+                    note(Kind.SHOWN, lesson=answer, who=asked.teacher)
+                    demonstration = answer
+            move, outcome = learner.ask(context), None
+            if move is not None:
+                outcome = _tried("outcome", environment.outcomes.dim, execute, index, context, move.theta)
+        except _NoOutcome as error:
+            failed, in_a_row = str(error), in_a_row + 1
+            learner.fail(failed)
+            planned = {} if move is None else {"theta": move.theta, "goal": move.goal, "origin": move.origin}
+            note(Kind.FAILED, context, reply=failed, **planned)
+            seen = np.full(environment.contexts.dim, np.nan) if context is None else context
+            yield Episode(index, seen, move, None, demonstration, request, reply, failed)
+            if in_a_row == failures:
+                raise NoOutcomeError(f"{failures} movements in a row failed, the last one: {failed}") from error.__cause__
+            continue
+        if move is None or outcome is None:
             note(Kind.RESTED, context)
         else:
-            outcome = execute(index, context, move.theta)
+            in_a_row = 0
             learner.tell(outcome)
-            outcome = np.asarray(outcome, dtype=np.float64)  # as memory keeps it, also of integers
             note(Kind.MOVED, context, theta=move.theta, goal=move.goal, outcome=outcome, origin=move.origin)
         yield Episode(index, context, move, outcome, demonstration, request, reply)
+
+
+class _NoOutcome(Exception):
+    """A movement failed; the message is the reason."""
+
+
+def _tried(name: str, dim: int, robot: Callable[..., ArrayLike], *given: Any) -> Array:
+    """What the robot gives, as ``(dim,)`` finite numbers."""
+    try:
+        return read_only(check_point(name, robot(*given), dim))
+    except (Exception, SystemExit) as error:  # whatever a robot does, it must not end the learner's life
+        raise _NoOutcome(reason_of(error)) from error
+
+
+def reason_of(error: BaseException) -> str:
+    """Why a robot failed, in one line of at most 300 characters that a terminal can show."""
+    said = str(error) if isinstance(error, SimulationError) else f"{type(error).__name__}: {error}"
+    return "".join(sign if sign.isprintable() else " " for sign in said)[:300].strip()
 
 
 def _asked(

@@ -249,6 +249,7 @@ class Lesson(NamedTuple):
 @dataclass(frozen=True, eq=False)
 class Episode:
     """[context][policy][outcome] and why it happened. ``move`` and ``outcome`` are None when the learner rested;
+    ``outcome`` is None, too, of a movement that ``failed``, which says why ("" if it did not);
     ``demonstration`` is what a teacher showed just before, if anything, and ``request`` what the learner had asked for,
     answered or not; then ``reply`` says "shown", or why not: "nothing", "again" (it was shown this before), "failed" or
     "timed out". Arrays are read-only copies."""
@@ -260,6 +261,7 @@ class Episode:
     demonstration: Demonstration | None
     request: Request | None = None
     reply: str = ""
+    failed: str = ""
 
     def __post_init__(self) -> None:
         _own(self, "context", "outcome")

@@ -237,10 +237,23 @@ class Learner:
         """
         return _lesson(demonstration, self.translate(demonstration)) in self._lessons
 
+    def fail(self, reason: str) -> None:
+        """Say that a movement got no outcome. It counts as a movement, and its attempt ends as by `interrupt`; nothing is
+        remembered, and the next `ask` begins another attempt.
+
+        Args:
+            reason: for the record.
+        """
+        theta = self._next.theta if self._asked and isinstance(self._next, Move) else None
+        context = self._context if theta is not None else None
+        self._events.append(Event(Kind.FAILED, context, theta, reply=reason))
+        self._movements += 1
+        self._end()
+
     def interrupt(self) -> None:
         """End the attempt under way; what it learnt so far counts. An outcome not yet told is no longer expected."""
         if self._asked and isinstance(self._next, Move):
-            self._events.append(Event(Kind.FAILED, self._context, self._next.theta))
+            self._events.append(Event(Kind.INTERRUPTED, self._context, self._next.theta))
         elif self._attempt is not None:
             self._events.append(Event(Kind.INTERRUPTED))
         self._end()

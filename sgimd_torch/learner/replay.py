@@ -56,6 +56,8 @@ class Lives(Protocol):
 
     def tell(self, outcome: Array, /) -> object: ...
 
+    def fail(self, reason: str, /) -> object: ...
+
     def interrupt(self) -> object: ...
 
 
@@ -84,7 +86,8 @@ def replay(
     before = BeforeMovement()
     for event in events:
         index = learner.movements
-        if teacher is not None and asked_at < index and event.kind != Kind.INTERRUPTED:
+        between = event.kind == Kind.INTERRUPTED and event.theta is None  # two movements
+        if teacher is not None and asked_at < index and not between:
             asked_at, offered = index, teacher.offer(index, learner.memory)
         match event.kind:
             case Kind.SHOWN:
@@ -98,8 +101,12 @@ def replay(
                 if event.who is not None and event.goal is not None:
                     request = Request(event.who, event.goal, event.strategy or "")
                     before = before._replace(request=request, reply=event.reply or "")
-            case Kind.INTERRUPTED:
+            case Kind.INTERRUPTED if between:
                 learner.interrupt()
+            case Kind.FAILED if event.theta is None:
+                learner.fail(event.reply or "")
+                yield Episode(index, np.full(learner.memory.context_dim, np.nan), None, None, *before, event.reply or "")
+                before = BeforeMovement()
             case _:
                 assert event.context is not None
                 _check_lesson(index, None, offered)
@@ -107,13 +114,16 @@ def replay(
                 _check_repeats(index, "theta", event.theta, None if move is None else move.theta)
                 if event.goal is not None:
                     _check_repeats(index, "goal", event.goal, None if move is None else move.goal)
-                if event.kind == Kind.FAILED:
+                if event.kind == Kind.INTERRUPTED:
                     learner.interrupt()
                     asked_at = -1  # the run that went on asked its teacher once more
                     continue
-                if event.outcome is not None:
+                failed = (event.reply or "") if event.kind == Kind.FAILED else ""
+                if event.kind == Kind.FAILED:
+                    learner.fail(failed)
+                elif event.outcome is not None:
                     learner.tell(event.outcome)
-                yield Episode(index, event.context, move, event.outcome, *before)
+                yield Episode(index, event.context, move, event.outcome, *before, failed)
                 before = BeforeMovement()
     return before
 

@@ -40,8 +40,8 @@ class Kind(StrEnum):
     RESTED = "rested"
     SHOWN = "shown"
     ASKED = "asked"  # an attempt began that may ask for a demonstration; what is shown next by that teacher answers it
-    FAILED = "failed"  # a movement was proposed and never got an outcome
-    INTERRUPTED = "interrupted"
+    FAILED = "failed"  # a movement got no outcome: ``reply`` says why; without theta, no context could be observed
+    INTERRUPTED = "interrupted"  # by the caller; with theta, before the outcome of that movement was told
 
 
 class Event(NamedTuple):
@@ -59,8 +59,8 @@ class Event(NamedTuple):
     reply: str | None = None
 
 
-_COUNTED: Final = (Kind.MOVED, Kind.RESTED)
-_IN_CONTEXT: Final = (*_COUNTED, Kind.ASKED, Kind.FAILED)
+_COUNTED: Final = (Kind.MOVED, Kind.RESTED, Kind.FAILED)
+_IN_CONTEXT: Final = (*_COUNTED, Kind.ASKED, Kind.INTERRUPTED)
 
 
 def layout(dims: Dims) -> dict[str, list[str]]:
@@ -82,7 +82,7 @@ def layout(dims: Dims) -> dict[str, list[str]]:
         "demonstrations": [*context, *outcome, "n_joints INTEGER", "times BLOB", "trajectory BLOB"],
         "goals": ["goal INTEGER", *goal],
         "evaluations": [*evaluated, *numbers],
-        "errors": [*evaluated, "goal INTEGER", "error REAL", "noise REAL", *context],
+        "errors": [*evaluated, "goal INTEGER", "error REAL", "noise REAL", "failed INTEGER", *context],
         "regions": ["movements INTEGER", "path TEXT", *corners, "attempts INTEGER", "goals INTEGER", *interest],
         "predictions": ["exemplar INTEGER", *outcome, *predicted],
         "refreshes": ["movements INTEGER", "exemplars INTEGER", "steps INTEGER", *learnt],
