@@ -9,14 +9,15 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from sgimd_torch.environments.protocol import Environment, execute_many
+from sgimd_torch.environments.protocol import BatchEnvironment, Environment, execute_many
 from sgimd_torch.files import read_npz, write_npz
 from sgimd_torch.spaces import Array, Box, Estimate, check_count, check_vector, first_entry, stream
 
@@ -61,13 +62,15 @@ class Evaluation:
     """What ``evaluate`` found. ``errors`` ``(n,)`` m, one for each goal; ``thetas`` ``(n, theta_dim)`` that were
     executed; ``outcomes`` ``(n, outcome_dim)`` where they landed; ``scatter`` ``(n,)`` m, the mean distance of the
     repeated landing points of each theta to their true mean (estimated, see ``evaluate``), NaN without repeats;
-    ``contexts`` ``(n, context_dim)`` in which they were executed."""
+    ``contexts`` ``(n, context_dim)`` in which they were executed; ``failed`` ``(n,)``, whether there was none: the
+    error is then the distance from ``rest`` to the goal, and the outcome NaN."""
 
     errors: Array
     thetas: Array
     outcomes: Array
     scatter: Array
     contexts: Array
+    failed: NDArray[np.bool_]
 
     @property
     def mean_error(self) -> float:
@@ -77,7 +80,8 @@ class Evaluation:
     @property
     def noise_floor(self) -> float:
         """The part of ``mean_error`` that noise alone makes, m; the rest is bias."""
-        return float(self.scatter.mean())
+        known = self.scatter[np.isfinite(self.scatter)]
+        return float(known.mean()) if len(known) else float("nan")
 
     @property
     def without_noise(self) -> Evaluation:
@@ -172,15 +176,29 @@ def evaluate(
         estimates = [inverse(*each) for each in zip(contexts, goals, strict=True)]
     thetas = np.stack([estimate.theta for estimate in estimates])
     copies = np.tile(thetas, (1 + repeats, 1))  # all goals once, then again: the judged rows do not depend on repeats
-    rngs = [stream(seed, f"evaluation {step}", row) for row in range(len(copies))]
-    landed = execute_many(environment, np.tile(contexts, (1 + repeats, 1)), copies, rngs)
+    landed = _landed(environment, np.tile(contexts, (1 + repeats, 1)), copies, seed, f"evaluation {step}")
     landed = landed.reshape(1 + repeats, *goals.shape)
     outcomes, again = landed[0], landed[1:]
+    failed = np.isnan(outcomes).any(axis=1)
     scatter = np.full(len(goals), np.nan)
     if repeats:
         bessel = np.sqrt(repeats / (repeats - 1))
         scatter = bessel * np.linalg.norm(again - again.mean(axis=0), axis=2).mean(axis=0)
-    return Evaluation(np.linalg.norm(outcomes - goals, axis=1), thetas, outcomes, scatter, contexts)
+    reached = np.where(np.isnan(outcomes), environment.rest, outcomes)
+    return Evaluation(np.linalg.norm(reached - goals, axis=1), thetas, outcomes, scatter, contexts, failed)
+
+
+def _landed(environment: Environment, contexts: Array, thetas: Array, seed: int, name: str) -> Array:
+    """``(n, outcome_dim)``, NaN for a movement that failed; movement i has stream i of this ``name``."""
+    rows = range(len(thetas))
+    if isinstance(environment, BatchEnvironment):
+        with suppress(Exception, SystemExit):  # one of them failed; which one is found below
+            return execute_many(environment, contexts, thetas, [stream(seed, name, row) for row in rows])
+    landed = np.full((len(thetas), environment.outcomes.dim), np.nan)
+    for row in rows:
+        with suppress(Exception, SystemExit):  # whatever a robot does, it must not end an evaluation
+            landed[row] = execute_many(environment, contexts[[row]], thetas[[row]], [stream(seed, name, row)])[0]
+    return landed
 
 
 def tile_goals(outcomes: Array, box: Box, side: float, rng: np.random.Generator, *, at_least: int = 2) -> Array:

@@ -10,12 +10,12 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sgimd_torch.environments.protocol import Environment, SimulationError
+from sgimd_torch.environments.protocol import FAILURES, Environment, SimulationError
 from sgimd_torch.learner import Learner, ReplayError
 from sgimd_torch.learner.replay import TEACHER, BeforeMovement, replay
 from sgimd_torch.record import Event, Kind, Record
@@ -23,12 +23,10 @@ from sgimd_torch.spaces import Array, Demonstration, Episode, Request, check_cou
 from sgimd_torch.teachers import Teacher
 from sgimd_torch.teachers.answering import Demonstrator
 
-__all__ = ["FAILURES", "Execute", "NoOutcomeError", "ReplayError", "live", "run"]
+__all__ = ["Execute", "NoOutcomeError", "ReplayError", "live", "run"]
 
 Execute = Callable[[int, Array, Array], Array]
 """(index, context, theta) -> outcome of movement ``index``."""
-FAILURES: Final = 10
-"""Failed movements in a row that end a run."""
 
 
 class NoOutcomeError(RuntimeError):
@@ -105,7 +103,9 @@ def run(
         context, move = None, None
         try:
             if learner.idle:
-                context = _tried("context", environment.contexts.dim, environment.observe, stream(seed, "context", index))
+                context = _tried(
+                    "context", environment.contexts.dim, environment.observe, stream(seed, "context", index)
+                )
             else:
                 context = learner.context
             asked = learner.request(context) if teachers and request is None else None
@@ -128,7 +128,9 @@ def run(
             seen = np.full(environment.contexts.dim, np.nan) if context is None else context
             yield Episode(index, seen, move, None, demonstration, request, reply, failed)
             if in_a_row == failures:
-                raise NoOutcomeError(f"{failures} movements in a row failed, the last one: {failed}") from error.__cause__
+                raise NoOutcomeError(
+                    f"{failures} movements in a row failed, the last one: {failed}"
+                ) from error.__cause__
             continue
         if move is None or outcome is None:
             note(Kind.RESTED, context)

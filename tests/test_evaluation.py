@@ -103,7 +103,7 @@ def test_without_contexts_an_environment_is_not_asked_for_any() -> None:
 def test_errors_by_context_are_those_of_the_thirds_of_each_of_its_dimensions() -> None:
     contexts = np.array([[-3.0, 0.0], [-1.5, 0.1], [-1.0, 0.2], [1.0, 0.3], [3.0, 0.1]])
     empty = np.zeros((5, 0))
-    found = Evaluation(np.array([1.0, 3.0, 5.0, 7.0, 9.0]), empty, empty, np.zeros(5), contexts)
+    found = Evaluation(np.array([1.0, 3.0, 5.0, 7.0, 9.0]), empty, empty, np.zeros(5), contexts, np.zeros(5, bool))
     parts = found.by_context(Box(np.array([-3.0, 0.0]), np.array([3.0, 0.9])))
     assert parts[:3] == [Part(0, -3, -1, 2, 2.0), Part(0, -1, 1, 1, 5.0), Part(0, 1, 3, 2, 8.0)]
     assert [(part.context, part.goals, part.mean_error) for part in parts[3:5]] == [(1, 4, 4.5), (1, 1, 7.0)]

@@ -125,7 +125,7 @@ def test_a_learner_that_was_interrupted_asked_in_vain_and_rested_is_the_same_aga
             if k == 9:
                 robot.watch(lesson)
             if k % 7 == 3:
-                robot.ask(NO_CONTEXT)  # the simulation failed, say
+                robot.ask(NO_CONTEXT)
                 robot.interrupt()
             if k % 11 == 5:
                 robot.interrupt()
@@ -135,7 +135,7 @@ def test_a_learner_that_was_interrupted_asked_in_vain_and_rested_is_the_same_aga
     live(whole, moves)
     whole.save(tmp_path / "life.sqlite")
     kinds = {row[1] for row in events_of(tmp_path / "life.sqlite")}
-    assert kinds == {Kind.MOVED, Kind.SHOWN, Kind.FAILED, Kind.INTERRUPTED}
+    assert kinds == {Kind.MOVED, Kind.SHOWN, Kind.INTERRUPTED}
     again = sgim_d(ARM, 3, correspondence=last_posture)
     again.load(tmp_path / "life.sqlite")
     assert again.movements == whole.movements == 40

@@ -89,8 +89,10 @@ def test_events_of_every_kind_come_back(tmp_path):
         Event(Kind.SHOWN, lesson=shown(1.0)),
         Event(Kind.ASKED, context),
         Event(Kind.ASKED, context, goal=goal, who="all", strategy="imitate all", reply="again"),
-        Event(Kind.FAILED, context, theta),
+        Event(Kind.INTERRUPTED, context, theta),
         Event(Kind.INTERRUPTED),
+        Event(Kind.FAILED, context, theta, goal, origin="local", reply="lost"),
+        Event(Kind.FAILED, reply="no camera"),
     ]
     assert {event.kind for event in events} == {*Kind}
     with Record.make(tmp_path / "run.sqlite", DIMS, {}) as record:
@@ -98,7 +100,7 @@ def test_events_of_every_kind_come_back(tmp_path):
             record.add(event)
         record.commit()
         assert all(same(*pair) for pair in zip(record.events(), events, strict=True))
-    assert [row[0] for row in read(tmp_path / "run.sqlite")["events"]] == [0, 1, 2, 2, 2, 2, 2, 2]
+    assert [row[0] for row in read(tmp_path / "run.sqlite")["events"]] == [0, 1, 2, 2, 2, 2, 2, 2, 2, 3]
 
 
 def test_a_demonstration_is_kept_once_also_when_it_is_shown_again_after_a_break(tmp_path):

@@ -71,7 +71,8 @@ class Behaviour:
         """Count a movement."""
         move = episode.move
         self._demonstrations += episode.demonstration is not None
-        self._since[f"regime/{'rest' if move is None else move.origin}"] += 1
+        regime = "failed" if episode.failed else "rest" if move is None else move.origin
+        self._since[f"regime/{regime}"] += 1
         if episode.request is not None:
             self._answered += episode.reply == "shown"
             self._since[f"strategy/{episode.request.strategy}"] += 1
@@ -133,6 +134,7 @@ class Competent:
             "error/median": float(np.median(found.errors)),
             "error/p90": float(np.quantile(found.errors, 0.9)),
             "error/noise_floor": found.noise_floor,
+            **({"error/failed": float(found.failed.sum())} if found.failed.any() else {}),
             f"met/{EVERYWHERE}": float(met.mean()),
             **{f"met/{name}": share for name, share in self._places.means(self._goals, met).items()},
         }

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Final, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -145,6 +145,10 @@ class HandLed:
 
 Record = Callable[[Array, Array, np.random.Generator], Recorded]
 """(context, theta, rng) -> the movement, to be filmed."""
+
+
+FAILURES: Final = 10
+"""Failed movements in a row that end a run."""
 
 
 class SimulationError(RuntimeError):

@@ -238,11 +238,11 @@ class Learner:
         return _lesson(demonstration, self.translate(demonstration)) in self._lessons
 
     def fail(self, reason: str) -> None:
-        """Say that a movement got no outcome. It counts as a movement, and its attempt ends as by `interrupt`; nothing is
-        remembered, and the next `ask` begins another attempt.
+        """Say that a movement has failed, so that there is no outcome to tell. It counts as a movement, nothing is
+        remembered, and its attempt ends as by `interrupt`.
 
         Args:
-            reason: for the record.
+            reason: why, for the record.
         """
         theta = self._next.theta if self._asked and isinstance(self._next, Move) else None
         context = self._context if theta is not None else None

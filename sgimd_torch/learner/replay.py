@@ -105,7 +105,9 @@ def replay(
                 learner.interrupt()
             case Kind.FAILED if event.theta is None:
                 learner.fail(event.reply or "")
-                yield Episode(index, np.full(learner.memory.context_dim, np.nan), None, None, *before, event.reply or "")
+                yield Episode(
+                    index, np.full(learner.memory.context_dim, np.nan), None, None, *before, event.reply or ""
+                )
                 before = BeforeMovement()
             case _:
                 assert event.context is not None

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, Final, Self
 
 from sgimd_torch.catalogue import CATALOGUE, find
+from sgimd_torch.environments.protocol import FAILURES
 from sgimd_torch.runs.chosen import chosen, part_of, refused, standards
 
 OWN: Final = "own"  # the answer of the inverse model that a run chose
@@ -24,7 +25,10 @@ FILES: Final = ("benchmark", "demonstrations")  # options that name a file
 THREADS: Final = "environment.threads"
 PLACE: Final = ("seed", "out", "name", "board", THREADS)  # they do not change the learner
 EVALUATES: Final = ("evaluated_by", "repeats", "floor_at", "benchmark_crc32")  # all evaluations of a run share these
-MAY_CHANGE: Final = ("movements", "out", "name", "board", "patience", "evaluate_at", *FILES, *EVALUATES, THREADS)
+MAY_CHANGE: Final = (
+    *("movements", "out", "name", "board", "patience", "failures", "evaluate_at"),
+    *(*FILES, *EVALUATES, THREADS),
+)
 """When a run is resumed, as they only say how long it lasts, where it is or how it is shown. Files count by their
 content, of which a checksum is recorded; a benchmark may be another one."""
 LEADS: Final = ("algorithm", "movements", "goals", "search", "inverse")  # what a comparison shows first
@@ -48,6 +52,7 @@ class Config:
         benchmark: file of the goals to evaluate on; null is the environment's own.
         demonstrations: file of recorded demonstrations; null is the environment's own.
         patience: seconds to wait for a teacher who is asked; null is as long as it takes.
+        failures: failed movements in a row that stop the run.
         parts: by name, such as "goals" or "goals.window", what is chosen for it; what differs from its default is kept.
 
     Raises:
@@ -67,6 +72,7 @@ class Config:
     benchmark: Path | None = None
     demonstrations: Path | None = None
     patience: float | None = None
+    failures: int = FAILURES
     parts: Mapping[str, Any] | tuple[tuple[str, Any], ...] = ()
 
     def __post_init__(self) -> None:
@@ -78,7 +84,7 @@ class Config:
                 raise refused(name, parts, RUN)
         differing = sorted((name, value) for name, value in given.items() if value != standard[name])
         object.__setattr__(self, "parts", tuple(differing))
-        for name, least in (("seed", 0), ("movements", 1), ("repeats", 0)):
+        for name, least in (("seed", 0), ("movements", 1), ("repeats", 0), ("failures", 1)):
             if getattr(self, name) < least:
                 raise ValueError(f"{name} must be at least {least}, got {getattr(self, name)}")
         if self.repeats == 1:

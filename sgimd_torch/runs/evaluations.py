@@ -29,8 +29,14 @@ def write_evaluation(
         errors = each.errors
         summary = each.mean_error, np.median(errors), np.quantile(errors, 0.9), each.noise_floor, each.met(near)
         record.add_rows("evaluations", [(movements, answer, *summary)])
-        columns = zip(errors.tolist(), each.scatter.tolist(), each.contexts.tolist(), strict=True)
-        record.add_rows("errors", [(movements, answer, k, *two, *c) for k, (*two, c) in enumerate(columns)])
+        columns = zip(
+            errors.tolist(),
+            each.scatter.tolist(),
+            each.failed.astype(int).tolist(),
+            each.contexts.tolist(),
+            strict=True,
+        )
+        record.add_rows("errors", [(movements, answer, k, *more, *c) for k, (*more, c) in enumerate(columns)])
     record.add_rows("regions", [(movements, *_fields(region)) for region in regions])
 
 
@@ -56,7 +62,7 @@ def sort_evaluations(record: Record) -> None:
 
 def _evaluation(numbers: np.ndarray) -> Evaluation:
     unknown = np.full((len(numbers), 0), np.nan)
-    return Evaluation(numbers[:, 0], unknown, unknown, numbers[:, 1], numbers[:, 2:])
+    return Evaluation(numbers[:, 0], unknown, unknown, numbers[:, 1], numbers[:, 3:], numbers[:, 2] > 0)
 
 
 def _fields(region: Region) -> Iterator[Any]:

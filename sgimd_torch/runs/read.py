@@ -32,12 +32,12 @@ class Run:
 
     ``index`` ``(n,)``, ``origin`` ``(n,)`` names, "" at rest, ``demonstration`` ``(n,)`` which of ``demonstrations``
     came just before, -1 if there was none; ``contexts``, ``thetas``, ``goals`` and ``outcomes`` ``(n, dim)``, NaN where
-    there was none. ``answers`` has, for each answer, the columns of its evaluations; ``errors`` those of every goal at
-    every evaluation, ``benchmark`` ``(n_goals, outcome_dim)`` the goals; ``regions`` those of the goal model at every
-    evaluation, None for a goal model without regions; ``predictions`` and ``refreshes`` those of a forward model, None
-    without one; ``requests`` those of what was asked for, None if nothing was. ``config``: all options by name;
-    ``robot``: the class of the environment; ``spaces``: its contexts, policies and outcomes; ``summary``: movements,
-    whether it is finished, and seconds.
+    there was none: a movement that failed has a theta and no outcome. ``answers`` has, for each answer, the columns of
+    its evaluations; ``errors`` those of every goal at every evaluation, ``benchmark`` ``(n_goals, outcome_dim)`` the
+    goals; ``regions`` those of the goal model at every evaluation, None for a goal model without regions;
+    ``predictions`` and ``refreshes`` those of a forward model, None without one; ``requests`` those of what was asked
+    for, None if nothing was. ``config``: all options by name; ``robot``: the class of the environment; ``spaces``: its
+    contexts, policies and outcomes; ``summary``: movements, how many ``failed``, whether it is finished, and seconds.
     """
 
     path: Path
@@ -95,7 +95,9 @@ class Run:
         for answer in self.answers:
             for movements in np.unique(errors["movements"]):
                 here = (errors["answer"] == answer) & (errors["movements"] == movements)
-                found = Evaluation(errors["error"][here], points[here], points[here], unknown[here], points[here])
+                found = Evaluation(
+                    errors["error"][here], points[here], points[here], unknown[here], points[here], here[here]
+                )
                 rows += [(movements, answer, *part) for part in found.by_context(contexts) if here.any()]
         names = ("movements", "answer", *Part._fields)
         columns = zip(*rows, strict=True) if rows else ([] for _ in names)
@@ -140,7 +142,7 @@ def read_run(path: str | os.PathLike[str]) -> Run:
         files=about["files"],
         robot=about["robot"],
         spaces={name: Box(np.array(low), np.array(high)) for name, (low, high) in about["spaces"].items()},
-        summary={"movements": n, "finished": bool(finished), **about.get("seconds", {})},
+        summary={"movements": n, "failed": events.failed, "finished": bool(finished), **about.get("seconds", {})},
         **arrays,
         answers=_by_answer(found["evaluations"]),
         errors=found["errors"],
@@ -166,7 +168,7 @@ class _Movements:
         self._vectors = {name: array("d") for name in self.dims}
         self._row = {id(each): k for k, each in enumerate(shown)}
         self._origins, self._shown, self._requests = list[str](), array("q"), list[tuple[Any, ...]]()
-        self._last = -1
+        self._last, self.failed = -1, 0
 
     def add(self, event: Event) -> None:
         if event.lesson is not None:
@@ -176,7 +178,8 @@ class _Movements:
         elif event.kind == Kind.ASKED and event.goal is not None:
             asked = len(self._origins), event.who, event.strategy, event.reply, None, event.context, event.goal
             self._requests.append(asked)
-        elif event.kind in (Kind.MOVED, Kind.RESTED):
+        elif event.kind in (Kind.MOVED, Kind.RESTED, Kind.FAILED):
+            self.failed += event.kind == Kind.FAILED
             self._origins.append(event.origin or "")
             self._shown.append(self._last)
             self._last = -1
@@ -224,7 +227,7 @@ def _columns(record: Record, table: str) -> Columns:
 def _column(name: str, values: Any) -> np.ndarray:
     if name in ("answer", "path"):
         return np.array(values, dtype=np.str_)
-    whole = name in ("movements", "goal", "goals", "attempts", "exemplar", "exemplars", "steps", "diverged")
+    whole = name in ("movements", "goal", "goals", "attempts", "exemplar", "exemplars", "steps", "diverged", "failed")
     return np.array(values, dtype=np.int64 if whole else np.float64)
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import time
+import traceback
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from typing import Any, Final, Self
@@ -21,12 +22,13 @@ from sgimd_torch.runs.directory import open_run
 from sgimd_torch.runs.evaluations import read_evaluations, sort_evaluations, write_evaluation
 from sgimd_torch.runs.listeners import listeners_of
 from sgimd_torch.runs.process import Failed, Progress, Stopped, Stopping, say
-from sgimd_torch.session import ReplayError, live, run
+from sgimd_torch.session import NoOutcomeError, ReplayError, live, reason_of, run
 from sgimd_torch.spaces import Episode
 from sgimd_torch.teachers.answering import Demonstrator
 from sgimd_torch.teachers.awaited import Awaited
 from sgimd_torch.teachers.by_hand import ByHand
 
+TOLD: Final = 3  # failed movements that are told one by one
 COMMIT_EVERY: Final = 1.0  # s; a killed run loses what came since
 
 
@@ -51,13 +53,16 @@ def carry_out(parts: RunParts, stopping: Stopping, *, resume: bool, accept_loss:
         except Stopped:
             say(f"stopped after {life.movements} movements; to go on: {again}")
             raise
-        except ReplayError as error:
+        except (ReplayError, RunError) as error:
             raise RunError(str(error)) from error
-        except (SimulationError, ValueError) as error:
-            raise Failed(str(error)) from error
         except OSError as error:
-            either = f"{life.record.path} cannot be written, or the robot failed"
-            raise Failed(f"{either}: {type(error).__name__}: {error}; --resume goes on") from error
+            raise Failed(f"{life.record.path} cannot be written: {reason_of(error)}; to go on: {again}") from error
+        except (Exception, SystemExit) as error:  # of a part, as one's own; or too many failed movements
+            raised = error.__cause__ if isinstance(error, NoOutcomeError) and error.__cause__ else error
+            if not isinstance(raised, SimulationError):
+                traceback.print_exception(raised)
+            said = str(error) if raised is not error else reason_of(error)
+            raise Failed(f"{said}; {life.movements} movements are kept; to go on: {again}") from error
         return life.summary
 
 
@@ -70,7 +75,7 @@ class Life:
 
     Attributes:
         record: of the run; it is written from the end of the replay on.
-        movements, recorded: how many it has made, and how many of them were recorded before.
+        movements, recorded, failed: how many it has made, how many were recorded before, and how many have failed.
 
     Raises:
         RunError, OSError: see ``open_run``.
@@ -80,7 +85,7 @@ class Life:
         self.parts, self.stopping = parts, stopping
         self.record, notes = open_run(parts, resume=resume, accept_loss=accept_loss)
         say(*parts.notes, *notes)
-        self.movements, self.recorded = 0, self.record.movements
+        self.movements, self.recorded, self.failed = 0, self.record.movements, 0
         self.seconds = Seconds(self.record.about.get("seconds", {}))
         self.evaluations = read_evaluations(self.record)
         self._wanted = set(parts.config.evaluations)
@@ -118,7 +123,10 @@ class Life:
             floor = last.noise_floor
             measured = "not measured" if math.isnan(floor) else f"{floor:.4f} m"
             found = f"mean error {last.mean_error:.4f} m, noise floor {measured}"
-        return f"{self.parts.config.directory}: {self.movements} movements, {found}"
+            if last.failed.any():
+                found += f" ({last.failed.sum()} of {len(last.failed)} movements of the evaluation failed)"
+        failed = f" ({self.failed} failed)" if self.failed else ""
+        return f"{self.parts.config.directory}: {self.movements} movements{failed}, {found}"
 
     def go_on(self) -> None:
         """From the first movement to the last."""
@@ -145,6 +153,7 @@ class Life:
             teachers={name: self._awaited(name, each) for name, each in parts.teachers.items()},
             execute=self.seconds.of("physics")(alive),
             record=self.record,
+            failures=parts.config.failures,
         )
         if not self.recorded:
             self._begin()
@@ -177,6 +186,11 @@ class Life:
     def _after(self, episode: Episode) -> None:
         replayed = self.replaying
         self.movements = episode.index + 1
+        if episode.failed:
+            self.failed += 1
+            if not replayed and self.failed <= TOLD:
+                more = "; from now on they are only counted" if self.failed == TOLD else ""
+                say(f"movement {episode.index} failed: {episode.failed}{more}")
         for each in self.listeners:
             each.episode(episode, replayed)
         if self.movements in self._wanted:

@@ -22,7 +22,7 @@ def remember(run: Run, parts: RunParts, start: int, stop: int) -> None:
         if by_observation and correspondence is not None and run.demonstration[row] >= 0:
             shown = run.demonstrations[run.demonstration[row]]
             memory.add(shown.context, correspondence(shown.times, shown.trajectory), shown.outcome)
-        if run.origin[row]:
+        if np.isfinite(run.outcomes[row]).all():
             memory.add(run.contexts[row], run.thetas[row], run.outcomes[row])
         if parts.model is not None:
             goal = run.goals[row]

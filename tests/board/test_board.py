@@ -44,7 +44,7 @@ def evaluation(errors):
     """Of goals that were missed by ``errors``; nothing else is known."""
     errors = np.array(errors)
     nothing = np.full((len(errors), 0), np.nan)
-    return Evaluation(errors, nothing, nothing, np.full(len(errors), 0.01), nothing)
+    return Evaluation(errors, nothing, nothing, np.full(len(errors), 0.01), nothing, errors < 0)
 
 
 def values_of(directory):

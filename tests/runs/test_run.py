@@ -167,8 +167,8 @@ def test_a_diverging_simulation_is_reported_with_its_theta_and_leaves_a_whole_re
     assert "Traceback" not in errors
     directory = tmp_path / "sgim-d" / "seed-003"
     run = read_run(directory)
-    assert len(run.index) < MOVEMENTS
-    assert np.isfinite(run.outcomes).all()
+    assert len(run.index) == run.summary["failed"] == 10
+    assert np.isnan(run.outcomes).all()
     assert run.summary["finished"] is False
 
 
@@ -270,13 +270,15 @@ def test_a_link_to_nowhere_is_named(tmp_path, go, capsys):
     assert f"{tmp_path / 'link'} is no folder" in capsys.readouterr().err
 
 
-def test_an_error_while_running_is_one_line(tmp_path, go, capsys, monkeypatch):
+def test_an_error_of_a_part_keeps_its_traceback_and_says_how_to_go_on(tmp_path, go, capsys, monkeypatch):
     def fail(*_, **__):
         raise ValueError("this cannot be evaluated")
 
     monkeypatch.setattr(run_script, "evaluate", fail)
     assert go(tmp_path) == 1
-    assert "error: this cannot be evaluated\n" in capsys.readouterr().err
+    errors = capsys.readouterr().err.splitlines()
+    assert errors[-1].startswith("error: ValueError: this cannot be evaluated; 30 movements are kept; to go on: ")
+    assert "Traceback (most recent call last):" in errors
 
 
 @pytest.mark.parametrize("after_another", [False, True])

@@ -1,0 +1,246 @@
+"""A movement may fail: it is counted and recorded, nothing is remembered of it, and the learner goes on."""
+
+import signal
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import ArrayLike
+
+from runs import LIVE, content_of, end, start, stopped_at
+from sgimd_torch.algorithms import practice, sgim_d
+from sgimd_torch.environments.planar_arm import PlanarArm
+from sgimd_torch.environments.protocol import SimulationError
+from sgimd_torch.evaluation import evaluate
+from sgimd_torch.record import Kind, Record
+from sgimd_torch.runs.read import read_run
+from sgimd_torch.session import NoOutcomeError, run
+from sgimd_torch.spaces import Array, Episode, stream
+from sgimd_torch.teachers import PeriodicTeacher
+from worlds import demonstrations
+
+DIMS = 0, 5, 2
+
+
+class FailingArm(PlanarArm):
+    """``fails(n)`` is what its n-th call gives in the place of an outcome, or raises; None: it moves."""
+
+    def __init__(self, fails, noise: float = 0.01) -> None:
+        super().__init__(5, noise=noise)
+        self.fails, self.calls, self.draws = fails, 0, list[float]()
+
+    def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
+        self.calls += 1
+        self.draws.append(stream(0, "environment", self.calls - 1).random() - rng.random())
+        failure = self.fails(self.calls - 1)
+        if isinstance(failure, BaseException):
+            raise failure
+        return super().execute(context, theta, rng) if failure is None else failure
+
+    execute_many = None
+
+
+def every_fifth(failure: object):
+    return lambda n: failure if n % 5 == 4 else None
+
+
+FAILURES = {
+    "diverged": SimulationError(np.zeros(5), "diverged"),
+    "ConnectionError: the robot is away": ConnectionError("the robot is away"),
+    "SystemExit: 0": SystemExit(0),
+    "outcome must be finite": np.array([0.0, np.nan]),
+    "outcome must have shape": np.zeros(3),
+    "got <U7": "nothing",
+    "got object": [None, None],
+}
+
+
+@pytest.mark.parametrize("reason", FAILURES)
+def test_a_movement_that_fails_counts_and_is_forgotten(reason: str) -> None:
+    arm = FailingArm(every_fifth(FAILURES[reason]))
+    learner = practice(arm, 0)
+    episodes = list(run(learner, arm, 0, movements=50))
+    failed = [episode for episode in episodes if episode.failed]
+    assert [episode.index for episode in failed] == list(range(4, 50, 5))
+    assert all(episode.outcome is None and episode.move is not None for episode in failed)
+    assert all(reason in episode.failed for episode in failed)
+    assert len(learner.memory) == 40
+    assert learner.movements == 50
+    assert arm.draws == [0.0] * 50  # each movement, failed or not, has the stream of its number
+
+
+def test_the_attempt_of_a_failed_movement_is_over() -> None:
+    arm = FailingArm(every_fifth(ConnectionError()))
+    learner = sgim_d(arm, 0, correspondence=arm.correspondence, budget=1000, give_up=-1.0, tolerance=0.0)
+    episodes = list(run(learner, arm, 0, movements=60))
+    for before, after in pairwise(episodes):
+        assert before.move is not None
+        assert after.move is not None
+        goals = before.move.goal, after.move.goal
+        assert np.array_equal(*goals) == (not before.failed)
+
+
+def test_what_cannot_be_observed_fails_before_the_learner_proposes_anything() -> None:
+    arm = FailingArm(lambda n: None)
+    observe, asked = arm.observe, []
+
+    def sometimes(rng: np.random.Generator) -> Array:
+        asked.append(rng)
+        if len(asked) == 3:
+            raise TimeoutError("no camera")
+        return observe(rng)
+
+    arm.observe = sometimes
+    learner = practice(arm, 0)
+    episodes = list(run(learner, arm, 0, movements=5))
+    assert [episode.failed for episode in episodes] == ["", "", "TimeoutError: no camera", "", ""]
+    assert episodes[2].move is None
+    assert (learner.movements, len(learner.memory)) == (5, 4)
+
+
+def test_too_many_failures_in_a_row_end_a_run_which_can_go_on() -> None:
+    arm = FailingArm(lambda n: ConnectionError("unplugged") if n in (1, 2) or 5 <= n < 8 else None)
+    learner = practice(arm, 0)
+    episodes: list[Episode] = []
+    with pytest.raises(NoOutcomeError, match="3 movements in a row failed, the last one: ConnectionError: unplugged"):
+        episodes.extend(run(learner, arm, 0, movements=20, failures=3))
+    assert learner.movements == 8
+    again = list(run(learner, arm, 0, movements=20, first=learner.movements, failures=3))
+    assert [episode.index for episode in again] == list(range(8, 20))
+    assert len(learner.memory) == 15
+
+
+@pytest.mark.parametrize("failures", [0, -1, 1.5, True])
+def test_a_number_of_failures_that_makes_no_sense_is_refused(failures: object) -> None:
+    arm = PlanarArm(5)
+    with pytest.raises(ValueError, match="failures"):
+        list(run(practice(arm, 0), arm, 0, movements=5, failures=failures))
+
+
+def failing_life(path: Path, movements: int):
+    """A taught life on an arm that loses some movements and some contexts, from the record at ``path`` on."""
+    arm = PlanarArm(5, noise=0.01)
+    lost = set(stream(0, "lost").choice(200, 40, replace=False).tolist())
+    learner = sgim_d(arm, 0, correspondence=arm.correspondence)
+    teacher = PeriodicTeacher(demonstrations(arm), stream(0, "teacher"), every=20)
+
+    def moved(index: int, context: Array, theta: Array) -> Array:
+        if index in lost:
+            raise ConnectionError("lost")
+        return arm.execute(context, theta, stream(0, "environment", index))
+
+    with Record.make(path, DIMS, {}) if not path.exists() else Record(path, write=True) as record:
+        episodes = list(run(learner, arm, 0, movements=movements, teacher=teacher, execute=moved, record=record))
+        record.commit()
+    return learner, episodes
+
+
+def test_a_life_with_failures_goes_on_from_its_record_as_if_it_had_never_stopped(tmp_path: Path) -> None:
+    whole, episodes = failing_life(tmp_path / "whole", 150)
+    failing_life(tmp_path / "parts", 70)
+    parts, again = failing_life(tmp_path / "parts", 150)
+    assert sum(bool(episode.failed) for episode in episodes) > 20
+    assert [(e.index, e.failed) for e in again] == [(e.index, e.failed) for e in episodes]
+    assert parts.memory.outcomes.tobytes() == whole.memory.outcomes.tobytes()
+    with Record(tmp_path / "whole") as one, Record(tmp_path / "parts") as other:
+        assert list(one.rows("events")) == list(other.rows("events"))
+        assert {event.reply for event in one.events() if event.kind == Kind.FAILED} == {"ConnectionError: lost"}
+
+
+def test_a_saved_life_keeps_its_failures(tmp_path: Path) -> None:
+    learner, _ = failing_life(tmp_path / "run", 100)
+    learner.save(tmp_path / "life")
+    arm = PlanarArm(5, noise=0.01)
+    for path in (tmp_path / "life", tmp_path / "run"):
+        loaded = sgim_d(arm, 0, correspondence=arm.correspondence)
+        loaded.load(path)
+        assert loaded.movements == 100
+        assert loaded.memory.outcomes.tobytes() == learner.memory.outcomes.tobytes()
+
+
+@pytest.mark.parametrize("together", [False, True])
+def test_a_failed_answer_misses_its_goal_as_if_the_robot_had_not_moved(together: bool) -> None:
+    arm = PlanarArm(5)
+    learner = practice(arm, 0)
+    list(run(learner, arm, 0, movements=30))
+    goals = np.array([[0.1, 0.2], [0.3, 0.1], [-0.2, 0.4]])
+    right = evaluate(learner.inverse, arm, goals, 0, 30)
+    thetas = [theta.tobytes() for theta in right.thetas]
+
+    class Sometimes(PlanarArm):
+        def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
+            if np.asarray(theta).tobytes() == thetas[1]:
+                raise RuntimeError("stuck")
+            return super().execute(context, theta, rng)
+
+        def execute_many(self, contexts, thetas, rngs):
+            return np.stack([self.execute(*each) for each in zip(contexts, thetas, rngs, strict=True)])
+
+    robot = Sometimes(5)
+    if not together:
+        robot.execute_many = None
+    found = evaluate(learner.inverse, robot, goals, 0, 30)
+    assert found.failed.tolist() == [False, True, False]
+    assert found.errors[[0, 2]].tolist() == right.errors[[0, 2]].tolist()
+    assert found.errors[1] == np.linalg.norm(arm.rest - goals[1])
+    assert found.noise_floor == pytest.approx(0, abs=1e-12)
+
+
+MODULE = """
+import os
+from pathlib import Path
+from sgimd_torch.environments.planar_arm import PlanarArm
+class Lossy(PlanarArm):
+    execute_many = None
+    def execute(self, context, theta, rng):
+        outcome = super().execute(context, theta, rng)
+        if rng.random() < .2:
+            raise ConnectionError("lost")
+        return outcome
+class Broken(Lossy):
+    def execute(self, context, theta, rng):
+        if Path("repaired").exists():
+            return PlanarArm.execute(self, context, theta, rng)
+        raise SystemExit(0)
+def lossy(): return Lossy(5, noise=.01)
+def broken(): return Broken(5, noise=.01)
+"""
+
+
+@pytest.fixture
+def robots(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    (tmp_path / "lossy_robots.py").write_text(MODULE)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def command(name: str, *more: str) -> list[str]:
+    fixed = ["--algorithm", "practice", "--movements", "90", "--evaluate-at", "40", "--repeats", "2", "--seed", "3"]
+    return ["--environment", f"lossy_robots:{name}", *fixed, "--out", name, *more]
+
+
+@pytest.mark.parametrize("signum", [signal.SIGTERM, signal.SIGKILL])
+def test_a_stopped_run_with_failures_ends_as_if_it_had_never_stopped(robots: Path, signum: int) -> None:
+    code, errors = end(start(LIVE, *command("lossy", "--name", "whole")), 0)
+    assert code == 0, errors
+    assert "movements of the evaluation failed" in errors or "failed" in errors
+    end(stopped_at(50, *command("lossy", "--name", "parts")), signum)
+    code, errors = end(start(LIVE, *command("lossy", "--name", "parts", "--resume")), 0)
+    assert code == 0, errors
+    whole, parts = (content_of(robots / "lossy" / name / "seed-003") for name in ("whole", "parts"))
+    assert parts == whole
+    run_ = read_run(robots / "lossy" / "whole" / "seed-003")
+    assert run_.summary["failed"] == (np.isnan(run_.outcomes) & np.isfinite(run_.thetas[:, :2])).all(axis=1).sum() > 5
+
+
+def test_a_run_whose_robot_is_broken_says_how_to_go_on_and_does(robots: Path) -> None:
+    code, errors = end(start(LIVE, *command("broken")), 0)
+    assert code == 1
+    assert "SystemExit" in errors
+    assert "10 movements in a row failed" in errors
+    assert errors.rstrip().endswith("--resume")
+    (robots / "repaired").touch()
+    code, errors = end(start(LIVE, *command("broken", "--resume")), 0)
+    assert code == 0, errors
+    assert read_run(robots / "broken" / "practice" / "seed-003").summary["failed"] == 10
