@@ -2,15 +2,14 @@
 
 Each page is a template in experiments/pages/, which has the text; the tables are put in by name. Change the template,
 not the page. The tables come from results.csv in --results, which compare.py writes, and from the small tables beside
-it: goals.csv, asked.csv, contexts.csv, anova.csv, said.csv (what 0.1 claimed), rivals.csv and model/table.csv. A page
+it: goals.csv, asked.csv, contexts.csv, said.csv (what 0.1 claimed), and rivals.csv. A page
 without rows is left out.
 
-Intervals are bootstrapped with a fixed seed, so the same rows give the same page. The analyses of variance need
-run directories: --runs makes them again and keeps their rows in anova.csv.
+Intervals are bootstrapped with a fixed seed, so the same rows give the same page.
 
 Examples:
   python experiments/claims.py --readme README.md               all pages, and the numbers of the README
-  python experiments/claims.py --runs runs --only RESULTS       and the analyses of variance again
+  python experiments/claims.py --only RESULTS                   one of them
 """
 
 from __future__ import annotations
@@ -27,7 +26,6 @@ from sgimd_torch.runs.process import command, loading, say
 with loading():  # Ctrl-C shows no traceback
     import numpy as np
 
-    from anova import anova_cells, update_anova
     from asking_claims import ASKING_CLAIMS, BLIND, ON_TOSS, counts
     from judging import LAST, Results, judge
     from learning_claims import LEARNING_CLAIMS, SUITE_CLAIMS, TIMES
@@ -104,10 +102,6 @@ def paper_page(folder: Path) -> Page:
         "said": said_table(read_table(folder, "said.csv"), verdicts),
         "learners": variants_table(_by_error(alike, learners)[::-1], columns),
         "ablations": variants_table(others, columns),
-        "anova": markdown(
-            ("means compared", "of", "dimensions of theta in which they differ", "smallest p", "largest p"),
-            anova_cells(folder),
-        ),
     }
     return Page(verdicts, tables, {"own": own, "alike": alike, "proved": proved})
 
@@ -130,7 +124,7 @@ def readme_page(folder: Path) -> Page:
 
 def model_page(folder: Path) -> Page:
     """The page results/FORWARD_MODEL.md; variants in the order of ``EXPERIMENTS``."""
-    own = Results.of(folder, MODEL_TABLES, ["model/table.csv"])
+    own = Results.of(folder, MODEL_TABLES)
     alike, proved = own.by("linear"), own.by("process")
     verdicts = judge(MODEL_CLAIMS, own, "linear")
     tables = {"bars": verdicts_table("what", verdicts)}
@@ -330,7 +324,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     results = Path("results")
     parser.add_argument("--results", type=Path, default=results, help="folder of the rows (default: %(default)s)")
-    parser.add_argument("--runs", type=Path, help="run directories, to make the analyses of variance again")
     parser.add_argument("--out", type=Path, default=results, help="folder of the pages (default: %(default)s)")
     parser.add_argument("--only", choices=PAGES, help="only this page")
     parser.add_argument("--readme", type=Path, help="a README whose section of results is made again, too")
@@ -344,8 +337,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         f"{name} is left out: {folder} has no rows of {PAGES[name][1]}" for name in paths if PAGES[name][1] not in there
     ]:
         say(*missing)
-    if options.runs is not None:
-        update_anova(folder, options.runs)
     pages = {name: PAGES[name][0](folder) for name in paths if PAGES[name][1] in there}
     texts = {name: render(name, page) for name, page in pages.items()}
     if options.readme is not None:

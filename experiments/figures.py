@@ -231,7 +231,7 @@ def variants(data: Data) -> Figure:
     figure = _figure(8.5, 1.4 + 0.36 * sum(rows) + 0.5 * len(rows))
     axes = figure.subplots(len(rows), 1, sharex=True, squeeze=False, height_ratios=rows)[:, 0]
     for ax, (experiment, panel) in zip(axes, panels.items(), strict=True):
-        forest(ax, panel, reference="SGIM-D")
+        forest(ax, panel, reference="SGIM-D", space=Box.cube(-1, 1, 2, unit="m"))
         ax.set_title(PANELS[experiment], loc="left")
         ax.label_outer()
     figure.suptitle(

@@ -59,7 +59,7 @@ class Results:
 
     Args:
         rows: error, floor, tiles, claimed and met by answer, variant, movements and seed.
-        small: some of goals.csv, asked.csv and model/table.csv by name.
+        small: some of goals.csv and asked.csv by name.
     """
 
     rows: pd.DataFrame

@@ -20,7 +20,6 @@ from judging import (
     Claim,
     Judge,
     Judged,
-    NotRun,
     Results,
     all_of,
     at_least,
@@ -36,7 +35,6 @@ from sgimd_torch.views.statistics import (
     improvement_interval,
     interquartile_mean,
     interval,
-    iqm_interval,
     metres,
     rng,
     show,
@@ -47,7 +45,6 @@ DAMAGE: Final = 0.005  # m; what later movements may cost, a tenth of the error
 ROBUST: Final = "SGIM-D − SAGG-RIAC, and SGIM-D − Imitation taught alike, at 5000 < 0"
 SIMPLEX: Final = "sgim-d"  # with Nelder & Mead's simplex and no model, what learners with a model are compared with
 JUDGED: Final = ("model", "gradient")
-REGIONS: Final = (50, 80, 95)  # percent of the outcomes that a region of the model should hold
 
 
 def _sagg_riac_beats_random(results: Results) -> Judged:
@@ -236,34 +233,12 @@ def _half_on_fifty_joints(name: str, results: Results) -> Judged:
     return ratio_at_most(f"{name}-arm-50", f"{SIMPLEX}-arm-50", 0.5, movements=2000)(results)
 
 
-def _calibrated(region: int, least: float, most: float, name: str, results: Results) -> Judged:
-    """Judges the share of late outcomes in the model's regions of so many percent, of the table of model_figures.py."""
-    table = results.small["model/table.csv"]
-    late = table.loc[table.run.str.startswith(f"{name}/"), [f"inside_{each}_late" for each in REGIONS]].dropna()
-    if len(late) < 2:
-        raise NotRun(f"{name} in the table of model_figures.py")
-    shares = late[f"inside_{region}_late"].to_numpy()
-    found = iqm_interval(shares, rng=rng(), level=results.level)
-    number = f"{show(found)}, single runs {shares.min():.2f} to {shares.max():.2f}"
-    return number, all_of(at_least(found, least), at_most(found, most))
-
-
 # What, the bar, how it is judged, the end of the names of what is compared, and after how many movements.
 BARS: Final[tuple[tuple[str, str, Callable[[str, Results], Judged], str | None, int], ...]] = (
     ("fewer movements", "SGIM-D's error at 5000 in ≤ 60 % of the movements", _fewer_movements, "", LAST),
     ("lower error", "difference at 1000, 2000, 5000 < 0 at two of them", _lower_error, "", LAST),
     ("below the noise of typical movements", "error at 5000 ≤ noise floor of SGIM-D", _below_the_floor, "", LAST),
     ("planar arm, 50 joints", "error at 2000 ≤ half of SGIM-D's", _half_on_fifty_joints, "-arm-50", 2000),
-    *(
-        (
-            f"calibration, {region} %",
-            f"{region} % regions hold {100 * least:.0f} to {100 * most:.0f} % from 2000 movements on",
-            partial(_calibrated, region, least, most),
-            None,
-            LAST,
-        )
-        for region, least, most in ((50, 0.4, 0.6), (80, 0.7, 0.9), (95, 0.91, 0.99))
-    ),
 )
 MODEL_CLAIMS: Final = tuple(
     Claim(

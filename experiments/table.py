@@ -32,7 +32,6 @@ Row = dict[str, Any]
 FILE: Final = "results.csv"
 ERROR, FLOOR, MET = "mean_error", "noise_floor", "goals_met"  # columns of a run's record
 _ASKED: Final = ("requests", "shown", "late", "late_own", "strong", "weak")
-_INSIDE: Final = tuple(f"inside_{share}_{when}" for when in ("last", "late") for share in (50, 80, 95))
 # The columns of each table, and how many of them make its key, which no two rows share.
 TABLES: Final[dict[str, tuple[int, tuple[str, ...]]]] = {
     FILE: (
@@ -46,18 +45,12 @@ TABLES: Final[dict[str, tuple[int, tuple[str, ...]]]] = {
     "asked.csv": (3, ("variant", "seed", "teacher", *_ASKED)),
     "contexts.csv": (3, ("variant", "seed", "low", "high", "error")),
     "said.csv": (1, ("claim", "number", "verdict")),
-    "anova.csv": (1, ("compared", "of", "differ", "dimensions", "smallest_p", "largest_p")),
     "rivals.csv": (4, ("rival", "setting", "seed", "movements", "linear", "process")),
-    "model/table.csv": (
-        1,
-        ("run", "predicted", "error", *_INSIDE, "improved", "refreshes", "diverged", "ms_per_refresh"),
-    ),
 }
 TYPES: Final = {  # of columns, in every table; all others have numbers, whose empty fields are NaN
-    **dict.fromkeys(("experiment", "variant", "answer", "environment", "teacher", "run", "rival", "setting"), "str"),
-    **dict.fromkeys(("claim", "number", "verdict", "compared", "of"), "str"),
+    **dict.fromkeys(("experiment", "variant", "answer", "environment", "teacher", "rival", "setting"), "str"),
+    **dict.fromkeys(("claim", "number", "verdict"), "str"),
     **dict.fromkeys(("seed", "movements", "own", "tiles", "n_goals", "n_near", *_ASKED), "int64"),
-    **dict.fromkeys(("differ", "dimensions", "predicted", "refreshes", "diverged"), "int64"),
     **dict.fromkeys(("claimed", "met"), "Int64"),  # may be empty
 }
 LATE: Final = 1000  # movements; from then on a learner should know whom to ask
@@ -204,14 +197,16 @@ def asked_rows(config: Config, run: Run) -> list[Row]:
 
 
 def context_rows(config: Config, run: Run) -> list[Row]:
-    """A row for each part of C that had goals in the last evaluation; none where there is no context, or several."""
-    if run.by_context is None or run.contexts.shape[1] != 1:
+    """A row for each third of C that had goals in the last evaluation; none where there is no context, or several."""
+    if run.contexts.shape[1] != 1:
         return []
-    parts = pd.DataFrame(run.by_context)
-    parts = parts[(parts["movements"] == parts["movements"].max()) & (parts["answer"] == OWN)].dropna(subset=ERROR)
+    errors, space = pd.DataFrame(run.errors), run.spaces["contexts"]
+    errors = errors[(errors["movements"] == errors["movements"].max()) & (errors["answer"] == OWN)]
+    edges = np.linspace(space.low[0], space.high[0], 4)
+    means = errors["error"].groupby(np.clip(np.searchsorted(edges, errors["context_0"], "right") - 1, 0, 2)).mean()
     return [
-        {"variant": config.variant, "seed": config.seed, "low": each["low"], "high": each["high"], "error": each[ERROR]}
-        for each in parts.to_dict("records")
+        {"variant": config.variant, "seed": config.seed, "low": edges[k], "high": edges[k + 1], "error": error}
+        for k, error in means.items()
     ]
 
 

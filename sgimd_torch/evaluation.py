@@ -12,7 +12,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,7 +23,6 @@ from sgimd_torch.spaces import Array, Box, Estimate, check_count, check_vector, 
 
 SHIPPED = Path(__file__).with_name("data") / "benchmark.npz"
 TILES: Final = 358  # of the paper's benchmark
-PARTS: Final = 3  # of the range of each context, for errors by context
 SIDES: Final = np.linspace(0.025, 0.1, 301)  # of a tile in the plane, as parts of T's; they leave 1600 to 100 tiles
 
 
@@ -52,8 +51,8 @@ class Benchmark:
         if not space.contains(self.goals).all():
             entry = first_entry(self.goals, ~((self.goals >= space.low) & (self.goals <= space.high)))  # NaN too
             raise ValueError(
-                f"goals of the benchmark must lie in the task space {space.low.tolist()} to {space.high.tolist()} m, "
-                f"but {entry}; were they in cm, or made for another T?"
+                f"goals of the benchmark must lie in the task space {space.low.tolist()} to {space.high.tolist()}, "
+                f"but {entry}; were they made for another T, or not in {space.unit or 'its unit'}?"
             )
 
 
@@ -91,29 +90,6 @@ class Evaluation:
     def met(self, near: float) -> int:
         """How many goals were missed by ``near`` (m) or less."""
         return int((self.errors <= near).sum())
-
-    def by_context(self, contexts: Box) -> list[Part]:
-        """The errors by context: C is cut into thirds, along one of its dimensions after the other."""
-        found = []
-        for k in range(contexts.dim):
-            edges = np.linspace(contexts.low[k], contexts.high[k], PARTS + 1)
-            part = np.clip(np.searchsorted(edges, self.contexts[:, k], "right") - 1, 0, PARTS - 1)
-            for n in range(PARTS):
-                there = self.errors[part == n]
-                mean = float(there.mean()) if len(there) else float("nan")
-                found.append(Part(k, float(edges[n]), float(edges[n + 1]), len(there), mean))
-        return found
-
-
-class Part(NamedTuple):
-    """A part of C: ``context``, the dimension, from ``low`` to ``high``; how many ``goals`` were evaluated in it, and
-    their ``mean_error`` (m), NaN without any."""
-
-    context: int
-    low: float
-    high: float
-    goals: int
-    mean_error: float
 
 
 def contexts_of_goals(environment: Environment, n: int) -> Array:

@@ -124,13 +124,17 @@ class Box:
     Args:
         low: ``(dim,)`` lower corner.
         high: ``(dim,)`` upper corner, above ``low`` in every dimension.
+        names: of the dimensions, for axes, columns and messages; () for none.
+        unit: of all dimensions, such as "m"; "" for none.
 
     Raises:
-        ValueError: corners of different shapes, not finite, or not in order.
+        ValueError: corners of different shapes, not finite, or not in order; or not a name for each dimension.
     """
 
     low: Array
     high: Array
+    names: tuple[str, ...] = ()
+    unit: str = ""
 
     def __post_init__(self) -> None:
         low, high = np.array(self.low, dtype=np.float64), np.array(self.high, dtype=np.float64)
@@ -138,14 +142,18 @@ class Box:
             raise ValueError(f"Box needs two corners of shape (dim,), got {low.shape} and {high.shape}")
         if not (np.isfinite(low).all() and np.isfinite(high).all() and (low < high).all()):
             raise ValueError(f"Box needs finite corners with low < high, got {low} and {high}; were they swapped?")
+        names = tuple(self.names)
+        if len(names) not in (0, len(low)) or not all(isinstance(each, str) for each in (*names, self.unit)):
+            raise ValueError(f"Box needs {len(low)} names, texts, and a unit, a text, got {names} and {self.unit!r}")
+        object.__setattr__(self, "names", names)
         for name, corner in (("low", low), ("high", high)):
             corner.flags.writeable = False
             object.__setattr__(self, name, corner)
 
     @classmethod
-    def cube(cls, low: float, high: float, dim: int) -> Box:
+    def cube(cls, low: float, high: float, dim: int, *, names: tuple[str, ...] = (), unit: str = "") -> Box:
         """``[low, high]^dim``."""
-        return cls(np.full(dim, low), np.full(dim, high))
+        return cls(np.full(dim, low), np.full(dim, high), names, unit)
 
     @property
     def dim(self) -> int:
@@ -156,6 +164,18 @@ class Box:
     def sides(self) -> Array:
         """``(dim,)`` lengths of the sides."""
         return self.high - self.low
+
+    def axis(self, k: int, kind: str = "outcome") -> str:
+        """What dimension ``k`` is called: "x (m)", or "outcome 0" where it has no name."""
+        return self.in_unit(self.names[k] if self.names else f"{kind} {k}")
+
+    def in_unit(self, quantity: str) -> str:
+        """ "error (m)", or "error" where there is no unit."""
+        return f"{quantity} ({self.unit})" if self.unit else quantity
+
+    def amount(self, value: float, form: str = ".3g") -> str:
+        """ "0.12 m", or "0.12" where there is no unit."""
+        return f"{value:{form}} {self.unit}".rstrip()
 
     def sample(self, rng: np.random.Generator) -> Array:
         """``(dim,)`` one uniform point."""

@@ -5,7 +5,7 @@ import pandas as pd
 
 from asking_claims import FOUR
 from learning_claims import TIMES
-from paper_claims import JUDGED, REGIONS
+from paper_claims import JUDGED
 from sgimd_torch.views.suite import TASKS
 from table import FILE, TABLES, write_table
 from variants import EXPERIMENTS, LEARNING, PROVED
@@ -132,8 +132,8 @@ def write_paper(folder, *, without=(), **spoilt):
     return write(folder, rows)
 
 
-def write_model(folder, *, without=(), shares=None, **spoilt):
-    """``shares`` of outcomes in regions, of a model, by region; ``spoilt``: to errors in the place of the true ones."""
+def write_model(folder, *, without=(), **spoilt):
+    """``spoilt``: to errors in the place of the true ones."""
     rows = [
         row(experiment, name, seed, movements, "model", error * spread(seed), 1, 0.033 if movements == 5000 else None)
         for name, (experiment, errors) in MODEL.items()
@@ -141,15 +141,6 @@ def write_model(folder, *, without=(), shares=None, **spoilt):
         for seed in range(SEEDS)
         for movements, error in {**errors, **undashed(spoilt).get(name, {})}.items()
     ]
-    honest = {name: {region: region / 100 for region in REGIONS} for name in JUDGED}
-    found = [
-        {"run": f"{name}/seed-{seed:03d}", **{f"inside_{each}_late": share for each, share in shares.items()}}
-        for name, shares in {**honest, **(shares or {})}.items()
-        for seed in range(5)
-    ]
-    table = pd.DataFrame(found, columns=[*TABLES["model/table.csv"][1]]).fillna(1)
-    (folder / "model").mkdir(exist_ok=True)
-    write_table(folder, "model/table.csv", table.astype({"predicted": int, "refreshes": int, "diverged": int}))
     return write(folder, rows)
 
 

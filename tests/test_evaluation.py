@@ -11,7 +11,6 @@ from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import (
     Benchmark,
     Evaluation,
-    Part,
     contexts_of_goals,
     evaluate,
     load_benchmark,
@@ -98,18 +97,6 @@ def test_without_contexts_an_environment_is_not_asked_for_any() -> None:
 
     found = evaluate(perfect(PlanarArm(5)), Silent(5), np.array([[0.5, 0.5]]), 0, 0)
     assert found.contexts.shape == (1, 0)
-
-
-def test_errors_by_context_are_those_of_the_thirds_of_each_of_its_dimensions() -> None:
-    contexts = np.array([[-3.0, 0.0], [-1.5, 0.1], [-1.0, 0.2], [1.0, 0.3], [3.0, 0.1]])
-    empty = np.zeros((5, 0))
-    found = Evaluation(np.array([1.0, 3.0, 5.0, 7.0, 9.0]), empty, empty, np.zeros(5), contexts, np.zeros(5, bool))
-    parts = found.by_context(Box(np.array([-3.0, 0.0]), np.array([3.0, 0.9])))
-    assert parts[:3] == [Part(0, -3, -1, 2, 2.0), Part(0, -1, 1, 1, 5.0), Part(0, 1, 3, 2, 8.0)]
-    assert [(part.context, part.goals, part.mean_error) for part in parts[3:5]] == [(1, 4, 4.5), (1, 1, 7.0)]
-    assert parts[5].goals == 0
-    assert np.isnan(parts[5].mean_error)
-    assert found.by_context(Box.cube(0, 1, 0)) == []
 
 
 def test_without_repeats_there_is_no_noise_floor_and_without_noise_it_is_zero() -> None:
@@ -221,7 +208,7 @@ def test_a_benchmark_of_another_environment_is_refused() -> None:
 
 def test_goals_outside_the_task_space_are_refused_and_a_larger_space_takes_them() -> None:
     in_cm = Benchmark("PlanarArm", 100 * BENCHMARK.goals, 10.0)
-    with pytest.raises(ValueError, match=r"entry \[0, 0\] is 50.0 \(and 3 more\); were they in cm"):
+    with pytest.raises(ValueError, match=r"entry \[0, 0\] is 50.0 \(and 3 more\); were they made for another T"):
         in_cm.check(PlanarArm(5))
     with pytest.raises(ValueError, match=r"entry \[0, 0\] is nan"):
         Benchmark("PlanarArm", np.full((1, 2), np.nan), 0.1).check(PlanarArm(5))

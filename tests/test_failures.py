@@ -46,7 +46,7 @@ def every_fifth(failure: object):
 
 
 FAILURES = {
-    "diverged": SimulationError(np.zeros(5), "diverged"),
+    "diverged": SimulationError("diverged"),
     "ConnectionError: the robot is away": ConnectionError("the robot is away"),
     "SystemExit: 0": SystemExit(0),
     "outcome must be finite": np.array([0.0, np.nan]),

@@ -9,6 +9,7 @@ from __future__ import annotations
 import itertools
 from collections import Counter, deque
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -34,7 +35,7 @@ class Grid:
     def __init__(self, box: Box, most: int = CELLS) -> None:
         self.box = box
         self.per_side = max(1, int(most ** (1 / max(1, box.dim)) + 1e-9))
-        axes = "xy" if box.dim == 2 else [f"outcome_{k}" for k in range(box.dim)]
+        axes = box.names or [f"outcome_{k}" for k in range(box.dim)]
         edges = np.linspace(box.low, box.high, self.per_side + 1).T
         bounds = [
             [f"{axis} {low:.3g}..{high:.3g}" for low, high in itertools.pairwise(sides)]
@@ -149,7 +150,7 @@ def cells_of(space: Box, goals: Array) -> Box:
     step = 10 ** np.floor(np.log10(np.where(sides > 0, sides, space.sides))) / 2
     low = space.clip(np.floor(goals.min(axis=0) / step) * step + 0.0)  # no -0 in the names of cells
     high = space.clip(np.ceil(goals.max(axis=0) / step) * step + 0.0)
-    return Box(np.where(low < high, low, space.low), np.where(low < high, high, space.high))
+    return replace(space, low=np.where(low < high, low, space.low), high=np.where(low < high, high, space.high))
 
 
 def of_regions(regions: Sequence[Region]) -> dict[str, float]:

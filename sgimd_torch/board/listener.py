@@ -70,7 +70,11 @@ class BoardListener:
         rows = "\n".join(f"| {name} | {value} |" for name, value in settings.items())
         self._file.text(0, "about/settings", f"| option | value |\n|---|---|\n{rows}")
         rows = "\n".join(f"| **{tag if '/' in tag else f'{tag}/…'}** | {what} |" for tag, what in LEGEND.items())
-        self._file.text(0, "about/legend", f"Steps are movements.\n\n| tag | what it shows |\n|---|---|\n{rows}")
+        self._file.text(
+            0,
+            "about/legend",
+            f"Steps are movements; distances are in the unit of T.\n\n| tag | what it shows |\n|---|---|\n{rows}",
+        )
         self._file.settings(settings)
 
     def episode(self, episode: Episode, replayed: bool) -> None:
@@ -113,7 +117,7 @@ class BoardListener:
 
     def _scalars(self, values: Mapping[str, float]) -> None:
         self._file.scalars(self._movements, values)
-        page = charts(self._file.tags, self._competent.near)
+        page = charts(self._file.tags, self._parts.environment.outcomes.amount(self._competent.near, ".2g"))
         if page != self._page:  # a chart appears with its first point
             self._page = page
             self._file.layout(page)

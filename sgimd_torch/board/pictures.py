@@ -17,15 +17,14 @@ from matplotlib.patches import Rectangle
 
 from sgimd_torch.board.curves import DEPTH, Competent, branches, summary
 from sgimd_torch.figures.axes import colour_bar, plane
-from sgimd_torch.figures.learning import competence_map, interest_map, landing_points
+from sgimd_torch.figures.learning import competence_map, interest_map, landing_points, misses
 from sgimd_torch.figures.sections import Section, sections
 from sgimd_torch.goals.regions import Region
 from sgimd_torch.spaces import Array, Box
 
 # Fixed scales, so that pictures of different times and runs can be compared; values beyond look like the end.
 WORST = -0.25
-FARTHEST = 0.3  # m
-SHARE = 0.15  # of the longest side of T, likewise where T is not a plane
+SHARE = 0.15  # of the longest side of T: the error at the end of the colours
 NARROW = 0.2  # of the picture's width; the name of a narrower region stands upright
 THIN = 0.1  # of the picture's side; narrower than a name
 STYLE: Any = {"font.size": 8, "axes.titlesize": 8}
@@ -59,7 +58,7 @@ def draw(
 
     pictures: dict[str, Callable[[Axes, Section], object]] = {
         "map/landed": landed,
-        "map/error": lambda ax, section: _errors(ax, benchmark, errors, section),
+        "map/error": lambda ax, section: _errors(ax, benchmark, errors, space, section),
     }
     if space.dim == 2:
         pictures = {"competent/since": lambda ax, section: _since(ax, competent), **pictures}
@@ -111,19 +110,9 @@ def _since(ax: Axes, competent: Competent) -> None:
     ax.set_title("since when half of the goals are met, else the share")
 
 
-def _errors(ax: Axes, benchmark: Array, errors: Array, section: Section) -> None:
-    ax.set_title(f"{len(errors)} benchmark goals, mean error {errors.mean():.3f} m")
-    label = "distance from goal to landing point (m)"
-    if section.is_strip:  # there is room for heights
-        ax.plot(benchmark[:, 0], errors, ".", color="#0072b2", markersize=4)
-        ax.set(xlabel="outcome", ylabel=label)
-        ax.set_ylim(bottom=0)
-        return
-    most = FARTHEST if section.space.dim == 2 else SHARE * float(section.space.sides.max())
-    x, y = section.points(benchmark).T
-    drawn = ax.scatter(x, y, c=errors, s=14, cmap="viridis_r", vmin=0, vmax=most, edgecolors="none")
-    colour_bar([ax], drawn, label, extend="max")
-    section.frame(ax, legend=False)
+def _errors(ax: Axes, benchmark: Array, errors: Array, space: Box, section: Section) -> None:
+    ax.set_title(f"{len(errors)} benchmark goals, mean error {space.amount(float(errors.mean()), '.3f')}")
+    misses(ax, benchmark, errors, space, section, SHARE * float(space.sides.max()))
     ax.autoscale()  # where the goals are, even in a large space
 
 

@@ -75,11 +75,12 @@ class FishingRod:
         self.noise = noise
         self.primitive = GaussianPrimitive(JOINT_RANGES, DURATIONS, sharpness=6.0)
         self.policies = self.primitive.policies
-        self.outcomes = Box.cube(-1.0, 1.0, 2) if outcomes is None else outcomes
+        self.outcomes = Box.cube(-1.0, 1.0, 2, names=("x", "y"), unit="m") if outcomes is None else outcomes
         self.outcome_noise = 1.15 * noise  # m for each s, see scripts/check_physics.py
         ranges = np.array([max_yaw, max_wind])
         self._context_columns = np.flatnonzero(ranges)
-        self.contexts = Box(-ranges[self._context_columns], ranges[self._context_columns])
+        ranges, names = ranges[self._context_columns], np.array(["yaw (rad)", "wind (N)"])[self._context_columns]
+        self.contexts = Box(-ranges, ranges, tuple(names.tolist()))
 
         threads = None if threads is None else check_count("threads", threads, 1)
         self._caster = Caster(MODEL, (JOINT_RANGES.low + JOINT_RANGES.high) / 2, threads, line=line)
@@ -184,7 +185,7 @@ class FishingRod:
         commands = np.stack([np.interp(steps, times, column) for column in trajectory.T], axis=1)
         landings, diverged = self._caster.cast([commands], np.array([end]))
         if diverged.any():
-            raise SimulationError(trajectory[-1], "the simulation of a recorded trajectory diverged")
+            raise SimulationError("the simulation of a recorded trajectory diverged", trajectory[-1])
         return landings[0]
 
     def _execute(self, contexts: Array, thetas: Array, rngs: Sequence[np.random.Generator]) -> Array:
@@ -196,7 +197,7 @@ class FishingRod:
         landings, diverged = self._caster.cast(commands, ends, self._yaw_wind(contexts))
         if diverged.any():
             row = int(np.flatnonzero(diverged)[0])
-            raise SimulationError(thetas[row], f"the simulation diverged in context {contexts[row].tolist()}")
+            raise SimulationError(f"the simulation diverged in context {contexts[row].tolist()}", thetas[row])
         return landings
 
     def _yaw_wind(self, contexts: Array) -> Array | None:

@@ -193,9 +193,9 @@ class FromGymnasium:
                 break
         warned = getattr(getattr(self.world.unwrapped, "data", None), "warning", None)
         if warned is not None and np.any(warned.number):
-            raise SimulationError(theta, "MuJoCo gave a warning: the simulation diverged, or ran out of room")
+            raise SimulationError("MuJoCo gave a warning: the simulation diverged, or ran out of room", theta)
         if not all(np.isfinite(part).all() for part in _parts(observations[-1])):
-            raise SimulationError(theta, "the last observation is not finite")
+            raise SimulationError("the last observation is not finite", theta)
         return observations
 
     def _judged(self, observations: list[Any]) -> Array:

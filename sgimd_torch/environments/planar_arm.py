@@ -48,9 +48,9 @@ class PlanarArm:
             max_angle = 2 * np.pi / n_joints
         if not (0 < length < np.inf and 0 < max_angle <= np.pi and 0 <= noise < np.inf):
             raise ValueError(f"needs length > 0, 0 < max_angle <= pi, noise >= 0, got {length}, {max_angle}, {noise}")
-        self.contexts = Box.cube(-np.pi / 4, np.pi / 4, int(context))
+        self.contexts = Box.cube(-np.pi / 4, np.pi / 4, int(context), names=("turn",) * context, unit="rad")
         self.policies = Box.cube(0.0, 1.0, n_joints)
-        self.outcomes = Box.cube(-length, length, 2) if outcomes is None else outcomes
+        self.outcomes = Box.cube(-length, length, 2, names=("x", "y"), unit="m") if outcomes is None else outcomes
         self.rest = self.outcomes.check("rest, where the straight arm ends,", [length, 0.0], "T has 2 dimensions")
         self.rest.flags.writeable = False
         self.length, self.noise = length, noise

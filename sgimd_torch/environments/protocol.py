@@ -152,14 +152,14 @@ FAILURES: Final = 10
 
 
 class SimulationError(RuntimeError):
-    """A simulation gave no usable outcome; ``theta`` ``(theta_dim,)`` is the movement that was executed."""
+    """There is no usable outcome: ``SimulationError("diverged")``, or with the movement ``theta`` ``(theta_dim,)``."""
 
-    def __init__(self, theta: Array, reason: str) -> None:
-        super().__init__(theta, reason)  # both in args: other processes rebuild the error from them
-        self.theta, self.reason = theta, reason
+    def __init__(self, reason: str, theta: Array | None = None) -> None:
+        super().__init__(reason, theta)  # both in args: other processes rebuild the error from them
+        self.reason, self.theta = reason, theta
 
     def __str__(self) -> str:
-        return f"{self.reason}; theta={np.asarray(self.theta).tolist()}"
+        return self.reason if self.theta is None else f"{self.reason}; theta={np.asarray(self.theta).tolist()}"
 
 
 def execute_many(
@@ -193,7 +193,7 @@ def execute_many(
         outcomes = np.stack([environment.execute(*movement) for movement in zip(contexts, thetas, rngs, strict=True)])
     lost = np.flatnonzero(~np.isfinite(outcomes).reshape(len(thetas), -1).all(axis=1))
     if len(lost):
-        raise SimulationError(thetas[lost[0]], "the outcome is not finite")
+        raise SimulationError("the outcome is not finite", thetas[lost[0]])
     return outcomes
 
 

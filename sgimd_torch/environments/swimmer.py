@@ -36,7 +36,7 @@ class Swimmer(FromGymnasium):
         super().__init__(
             make_world("Swimmer-v5", reset_noise_scale=start, exclude_current_positions_from_observation=False),
             Sinusoids(Box.cube(-1.0, 1.0, 2), FREQUENCIES),
-            outcomes=Box.cube(-1.5, 1.5, 2),
+            outcomes=Box.cube(-1.5, 1.5, 2, names=("x", "y"), unit="m"),
             rest=np.zeros(2),
             outcome_noise=NOISE * start / START,
             steps=STEPS,

@@ -20,6 +20,7 @@ from sgimd_torch.spaces import Array, Box
 
 GRAVITY: Final = 9.81  # m/s^2
 _STROKES: Final = 10  # of the crawler, in one movement
+_PLANE: Final = Box.cube(-1, 1, 2, names=("x", "y"), unit="m")
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,8 +79,8 @@ def toss(*, noise: float = 0.03) -> Toy:
         return np.stack([distance * np.sin(direction) + blown, distance * np.cos(direction)], axis=-1)
 
     weak = np.array([0.5, 0.5, 0.0, 0.0])
-    floor = Box(np.array([-5.0, 0.0]), np.array([5.0, 5.0]))
-    return Toy(Box.cube(-1, 1, 1), Box.cube(0, 1, 4), floor, landing, weak, noise)
+    floor = Box(np.array([-5.0, 0.0]), np.array([5.0, 5.0]), ("sideways", "forwards"), "m")
+    return Toy(Box.cube(-1, 1, 1, names=("wind",), unit="m/s²"), Box.cube(0, 1, 4), floor, landing, weak, noise)
 
 
 def crawler(*, noise: float = 0.02) -> Toy:
@@ -98,7 +99,7 @@ def crawler(*, noise: float = 0.02) -> Toy:
         heading = np.arange(1, 1 + _STROKES) * turn  # (..., strokes)
         return np.stack([(step * np.cos(heading)).sum(axis=-1), (step * np.sin(heading)).sum(axis=-1)], axis=-1)
 
-    return Toy(Box.cube(0, 1, 0), Box.cube(0, 1, 5), Box.cube(-1, 1, 2), place, np.zeros(5), noise)
+    return Toy(Box.cube(0, 1, 0), Box.cube(0, 1, 5), _PLANE, place, np.zeros(5), noise)
 
 
 def two_elbows(*, noise: float = 0.01) -> Toy:
@@ -119,7 +120,7 @@ def two_elbows(*, noise: float = 0.01) -> Toy:
         return np.stack([np.cos(directions) @ lengths, np.sin(directions) @ lengths], axis=-1)
 
     folded = np.array([0.5, 1.0, 0.5])
-    return Toy(Box.cube(0, 1, 0), Box.cube(0, 1, 3), Box.cube(-1, 1, 2), hand, folded, noise)
+    return Toy(Box.cube(0, 1, 0), Box.cube(0, 1, 3), _PLANE, hand, folded, noise)
 
 
 def spatial_arm(*, noise: float = 1.0) -> Toy:
@@ -136,4 +137,5 @@ def spatial_arm(*, noise: float = 1.0) -> Toy:
         return np.stack([reach * np.cos(turn), reach * np.sin(turn), up], axis=-1)
 
     middle = np.full(6, 0.5)
-    return Toy(Box.cube(0, 1, 0), Box.cube(0, 1, 6), Box.cube(-100, 100, 3), hand, middle, noise)
+    space = Box.cube(-100, 100, 3, names=("x", "y", "height"), unit="cm")
+    return Toy(Box.cube(0, 1, 0), Box.cube(0, 1, 6), space, hand, middle, noise)

@@ -1,4 +1,4 @@
-"""What figures share: the water plane, movements along the x axis, colour bars, notes.
+"""What figures share: the plane of outcomes, movements along the x axis, colour bars, notes.
 
 Each function draws on the axes it is given.   mesh = ax.pcolormesh(x, y, z); colour_bar([ax], mesh, "error (m)")
 """
@@ -6,6 +6,7 @@ Each function draws on the axes it is given.   mesh = ax.pcolormesh(x, y, z); co
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
@@ -34,7 +35,7 @@ def colours(names: Iterable[str]) -> dict[str, str]:
     return {name: _PALETTE[k % len(_PALETTE)] for k, name in enumerate(sorted({*names}))}
 
 
-def limits(points: Array) -> Box:
+def limits(points: Array, space: Box) -> Box:
     """Where the points lie, far ones left out, in round numbers: so a single far point leaves a map its scale.
 
     Far is, in a dimension, what lies farther from the middle half of the distinct points than 1.5 times its width
@@ -42,6 +43,7 @@ def limits(points: Array) -> Box:
 
     Args:
         points: ``(n, dim)``, n >= 1, finite.
+        space: T, which gives names and unit.
     """
     lower, upper = np.quantile(np.unique(points, axis=0), (0.25, 0.75), axis=0)
     fence = 1.5 * (upper - lower)
@@ -50,7 +52,7 @@ def limits(points: Array) -> Box:
     longest = float((high - low).max()) or float(np.abs(points).max()) or 1.0
     step = np.array([rounded((side or longest) / 40) for side in (high - low).tolist()])
     low, high = np.floor(low / step) * step, np.ceil(high / step) * step
-    return Box(low, np.where(high > low, high, low + step))
+    return replace(space, low=low, high=np.where(high > low, high, low + step))
 
 
 def rounded(length: float) -> float:
@@ -60,19 +62,11 @@ def rounded(length: float) -> float:
 
 
 def plane(ax: Axes, box: Box) -> None:
-    """Axes in metres, equal aspect unless a side is much longer, showing all of ``box``."""
+    """All of ``box``, with the names of its dimensions; equal aspect unless a side is much longer."""
     limits = {"xlim": (box.low[0], box.high[0]), "ylim": (box.low[1], box.high[1])}
-    ax.set(**limits, aspect="equal" if alike(box.sides) else "auto", xlabel="x (m)", ylabel="y (m)")
+    ax.set(**limits, aspect="equal" if alike(box.sides) else "auto", xlabel=box.axis(0), ylabel=box.axis(1))
     ax.xaxis.set_major_locator(MaxNLocator(4))
     ax.yaxis.set_major_locator(MaxNLocator(4))
-
-
-def water_plane(ax: Axes, box: Box, *, legend: bool = True) -> None:
-    """The ``plane`` with the robot's base marked, and a legend above."""
-    ax.plot(0, 0, "^", color="black", markeredgecolor="white", markersize=10, label="base of the arm")
-    plane(ax, box)
-    if legend:
-        ax.legend(**LEGEND)
 
 
 def alike(sides: Array) -> bool:

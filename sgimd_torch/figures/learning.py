@@ -57,8 +57,8 @@ def landing_points(
     section = in_the_plane(box) if section is None else section
     mesh = histogram(ax, section.points(outcomes), section.box, side=section.tile(side), most=most)
     if colour_bar:
-        metric = box.dim == 2 and alike(box.sides)
-        count_bar([ax], mesh, f"movements on a tile of {100 * side:.3g} cm" if metric else "movements on a tile")
+        same_scale = box.dim == 2 and alike(box.sides)
+        count_bar([ax], mesh, f"movements on a tile of {box.amount(side)}" if same_scale else "movements on a tile")
     if demonstrated is not None:
         different = np.unique(demonstrated, axis=0)
         crosses, label = section.points(different), f"{len(different)} demonstrated outcomes"
@@ -171,6 +171,29 @@ def frame_regions(ax: Axes, lows: Array, highs: Array, section: Section | None, 
     section.frame(ax, legend=legend)
     if where := section.cut_at(lows, highs):
         note(ax, f"at {where}")
+
+
+def misses(ax: Axes, goals: Array, errors: Array, space: Box, section: Section, most: float) -> None:
+    """Where is it bad? Each goal of an evaluation, coloured by its error.
+
+    Args:
+        ax: drawn on, and given a colour bar.
+        goals: ``(n, outcome_dim)``.
+        errors: ``(n,)``, in the unit of T.
+        space: T.
+        section: which dimensions to show.
+        most: the error at the end of the colours.
+    """
+    label = space.in_unit("distance from goal to outcome")
+    if section.is_strip:  # there is room for heights
+        ax.plot(goals[:, 0], errors, ".", color="#0072b2", markersize=4)
+        ax.set(xlabel=space.axis(0), ylabel=label)
+        ax.set_ylim(bottom=0)
+        return
+    x, y = section.points(goals).T
+    drawn = ax.scatter(x, y, c=errors, s=14, cmap="viridis_r", vmin=0, vmax=most, edgecolors="none")
+    colour_bar([ax], drawn, label, extend="max")
+    section.frame(ax, legend=False)
 
 
 def map_after(regions: Mapping[str, np.ndarray], movements: int) -> tuple[Array, Array, Array]:

@@ -111,8 +111,8 @@ def goal_distances(ax: Axes, runs: Mapping[str, Sequence[Array]], *, reach: floa
     return lines
 
 
-def forest(ax: Axes, differences: Sequence[Difference], *, reference: str) -> list[Line2D]:
-    """One row for each variant, the best on top: error (m) minus the reference's, with interval.
+def forest(ax: Axes, differences: Sequence[Difference], *, reference: str, space: Box) -> list[Line2D]:
+    """One row for each variant, the best on top: error, in the unit of ``space``, minus the reference's, with interval.
 
     A filled mark: the interval excludes 0. Small ticks behind are seeds; their number is next to the name. A row
     without an interval has its seeds as points and no mark.
@@ -134,7 +134,7 @@ def forest(ax: Axes, differences: Sequence[Difference], *, reference: str) -> li
     ax.axvline(0, color=COLOURS["sgim-d"], zorder=0)
     ax.set_yticks(range(len(ordered)), [f"{row.label} ({_seeds(len(row.seeds))})" for row in ordered])
     ax.set_ylim(len(ordered) - 0.4, -0.6)
-    ax.set_xlabel(f"error less that of {reference}, seed by seed (m)")
+    ax.set_xlabel(space.in_unit(f"error less that of {reference}, seed by seed"))
     ax.grid(axis="x", alpha=0.3)
     return marks
 

@@ -8,7 +8,7 @@ the dimensions that are not shown, and at the middle of C where regions include 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -16,7 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from sgimd_torch.figures.axes import LEGEND, alike, plane, water_plane
+from sgimd_torch.figures.axes import LEGEND, alike, plane
 from sgimd_torch.spaces import Array, Box
 
 _MOST_NAMED: Final = 2  # dimensions, in a note: more would not fit
@@ -37,7 +37,9 @@ class Section:
     @property
     def box(self) -> Box:
         """What the picture covers, of two dimensions; a strip has the height 1."""
-        return Box(self._flat(self.space.low, 0.0), self._flat(self.space.high, 1.0))
+        names = tuple(self.space.axis(k) for k in self.dims)
+        flat = self._flat(self.space.low, 0.0), self._flat(self.space.high, 1.0)
+        return Box(*flat, (*names, "") if self.is_strip else names)
 
     def points(self, outcomes: Array) -> Array:
         """``(n, 2)`` where ``(n, outcome_dim)`` lie in the picture; on a strip, in the middle of its height."""
@@ -65,23 +67,18 @@ class Section:
     def cut_at(self, lows: Array, highs: Array) -> str:
         """Where ``cut`` cuts, in words; "" if nothing is hidden."""
         context_dim, middle = lows.shape[1] - self.space.dim, (lows.min(axis=0) + highs.max(axis=0)) / 2
-        names = [f"context {k}" for k in range(context_dim)] + [f"outcome {k}" for k in range(self.space.dim)]
+        names = [f"context {k}" for k in range(context_dim)] + [self.space.axis(k) for k in range(self.space.dim)]
         hidden = [k for k in range(len(names)) if k - context_dim not in self.dims]
         if len(hidden) > _MOST_NAMED:
             return f"the middle of {len(hidden)} others"
         return ", ".join(f"{names[k]} = {middle[k]:.3g}" for k in hidden)
 
     def frame(self, ax: Axes, *, legend: bool = True) -> None:
-        """Limits and names of the axes; the water plane of a T of two dimensions, with the robot's base."""
-        if self.space.dim == 2:
-            water_plane(ax, self.box, legend=legend)
-            return
+        """Limits and names of the axes."""
         plane(ax, self.box)
         if self.is_strip:
-            ax.set(xlabel="outcome", ylabel="", aspect="auto", yticks=[])
+            ax.set(aspect="auto", yticks=[])
             ax.xaxis.set_major_locator(MaxNLocator(6))
-        else:
-            ax.set(xlabel=f"outcome {self.dims[0]}", ylabel=f"outcome {self.dims[1]}")
         if legend and ax.get_legend_handles_labels()[0]:
             ax.legend(**LEGEND)
 
@@ -104,9 +101,9 @@ def sections(space: Box) -> list[Section]:
     return [Section(space, pair) for pair in pairs]
 
 
-def of_regions(lows: Array, highs: Array, outcome_dim: int) -> list[Section]:
-    """The pictures of the T that regions ``(n, context_dim + outcome_dim)`` fill."""
-    return sections(Box(lows.min(axis=0)[-outcome_dim:], highs.max(axis=0)[-outcome_dim:]))
+def of_regions(lows: Array, highs: Array, space: Box) -> list[Section]:
+    """The pictures of the part of T, ``space``, that regions ``(n, context_dim + outcome_dim)`` fill."""
+    return sections(replace(space, low=lows.min(axis=0)[-space.dim :], high=highs.max(axis=0)[-space.dim :]))
 
 
 def in_the_plane(box: Box) -> Section:

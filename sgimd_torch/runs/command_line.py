@@ -42,7 +42,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     """The command ``sgimd run``; 0 when the run has finished. It raises what ``carry_out`` raises."""
     argv = sys.argv[1:] if argv is None else argv
     config, flags = parse(argv, __doc__)
-    again = [sys.executable, "-m", "sgimd_torch", "run", *argv, *([] if flags["resume"] else ["--resume"])]
+    typed = [Path(sys.argv[0]).name] if Path(sys.argv[0]).name == "sgimd" else [sys.executable, "-m", "sgimd_torch"]
+    again = [*typed, "run", *argv, *([] if flags["resume"] else ["--resume"])]
     with loading():
         from sgimd_torch.runs.build import build  # after --help
         from sgimd_torch.runs.run import carry_out

@@ -53,7 +53,7 @@ def open_run(parts: RunParts, *, resume: bool, accept_loss: bool = False) -> tup
         "files": parts.data,
         "versions": {**versions(forward=parts.model is not None), **sources(config)},
         "robot": type(robot).__name__,
-        "spaces": {name: [box.low.tolist(), box.high.tolist()] for name, box in spaces.items()},
+        "spaces": {n: [b.low.tolist(), b.high.tolist(), b.names, b.unit] for n, b in spaces.items()},
     }
     dims = robot.contexts.dim, robot.policies.dim, robot.outcomes.dim
     make_folder(config.directory)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from sgimd_torch.evaluation import Evaluation
-from sgimd_torch.forward_model.diagnostics import coverage, improvements
+from sgimd_torch.forward_model.diagnostics import coverage, improved
 from sgimd_torch.memory import Memory
 from sgimd_torch.record import Record
 from sgimd_torch.runs.clock import Seconds
@@ -104,14 +104,13 @@ class ModelListener:
         self._record.remake_rows("predictions", ((row, *each) for row, each in enumerate(values, first)))
         spread = np.hypot(predicted.epistemic, predicted.aleatoric)
         self._curves["model/error"] = float(np.linalg.norm(outcomes - predicted.mean, axis=1).mean())
-        self._curves["model/coverage"] = float(coverage(outcomes, predicted.mean, spread, (LEVEL,))[0])
+        self._curves["model/coverage"] = coverage(outcomes, predicted.mean, spread, LEVEL)
 
     def _improved(self) -> float:
         if not self._lately:
             return float("nan")
         goals, outcomes, origins = zip(*self._lately, strict=True)
-        found = improvements(np.stack(goals), np.stack(outcomes), np.array(origins))
-        return found.share
+        return improved(np.stack(goals), np.stack(outcomes), np.array(origins))
 
     def _say_whether_asked(self, movements: int, error: float) -> None:
         asked = error <= self._trust

@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sgimd_torch.evaluation import Evaluation, Part
 from sgimd_torch.files import checksum
 from sgimd_torch.record import DERIVED, Event, Kind, Record, RunError
 from sgimd_torch.runs.config import FILES, OWN, PLACE, Config
@@ -76,32 +75,18 @@ class Run:
         found = evaluation[column][evaluation["movements"] == movements]
         return float(found[0]) if len(found) else float("nan")
 
+    def missed_by(self, movements: int, answer: str = OWN) -> tuple[Array, Array]:
+        """The errors ``(n_goals,)`` of ``benchmark`` at an evaluation, and the contexts ``(n_goals, context_dim)``."""
+        now = (self.errors["movements"] == movements) & (self.errors["answer"] == answer)
+        contexts = [self.errors[f"context_{k}"][now] for k in range(self.spaces["contexts"].dim)]
+        return self.errors["error"][now], np.array(contexts).T.reshape(int(now.sum()), -1)
+
     def chosen_goals(self) -> Array:
         """``(n, outcome_dim)``, the goals that the learner chose itself, in order, each once even if it took several
         movements. The goals of imitation are the teacher's, so they are left out."""
         own = self.goals[np.isfinite(self.goals).all(axis=1) & (self.origin != "imitate")]
         new = (np.diff(own, axis=0, prepend=np.nan) != 0).any(axis=1)
         return own[new]
-
-    @property
-    def by_context(self) -> Columns | None:
-        """The mean error in each third of each context, at each evaluation, by each answer; None without contexts."""
-        contexts, errors = self.spaces["contexts"], self.errors
-        if not contexts.dim:
-            return None
-        points = np.stack([errors[f"context_{k}"] for k in range(contexts.dim)], axis=1)
-        unknown = np.full(len(points), np.nan)
-        rows = []
-        for answer in self.answers:
-            for movements in np.unique(errors["movements"]):
-                here = (errors["answer"] == answer) & (errors["movements"] == movements)
-                found = Evaluation(
-                    errors["error"][here], points[here], points[here], unknown[here], points[here], here[here]
-                )
-                rows += [(movements, answer, *part) for part in found.by_context(contexts) if here.any()]
-        names = ("movements", "answer", *Part._fields)
-        columns = zip(*rows, strict=True) if rows else ([] for _ in names)
-        return {name: np.array(column) for name, column in zip(names, columns, strict=True)}
 
 
 def read_run(path: str | os.PathLike[str]) -> Run:
@@ -141,7 +126,7 @@ def read_run(path: str | os.PathLike[str]) -> Run:
         versions=about["versions"],
         files=about["files"],
         robot=about["robot"],
-        spaces={name: Box(np.array(low), np.array(high)) for name, (low, high) in about["spaces"].items()},
+        spaces={name: Box(*box) for name, box in about["spaces"].items()},
         summary={"movements": n, "failed": events.failed, "finished": bool(finished), **about.get("seconds", {})},
         **arrays,
         answers=_by_answer(found["evaluations"]),

@@ -121,8 +121,9 @@ class Life:
         found = "not evaluated"
         if last is not None:
             floor = last.noise_floor
-            measured = "not measured" if math.isnan(floor) else f"{floor:.4f} m"
-            found = f"mean error {last.mean_error:.4f} m, noise floor {measured}"
+            amount = self.parts.environment.outcomes.amount
+            measured = "not measured" if math.isnan(floor) else amount(floor, ".4f")
+            found = f"mean error {amount(last.mean_error, '.4f')}, noise floor {measured}"
             if last.failed.any():
                 found += f" ({last.failed.sum()} of {len(last.failed)} movements of the evaluation failed)"
         failed = f" ({self.failed} failed)" if self.failed else ""
@@ -131,10 +132,11 @@ class Life:
     def go_on(self) -> None:
         """From the first movement to the last."""
         total, title = self.parts.config.movements, self.parts.config.title
+        unit = self.parts.environment.outcomes.amount
         with Progress("replaying" if self.recorded else title, self.recorded or total) as progress:
             for _ in self.episodes():
                 last = self._last
-                progress.show(self.movements, "" if last is None else f"error {last.mean_error:.4f} m")
+                progress.show(self.movements, "" if last is None else f"error {unit(last.mean_error, '.4f')}")
                 if self.movements == self.recorded < total:
                     progress.begin(title, total, self.movements)
                 self.stopping.check()

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from sgimd_torch.figures.axes import goal_rings, water_plane
+from sgimd_torch.figures.axes import LEGEND, goal_rings, plane
 from sgimd_torch.figures.learning import COLOURS, NAMES, landing_points, tile_counts
 from sgimd_torch.figures.results import SeedCurves, seed_curves
 from sgimd_torch.runs.build import build
@@ -31,7 +31,7 @@ class Cast(NamedTuple):
 def draw(runs: Mapping[str, Run]) -> Figure:
     """The figure: error curves; four goals and how each learner answers them; where the float landed in each run."""
     half_side = float(runs["sgim-d"].config["environment.task_space"])
-    box, tile = Box.cube(-half_side, half_side, 2), 0.05 * half_side
+    box, tile = runs["sgim-d"].spaces["outcomes"], 0.05 * half_side
     figure = Figure(figsize=(7 * len(runs), 12.6), layout="constrained")
     axes: dict[str, Axes] = figure.subplot_mosaic([["curves", "above", "side"], [*runs]])
     seed_curves(axes["curves"], [_curve(algorithm, run) for algorithm, run in runs.items()])
@@ -96,7 +96,8 @@ def _draw_casts(above: Axes, beside: Axes, casts: Mapping[str, Sequence[Cast]], 
             label = missed if ax is above and cast is first else None
             ax.plot(*cast.path[-1:, seen].T, "X", color=colour, mec="white", ms=10, label=label)
     goal_rings(above, GOALS, 17)
-    water_plane(above, box)
+    plane(above, box)
+    above.legend(**LEGEND)
     goal_rings(beside, [[GOALS[0, 0], 0.0]], 17)
     beside.set(xlim=(box.low[0], box.high[0]), ylim=(-0.12, 1.2), aspect="equal", xlabel="x (m)", ylabel="height (m)")
 

@@ -2,18 +2,21 @@
 
 It takes a folder with run directories, OUT/NAME/seed-000, or one variant's, OUT/NAME. Variants are compared after the
 last number of movements at which all finished runs were evaluated, or after --at. The worst comes first. Errors and
-noise floors are means over seeds in metres, ± the standard deviation; with fewer than 5 seeds there is none, and a
-note. "by linear" is the error if LocallyLinear answers, whatever inverse model the run has: compare learners by it.
+noise floors are means over seeds, ± the standard deviation; with fewer than 5 seeds there is none, and a note. They are
+in the unit of T. "by linear" is the error if LocallyLinear answers, whatever inverse model the run has.
 Costs are milliseconds for each movement. Runs that were not evaluated there are left out, and named below the table.
 
 With --baseline there is a column more: error minus that of the baseline, paired by seed, interquartile mean over the
 seeds that both have; with five seeds or more, its bootstrap interval of 95 % in brackets. Below 0 is better.
+
+With --by region it prints instead where it is bad: the mean error of each variant at the goals in each part of T.
 
 With --episodes it prints all movements of one run instead, as csv: a line for each, numbers that read back exactly.
 
   sgimd table runs
   sgimd table study --at 2000                      such as while runs are under way
   sgimd table study --baseline goals=interest-map  what the others are compared with
+  sgimd table study --by region                    where each variant is bad
   sgimd table runs/sgim-d/seed-003 --episodes > movements.csv
 
 Exit code: 0 a table was printed, 2 there is nothing to show.
@@ -30,6 +33,7 @@ from typing import Final
 
 import numpy as np
 
+from sgimd_torch.board.curves import Grid, cells_of
 from sgimd_torch.record import RunError
 from sgimd_torch.runs.process import say
 from sgimd_torch.runs.read import Run, read_run
@@ -37,7 +41,7 @@ from sgimd_torch.spaces import Array
 from sgimd_torch.views.comparison import baseline_of, compare
 from sgimd_torch.views.statistics import LEAST_SEEDS, show
 from sgimd_torch.views.text_table import print_table
-from sgimd_torch.views.variants import Variant, best_first, read
+from sgimd_torch.views.variants import Variant, best_first, read, unit_of
 
 EARLY: Final = 1000  # movements, for a column of its own
 
@@ -52,6 +56,7 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument("runs", type=Path, help="a run's directory, a variant's folder, or an --out of runs")
     parser.add_argument("--at", type=int, metavar="MOVEMENTS", help="compare after this number of movements")
     parser.add_argument("--baseline", metavar="NAME", help="variant that the others are compared with, seed by seed")
+    parser.add_argument("--by", choices=["region"], help="errors by part of T, a row for each")
     parser.add_argument("--episodes", action="store_true", help="all movements of one run, as csv")
     return parser
 
@@ -78,7 +83,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     ]
     if not variants:
         raise RunError("\n".join(["there is nothing to compare; is --at another number of movements?", *left_out]))
-    errors = (f"error at {EARLY}", f"at {at} (m)", "by linear (m)", "noise floor (m)")
+    if options.by is not None:
+        print_table(_by_region(variants))
+        return 0
+    unit = unit_of(variants)
+    errors = (f"error at {EARLY}", unit(f"at {at}"), "by linear", "noise floor")
     table: list[tuple[str, ...]] = [
         ("variant", "seeds", *errors, "physics (ms)", "learning (ms)"),
         *map(_row, variants),
@@ -86,13 +95,30 @@ def main(argv: Sequence[str] | None = None) -> int:
     if options.baseline is not None:
         baseline = baseline_of(variants, options.baseline)
         minus = {each.variant: show(each.found, "+.4f") for each in compare(variants, baseline)}
-        further = [f"minus {options.baseline} (m)", *(minus.get(variant, "-") for variant in variants)]
+        further = [f"minus {options.baseline}", *(minus.get(variant, "-") for variant in variants)]
         table = [(*cells, cell) for cells, cell in zip(table, further, strict=True)]
     print_table(table)
     if few := [f"{variant.name} ({len(variant.used)})" for variant in variants if variant.few]:
         say(f"fewer than {LEAST_SEEDS} seeds, too few for a verdict or a deviation: {', '.join(few)}")
     say(*(f"left out: {reason}" for reason in left_out))
     return 0
+
+
+def _by_region(variants: Sequence[Variant]) -> list[tuple[str, ...]]:
+    """A row for each cell of T with goals, a column for each variant.
+
+    Raises:
+        RunError: the variants have other goals, so that their errors cannot be compared.
+    """
+    goals = variants[0].misses[0]
+    if not all(np.array_equal(variant.misses[0], goals) for variant in variants):
+        raise RunError("these variants were evaluated on different goals; give the folder of one of them")
+    grid = Grid(cells_of(variants[0].space, goals))
+    counts = grid.means(goals, np.ones(len(goals)))
+    means = [grid.means(goals, variant.misses[1]) for variant in variants]
+    unit = unit_of(variants)
+    head = ("region", *(unit(variant.name) for variant in variants))
+    return [head, *((name, *(f"{mean[name]:.3f}" for mean in means)) for name in counts)]
 
 
 def print_episodes(run: Run) -> None:
@@ -126,13 +152,13 @@ def _row(variant: Variant) -> tuple[str, ...]:
     return (
         variant.name,
         str(len(errors)),
-        _metres(variant.values(EARLY)),
-        _metres(errors) + ("" if variant.few else f" ± {errors.std(ddof=1):.3f}"),
-        _metres(variant.values(variant.last, answer="linear")),
-        _metres(variant.values(variant.last, "noise_floor")),
+        _mean(variant.values(EARLY)),
+        _mean(errors) + ("" if variant.few else f" ± {errors.std(ddof=1):.3f}"),
+        _mean(variant.values(variant.last, answer="linear")),
+        _mean(variant.values(variant.last, "noise_floor")),
         *(f"{milliseconds * variant.seconds(part):.2f}" for part in ("physics", "learner")),
     )
 
 
-def _metres(lengths: Array) -> str:
+def _mean(lengths: Array) -> str:
     return f"{lengths.mean():.3f}" if np.isfinite(lengths.mean()) else "-"

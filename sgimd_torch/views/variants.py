@@ -5,7 +5,7 @@ variants = read(Path("runs")); variants[0].last_error    # interquartile mean an
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import cached_property, reduce
 from pathlib import Path
@@ -51,6 +51,13 @@ def best_first(variants: Iterable[Variant]) -> list[Variant]:
     return sorted(variants, key=lambda v: (v.last_error.value if v.last_error else np.inf, v.name))
 
 
+def unit_of(variants: Sequence[Variant]) -> Callable[[str], str]:
+    """Names a quantity, with the unit of their outcomes if all have the same."""
+    first = variants[0].space
+    same = all(variant.space.unit == first.unit for variant in variants)
+    return first.in_unit if same else lambda quantity: f"{quantity} (unit of T)"
+
+
 class Variant:
     """The runs of one variant, one for each seed.
 
@@ -68,7 +75,7 @@ class Variant:
         self.name, self.label = name, label(name)
         self.runs = sorted(runs, key=lambda run: int(run.config["seed"]))
         self.algorithm = str(self.runs[0].config["algorithm"])
-        self.environment = str(self.runs[0].config["environment"])
+        self.environment, self.space = str(self.runs[0].config["environment"]), self.runs[0].spaces["outcomes"]
         evaluated = [run for run in self.runs if len(run.answers["own"]["movements"])]
         if at is None:
             self.used = [run for run in evaluated if run.summary["finished"]] or evaluated
@@ -123,6 +130,14 @@ class Variant:
         """``(n, outcome_dim)`` m the outcomes of what its runs were shown."""
         shown = [each.outcome for run in self.runs for each in run.demonstrations]
         return np.array(shown, dtype=np.float64).reshape(len(shown), self.landed.shape[1])
+
+    @cached_property
+    def misses(self) -> tuple[Array, Array, Array]:
+        """Goals ``(n, outcome_dim)`` of the last evaluation, their errors ``(n,)``, means over the seeds that have the
+        same goals, and contexts ``(n, context_dim)``."""
+        goals = self.typical.benchmark
+        errors = [run.missed_by(self.last) for run in self.used if np.array_equal(run.benchmark, goals)]
+        return goals, np.mean([each for each, _ in errors], axis=0), errors[0][1]
 
     @property
     def ratio(self) -> Interval | None:

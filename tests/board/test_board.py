@@ -31,7 +31,7 @@ from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.run import Life
 from sgimd_torch.spaces import Box, Demonstration, Episode, Move, Request
 
-PLANE = Box.cube(-1, 1, 2)
+PLANE = Box.cube(-1.0, 1.0, 2, names=("x", "y"), unit="m")
 GOAL, NEAR, FAR = np.array([0.5, 0.5]), np.array([0.5, 0.51]), np.array([0.5, 0.9])  # near: within the tolerance
 SHOWN = Demonstration(np.zeros(0), np.zeros(2), np.zeros((2, 1)), np.array([-0.5, 0.5]))
 

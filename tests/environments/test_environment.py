@@ -130,7 +130,7 @@ def test_an_environment_that_writes_into_a_batch_leaves_the_callers_arrays_as_th
 
 
 def test_a_diverged_simulation_names_its_theta_even_from_another_process():
-    error = pickle.loads(pickle.dumps(SimulationError(np.array([0.25, 0.5]), "NaN in qpos")))
+    error = pickle.loads(pickle.dumps(SimulationError("NaN in qpos", np.array([0.25, 0.5]))))
     assert str(error) == "NaN in qpos; theta=[0.25, 0.5]"
     assert error.theta.tolist() == [0.25, 0.5]
 

@@ -13,11 +13,13 @@ from sgimd_torch.figures.learning import (
     histogram,
     interest_map,
     landing_points,
+    misses,
 )
+from sgimd_torch.figures.sections import sections
 from sgimd_torch.goals.interest_map import InterestMap
 from sgimd_torch.spaces import Box, stream
 
-T = Box.cube(-1.0, 1.0, 2)
+T = Box.cube(-1.0, 1.0, 2, names=("x", "y"), unit="m")
 LOWS, HIGHS = np.array([[-1.0, -1.0], [0.0, -1.0]]), np.array([[0.0, 1.0], [1.0, 1.0]])
 
 
@@ -48,12 +50,11 @@ def test_no_landing_point_leaves_an_empty_plane(ax):
     assert landing_points(ax, np.empty((0, 2)), T).get_array().mask.all()
 
 
-def test_demonstrated_outcomes_are_crosses_and_the_base_is_at_the_origin(ax):
+def test_demonstrated_outcomes_are_crosses(ax):
     demonstrated = np.array([[-0.3, 0.4], [0.1, 0.2]])
     landing_points(ax, np.zeros((3, 2)), T, demonstrated=demonstrated)
-    crosses, base = ax.lines
+    (crosses,) = ax.lines
     np.testing.assert_array_equal(crosses.get_xydata(), demonstrated)
-    np.testing.assert_array_equal(base.get_xydata(), [[0, 0]])
 
 
 def test_what_was_demonstrated_several_times_is_one_demonstrated_outcome(ax):
@@ -66,19 +67,19 @@ def test_what_was_demonstrated_several_times_is_one_demonstrated_outcome(ax):
 @pytest.mark.parametrize("n", [20, 60, 400])
 def test_limits_hold_every_point_but_one_that_is_far_away(n):
     points = stream(0, "test").uniform([-0.4, 0.1], [0.3, 0.9], (n, 2))
-    near = limits(points)
+    near = limits(points, T)
     assert near.contains(points).all()
     assert (near.sides < 1).all()
     points[n // 2] = [500.0, -3.0]
-    assert (np.abs(limits(points).low - near.low) < 0.1).all()
-    assert (np.abs(limits(points).high - near.high) < 0.1).all()
+    assert (np.abs(limits(points, T).low - near.low) < 0.1).all()
+    assert (np.abs(limits(points, T).high - near.high) < 0.1).all()
 
 
 @pytest.mark.parametrize(
     "points", [[[0.2, 0.3]], [[0.0, 0.0]], [[0.2, 0.3], [0.2, 0.7]], [[-7e-5, 3e-5], [2e-5, 9e-5]]]
 )
 def test_limits_of_few_points_hold_all_of_them(points):
-    box = limits(np.array(points))
+    box = limits(np.array(points), T)
     assert (box.sides > 0).all()
     assert box.contains(points).all()
 
@@ -120,7 +121,7 @@ def test_competence_is_shown_from_minus_one_to_zero_and_unknown_regions_are_left
     corners = np.stack([path.vertices for path in drawn.get_paths()])
     np.testing.assert_array_equal(corners.min(axis=1), LOWS)
     np.testing.assert_array_equal(corners.max(axis=1), HIGHS)
-    assert (ax.get_xlabel(), ax.get_aspect(), ax.get_xlim()) == ("x (m)", 1.0, (-1, 1))
+    assert (ax.get_xlabel(), ax.get_aspect(), ax.get_xlim()) == ("outcome 0", 1.0, (-1, 1))
 
 
 @pytest.mark.parametrize("draw", [interest_map, competence_map])
@@ -147,11 +148,21 @@ def test_a_histogram_is_nothing_but_tiles(ax):
     assert not ax.lines
 
 
-@pytest.mark.parametrize("draw", ["landing_points", "interest_map"])
-def test_axes_carry_names_with_units_and_the_water_plane_is_not_distorted(ax, draw):
-    if draw == "landing_points":
-        landing_points(ax, np.zeros((3, 2)), T)
-    else:
-        interest_map(ax, T.low[None], T.high[None], np.zeros(1))
+def test_axes_carry_the_names_and_the_unit_of_the_task_space_which_is_not_distorted(ax):
+    landing_points(ax, np.zeros((3, 2)), T)
     assert (ax.get_xlabel(), ax.get_ylabel(), ax.get_aspect()) == ("x (m)", "y (m)", 1.0)
     assert ax.get_xlim() == ax.get_ylim() == (-1, 1)
+
+
+@pytest.mark.parametrize(
+    ("dim", "labels"), [(1, ("height", "distance from goal to outcome")), (2, ("height", "reach"))]
+)
+def test_misses_are_at_their_goals(ax, dim, labels):
+    space = Box.cube(0, 1, dim, names=("height", "reach")[:dim])
+    goals = stream(0, "test").random((5, dim))
+    misses(ax, goals, np.arange(5.0), space, sections(space)[0], 2.0)
+    assert (ax.get_xlabel(), ax.get_ylabel()) == labels
+    drawn = ax.lines[0].get_xydata() if dim == 1 else ax.collections[0].get_offsets()
+    np.testing.assert_array_equal(drawn[:, :dim], goals)
+    if dim == 2:
+        assert ax.collections[0].get_array().tolist() == [0, 1, 2, 3, 4]

@@ -8,6 +8,8 @@ from sgimd_torch.figures.learning import COLOURS
 from sgimd_torch.figures.results import Difference, SeedCurves, forest, goal_distances, goal_histogram, seed_curves
 from sgimd_torch.spaces import Box
 
+PLANE = Box.cube(-1, 1, 2, unit="m")
+
 
 @pytest.fixture
 def ax():
@@ -58,7 +60,7 @@ def test_goals_of_a_large_space_keep_its_shape(ax):
     box = Box.cube(-100.0, 100.0, 2)
     mesh = goal_histogram(ax, np.array([[-90.0, 90.0], [3.0, 3.0], [4.0, 4.0]]), box, side=100.0)
     np.testing.assert_array_equal(mesh.get_array().filled(0), [[0, 0], [1, 2]])
-    assert (ax.get_aspect(), ax.get_xlabel(), ax.get_xlim()) == (1.0, "x (m)", (-100, 100))
+    assert (ax.get_aspect(), ax.get_xlabel(), ax.get_xlim()) == (1.0, "outcome 0", (-100, 100))
 
 
 def test_the_share_of_goals_within_a_distance_counts_all_seeds_alike(ax):
@@ -74,7 +76,7 @@ def test_the_share_of_goals_within_a_distance_counts_all_seeds_alike(ax):
 
 def test_a_row_of_a_forest_without_an_interval_shows_its_seeds_alone(ax):
     few = Difference("few", np.array([-0.2, -0.1]), -0.15, np.nan, np.nan)
-    (points,) = forest(ax, [few], reference="SGIM-D")
+    (points,) = forest(ax, [few], reference="SGIM-D", space=PLANE)
     np.testing.assert_array_equal(points.get_xdata(), few.seeds)
     assert not [line for line in ax.lines if line.get_color() == "black"]  # neither mark nor interval
 
@@ -83,7 +85,7 @@ def test_a_forest_has_the_best_on_top_and_a_full_mark_where_zero_is_excluded(ax)
     worse = Difference("worse", np.array([0.1, 0.3]), 0.2, 0.1, 0.3)
     unsure = Difference("unsure", np.array([-0.1, 0.2, 0.0]), 0.05, -0.1, 0.2)
     better = Difference("better", np.array([-0.3, -0.1]), -0.2, -0.3, -0.1)
-    marks = forest(ax, [worse, unsure, better], reference="SGIM-D")
+    marks = forest(ax, [worse, unsure, better], reference="SGIM-D", space=PLANE)
     assert [label.get_text() for label in ax.get_yticklabels()] == [
         "better (2 seeds)",
         "unsure (3 seeds)",

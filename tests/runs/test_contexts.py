@@ -27,30 +27,10 @@ def run(tmp_path_factory):
     return read_run(out / "sagg-riac/seed-000")
 
 
-def test_the_errors_by_context_are_those_of_the_evaluation(run):
-    by, n = run.by_context, len(build(Config("sagg-riac", parts={"environment": "toss"})).benchmark.goals)
-    assert list(by) == ["movements", "answer", "context", "low", "high", "goals", "mean_error"]
-    for answer in ("own", "nearest"):
-        for k, movements in enumerate((30, 60)):
-            rows = (by["answer"] == answer) & (by["movements"] == movements)
-            assert by["context"][rows].tolist() == [0, 0, 0]
-            assert by["low"][rows] == pytest.approx([-1, -1 / 3, 1 / 3])
-            assert by["goals"][rows].sum() == n
-            mean = np.average(by["mean_error"][rows], weights=by["goals"][rows])
-            assert mean == pytest.approx(run.answers[answer]["mean_error"][k])
-
-
 def test_a_run_with_contexts_ends_the_same_however_often_it_was_stopped(run, tmp_path):
     assert live(tmp_path, "--movements", 40) == 0
     assert live(tmp_path, "--resume") == 0
     assert content_of(tmp_path / "sagg-riac/seed-000") == content_of(run.path)
-
-
-def test_a_run_without_contexts_has_no_such_table(tmp_path):
-    words = "--environment crawler --algorithm random --movements 20 --evaluate-at 10 --repeats 0"
-    assert command(main, [*words.split(), "--out", str(tmp_path)]) == 0
-    found = read_run(tmp_path / "random/seed-000")
-    assert found.by_context is None
 
 
 @pytest.mark.parametrize(("word", "reach"), [("rod-wind", 0.05), ("rod-yaw", 0.5)])
@@ -85,4 +65,4 @@ def test_the_rod_in_the_wind_is_run_taught_and_resumed(tmp_path, benchmark):
     assert run.contexts.shape == (45, 1)
     assert np.abs(run.contexts).max() <= 0.05
     assert (run.demonstration >= 0).any()
-    assert run.by_context["goals"].sum() == 2 * 2 * 3  # evaluations, answers, goals
+    assert len(run.errors["context_0"]) == 2 * 2 * 3  # evaluations, answers, goals

@@ -96,7 +96,7 @@ def test_the_figure_shows_the_data_of_the_runs(runs):
     for ax, run in zip(landed, runs.values(), strict=True):
         assert ax.collections[0].get_array().sum() == (np.abs(run.outcomes) <= 1).all(axis=1).sum()
     assert len({ax.collections[0].norm.vmax for ax in landed}) == 1
-    assert [len(ax.lines) for ax in landed] == [1, 2, 2]  # the base, and demonstrated outcomes
+    assert [len(ax.lines) for ax in landed] == [0, 1, 1]  # demonstrated outcomes
 
 
 def test_a_second_start_uses_what_is_there_and_fewer_movements_are_refused(shown, options, capsys):

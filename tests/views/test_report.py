@@ -14,20 +14,20 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from pages import Page, rows_of
-from sgimd_torch.evaluation import Benchmark, save_benchmark
 from sgimd_torch.figures.learning import COLOURS
 from sgimd_torch.runs.command_line import main as live
 from sgimd_torch.runs.command_line import parse
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
+from sgimd_torch.spaces import Box
 from sgimd_torch.views.comparison import compare
-from sgimd_torch.views.model_run import model_run
 from sgimd_torch.views.report import command as report
 from sgimd_torch.views.report import figures, record
 from sgimd_torch.views.report.page import page, requested
 from sgimd_torch.views.statistics import interquartile_mean
 from sgimd_torch.views.variants import Variant
 
+FIGURES = [f"{what} of SGIM-D" for what in ("Error curve", "Misses", "Landing points", "Regions")]
 ODD = "<b>&'$x\" "
 
 
@@ -81,9 +81,9 @@ def test_a_page_is_one_file_that_asks_for_nothing_else(pages, name):
 
 
 def test_every_figure_is_an_image_with_words_for_those_who_do_not_see_it(pages):
-    assert alts(pages["one"]) == ["Error curve of SGIM-D", "Landing points of SGIM-D", "Regions of SGIM-D"]
+    assert alts(pages["one"]) == FIGURES
     # all curves and differences; of each variant its curve, where it landed if it moved, regions of one
-    assert len(alts(pages["many"])) == 2 + 3 + 2 + 1
+    assert len(alts(pages["many"])) == 2 + 3 + 3 + 2 + 1
     assert all(alts(pages["many"]))
     source = next(given["src"] for name, given in Page(pages["one"]).elements if name == "img")
     with Image.open(io.BytesIO(base64.b64decode(source.partition(",")[2]))) as picture:
@@ -125,9 +125,9 @@ def test_the_numbers_of_a_run_are_those_of_its_evaluations(pages, run):
     assert "60 of 60 movements on fishing-rod" in pages["one"]
     errors = dict(zip(*rows_of(pages["one"], "Errors"), strict=True))
     assert errors["last error (m)"] == f"{mean:.3f}"
-    assert errors["by linear (m)"] == f"{run.at(60, answer='linear'):.3f}"
+    assert errors["by linear"] == f"{run.at(60, answer='linear'):.3f}"
     assert errors["times the floor"] == f"{mean / floor:.2f}"
-    assert errors["error over life (m)"] == f"{(run.at(30) + mean) / 2:.3f}"  # of one trapezoid
+    assert errors["error over life"] == f"{(run.at(30) + mean) / 2:.3f}"  # of one trapezoid
     assert errors["physics (s)"] == f"{run.summary['seconds_physics']:.1f}"
 
 
@@ -185,9 +185,11 @@ def test_outcomes_that_are_not_in_the_plane_have_maps_of_strips_or_pairs(run, tm
         outcomes=rng.random((60, dim)),
         demonstrations=[],
         regions={"movements": np.array([60]), "path": np.array(["R"]), **corners, **about},
+        benchmark=rng.random((3, dim)),
+        spaces={**run.spaces, "outcomes": Box.cube(0, 1, dim)},
     )
     made = page(tmp_path, [Variant("sgim-d", [other])])
-    assert alts(made) == ["Error curve of SGIM-D", "Landing points of SGIM-D", "Regions of SGIM-D"]
+    assert alts(made) == FIGURES
 
 
 FIVE = [0.10, 0.12, 0.11, 0.14, 0.10]
@@ -373,45 +375,6 @@ def test_a_learner_that_asks_has_a_line_and_a_figure_of_its_requests(asked, run,
     assert sum(bar.get_height() for bar in ax.patches) == len(shown)
     assert {text.get_text() for text in ax.get_legend().get_texts()} == {*requests["strategy"]}
     assert requested(run) == ""
-
-
-def test_errors_by_context_have_a_table(tmp_path):
-    words = "--environment toss --algorithm random --movements 40 --evaluate-at 40 --repeats 0 --out"
-    assert command(live, [*words.split(), str(tmp_path)]) == 0
-    run = read_run(tmp_path / "random" / "seed-000")
-    head, row = rows_of(page(tmp_path, [Variant("random", [run])]), "The last error by context (m)")
-    own = run.by_context["answer"] == "own"
-    assert head[1:] == ["context 0: -1 to -0.333", "context 0: -0.333 to 0.333", "context 0: 0.333 to 1"]
-    assert row == ["Random", *(f"{error:.3f}" for error in run.by_context["mean_error"][own])]
-
-
-@pytest.fixture(scope="module")
-def modelled(tmp_path_factory, go):
-    """A run with a forward model, and one too short for it to learn."""
-    out = tmp_path_factory.mktemp("modelled")
-    save_benchmark(out / "arm.npz", Benchmark("PlanarArm", np.array([[0.0, 0.6], [0.3, -0.5]]), 0.1))
-    words = "--environment planar-arm-7 --model.rate 2 --evaluate_at 120 --repeats 0 --search gradient --inverse model"
-    for seed, movements in ((0, 170), (1, 30)):
-        options = ("--benchmark", out / "arm.npz", "--seed", seed, "--movements", movements, "--name", "model")
-        assert go(out, *words.split(), *options) == 0
-    return [read_run(out / "model" / f"seed-00{seed}") for seed in (0, 1)]
-
-
-def test_a_run_with_a_forward_model_has_a_figure_that_is_shaded_where_it_was_not_asked(modelled, tmp_path):
-    run, short = modelled
-    assert "Forward model of model" in alts(page(tmp_path, [Variant("model", [run])]))
-    asked = np.zeros(170, bool)
-    for movements, error in zip(run.refreshes["movements"], run.refreshes["relative_error"], strict=True):
-        asked[movements:] = error <= 0.25  # each refresh decides until the next
-    assert (model_run(run).asked == asked).all()
-    for ax in drawn(figures.model, run).axes:
-        (shade,) = (each for each in ax.collections if isinstance(each, PolyCollection))
-        spans = [(path.vertices[:, 0].min(), path.vertices[:, 0].max()) for path in shade.get_paths()]
-        covered = [any(low <= k <= high for low, high in spans) for k in range(170)]
-        assert sum(covered) == pytest.approx((~asked).sum(), abs=len(spans))
-    with pytest.raises(ValueError, match="no prediction"):
-        model_run(short)
-    assert "Forward model" not in page(tmp_path, [Variant("model", [short])])
 
 
 def test_the_same_runs_give_the_same_page(runs, pages, tmp_path):

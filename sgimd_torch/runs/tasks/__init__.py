@@ -142,8 +142,9 @@ def _fit(robot: Environment, shown: Sequence[Demonstration], misfits: Sequence[f
     outside = [row for row, each in enumerate(shown) if not robot.outcomes.contains(each.outcome)]
     if outside:
         place = ", ".join(f"{x:g}" for x in shown[outside[0]].outcome)
+        unit = robot.outcomes.unit or "the unit of T"
         more = f", as do {len(outside) - 1} more" if len(outside) > 1 else ""
-        notes.append(f"recording {outside[0]} lands at ({place}) m, outside T{more}; were they recorded in cm?")
+        notes.append(f"recording {outside[0]} lands at ({place}), outside T{more}; were they not recorded in {unit}?")
     return notes
 
 

@@ -38,7 +38,7 @@ def swimmer() -> Task:
 
 def half_reached() -> Task:
     """The arm of 7 joints, with a little noise and a T of which it cannot reach a half and a bit."""
-    arm = PlanarArm(7, noise=0.02, outcomes=Box(np.array([-1.0, -1.0]), np.array([3.0, 1.0])))
+    arm = PlanarArm(7, noise=0.02, outcomes=Box(np.array([-1.0, -1.0]), np.array([3.0, 1.0]), ("x", "y"), "m"))
     return Task(arm, partial(arm_benchmark, arm))
 
 

@@ -40,7 +40,8 @@ def fishing_rod(*, task_space: float = 1.0, threads: int = 1, **physics: Any) ->
         raise ValueError(
             f"task_space must be above 0 and at most {LARGEST:g}, got {task_space}; it is a length in metres"
         )
-    rod = FishingRod(outcomes=Box.cube(-task_space, task_space, 2), threads=threads, **physics)
+    space = Box.cube(-task_space, task_space, 2, names=("x", "y"), unit="m")
+    rod = FishingRod(outcomes=space, threads=threads, **physics)
     return Task(
         rod,
         SHIPPED_BENCHMARK,

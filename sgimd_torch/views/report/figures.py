@@ -8,6 +8,7 @@ from __future__ import annotations
 import io
 from base64 import b64encode
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import wraps
 from typing import Any, Concatenate, Final, ParamSpec
 
@@ -19,14 +20,12 @@ from matplotlib.figure import Figure
 from sgimd_torch.figures.axes import LEGEND, alike, limits, over_movements, rounded
 from sgimd_torch.figures.axes import colours as palette
 from sgimd_torch.figures.learning import COLOURS, competence_map, interest_map, landing_points, map_after
-from sgimd_torch.figures.predictions import coverage_over_time, error_over_time
+from sgimd_torch.figures.learning import misses as draw_misses
 from sgimd_torch.figures.results import Difference, forest
 from sgimd_torch.figures.sections import Section, of_regions, sections
-from sgimd_torch.forward_model.diagnostics import LEVELS, TRUSTED_UP_TO, running
 from sgimd_torch.runs.read import Run
 from sgimd_torch.spaces import Array, Box
 from sgimd_torch.views.comparison import Comparison
-from sgimd_torch.views.model_run import model_run
 from sgimd_torch.views.variants import Variant
 
 P = ParamSpec("P")
@@ -34,9 +33,6 @@ TILES: Final = 50  # along the longer side of a map, at most
 GOALS: Final = 100  # the last ones are shown
 MOST_CURVES: Final = 8
 PARTS: Final = 20  # of a run, each with its requests
-LEVEL: Final = 0.8  # of the forward model's regions
-WINDOW: Final = 100  # predictions, from one point of a curve to the next
-NOT_ASKED: Final = "#f3e3bf"  # where the forward model was not asked
 STYLE: Final[Any] = {
     "font.size": 11,
     "axes.titlesize": 11,
@@ -101,7 +97,7 @@ def curves(figure: Figure, variants: Sequence[Variant], colours: Mapping[str, st
         if len(variants) == 1:
             floor = variant.floors.mean(axis=0)
             ax.plot(variant.evaluated, floor, "_--", color="black", linewidth=1.2, markersize=8, label="noise floor")
-    over_movements(ax, "mean distance to benchmark goals (m)")
+    over_movements(ax, variants[0].space.in_unit("mean distance to benchmark goals"))
     ax.set_ylim(bottom=0)
     handles = [line for line in ax.lines if not str(line.get_label()).startswith("_")]
     ax.legend(handles=handles, ncols=1 + (len(variants) > 4), loc="upper right")
@@ -118,7 +114,7 @@ def differences(figure: Figure, compared: Sequence[Comparison], baseline: Varian
     """
     figure.set_size_inches(6.8, 1.1 + 0.36 * len(compared))
     rows = [Difference(_plain(each.variant.label), each.seeds, *each.found) for each in compared]
-    forest(figure.subplots(), rows, reference=_plain(baseline.label))
+    forest(figure.subplots(), rows, reference=_plain(baseline.label), space=baseline.space)
 
 
 def planes_of(variants: Sequence[Variant]) -> dict[str, Box]:
@@ -126,9 +122,13 @@ def planes_of(variants: Sequence[Variant]) -> dict[str, Box]:
     found: dict[str, list[Array]] = {}
     for variant in variants:
         if len(variant.landed):
-            box = limits(variant.landed)
+            box = limits(variant.landed, variant.space)
             found.setdefault(variant.environment, []).extend([box.low, box.high])
-    return {name: Box(np.min(corners, axis=0), np.max(corners, axis=0)) for name, corners in found.items()}
+    spaces = {variant.environment: variant.space for variant in variants}
+    return {
+        name: replace(spaces[name], low=np.min(corners, axis=0), high=np.max(corners, axis=0))
+        for name, corners in found.items()
+    }
 
 
 @png
@@ -140,6 +140,24 @@ def landing(figure: Figure, variant: Variant, plane: Box) -> None:
         longest = float(sides[0] if section.is_strip or not alike(sides) else sides.max())
         side, crosses = rounded(longest / TILES), shown if len(shown) else None
         landing_points(ax, variant.landed, plane, demonstrated=crosses, side=side, section=section)
+
+
+@png
+def misses(figure: Figure, variant: Variant) -> None:
+    """Where is it bad? Each goal of the last evaluation, coloured by its error; apart for thirds of the context."""
+    goals, errors, contexts = variant.misses
+    parts = [("", np.ones(len(goals), bool))]
+    for k in range(contexts.shape[1]):
+        box = variant.runs[0].spaces["contexts"]
+        edges = np.linspace(box.low[k], box.high[k], 4)
+        third = np.clip(np.searchsorted(edges, contexts[:, k], "right") - 1, 0, 2)
+        parts += [(f"{box.axis(k, 'context')} {edges[n]:.3g} to {edges[n + 1]:.3g}", third == n) for n in range(3)]
+    panels = [(section, *part) for part in parts for section in sections(variant.space) if part[1].any()]
+    axes = _panels(figure, [section for section, *_ in panels])
+    most = max(float(np.quantile(errors, 0.95)), 1e-12)
+    for ax, (section, title, here) in zip(axes, panels, strict=True):
+        draw_misses(ax, goals[here], errors[here], variant.space, section, most)
+        ax.set_title(title)
 
 
 def has_regions(run: Run) -> bool:
@@ -154,7 +172,7 @@ def regions(figure: Figure, run: Run) -> None:
     now = run.regions["movements"].max()
     lows, highs, interests = map_after(run.regions, now)
     competences = run.regions["competence"][run.regions["movements"] == now]
-    panels = of_regions(lows, highs, run.outcomes.shape[1])
+    panels = of_regions(lows, highs, run.spaces["outcomes"])
     axes = _panels(figure, [*panels, *panels])
     for above, below, section in zip(axes, axes[len(panels) :], panels, strict=False):
         competence_map(above, lows, highs, competences, section=section)
@@ -174,24 +192,6 @@ def requests(figure: Figure, run: Run) -> None:
         below += counts
     over_movements(ax, "requests for a demonstration")
     ax.legend(**LEGEND)
-
-
-@png
-def model(figure: Figure, run: Run) -> None:
-    """Error and coverage of the forward model's predictions against movements, shaded where it was not asked."""
-    figure.set_size_inches(6.4, 6.4)
-    found = model_run(run)
-    windows = running(found.observed, found.mean, found.spread, WINDOW)
-    ends = (found.movements[windows.last] + 1).astype(np.float64)
-    above, below = figure.subplots(2, 1, sharex=True)
-    error_over_time(above, ends, windows.errors)
-    coverage_over_time(below, ends, windows.coverages[:, LEVELS.index(LEVEL)])
-    for ax in (above, below):
-        edge = ax.get_xaxis_transform()
-        ax.fill_between(run.index, 0, 1, where=~found.asked, step="post", transform=edge, color=NOT_ASKED, zorder=0)
-    above.plot([], [], color=NOT_ASKED, linewidth=8, label=f"not asked: relative error above {TRUSTED_UP_TO:g}")
-    above.set_xlabel("")
-    above.legend(loc="upper right")
 
 
 def _panels(figure: Figure, shown: Sequence[Section]) -> list[Axes]:

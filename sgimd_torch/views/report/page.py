@@ -16,7 +16,7 @@ from sgimd_torch.runs.read import Run
 from sgimd_torch.views import comparison
 from sgimd_torch.views.report import figures, record
 from sgimd_torch.views.statistics import LEAST_SEEDS, Interval, show
-from sgimd_torch.views.variants import Variant
+from sgimd_torch.views.variants import Variant, unit_of
 
 EARLY: Final = 1000  # movements, for the column next to the last error
 
@@ -56,6 +56,7 @@ def page(place: Path, variants: Sequence[Variant], baseline: str | None = None) 
         figures=figures,
         record=record,
         requested=requested,
+        unit=unit_of(variants),
     )
     return html.encode(errors="backslashreplace").decode()  # a name may not be valid text
 

@@ -11,8 +11,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Final, NamedTuple
 
-import numpy as np
-
 from sgimd_torch.record import RunError
 from sgimd_torch.runs.config import PLACE, Config, words
 from sgimd_torch.runs.read import Run, config_of
@@ -56,24 +54,6 @@ def doubts(variants: Sequence[Variant]) -> Iterator[str]:
     if cut:
         named = [f"{run.path}: {len(run.index)} of {run.config['movements']} movements" for run in cut]
         yield f"{_count(len(cut))} not finished, stopped or still running: {'; '.join(named)}."
-
-
-def by_context(variants: Sequence[Variant]) -> Table:
-    """The last error (m) in each part of C, the mean over seeds, of the variants that have contexts."""
-    table: dict[str, dict[str, list[float]]] = {}
-    for variant in variants:
-        for found in [run.by_context for run in variant.used if run.by_context]:
-            now = (found["movements"] == variant.last) & (found["answer"] == "own")
-            columns = [found[name][now].tolist() for name in ("context", "low", "high", "mean_error")]
-            for dim, low, high, error in zip(*columns, strict=True):
-                part = f"context {dim:.0f}: {low:.3g} to {high:.3g}"
-                table.setdefault(variant.label, {}).setdefault(part, []).append(error)
-    parts = list(dict.fromkeys(part for errors in table.values() for part in errors))
-    rows = [
-        (label, [f"{np.mean(errors[part]):.3f}" if part in errors else "–" for part in parts])
-        for label, errors in table.items()
-    ]
-    return Table(parts, rows)
 
 
 def versions(variants: Sequence[Variant]) -> list[tuple[str, str]]:

@@ -58,7 +58,7 @@ class Page:
         self._outcomes = parts.environment.outcomes
         self.arm = LedArm(led)
         self.scene = Scene(server, led, self._outcomes, parts.benchmark.goals)
-        self.panel = Panel(server, self._act)
+        self.panel = Panel(server, self._act, self._outcomes)
         self.lesson: HandLesson | None = None
         """What the recording teaches, as it is trimmed now; None until that is known."""
         self.drawn: Chart | None = None
@@ -241,7 +241,7 @@ class Page:
     def _tried(self, trial: Trial) -> None:
         self.panel.say_trial(trial)
         self.scene.mark("goal", trial.goal)
-        self.scene.mark("landed", trial.outcome, f"missed by {trial.missed:.2f} m")
+        self.scene.mark("landed", trial.outcome, f"missed by {self._outcomes.amount(trial.missed, '.2f')}")
         self.scene.play(trial.recorded, time.monotonic(), 1.0)
 
     def _set_speed(self, word: str) -> None:

@@ -14,7 +14,7 @@ import numpy as np
 import viser
 
 from sgimd_torch.demonstrations.lessons import HandLesson
-from sgimd_torch.spaces import Array
+from sgimd_torch.spaces import Array, Box
 from sgimd_torch.views.teach.chart import CHANGE, SKILL, Chart, State
 from sgimd_torch.views.teach.taught import Trial
 
@@ -58,7 +58,7 @@ _STATUS: Final = (
     'reach &nbsp; <b style="color:#788ca0">●</b> goals still too far</div>'
 )
 _CURVE: Final = (
-    '<div style="padding:0 .6em;font-size:.85em">Predicted error (m) over movements, '
+    '<div style="padding:0 .6em;font-size:.85em">Predicted error over movements, '
     '<b style="color:#f0781e">●</b> lessons</div>'
 )
 _LEGEND: Final = (
@@ -70,8 +70,8 @@ _LEGEND: Final = (
 class Panel:
     """What viewers see beside the scene; all of them see the same."""
 
-    def __init__(self, server: viser.ViserServer, act: Act) -> None:
-        self._server, self._act = server, act
+    def __init__(self, server: viser.ViserServer, act: Act, space: Box) -> None:
+        self._server, self._act, self._space = server, act, space
         self.buttons: dict[str, Any] = {}
         gui = server.gui
         gui.configure_theme(
@@ -112,7 +112,7 @@ class Panel:
                 (empty, empty, empty),
                 (
                     {"label": "movements"},
-                    {"label": "error (m)", "stroke": "#3c46be", "width": 2},
+                    {"label": "error", "stroke": "#3c46be", "width": 2},
                     {"label": "lesson", "stroke": ORANGE, "width": 0, "points": {"size": 9, "fill": ORANGE}},
                 ),
                 scales={"x": {"time": False}},
@@ -154,7 +154,7 @@ class Panel:
         if lesson is None:
             self.lesson.content = f"**This is no lesson:** {problem}" if problem else LOOK
             return
-        lines = [f"It lands at **{_place(lesson.demonstration.outcome)}**, the orange ring."]
+        lines = [f"It lands at **{self._place(lesson.demonstration.outcome)}**, the orange ring."]
         if np.isfinite(lesson.misfit):
             lines.append(f"The robot plays it within **{lesson.misfit:.3f} rad** of what you did.")
         remarks = list(lesson.remarks[:REMARKS]) or ["everything could be followed"]
@@ -179,7 +179,7 @@ class Panel:
     def say_trial(self, trial: Trial) -> None:
         """How a trial went."""
         missed = f"**missed by {trial.missed:.2f} m** (blue ring)"
-        self.trial.content = f"{CLICK}\n\nGoal {_place(trial.goal)}, the pink ring: {missed}."
+        self.trial.content = f"{CLICK}\n\nGoal {self._place(trial.goal)}, the pink ring: {missed}."
 
     def say_state(self, state: State, cannot: str) -> None:
         """What it does and how well; ``cannot`` says why it cannot be taught."""
@@ -193,7 +193,7 @@ class Panel:
         lessons = f"{len(state.lessons)} lesson{'s' * (len(state.lessons) != 1)} by you"
         error, met = "–", ""
         if state.chart is not None:
-            error = f"{state.chart.mean_error:.3f} m"
+            error = self._space.amount(state.chart.mean_error, ".3f")
             met = f"{int(state.chart.met.sum())} of {len(state.chart.met)} goals within reach"
         doing = escape(state.problem or doing)
         self.status.content = _STATUS.format(doing, state.movements, state.total, lessons, error, met, escape(cannot))
@@ -213,6 +213,5 @@ class Panel:
         stops = ",".join(f"rgb({r:.0f},{g:.0f},{b:.0f})" for r, g, b in colours)
         self.legend.content = _LEGEND.format(low, stops, high)
 
-
-def _place(outcome: Array) -> str:
-    return f"({', '.join(f'{x:.2f}' for x in outcome)}) m"
+    def _place(self, outcome: Array) -> str:
+        return f"({', '.join(f'{x:.2f}' for x in outcome)}) {self._space.unit}".rstrip()
