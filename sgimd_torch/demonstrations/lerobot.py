@@ -74,7 +74,7 @@ def _info(path: Path) -> dict[str, Any]:
 def _columns(file: Path, names: list[str]) -> dict[str, np.ndarray]:
     """``(n,)`` or ``(n, k)`` for each name."""
     try:
-        table = pyarrow.parquet.read_table(file, columns=names)
+        table = pyarrow.parquet.read_table(file, columns=names, page_checksum_verification=True)
         return {name: np.array(table.column(name).to_pylist()) for name in names}
     except (pyarrow.ArrowException, OSError, ValueError, KeyError) as error:  # vectors of several lengths, too
         raise ValueError(f"{file} cannot be read: {str(error)[:200]}; is it whole, with all of {names}?") from error

@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any, Final, Self
 
 from sgimd_torch.catalogue import CATALOGUE, find
-from sgimd_torch.environments.protocol import FAILURES
 from sgimd_torch.runs.chosen import chosen, part_of, refused, standards
 
 OWN: Final = "own"  # the answer of the inverse model that a run chose
@@ -52,7 +51,7 @@ class Config:
         benchmark: file of the goals to evaluate on; null is the environment's own.
         demonstrations: file of recorded demonstrations; null is the environment's own.
         patience: seconds to wait for a teacher who is asked; null is as long as it takes.
-        failures: failed movements in a row that stop the run.
+        failures: failed movements in a row that stop the run; null is ten.
         parts: by name, such as "goals" or "goals.window", what is chosen for it; what differs from its default is kept.
 
     Raises:
@@ -72,7 +71,7 @@ class Config:
     benchmark: Path | None = None
     demonstrations: Path | None = None
     patience: float | None = None
-    failures: int = FAILURES
+    failures: int | None = None
     parts: Mapping[str, Any] | tuple[tuple[str, Any], ...] = ()
 
     def __post_init__(self) -> None:
@@ -84,9 +83,11 @@ class Config:
                 raise refused(name, parts, RUN)
         differing = sorted((name, value) for name, value in given.items() if value != standard[name])
         object.__setattr__(self, "parts", tuple(differing))
-        for name, least in (("seed", 0), ("movements", 1), ("repeats", 0), ("failures", 1)):
+        for name, least in (("seed", 0), ("movements", 1), ("repeats", 0)):
             if getattr(self, name) < least:
                 raise ValueError(f"{name} must be at least {least}, got {getattr(self, name)}")
+        if self.failures is not None and self.failures < 1:
+            raise ValueError(f"failures must be at least 1, got {self.failures}")
         if self.repeats == 1:
             raise ValueError("repeats must be 0 or at least 2, got 1; one landing point does not scatter")
         for name in ("evaluate_at", "floor_at"):

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from typing import Any, Final, Self
 
-from sgimd_torch.environments.protocol import SimulationError
+from sgimd_torch.environments.protocol import FAILURES, SimulationError
 from sgimd_torch.evaluation import Evaluation, evaluate
 from sgimd_torch.record import RunError
 from sgimd_torch.runs.build import RunParts
@@ -155,7 +155,7 @@ class Life:
             teachers={name: self._awaited(name, each) for name, each in parts.teachers.items()},
             execute=self.seconds.of("physics")(alive),
             record=self.record,
-            failures=parts.config.failures,
+            failures=parts.config.failures or FAILURES,
         )
         if not self.recorded:
             self._begin()

@@ -120,7 +120,7 @@ def test_own_demonstrations_and_goals_replace_those_of_the_arm(tmp_path, capsys)
     assert [each.trajectory.tolist() for each in run.demonstrations] in (own, own[::-1])
     assert run.evaluation["mean_error"].tolist() == run.evaluation["median_error"].tolist()  # of one goal
     assert None not in (run.files["benchmark_crc32"], run.files["demonstrations_crc32"])
-    assert "2 demonstrations; correspondence misses them by 0.0000 rad" in capsys.readouterr().err
+    assert "2 demonstrations; how far the correspondence misses them is not measured" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -261,7 +261,7 @@ def test_recordings_whose_float_lands_outside_the_task_space_are_noted(tmp_path,
     far = Demonstration(shown.context, shown.times, shown.trajectory, 100 * shown.outcome)
     save_demonstrations(tmp_path / "own.npz", [shown, far])
     assert go(tmp_path, "--demonstrations", tmp_path / "own.npz", "--movements", 5) == 0
-    assert re.search(r"recording 1 lands at \(.*\) m, outside T; were they recorded in cm\?", capsys.readouterr().err)
+    assert re.search(r"recording 1 lands at \(.*\), outside T; were they not recorded in m\?", capsys.readouterr().err)
 
 
 def test_a_link_to_nowhere_is_named(tmp_path, go, capsys):
@@ -317,7 +317,7 @@ SCRIPTS = {**os.environ, "PYTHONPATH": str(ROOT)}
     "script",
     [
         *(f"-m sgimd_torch {words}" for words in ("run --out", "demo --out", "table", "report")),
-        *(f"experiments/{name}.py" for name in ("compare", "claims", "figures", "model_figures")),
+        *(f"experiments/{name}.py" for name in ("compare", "claims", "figures")),
     ],
 )
 def test_ctrl_c_while_python_imports_shows_no_traceback(script, tmp_path):

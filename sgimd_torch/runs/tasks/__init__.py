@@ -117,7 +117,7 @@ def demonstrations_of(task: Task, file: Path | None) -> tuple[Sequence[Demonstra
         )
     if not isinstance(source, Path):
         made = source()
-        return made, _fit(robot, made, [0.0] * len(made)), None
+        return made, _fit(robot, made, []), None
     crc32 = _checksum("demonstrations", source)
     found = load_demonstrations(
         source, n_joints=task.n_joints, outcome_dim=robot.outcomes.dim, context_dim=robot.contexts.dim
@@ -127,7 +127,8 @@ def demonstrations_of(task: Task, file: Path | None) -> tuple[Sequence[Demonstra
         try:
             if task.misfit is None:
                 correspondence_of(task)(demonstration.times, demonstration.trajectory)
-            misfits.append(0.0 if task.misfit is None else task.misfit(demonstration))
+            else:
+                misfits.append(task.misfit(demonstration))
         except ValueError as error:
             raise ValueError(f"{source}: recording {row} cannot be translated: {error}") from error
     return found, _fit(robot, found, misfits), crc32
@@ -137,8 +138,10 @@ def _fit(robot: Environment, shown: Sequence[Demonstration], misfits: Sequence[f
     """How well the robot can play what it will be shown, and what lands outside T."""
     if not shown:
         return []
-    size = f"{np.median(misfits):.4f} rad (median), {max(misfits):.4f} rad at most"
-    notes = [f"{len(shown)} demonstrations; correspondence misses them by {size}"]
+    size = "how far the correspondence misses them is not measured"
+    if misfits:
+        size = f"correspondence misses them by {np.median(misfits):.4f} rad (median), {max(misfits):.4f} rad at most"
+    notes = [f"{len(shown)} demonstrations; {size}"]
     outside = [row for row, each in enumerate(shown) if not robot.outcomes.contains(each.outcome)]
     if outside:
         place = ", ".join(f"{x:g}" for x in shown[outside[0]].outcome)

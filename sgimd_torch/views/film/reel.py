@@ -34,6 +34,7 @@ Frame = NDArray[np.uint8]  # (height, width, 3)
 
 WIDTH: Final = 640  # pixels, of the robot's picture
 HEIGHT: Final = 480
+PATIENCE: Final = 60.0  # s, for ffmpeg to end once it has all frames
 PAUSE: Final = 0.8  # s, the landing is shown
 POUR: Final = 0.6  # s, in which the landings since the last shot appear
 RATES: Final = {".mp4": 25.0, ".webp": 12.5}
@@ -137,7 +138,10 @@ def write_film(path: Path, frames: Iterable[Frame]) -> None:
                 with suppress(BrokenPipeError):  # it failed, and its error output says why
                     for frame in chain([first], frames):
                         encoder.stdin.write(frame.tobytes())
-                _, said = encoder.communicate()
+                _, said = encoder.communicate(timeout=PATIENCE)
+            except subprocess.TimeoutExpired:
+                encoder.kill()
+                raise OSError(f"ffmpeg did not end within {PATIENCE} s after the last frame") from None
             except BaseException:
                 encoder.kill()
                 raise
