@@ -14,6 +14,7 @@ from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.directory import sources
 from sgimd_torch.runs.process import command
+from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.sweep import main as sweep
 
 SHORT = "--environment sliders:Slider --algorithm random --movements 40 --evaluate-at 20 --repeats 0 --out"
