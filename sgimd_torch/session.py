@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sgimd_torch.environments.protocol import FAILURES, Environment, SimulationError
+from sgimd_torch.environments.protocol import FAILURES, Environment, SimulationError, check_instance
 from sgimd_torch.learner import Learner, ReplayError
 from sgimd_torch.learner.replay import TEACHER, BeforeMovement, replay
 from sgimd_torch.record import Event, Kind, Record
@@ -39,7 +39,6 @@ def run(
     seed: int,
     *,
     movements: int,
-    first: int = 0,
     teacher: Teacher | None = None,
     teachers: Mapping[str, Demonstrator] | None = None,
     execute: Execute | None = None,
@@ -59,40 +58,42 @@ def run(
             movement was broken off, as by Ctrl-C, after ``learner.interrupt()``.
         environment: is observed and executed.
         seed: of the environment's streams.
-        movements: in all, counting those before ``first``; at least 1.
-        first: index of the first movement; to go on with an earlier run, the number of movements that it made.
+        movements: in all, counting those that ``learner`` has made before: its run goes on.
         teacher: is asked before every movement whether it demonstrates.
         teachers: by name, for a learner that asks for demonstrations. One that fails, or shows what this robot cannot
             use, counts as one without an answer, with a `RuntimeWarning`; so does one that raises TimeoutError, see
             `sgimd_torch.teachers.awaited`.
         execute: is called instead of the environment's, see ``live``.
         record: what it holds is lived through again first, without executing anything or asking ``teachers``; what
-            happens then is added to it. It is for a learner and a teacher freshly built, and ``first`` 0.
+            happens then is added to it. It is for a learner and a teacher freshly built.
         failures: failed movements in a row that end the run; at least 1.
 
     Yields:
         Every episode, after the learner was told its outcome.
 
     Raises (when iterated):
-        ValueError: ``movements`` or ``first`` is not such a number, or ``first`` comes after them all; or the learner
-            asks a teacher of another name.
+        ValueError: ``movements`` is not such a number, or the learner has made as many already; or it asks a teacher of
+            another name.
         NoOutcomeError: ``failures`` movements in a row have failed. They are made; a `run` may go on after them.
     """
     check_count("failures", failures, 1)
-    if check_count("first", first, 0) > check_count("movements", movements, 1):
-        raise ValueError(f"first must be at most movements, got {first} of {movements}; movements counts all of a run")
+    check_instance(environment)
+    made = learner.movements
+    if check_count("movements", movements, 1) <= made:
+        raise ValueError(
+            f"movements must be above {made}, which the learner has made already and which count, got {movements}"
+        )
     execute = live(environment, seed) if execute is None else execute
     before = BeforeMovement()
     if record is not None:
         before = yield from replay(learner, record.events(), teacher=teacher)
-        first = learner.movements
 
     def note(kind: Kind, context: Array | None = None, **more: Any) -> None:
         if record is not None:
             record.add(Event(kind, context, **more))
 
     in_a_row = 0
-    for index in range(first, movements):
+    for index in range(learner.movements, movements):
         (demonstration, request, reply), before = before, BeforeMovement()
         asks = None if learner.lesson_waits else teacher
         offered = None if asks is None else asks.offer(index, learner.memory)

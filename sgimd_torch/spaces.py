@@ -235,7 +235,11 @@ class Estimate(NamedTuple):
 @dataclass(frozen=True, eq=False)
 class Demonstration:
     """(c_d, zeta_d, tau_d): ``context`` ``(context_dim,)``; ``trajectory`` ``(n_times, n_joints)`` rad at ``times``
-    ``(n_times,)`` s; ``outcome`` ``(outcome_dim,)`` m, where the float landed. All are read-only copies."""
+    ``(n_times,)`` s, or commands; ``outcome`` ``(outcome_dim,)``, what came of it. All are read-only copies.
+
+    Raises:
+        ValueError: other shapes, numbers that are not finite, or times that do not increase.
+    """
 
     context: Array
     times: Array
@@ -243,6 +247,17 @@ class Demonstration:
     outcome: Array
 
     def __post_init__(self) -> None:
+        shape = np.shape(self.trajectory)
+        if len(shape) != 2 or np.shape(self.times) != shape[:1]:
+            raise ValueError(
+                "a demonstration needs times (n_times,) and a trajectory (n_times, n_joints), got shapes "
+                f"{np.shape(self.times)} and {shape}; is one row missing, or transposed?"
+            )
+        for name in ("context", "times", "trajectory", "outcome"):
+            value = np.atleast_1d(getattr(self, name))
+            check_vector(f"{name} of a demonstration", value, value.shape[-1], "did the recording drop samples?")
+        if (np.diff(self.times) <= 0).any():
+            raise ValueError("times of a demonstration must increase; were its rows shuffled?")
         _own(self, "context", "times", "trajectory", "outcome")
 
 

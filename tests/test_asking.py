@@ -109,7 +109,7 @@ def test_a_life_that_asked_goes_on_as_if_it_had_never_stopped_without_asking_aga
     for last in (0, 13, 40, 77, 99):
         again = acts(arm, 1, teachers)
         again.load(tmp_path / f"{last}.npz")  # the teachers' answers are in the file
-        rest = live(again, teachers, 140, arm, 1, first=last + 1)
+        rest = live(again, teachers, 140, arm, 1)
         assert lines(rest) == lines(episodes[last + 1 :])
         assert again.memory.outcomes.tobytes() == whole.memory.outcomes.tobytes()
 

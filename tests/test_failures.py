@@ -106,7 +106,7 @@ def test_too_many_failures_in_a_row_end_a_run_which_can_go_on() -> None:
     with pytest.raises(NoOutcomeError, match="3 movements in a row failed, the last one: ConnectionError: unplugged"):
         episodes.extend(run(learner, arm, 0, movements=20, failures=3))
     assert learner.movements == 8
-    again = list(run(learner, arm, 0, movements=20, first=learner.movements, failures=3))
+    again = list(run(learner, arm, 0, movements=20, failures=3))
     assert [episode.index for episode in again] == list(range(8, 20))
     assert len(learner.memory) == 15
 

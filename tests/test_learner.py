@@ -221,7 +221,6 @@ def test_a_demonstration_that_does_not_fit_is_refused_and_interrupts_nothing() -
     times, trajectory, outcome = LESSON.times, LESSON.trajectory, LESSON.outcome
     for bad in (
         Demonstration(np.zeros(1), times, trajectory, outcome),
-        Demonstration(NO_CONTEXT, times, trajectory, np.full(2, np.nan)),
         Demonstration(NO_CONTEXT, times, trajectory, np.zeros(3)),
         Demonstration(NO_CONTEXT, times, trajectory, outcome[None]),
         Demonstration(np.zeros((2, 0)), times, trajectory, outcome),

@@ -5,7 +5,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from runs import edit, files_of
+from runs import edit
 from sgimd_torch.algorithms import observation, random_exploration, sagg_riac, sgim_d
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import evaluate
@@ -86,7 +86,7 @@ def test_a_loaded_learner_goes_on_as_if_it_had_never_stopped(name, tmp_path):
         learner, again = build(seed=1), teacher_for(name)
         learner.load(path, teacher=again)
         assert learner.movements == movements
-        rest = [line(episode) for episode in run(learner, arm, 1, movements=130, first=movements, teacher=again)]
+        rest = [line(episode) for episode in run(learner, arm, 1, movements=130, teacher=again)]
         assert rest == lines[movements:]
         for part in ("contexts", "thetas", "outcomes"):
             assert getattr(learner.memory, part).tobytes() == getattr(whole.memory, part).tobytes()
@@ -178,7 +178,7 @@ def test_a_search_through_a_model_goes_on_when_the_model_is_refreshed_as_the_loo
     model, again = build()
     again.load(tmp_path / "life.sqlite", after=lambda move: model.refresh(again.memory, move.goal))
     rest = []
-    for episode in run(again, ARM, 5, movements=140, first=100):
+    for episode in run(again, ARM, 5, movements=140):
         rest.append(line(episode))
         model.refresh(again.memory, episode.move.goal)
     assert rest == lines[100:]
@@ -276,16 +276,6 @@ def test_the_file_holds_nothing_but_what_happened(saved):
         assert record.check() == {}
 
 
-def test_a_lesson_that_cannot_be_recorded_leaves_the_old_file(tmp_path):
-    robot = observation(ARM, 0, correspondence=lambda times, trajectory: np.full(4, 0.5))
-    robot.save(tmp_path / "life.sqlite")
-    before = files_of(tmp_path)
-    robot.watch(Demonstration(NO_CONTEXT, np.arange(5.0), np.zeros(5), np.zeros(2)))
-    with pytest.raises(ValueError, match=r"needs \(n_times,\) times and a"):
-        robot.save(tmp_path / "life.sqlite")
-    assert files_of(tmp_path) == before
-
-
 def test_lessons_of_different_shape_are_saved(tmp_path):
     """Of a glove with more joints, or of another length: a correspondence may take any."""
     robot, again = (observation(ARM, 0, correspondence=lambda times, trajectory: np.full(4, 0.5)) for _ in range(2))
@@ -309,7 +299,7 @@ def test_the_file_of_a_run_is_loaded_by_a_learner_of_a_program_of_ones_own(tmp_p
     run_of_50, run_of_70 = (read_run(tmp_path / f"{movements}/run/seed-004") for movements in (50, 70))
     parts = build(config_of(run_of_50))
     parts.learner.load(run_of_50.path / FILE, teacher=parts.teacher)
-    lived = {"movements": 70, "first": 50, "teacher": parts.teacher, "teachers": parts.teachers}
+    lived = {"movements": 70, "teacher": parts.teacher, "teachers": parts.teachers}
     episodes = list(run(parts.learner, parts.environment, 4, **lived))
     assert [e.move and e.move.theta.tolist() for e in episodes] == [
         None if np.isnan(theta).any() else theta.tolist() for theta in run_of_70.thetas[50:]

@@ -268,7 +268,7 @@ def test_a_run_may_be_left_at_any_time_and_gone_on_with() -> None:
         if episode.index == 16:
             break
     assert len(learner.memory) == 17
-    list(run(learner, arm, 1, movements=10))
+    list(run(learner, arm, 1, movements=27))
     assert len(learner.memory) == 27
 
 
@@ -319,7 +319,7 @@ def test_a_run_in_two_parts_is_the_whole_run(context: bool) -> None:
     learner = sagg_riac(arm, 0)
     parts = [e.outcome for e in run(learner, arm, 0, movements=37)]
     assert not learner.idle  # the first part ends in mid-search
-    parts += [e.outcome for e in run(learner, arm, 0, movements=60, first=37)]
+    parts += [e.outcome for e in run(learner, arm, 0, movements=60)]
     assert np.array_equal(whole, parts)
 
 
@@ -347,7 +347,7 @@ def test_a_life_saved_where_a_movement_was_broken_off_goes_on_as_if_it_never_was
     learner.save(tmp_path / "life.sqlite")
     again, teacher = make("sgim-d", arm), teacher_of(other, 5)
     again.load(tmp_path / "life.sqlite", teacher=teacher)
-    rest = list(run(again, arm, 0, movements=60, first=again.movements, teacher=teacher))
+    rest = list(run(again, arm, 0, movements=60, teacher=teacher))
     assert summary(rest) == summary(whole[after:])
     again.save(tmp_path / "later.sqlite")
     make("sgim-d", arm).load(tmp_path / "later.sqlite", teacher=teacher_of(other, 5))
@@ -359,9 +359,9 @@ def test_after_a_movement_that_was_broken_off_a_run_goes_on_when_it_is_given_up(
     with pytest.raises(KeyboardInterrupt):
         list(run(learner, arm, 0, movements=60))
     with pytest.raises(RuntimeError, match=r"interrupt\(\)"):
-        list(run(learner, arm, 0, movements=60, first=16))
+        list(run(learner, arm, 0, movements=60))
     learner.interrupt()
-    assert len(list(run(learner, arm, 0, movements=60, first=16))) == 44
+    assert len(list(run(learner, arm, 0, movements=60))) == 44
 
 
 def test_a_lesson_whose_answer_was_given_up_is_offered_again_and_such_a_life_can_be_loaded(tmp_path: Path) -> None:
@@ -371,7 +371,7 @@ def test_a_lesson_whose_answer_was_given_up_is_offered_again_and_such_a_life_can
         list(run(learner, arm, 0, movements=40, teacher=teacher))
     assert learner.lesson_waits
     learner.interrupt()
-    rest = list(run(learner, arm, 0, movements=40, first=15, teacher=teacher))
+    rest = list(run(learner, arm, 0, movements=40, teacher=teacher))
     assert [e.index for e in rest if e.demonstration is not None] == [15, 20, 25, 30, 35]
     learner.save(tmp_path / "life.sqlite")
     make("sgim-d", arm).load(tmp_path / "life.sqlite", teacher=teacher_of(other, 5))
@@ -398,11 +398,13 @@ def test_an_outcome_of_integers_is_recorded_as_it_is_remembered() -> None:
     }
 
 
-@pytest.mark.parametrize("counts", [{"movements": 0}, {"movements": 1.5}, {"first": -1}, {"first": 11}])
-def test_a_run_without_movements_or_that_begins_after_its_end_is_refused(counts: dict[str, int]) -> None:
+@pytest.mark.parametrize("movements", [0, 1.5, -1, 7, 10])
+def test_a_run_without_new_movements_is_refused(movements: int) -> None:
     arm = PlanarArm(5)
-    with pytest.raises(ValueError, match=f"{next(iter(counts))} must be"):
-        next(run(sagg_riac(arm, 0), arm, 0, **{"movements": 10} | counts))
+    learner = sagg_riac(arm, 0)
+    list(run(learner, arm, 0, movements=10))
+    with pytest.raises(ValueError, match="movements must be"):
+        next(run(learner, arm, 0, movements=movements))
 
 
 class CarelessArm(PlanarArm):

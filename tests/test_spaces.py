@@ -84,7 +84,7 @@ def test_a_stream_needs_whole_numbers(seed: object, index: object):
 
 
 def test_a_record_keeps_what_it_was_made_of_and_is_read_only():
-    arrays = [np.full(shape, 0.5) for shape in (1, 3, (3, 2), 2, 2)]
+    arrays = [np.full(shape, 0.5) for shape in (1, 1, (1, 2), 2, 2)]
     demonstration = Demonstration(*arrays[:4])
     move = Move(arrays[3], arrays[4], "test")
     records = [demonstration, move, Episode(0, arrays[0], move, arrays[4], demonstration)]
@@ -121,3 +121,23 @@ def test_one_number_too_large_or_none_at_all_is_found_wherever_it_stands(shape: 
         array[entry] = wrong
         with pytest.raises(ValueError, match="finite"):
             check_vector("point", array, 5)
+
+
+@pytest.mark.parametrize(
+    ("part", "value", "message"),
+    [
+        ("times", np.arange(2.0), r"shapes \(2,\) and \(3, 2\)"),
+        ("times", np.arange(3.0)[None], "shapes"),
+        ("times", np.array([0.0, 0.2, 0.1]), "times of a demonstration must increase"),
+        ("times", np.array([0.0, np.nan, 1.0]), "times of a demonstration must be finite"),
+        ("trajectory", np.zeros(3), "shapes"),
+        ("trajectory", np.full((3, 2), np.inf), "trajectory of a demonstration must be finite"),
+        ("outcome", np.array([np.nan, 0.0]), "outcome of a demonstration must be finite"),
+        ("context", np.array(["north"]), "context of a demonstration must be real numbers"),
+    ],
+)
+def test_a_demonstration_that_cannot_be_right_is_refused_by_the_name_of_its_part(part, value, message):
+    right = {"context": np.zeros(0), "times": np.arange(3.0), "trajectory": np.zeros((3, 2)), "outcome": np.zeros(2)}
+    Demonstration(**right)
+    with pytest.raises(ValueError, match=message):
+        Demonstration(**right | {part: value})

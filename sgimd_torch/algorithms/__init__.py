@@ -16,6 +16,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from sgimd_torch.catalogue import check_constructors
 from sgimd_torch.catalogue.options import given, hands_on
 from sgimd_torch.competence import AttemptCompetence, Competence, Performance, performance
 from sgimd_torch.environments.protocol import Environment, check_rest
@@ -116,6 +117,7 @@ def goal_babbling(
     Raises:
         ValueError: a number out of its range.
     """
+    check_constructors(goals=goals, search=search, explore=explore, judge=judge)
     noise = max(environment.outcome_noise, 0.02)
     if measure is None:
         measure = partial(performance, rest=environment.rest, d_min=noise)
@@ -219,6 +221,7 @@ def sgim_d(
     """
     memory = start_memory(environment, memory)
     babbling = goal_babbling(environment, seed, memory, **parts)
+    check_constructors(social=social)
     answer = social(babbling, environment.outcomes, stream(seed, "imitate"))
     return Learner(
         memory,
@@ -258,6 +261,7 @@ def practice_taught(environment: Environment, seed: int, *, correspondence: Corr
 
 def answering(environment: Environment, memory: Memory, inverse: MakeInverse) -> Callable[[Array, Array], Estimate]:
     """The inverse model of a learner, with what it names of its robot."""
+    check_constructors(inverse=inverse)
     made: Callable[[Array, Array], Estimate]
     made = given(inverse, outcome_noise=environment.outcome_noise, policies=environment.policies)(memory)
     return made

@@ -9,7 +9,7 @@ import math
 import re
 import struct
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Final
 
@@ -26,7 +26,7 @@ from tensorboard.plugins.text.summary_v2 import text_pb
 from tensorboard.summary.writer.record_writer import RecordWriter
 from tensorboard.util.tensor_util import make_tensor_proto
 
-from sgimd_torch.board.legend import METRICS, sentence
+from sgimd_torch.board.legend import sentence
 
 NAME: Final = "events.out.tfevents."  # TensorBoard looks for it
 
@@ -91,22 +91,28 @@ class EventFile:
         """A page of text."""
         self._write(step, text_pb(tag, markdown, sentence(tag)))
 
-    def settings(self, settings: Mapping[str, object]) -> None:
-        """The options of this run, for the tab HParams: those of parts, such as "goals.window", after the others."""
+    def settings(self, settings: Mapping[str, object], metrics: Iterable[str], learner: str) -> None:
+        """The options of this run, for the tab HParams: those of parts, such as "goals.window", after the others.
+
+        Args:
+            settings: by name.
+            metrics: tags of the numbers that summarise it.
+            learner: runs of one learner make one row.
+        """
         shown = {
             name: value if isinstance(value, bool | int | float) else str(value)
             for name, value in settings.items()
             if value is not None  # else some runs had a number and others a text, which cannot be sorted
         }
         kinds = {bool: api_pb2.DATA_TYPE_BOOL, str: api_pb2.DATA_TYPE_STRING}
-        compared = api_pb2.Experiment(metric_infos=[{"name": {"tag": tag}} for tag in METRICS])
+        compared = api_pb2.Experiment(metric_infos=[{"name": {"tag": tag}} for tag in metrics])
         for name in sorted(settings, key=lambda name: "." in name):
             kind = kinds.get(type(shown.get(name)), api_pb2.DATA_TYPE_FLOAT64)
             compared.hparam_infos.add(name=name, type=kind, differs="." not in name)
         metadata = hparams.create_summary_metadata(plugin_data_pb2.HParamsPluginData(experiment=compared))
         value = Summary.Value(tag=hparams.EXPERIMENT_TAG, metadata=metadata, tensor=hparams.NULL_TENSOR)
         self._write(0, Summary(value=[value]))
-        self._write(0, hparams_pb(shown, start_time_secs=time.time()))
+        self._write(0, hparams_pb(shown, learner, time.time()))
 
     def layout(self, page: Mapping[str, Mapping[str, str]]) -> None:
         """The page of charts, category -> title -> tag; the largest counts."""

@@ -71,7 +71,9 @@ CHARTS: Final[Mapping[str, Mapping[str, str]]] = {
         "share of refinements that helped, last 500 movements": "model/improved",
     },
 }
-METRICS: Final = ("error/mean", "error/noise_floor", "competence/R", "goals/reached_share")  # that summarise a run
+METRICS: Final = ("error/mean", "error/noise_floor")  # that summarise a run
+OF_GOALS: Final = "goals/reached_share"  # of a learner with goals
+OF_REGIONS: Final = "competence/R"  # of one with regions
 
 
 def sentence(tag: str) -> str:

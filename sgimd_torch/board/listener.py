@@ -16,7 +16,7 @@ import numpy as np
 
 from sgimd_torch.board.curves import Behaviour, Competent, of_regions
 from sgimd_torch.board.events import EventFile
-from sgimd_torch.board.legend import LEGEND, charts
+from sgimd_torch.board.legend import LEGEND, METRICS, OF_GOALS, OF_REGIONS, charts
 from sgimd_torch.board.pictures import draw, where
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.evaluation import Benchmark, Evaluation
@@ -75,7 +75,9 @@ class BoardListener:
             "about/legend",
             f"Steps are movements; distances are in the unit of T.\n\n| tag | what it shows |\n|---|---|\n{rows}",
         )
-        self._file.settings(settings)
+        has_goals = hasattr(parts.learner.autonomous, "goals")
+        metrics = [*METRICS, *[OF_GOALS] * has_goals, *[OF_REGIONS] * bool(parts.regions)]
+        self._file.settings(settings, metrics, f"{parts.config.variant}, {settings['environment']}")
 
     def episode(self, episode: Episode, replayed: bool) -> None:
         """Count a movement; every 50th gives the curves a point. When a recorded one was made, nobody knows."""

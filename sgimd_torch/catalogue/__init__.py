@@ -290,6 +290,20 @@ def find(kind: str, word: str) -> Entry:
     return Entry(word, "of your own")
 
 
+def check_constructors(**parts: object) -> None:
+    """Refuse a word of the command line, or a part that is made already, where a learner wants a constructor.
+
+    Raises:
+        ValueError: with the import or the call that was meant.
+    """
+    for kind, part in parts.items():
+        if isinstance(part, str):
+            module, _, name = find(kind, part).at.partition(":")
+            raise ValueError(f"{kind} must be a constructor, got the word {part!r}; from {module} import {name}")
+        if not callable(part):
+            raise ValueError(f"{kind} must be a constructor, {_WANTED[kind][0]}, got a {type(part).__name__}")
+
+
 def word_of(kind: str, made: Callable[..., Any]) -> str:
     """What a default is called: a word of the catalogue, or package.module:attribute; "" if it has no such name."""
     made = made.func if isinstance(made, partial) else made

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from sgimd_torch.environments.protocol import BatchEnvironment, Environment, check_rest
+from sgimd_torch.environments.protocol import BatchEnvironment, Environment, check_instance, check_rest
 from sgimd_torch.spaces import Array, Box, check_count, stream
 
 _FACTOR: Final = 10.0  # between the noise announced and that of a few movements; a wrong unit is farther off
@@ -30,6 +30,7 @@ def check_environment(environment: Environment, *, movements: int = 3) -> None:
             broken one are not tried, so a second look may find more.
     """
     check_count("movements", movements, 1)
+    check_instance(environment)
     stages: list[tuple[Callable[..., Iterator[str]], ...]] = [(_spaces,), (_contexts,), (_outcomes,), (_repeats,)]
     stages.append((_noise, _batches, _refusals))
     found: list[str] = []

@@ -177,7 +177,8 @@ def execute_many(
         ``(n, outcome_dim)``, row i equal to ``environment.execute(contexts[i], thetas[i], rngs[i])`` bit for bit.
 
     Raises:
-        ValueError: the numbers of rows differ, or a row lies outside C or Pi.
+        ValueError: the numbers of rows differ, a row lies outside C or Pi, or the environment gives anything else than
+            numbers of this shape.
         SimulationError: a movement has no finite outcome.
     """
     # Copies, so that an environment may write into them.
@@ -187,14 +188,24 @@ def execute_many(
         raise ValueError(f"needs n contexts, thetas, rngs, got {contexts.shape}, {thetas.shape} and {len(rngs)} rngs")
     if len(thetas) == 0:
         return np.empty((0, environment.outcomes.dim))
+    dim = environment.outcomes.dim
     if isinstance(environment, BatchEnvironment):
-        outcomes = environment.execute_many(contexts, thetas, rngs)
+        outcomes = _numbers("execute_many()", environment.execute_many(contexts, thetas, rngs), len(thetas), dim)
     else:
-        outcomes = np.stack([environment.execute(*movement) for movement in zip(contexts, thetas, rngs, strict=True)])
-    lost = np.flatnonzero(~np.isfinite(outcomes).reshape(len(thetas), -1).all(axis=1))
+        moved = [environment.execute(*movement) for movement in zip(contexts, thetas, rngs, strict=True)]
+        outcomes = np.stack([_numbers(f"execute() of movement {k}", each, dim) for k, each in enumerate(moved)])
+    lost = np.flatnonzero(~np.isfinite(outcomes).all(axis=1))
     if len(lost):
         raise SimulationError("the outcome is not finite", thetas[lost[0]])
     return outcomes
+
+
+def _numbers(what: str, value: Any, *shape: int) -> Array:
+    array = np.asarray(value)
+    if array.shape != shape or array.dtype.kind not in "fiu":
+        got = type(value).__name__ if array.ndim == 0 else f"{array.dtype} {array.shape}"
+        raise ValueError(f"{what} must give numbers of shape {shape}, got {got}; is there a return?")
+    return array.astype(np.float64)
 
 
 def recorded(
@@ -261,12 +272,24 @@ def check_recording(
     return times, trajectory
 
 
+def check_instance(environment: object) -> None:
+    """Refuse a class in the place of an environment.
+
+    Raises:
+        ValueError: it is a class.
+    """
+    if isinstance(environment, type):
+        name = environment.__name__
+        raise ValueError(f"an environment is wanted, got the class {name} itself; write {name}()")
+
+
 def check_rest(environment: Environment) -> None:
     """Refuse an environment whose ``rest`` is not one point of T, before a learner is built for it.
 
     Raises:
-        ValueError: another shape, NaN or infinity, or a point outside T.
+        ValueError: a class, another shape, NaN or infinity, or a point outside T.
     """
+    check_instance(environment)
     if environment.outcomes.check("rest of the environment", environment.rest, "is it a theta?").ndim != 1:
         raise ValueError(f"rest of the environment must be one outcome, got shape {np.shape(environment.rest)}")
 

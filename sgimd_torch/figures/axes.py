@@ -88,11 +88,10 @@ def colour_bar(axes: Sequence[Axes], drawn: ScalarMappable, label: str, *, exten
     return figure.colorbar(drawn, ax=list(axes), label=label, extend=extend)
 
 
-def note(ax: Axes, text: str, *, top: bool = False) -> None:
-    """Text at the lower or upper edge."""
-    white = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 2}
-    height, side = (0.985, "top") if top else (0.015, "bottom")
-    ax.text(0.5, height, text, transform=ax.transAxes, ha="center", va=side, fontsize="small", bbox=white)
+def note(ax: Axes, text: str) -> None:
+    """Text below the name of the x axis."""
+    at = {"xycoords": "axes fraction", "textcoords": "offset points", "ha": "center", "va": "top"}
+    ax.annotate(text, (0.5, 0), (0, -34), fontsize="small", **at)  # type: ignore[arg-type]
 
 
 def goal_rings(ax: Axes, points: ArrayLike, size: float) -> None:

@@ -229,24 +229,24 @@ class ForwardModel(Ensemble):
         state = {name: values.cpu().contiguous() for name, values in self.state_dict().items()}
         write_bytes(path, save(state, {"model": json.dumps({**self.sizes, **self.shape})}))
 
-    @classmethod
-    def load(cls, path: str | os.PathLike[str], **options: Any) -> ForwardModel:
-        """The model that ``save`` wrote; ``options`` are the constructor's options for training.
-
-        Raises:
-            ValueError: not such a file, or truncated.
-            OSError: there is no file, or it may not be read.
-        """
-        Path(path).open("rb").close()  # says why it may not be read
-        try:
-            with safe_open(str(path), framework="pt") as file:
-                about = json.loads(file.metadata()["model"])
-                state = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118, it is no dict
-        except (SafetensorError, KeyError, TypeError, ValueError) as error:
-            raise ValueError(f"{path} is no forward model: {str(error)[:100]}; was it written by save()?") from error
-        model = cls(**{**options, **about})
-        model.load_state_dict(state)
-        return model
-
     def _tensor(self, values: Array) -> torch.Tensor:
         return torch.tensor(values, dtype=torch.float32, device=self.input_mean.device)
+
+
+def load_forward_model(path: str | os.PathLike[str], **options: Any) -> ForwardModel:
+    """The model that ``ForwardModel.save`` wrote; ``options`` are the constructor's options for training.
+
+    Raises:
+        ValueError: not such a file, or truncated.
+        OSError: there is no file, or it may not be read.
+    """
+    Path(path).open("rb").close()  # says why it may not be read
+    try:
+        with safe_open(str(path), framework="pt") as file:
+            about = json.loads(file.metadata()["model"])
+            state = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118, it is no dict
+    except (SafetensorError, KeyError, TypeError, ValueError) as error:
+        raise ValueError(f"{path} is no forward model: {str(error)[:100]}; was it written by save()?") from error
+    model = ForwardModel(**{**options, **about})
+    model.load_state_dict(state)
+    return model

@@ -84,7 +84,7 @@ class Learner:
 
     @property
     def movements(self) -> int:
-        """How many it has made, those at rest included: the ``first`` of a `run` that goes on."""
+        """How many it has made, those at rest and those that failed included."""
         return self._movements
 
     @property
@@ -264,7 +264,6 @@ class Learner:
         A movement that was asked for and not told yet is left out: after `load`, ask for it again.
 
         Raises:
-            ValueError: a lesson whose times do not fit its trajectory.
             OSError: ``path`` is a directory, or cannot be written.
         """
         memory = self.memory

@@ -126,13 +126,7 @@ def movements_after(movement: int, kind: str) -> int:
 
 
 def demonstration_row(shown: Demonstration, dims: Dims) -> Row:
-    """A demonstration.
-
-    Raises:
-        ValueError: its times do not fit its trajectory.
-    """
-    if shown.trajectory.ndim != 2 or shown.times.shape != shown.trajectory.shape[:1]:
-        raise ValueError("a lesson needs (n_times,) times and a (n_times, n_joints) trajectory to be recorded")
+    """A demonstration."""
     times, trajectory = (np.asarray(each, dtype=np.float64).tobytes() for each in (shown.times, shown.trajectory))
     vectors = *_cells(shown.context, dims[0]), *_cells(shown.outcome, dims[2])
     return *vectors, shown.trajectory.shape[1], times, trajectory

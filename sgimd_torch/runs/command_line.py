@@ -33,6 +33,7 @@ FLAGS: Final = {
     "resume": "go on with a stopped or killed run, or lengthen a finished one.",
     "accept_loss": "with --resume: go on even if the log has lost movements; a copy of it is kept.",
 }
+ALONE: Final = "practice"  # the default learner of a robot without demonstrations
 _WANTED: Final = {int: "a whole number", float: "a number", bool: "true or false", str: "a word", Path: "a path"}
 _MANY: Final = {int: "whole numbers such as 250,500", float: "numbers such as .1,.2", str: "words such as own,nearest"}
 _WIDTH: Final = 120
@@ -68,7 +69,7 @@ def parse(argv: Sequence[str], description: str | None = None) -> tuple[Config, 
         if "help" in asked and not given:
             print(overview(description))
             raise SystemExit(0)
-        algorithm = given.get("algorithm", Config.algorithm)
+        algorithm = given.setdefault("algorithm", _suited(given))
         choices = {name: text for name, text in given.items() if name != "teachers"}
         parts = chosen(algorithm, choices)
         for name in given:
@@ -85,6 +86,20 @@ def parse(argv: Sequence[str], description: str | None = None) -> tuple[Config, 
     except ValueError as error:
         print(f"error: {error}\n--help explains all options", file=sys.stderr)
         raise SystemExit(2) from None
+
+
+def _suited(given: Mapping[str, str]) -> str:
+    """The default learner for a robot: one that is taught if there are demonstrations, else one that learns alone."""
+    robot = {name: text for name, text in given.items() if name.partition(".")[0] == "environment"}
+    if not robot or "demonstrations" in given:
+        return Config.algorithm
+    with loading():
+        from sgimd_torch.runs.build import has_demonstrations
+    parts = chosen(ALONE, robot)
+    options = {name: text for name, text in robot.items() if name in standards(parts)}
+    values = parser(parts).values({name: text for name, text in options.items() if name not in parts})
+    config = Config(ALONE, parts={**{name: text for name, text in options.items() if name in parts}, **values})
+    return Config.algorithm if has_demonstrations(config) else ALONE
 
 
 def parser(parts: Mapping[str, Part] | None = None, description: str | None = None) -> _Parser:

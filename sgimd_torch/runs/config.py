@@ -195,7 +195,9 @@ RUN: Final = tuple(each.name for each in fields(Config) if each.name != "parts")
 def words(config: Config) -> list[str]:
     """The command line of ``sgimd run`` for a run: ``--dashed-name=value`` for all that is not at its default."""
     standard = {each.name: each.default for each in fields(Config)}
-    own = [(name, getattr(config, name)) for name in RUN if getattr(config, name) != standard[name]]
+    own = [
+        (name, getattr(config, name)) for name in RUN if getattr(config, name) != standard[name] or name == "algorithm"
+    ]
     return [f"--{dashed(name)}={_typed(plain(value))}" for name, value in (*own, *dict(config.parts).items())]
 
 

@@ -21,7 +21,7 @@ from sgimd_torch.catalogue import source
 from sgimd_torch.files import checksum, make_folder
 from sgimd_torch.record import DERIVED, InUseError, Record, RunError
 from sgimd_torch.runs.build import RunParts
-from sgimd_torch.runs.config import EVALUATES, MAY_CHANGE, Config
+from sgimd_torch.runs.config import EVALUATES, MAY_CHANGE, Config, words
 from sgimd_torch.runs.evaluations import EVALUATED
 
 FILE: Final = "run.sqlite"
@@ -53,6 +53,7 @@ def open_run(parts: RunParts, *, resume: bool, accept_loss: bool = False) -> tup
         "files": parts.data,
         "versions": {**versions(forward=parts.model is not None), **sources(config)},
         "robot": type(robot).__name__,
+        "words": words(config),
         "spaces": {n: [b.low.tolist(), b.high.tolist(), b.names, b.unit] for n, b in spaces.items()},
     }
     dims = robot.contexts.dim, robot.policies.dim, robot.outcomes.dim

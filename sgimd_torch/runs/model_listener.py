@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 LEVEL: Final = 0.8  # of the regions whose coverage the board shows
 LATELY: Final = 500  # movements, over which the board shows how often refining a guess helped
-NOT_ASKED: Final = "the forward model is not asked, the local inverse model answers and the simplex searches instead"
+NOT_ASKED: Final = "the forward model is not asked, the learner goes on without it"
 
 
 class ModelListener:

@@ -198,4 +198,9 @@ def say(*messages: str) -> None:
     write: Any = print if bars is None else bars.tqdm.write
     with suppress(OSError):
         for message in messages:
-            write(message, file=sys.stderr)
+            write(printable(message), file=sys.stderr)
+
+
+def printable(text: str) -> str:
+    """Without what a terminal would execute, such as escape codes in a name."""
+    return "".join(sign if sign.isprintable() or sign in "\n\t" else "\N{REPLACEMENT CHARACTER}" for sign in text)

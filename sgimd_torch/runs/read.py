@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import re
 from array import array
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -44,6 +45,7 @@ class Run:
     versions: dict[str, Any]
     files: dict[str, Any]
     robot: str
+    words: list[str]
     spaces: dict[str, Box]
     summary: dict[str, Any]
     index: NDArray[np.int64]
@@ -126,6 +128,7 @@ def read_run(path: str | os.PathLike[str]) -> Run:
         versions=about["versions"],
         files=about["files"],
         robot=about["robot"],
+        words=about["words"],
         spaces={name: Box(*box) for name, box in about["spaces"].items()},
         summary={"movements": n, "failed": events.failed, "finished": bool(finished), **about.get("seconds", {})},
         **arrays,
@@ -216,16 +219,32 @@ def _column(name: str, values: Any) -> np.ndarray:
     return np.array(values, dtype=np.int64 if whole else np.float64)
 
 
-def config_of(run: Run) -> Config:
-    """The configuration of a run.
+def config_of(run: Run, *, trust: bool = False) -> Config:
+    """What made a run, to build its parts again.
+
+    Args:
+        run: as read.
+        trust: whether code that its settings name, ``package.module:attribute``, may be imported and executed.
 
     Raises:
-        RunError: it makes no sense today.
+        RunError: its settings name such code and are not trusted, or do not describe a run of this version.
     """
+    code = [] if trust else list(_code_of(run.config))
+    if code:
+        raise RunError(f"{run.path} names code of its own, {', '.join(code)}; look at it, then execute it with --trust")
     try:
         return Config.from_settings(run.config)
     except (TypeError, ValueError) as error:
         raise RunError(f"the settings of {run.path} do not describe a run of this version: {error}") from error
+
+
+def _code_of(settings: Mapping[str, Any]) -> Iterator[str]:
+    """What is neither in the catalogue nor in this library."""
+    for name in sorted(settings.keys() - {*PLACE, *FILES}):
+        value = settings[name]
+        for word in value if isinstance(value, list) else [value]:
+            if isinstance(word, str) and ":" in word and not word.startswith("sgimd_torch."):
+                yield word
 
 
 def find_runs(place: str | os.PathLike[str]) -> dict[str, list[Path]]:

@@ -35,6 +35,7 @@ from sgimd_torch.runs.build import task_of
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.tasks import Task, benchmark_of, demonstrations_of
 from sgimd_torch.spaces import Array, Box, check_count, stream
+from sgimd_torch.views.demonstrations import check
 
 TIMED = 20  # movements
 NARROW = 0.03  # of the volume of T; where random movements span less, most goals may be out of reach
@@ -110,12 +111,14 @@ def _sizes(task: Task) -> list[str]:
 
 
 def _narrow(outcomes: Array, space: Box) -> list[str]:
-    """A note if random movements span little of T."""
+    """A note if random movements end outside T, or span little of it."""
     low, high = outcomes.min(axis=0), outcomes.max(axis=0)
     share = float(np.prod((high - low) / space.sides))
+    spans = " x ".join(f"[{a:.3g}, {b:.3g}]" for a, b in zip(low, high, strict=True))
+    if not space.contains(outcomes).any():
+        return [f"0 of {TIMED} random movements ended in T, they span {spans}; are T and outcomes in one unit?"]
     if share >= NARROW:
         return []
-    spans = " x ".join(f"[{a:.3g}, {b:.3g}]" for a, b in zip(low, high, strict=True))
     return [
         f"{TIMED} random movements span only {100 * share:.2g} % of T, {spans}; if nothing gets much farther, make T "
         "smaller: learners draw goals from all of it"
@@ -126,4 +129,10 @@ def _lessons(task: Task) -> list[str]:
     if task.demonstrations is None:
         return ["  demonstrations: none"]
     shown, notes, _ = demonstrations_of(task, None)
+    places = np.array([each.outcome for each in shown])
+    tried = [check(task, each, row) for row, each in enumerate(shown[:TIMED])]
+    apart, spread = np.median([each.apart for each in tried]), np.linalg.norm(places.std(axis=0))
+    if not apart < max(spread / 2, 3 * task.environment.outcome_noise):
+        amount = task.environment.outcomes.amount(float(apart))
+        notes = [*notes, f"executed, they land {amount} from where they say (median); are joints, units, times right?"]
     return [f"  demonstrations: {len(shown)}", *(f"  {note}" for note in notes)]

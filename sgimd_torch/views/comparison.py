@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from sgimd_torch.catalogue import did_you_mean
+from sgimd_torch.catalogue import unknown
 from sgimd_torch.spaces import Array
 from sgimd_torch.views.statistics import LEAST_SEEDS, Interval, common_differences, over_seeds
 from sgimd_torch.views.variants import Variant
@@ -45,8 +45,7 @@ def baseline_of(variants: Sequence[Variant], name: str | None = None) -> Variant
     if name is None:
         return evaluated.get(USUAL) or next(iter(evaluated.values()), None)
     if name not in evaluated:
-        names = f"{', '.join(sorted(evaluated))}{did_you_mean(name, evaluated)}"
-        raise ValueError(f"--baseline must be a variant with errors to compare, got {name!r}; these are {names}")
+        raise unknown("--baseline, a variant with errors to compare,", name, sorted(evaluated))
     return evaluated[name]
 
 

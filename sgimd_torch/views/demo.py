@@ -5,7 +5,7 @@ random. SGIM-D has curiosity and a teacher. The third, practice-taught, is this 
 at the start, then it practises, one movement for each goal. They write to --out (default: runs/demo):
 
   random/seed-000/ and so on   everything that happened (docs/runs.md explains the files)
-  demo.png                     how the error falls; how each answers four goals; where the float landed
+  demo.png                     how the error falls; where the float landed; how far each goal is missed
 
 Start it again after Ctrl-C or a power cut, and it goes on where it stopped; finished runs are used as they are. Options
 of sgimd run apply to all three; sgimd run --help lists them.
@@ -66,7 +66,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         failures = sweep(longest_first, submit)
     if failures:
         raise Failed("\n".join(failures))
-    say("drawing where the float landed, and how each learner answers four goals")
+    say("drawing where the float landed, and how far each goal is missed")
     runs = {algorithm: read_run(config.directory) for algorithm, config in configs.items()}
     (figure,) = save_figure(partial(draw, runs), base.out / "demo", "png")
     print("\nMean distance to the benchmark goals after so many movements, and time spent\n")

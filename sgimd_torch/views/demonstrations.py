@@ -99,6 +99,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     if options.figure is not None and options.figure.suffix not in (".png", ".svg", ".pdf"):
         raise ValueError(f"--figure must end in .png, .svg or .pdf, got {options.figure}")
     task = task_of(Config(parts={"environment": options.task}))
+    contexts = task.environment.contexts
+    if contexts.dim and not shown[0].context.size:
+        what = ", ".join(contexts.axis(k, "context") for k in range(contexts.dim))
+        raise ValueError(f"{options.source} says nothing of the context ({what}); name its columns with --context")
     found = [check(task, each, row) for row, each in enumerate(shown)]
     print_table([HEADS, *(_cells(row, each) for row, each in enumerate(found))])
     apart = [each.apart for each in found if each.lands is not None]

@@ -35,7 +35,7 @@ import numpy as np
 
 from sgimd_torch.board.curves import Grid, cells_of
 from sgimd_torch.record import RunError
-from sgimd_torch.runs.process import say
+from sgimd_torch.runs.process import printable, say
 from sgimd_torch.runs.read import Run, read_run
 from sgimd_torch.spaces import Array
 from sgimd_torch.views.comparison import baseline_of, compare
@@ -130,7 +130,7 @@ def print_episodes(run: Run) -> None:
     numbers = np.concatenate(list(parts.values()), axis=1).tolist()
     for index, origin, shown, row in zip(run.index, run.origin, run.demonstration, numbers, strict=True):
         cells = ["" if np.isnan(number) else repr(number) for number in row]
-        writer.writerow([index, origin, shown if shown >= 0 else "", *cells])
+        writer.writerow([index, printable(origin), shown if shown >= 0 else "", *cells])
 
 
 def _last_common(runs: Sequence[Run]) -> int:

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from sgimd_torch.runs.process import printable
+
 
 def print_table(rows: Sequence[Sequence[str]]) -> None:
     """Print rows of equally many cells in aligned columns, two spaces apart.
@@ -15,4 +17,5 @@ def print_table(rows: Sequence[Sequence[str]]) -> None:
     """
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for row in rows:
-        print("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip(), flush=True)
+        line = "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True))
+        print(printable(line.rstrip()), flush=True)

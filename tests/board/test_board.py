@@ -33,7 +33,7 @@ from sgimd_torch.spaces import Box, Demonstration, Episode, Move, Request
 
 PLANE = Box.cube(-1.0, 1.0, 2, names=("x", "y"), unit="m")
 GOAL, NEAR, FAR = np.array([0.5, 0.5]), np.array([0.5, 0.51]), np.array([0.5, 0.9])  # near: within the tolerance
-SHOWN = Demonstration(np.zeros(0), np.zeros(2), np.zeros((2, 1)), np.array([-0.5, 0.5]))
+SHOWN = Demonstration(np.zeros(0), np.arange(2.0), np.zeros((2, 1)), np.array([-0.5, 0.5]))
 
 
 def movement(index, goal, outcome, origin="local", demonstration=None):
@@ -320,7 +320,7 @@ def test_runs_can_be_compared_by_settings_and_results(watched):
 
 def test_options_of_parts_come_after_the_parts_and_one_that_is_not_set_is_left_out(tmp_path):
     file = EventFile(tmp_path)
-    file.settings({"goals.window": 12, "goals": "interest-map", "floor_at": None})
+    file.settings({"goals.window": 12, "goals": "interest-map", "floor_at": None}, ["error/mean"], "grid")
     file.begin()
     file.close()
     contents = {value.tag: value.metadata.plugin_data.content for _, value in values_of(tmp_path)}

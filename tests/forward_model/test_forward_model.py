@@ -10,7 +10,7 @@ import torch
 from safetensors.torch import save_file
 
 from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.forward_model.model import ForwardModel
+from sgimd_torch.forward_model.model import ForwardModel, load_forward_model
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import stream
 
@@ -254,7 +254,7 @@ def test_a_copy_for_another_process_predicts_the_same_and_learns_on(model, unsee
 def test_a_saved_model_predicts_the_same_and_keeps_its_relative_error(tmp_path, unseen, noise_heads):
     model = taught(remembered(100), noise_heads=noise_heads, members=2, hidden=(8,))
     model.save(tmp_path / "model.safetensors")
-    loaded = ForwardModel.load(tmp_path / "model.safetensors")
+    loaded = load_forward_model(tmp_path / "model.safetensors")
     for saved, read in zip(
         model.predict(NO_CONTEXT, unseen.thetas), loaded.predict(NO_CONTEXT, unseen.thetas), strict=True
     ):
@@ -268,18 +268,18 @@ def test_weights_of_something_else_are_refused_by_name(tmp_path, model, header):
     path = tmp_path / "model.safetensors"
     save_file(model.state_dict(), path, header)
     with pytest.raises(ValueError, match=r"model\.safetensors is no forward model"):
-        ForwardModel.load(path)
+        load_forward_model(path)
 
 
 def test_a_misspelt_option_of_a_model_to_be_loaded_is_not_blamed_on_the_file(tmp_path, model):
     model.save(tmp_path / "model.safetensors")
     with pytest.raises(TypeError, match="ratee"):
-        ForwardModel.load(tmp_path / "model.safetensors", ratee=3)
+        load_forward_model(tmp_path / "model.safetensors", ratee=3)
 
 
 def test_a_loaded_model_learns_on(tmp_path):
     taught(remembered(100)).save(tmp_path / "model.safetensors")
-    loaded = ForwardModel.load(tmp_path / "model.safetensors", every=20, rate=1.0)
+    loaded = load_forward_model(tmp_path / "model.safetensors", every=20, rate=1.0)
     assert loaded.refresh(remembered(110)) is None
     refresh = loaded.refresh(remembered(120))
     assert (refresh.first, refresh.steps, len(refresh.predicted.mean)) == (100, 20, 20)

@@ -118,4 +118,4 @@ def test_a_life_goes_on_as_if_it_had_never_stopped_and_equal_seeds_live_alike(tm
     for last in (11, 40):
         again, _ = taught()
         again.load(tmp_path / f"{last}.npz")  # asks nobody
-        assert lines(live(again, teachers, first=last + 1)) == lines(episodes[last + 1 :])
+        assert lines(live(again, teachers)) == lines(episodes[last + 1 :])

@@ -13,7 +13,7 @@ from sgimd_torch.evaluation import Benchmark, save_benchmark
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.views.demo import configs_of, main
-from sgimd_torch.views.demo_figure import GOALS, answers, draw, table
+from sgimd_torch.views.demo_figure import draw, table
 
 LEARNERS = ("random", "sgim-d", "practice-taught")
 NAMES = ("Random", "SGIM-D", "Practice, taught")
@@ -80,23 +80,20 @@ def test_the_table_of_long_runs_has_columns_on_the_way_too(runs):
 
 
 def test_the_figure_shows_the_data_of_the_runs(runs):
-    curves, above, side, *landed = draw(runs).axes[:6]
+    curves, *maps = [ax for ax in draw(runs).axes if ax.get_xlabel()]
     for line, run in zip(curves.lines, runs.values(), strict=True):
         np.testing.assert_array_equal(line.get_xdata(), [30, 60])
         np.testing.assert_array_equal(line.get_ydata(), run.evaluation["mean_error"])
-    paths = [line for line in above.lines if line.get_linestyle() == ":"]
-    assert len(paths) == len(GOALS) * len(runs)
-    assert len([line for line in side.lines if line.get_linestyle() == ":"]) == len(runs)  # for the first goal
-    said = [text.get_text() for text in above.get_legend().get_texts()]
-    for name, run, first in zip(NAMES, runs.values(), (0, 4, 8), strict=True):
-        ends = np.array([[line.get_xdata()[-1], line.get_ydata()[-1]] for line in paths[first : first + 4]])
-        missed = 100 * np.linalg.norm(ends - GOALS, axis=1).mean()
-        assert f"{name}: misses by {missed:.0f} cm" in said
-        np.testing.assert_array_equal([cast.path[-1, :2] for cast in answers(run)], ends)
+    landed, missed = maps[::2], maps[1::2]
     for ax, run in zip(landed, runs.values(), strict=True):
         assert ax.collections[0].get_array().sum() == (np.abs(run.outcomes) <= 1).all(axis=1).sum()
     assert len({ax.collections[0].norm.vmax for ax in landed}) == 1
     assert [len(ax.lines) for ax in landed] == [0, 1, 1]  # demonstrated outcomes
+    for ax, name, run in zip(missed, NAMES, runs.values(), strict=True):
+        np.testing.assert_array_equal(ax.collections[0].get_offsets(), run.benchmark)
+        np.testing.assert_array_equal(ax.collections[0].get_array(), run.missed_by(60)[0])
+        assert ax.get_title() == f"{name} misses its goals by {run.evaluation['mean_error'][-1]:.3f} m"
+    assert len({ax.collections[0].norm.vmax for ax in missed}) == 1
 
 
 def test_a_second_start_uses_what_is_there_and_fewer_movements_are_refused(shown, options, capsys):

@@ -211,7 +211,7 @@ def test_a_baseline_that_is_no_variant_is_refused_with_the_near_name(runs, capsy
     assert table(runs, "--at", 40, "--baseline", "randon") == 2
     said = capsys.readouterr()
     assert not said.out
-    assert "got 'randon'; these are random, sgim-d; did you mean random?" in said.err
+    assert "'randon'; did you mean random? Known are random, sgim-d" in said.err
     assert said.err.count("\n") == 1
 
 

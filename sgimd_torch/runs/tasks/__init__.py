@@ -16,7 +16,7 @@ import numpy as np
 
 from sgimd_torch.algorithms import Correspondence
 from sgimd_torch.demonstrations import load_demonstrations
-from sgimd_torch.environments.protocol import Environment, HandLed, Record, recorded
+from sgimd_torch.environments.protocol import Environment, HandLed, Record, check_instance, recorded
 from sgimd_torch.evaluation import Benchmark, load_benchmark
 from sgimd_torch.files import checksum
 from sgimd_torch.spaces import Demonstration
@@ -39,6 +39,9 @@ class Task:
         record: (context, theta, rng) -> a movement that `sgimd film` shows, see ``Sketch`` in environments/protocol.py;
             None for the environment's own, if it has one.
         hand_led: what a person can lead by the hand to teach it; None for the environment's own, if it has one.
+
+    Raises:
+        ValueError: a class in the place of an environment.
     """
 
     environment: Environment
@@ -49,6 +52,9 @@ class Task:
     n_joints: int | None = None
     record: Record | None = None
     hand_led: HandLed | None = None
+
+    def __post_init__(self) -> None:
+        check_instance(self.environment)
 
     @property
     def picture(self) -> Record | None:

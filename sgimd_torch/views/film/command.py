@@ -3,9 +3,9 @@
 Each goal is answered by the run's inverse model, its memory rebuilt from the record, and executed once with noise;
 where there are contexts, in the middle of their range. A yellow ring is the goal, white dots are past landings; of the
 rod, circles are half a metre and a metre around the base. If the float has not met the water after the movement, the
-line is let out and the float falls; the film says so. Beside it: each goal of the benchmark, the bluer the nearer its
-answer lands, and how the mean error has fallen. Planar arms, and environments of your own with
-record(context, theta, rng) -> Sketch, are drawn in the plane.
+line is let out and the float falls; the film says so. Beside it: each goal of the benchmark, coloured by how far its
+answer misses it, and how the mean error has fallen. Planar arms, and environments of your own with
+record(context, theta, rng) -> Sketch, are drawn in the plane; a red cross is the outcome, in the plane of the goals.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ from sgimd_torch.evaluation import evaluate
 from sgimd_torch.runs.build import RunParts, build
 from sgimd_torch.runs.read import Run, config_of, read_run
 from sgimd_torch.spaces import Array, stream
+from sgimd_torch.strategies import Remember
 from sgimd_torch.views.film.panel import Panel
 from sgimd_torch.views.film.reel import RATES, Filming, Shot, shoot, write_film
 from sgimd_torch.views.film.sketch import Sketchbook
-from sgimd_torch.views.memories import remember
 
 AFTER = (30, 100, 300, 1000, 3000)
 EXAMPLES = """examples:
@@ -52,7 +52,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     options = _options(argv)
     run = read_run(options.run)
-    parts = _parts(run)
+    parts = _parts(run, trust=options.trust)
     if parts.record is None:
         raise ValueError(
             f"{run.path} is of {run.config['environment']}, which cannot be filmed: it brings no picture of its "
@@ -71,19 +71,21 @@ def main(argv: Sequence[str] | None = None) -> int:
         n = sum(len(shot.moments(rate)) for shot in shots)
         interval = 0.2 if sys.stderr.isatty() else 10.0  # s; without a terminal a line now and then
         write_film(options.out, tqdm(shoot(camera, shots, rate), "filming", n, unit=" frames", mininterval=interval))
+    amount = parts.environment.outcomes.amount
     for k, movements in enumerate(stages):
         missed = np.array([shot.missed for shot in shots[k * len(goals) : (k + 1) * len(goals)]])
-        print(f"after {movements} movements: mean distance to the goal {missed.mean():.3f}, at most {missed.max():.3f}")
+        mean, most = amount(missed.mean()), amount(missed.max())
+        print(f"after {movements} movements: mean distance to the goal {mean}, at most {most}")
     print(f"Film {options.out}")
     return 0
 
 
-def _parts(run: Run) -> RunParts:
+def _parts(run: Run, *, trust: bool) -> RunParts:
     """What made the run. MuJoCo chooses how to draw when it is imported, and may fail then; arms do without it."""
     if sys.platform == "linux":
         os.environ.setdefault("MUJOCO_GL", "egl")  # draws without a display
     try:
-        return build(config_of(run))
+        return build(config_of(run, trust=trust))
     except (AttributeError, RuntimeError) as error:  # each kind of OpenGL fails in its own way
         if "mujoco" in sys.modules:
             raise
@@ -121,18 +123,34 @@ def _cast(run: Run, parts: RunParts, goals: Array, stages: Sequence[int]) -> lis
             recording = parts.record(context, parts.inverse(context, goal).theta, stream(seed, "film", k))
             # The first shot of a stage begins with what was learnt since the last one.
             new = len(past) - known if len(stages) > 1 and k == 0 else 0
-            shots.append(Shot(recording, goal, title, past, new))
+            shots.append(Shot(recording, goal, title, robot.outcomes.unit, past, new))
         known = len(past)
         found = evaluate(parts.inverse, robot, parts.benchmark.goals, seed, movements, context=context, repeats=0)
         errors.append(found.errors)
     curve = np.array(stages), np.array([each.mean() for each in errors])
     if len(stages) == 1 and len(run.evaluation["movements"]):
         curve = run.evaluation["movements"], run.evaluation["mean_error"]
-    panel = Panel(parts.benchmark.goals, colour(run.config["algorithm"]), *curve)
+    panel = Panel(robot.outcomes, parts.benchmark.goals, colour(run.config["algorithm"]), *curve)
     return [
         replace(shot, beside=panel.beside(stages[k], errors[k], shot.goal, shot.recording.outcome))
         for k, shot in ((row // len(goals), shot) for row, shot in enumerate(shots))
     ]
+
+
+def remember(run: Run, parts: RunParts, start: int, stop: int) -> None:
+    """Add to the memory of ``parts`` what the learner remembered in movements ``start`` to ``stop``, in the same order,
+    and train a forward model on it as in the run."""
+    memory, correspondence = parts.learner.memory, parts.learner.correspondence
+    by_observation = isinstance(parts.learner.social, Remember)  # other learners remember only their own movements
+    for row in range(start, min(stop, len(run.index))):
+        if by_observation and correspondence is not None and run.demonstration[row] >= 0:
+            shown = run.demonstrations[run.demonstration[row]]
+            memory.add(shown.context, correspondence(shown.times, shown.trajectory), shown.outcome)
+        if np.isfinite(run.outcomes[row]).all():
+            memory.add(run.contexts[row], run.thetas[row], run.outcomes[row])
+        if parts.model is not None:
+            goal = run.goals[row]
+            parts.model.refresh(memory, goal if np.isfinite(goal).all() else None)
 
 
 def _stages(run: Run, options: argparse.Namespace) -> list[int]:
@@ -163,11 +181,12 @@ def parser() -> argparse.ArgumentParser:
         type=numbers,
         nargs="+",
         metavar="X,Y",
-        help="in the task space (m); without it, six of the benchmark's; in a time lapse two",
+        help="in the task space; without it, six of the benchmark's; in a time lapse two",
     )
     parser.add_argument("--time-lapse", action="store_true", help="the goals again and again, early and late")
     after = f"movements, of a time lapse (default: {','.join(map(str, AFTER))})"
     parser.add_argument("--after", type=whole_numbers, metavar="N,N", help=after)
+    parser.add_argument("--trust", action="store_true", help="execute code that the run's settings name")
     parser.add_argument("--out", type=Path, help="the film, .mp4 or .webp (default: .mp4 next to the run's directory)")
     return parser
 

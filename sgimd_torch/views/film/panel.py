@@ -1,60 +1,56 @@
 """Beside a film: which goals the learner meets already, and how its error falls.
 
-    panel = Panel(goals, colour, movements, errors)
+    panel = Panel(space, goals, colour, movements, errors)
     shot = Shot(recording, goal, beside=panel.beside(500, goal_errors, goal, recording.outcome))
 
-The map shows T around the goals of the benchmark: the bluer a place, the nearer the answer to its nearest goal has
-landed. A yellow ring is the present goal, a cross where its answer has landed. Needs the extra ``film``.
+The map shows each goal of the benchmark in the first two dimensions of T, coloured by how far its answer misses it. A
+yellow ring is the present goal, a cross where its answer has landed. Needs the extra ``film``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
 
 try:
-    from matplotlib import colormaps, rc_context
+    from matplotlib import rc_context
     from matplotlib.axes import Axes
     from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.colors import ListedColormap
     from matplotlib.figure import Figure
 except ImportError as error:
     raise ImportError(f"films need {error.name}; install the extra film: pip install 'sgimd-torch[film]'") from error
 
-from scipy.spatial import cKDTree
-
-from sgimd_torch.figures.axes import goal_rings, rounded
+from sgimd_torch.figures.axes import goal_rings, limits, over_movements, rounded
+from sgimd_torch.figures.learning import misses
 from sgimd_torch.figures.save import STYLE
-from sgimd_torch.spaces import Array
+from sgimd_torch.figures.sections import sections
+from sgimd_torch.spaces import Array, Box
 from sgimd_torch.views.film.reel import HEIGHT, Frame
-from sgimd_torch.views.film.sketch import in_picture
 
 _DPI: Final = 100
-_FINE: Final = 240  # places of the map along each side
-_BLUES: Final = ListedColormap(colormaps["Blues_r"](np.linspace(0.08, 0.95, 256)))
-_TEXT: Final[Any] = {"font.size": 10, "axes.titlesize": 11, "axes.titlelocation": "left"}
+_TEXT: Final[Any] = {"font.size": 8, "axes.titlesize": 9, "axes.titlelocation": "left"}
 
 
 class Panel:
     """Draws map and curve.
 
     Args:
+        space: T, which gives names and unit.
         goals: ``(n, outcome_dim)`` of the benchmark.
         colour: of the curve.
         movements, errors: ``(m,)`` each, m >= 1: the curve, mean errors after so many movements.
     """
 
-    def __init__(self, goals: Array, colour: str, movements: Array, errors: Array) -> None:
-        places = in_picture(goals)
-        self._colour, self._movements, self._errors = colour, movements, errors
-        side = float(np.ptp(places, axis=0).max()) or 1.0
-        self.near = rounded(side / 50)
+    def __init__(self, space: Box, goals: Array, colour: str, movements: Array, errors: Array) -> None:
+        self._goals, self._colour, self._movements, self._errors = goals, colour, movements, errors
+        shown = limits(goals, space)
+        margin = shown.sides / 20  # for rings at the edge
+        self._space = replace(shown, low=shown.low - margin, high=shown.high + margin)
+        self.near = rounded(float(np.ptp(goals, axis=0).max() or 1.0) / 50)
         """Nearer than this, in the unit of T, is met."""
-        self._low, self._high = places.min(axis=0) - side / 20, places.max(axis=0) + side / 20
-        x, y = np.linspace(self._low, self._high, _FINE).T
-        self._nearest = cKDTree(places).query(np.stack(np.meshgrid(x, y), axis=-1))[1]  # (_FINE, _FINE)
 
     def beside(self, movements: int, errors: Array, goal: Array, outcome: Array) -> tuple[Frame, Frame]:
         """After so many ``movements``, missing the goals by ``errors`` ``(n,)``: pictures before and after the answer
@@ -64,7 +60,7 @@ class Panel:
     def _draw(self, movements: int, errors: Array, marked: Sequence[Array]) -> Frame:
         with rc_context({**STYLE, **_TEXT}):
             figure = Figure(figsize=(0.75 * HEIGHT / _DPI, HEIGHT / _DPI), dpi=_DPI, layout="constrained")
-            above, below = figure.subplots(2, height_ratios=[2.7, 1])
+            above, below = figure.subplots(2, height_ratios=[2.2, 1])
             self._map(above, errors, *marked)
             self._curve(below, movements)
             canvas: Any = FigureCanvasAgg(figure)
@@ -72,25 +68,19 @@ class Panel:
             return np.array(canvas.buffer_rgba())[..., :3]
 
     def _map(self, ax: Axes, errors: Array, goal: Array, outcome: Array | None = None) -> None:
-        (left, bottom), (right, top) = self._low.tolist(), self._high.tolist()
-        shades = np.clip(errors / (6 * self.near), 0, 1)[self._nearest]
-        ax.imshow(shades, cmap=_BLUES, vmin=0, vmax=1, origin="lower", extent=(left, right, bottom, top))
-        goal_rings(ax, in_picture(goal[None]), 14)
-        if outcome is not None:
-            ax.plot(*in_picture(outcome[None]).T, "X", color="#d55e00", mec="white", ms=10, mew=1)
+        section = sections(self._space)[0]
+        misses(ax, self._goals, errors, self._space, section, 6 * self.near)
+        if not section.is_strip:
+            goal_rings(ax, section.points(goal[None]), 14)
+            if outcome is not None:
+                ax.plot(*section.points(outcome[None]).T, "X", color="#d55e00", mec="white", ms=10, mew=1)
         met = int((errors <= self.near).sum())
-        ax.set(xlim=(left, right), ylim=(bottom, top), xticks=[], yticks=[])
-        ax.set_title(f"{met} of {len(errors)} goals met within {self.near:g}")
-        ax.spines[:].set_visible(False)
+        ax.set_title(f"{met} of {len(errors)} met within {self._space.amount(self.near)}")
 
     def _curve(self, ax: Axes, movements: int) -> None:
         seen = self._movements <= movements
         ax.plot(self._movements[seen], self._errors[seen], "o-", color=self._colour, ms=4)
-        first, last = float(self._movements.min()), float(self._movements.max())
-        if last > 20 * first:
-            ax.set_xscale("log")
-        ax.set(xlim=(first / 1.2, last * 1.2), ylim=(0, 1.1 * float(self._errors.max()) or 1.0))
-        ax.xaxis.set_major_formatter("{x:.0f}")
-        ax.xaxis.set_minor_formatter("")
-        ax.set_title(f"mean error {self._errors[seen][-1]:.3f} after {movements} movements" if seen.any() else "")
-        ax.grid(alpha=0.3)
+        over_movements(ax, self._space.in_unit("mean error"))
+        ax.set(xlim=(0, 1.05 * float(self._movements.max())), ylim=(0, 1.1 * float(self._errors.max()) or 1.0))
+        if seen.any():
+            ax.set_title(f"{self._space.amount(self._errors[seen][-1])} after {movements} movements")

@@ -11,10 +11,11 @@ from __future__ import annotations
 
 import subprocess
 from collections.abc import Iterable, Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from itertools import chain
 from pathlib import Path
+from threading import Timer
 from typing import Final, Protocol
 
 import numpy as np
@@ -48,13 +49,14 @@ _CODECS: Final = {
 
 @dataclass(frozen=True, eq=False)
 class Shot:
-    """One movement to film: the ``goal`` ``(outcome_dim,)`` that it is for, a ``title``, ``past`` outcomes
-    ``(n, outcome_dim)``, the last ``new`` of them since the shot before, and pictures to stand ``beside`` it, before
-    and after the landing."""
+    """One movement to film: the ``goal`` ``(outcome_dim,)`` that it is for, a ``title``, the ``unit`` of T, ``past``
+    outcomes ``(n, outcome_dim)``, the last ``new`` of them since the shot before, and pictures to stand ``beside`` it,
+    before and after the landing."""
 
     recording: Recorded
     goal: Array
     title: str = ""
+    unit: str = ""
     past: Array = field(default_factory=lambda: np.empty((0, 2)))
     new: int = 0
     beside: tuple[Frame, Frame] | None = None
@@ -78,7 +80,7 @@ class Shot:
         """The text below the picture at ``time`` (s)."""
         goal = f"goal {_place(self.goal)}"
         if time >= self.recording.landed:
-            return f"{goal}, reached {_place(self.recording.outcome)}: missed by {self.missed:.2g}"
+            return f"{goal}, reached {_place(self.recording.outcome)}: missed by {self.missed:.2g} {self.unit}".rstrip()
         let_out = getattr(self.recording, "let_out", None)  # of the rod
         return f"{goal}   {time:.2f} s{'   line let out' if let_out is not None and time > let_out else ''}"
 
@@ -137,16 +139,27 @@ def write_film(path: Path, frames: Iterable[Frame]) -> None:
             try:
                 with suppress(BrokenPipeError):  # it failed, and its error output says why
                     for frame in chain([first], frames):
-                        encoder.stdin.write(frame.tobytes())
-                _, said = encoder.communicate(timeout=PATIENCE)
-            except subprocess.TimeoutExpired:
-                encoder.kill()
-                raise OSError(f"ffmpeg did not end within {PATIENCE} s after the last frame") from None
+                        with _at_most(PATIENCE, encoder):
+                            encoder.stdin.write(frame.tobytes())
+                with _at_most(PATIENCE, encoder):
+                    _, said = encoder.communicate()
             except BaseException:
                 encoder.kill()
                 raise
         if encoder.returncode:
-            raise OSError(f"the film was not encoded: {said.decode(errors='replace').strip() or encoder.returncode}")
+            silent = f"ffmpeg ended with {encoder.returncode}, or did nothing for {PATIENCE:g} s"
+            raise OSError(f"the film was not encoded: {said.decode(errors='replace').strip() or silent}")
+
+
+@contextmanager
+def _at_most(seconds: float, process: subprocess.Popen[bytes]) -> Iterator[None]:
+    """Kill a process that keeps this block waiting for so long."""
+    timer = Timer(seconds, process.kill)
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
 
 
 def _place(point: Array) -> str:

@@ -1,8 +1,8 @@
 """Films of robots in the plane: what their ``record`` gives, drawn as a chain of links, without OpenGL.
 
     sketchbook = Sketchbook(arm.outcomes, shots); write_film(Path("film.mp4"), shoot(sketchbook, shots))
-The goal is a ring, past outcomes are dots, the end of the chain leaves a path. The first two dimensions of the outcome
-are x and y of the picture; an outcome of one dimension lies on y = 0.
+The goal is a ring, past outcomes are dots, the outcome is a cross, the end of the chain leaves a path. The first two
+dimensions of the outcome are x and y of the picture; an outcome of one dimension lies on y = 0.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class Sketchbook:
     def __init__(self, space: Box, shots: Sequence[Shot]) -> None:
         self._frame = in_picture(np.stack([space.low, space.high])) if space.dim > 1 else None
         seen = [_chains(shot).reshape(-1, 2) for shot in shots]
-        seen += [in_picture(space.clip([*shot.past, shot.goal])) for shot in shots]
+        seen += [in_picture(space.clip([*shot.past, shot.goal, shot.recording.outcome])) for shot in shots]
         low, high = (end(np.concatenate(seen), axis=0) for end in (np.min, np.max))
         self._size = np.array([WIDTH, HEIGHT]) * _FINER
         room = self._size * (1 - 2 * np.array(MARGINS))
@@ -57,6 +57,10 @@ class Sketchbook:
         self._line(pen, chains[row], _LINK, 5)
         self._dots(pen, chains[row][:-1], 3, fill=_JOINT, outline=_LINK, width=_FINER)
         self._dots(pen, chains[row][-1:], 5, fill=_END)
+        if time >= sketch.landed:
+            for slope in (-1, 1):
+                arm = np.array([[-8, -8 * slope], [8, 8 * slope]]) * _FINER / self._scale
+                self._line(pen, in_picture(sketch.outcome[None]) + arm, _END, 3)
         return image.resize((WIDTH, HEIGHT), Image.Resampling.LANCZOS)
 
     def _pixels(self, points: Array) -> Array:

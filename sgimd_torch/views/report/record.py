@@ -8,12 +8,10 @@ from __future__ import annotations
 import json
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from typing import Any, Final, NamedTuple
 
-from sgimd_torch.record import RunError
-from sgimd_torch.runs.config import PLACE, Config, words
-from sgimd_torch.runs.read import Run, config_of
+from sgimd_torch.runs.config import PLACE
+from sgimd_torch.runs.read import Run
 from sgimd_torch.views.statistics import LEAST_SEEDS
 from sgimd_torch.views.variants import Variant
 
@@ -73,23 +71,16 @@ def checkout(variants: Sequence[Variant]) -> str:
 
 
 def commands(runs: Sequence[Run]) -> list[str]:
-    """A line of shell for all runs of the same settings, defaults left out; a comment for a run of another version."""
+    """A line of shell for all runs of the same settings, defaults left out."""
     groups: dict[str, list[int]] = {}
-    refused = []
     for run in runs:
-        try:
-            config = config_of(run)
-        except RunError as error:  # the report is of what was recorded, whatever can be run today
-            refused.append(f"# {' '.join(str(error).split())}")
-            continue
-        name = None if config.name == config.algorithm else config.name  # a run is named after its algorithm anyway
-        own = replace(config, seed=Config.seed, out=Config.out, name=name, board=False)
-        groups.setdefault(shlex.join(words(own)), []).append(int(run.config["seed"]))
+        own = [word for word in run.words if word.partition("=")[0] not in ("--seed", "--out", "--board")]
+        groups.setdefault(shlex.join(own), []).append(int(run.config["seed"]))
     lines = list[str]()
     for given, seeds in groups.items():
         line = f"sgimd run {given} --seed={'$seed' if len(seeds) > 1 else seeds[0]} --out={AGAIN}"
         lines.append(f"for seed in {' '.join(map(str, seeds))}; do\n  {line}\ndone" if len(seeds) > 1 else line)
-    return [*lines, *refused]
+    return lines
 
 
 def settings(config: Mapping[str, Any]) -> str:
