@@ -44,7 +44,6 @@ REACHES: Final = (0.25, 0.7)  # m, how far from the base a sweep ends
 HEIGHTS: Final = (0.6, 0.8)  # m, and how high; it begins at .85
 BESIDE: Final = 0.03  # m, standard deviation of where it ends
 ARCH: Final = 0.05  # m, the same of how far the middle of a sweep lies off the way
-STILL: Final = 0.05  # of the largest speed: all joints slower than this is a pause
 TREMBLE: Final = 0.004  # m, the same of the hand's trembling where it is fastest; a mouse at rest does not tremble
 
 
@@ -119,14 +118,7 @@ def lead(leading: Leading, end: Array, rng: np.random.Generator) -> LedMovement:
         leading.step(HEARD)
     leading.release()
     leading.step(WAITS)
-    return without_pauses(leading.stop())
-
-
-def without_pauses(recording: LedMovement) -> LedMovement:
-    """Without the time before the first motion and after the last one."""
-    speeds = np.abs(np.diff(recording.joints, axis=0) / np.diff(recording.times)[:, None]).max(axis=1)
-    rows = np.flatnonzero(speeds > STILL * speeds.max())
-    return recording.trim(recording.times[rows[0]], recording.times[rows[-1] + 1])
+    return leading.stop().moving()
 
 
 def lessons_of_a_script() -> list[HandLesson]:

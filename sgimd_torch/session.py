@@ -8,6 +8,7 @@ executes nothing, does not change the noise of the movements after it.
 
 from __future__ import annotations
 
+import traceback
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
@@ -78,6 +79,10 @@ def run(
     """
     check_count("failures", failures, 1)
     check_instance(environment)
+    if not isinstance(learner, Learner):
+        raise ValueError(f"learner must be a Learner, got a {type(learner).__name__}; sagg_riac(environment, seed)?")
+    if teacher is not None and not hasattr(teacher, "offer"):
+        raise ValueError(f"teacher must have offer(), got a {type(teacher).__name__}; PeriodicTeacher(shown, rng)?")
     made = learner.movements
     if check_count("movements", movements, 1) <= made:
         raise ValueError(
@@ -156,7 +161,8 @@ def _tried(name: str, dim: int, robot: Callable[..., ArrayLike], *given: Any) ->
 
 def reason_of(error: BaseException) -> str:
     """Why a robot failed, in one line of at most 300 characters that a terminal can show."""
-    said = str(error) if isinstance(error, SimulationError) else f"{type(error).__name__}: {error}"
+    simulated = isinstance(error, SimulationError)
+    said = str(error) if simulated else "".join(traceback.format_exception_only(error))
     return "".join(sign if sign.isprintable() else " " for sign in said)[:300].strip()
 
 

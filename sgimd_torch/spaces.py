@@ -106,6 +106,17 @@ def check_count(name: str, value: object, least: int) -> int:
     return int(value)
 
 
+def check_rng(rng: object) -> None:
+    """Refuse what is not a random stream, before anything is drawn from it.
+
+    Raises:
+        TypeError: it is not a Generator.
+    """
+    if not isinstance(rng, np.random.Generator):
+        hint = "was the seed passed instead of a Generator, such as stream(seed, name)?"
+        raise TypeError(f"rng must be a numpy.random.Generator, got {type(rng).__name__}; {hint}")
+
+
 def first_entry(array: Array, wrong: NDArray[np.bool_]) -> str:
     """The first ``wrong`` entry of ``array`` and how many more there are, for an error message of one line."""
     entries = np.argwhere(wrong)
@@ -142,9 +153,11 @@ class Box:
             raise ValueError(f"Box needs two corners of shape (dim,), got {low.shape} and {high.shape}")
         if not (np.isfinite(low).all() and np.isfinite(high).all() and (low < high).all()):
             raise ValueError(f"Box needs finite corners with low < high, got {low} and {high}; were they swapped?")
-        names = tuple(self.names)
-        if len(names) not in (0, len(low)) or not all(isinstance(each, str) for each in (*names, self.unit)):
-            raise ValueError(f"Box needs {len(low)} names, texts, and a unit, a text, got {names} and {self.unit!r}")
+        given: Any = self.names
+        names = tuple(given)
+        texts = all(isinstance(each, str) for each in (*names, self.unit))
+        if isinstance(given, str) or len(names) not in (0, len(low)) or not texts:
+            raise ValueError(f"Box needs {len(low)} names, texts, and a unit, a text, got {given} and {self.unit!r}")
         object.__setattr__(self, "names", names)
         for name, corner in (("low", low), ("high", high)):
             corner.flags.writeable = False

@@ -14,6 +14,7 @@ CHROMIUM = next((path for path in map(Path, ("/usr/bin/chromium", "/usr/bin/chro
 # Without the first one there is no WebGL, and so no picture; the second is for machines where tests run as root.
 FLAGS = ["--enable-unsafe-swiftshader", "--no-sandbox"]
 SIZE = {"width": 1150, "height": 640}
+TOKEN = "a-token-that-nobody-guesses"
 LONG = 120_000  # ms, after which Playwright gives a browser up
 # Colours of a square of the scene, and which share of its pixels differ from earlier ones by more than so much.
 LOOK = """
@@ -68,9 +69,9 @@ def served(session):
         with ticked:
             ticked.wait_for(condition)
 
-    with serving(8300) as server:
+    with serving(8300, TOKEN) as server:
         page = Page(server, session)
-        page.address, page.until = f"http://127.0.0.1:{server.get_port()}", until
+        page.address, page.until = f"http://127.0.0.1:{server.get_port()}/?token={TOKEN}", until
         with session:
             loop = threading.Thread(target=page.run, args=(stopped,))
             loop.start()
@@ -103,12 +104,6 @@ class Tab:
         page.until(lambda: abs(self.client.camera.image_width - self.box["width"]) < 2)
         self.until_changed(self.hand(), 60, [255] * 4 * 60 * 60, 10, 0.05)
 
-    def enter(self, label, value):
-        """Type a number beside a slider."""
-        row = self.tab.get_by_text(label, exact=True).locator("xpath=ancestor::div[contains(@class, 'Flex-root')][1]")
-        row.locator("input").last.fill(f"{value:g}")
-        row.locator("input").last.press("Tab")
-
     def colours(self, place, side):
         """Of a square around a place on the screen."""
         return self.tab.evaluate("(square) => look(...square)", _square(place, side))
@@ -132,7 +127,7 @@ class Tab:
 
     def hand(self):
         """Where on the screen the hand is."""
-        return self.at(self.page.arm.hanging.hand)
+        return self.at(self.page.arm.leading.hand)
 
 
 def _square(place, side):

@@ -321,7 +321,7 @@ def test_what_lies_outside_the_limits_of_speed_and_range_is_remarked(slow, tmp_p
         (["check", "shown.npz", "--task", "planar-arm-7", "--figure", "shown.gif"], "--figure must end in .png"),
         (["check", "two.npz", "--task", "planar-arm-7"], "its outcome has 1 numbers, the robot's has 2"),
         (["import", "one.csv", "--joints", "a,q", "--outcome", "x", "--out", "o.npz"], "one.csv has no column q"),
-        (["import", "one.csv", "--joints", "a,b", "--outcome", "x", "--out", "."], "is a directory"),
+        (["import", "one.csv", "--joints", "a,b", "--outcome", "x", "--out", "."], "--out must end in .npz"),
         (["convert"], "invalid choice: 'convert'"),
     ],
 )

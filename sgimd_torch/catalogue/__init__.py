@@ -283,7 +283,9 @@ def find(kind: str, word: str) -> Entry:
     if word in known:
         return known[word]
     if ":" not in word:
-        raise unknown(kind, word, known, ", and package.module:attribute for one of your own")
+        module, dot, name = word.rpartition(".")
+        meant = f"; is it {module}:{name}?" if dot else ", and package.module:attribute for one of your own"
+        raise unknown(kind, word, known, meant)
     made = load(word, f"{kind} {word}")
     if not callable(made):
         raise ValueError(f"{kind} {word} must be called as {_WANTED[kind][0]}, but it is a {type(made).__name__}")
@@ -349,6 +351,10 @@ def load(place: str, what: str = "") -> Any:
     """
     module, _, attribute = place.partition(":")
     what = what or place
+    if module.endswith(".py"):
+        raise ValueError(
+            f"{what}: a module is named without .py and with dots: {module[:-3].replace('/', '.')}:{attribute}"
+        )
     here = os.getcwd()
     if here not in sys.path:
         sys.path.append(here)

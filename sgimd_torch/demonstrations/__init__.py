@@ -64,7 +64,7 @@ def load_demonstrations(
         OSError: there is no file, or it is a directory.
     """
     source = str(path)
-    arrays = read_npz(path, "demonstration file", "save_demonstrations", _FIELDS)
+    arrays = read_npz(path, "demonstration file", "save_demonstrations or sgimd demonstrations import", _FIELDS)
     _check(source, dict(zip(_FIELDS, arrays, strict=True)))
     lengths, times, trajectories, outcomes, contexts = arrays
     for name, field, wanted in (

@@ -115,7 +115,10 @@ def recordings(source: str, table: Mapping[str, np.ndarray], columns: Columns) -
 def _table(file: Path, names: Sequence[str]) -> dict[str, np.ndarray]:
     """Columns of a CSV file, as text."""
     with open(file, encoding="utf-8-sig", errors="replace", newline="") as text:
-        heads, *rows = [[field.strip() for field in row] for row in csv.reader(text) if row] or [[]]
+        lines = text.readlines()
+    if any("\0" in line for line in lines):
+        raise ValueError(f"{file} has a NUL, so it is no text in UTF-8; was it saved as UTF-16, or cut off by a crash?")
+    heads, *rows = [[field.strip() for field in row] for row in csv.reader(lines) if row] or [[]]
     missing = [name for name in names if name not in heads]
     if missing:
         raise ValueError(f"{file} has no column {', '.join(missing)}; it has {', '.join(heads[:20])}")

@@ -97,6 +97,11 @@ class Leading:
         return self._arm.where(*((self._held.body, self._held.place) if self._held else self._hand))
 
     @property
+    def hand(self) -> Array:
+        """``(3,)`` m, where its own hand is."""
+        return self._arm.where(*self._hand)
+
+    @property
     def gap(self) -> float:
         """m, how far the held point is from the way that the hand took during the last moments; 0 if nothing is held.
 

@@ -22,6 +22,8 @@ from sgimd_torch.spaces import Array, Demonstration, read_only
 RATE: Final = 50.0  # Hz, of the shipped demonstrations and of motor primitives
 LAG: Final = 0.03  # m: warn when the arm lags the hand by more
 FASTER: Final = 1.02  # warn when a joint would be so many times faster than in the robot's own movements
+MOVES: Final = 0.02  # rad/s: an arm that never was faster did not move
+STILL: Final = 0.05  # of the largest speed: all joints slower than this is a pause
 AWAY: Final = 0.05  # rad: warn when it starts farther than this from where movements start
 
 
@@ -42,18 +44,18 @@ class LedMovement:
         """s."""
         return float(self.times[-1])
 
-    def trim(self, start: float, end: float) -> LedMovement:
-        """What happened from ``start`` to ``end`` (s), its times from 0.
+    def moving(self) -> LedMovement:
+        """The same without the stillness before and after it, its times from 0.
 
         Raises:
-            ValueError: fewer than two samples lie between them.
+            ValueError: it never moved.
         """
-        kept = (self.times >= start - 1e-9) & (self.times <= end + 1e-9)
-        if kept.sum() < 2:
-            found = f"from {start:g} s to {end:g} s there are {int(kept.sum())} samples"
-            raise ValueError(f"{found}, at least 2 are needed; were the ends swapped?")
-        times = self.times[kept]
-        return LedMovement(times - times[0], self.joints[kept], self.gaps[kept])
+        speeds = np.abs(np.diff(self.joints, axis=0)).max(axis=1) / np.diff(self.times)
+        if not speeds.max() > MOVES:
+            raise ValueError("you did not move the arm")
+        moved = np.flatnonzero(speeds > STILL * speeds.max())
+        kept = slice(moved[0], moved[-1] + 2)
+        return LedMovement(self.times[kept] - self.times[moved[0]], self.joints[kept], self.gaps[kept])
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,7 +30,8 @@ def check_environment(environment: Environment, *, movements: int = 3) -> None:
             broken one are not tried, so a second look may find more.
     """
     check_count("movements", movements, 1)
-    check_instance(environment)
+    if isinstance(environment, type):
+        check_instance(environment)
     stages: list[tuple[Callable[..., Iterator[str]], ...]] = [(_spaces,), (_contexts,), (_outcomes,), (_repeats,)]
     stages.append((_noise, _batches, _refusals))
     found: list[str] = []

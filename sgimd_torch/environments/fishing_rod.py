@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sgimd_torch.environments.motor_primitives import GaussianPrimitive
-from sgimd_torch.environments.protocol import HandLed, SimulationError, check_movement, check_recording, check_rng
-from sgimd_torch.spaces import Array, Box, check_count
+from sgimd_torch.environments.protocol import HandLed, SimulationError, check_movement, check_recording
+from sgimd_torch.spaces import Array, Box, check_count, check_rng
 
 if TYPE_CHECKING:
     from sgimd_torch.environments.rod_physics import Recording

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sgimd_torch.environments.controllers import Controller
-from sgimd_torch.environments.protocol import SimulationError, check_movement, check_rest, check_rng
-from sgimd_torch.spaces import Array, Box, Demonstration, check_count, check_point, check_vector, stream
+from sgimd_torch.environments.protocol import SimulationError, check_movement, check_rest
+from sgimd_torch.spaces import Array, Box, Demonstration, check_count, check_point, check_rng, check_vector, stream
 
 try:
     import gymnasium

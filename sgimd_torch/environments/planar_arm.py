@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sgimd_torch.environments.protocol import HandLed, Sketch, check_movement, check_recording, check_rng
-from sgimd_torch.spaces import Array, Box, check_count, check_vector, first_entry
+from sgimd_torch.environments.protocol import HandLed, Sketch, check_movement, check_recording
+from sgimd_torch.spaces import Array, Box, check_count, check_rng, check_vector, first_entry
 
 _STEP = 0.04  # s, of a recorded movement
 _STEPS = 26  # of it, from rest to its posture

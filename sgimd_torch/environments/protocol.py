@@ -273,14 +273,18 @@ def check_recording(
 
 
 def check_instance(environment: object) -> None:
-    """Refuse a class in the place of an environment.
+    """Refuse a class, or something else, in the place of an environment.
 
     Raises:
-        ValueError: it is a class.
+        ValueError: it is none.
     """
     if isinstance(environment, type):
         name = environment.__name__
         raise ValueError(f"an environment is wanted, got the class {name} itself; write {name}()")
+    if not hasattr(environment, "policies"):
+        raise ValueError(
+            f"an environment is wanted, got a {type(environment).__name__}; is the order of arguments right?"
+        )
 
 
 def check_rest(environment: Environment) -> None:
@@ -292,14 +296,3 @@ def check_rest(environment: Environment) -> None:
     check_instance(environment)
     if environment.outcomes.check("rest of the environment", environment.rest, "is it a theta?").ndim != 1:
         raise ValueError(f"rest of the environment must be one outcome, got shape {np.shape(environment.rest)}")
-
-
-def check_rng(rng: object) -> None:
-    """Refuse what is not a random stream, before anything is drawn from it.
-
-    Raises:
-        TypeError: it is not a Generator.
-    """
-    if not isinstance(rng, np.random.Generator):
-        hint = "was the seed passed instead of a Generator, such as stream(seed, name)?"
-        raise TypeError(f"rng must be a numpy.random.Generator, got {type(rng).__name__}; {hint}")

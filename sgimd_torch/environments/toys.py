@@ -15,8 +15,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sgimd_torch.environments.protocol import check_movement, check_rng
-from sgimd_torch.spaces import Array, Box
+from sgimd_torch.environments.protocol import check_movement
+from sgimd_torch.spaces import Array, Box, check_rng
 
 GRAVITY: Final = 9.81  # m/s^2
 _STROKES: Final = 10  # of the crawler, in one movement

@@ -175,7 +175,8 @@ def _read(argv: Sequence[str]) -> tuple[dict[str, str], set[str]]:
         if typed in ("-h", "--help"):
             asked.add("help")
         elif not typed.startswith("--"):
-            raise ValueError(f"{typed!r} belongs to no option; an option begins with -- and takes one value")
+            flags = f"; --{', --'.join(map(dashed, FLAGS))} take none"
+            raise ValueError(f"{typed!r} belongs to no option; an option begins with -- and takes one value{flags}")
         elif name in FLAGS:
             if equals:
                 raise ValueError(f"{typed} takes no value, got {value!r}")

@@ -60,7 +60,7 @@ def carry_out(parts: RunParts, stopping: Stopping, *, resume: bool, accept_loss:
         except (Exception, SystemExit) as error:  # of a part, as one's own; or too many failed movements
             raised = error.__cause__ if isinstance(error, NoOutcomeError) and error.__cause__ else error
             if not isinstance(raised, SimulationError):
-                traceback.print_exception(raised)
+                say("".join(traceback.format_exception(raised)).rstrip())
             said = str(error) if raised is not error else reason_of(error)
             raise Failed(f"{said}; {life.movements} movements are kept; to go on: {again}") from error
         return life.summary

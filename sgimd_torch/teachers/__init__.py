@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sgimd_torch.memory import Memory
-from sgimd_torch.spaces import Array, Demonstration, check_count, check_vector
+from sgimd_torch.spaces import Array, Demonstration, check_count, check_rng, check_vector
 
 _STALLED: Final = 0.01  # share by which distances fall at least while a learner progresses
 
@@ -107,6 +107,7 @@ class PeriodicTeacher:
         choose: Choose = least_explored,
     ) -> None:
         self.demonstrations = check_demonstrations(demonstrations)
+        check_rng(rng)
         self.rng = rng
         self.every = check_count("every", every, 1)
         self.choose = choose
@@ -129,6 +130,7 @@ class InitialTeacher:
 
     def __init__(self, demonstrations: Sequence[Demonstration], rng: np.random.Generator, *, every: int = 10) -> None:
         self.demonstrations = check_demonstrations(demonstrations)
+        check_rng(rng)
         self.every = check_count("every", every, 1)
         self._order = rng.permutation(len(demonstrations))
 
@@ -162,6 +164,7 @@ class AskedTeacher:
         choose: Choose = least_explored,
     ) -> None:
         self.demonstrations = check_demonstrations(demonstrations)
+        check_rng(rng)
         self.rng = rng
         self.patience = check_count("patience", patience, 1)
         self.choose = choose

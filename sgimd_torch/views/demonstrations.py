@@ -91,6 +91,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         OSError: a file cannot be read or written.
     """
     options = parser().parse_args(argv)
+    if options.command == "import" and options.out.suffix != ".npz":
+        raise ValueError(f"--out must end in .npz, got {options.out}")
     shown = read(options)
     if options.command == "import":
         save_demonstrations(options.out, shown)

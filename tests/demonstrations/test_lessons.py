@@ -130,18 +130,17 @@ def test_a_recording_of_another_robot_is_refused(rod):
         give(rod, led(np.linspace(0, 1, 11), np.zeros((11, 7))))
 
 
-def test_trimming_keeps_what_was_between_and_counts_from_0():
-    times = np.arange(201) / 100
-    part = LedMovement(times, np.stack([times, -times], axis=1), times / 10).trim(0.5, 1.0)
-    assert (len(part.times), part.times[0], part.duration) == (51, 0.0, pytest.approx(0.5))
-    np.testing.assert_array_equal(part.joints[:, 0], times[50:101])
-    np.testing.assert_array_equal(part.gaps, times[50:101] / 10)
+def test_stillness_before_and_after_a_movement_is_left_out():
+    times, turn = np.arange(201) / 100, np.clip(np.arange(201) / 100 - 0.5, 0, 0.8)
+    part = LedMovement(times, np.stack([turn, -turn], axis=1), times / 10).moving()
+    np.testing.assert_allclose(part.times, np.arange(81) / 100, atol=1e-12)
+    np.testing.assert_allclose(part.joints[[0, -1], 0], [0.0, 0.8], atol=1e-12)
+    np.testing.assert_allclose(part.gaps, times[50:131] / 10)
 
 
-@pytest.mark.parametrize("ends", [(1.0, 0.5), (3.0, 4.0), (0.501, 0.509)])
-def test_trimming_all_away_is_refused(ends):
-    with pytest.raises(ValueError, match="at least 2 are needed"):
-        led(np.arange(201) / 100, np.zeros((201, 2))).trim(*ends)
+def test_an_arm_that_did_not_move_teaches_nothing():
+    with pytest.raises(ValueError, match="you did not move the arm"):
+        led(np.arange(201) / 100, np.zeros((201, 2))).moving()
 
 
 def test_resampling_has_equal_steps_and_both_ends():

@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import io
+import secrets
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -20,7 +21,7 @@ from typing import TYPE_CHECKING, Final
 
 from sgimd_torch.runs.command_line import parse
 from sgimd_torch.runs.config import Config
-from sgimd_torch.runs.process import loading
+from sgimd_torch.runs.process import loading, say
 from sgimd_torch.runs.read import config_of, read_run
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 
 NAME: Final = "taught"  # of the run, if no other is given
 WHERE: Final = """
-Teach it here:  http://127.0.0.1:{port}   (Ctrl-C ends it; {path} keeps everything)
+Teach it here:  http://127.0.0.1:{port}/?token={token}   (Ctrl-C ends it; {path} keeps everything)
       From another machine:  ssh -L {port}:127.0.0.1:{port} THIS-MACHINE   and open the same address there.
 """
 
@@ -40,6 +41,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         ValueError: the request is wrong, or this task cannot be led by the hand.
     """
     config, port = options_of(sys.argv[1:] if argv is None else argv)
+    token = secrets.token_urlsafe(16)
     with loading():
         from sgimd_torch.runs.build import task_of
         from sgimd_torch.runs.process import Failed
@@ -48,27 +50,33 @@ def main(argv: Sequence[str] | None = None) -> int:
         from sgimd_torch.views.teach.session import Session
     hand_led_of(task_of(config))  # what cannot be led is refused before anything is made
     session = Session(config)
-    with serving(port) as server:
+    with serving(port, token) as server:
         page = Page(server, session)
-        print(WHERE.format(port=server.get_port(), path=config.directory), flush=True)
-        session.pause("teachers" in config)  # who asks in vain soon asks no more: it waits for somebody
-        with session:
-            page.run()
+        print(WHERE.format(port=server.get_port(), token=token, path=config.directory), flush=True)
+        session.pause(True)  # it waits for its first lesson
+        try:
+            with session:
+                page.run()
+        except KeyboardInterrupt:
+            say(f"all of it is kept; to go on: sgimd teach {config.directory}")
+            raise
     if session.state.problem:
         raise Failed(session.state.problem)
     return 0
 
 
 @contextlib.contextmanager
-def serving(port: int) -> Iterator[ViserServer]:
-    """A web server on 127.0.0.1, at the first free port from ``port`` on.
+def serving(port: int, token: str) -> Iterator[ViserServer]:
+    """A web server on 127.0.0.1, at the first free port from ``port`` on, for whoever has the ``token``.
 
     Raises:
         ValueError: no such port, or none is free.
     """
     import viser  # only when it is needed
 
-    with contextlib.redirect_stdout(io.StringIO()):  # a banner, and where it listens
+    from sgimd_torch.views.teach.guard import guarded
+
+    with contextlib.redirect_stdout(io.StringIO()), guarded(token):  # a banner, and where it listens
         server = viser.ViserServer(host="127.0.0.1", port=port, verbose=False)
     try:
         yield server
@@ -87,6 +95,7 @@ def parser() -> argparse.ArgumentParser:
         allow_abbrev=False,
     )
     parser.add_argument("--port", type=int, default=8080, help="the first port to try (8080)")
+    parser.add_argument("--trust", action="store_true", help="execute code that the settings of RUN name")
     return parser
 
 
@@ -95,7 +104,7 @@ def options_of(argv: Sequence[str]) -> tuple[Config, int]:
     options, words = parser().parse_known_args(argv)
     if words and not words[0].startswith("-"):
         path = Path(words[0])
-        config = config_of(read_run(path))
+        config = config_of(read_run(path), trust=options.trust)
         if len(words) > 1:
             parser().error(f"{path} has its own options; {' '.join(words[1:])} cannot change them")
         config = replace(config, out=path.parent.parent, name=path.parent.name)

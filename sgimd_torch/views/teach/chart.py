@@ -49,8 +49,7 @@ class State:
 
     ``busy`` says what it does if it neither learns nor pauses; ``problem`` what ended it. ``asked`` ``(outcome_dim,)``
     is a goal that the learner would like to be shown, and ``waiting`` whether it waits for an answer. ``latest`` are
-    the last episodes. ``chart`` is the newest map, ``before`` that from before the last lesson, ``curve`` movements and
-    mean predicted error (m) of all maps.
+    the last episodes. ``chart`` is the newest map, ``before`` that from before the last lesson.
     """
 
     total: int
@@ -64,7 +63,6 @@ class State:
     latest: tuple[Episode, ...] = ()
     chart: Chart | None = None
     before: Chart | None = None
-    curve: tuple[tuple[int, float], ...] = ()
 
 
 def chart_of(

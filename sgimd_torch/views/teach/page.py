@@ -1,4 +1,4 @@
-"""The page: one loop that moves the led arm, plays movements and shows how the session stands; nobody waits for it.
+"""The page: one loop that moves the led arm and shows how the session stands; nobody waits for it.
 
     with serving(8080) as server, Session(config) as session: Page(server, session).run()
 What viewers do is put into a queue for this loop. All viewers see the same, and each may do everything; the arm is held
@@ -18,8 +18,7 @@ from typing import Any, Final
 import numpy as np
 import viser
 
-from sgimd_torch.demonstrations.lessons import HandLesson, LedMovement
-from sgimd_torch.environments.protocol import Recorded
+from sgimd_torch.demonstrations.lessons import HandLesson
 from sgimd_torch.runs.tasks import hand_led_of
 from sgimd_torch.spaces import Array
 from sgimd_torch.views.teach.arm import LedArm
@@ -30,8 +29,6 @@ from sgimd_torch.views.teach.session import Session
 from sgimd_torch.views.teach.taught import Trial
 
 TICK: Final = 1 / 30  # s, from one picture to the next
-MOVEMENT: Final = 2.0  # s, from one movement of the learner to the next in real time
-FASTEST: Final = 4.0  # times as fast as they are, movements of a learner that goes as fast as it can
 FAREWELL: Final = 0.3  # s, in which the last words reach the viewers
 ENDED: Final = (
     '<div style="padding:0 .6em;color:#a33"><b>This session has ended.</b> '
@@ -57,18 +54,16 @@ class Page:
         led = hand_led_of(parts.task)
         self._outcomes = parts.environment.outcomes
         self.arm = LedArm(led)
-        self.scene = Scene(server, led, self._outcomes, parts.benchmark.goals)
-        self.panel = Panel(server, self._act, self._outcomes)
+        self.scene = Scene(server, led, self.arm.leading.links, self._outcomes, parts.benchmark.goals)
+        self.panel = Panel(server, self._act, self._outcomes, asks="teachers" in session.config)
         self.lesson: HandLesson | None = None
-        """What the recording teaches, as it is trimmed now; None until that is known."""
+        """What the recording teaches; None until that is known."""
         self.drawn: Chart | None = None
         """What the map shows."""
         self._tasks: SimpleQueue[Callable[[], object]] = SimpleQueue()
-        self._judging = self._trimmed = False  # a lesson is being made of the recording; it was trimmed since
-        self._fetching, self._last = False, -1  # the next ghost; the last movement of which there was one
         self._seen: State | None = None
         self._which = ""
-        self._set_speed("1 x")
+        self._set_speed(next(iter(SPEEDS)))
         self._listen()
 
     def run(self, stopped: Callable[[], bool] = lambda: False) -> None:
@@ -79,8 +74,9 @@ class Page:
                 self._carry_out(until=last + TICK)
                 now = time.monotonic()
                 with self.server.atomic():
-                    self._move(now, now - last)
-                    self._tell(now)
+                    self.arm.leading.step(now - last)
+                    self.scene.draw_arm(self.arm.leading.data, self.arm.leading.hand)
+                    self._tell()
                 self.server.flush()
                 last = now
         finally:
@@ -109,15 +105,9 @@ class Page:
         async def _(event: Any) -> None:
             self._later(event.client, lambda: self._set_speed(event.target.value))
 
-        @self.panel.start.on_update  # type: ignore[untyped-decorator]
-        @self.panel.end.on_update  # type: ignore[untyped-decorator]
-        async def _(event: Any) -> None:
-            if event.client is not None:
-                self._later(event.client, self._trim)
-
         @self.server.on_client_disconnect
         async def _(client: viser.ClientHandle) -> None:
-            self._tasks.put(lambda: self.arm.let_go(client.client_id))
+            self._tasks.put(lambda: self._leave(client.client_id))
 
     def _listen_to(self, body: str, handle: Any) -> None:
         @handle.on_drag("left")  # type: ignore[untyped-decorator]
@@ -143,10 +133,9 @@ class Page:
 
     def _act(self, name: str, client: viser.ClientHandle) -> None:
         actions: dict[str, Callable[[], object]] = {
-            "record": self._record,
-            "home": self.arm.home,
-            "play": lambda: self.arm.play(self.trimmed(), time.monotonic()),
-            "discard": self._discard,
+            "record": lambda: self._record(client),
+            "home": self.arm.leading.home,
+            "discard": lambda: self._say(None),
             "show": lambda: self._show(client),
             "undo": lambda: self._then(client, self.session.take_back(), lambda _: self._taken_back(client)),
             "alone": self.session.decline,
@@ -163,57 +152,38 @@ class Page:
         else:
             self.arm.drag(viewer, end)
 
-    def _record(self) -> None:
-        """Begin a recording, or end the one under way and look at it."""
-        try:
-            self.arm.record()
-        finally:
-            self.panel.say_recording(self.arm.leading.recording)
-        if not self.arm.leading.recording and self.arm.recording is not None:
-            self.panel.set_trim(self.arm.recording.duration)
-            self._trim()
+    def _leave(self, viewer: int) -> None:
+        """A tab was closed: it lets go, and what it was recording is over."""
+        self.arm.let_go(viewer)
+        if self.arm.recorder == viewer:
+            with contextlib.suppress(ValueError):
+                self.arm.stop()
+            self.panel.say_recording(False)
 
-    def trimmed(self) -> LedMovement:
-        """What the sliders leave of the recording.
-
-        Raises:
-            ValueError: there is none, or they leave nothing of it.
-        """
-        if self.arm.recording is None:
-            raise ValueError("there is no recording yet")
-        return self.arm.recording.trim(self.panel.start.value, self.panel.end.value)
-
-    def _trim(self) -> None:
-        """Find out what the recording teaches as it is trimmed now; one after the other, however fast sliders move."""
-        self.lesson, self._trimmed = None, True
-        if self._judging or self.arm.recording is None:
+    def _record(self, client: viser.ClientHandle) -> None:
+        """Begin a recording, or end the one under way and find out what it teaches."""
+        if not self.arm.leading.recording:
+            self._say(None)
+            self.arm.record(client.client_id)
+            self.panel.say_recording(True)
             return
-        self._trimmed = False
+        self.panel.say_recording(False)
         try:
-            trimmed = self.trimmed()
+            recording = self.arm.stop()
         except ValueError as error:
             self._say(None, str(error))
             return
-        self._judging = True
-        future = self.session.do(lambda: self.session.run.lesson_of(trimmed))
+        future = self.session.do(lambda: self.session.run.lesson_of(recording))
         future.add_done_callback(lambda done: self._tasks.put(lambda: self._judged(done)))
 
     def _judged(self, done: Future[HandLesson]) -> None:
-        self._judging = False
-        if self._trimmed:
-            self._trim()
-        elif self.arm.recording is not None:
-            error = done.exception()
-            self._say(*((done.result(), "") if error is None else (None, str(error))))
+        error = done.exception()
+        self._say(*((done.result(), "") if error is None else (None, str(error))))
 
     def _say(self, lesson: HandLesson | None, problem: str = "") -> None:
         self.lesson = lesson
         self.panel.say_lesson(lesson, problem)
         self.scene.mark("lesson", None if lesson is None else lesson.demonstration.outcome, "your throw lands here")
-
-    def _discard(self) -> None:
-        self.arm.recording, self._trimmed = None, False
-        self._say(None)
 
     def _show(self, client: viser.ClientHandle) -> None:
         if self.lesson is None:
@@ -228,7 +198,7 @@ class Page:
         assert state.chart is not None
         self.panel.say_effect(state.before, state.chart)
         self.panel.maps.value = MAPS[1]
-        self._discard()
+        self._say(None)
 
     def _taken_back(self, client: viser.ClientHandle) -> None:
         self.panel.maps.value = MAPS[0]
@@ -242,42 +212,17 @@ class Page:
         self.panel.say_trial(trial)
         self.scene.mark("goal", trial.goal)
         self.scene.mark("landed", trial.outcome, f"missed by {self._outcomes.amount(trial.missed, '.2f')}")
-        self.scene.play(trial.recorded, time.monotonic(), 1.0)
 
     def _set_speed(self, word: str) -> None:
-        """One of ``SPEEDS``; the learner moves as often as its movements can be played."""
-        self._speed = min(SPEEDS[word], FASTEST)
-        self.session.pace(MOVEMENT / SPEEDS[word])
+        """One of ``SPEEDS``."""
+        self.session.pace(SPEEDS[word])
 
-    def _move(self, now: float, seconds: float) -> None:
-        """The led arm and what hangs on it, and the learner's newest movement."""
-        self.arm.move(now, seconds)
-        self.scene.draw_arm(self.arm.hanging.data, self.arm.hanging.hand)
-        if not (self.scene.draw_ghost(now) or self._fetching) and self.server.get_clients():
-            self._fetch()
-
-    def _fetch(self) -> None:
-        """The learner's last movement is to be played, if it was not yet."""
-        latest = self.session.state.latest[-1:]
-        if not latest or latest[0].index == self._last:
-            return
-        self._last, self._fetching = latest[0].index, True
-
-        def begin(done: Future[Recorded | None]) -> None:
-            self._fetching = False
-            self.scene.play(None if done.exception() else done.result(), time.monotonic(), self._speed)
-
-        future = self.session.do(lambda: self.session.run.recorded(latest[0]))
-        future.add_done_callback(lambda done: self._tasks.put(lambda: begin(done)))
-
-    def _tell(self, now: float) -> None:
+    def _tell(self) -> None:
         """Whatever has changed since the last picture."""
         state, seen = self.session.state, self._seen
-        self.session.answered = bool(self.server.get_clients())
+        self.session.answered = self.panel.waits.value and bool(self.server.get_clients())
         if state is not seen:
             self.panel.say_state(state, self.session.run.cannot_be_taught)
-            if state.curve and (seen is None or state.curve is not seen.curve):
-                self.panel.say_curve(state)
             if seen is None or state.asked is not seen.asked:
                 self.scene.mark("asked", state.asked, "show me how to get here")
             landed = [episode.outcome for episode in state.latest if episode.outcome is not None]

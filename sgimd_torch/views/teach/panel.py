@@ -35,31 +35,30 @@ ICON: Final = viser.Icon
 ACTIONS: Final = {
     "record": Action("Record", ICON.PLAYER_RECORD, "R", "red"),
     "home": Action("Arm back to its start", ICON.HOME, "H"),
-    "play": Action("Play it back", ICON.PLAYER_PLAY, "P"),
     "discard": Action("Throw it away", ICON.TRASH, "X"),
     "show": Action("Show it to the learner", ICON.SCHOOL, "T", "green"),
     "alone": Action("Let it go on alone", ICON.WALK, "G"),
     "undo": Action("Take back the last lesson", ICON.ARROW_BACK_UP, "U"),
     "pause": Action("Pause the learner", ICON.PLAYER_PAUSE, "space", "blue"),
 }
-SPEEDS: Final = {"½ x": 0.5, "1 x": 1.0, "4 x": 4.0, "max": np.inf}
+SPEEDS: Final = {"slowly": 2.0, "as fast as it can": 0.0}
+"""s, from one movement of the learner to the next."""
 MAPS: Final = ("error", "last lesson")
 ENDS: Final = {"error": ("cannot", "can"), "last lesson": ("worse", "better")}
 LEAD: Final = "Press **Record**, **drag the orange ball** (or any part of the arm) as if you threw, press **Stop**."
 REMARKS: Final = 3  # that are shown
 LOOK: Final = "Nothing recorded yet."
+SEEN: Final = (
+    "The ground is the task space, {0}: light where the learner can land, dark where it cannot yet. "
+    "The orange ball is the hand of the robot; small dots are goals of the benchmark."
+)
 CLICK: Final = "**Click anywhere on the map**: the learner does its best to land there."
-ORANGE: Final = "#f0781e"
 _STATUS: Final = (
     '<div style="padding:0 .6em;line-height:1.5"><b style="font-size:1.1em">{0}</b><br>{1} of {2} movements, {3}<br>'
     'predicted error <b>{4}</b><br>{5}</div><div style="color:#a33;padding:0 .6em">{6}</div>'
     '<div style="padding:0 .6em;font-size:.85em;line-height:1.5"><b style="color:#f0781e">●</b> you &nbsp; '
-    '<b style="color:#3c46be">●</b> the learner, and where it landed<br><b style="color:#0a6e32">●</b> goals within '
+    '<b style="color:#3c46be">●</b> where the learner landed<br><b style="color:#0a6e32">●</b> goals within '
     'reach &nbsp; <b style="color:#788ca0">●</b> goals still too far</div>'
-)
-_CURVE: Final = (
-    '<div style="padding:0 .6em;font-size:.85em">Predicted error over movements, '
-    '<b style="color:#f0781e">●</b> lessons</div>'
 )
 _LEGEND: Final = (
     '<div style="display:flex;gap:.5em;align-items:center;padding:0 .6em;font-size:.85em">{0}<div style="flex:1;'
@@ -70,7 +69,7 @@ _LEGEND: Final = (
 class Panel:
     """What viewers see beside the scene; all of them see the same."""
 
-    def __init__(self, server: viser.ViserServer, act: Act, space: Box) -> None:
+    def __init__(self, server: viser.ViserServer, act: Act, space: Box, *, asks: bool) -> None:
         self._server, self._act, self._space = server, act, space
         self.buttons: dict[str, Any] = {}
         gui = server.gui
@@ -80,24 +79,23 @@ class Panel:
         gui.set_panel_label("Teach it by hand")
         gui.main_panel.dock_right()
         gui.main_panel.set_width(350)
+        gui.add_markdown(SEEN.format(" and ".join(space.axis(k) for k in range(min(2, space.dim)))))
         with gui.add_folder("1 · Lead the arm"):
             gui.add_markdown(LEAD)
             self._add_buttons("record", "home")
         with gui.add_folder("2 · Look at what you recorded"):
             self.lesson = gui.add_markdown(LOOK)
-            self.start: Any = gui.add_slider("From (s)", 0.0, 1.0, 0.01, 0.0, visible=False)
-            self.end: Any = gui.add_slider("To (s)", 0.0, 1.0, 0.01, 1.0, visible=False)
-            self._add_buttons("play", "discard")
+            self._add_buttons("discard")
         with gui.add_folder("3 · Teach it"):
             self._add_buttons("show", "alone")
             self.effect = gui.add_markdown("It answers at once, and the map shows what changed.")
             self._add_buttons("undo")
         with gui.add_folder("4 · Try what it has learnt"):
             self.trial = gui.add_markdown(CLICK)
-        self._add_learner()
+        self._add_learner(asks)
         self.say_lesson(None)
 
-    def _add_learner(self) -> None:
+    def _add_learner(self, asks: bool) -> None:
         gui = self._server.gui
         panel = gui.add_panel()
         with panel.add_tab("The learner"):
@@ -106,19 +104,7 @@ class Panel:
             self.speed = gui.add_button_group("Speed", tuple(SPEEDS))
             self.maps: Any = gui.add_dropdown("Map shows", MAPS, initial_value=MAPS[0])
             self.legend = gui.add_html("")
-            empty = np.zeros(1)
-            gui.add_html(_CURVE)
-            self.curve = gui.add_uplot(
-                (empty, empty, empty),
-                (
-                    {"label": "movements"},
-                    {"label": "error", "stroke": "#3c46be", "width": 2},
-                    {"label": "lesson", "stroke": ORANGE, "width": 0, "points": {"size": 9, "fill": ORANGE}},
-                ),
-                scales={"x": {"time": False}},
-                legend={"show": False},
-                height=170,
-            )
+            self.waits: Any = gui.add_checkbox("It waits for me when it asks", asks, visible=asks)
             with gui.add_folder("Keys", expand_by_default=False):
                 gui.add_markdown("\n".join(f"- **{each.key}** {each.label}" for each in ACTIONS.values()))
         panel.dock_left()
@@ -142,14 +128,13 @@ class Panel:
                 self._act(name, event.client)
 
     def say_recording(self, recording: bool) -> None:
-        """The button that begins a recording ends it."""
+        """The button that begins a recording ends it; until then there is nothing to show."""
         button = self.buttons["record"]
         button.label, button.icon = ("Stop", ICON.PLAYER_STOP) if recording else ("Record", ICON.PLAYER_RECORD)
 
     def say_lesson(self, lesson: HandLesson | None, problem: str = "") -> None:
         """What was recorded, or why it is no lesson."""
-        for handle in (self.start, self.end, self.buttons["play"], self.buttons["discard"]):
-            handle.visible = lesson is not None or bool(problem)
+        self.buttons["discard"].visible = lesson is not None or bool(problem)
         self.buttons["show"].disabled = lesson is None
         if lesson is None:
             self.lesson.content = f"**This is no lesson:** {problem}" if problem else LOOK
@@ -166,19 +151,13 @@ class Panel:
         """What a lesson changed."""
         more = int(after.met.sum() - before.met.sum())
         self.effect.content = (
-            f"**Taught.** Predicted error {before.mean_error:.3f} → **{after.mean_error:.3f} m**, "
+            f"**Taught.** Predicted error {before.mean_error:.3f} → **{self._space.amount(after.mean_error, '.3f')}**, "
             f"{more:+d} goals within reach. The map shows where it changed."
         )
 
-    def set_trim(self, duration: float) -> None:
-        """Both sliders at the ends of a new recording."""
-        for slider, value in ((self.start, 0.0), (self.end, duration)):
-            slider.max = max(duration, 0.02)
-            slider.value = value
-
     def say_trial(self, trial: Trial) -> None:
         """How a trial went."""
-        missed = f"**missed by {trial.missed:.2f} m** (blue ring)"
+        missed = f"**missed by {self._space.amount(trial.missed, '.2f')}** (blue ring)"
         self.trial.content = f"{CLICK}\n\nGoal {self._place(trial.goal)}, the pink ring: {missed}."
 
     def say_state(self, state: State, cannot: str) -> None:
@@ -197,15 +176,6 @@ class Panel:
             met = f"{int(state.chart.met.sum())} of {len(state.chart.met)} goals within reach"
         doing = escape(state.problem or doing)
         self.status.content = _STATUS.format(doing, state.movements, state.total, lessons, error, met, escape(cannot))
-
-    def say_curve(self, state: State) -> None:
-        """The predicted error over movements, with the lessons on it."""
-        movements, errors = np.array(state.curve).T
-        rows = np.searchsorted(movements, np.array(state.lessons)).clip(max=len(movements) - 1)
-        taught = np.full(len(movements), np.nan)
-        taught[rows] = errors[rows]
-        self.curve.scales = {"x": {"time": False}, "y": {"range": (0.0, float(errors.max()) or 1.0)}}
-        self.curve.data = movements, errors, taught
 
     def say_map(self, which: str) -> None:
         """The colours of the map that is shown."""

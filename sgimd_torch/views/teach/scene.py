@@ -1,11 +1,12 @@
-"""The scene: the robot that a hand leads, the learner's movements as an outline, and the map of T on the ground.
+"""The scene: the robot that a hand leads, and the map of T on the ground.
 
-    scene = Scene(server, led, outcomes, goals); scene.draw_arm(hanging.data); scene.draw_map(by_error(chart, outcomes))
+    scene = Scene(server, led, links, outcomes, goals); scene.draw_arm(leading.data, leading.hand)
 Places in T are places in the model's plane z = 0: what lands there lands on the map.
 """
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any, Final
 
 import mujoco
@@ -14,12 +15,10 @@ import trimesh
 import viser
 from numpy.typing import NDArray
 
-from sgimd_torch.environments.protocol import HandLed, Recorded, Sketch
+from sgimd_torch.environments.protocol import HandLed
 from sgimd_torch.spaces import Array, Box
-from sgimd_torch.views.teach.arm import STILL
 from sgimd_torch.views.teach.chart import CELLS, SKILL, Colours
 
-THIN: Final = 0.003  # m: geoms with a smaller radius are drawn as lines
 HAND, LEARNER, GOAL, MET, UNMET = (240, 120, 30), (60, 70, 190), (230, 60, 120), (10, 110, 50), (120, 140, 160)
 RINGS: Final = {"goal": (GOAL, 0.035), "landed": (LEARNER, 0.02), "asked": (GOAL, 0.06), "lesson": (HAND, 0.03)}
 ABOVE: Final = 0.002  # m, from one layer of the map to the next
@@ -32,12 +31,15 @@ class Scene:
     Args:
         server: that shows it, to all viewers alike.
         led: the robot.
+        links: names of the bodies that a hand leads; what hangs on them, such as a line, is not drawn.
         outcomes: T.
         goals: ``(n, outcome_dim)`` of the benchmark.
     """
 
-    def __init__(self, server: viser.ViserServer, led: HandLed, outcomes: Box, goals: Array) -> None:
-        self._scene, self._led, self._outcomes = server.scene, led, outcomes
+    def __init__(
+        self, server: viser.ViserServer, led: HandLed, links: Collection[str], outcomes: Box, goals: Array
+    ) -> None:
+        self._scene, self._outcomes = server.scene, outcomes
         self._model = model = led.model
         self.size = float(outcomes.sides[:2].max())
         middle = self.ground((outcomes.low + outcomes.high) / 2)
@@ -47,24 +49,17 @@ class Scene:
         self.map = self._scene.add_image("/map", blank, width, height, format="png", wxyz=(0, 1, 0, 0), position=middle)
         self._goals = self._points("/goals", self.ground(goals, 3), UNMET, 0.006)
         self._landings = self._points("/landings", np.zeros((1, 3)), LEARNER, 0.01)
-        thick = [k for k in range(model.ngeom) if model.geom_bodyid[k] and model.geom_size[k, 0] > THIN]
-        thin = [k for k in range(model.ngeom) if model.geom_bodyid[k] and model.geom_size[k, 0] <= THIN]
+        led_bodies = {model.body(name).id for name in links}
+        shown = [k for k in range(model.ngeom) if model.geom_bodyid[k] in led_bodies]
         self._drawn = np.full((model.ngeom, 3), np.inf)
-        self._geoms = {k: self._add_geom(k) for k in thick}
-        self._thin = np.array(thin, dtype=np.int64)
-        self._line = self._lines("/line", len(thin), (30, 30, 30), 0.005)
+        self._geoms = {k: self._add_geom(k) for k in shown}
         self._hand = self._ball("/hand", HAND, 0.026 * self.size)
-        self._chain = np.array([(model.body_parentid[k], k) for k in range(1, model.nbody) if model.body_parentid[k]])
-        self._ghost_data = mujoco.MjData(model)
-        self._played: tuple[Recorded, float, float] | None = None  # by the ghost: since when, how fast
-        self._ghost = self._lines("/ghost", len(self._chain), LEARNER, 0.005 * self.size)
-        self._ghost_end = self._ball("/ghost_end", LEARNER, 0.014 * self.size)
         self._marks = {name: self._ring(name, colour, radius) for name, (colour, radius) in RINGS.items()}
         self._labels = {name: self._scene.add_label(f"/label/{name}", " ", anchor="bottom-left") for name in RINGS}
         for name in RINGS:
             self.mark(name, None)
         self.hint = self._scene.add_label("/hint", "drag me", anchor="bottom-center")
-        names = [model.body(model.geom_bodyid[k]).name for k in thick]
+        names = [model.body(model.geom_bodyid[k]).name for k in shown]
         self.grips = [(led.hand, self._hand), *zip(names, self._geoms.values(), strict=True)]
         """What can be dragged, the hand first: the name of a body, and its picture."""
         # Browsers without a GPU draw every pixel on the processor: an environment map, shadows, a sky or a sheet of
@@ -98,39 +93,9 @@ class Scene:
         self._drawn = data.geom_xpos.copy()
         for k, handle in self._geoms.items():
             handle.position, handle.wxyz = data.geom_xpos[k], _quaternion(data.geom_xmat[k])
-        if self._thin.size:
-            axes = data.geom_xmat[self._thin].reshape(-1, 3, 3)[:, :, 2] * self._model.geom_size[self._thin, 1:2]
-            middles = data.geom_xpos[self._thin]
-            self._line.points = np.stack([middles - axes, middles + axes], axis=1).astype(np.float32)
         self._hand.position = hand
         if self.hint.visible:
             self.hint.position = hand + np.array([0, 0, 0.04 * self.size])
-
-    def play(self, recorded: Recorded | None, now: float, speed: float) -> None:
-        """Let the learner's robot do a movement from ``now`` (s) on, ``speed`` times as fast as it was."""
-        self._played = None if recorded is None else (recorded, now, speed)
-
-    def draw_ghost(self, now: float) -> bool:
-        """The learner's robot as lines, and where its end or float is; whether it still moves."""
-        if self._played is None:
-            return False
-        recorded, begun, speed = self._played
-        played = (now - begun) * speed
-        seconds = min(played, recorded.landed)
-        if played > recorded.landed + STILL:
-            self._played = None
-        if isinstance(recorded, Sketch):
-            row = min(round(seconds / recorded.step), len(recorded.chains) - 1)
-            points = np.pad(recorded.chains[row], ((0, 0), (0, 1)), constant_values=0.02)
-            lines, end = np.stack([points[:-1], points[1:]], axis=1), points[-1]
-        else:
-            found: Any = recorded
-            row = min(int(seconds / found.step), len(found.states) - 1)
-            mujoco.mj_setState(self._model, self._ghost_data, found.states[row], mujoco.mjtState.mjSTATE_FULLPHYSICS)
-            mujoco.mj_kinematics(self._model, self._ghost_data)
-            lines, end = self._ghost_data.xpos[self._chain], found.float_at(seconds)
-        self._ghost.points, self._ghost_end.position = np.asarray(lines, dtype=np.float32), end
-        return True
 
     def draw_map(self, colours: Colours, met: NDArray[np.bool_]) -> None:
         """Another picture on the ground, and on it the goals of the benchmark; ``met`` ``(n,)`` are within reach."""
@@ -156,9 +121,6 @@ class Scene:
         return self._scene.add_point_cloud(
             name, points, colour, point_size=size * self.size, point_shape="circle", point_shading="flat"
         )
-
-    def _lines(self, name: str, n: int, colour: tuple[int, int, int], thickness: float) -> Any:
-        return self._scene.add_line_segments(name, np.zeros((max(n, 1), 2, 3)), colour, thickness=thickness)
 
     def _ball(self, name: str, colour: tuple[int, int, int], radius: float) -> Any:
         return self._scene.add_icosphere(name, radius=radius, color=colour, subdivisions=3)

@@ -242,9 +242,8 @@ class Session:
 
     def _draw(self) -> None:
         chart = self.run.chart()
-        curve = [point for point in self._state.curve if point[0] < chart.movements]
         self._drawn = time.monotonic()
-        self._tell(chart=chart, curve=(*curve, (chart.movements, chart.mean_error)))
+        self._tell(chart=chart)
 
     def _hurry(self, movements: int, *, answer: bool = False) -> None:
         """Until so many movements are made, or an ``answer`` to a lesson is complete."""
@@ -282,4 +281,3 @@ class Session:
         self._tell(busy="going back", waiting=False)
         self.run.take_back()
         self._latest.clear()
-        self._tell(curve=tuple(point for point in self._state.curve if point[0] <= self.run.life.recorded))

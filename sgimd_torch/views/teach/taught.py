@@ -17,7 +17,6 @@ from typing import Any, Final
 import numpy as np
 
 from sgimd_torch.demonstrations.lessons import HandLesson, LedMovement, lesson_by_hand
-from sgimd_torch.environments.protocol import Recorded
 from sgimd_torch.record import Record
 from sgimd_torch.runs.build import RunParts, build
 from sgimd_torch.runs.config import Config
@@ -25,7 +24,7 @@ from sgimd_torch.runs.directory import FILE, holds_run
 from sgimd_torch.runs.process import Stopping
 from sgimd_torch.runs.run import Life
 from sgimd_torch.runs.tasks import correspondence_of, hand_led_of
-from sgimd_torch.spaces import Array, Demonstration, Episode, stream
+from sgimd_torch.spaces import Array, Demonstration, stream
 from sgimd_torch.teachers.by_hand import BY_HAND, Ask, ByHand
 from sgimd_torch.views.teach.chart import Chart, chart_of
 
@@ -34,17 +33,15 @@ NO_MORE: Final = "it has made all its {0} movements; end this session, and go on
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """``goal`` and ``outcome`` ``(outcome_dim,)`` of the movement ``theta``, from which nothing was learnt;
-    ``recorded`` is the movement itself, None if the task has no picture."""
+    """``goal`` and ``outcome`` ``(outcome_dim,)`` of the movement ``theta``, from which nothing was learnt."""
 
     goal: Array
     theta: Array
     outcome: Array
-    recorded: Recorded | None
 
     @property
     def missed(self) -> float:
-        """The distance from the goal to the outcome, m."""
+        """The distance from the goal to the outcome."""
         return float(np.linalg.norm(self.outcome - self.goal))
 
 
@@ -171,17 +168,7 @@ class TaughtRun:
             raise ValueError("it remembers no movement yet; let it move, or show it something first")
         self._trials += 1
         theta, rng = parts.inverse(self.context, goal).theta, stream(self.config.seed, "trials", self._trials)
-        if parts.record is None:
-            return Trial(goal, theta, parts.environment.execute(self.context, theta.copy(), rng), None)
-        recorded = parts.record(self.context, theta, rng)
-        return Trial(goal, theta, np.asarray(recorded.outcome), recorded)
-
-    def recorded(self, episode: Episode) -> Recorded | None:
-        """A movement that was made, as it was; None if the task has no picture, or the learner rested."""
-        if episode.move is None or self.parts.record is None:
-            return None
-        rng = stream(self.config.seed, "environment", episode.index)
-        return self.parts.record(episode.context, episode.move.theta, rng)
+        return Trial(goal, theta, parts.environment.execute(self.context, theta.copy(), rng))
 
 
 def lessons_among(events: Iterable[Any]) -> list[tuple[int, int]]:

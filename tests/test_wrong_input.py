@@ -1,0 +1,158 @@
+"""Wrong commands and wrong calls: each is refused in one line that says what came, what was wanted, the likely slip."""
+
+import re
+
+import numpy as np
+import pytest
+
+import sgimd_torch as s
+from sgimd_torch.__main__ import _call
+from sgimd_torch.algorithms import sgim_d
+from sgimd_torch.environments.protocol import execute_many
+from sgimd_torch.evaluation import evaluate, load_benchmark
+from sgimd_torch.runs.process import command
+from sgimd_torch.runs.read import read_run
+from sgimd_torch.runs.tasks import Task
+from sgimd_torch.spaces import Box, Demonstration, stream
+from sgimd_torch.teachers import PeriodicTeacher
+
+ROBOT = """
+import numpy as np
+from sgimd_torch import Box
+from sgimd_torch.environments.protocol import check_movement
+
+class Toss:
+    contexts, policies = Box.cube(0, 1, 0), Box.cube(-1, 1, 3)
+    outcomes = Box.cube(-2, 2, 2, names=("x", "apex"), unit="m")
+    rest, outcome_noise = np.zeros(2), 0.0
+
+    def observe(self, rng):
+        return np.zeros(0)
+
+    def execute(self, context, theta, rng):
+        context, theta = check_movement(self, context, theta)
+        return theta[:2] + theta[2]
+"""
+CSV = "time,q0,q1,x,y\n0,0,0,1,0\n0.1,0.1,0.1,0.9,0.1\n"
+COLUMNS = "--joints q0,q1 --outcome x,y"
+COMMANDS = {
+    "runn": "unknown command 'runn'; did you mean run?",
+    "run --algorithm sgimd": r"unknown algorithm 'sgimd'; did you mean sgim-d\? Known are",
+    "run --algoritm sgim-d": "--algoritm: .* no such option; did you mean algorithm",
+    "run sgim-d": "'sgim-d' belongs to no option",
+    "run --resume yes": "'yes' belongs to no option; .* --resume, --accept-loss take none",
+    "run --movements 1e3": "--movements must be a whole number, got 1e3",
+    "run --movements": "--movements needs a value",
+    "run --seed -3": "seed must be at least 0, got -3",
+    "run --failures 0": "failures must be at least 1, got 0",
+    "run --evaluate-at 100;200": "--evaluate-at must be whole numbers such as 250,500",
+    "run --goals grid --goals.windw 3": "--goals.windw: goals grid has no such option; did you mean goals.window",
+    "run --goals.window 12": "--goals.window: goals uniform has no such option; goals interest-map, grid have it",
+    "run --noise 0.1": r"--noise: .* environment fishing-rod, .* \(environment.noise\)",
+    "run --inverse gaussian": "unknown inverse 'gaussian'; known are linear",
+    "run --teacher human": "unknown teacher 'human'; did you mean by-hand?",
+    "run --environment toss.Toss": "unknown environment 'toss.Toss'; .*; is it toss:Toss?",
+    "run --environment toss.py:Toss": "named without .py and with dots: toss:Toss",
+    "run --environment toss:Tos": "toss has no Tos; did you mean Toss?",
+    "run --environment toss:Toss --algorithm sgim-d": "Toss comes without demonstrations, .* --algorithm practice",
+    "run --environment toss:Toss --environment.noise 1": "--environment.noise: environment toss:Toss has no such",
+    "run --demonstrations nothing.npz": "demonstrations: there is no file nothing.npz",
+    "run --demonstrations shown.csv": "shown.csv is no demonstration file: .* sgimd demonstrations import",
+    "run --benchmark shown.csv": "shown.csv is no benchmark: it is not an npz file",
+    "run --out shown.csv --environment planar-arm-7": "shown.csv is no folder; choose another --out",
+    "sweep --vary goals --seeds 0-2": "--vary must be like goals=interest-map,uniform, got 'goals'",
+    "sweep --vary goals=interest-map,unifrm": "unknown goals 'unifrm'; did you mean uniform?",
+    "sweep --seed 4": "--seed cannot be given here: --seeds takes them",
+    "table nowhere": "nowhere does not exist; runs are in OUT/NAME/seed-000",
+    "report shown.csv": "shown.csv is a file, not a folder",
+    "film nowhere": "nowhere holds no run; runs are in OUT/NAME/seed-000",
+    "benchmark nowhere --out goals.txt": "--out must be a .npz file in a folder that exists, got goals.txt",
+    "check toss:make": "toss has no make",
+    "demonstrations check shown.csv --task planar-arm-7": "shown.csv is no .npz file, so name its columns",
+    f"demonstrations check shown.csv --task rod-wind {COLUMNS}": r"context \(wind \(N\)\); name .* --context",
+    f"demonstrations check nul.csv --task planar-arm-7 {COLUMNS}": "nul.csv has a NUL",
+    f"demonstrations import shown.csv {COLUMNS} --out shown.txt": "--out must end in .npz, got shown.txt",
+    "suite --environment toss": "--environment cannot be given here: each task has its own",
+    "watch nowhere": "nowhere holds no board; start a run with --board true",
+    "demo --algorithm random": "--algorithm cannot be given here",
+}
+
+
+@pytest.mark.parametrize("words", COMMANDS)
+def test_a_wrong_command_is_refused_in_a_line_and_leaves_nothing(tmp_path, monkeypatch, capsys, words):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    files = {"toss.py": ROBOT, "shown.csv": CSV, "nul.csv": CSV.replace("0.9", "0.9\0")}
+    for name, content in files.items():
+        (tmp_path / name).write_text(content)
+    assert command(_call, words.split()) == 2
+    said = capsys.readouterr().err.removesuffix("--help explains all options\n")
+    assert re.search(f"^error: .*{COMMANDS[words]}", said), said
+    assert said.count("\n") == 1
+    assert {path.name for path in tmp_path.iterdir()} - {"__pycache__"} == {*files}
+
+
+ARM = s.PlanarArm(5)
+SHOWN = Demonstration(np.zeros(0), np.arange(2.0), np.zeros((2, 5)), np.zeros(2))
+
+
+def learner(**parts):
+    return s.sagg_riac(ARM, 0, **parts)
+
+
+class Silent(s.PlanarArm):
+    """Its outcome has no return."""
+
+    execute_many = None
+
+    def execute(self, context, theta, rng):
+        super().execute(context, theta, rng)
+
+
+CALLS = {
+    "a word for a part": (lambda: learner(goals="uniform"), "from sgimd_torch.goals.uniform import UniformGoals"),
+    "a wrong word": (lambda: learner(search="nelder-meat"), "unknown search 'nelder-meat'; did you mean nelder-mead?"),
+    "a part made already": (
+        lambda: learner(goals=s.UniformGoals(ARM.contexts, ARM.outcomes, stream(0, "goals"))),
+        r"goals must be a constructor, \(contexts, outcomes, rng\) -> a goal model, got a UniformGoals",
+    ),
+    "no inverse": (lambda: learner(inverse=None), "inverse must be a constructor, .* got a NoneType"),
+    "a budget of nothing": (lambda: learner(budget=0), "budget must be a whole number >= 1, got 0"),
+    "a generator for a seed": (lambda: s.sagg_riac(ARM, stream(0, "a")), "seed must be a whole number >= 0"),
+    "a class for an environment": (lambda: s.sagg_riac(s.PlanarArm, 0), r"got the class PlanarArm .* PlanarArm\(\)"),
+    "a class in a task": (lambda: Task(s.PlanarArm), "got the class PlanarArm itself"),
+    "swapped": (lambda: s.sagg_riac(0, ARM), "an environment is wanted, got a int; is the order of arguments right?"),
+    "swapped in a run": (
+        lambda: next(s.run(ARM, learner(), 0, movements=3)),
+        "learner must be a Learner, got a PlanarArm",
+    ),
+    "a builder": (lambda: next(s.run(s.sagg_riac, ARM, 0, movements=3)), "learner must be a Learner, got a function"),
+    "a list for a teacher": (
+        lambda: next(s.run(learner(), ARM, 0, movements=3, teacher=[SHOWN])),
+        r"teacher must have offer\(\), got a list; PeriodicTeacher",
+    ),
+    "movements that are none": (lambda: next(s.run(learner(), ARM, 0, movements=1e3)), "movements must be a whole"),
+    "an empty memory": (lambda: learner().inverse(np.zeros(0), np.zeros(2)), "memory of at least one exemplar"),
+    "no movement asked for": (lambda: learner().tell([0, 0]), "but ask.* has not proposed one"),
+    "a pupil that cannot learn": (lambda: learner().watch(SHOWN), "has no social strategy"),
+    "no correspondence": (lambda: sgim_d(ARM, 0), "missing 1 required keyword-only argument: 'correspondence'"),
+    "one goal": (lambda: evaluate(learner().inverse, ARM, np.zeros(2), 0, 0), "goals must have shape"),
+    "corners swapped": (lambda: Box(np.ones(2), np.zeros(2)), "corners with low < high, .* were they swapped?"),
+    "a text for names": (lambda: Box(np.zeros(2), np.ones(2), names="xy"), "Box needs 2 names"),
+    "a seed for a teacher": (lambda: PeriodicTeacher([SHOWN], 0), "rng must be a numpy.random.Generator, got int"),
+    "a text for a benchmark": (lambda: load_benchmark(__file__), "is no benchmark: it is not an npz file"),
+    "a life that is none": (lambda: learner().load(__file__), "cannot be read as a record"),
+    "a run that is none": (lambda: read_run("nowhere"), "nowhere holds no run"),
+    "no return": (
+        lambda: execute_many(Silent(5), np.zeros((3, 0)), np.full((3, 5), 0.5), [stream(0, "a", k) for k in range(3)]),
+        r"execute\(\) of movement 0 must give numbers of shape \(2,\), got NoneType; is there a return\?",
+    ),
+}
+
+
+@pytest.mark.parametrize("what", CALLS)
+def test_a_wrong_call_is_refused_with_the_likely_slip(what):
+    call, message = CALLS[what]
+    with pytest.raises((ValueError, TypeError, RuntimeError), match=message) as raised:
+        call()
+    assert "\n" not in str(raised.value)
