@@ -49,7 +49,6 @@ LIBRARIES = {  # library: the only rooms that may import it; of a folder, where 
     "viser": {"views/teach"},
     "trimesh": {"views/teach"},
     "jinja2": {"views/report"},
-    "jsonargparse": {"runs/command_line"},
     "docstring_parser": {"catalogue/options"},
     "tqdm": {"runs/process", "views"},
     "threadpoolctl": {"inverses/gaussian_process"},

@@ -198,7 +198,7 @@ def words(config: Config) -> list[str]:
     own = [
         (name, getattr(config, name)) for name in RUN if getattr(config, name) != standard[name] or name == "algorithm"
     ]
-    return [f"--{dashed(name)}={_typed(plain(value))}" for name, value in (*own, *dict(config.parts).items())]
+    return [f"--{dashed(name)}={typed(value)}" for name, value in (*own, *dict(config.parts).items())]
 
 
 def dashed(name: str) -> str:
@@ -211,5 +211,8 @@ def plain(value: Any) -> Any:
     return json.loads(json.dumps(value, default=str))
 
 
-def _typed(value: Any) -> str:
-    return value if isinstance(value, str) else json.dumps(value, separators=(",", ":"))
+def typed(value: Any) -> str:
+    """A value as one types it."""
+    if isinstance(value, tuple):
+        return ",".join(map(typed, value)) or "[]"
+    return json.dumps(value) if value is None or isinstance(value, bool) else str(value)

@@ -102,8 +102,7 @@ def read_run(path: str | os.PathLike[str]) -> Run:
     """
     path = Path(path)
     if not (path / FILE).exists():
-        what = "a run of files that this version does not read" if (path / "config.json").exists() else "no run"
-        raise RunError(f"{path} holds {what}; runs are in OUT/NAME/seed-000 and have a file {FILE}")
+        raise RunError(f"{path} holds no run; runs are in OUT/NAME/seed-000 and have a file {FILE}")
     with Record(path / FILE) as record:
         about = record.about
         if "settings" not in about:

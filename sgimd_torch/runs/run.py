@@ -19,7 +19,7 @@ from sgimd_torch.runs.build import RunParts
 from sgimd_torch.runs.clock import Seconds
 from sgimd_torch.runs.config import OWN
 from sgimd_torch.runs.directory import open_run
-from sgimd_torch.runs.evaluations import read_evaluations, sort_evaluations, write_evaluation
+from sgimd_torch.runs.evaluations import read_evaluations, write_evaluation
 from sgimd_torch.runs.listeners import listeners_of
 from sgimd_torch.runs.process import Failed, Progress, Stopped, Stopping, say
 from sgimd_torch.session import NoOutcomeError, ReplayError, live, reason_of, run
@@ -222,7 +222,6 @@ class Life:
         """The replay is over: from now on files change."""
         for each in self.listeners:
             each.begin()
-        sort_evaluations(self.record)
         self.commit()
 
 

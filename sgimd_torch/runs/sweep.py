@@ -35,7 +35,7 @@ from sgimd_torch.runs.config import FILES, Config, dashed
 from sgimd_torch.runs.engines.local import local
 from sgimd_torch.runs.engines.loop import Submit, sweep
 from sgimd_torch.runs.process import loading, say
-from sgimd_torch.runs.read import finished, movements_on_disk, read_run
+from sgimd_torch.runs.read import finished, movements_on_disk
 
 Item = TypeVar("Item")
 NOT_VARIED: Final = {
@@ -83,12 +83,6 @@ def carry_out(whole: Sequence[Config], options: argparse.Namespace, flags: Seque
     configs = options.shard.of(whole)
     left = [config for config in configs if not finished(config)]
     say(f"{len(configs)} runs{options.shard.note(whole)}, {len(configs) - len(left)} of them finished: {out}")
-    own = [config for config in configs if config.own and config not in left]
-    if own:
-        from sgimd_torch.runs.directory import changed_sources, sources
-
-        notes = ((each, changed_sources(read_run(each.directory).versions, sources(each))) for each in own)
-        say(*(f"{config.title}: {note}" for config, found in notes for note in found))
     if options.dry_run:
         for config in left:
             print(f"{config.directory}: {movements_on_disk(config.directory)} of {config.movements} movements")

@@ -275,7 +275,7 @@ def test_dashes_and_underscores_mean_the_same():
         ("--search.sd -1", "sd must be positive"),  # from here on by the part itself, before anything is written
         ("--algorithm sgim-d --goals.window 7", "window must be even"),
         ("--environment.task_space 0", "task_space must be above 0"),
-        ("--environment.noise .nan", "noise must be finite"),
+        ("--environment.noise nan", "noise must be finite"),
         ("--give-up 1", "give_up must be"),
         ("--social.epsilon -1", "epsilon must be"),
         ("--algorithm sgim-d --teacher.every 0", "every must be"),
@@ -298,7 +298,7 @@ def test_help_is_one_screen_and_a_parts_options_are_shown_once_it_is_chosen(caps
         assert stop.value.code == 0
     assert len(overview(command_line.__doc__).splitlines()) <= 60
     said = capsys.readouterr().out
-    assert said.count("--goals.window X") == 1
+    assert said.count("--goals.window ") == 2  # of which one is an example
     assert "how many recent goals the interest looks at" in " ".join(said.split())
 
 

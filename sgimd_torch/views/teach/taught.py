@@ -136,7 +136,7 @@ class TaughtRun:
         shutil.copy(self.path, partial)
         os.replace(partial, copy)
         with Record(self.path, write=True) as record:
-            record.rewrite(n_events=lessons_among(record.events())[-1][1])
+            record.rewrite(n_events=lessons_among(record.events())[-1][1]).close()
         self.open()
 
     def chart(self) -> Chart:
