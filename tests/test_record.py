@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from records import DIMS, fill, moved, read, shown
 from runs import edit, end, start, stopped
 from sgimd_torch.record import DERIVED, Event, InUseError, Kind, Record, RunError, layout
-from sgimd_torch.spaces import Demonstration, stream
+from sgimd_torch.spaces import Demonstration
 
 numbers = st.floats(allow_nan=False)
 
@@ -65,19 +65,6 @@ def test_nan_is_null_and_minus_zero_is_zero(tmp_path):
         *_, event = record.events()
         assert event.goal is None
         assert event.theta.tolist() == [0.0, 0.5, 1.0]
-
-
-def test_vectors_that_are_too_long_for_columns_are_one_cell(tmp_path):
-    long = [stream(0, "long").random(500) for _ in range(4)]
-    with Record.make(tmp_path / "run.sqlite", (500, 500, 500), {}) as record:
-        record.add(moved(long[0], long[1], long[2], long[3]))
-        record.add(Event(Kind.RESTED, long[2]))
-        record.commit()
-    with Record(tmp_path / "run.sqlite") as record:
-        assert "theta_values BLOB" in layout(record.dims)["events"]
-        first, second = record.events()
-    assert same(first, moved(long[0], long[1], long[2], long[3]))
-    assert same(second, Event(Kind.RESTED, long[2]))
 
 
 def test_events_of_every_kind_come_back(tmp_path):

@@ -8,19 +8,18 @@ from __future__ import annotations
 import math
 import time
 import traceback
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from typing import Any, Final, Self
 
 from sgimd_torch.environments.protocol import FAILURES, SimulationError
 from sgimd_torch.evaluation import Evaluation, evaluate
-from sgimd_torch.record import RunError
+from sgimd_torch.record import Record, RunError
 from sgimd_torch.runs.build import RunParts
-from sgimd_torch.runs.clock import Seconds
 from sgimd_torch.runs.config import OWN
 from sgimd_torch.runs.directory import open_run
 from sgimd_torch.runs.evaluations import read_evaluations, write_evaluation
-from sgimd_torch.runs.listeners import listeners_of
+from sgimd_torch.runs.listeners import Listener, Seconds
 from sgimd_torch.runs.process import Failed, Progress, Stopped, Stopping, say
 from sgimd_torch.session import NoOutcomeError, ReplayError, live, reason_of, run
 from sgimd_torch.spaces import Episode
@@ -223,6 +222,23 @@ class Life:
         for each in self.listeners:
             each.begin()
         self.commit()
+
+
+def listeners_of(parts: RunParts, record: Record, seconds: Seconds) -> list[Listener]:
+    """Who listens to a run, in the order in which they are told."""
+    found: list[Listener] = []
+    curves: Callable[[], Mapping[str, float]] = dict
+    if parts.model is not None and parts.trust is not None:
+        from sgimd_torch.runs.model_listener import ModelListener
+
+        model = ModelListener(record, parts.model, parts.trust.error, parts.learner.memory, seconds)
+        found.append(model)
+        curves = model.new_curves
+    if parts.config.board:
+        from sgimd_torch.board.listener import BoardListener
+
+        found.append(BoardListener(parts.config.directory, parts, seconds.summary, curves))
+    return found
 
 
 def evaluate_answers(parts: RunParts, movements: int) -> dict[str, Evaluation]:

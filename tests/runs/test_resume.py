@@ -271,19 +271,6 @@ def test_another_configuration_a_shorter_one_and_what_is_no_run_are_refused(tmp_
     assert files_of(copy) == before
 
 
-@pytest.mark.parametrize(
-    ("name", "message"),
-    [("thesis.tex", "holds thesis.tex but no run"), ("config.json", "that this version does not read")],
-)
-def test_a_directory_with_other_files_is_left_alone(tmp_path, go, capsys, name, message):
-    directory = tmp_path / "sgim-d" / "seed-003"
-    directory.mkdir(parents=True)
-    (directory / name).touch()
-    assert go(tmp_path) == go(tmp_path, "--resume") == 2
-    assert capsys.readouterr().err.count(message) == 2
-    assert files_of(directory) == {name: b""}
-
-
 @pytest.mark.parametrize("watched", ["false", "true"])
 def test_a_full_disk_is_reported_and_the_run_can_go_on(tmp_path, go, benchmark, reference, watched):
     words = (*arguments(tmp_path, benchmark), "--board", watched)

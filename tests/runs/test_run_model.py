@@ -18,10 +18,10 @@ from sgimd_torch.forward_model.model import ForwardModel
 from sgimd_torch.memory import Memory
 from sgimd_torch.record import Record
 from sgimd_torch.runs.build import LEAST_NOISE, build
-from sgimd_torch.runs.clock import Seconds
 from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.directory import FILE
+from sgimd_torch.runs.listeners import Seconds
 from sgimd_torch.runs.model_listener import ModelListener
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run

@@ -302,14 +302,14 @@ def begun(odd, tmp_path, monkeypatch):
 
 
 def test_a_run_that_is_killed_is_named_and_goes_on_next_time(odd, begun, tmp_path):
-    foreign = tmp_path / "random/seed-001/thesis.txt"
+    foreign = tmp_path / "random/seed-001/run.sqlite"
     foreign.parent.mkdir(parents=True)
     foreign.write_text("not a run")
     options = ["--seeds", "0-1", "--processes", 1]
     said = said_by(begun(SWEEP, *options, at_20="dies"), 1)
     assert "0 runs ended well, 2 failed" in said
     assert "random seed 0 failed: stopped by SIGKILL; the same command goes on with it" in said
-    assert re.search(r"random seed 1 failed: \S*seed-001 holds thesis.txt", said)
+    assert re.search(r"random seed 1 failed: \S*seed-001/run.sqlite cannot be read as a record", said)
     assert f"Its whole log: {tmp_path / 'random/seed-001.log'}" in said
     assert foreign.read_text() == "not a run"
     shutil.rmtree(foreign.parent)
