@@ -30,7 +30,6 @@ MAY_CHANGE: Final = (
 )
 """When a run is resumed, as they only say how long it lasts, where it is or how it is shown. Files count by their
 content, of which a checksum is recorded; a benchmark may be another one."""
-LEADS: Final = ("algorithm", "movements", "goals", "search", "inverse")  # what a comparison shows first
 
 
 @dataclass(frozen=True)
