@@ -71,7 +71,7 @@ def test_whether_a_run_is_finished_is_counted_not_believed(run):
 
 def test_a_run_that_has_just_begun_is_read_as_empty(run):
     with Record(run / FILE, write=True) as record:
-        record.rewrite(n_events=0, keep=("goals",))
+        record.rewrite(n_events=0).close()
     found = read_run(run)
     assert found.thetas.shape == (0, 7)
     assert found.evaluation["mean_error"].shape == (0,)

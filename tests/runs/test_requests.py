@@ -84,12 +84,6 @@ def test_a_run_that_lost_its_robot_just_after_it_was_shown_something_has_that_an
     assert content_of(go(tmp_path, "--resume")) == content_of(whole)
 
 
-def test_a_run_that_does_not_ask_has_no_table(tmp_path):
-    words = "--environment=planar-arm-7 --algorithm=practice --name=run"
-    assert command(main, [*words.split(), *SHORT, f"--out={tmp_path}"]) == 0
-    assert read_run(tmp_path / "run" / "seed-000").requests is None
-
-
 @pytest.mark.parametrize("environment", ["fishing-rod", "rod-wind"])
 def test_demonstrators_have_their_own_recordings_whatever_is_there(environment):
     parts = build(Config("sgim-acts", parts={"environment": environment, "teachers": FOUR}))
