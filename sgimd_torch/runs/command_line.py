@@ -44,9 +44,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     with loading():
         from sgimd_torch.runs.build import build  # after --help
         from sgimd_torch.runs.run import carry_out
+    parts = build(config)
     with Stopping() as stopping:
-        with stopping.at_once():
-            parts = build(config)
         print(carry_out(parts, stopping, **flags, again=shlex.join(again)))
     return 0
 

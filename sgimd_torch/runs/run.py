@@ -46,9 +46,9 @@ def carry_out(parts: RunParts, stopping: Stopping, *, resume: bool, accept_loss:
         Failed: it failed under way.
         Stopped: by a signal.
     """
-    with Life(parts, stopping, resume=resume, accept_loss=accept_loss) as life:
+    with Life(parts, resume=resume, accept_loss=accept_loss) as life:
         try:
-            life.go_on()
+            life.go_on(stopping)
         except Stopped:
             say(f"stopped after {life.movements} movements; to go on: {again}")
             raise
@@ -67,10 +67,10 @@ def carry_out(parts: RunParts, stopping: Stopping, *, resume: bool, accept_loss:
 
 class Life:
     """A run under way. After each movement it is recorded, then listeners are told, then it is evaluated. A context
-    manager; leaving it brings to the disk what was lived.
+    manager; leaving it brings to the disk what was lived, but where it was broken off, as by Ctrl-C.
 
     Args:
-        parts, stopping, resume, accept_loss: see ``carry_out``.
+        parts, resume, accept_loss: see ``carry_out``.
 
     Attributes:
         record: of the run; it is written from the end of the replay on.
@@ -80,8 +80,8 @@ class Life:
         RunError, OSError: see ``open_run``.
     """
 
-    def __init__(self, parts: RunParts, stopping: Stopping, *, resume: bool, accept_loss: bool = False) -> None:
-        self.parts, self.stopping = parts, stopping
+    def __init__(self, parts: RunParts, *, resume: bool, accept_loss: bool = False) -> None:
+        self.parts = parts
         self.record, notes = open_run(parts, resume=resume, accept_loss=accept_loss)
         say(*parts.notes, *notes)
         self.movements, self.recorded, self.failed = 0, self.record.movements, 0
@@ -95,18 +95,19 @@ class Life:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        self.close(failed=kind is not None)
+        broken_off = kind is not None and issubclass(kind, KeyboardInterrupt)
+        with suppress(*([] if kind is None else [OSError])):  # of a full disk the first error is told
+            self.close(keep=not broken_off)
 
-    def close(self, *, failed: bool = False) -> None:
-        """Bring to the disk what was lived, and let others have the record."""
+    def close(self, *, keep: bool = True) -> None:
+        """Let others have the record, and ``keep`` what came since the last commit."""
         try:
-            if not self.replaying and not self.record.failed:
+            if keep and not self.replaying and not self.record.failed:
                 self._settle()
         finally:
             self.record.close()
             for each in self.listeners:
-                with suppress(*([OSError] if failed else [])):  # of a full disk the first error is told
-                    each.close()
+                each.close()
 
     @property
     def replaying(self) -> bool:
@@ -128,8 +129,8 @@ class Life:
         failed = f" ({self.failed} failed)" if self.failed else ""
         return f"{self.parts.config.directory}: {self.movements} movements{failed}, {found}"
 
-    def go_on(self) -> None:
-        """From the first movement to the last."""
+    def go_on(self, stopping: Stopping) -> None:
+        """From the first movement to the last, or to the one after which ``stopping`` has heard a signal."""
         total, title = self.parts.config.movements, self.parts.config.title
         unit = self.parts.environment.outcomes.amount
         with Progress("replaying" if self.recorded else title, self.recorded or total) as progress:
@@ -138,13 +139,15 @@ class Life:
                 progress.show(self.movements, "" if last is None else f"error {unit(last.mean_error, '.4f')}")
                 if self.movements == self.recorded < total:
                     progress.begin(title, total, self.movements)
-                self.stopping.check()
+                if stopping.heard:
+                    if not self.replaying:
+                        self.commit()
+                    raise Stopped(stopping.heard)
         self.commit()
 
     def episodes(self) -> Iterator[Episode]:
         """The same, one movement after the other: first those that were recorded, then new ones."""
         parts, seed = self.parts, self.parts.config.seed
-        alive = self.stopping.at_once(2)(live(parts.environment, seed))
         episodes = run(
             parts.learner,
             parts.environment,
@@ -152,7 +155,7 @@ class Life:
             movements=parts.config.movements,
             teacher=parts.teacher,
             teachers={name: self._awaited(name, each) for name, each in parts.teachers.items()},
-            execute=self.seconds.of("physics")(alive),
+            execute=self.seconds.of("physics")(live(parts.environment, seed)),
             record=self.record,
             failures=parts.config.failures or FAILURES,
         )
@@ -177,7 +180,7 @@ class Life:
         """A person who teaches by hand is waited for by the page that they see."""
         if isinstance(teacher, ByHand):
             return teacher
-        return Awaited(name, teacher, patience=self.parts.config.patience, say=say, waiting=self.stopping.at_once)
+        return Awaited(name, teacher, patience=self.parts.config.patience, say=say)
 
     @property
     def _last(self) -> Evaluation | None:
@@ -208,7 +211,7 @@ class Life:
         if found is None:
             if len(self.parts.learner.memory) == 0:
                 return
-            with self.seconds.of("evaluation"), self.stopping.at_once():
+            with self.seconds.of("evaluation"):
                 found = self.evaluations[self.movements] = evaluate_answers(self.parts, self.movements)
             near = self.parts.benchmark.side / 2
             write_evaluation(self.record, self.movements, found, near, self.parts.regions)

@@ -70,14 +70,15 @@ def test_a_run_that_lost_its_robot_just_after_it_was_shown_something_has_that_an
     def execute(self, context, theta, rng, really=PlanarArm.execute):
         executed.append(theta)
         if len(executed) == lost + 1:
+            life.commit()
             raise KeyboardInterrupt
         return really(self, context, theta, rng)
 
     with monkeypatch.context() as patched:
         parts = build(parse([*ACTS, *SHORT, f"--out={tmp_path}", "--name=run"])[0])
         patched.setattr(PlanarArm, "execute", execute)
-        with Stopping() as stopping, pytest.raises(KeyboardInterrupt), Life(parts, stopping, resume=False) as life:
-            life.go_on()
+        with Stopping() as stopping, pytest.raises(KeyboardInterrupt), Life(parts, resume=False) as life:
+            life.go_on(stopping)
     cut = content_of(tmp_path / "run" / "seed-003")["events"]
     assert [row[1] for row in cut[-2:]] == ["asked", "shown"]
     assert movements_on_disk(tmp_path / "run" / "seed-003") == lost

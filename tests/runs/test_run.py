@@ -240,33 +240,14 @@ def test_an_error_of_a_part_keeps_its_traceback_and_says_how_to_go_on(tmp_path, 
     assert "Traceback (most recent call last):" in errors
 
 
-@pytest.mark.parametrize("after_another", [False, True])
-def test_a_signal_waits_for_the_next_check_but_where_it_may_come_at_once(after_another):
+def test_a_signal_is_heard_and_a_second_one_stops_at_once(capfd):
     with Stopping() as stopping:
-        if after_another:
-            with stopping.at_once():
-                pass
-        try:
-            signal.raise_signal(signal.SIGTERM)
-        except Stopped:
-            pytest.fail("a signal interrupts what it should not")
-        with pytest.raises(Stopped), stopping.at_once():
-            pass
-    with Stopping() as stopping, pytest.raises(Stopped), stopping.at_once():
+        assert not stopping.heard
         signal.raise_signal(signal.SIGTERM)
-
-
-def test_a_second_signal_ends_a_movement_that_does_not_end(capsys):
-    with Stopping() as stopping, stopping.at_once(2):
-        signal.raise_signal(signal.SIGINT)
-        assert "once more stops at once" in capsys.readouterr().err
+        assert stopping.heard == signal.SIGTERM
+        assert "once more stops at once" in capfd.readouterr().err
         with pytest.raises(Stopped):
             signal.raise_signal(signal.SIGINT)
-    with Stopping() as stopping:
-        with stopping.at_once(2):
-            signal.raise_signal(signal.SIGTERM)
-        with pytest.raises(Stopped):
-            stopping.check()
 
 
 SCRIPTS = {**os.environ, "PYTHONPATH": str(ROOT)}
