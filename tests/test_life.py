@@ -11,7 +11,6 @@ from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import evaluate
 from sgimd_torch.forward_model.model import ForwardModel
 from sgimd_torch.goals.alp_gmm import AlpGmm
-from sgimd_torch.inverses.local import NearestNeighbour
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Learner, ReplayError
 from sgimd_torch.memory import Memory
@@ -108,13 +107,6 @@ def test_which_movement_reaches_a_goal_is_one_call_for_all_of_them(name):
     assert np.array_equal(
         found.thetas[0], LocalProcess(learner.memory, outcome_noise=arm.outcome_noise)(context, goal).theta
     )
-
-
-def test_the_builders_inverse_is_the_one_that_it_is_given():
-    for make in (partial(observation, correspondence=last_posture), random_exploration, sagg_riac):
-        assert isinstance(make(ARM, 0, inverse=NearestNeighbour).inverse, NearestNeighbour)
-    learner = sagg_riac(ARM, 0, inverse=NearestNeighbour)
-    assert learner.inverse is learner.autonomous.inverse
 
 
 def test_a_learner_that_was_interrupted_asked_in_vain_and_rested_is_the_same_again(tmp_path):

@@ -57,13 +57,13 @@ def lived(run, movements, out, *, until=None):
         parts = build(config)
         with Life(parts, resume=last != until and until is not None) as life:
             if not life.recorded and 0 in hand:
-                parts.hand.give(shown[hand[0]])
+                parts.teacher.give(shown[hand[0]])
             for episode in life.episodes():
                 made = episode.index + 1
                 if made == last:
                     break
                 if made in hand and not life.replaying:
-                    parts.hand.give(shown[hand[made]])
+                    parts.teacher.give(shown[hand[made]])
     return read_run(config.directory)
 
 

@@ -9,13 +9,11 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
-from sgimd_torch.algorithms import attempted, emulating, imitating, imitation, remembered, sagg_riac, sgim_d
+from sgimd_torch.algorithms import imitating, imitation, sagg_riac, sgim_d
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import evaluate
-from sgimd_torch.goals.uniform import UniformGoals
-from sgimd_torch.inverses.local import LocalInverse, NearestNeighbour
+from sgimd_torch.inverses.local import LocalInverse
 from sgimd_torch.record import Record
-from sgimd_torch.searches.perturb import perturb
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Array, Episode, stream
 from sgimd_torch.teachers import InitialTeacher, PeriodicTeacher
@@ -67,13 +65,6 @@ def test_a_run_has_exactly_as_many_movements_as_asked_for(name: str) -> None:
     executed = np.array([episode.outcome for episode in episodes if episode.move is not None]).reshape(-1, 2)
     if name != "observation":
         assert np.array_equal(learner.memory.outcomes, executed)
-
-
-@every_algorithm
-def test_all_movements_stay_inside_the_policy_space(name: str) -> None:
-    arm = PlanarArm(5, noise=0.05)
-    thetas = [e.move.theta for e in life(name, arm) if e.move is not None]
-    assert all(arm.policies.contains(theta) for theta in thetas)
 
 
 @every_algorithm
@@ -211,26 +202,6 @@ def test_a_context_holds_from_the_first_movement_of_an_attempt_to_its_last(name:
     if name != "observation":
         assert np.array_equal(learner.memory.contexts, contexts)
         assert len(np.unique(contexts)) > 1 or name == "imitation"
-
-
-@pytest.mark.parametrize(
-    "part",
-    [
-        {"goals": UniformGoals},
-        {"inverse": NearestNeighbour},
-        {"inverse": LocalInverse},
-        {"search": partial(perturb, sd=0.1)},
-        {"judge": attempted},
-        {"judge": remembered},
-        {"budget": 3, "tolerance": 0.1, "global_range": (0.0, 0.2), "give_up": -1.0},
-        {"social": emulating},
-    ],
-)
-def test_every_part_of_sgim_d_can_be_swapped_by_one_word(part: dict[str, object]) -> None:
-    arm = PlanarArm(5)
-    learner = sgim_d(arm, 0, correspondence=last_posture, **part)
-    list(run(learner, arm, 0, movements=90, teacher=teacher_of(arm)))
-    assert len(learner.memory) == 90
 
 
 def test_sgim_d_without_a_teacher_is_sagg_riac() -> None:
@@ -381,8 +352,3 @@ def test_no_learner_is_built_on_an_environment_whose_rest_is_no_outcome_in_its_t
     arm.rest = rest
     with pytest.raises(ValueError, match="rest of the environment must"):
         make(name, arm)
-
-
-def test_a_tolerance_that_is_no_number_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"tolerance must .* got nan"):
-        sagg_riac(PlanarArm(5), 0, tolerance=np.nan)

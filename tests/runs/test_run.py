@@ -52,16 +52,6 @@ def test_the_same_seed_makes_the_same_record(tmp_path, go, reference):
     assert content_of(tmp_path / "sgim-d" / "seed-003") == reference
 
 
-@pytest.mark.parametrize("evaluations", ["[]", "[1,2,7,30,31,89]"])
-def test_evaluating_more_or_not_at_all_leaves_the_movements_as_they_are(tmp_path, go, reference, evaluations):
-    assert go(tmp_path, "--evaluate_at", evaluations) == 0
-    recorded = content_of(tmp_path / "sgim-d" / "seed-003")
-    assert recorded["events"] == reference["events"]
-    assert len(recorded["evaluations"]) == (0 if evaluations == "[]" else 2 * 7)
-    assert len(recorded["errors"]) == 3 * len(recorded["evaluations"])
-    assert read_run(tmp_path / "sgim-d" / "seed-003").summary["finished"] is True
-
-
 def test_floor_at_names_the_evaluations_that_measure_the_noise_and_changes_nothing_else(tmp_path, go, reference):
     for floor_at, measured in (("60", [60]), ("30,90,1000", [30, 90]), ("[]", []), ("null", [30, 60, 90])):
         assert go(tmp_path / floor_at, "--floor_at", floor_at) == 0
