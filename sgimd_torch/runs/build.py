@@ -20,12 +20,12 @@ from sgimd_torch.runs.chosen import ALGORITHM, Part, chosen, part_of
 from sgimd_torch.runs.config import OWN, Config
 from sgimd_torch.runs.tasks import Task, benchmark_of, correspondence_of, demonstrations_of
 from sgimd_torch.spaces import Array, Demonstration, Estimate, stream
-from sgimd_torch.teachers import Teacher
-from sgimd_torch.teachers.answering import Demonstrator
 
 if TYPE_CHECKING:
     from sgimd_torch.forward_model.anchored import Trust
     from sgimd_torch.forward_model.model import ForwardModel
+    from sgimd_torch.teachers import Teacher
+    from sgimd_torch.teachers.answering import Demonstrator
 
 LEAST_NOISE: Final = 0.01  # m; predictions are not better than this, even if outcomes have no noise
 
@@ -36,8 +36,8 @@ class RunParts:
     first; they read the learner's memory. ``model`` is refreshed after each movement; it and its ``trust`` are None for
     a run without a model. ``teacher`` demonstrates, ``teachers`` are asked for it; without any of them there are no
     ``demonstrations``: those of the file, and what teachers have besides. ``data`` holds checksums of the files that
-    were read, ``notes`` messages for the user. ``record`` gives a movement to be filmed, None if the task has no picture
-    of its own."""
+    were read, ``notes`` messages for the user. ``record`` gives a movement to be filmed, None if the task has no
+    picture of its own."""
 
     config: Config
     environment: Environment

@@ -10,7 +10,7 @@ import time
 import traceback
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
-from typing import Any, Final, Self
+from typing import TYPE_CHECKING, Any, Final, Self
 
 from sgimd_torch.environments.protocol import FAILURES, SimulationError
 from sgimd_torch.evaluation import Evaluation, evaluate
@@ -23,9 +23,9 @@ from sgimd_torch.runs.listeners import Listener, Seconds
 from sgimd_torch.runs.process import Failed, Progress, Stopped, Stopping, say
 from sgimd_torch.session import NoOutcomeError, ReplayError, live, reason_of, run
 from sgimd_torch.spaces import Episode
-from sgimd_torch.teachers.answering import Demonstrator
-from sgimd_torch.teachers.awaited import Awaited
-from sgimd_torch.teachers.by_hand import ByHand
+
+if TYPE_CHECKING:
+    from sgimd_torch.teachers.answering import Demonstrator
 
 TOLD: Final = 3  # failed movements that are told one by one
 COMMIT_EVERY: Final = 1.0  # s; a killed run loses what came since
@@ -178,6 +178,9 @@ class Life:
 
     def _awaited(self, name: str, teacher: Demonstrator) -> Demonstrator:
         """A person who teaches by hand is waited for by the page that they see."""
+        from sgimd_torch.teachers.awaited import Awaited  # most learners ask nobody
+        from sgimd_torch.teachers.by_hand import ByHand
+
         if isinstance(teacher, ByHand):
             return teacher
         return Awaited(name, teacher, patience=self.parts.config.patience, say=say)
