@@ -58,14 +58,21 @@ def open_run(parts: RunParts, *, resume: bool, accept_loss: bool = False) -> tup
     if holds_run(path):
         if not resume:
             raise RunError(f"{path.parent} holds a run already; go on with it by --resume, or choose another --out")
-        record = _whole(path, accept_loss, notes)
+        record = _readable(path, accept_loss, notes)
     elif resume:
         notes.append(f"{path.parent} holds no run yet: it starts from the beginning")
     if record is None:
         record = Record.make(path, dims, about)
     else:
         try:
-            _take_up(record, about, dims, config, notes)
+            differ = _refuse_other(record, about, dims, config)
+            record = _whole(record, accept_loss, notes)
+            made = list(dict.fromkeys(movements for movements, *_ in record.rows("evaluations")))
+            if made != config.evaluations[: len(made)] or differ & {*EVALUATES}:  # all of them are made again
+                for table in EVALUATED:
+                    record.replace_rows(table, ())
+            about["versions"] = _with_earlier(record.about["versions"], about["versions"], notes)
+            record.settle(**about)
         except BaseException:
             record.close()
             raise
@@ -73,8 +80,25 @@ def open_run(parts: RunParts, *, resume: bool, accept_loss: bool = False) -> tup
     return record, notes
 
 
-def _take_up(record: Record, about: dict[str, Any], dims: Dims, config: Config, notes: list[str]) -> None:
-    """Make what is recorded the beginning of this run; evaluations that it would not have begun with are made again."""
+def holds_run(path: Path) -> bool:
+    """Whether there is a record; a process that was killed while it made one leaves an empty file."""
+    return path.is_file() and path.stat().st_size > 0
+
+
+def _readable(path: Path, accept_loss: bool, notes: list[str]) -> Record | None:
+    """The record at ``path``, open for writing; None if nothing of it can be read."""
+    try:
+        return Record(path, write=True)
+    except InUseError:
+        raise
+    except RunError as error:
+        _accept(path, f"{error}; nothing of it can be read", "make them", accept_loss, notes)
+        path.unlink()
+        return None
+
+
+def _refuse_other(record: Record, about: dict[str, Any], dims: Dims, config: Config) -> set[str]:
+    """Refuse what is not the beginning of this run; the names of the settings that differ, but may."""
     if "settings" not in record.about:
         raise RunError(f"{record.path} is a life that Learner.save wrote, not a run; choose another --out")
     before, now = ({**each["settings"], **each["files"]} for each in (record.about, about))
@@ -90,30 +114,12 @@ def _take_up(record: Record, about: dict[str, Any], dims: Dims, config: Config, 
         raise RunError(f"{record.path} was recorded with {was}; has the robot become another one?")
     if record.movements > config.movements:
         raise RunError(f"{record.path} has {record.movements} movements already, {config.movements} were asked for")
-    about["versions"] = _with_earlier(record.about["versions"], about["versions"], notes)
-    made = list(dict.fromkeys(movements for movements, *_ in record.rows("evaluations")))
-    if made != config.evaluations[: len(made)] or {*differ} & {*EVALUATES}:
-        for table in EVALUATED:
-            record.replace_rows(table, ())
-    record.settle(**about)
+    return {*differ}
 
 
-def holds_run(path: Path) -> bool:
-    """Whether there is a record; a process that was killed while it made one leaves an empty file."""
-    return path.is_file() and path.stat().st_size > 0
-
-
-def _whole(path: Path, accept_loss: bool, notes: list[str]) -> Record | None:
-    """The record at ``path``, without what is damaged; None if nothing is left of it."""
-    try:
-        record = Record(path, write=True)
-    except InUseError:
-        raise
-    except RunError as error:
-        _accept(path, f"{error}; nothing of it can be read", "make them", accept_loss, notes)
-        path.unlink()
-        return None
-    wrong = record.check()
+def _whole(record: Record, accept_loss: bool, notes: list[str]) -> Record:
+    """The record without what is damaged."""
+    wrong, path = record.check(), record.path
     if not wrong:
         return record
     notes += [f"{message}; it is made again" for table, message in wrong.items() if table in DERIVED]

@@ -11,13 +11,13 @@ from array import array
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sgimd_torch.files import checksum
-from sgimd_torch.record import DERIVED, Kind, Record, RunError
+from sgimd_torch.record import DERIVED, Kind, Record, RunError, layout
 from sgimd_torch.runs.config import FILES, OWN, PLACE, Config
 from sgimd_torch.runs.directory import FILE
 from sgimd_torch.spaces import Array, Box, Demonstration
@@ -191,16 +191,11 @@ def _requests(requests: list[dict[str, Any]], shown: list[Demonstration], outcom
 
 
 def _columns(record: Record, table: str) -> Columns:
-    names, rows = record.columns(table), list(record.rows(table))
-    columns = zip(*rows, strict=True) if rows else ([] for _ in names)
-    return {name: _column(name, column) for name, column in zip(names, columns, strict=True)}
+    rows, declared = list(record.rows(table)), (column.split() for column in layout(record.dims)[table][:-1])
+    return {name: np.array([row[k] for row in rows], dtype=_KINDS[kind]) for k, (name, kind) in enumerate(declared)}
 
 
-def _column(name: str, values: Any) -> np.ndarray:
-    if name in ("answer", "path"):
-        return np.array(values, dtype=np.str_)
-    whole = name in ("movements", "goal", "goals", "attempts", "exemplar", "exemplars", "steps", "diverged", "failed")
-    return np.array(values, dtype=np.int64 if whole else np.float64)
+_KINDS: Final = {"TEXT": np.str_, "INTEGER": np.int64, "REAL": np.float64}  # NULL is NaN
 
 
 def config_of(run: Run, *, trust: bool = False) -> Config:

@@ -9,13 +9,11 @@ import pytest
 from runs import (
     MOVEMENTS,
     STOPS,
-    about_of,
     arguments,
     content_of,
     edit,
     end,
     files_of,
-    settle,
     start,
     stopped,
     stopped_at,
@@ -284,16 +282,3 @@ def test_a_full_disk_is_reported_and_the_run_can_go_on(tmp_path, go, benchmark, 
     assert movements_on_disk(directory) < MOVEMENTS
     assert go(tmp_path, "--board", watched, "--resume") == 0
     assert content_of(directory) == reference
-
-
-def test_the_versions_of_each_part_of_a_run_are_kept(tmp_path, go, capsys):
-    directory = tmp_path / "sgim-d" / "seed-003"
-    short = ("--movements", 3, "--evaluate_at", "[]")
-    assert go(tmp_path, *short) == 0
-    for other in ("1.0", "2.0"):
-        settle(directory, versions={**about_of(directory)["versions"], "numpy": other})
-        assert go(tmp_path, *short, "--resume") == 0
-        assert f"resumed with other versions: numpy {other} -> {np.__version__}" in capsys.readouterr().err
-    now = about_of(directory)["versions"]
-    assert now["numpy"] == np.__version__
-    assert [part["numpy"] for part in now["before"]] == ["1.0", "2.0"]

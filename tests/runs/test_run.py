@@ -52,19 +52,6 @@ def test_the_same_seed_makes_the_same_record(tmp_path, go, reference):
     assert content_of(tmp_path / "sgim-d" / "seed-003") == reference
 
 
-def test_floor_at_names_the_evaluations_that_measure_the_noise_and_changes_nothing_else(tmp_path, go, reference):
-    for floor_at, measured in (("60", [60]), ("30,90,1000", [30, 90]), ("[]", []), ("null", [30, 60, 90])):
-        assert go(tmp_path / floor_at, "--floor_at", floor_at) == 0
-        directory = tmp_path / floor_at / "sgim-d" / "seed-003"
-        evaluation = read_run(directory).evaluation
-        assert evaluation["movements"][np.isfinite(evaluation["noise_floor"])].tolist() == measured
-        recorded = content_of(directory)
-        assert {recorded[name] == reference[name] for name in ("events", "regions")} == {True}
-        for row, full in zip(recorded["evaluations"], reference["evaluations"], strict=True):
-            movements, answer, *errors, floor, met = full
-            assert row == (movements, answer, *errors, floor if movements in measured else None, met)
-
-
 def answers_of(out, go, *options):
     assert go(out, *options) == 0
     (path,) = out.glob("*/seed-003")

@@ -39,6 +39,8 @@ def test_the_file_of_every_part_of_ones_own_is_kept_and_told_when_it_has_changed
         in said
     )
     assert content_of(own / "runs/random/seed-000")["events"][: len(before)] == before
+    before = about_of(own / "runs/random/seed-000")["versions"]["before"]
+    assert [each["source of sliders:Slider"] for each in before] == [kept]
     sys.modules.pop("answers")
     assert sources(Config()) == {}
 
