@@ -65,8 +65,10 @@ def open_run(parts: RunParts, *, resume: bool, accept_loss: bool = False) -> tup
         record = Record.make(path, dims, about)
     else:
         try:
-            differ = _refuse_other(record, about, dims, config)
+            differ = _refuse_other(record, about, dims)
             record = _whole(record, accept_loss, notes)
+            if record.movements > config.movements:
+                raise RunError(f"{path} has {record.movements} movements already, {config.movements} were asked for")
             made = list(dict.fromkeys(movements for movements, *_ in record.rows("evaluations")))
             if made != config.evaluations[: len(made)] or differ & {*EVALUATES}:  # all of them are made again
                 for table in EVALUATED:
@@ -97,7 +99,7 @@ def _readable(path: Path, accept_loss: bool, notes: list[str]) -> Record | None:
         return None
 
 
-def _refuse_other(record: Record, about: dict[str, Any], dims: Dims, config: Config) -> set[str]:
+def _refuse_other(record: Record, about: dict[str, Any], dims: Dims) -> set[str]:
     """Refuse what is not the beginning of this run; the names of the settings that differ, but may."""
     if "settings" not in record.about:
         raise RunError(f"{record.path} is a life that Learner.save wrote, not a run; choose another --out")
@@ -112,8 +114,6 @@ def _refuse_other(record: Record, about: dict[str, Any], dims: Dims, config: Con
     if record.dims != dims:
         was = f"dims {record.dims} of context, theta, outcome, the robot now has {dims}"
         raise RunError(f"{record.path} was recorded with {was}; has the robot become another one?")
-    if record.movements > config.movements:
-        raise RunError(f"{record.path} has {record.movements} movements already, {config.movements} were asked for")
     return {*differ}
 
 
