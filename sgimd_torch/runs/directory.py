@@ -20,7 +20,7 @@ from sgimd_torch.catalogue import load
 from sgimd_torch.files import checksum, make_folder
 from sgimd_torch.record import DERIVED, Dims, InUseError, Record, RunError
 from sgimd_torch.runs.build import RunParts
-from sgimd_torch.runs.config import EVALUATES, MAY_CHANGE, Config, words
+from sgimd_torch.runs.config import EVALUATES, MAY_CHANGE, Config, code_of, words
 from sgimd_torch.runs.evaluations import EVALUATED
 
 FILE: Final = "run.sqlite"
@@ -156,7 +156,7 @@ def _with_earlier(old: dict[str, Any], now: dict[str, Any], notes: list[str]) ->
 def sources(config: Config) -> dict[str, str]:
     """The file of each part of a user's own in a run, and its checksum, such as "toss.py, crc32 8f0a1b2c"."""
     found = {}
-    for word in config.own:
+    for word in code_of(config.settings):
         load(word)
         if file := getattr(sys.modules[word.partition(":")[0]], "__file__", None):
             found[f"source of {word}"] = f"{Path(file).name}, crc32 {checksum(Path(file))}"

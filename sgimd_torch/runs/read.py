@@ -8,7 +8,6 @@ from __future__ import annotations
 import os
 import re
 from array import array
-from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -18,7 +17,7 @@ from numpy.typing import NDArray
 
 from sgimd_torch.files import checksum
 from sgimd_torch.record import DERIVED, Kind, Record, RunError, layout
-from sgimd_torch.runs.config import FILES, OWN, PLACE, Config
+from sgimd_torch.runs.config import FILES, OWN, PLACE, Config, code_of
 from sgimd_torch.runs.directory import FILE
 from sgimd_torch.spaces import Array, Box, Demonstration
 
@@ -208,22 +207,13 @@ def config_of(run: Run, *, trust: bool = False) -> Config:
     Raises:
         RunError: its settings name such code and are not trusted, or do not describe a run of this version.
     """
-    code = [] if trust else list(_code_of(run.config))
+    code = [] if trust else code_of(run.config)
     if code:
         raise RunError(f"{run.path} names code of its own, {', '.join(code)}; look at it, then execute it with --trust")
     try:
         return Config.from_settings(run.config)
     except (TypeError, ValueError) as error:
         raise RunError(f"the settings of {run.path} do not describe a run of this version: {error}") from error
-
-
-def _code_of(settings: Mapping[str, Any]) -> Iterator[str]:
-    """What is neither in the catalogue nor in this library."""
-    for name in sorted(settings.keys() - {*PLACE, *FILES}):
-        value = settings[name]
-        for word in value if isinstance(value, list) else [value]:
-            if isinstance(word, str) and ":" in word and not word.startswith("sgimd_torch."):
-                yield word
 
 
 def find_runs(place: str | os.PathLike[str]) -> dict[str, list[Path]]:

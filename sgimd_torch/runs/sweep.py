@@ -31,7 +31,7 @@ from typing import Final, NamedTuple, TypeVar
 
 from sgimd_torch.files import make_folder
 from sgimd_torch.runs.command_line import parse
-from sgimd_torch.runs.config import FILES, Config, dashed
+from sgimd_torch.runs.config import FILES, Config, code_of, dashed
 from sgimd_torch.runs.engines.local import local
 from sgimd_torch.runs.engines.loop import Submit, sweep
 from sgimd_torch.runs.process import loading, say
@@ -166,7 +166,9 @@ def engine_of(options: argparse.Namespace, configs: Sequence[Config]) -> Abstrac
     except ModuleNotFoundError as error:
         hint = "pip install 'sgimd-torch[ray]' installs it"
         raise ImportError(f"--engine ray needs {error.name}, which is not installed; {hint}") from error
-    return on_ray(options.address, processes, ships=any(config.own for config in configs), out=configs[0].out)
+    return on_ray(
+        options.address, processes, ships=any(code_of(config.settings) for config in configs), out=configs[0].out
+    )
 
 
 class Shard(NamedTuple):
