@@ -11,7 +11,7 @@ from __future__ import annotations
 import traceback
 import warnings
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,8 +21,10 @@ from sgimd_torch.learner import Learner, ReplayError
 from sgimd_torch.learner.replay import TEACHER, BeforeMovement, replay
 from sgimd_torch.record import Event, Kind, Record
 from sgimd_torch.spaces import Array, Demonstration, Episode, Request, check_count, check_point, read_only, stream
-from sgimd_torch.teachers import Teacher
-from sgimd_torch.teachers.answering import Demonstrator
+
+if TYPE_CHECKING:
+    from sgimd_torch.teachers import Teacher
+    from sgimd_torch.teachers.answering import Demonstrator
 
 __all__ = ["Execute", "NoOutcomeError", "ReplayError", "live", "run"]
 

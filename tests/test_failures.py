@@ -111,13 +111,6 @@ def test_too_many_failures_in_a_row_end_a_run_which_can_go_on() -> None:
     assert len(learner.memory) == 15
 
 
-@pytest.mark.parametrize("failures", [0, -1, 1.5, True])
-def test_a_number_of_failures_that_makes_no_sense_is_refused(failures: object) -> None:
-    arm = PlanarArm(5)
-    with pytest.raises(ValueError, match="failures"):
-        list(run(practice(arm, 0), arm, 0, movements=5, failures=failures))
-
-
 def failing_life(path: Path, movements: int):
     """A taught life on an arm that loses some movements and some contexts, from the record at ``path`` on."""
     arm = PlanarArm(5, noise=0.01)

@@ -11,7 +11,6 @@ from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import evaluate
 from sgimd_torch.forward_model.model import ForwardModel
 from sgimd_torch.goals.alp_gmm import AlpGmm
-from sgimd_torch.inverses.local import NearestNeighbour
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Learner, ReplayError
 from sgimd_torch.memory import Memory
@@ -110,13 +109,6 @@ def test_which_movement_reaches_a_goal_is_one_call_for_all_of_them(name):
     )
 
 
-def test_the_builders_inverse_is_the_one_that_it_is_given():
-    for make in (partial(observation, correspondence=last_posture), random_exploration, sagg_riac):
-        assert isinstance(make(ARM, 0, inverse=NearestNeighbour).inverse, NearestNeighbour)
-    learner = sagg_riac(ARM, 0, inverse=NearestNeighbour)
-    assert learner.inverse is learner.autonomous.inverse
-
-
 def test_a_learner_that_was_interrupted_asked_in_vain_and_rested_is_the_same_again(tmp_path):
     lesson = demonstrate(PlanarArm(4), [-0.5, 0.5])
 
@@ -141,17 +133,6 @@ def test_a_learner_that_was_interrupted_asked_in_vain_and_rested_is_the_same_aga
     assert again.movements == whole.movements == 40
     for _ in range(30):
         assert np.array_equal(step(again).theta, step(whole).theta)
-
-
-def test_a_movement_that_was_asked_for_and_not_told_is_asked_for_again(tmp_path):
-    robot, again = sagg_riac(ARM, 4), sagg_riac(ARM, 4)
-    for _ in range(10):
-        step(robot)
-    move = robot.ask(NO_CONTEXT)
-    robot.save(tmp_path / "life.sqlite")
-    again.load(tmp_path / "life.sqlite")
-    assert again.movements == 10
-    assert np.array_equal(again.ask(NO_CONTEXT).theta, move.theta)
 
 
 def test_a_learner_without_a_life_is_saved_and_loaded(tmp_path):
@@ -268,14 +249,6 @@ def test_a_life_of_another_robot_and_other_files_are_refused(saved, tmp_path):
         assert learner.movements == 0
 
 
-def test_the_file_holds_nothing_but_what_happened(saved):
-    with Record(saved) as record:
-        assert record.about.keys() == {"run", "dims", "begun", "exemplars"}
-        kinds = [event.kind for event in record.events()]
-        assert kinds == 2 * (20 * [Kind.MOVED] + [Kind.SHOWN]) + 10 * [Kind.MOVED]
-        assert record.check() == {}
-
-
 def test_lessons_of_different_shape_are_saved(tmp_path):
     """Of a glove with more joints, or of another length: a correspondence may take any."""
     robot, again = (observation(ARM, 0, correspondence=lambda times, trajectory: np.full(4, 0.5)) for _ in range(2))
@@ -328,14 +301,6 @@ def test_map_elites_from_a_memory_varies_its_elites_at_once():
     moves = [e.move.theta for e in run(map_elites(ARM, 0, memory=start, sd=0.01), ARM, 0, movements=10)]
     nearest = [np.abs(start.thetas - theta).max(axis=1).min() for theta in moves]
     assert max(nearest) < 0.06
-
-
-def test_demonstrations_become_a_memory_by_a_learner_that_watches_them():
-    watching = observation(ARM, 0, correspondence=last_posture)
-    for shown in demonstrations(PlanarArm(4)):
-        watching.watch(shown)
-    learner = sgim_d(ARM, 0, correspondence=last_posture, memory=watching.memory)
-    assert len(learner.memory) == 20
 
 
 def test_a_life_that_started_from_a_memory_is_loaded_by_one_that_starts_from_the_same(tmp_path):

@@ -12,7 +12,6 @@ import pytest
 from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.runs.build import build
 from sgimd_torch.runs.config import Config
-from sgimd_torch.runs.process import Stopping
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.run import Life
 
@@ -56,15 +55,15 @@ def lived(run, movements, out, *, until=None):
     hand, shown = (BY_HAND, load_demonstrations()) if run.startswith("by-hand") else ({}, [])
     for last in [movements] if until is None else [until, movements]:
         parts = build(config)
-        with Stopping() as stopping, Life(parts, stopping, resume=last != until and until is not None) as life:
+        with Life(parts, resume=last != until and until is not None) as life:
             if not life.recorded and 0 in hand:
-                parts.hand.give(shown[hand[0]])
+                parts.teacher.give(shown[hand[0]])
             for episode in life.episodes():
                 made = episode.index + 1
                 if made == last:
                     break
                 if made in hand and not life.replaying:
-                    parts.hand.give(shown[hand[made]])
+                    parts.teacher.give(shown[hand[made]])
     return read_run(config.directory)
 
 

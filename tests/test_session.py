@@ -9,14 +9,12 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
-from sgimd_torch.algorithms import attempted, emulating, imitating, imitation, remembered, sagg_riac, sgim_d
+from sgimd_torch.algorithms import imitating, imitation, sagg_riac, sgim_d
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import evaluate
-from sgimd_torch.goals.uniform import UniformGoals
-from sgimd_torch.inverses.local import LocalInverse, NearestNeighbour
-from sgimd_torch.record import Kind, Record
-from sgimd_torch.searches.perturb import perturb
-from sgimd_torch.session import ReplayError, run
+from sgimd_torch.inverses.local import LocalInverse
+from sgimd_torch.record import Record
+from sgimd_torch.session import run
 from sgimd_torch.spaces import Array, Episode, stream
 from sgimd_torch.teachers import InitialTeacher, PeriodicTeacher
 from worlds import ALGORITHMS, TAUGHT, demonstrations, last_posture, make
@@ -67,19 +65,6 @@ def test_a_run_has_exactly_as_many_movements_as_asked_for(name: str) -> None:
     executed = np.array([episode.outcome for episode in episodes if episode.move is not None]).reshape(-1, 2)
     if name != "observation":
         assert np.array_equal(learner.memory.outcomes, executed)
-
-
-@every_algorithm
-def test_a_demonstration_comes_every_thirty_movements(name: str) -> None:
-    given = [e.index for e in life(name, PlanarArm(5)) if e.demonstration is not None]
-    assert given == ([30, 60, 90, 120, 150, 180] if name in TAUGHT else [])
-
-
-@every_algorithm
-def test_all_movements_stay_inside_the_policy_space(name: str) -> None:
-    arm = PlanarArm(5, noise=0.05)
-    thetas = [e.move.theta for e in life(name, arm) if e.move is not None]
-    assert all(arm.policies.contains(theta) for theta in thetas)
 
 
 @every_algorithm
@@ -178,41 +163,6 @@ def test_a_run_resumed_from_its_record_ends_as_if_never_stopped(name: str, stopp
     ]
 
 
-def changed(path: Path, row: int, **values: object) -> None:
-    """A record of the same life but for one event."""
-    with Record(path) as record:
-        events = list(record.events())
-    path.unlink()
-    with Record.make(path, (0, 5, 2), {}) as record:
-        for k, event in enumerate(events):
-            record.add(event._replace(**values) if k == row else event)  # type: ignore[arg-type]
-        record.commit()
-
-
-def test_a_replay_that_proposes_another_theta_is_an_error(path: Path) -> None:
-    arm = PlanarArm(5)
-    episodes = recorded(path, "sgim-d", arm, 50)
-    assert episodes[20].move is not None
-    changed(path, 20, theta=episodes[20].move.theta + 1e-15)
-    learner = make("sgim-d", arm)
-    with Record(path) as record, pytest.raises(ReplayError, match="movement 20"):
-        list(run(learner, arm, 0, movements=50, teacher=teacher_of(arm), record=record))
-    assert len(learner.memory) == 20
-
-
-def test_a_replay_of_another_seed_is_an_error_from_the_first_movement_on(path: Path) -> None:
-    recorded(path, "random", PlanarArm(5), 10, seed=1)
-    with pytest.raises(ReplayError, match="movement 0"):
-        recorded(path, "random", PlanarArm(5), 10, seed=2)
-
-
-def test_a_movement_where_the_record_has_rest_is_an_error(path: Path) -> None:
-    recorded(path, "random", PlanarArm(5), 10)
-    changed(path, 0, kind=Kind.RESTED, theta=None, goal=None, outcome=None, origin=None)
-    with pytest.raises(ReplayError, match="movement 0 was recorded as rest"):
-        recorded(path, "random", PlanarArm(5), 10)
-
-
 def test_a_movement_meets_the_same_noise_whatever_was_done_before_it() -> None:
     def noises_met(name: str, every: int) -> dict[int, object]:
         met: dict[int, object] = {}
@@ -234,13 +184,6 @@ def test_a_movement_meets_the_same_noise_whatever_was_done_before_it() -> None:
     assert noises_met("imitation", 20) == {index: alone[index] for index in range(20, 60)}
 
 
-def test_random_exploration_makes_the_same_movements_whatever_the_noise() -> None:
-    noisy, quiet = (
-        [e.move.theta.tolist() for e in life("random", PlanarArm(5, noise=noise), 50)] for noise in (0.1, 0.0)
-    )
-    assert noisy == quiet
-
-
 @every_algorithm
 def test_a_context_holds_from_the_first_movement_of_an_attempt_to_its_last(name: str) -> None:
     arm = PlanarArm(5, context=True)
@@ -259,51 +202,6 @@ def test_a_context_holds_from_the_first_movement_of_an_attempt_to_its_last(name:
     if name != "observation":
         assert np.array_equal(learner.memory.contexts, contexts)
         assert len(np.unique(contexts)) > 1 or name == "imitation"
-
-
-def test_a_run_may_be_left_at_any_time_and_gone_on_with() -> None:
-    arm = PlanarArm(5)
-    learner = make("sagg-riac", arm)
-    for episode in run(learner, arm, 0, movements=100):
-        if episode.index == 16:
-            break
-    assert len(learner.memory) == 17
-    list(run(learner, arm, 1, movements=27))
-    assert len(learner.memory) == 27
-
-
-def test_a_learner_that_cannot_be_taught_says_so_to_a_teacher() -> None:
-    arm = PlanarArm(5)
-    with pytest.raises(RuntimeError, match="social"):
-        list(run(make("random", arm), arm, 0, movements=40, teacher=teacher_of(arm)))
-
-
-def test_all_initial_demonstrations_reach_the_learner_before_it_is_left_alone() -> None:
-    arm = PlanarArm(5)
-    teacher = InitialTeacher(demonstrations(arm, n=4), stream(0, "teacher"), every=10)
-    learner = sgim_d(arm, 0, correspondence=last_posture)
-    episodes = list(run(learner, arm, 0, movements=80, teacher=teacher))
-    assert [e.index for e in episodes if e.demonstration is not None] == [0, 10, 20, 30]
-
-
-@pytest.mark.parametrize(
-    "part",
-    [
-        {"goals": UniformGoals},
-        {"inverse": NearestNeighbour},
-        {"inverse": LocalInverse},
-        {"search": partial(perturb, sd=0.1)},
-        {"judge": attempted},
-        {"judge": remembered},
-        {"budget": 3, "tolerance": 0.1, "global_range": (0.0, 0.2), "give_up": -1.0},
-        {"social": emulating},
-    ],
-)
-def test_every_part_of_sgim_d_can_be_swapped_by_one_word(part: dict[str, object]) -> None:
-    arm = PlanarArm(5)
-    learner = sgim_d(arm, 0, correspondence=last_posture, **part)
-    list(run(learner, arm, 0, movements=90, teacher=teacher_of(arm)))
-    assert len(learner.memory) == 90
 
 
 def test_sgim_d_without_a_teacher_is_sagg_riac() -> None:
@@ -454,8 +352,3 @@ def test_no_learner_is_built_on_an_environment_whose_rest_is_no_outcome_in_its_t
     arm.rest = rest
     with pytest.raises(ValueError, match="rest of the environment must"):
         make(name, arm)
-
-
-def test_a_tolerance_that_is_no_number_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"tolerance must .* got nan"):
-        sagg_riac(PlanarArm(5), 0, tolerance=np.nan)

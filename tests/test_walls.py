@@ -50,7 +50,6 @@ LIBRARIES = {  # library: the only rooms that may import it; of a folder, where 
     "trimesh": {"views/teach"},
     "websockets": {"views/teach"},
     "jinja2": {"views/report"},
-    "jsonargparse": {"runs/command_line"},
     "docstring_parser": {"catalogue/options"},
     "tqdm": {"runs/process", "views"},
     "threadpoolctl": {"inverses/gaussian_process"},

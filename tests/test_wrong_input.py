@@ -131,6 +131,11 @@ CALLS = {
         lambda: next(s.run(learner(), ARM, 0, movements=3, teacher=[SHOWN])),
         r"teacher must have offer\(\), got a list; PeriodicTeacher",
     ),
+    "failures that are none": (
+        lambda: next(s.run(learner(), ARM, 0, movements=3, failures=1.5)),
+        "failures must be a whole number >= 1, got 1.5",
+    ),
+    "a tolerance that is none": (lambda: learner(tolerance=np.nan), "tolerance must .* got nan"),
     "movements that are none": (lambda: next(s.run(learner(), ARM, 0, movements=1e3)), "movements must be a whole"),
     "an empty memory": (lambda: learner().inverse(np.zeros(0), np.zeros(2)), "memory of at least one exemplar"),
     "no movement asked for": (lambda: learner().tell([0, 0]), "but ask.* has not proposed one"),

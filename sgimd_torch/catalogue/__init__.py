@@ -15,7 +15,6 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from functools import partial, wraps
-from pathlib import Path
 from typing import Any, Final
 
 
@@ -373,20 +372,6 @@ def load(place: str, what: str = "") -> Any:
             raise ValueError(f"{what}: {module} has no {attribute}{did_you_mean(name, public, 3)}")
         found = getattr(found, name)
     return found
-
-
-def source(word: str) -> Path | None:
-    """The file that a thing of your own, ``package.module:attribute``, is written in; None if there is none.
-
-    Raises:
-        ValueError: see ``load``.
-    """
-    made = inspect.unwrap(load(word))
-    while isinstance(made, partial):
-        made = made.func
-    module = inspect.getmodule(made) or sys.modules[word.partition(":")[0]]
-    file = getattr(module, "__file__", None)
-    return Path(file) if file and Path(file).is_file() else None
 
 
 def label(algorithm: str) -> str:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -33,7 +34,9 @@ from sgimd_torch.spaces import (
     read_only,
 )
 from sgimd_torch.strategies import SocialStrategy, Strategy
-from sgimd_torch.teachers import Teacher
+
+if TYPE_CHECKING:
+    from sgimd_torch.teachers import Teacher
 
 __all__ = ["Learner", "ReplayError"]
 

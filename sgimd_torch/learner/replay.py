@@ -8,14 +8,16 @@ attempt, too. So nothing but events has to be kept; ``record.py`` keeps them.
 from __future__ import annotations
 
 from collections.abc import Generator, Iterable
-from typing import Final, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Final, NamedTuple, Protocol
 
 import numpy as np
 
 from sgimd_torch.memory import Memory
 from sgimd_torch.record import Event, Kind
 from sgimd_torch.spaces import Array, Demonstration, Episode, Move, Request
-from sgimd_torch.teachers import Teacher
+
+if TYPE_CHECKING:
+    from sgimd_torch.teachers import Teacher
 
 TEACHER: Final = "teacher"
 """Who has shown what the teacher of a run offered."""

@@ -21,8 +21,9 @@ import json
 import os
 import sqlite3
 import zlib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from itertools import islice, takewhile
 from pathlib import Path
 from typing import Any, Final, Self
 
@@ -230,39 +231,34 @@ class Record:
                 wrong[table] = str(error)
         return wrong
 
-    def rewrite(self, *, n_events: int | None = None, keep: Iterable[str] = ()) -> int:
+    def rewrite(self, *, n_events: int | None = None) -> Record:
         """Replace the file by one with the first events of this one, and close this one.
 
         Args:
             n_events: how many; None for all up to the first that is damaged.
-            keep: names of ``DERIVED`` tables that are kept, too.
 
         Returns:
-            The number of movements in it.
+            The new one, open for writing; what a replay makes again is not in it.
 
         Raises:
             OSError: it cannot be written.
         """
         about = {name: value for name, value in self.about.items() if name not in ("run", "dims")}
+        lesson = self.columns("events").index("demonstration")
         with replacing(self.path) as partial:
             with Record.make(partial, self.dims, about) as new:
-                shown = new._take(self, "demonstrations")
-                lesson = self.columns("events").index("demonstration")
-                new._take(self, "events", lambda n, row: n != n_events and (row[lesson] is None or row[lesson] < shown))
-                for table in keep:
-                    new._take(self, table)
-                last = new._waiting.get("events", [(0, "")])[-1]
+                shown = new._take("demonstrations", self.rows("demonstrations"))
+                rows = takewhile(lambda row: row[lesson] is None or row[lesson] < shown, self.rows("events"))
+                new._take("events", islice(rows, n_events))
                 new.commit()
             self.close()
-        return movements_after(*last[:2])
+        return Record(self.path, write=True)
 
-    def _take(self, other: Record, table: str, while_: Callable[[int, Row], bool] | None = None) -> int:
-        """Copy rows of another record while ``while_`` is true of their place and content; how many were whole."""
+    def _take(self, table: str, rows: Iterable[Row]) -> int:
+        """Copy rows of another record, up to the first that is damaged; how many."""
         n = 0
         with suppress(RunError):
-            for row in other.rows(table):
-                if while_ is not None and not while_(n, row):
-                    break
+            for row in rows:
                 self._append(table, [row])
                 n += 1
         return n

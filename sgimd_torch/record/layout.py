@@ -14,7 +14,6 @@ import numpy as np
 
 from sgimd_torch.spaces import Array, Demonstration
 
-_WIDEST: Final = 400  # a longer vector is one blob: SQLite has at most 2,000 columns
 DERIVED: Final = ("goals", "evaluations", "errors", "regions", "predictions", "refreshes")  # a replay makes them again
 SEALS: Final = ["name TEXT", "n_rows INTEGER", "seal INTEGER"]  # columns of the table of seals
 HINT: Final = "was it damaged or edited?"
@@ -64,7 +63,7 @@ _IN_CONTEXT: Final = (*_COUNTED, Kind.ASKED, Kind.INTERRUPTED)
 
 
 def layout(dims: Dims) -> dict[str, list[str]]:
-    """The columns of every table, as SQL declares them."""
+    """The columns of every table, as SQL declares them. SQLite has at most 2,000 of them in a table."""
     c, p, t = dims
     context, theta, goal, outcome = (
         _vector(name, dim) for name, dim in (("context", c), ("theta", p), ("goal", t), ("outcome", t))
@@ -105,11 +104,10 @@ def event_row(event: Event, movement: int, lesson: int | None, dims: Dims) -> Ro
 def event_reader(dims: Dims, shown: Sequence[Demonstration]) -> Callable[[Row], Event]:
     """What makes an event of such a row, ``shown`` being the demonstrations."""
     every = (*dims, dims[2])
-    ends = list(accumulate(map(_width, every), initial=3))
-    parts = [(slice(a, b), dim) for (a, b), dim in zip(pairwise(ends), every, strict=True)]
+    parts = [slice(*ends) for ends in pairwise(accumulate(every, initial=3))]
 
     def read(row: Row) -> Event:
-        context, theta, goal, outcome = (_array(row[part], dim) for part, dim in parts)
+        context, theta, goal, outcome = (_array(row[part]) for part in parts)
         lesson, who, strategy, reply = row[-4:]
         kind = Kind(row[1])
         if kind not in _IN_CONTEXT:
@@ -134,8 +132,8 @@ def demonstration_row(shown: Demonstration, dims: Dims) -> Row:
 
 def read_demonstration(row: Row, dims: Dims) -> Demonstration:
     """The demonstration of such a row."""
-    width, (*vectors, n_joints, times, trajectory) = _width(dims[0]), row
-    context, outcome = _array(tuple(vectors[:width]), dims[0]), _array(tuple(vectors[width:]), dims[2])
+    *vectors, n_joints, times, trajectory = row
+    context, outcome = _array(tuple(vectors[: dims[0]])), _array(tuple(vectors[dims[0] :]))
     assert context is not None
     assert outcome is not None
     return Demonstration(context, np.frombuffer(times), np.frombuffer(trajectory).reshape(-1, n_joints), outcome)
@@ -168,25 +166,17 @@ def sealed(rows: Iterable[Row], seal: int) -> list[Row]:
 
 
 def _vector(name: str, dim: int) -> list[str]:
-    return [f"{name}_values BLOB"] if dim > _WIDEST else [f"{name}_{k} REAL" for k in range(dim)]
-
-
-def _width(dim: int) -> int:
-    return 1 if dim > _WIDEST else dim
+    return [f"{name}_{k} REAL" for k in range(dim)]
 
 
 def _cells(values: Array | None, dim: int) -> list[Any]:
     """The cells of a vector; NULL for None, or with a NaN in it. -0.0 becomes 0.0, as in SQLite."""
     numbers = None if values is None else np.asarray(values, dtype=np.float64) + 0.0
-    if numbers is None or np.isnan(numbers).any():
-        return [None] * _width(dim)
-    return [numbers.tobytes()] if dim > _WIDEST else numbers.tolist()
+    return [None] * dim if numbers is None or np.isnan(numbers).any() else numbers.tolist()
 
 
-def _array(cells: Row, dim: int) -> Array | None:
+def _array(cells: Row) -> Array | None:
     """The vector in these cells, None where they are NULL."""
-    if dim > _WIDEST:
-        return None if cells[0] is None else np.frombuffer(cells[0])
     return None if None in cells else np.array(cells, dtype=np.float64)
 
 

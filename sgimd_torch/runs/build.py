@@ -20,13 +20,12 @@ from sgimd_torch.runs.chosen import ALGORITHM, Part, chosen, part_of
 from sgimd_torch.runs.config import OWN, Config
 from sgimd_torch.runs.tasks import Task, benchmark_of, correspondence_of, demonstrations_of
 from sgimd_torch.spaces import Array, Demonstration, Estimate, stream
-from sgimd_torch.teachers import Teacher
-from sgimd_torch.teachers.answering import Demonstrator
-from sgimd_torch.teachers.by_hand import ByHand
 
 if TYPE_CHECKING:
     from sgimd_torch.forward_model.anchored import Trust
     from sgimd_torch.forward_model.model import ForwardModel
+    from sgimd_torch.teachers import Teacher
+    from sgimd_torch.teachers.answering import Demonstrator
 
 LEAST_NOISE: Final = 0.01  # m; predictions are not better than this, even if outcomes have no noise
 
@@ -36,9 +35,9 @@ class RunParts:
     """What a run needs. ``config`` is what it was made from. ``answers`` are the inverses to evaluate by, the run's own
     first; they read the learner's memory. ``model`` is refreshed after each movement; it and its ``trust`` are None for
     a run without a model. ``teacher`` demonstrates, ``teachers`` are asked for it; without any of them there are no
-    ``demonstrations``: those of the file, and what teachers have besides. ``hand`` gives a person's lessons, and what
-    ``teacher`` offers at other times. ``data`` holds checksums of the files that were read, ``notes`` messages for the
-    user. ``record`` gives a movement to be filmed, None if the task has no picture of its own."""
+    ``demonstrations``: those of the file, and what teachers have besides. ``data`` holds checksums of the files that
+    were read, ``notes`` messages for the user. ``record`` gives a movement to be filmed, None if the task has no
+    picture of its own."""
 
     config: Config
     environment: Environment
@@ -54,7 +53,6 @@ class RunParts:
     record: Record | None = None
     teachers: Mapping[str, Demonstrator] = field(default_factory=dict)
     task: Task | None = None
-    hand: ByHand | None = None
 
     @property
     def inverse(self) -> Callable[[Array, Array], Estimate]:
@@ -90,7 +88,6 @@ def build(config: Config) -> RunParts:
         for word in config.values.get("teachers", ())
     }
     learner = make(ALGORITHM, teachers=teachers)(task.environment, config.seed)
-    hands = [each for each in (teacher, *teachers.values()) if isinstance(each, ByHand)]
     return RunParts(
         config=config,
         environment=task.environment,
@@ -106,7 +103,6 @@ def build(config: Config) -> RunParts:
         record=task.picture,
         teachers=teachers,
         task=task,
-        hand=hands[0] if hands else ByHand(teacher=teacher),
     )
 
 

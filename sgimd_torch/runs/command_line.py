@@ -9,24 +9,19 @@ Examples:
 
 from __future__ import annotations
 
-import argparse
-import json
-import re
 import shlex
 import sys
 import textwrap
+import types
 import typing
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
 from pathlib import Path
-from typing import Any, Final, NoReturn, get_type_hints
-
-import jsonargparse
+from typing import Any, Final, get_type_hints
 
 from sgimd_torch.catalogue import CATALOGUE
 from sgimd_torch.catalogue.options import help_of
-from sgimd_torch.runs.chosen import ALGORITHM, Part, chosen, refused, standards
-from sgimd_torch.runs.config import RUN, Config, dashed, plain
+from sgimd_torch.runs.chosen import Part, chosen, refused, standards
+from sgimd_torch.runs.config import RUN, Config, dashed, typed
 from sgimd_torch.runs.process import Stopping, loading
 
 FLAGS: Final = {
@@ -36,6 +31,7 @@ FLAGS: Final = {
 ALONE: Final = "practice"  # the default learner of a robot without demonstrations
 _WANTED: Final = {int: "a whole number", float: "a number", bool: "true or false", str: "a word", Path: "a path"}
 _MANY: Final = {int: "whole numbers such as 250,500", float: "numbers such as .1,.2", str: "words such as own,nearest"}
+_PLACES: Final = {"progress": "goals.progress", "choose": "teacher.choose"}  # of kinds that another part chooses
 _WIDTH: Final = 120
 
 
@@ -43,14 +39,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     """The command ``sgimd run``; 0 when the run has finished. It raises what ``carry_out`` raises."""
     argv = sys.argv[1:] if argv is None else argv
     config, flags = parse(argv, __doc__)
-    typed = [Path(sys.argv[0]).name] if Path(sys.argv[0]).name == "sgimd" else [sys.executable, "-m", "sgimd_torch"]
-    again = [*typed, "run", *argv, *([] if flags["resume"] else ["--resume"])]
+    program = ["sgimd"] if Path(sys.argv[0]).name == "sgimd" else [sys.executable, "-m", "sgimd_torch"]
+    again = [*program, "run", *argv, *([] if flags["resume"] else ["--resume"])]
     with loading():
         from sgimd_torch.runs.build import build  # after --help
         from sgimd_torch.runs.run import carry_out
+    parts = build(config)
     with Stopping() as stopping:
-        with stopping.at_once():
-            parts = build(config)
         print(carry_out(parts, stopping, **flags, again=shlex.join(again)))
     return 0
 
@@ -65,66 +60,29 @@ def parse(argv: Sequence[str], description: str | None = None) -> tuple[Config, 
     """
     try:
         given, asked = _read(argv)
-        flags = {flag: flag in asked for flag in FLAGS}
         if "help" in asked and not given:
             print(overview(description))
             raise SystemExit(0)
         algorithm = given.setdefault("algorithm", _suited(given))
-        choices = {name: text for name, text in given.items() if name != "teachers"}
-        parts = chosen(algorithm, choices)
+        parts = chosen(algorithm, {name: text for name, text in given.items() if name != "teachers"})
         for name in given:
             if name not in RUN and name not in standards(parts):
                 raise refused(name, parts, (*RUN, *FLAGS))
-        reader = parser(parts, description)
         if "help" in asked:
-            reader.print_help()
+            print(help_on(parts))
             raise SystemExit(0)
-        values = reader.values({name: text for name, text in given.items() if name not in parts})
-        own = {name: value for name, value in values.items() if name in RUN}
-        others = {name: value for name, value in values.items() if name not in RUN}
-        return Config(**own, parts={**{name: given[name] for name in parts if name in given}, **others}), flags
+        values = _values(given, parts)
+        own = {name: values.pop(name) for name in RUN if name in values}
+        return Config(**own, parts=values), {flag: flag in asked for flag in FLAGS}
     except ValueError as error:
         print(f"error: {error}\n--help explains all options", file=sys.stderr)
         raise SystemExit(2) from None
 
 
-def _suited(given: Mapping[str, str]) -> str:
-    """The default learner for a robot: one that is taught if there are demonstrations, else one that learns alone."""
-    robot = {name: text for name, text in given.items() if name.partition(".")[0] == "environment"}
-    if not robot or "demonstrations" in given:
-        return Config.algorithm
-    with loading():
-        from sgimd_torch.runs.build import has_demonstrations
-    parts = chosen(ALONE, robot)
-    options = {name: text for name, text in robot.items() if name in standards(parts)}
-    values = parser(parts).values({name: text for name, text in options.items() if name not in parts})
-    config = Config(ALONE, parts={**{name: text for name, text in options.items() if name in parts}, **values})
-    return Config.algorithm if has_demonstrations(config) else ALONE
-
-
-def parser(parts: Mapping[str, Part] | None = None, description: str | None = None) -> _Parser:
-    """The options that every run has, and those of these parts."""
-    found = _Parser(prog="sgimd run", usage="%(prog)s [--OPTION VALUE ...] [--resume]", description=description)
-    hints, about = get_type_hints(Config), help_of(Config)
-    group = found.add_argument_group("The run")
-    for each in fields(Config):
-        if each.name in RUN:
-            found.take(group, each.name, hints[each.name], each.default, about[each.name])
-    for flag, text in FLAGS.items():
-        group.add_argument(f"--{dashed(flag)}", action="store_true", help=text)
-    for part in (parts or {}).values():
-        about = help_of(part.make)
-        named = part.kind if part.name == ALGORITHM else part.name
-        group = found.add_argument_group(f"--{named} {part.word}", _choices(part, parts or {}))
-        for name, option in part.options.items():
-            found.take(group, name, option.kind, option.default, about.get(name.rpartition(".")[2], ""))
-    return found
-
-
 def overview(description: str | None = None) -> str:
     """What ``sgimd run --help`` prints: the options of every run, and the words for its parts."""
     about = help_of(Config)
-    shown = {name: _shown(getattr(Config, name)) for name in RUN}
+    shown = {name: typed(getattr(Config, name)) for name in RUN}
     run = {name: about[name] + f" ({text})" * (text != "null") for name, text in shown.items()} | FLAGS
     algorithms = {word: entry.about for word, entry in CATALOGUE["algorithm"].items() if "rivals" not in entry.about}
     rivals = [word for word in CATALOGUE["algorithm"] if word not in algorithms]
@@ -147,19 +105,23 @@ def overview(description: str | None = None) -> str:
     return "\n".join(lines)
 
 
-_PLACES: Final = {"progress": "goals.progress", "choose": "teacher.choose"}  # of kinds that another part chooses
+def help_on(parts: Mapping[str, Part]) -> str:
+    """What ``sgimd run --goals grid --help`` prints: the options of the parts that are chosen."""
+    lines = ["usage: sgimd run [--OPTION VALUE ...] [--resume]; sgimd run --help shows the options of every run"]
+    for part in parts.values():
+        words, about = CATALOGUE.get(part.kind, {}), help_of(part.make)
+        what = [words[part.word].about] if part.word in words else []
+        leads_to = [f"--{part.full(each)}={parts[part.full(each)].word}" for each in part.choices]
+        what += [f"its parts: {' '.join(leads_to)}"] if leads_to else []
+        lines += ["", textwrap.fill(f"--{part.name or part.kind} {part.word}: {'; '.join(what)}", _WIDTH)]
+        for name, option in part.options.items():
+            meant = f"{_wanted(option.kind)}; default: {typed(option.default)}"
+            lines.append(_line(f"--{dashed(name)}", f"{about.get(name.rpartition('.')[2], '')} ({meant})"))
+    return "\n".join(lines)
 
 
 def _line(name: str, text: str) -> str:
     return textwrap.fill(text, _WIDTH, initial_indent=f"  {name:17} ", subsequent_indent=" " * 20)
-
-
-def _choices(part: Part, parts: Mapping[str, Part]) -> str:
-    """What a part is, and which words could stand for it and for the parts that it leads to."""
-    words = CATALOGUE.get(part.kind, {})
-    about = words[part.word].about if part.word in words else "of your own" if ":" in part.word else ""
-    found = [f"--{part.full(each)}={parts[part.full(each)].word}" for each in part.choices]
-    return f"{about}{'; its parts: ' if found else ''}{' '.join(found)}"
 
 
 def _read(argv: Sequence[str]) -> tuple[dict[str, str], set[str]]:
@@ -170,77 +132,84 @@ def _read(argv: Sequence[str]) -> tuple[dict[str, str], set[str]]:
     """
     given, asked, waiting = dict[str, str](), set[str](), list(reversed(argv))
     while waiting:
-        typed, equals, value = waiting.pop().partition("=")
-        name = typed.removeprefix("--").replace("-", "_")
-        if typed in ("-h", "--help"):
+        word, equals, value = waiting.pop().partition("=")
+        name = word.removeprefix("--").replace("-", "_")
+        if word in ("-h", "--help"):
             asked.add("help")
-        elif not typed.startswith("--"):
+        elif not word.startswith("--"):
             flags = f"; --{', --'.join(map(dashed, FLAGS))} take none"
-            raise ValueError(f"{typed!r} belongs to no option; an option begins with -- and takes one value{flags}")
+            raise ValueError(f"{word!r} belongs to no option; an option begins with -- and takes one value{flags}")
         elif name in FLAGS:
             if equals:
-                raise ValueError(f"{typed} takes no value, got {value!r}")
+                raise ValueError(f"{word} takes no value, got {value!r}")
             asked.add(name)
         elif equals:
             given[name] = value
         elif waiting and not waiting[-1].startswith("--"):
             given[name] = waiting.pop()
         else:
-            raise ValueError(f"{typed} needs a value")
+            raise ValueError(f"{word} needs a value")
     return given, asked
 
 
-class _Parser(jsonargparse.ArgumentParser):
-    """Reads values by the types of their options, and says in one line what was wanted."""
+def _suited(given: Mapping[str, str]) -> str:
+    """The default learner for a robot: one that is taught if there are demonstrations, else one that learns alone."""
+    robot = {name: text for name, text in given.items() if name.partition(".")[0] == "environment"}
+    if not robot or "demonstrations" in given:
+        return Config.algorithm
+    with loading():
+        from sgimd_torch.runs.build import has_demonstrations
+    config = Config(ALONE, parts=_values(robot, chosen(ALONE, robot)))
+    return Config.algorithm if has_demonstrations(config) else ALONE
 
-    def __init__(self, **arguments: Any) -> None:
-        super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, **arguments)
-        self._kinds: dict[str, Any] = {}
-        self._given: Mapping[str, str] = {}
 
-    def take(self, group: Any, name: str, kind: Any, default: Any, about: str) -> None:
-        """Add an option to a group."""
-        self._kinds[name] = kind
-        text = f"{about} ({_wanted(kind)}; default: {_shown(default)})".replace("%", "%%")
-        group.add_argument(f"--{dashed(name)}", type=kind, default=default, metavar="X", help=text)
+def _values(given: Mapping[str, str], parts: Mapping[str, Part]) -> dict[str, Any]:
+    """What was typed, as values of the types of the options; words of parts stay words. Other names are left out.
 
-    def values(self, given: Mapping[str, str]) -> dict[str, Any]:
-        """What was typed, as values of their types.
+    Raises:
+        ValueError: one is of another type.
+    """
+    kinds = get_type_hints(Config) | {
+        name: option.kind for part in parts.values() for name, option in part.options.items()
+    }
+    found: dict[str, Any] = {name: text for name, text in given.items() if name in parts}
+    for name, text in given.items():
+        if name in kinds and name not in parts:
+            try:
+                found[name] = _value(text, kinds[name])
+            except ValueError as error:
+                raise ValueError(f"--{dashed(name)} must be {_wanted(kinds[name])}, got {text}") from error
+    return found
 
-        Raises:
-            ValueError: one is of another type.
-        """
-        self._given = given
-        known = vars(
-            self.parse_args([f"--{dashed(name)}={self._listed(name, text)}" for name, text in given.items()]).as_flat()
-        )
-        return {name: known[name] for name in given}
 
-    def error(self, message: str, ex: Exception | None = None) -> NoReturn:
-        key = re.search(r'key "([\w.]+)"', message)
-        if key is None or key[1] not in self._given:
-            raise ValueError(message)
-        raise ValueError(f"--{dashed(key[1])} must be {_wanted(self._kinds[key[1]])}, got {self._given[key[1]]}")
+def _value(text: str, kind: Any) -> Any:
+    """``text`` as a value of a type; a list may be typed with brackets or without.
 
-    def _listed(self, name: str, text: str) -> str:
-        """A list may be typed without brackets."""
-        if not text and "Path" in str(self._kinds[name]):
-            raise ValueError(f"--{dashed(name)} must be a path, got an empty one")
-        is_list = "tuple" in str(self._kinds[name]) and text != "null" and not text.startswith("[")
-        return f"[{text}]" if is_list else text
+    Raises:
+        ValueError: it is of another type.
+    """
+    inner = typing.get_args(kind)
+    if typing.get_origin(kind) is tuple:
+        items = [item.strip() for item in text.removeprefix("[").removesuffix("]").split(",") if item]
+        kinds = [inner[0]] * len(items) if ... in inner else inner
+        return tuple(_value(*each) for each in zip(items, kinds, strict=True))
+    if inner:  # of a union, None last
+        if text == "null" and types.NoneType in inner:
+            return None
+        return _value(text, inner[0])
+    if kind is bool:
+        return bool(("false", "true").index(text))
+    if not text:
+        raise ValueError("nothing was typed")
+    return kind(text)
 
 
 def _wanted(kind: Any) -> str:
     """A type in words."""
-    parts = typing.get_args(kind)
+    inner = typing.get_args(kind)
     if typing.get_origin(kind) is tuple:
-        many = _MANY.get(parts[0], "values")
-        return f"{many}, or []" if ... in parts else f"{len(parts)} {many}"
-    if parts:  # of a union
-        return " or ".join("null" if each is type(None) else _wanted(each) for each in parts)
+        many = _MANY.get(inner[0], "values")
+        return f"{many}, or []" if ... in inner else f"{len(inner)} {many}"
+    if inner:  # of a union
+        return " or ".join("null" if each is types.NoneType else _wanted(each) for each in inner)
     return _WANTED.get(kind, "a value")
-
-
-def _shown(default: Any) -> str:
-    """A default, as one types it."""
-    return str(default) if isinstance(default, str | Path) else json.dumps(plain(default))

@@ -16,7 +16,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Final, Self
 
-from sgimd_torch.catalogue import CATALOGUE, find
+from sgimd_torch.catalogue import find
 from sgimd_torch.runs.chosen import chosen, part_of, refused, standards
 
 OWN: Final = "own"  # the answer of the inverse model that a run chose
@@ -30,7 +30,6 @@ MAY_CHANGE: Final = (
 )
 """When a run is resumed, as they only say how long it lasts, where it is or how it is shown. Files count by their
 content, of which a checksum is recorded; a benchmark may be another one."""
-LEADS: Final = ("algorithm", "movements", "goals", "search", "inverse")  # what a comparison shows first
 
 
 @dataclass(frozen=True)
@@ -179,17 +178,16 @@ class Config:
             return list(self.evaluated_by)
         return [word for word in self.evaluated_by if word == OWN or "model" not in part_of("", "inverse", word).takes]
 
-    @property
-    def own(self) -> list[str]:
-        """The things of a user's own in this run, ``package.module:attribute``."""
-        names = {name for name in self.values if name.rpartition(".")[2] in CATALOGUE}
-        words = {self.algorithm, *self.answered, *(self.values.get("teachers", ()))}
-        words |= {self.values[name] for name in names - {"teachers"}}
-        return sorted(word for word in words if isinstance(word, str) and ":" in word)
-
 
 RUN: Final = tuple(each.name for each in fields(Config) if each.name != "parts")
 """The options that every run has."""
+
+
+def code_of(settings: Mapping[str, Any]) -> list[str]:
+    """The code of a user's own that ``settings`` name, ``package.module:attribute``: it is not in this library."""
+    values = [value for name, value in settings.items() if name not in (*PLACE, *FILES)]
+    words = [word for value in values for word in (value if isinstance(value, list) else [value])]
+    return sorted({w for w in words if isinstance(w, str) and ":" in w and not w.startswith("sgimd_torch.")})
 
 
 def words(config: Config) -> list[str]:
@@ -198,7 +196,7 @@ def words(config: Config) -> list[str]:
     own = [
         (name, getattr(config, name)) for name in RUN if getattr(config, name) != standard[name] or name == "algorithm"
     ]
-    return [f"--{dashed(name)}={_typed(plain(value))}" for name, value in (*own, *dict(config.parts).items())]
+    return [f"--{dashed(name)}={typed(value)}" for name, value in (*own, *dict(config.parts).items())]
 
 
 def dashed(name: str) -> str:
@@ -211,5 +209,8 @@ def plain(value: Any) -> Any:
     return json.loads(json.dumps(value, default=str))
 
 
-def _typed(value: Any) -> str:
-    return value if isinstance(value, str) else json.dumps(value, separators=(",", ":"))
+def typed(value: Any) -> str:
+    """A value as one types it."""
+    if isinstance(value, tuple):
+        return ",".join(map(typed, value)) or "[]"
+    return json.dumps(value) if value is None or isinstance(value, bool) else str(value)

@@ -7,26 +7,23 @@ A run is the file ``run.sqlite`` in OUT/NAME/seed-003; ``docs/runs.md`` explains
 from __future__ import annotations
 
 import importlib.metadata
-import os
 import platform
 import shutil
 import subprocess
-from collections.abc import Mapping
+import sys
 from itertools import count
 from pathlib import Path
 from typing import Any, Final
 
 import sgimd_torch
-from sgimd_torch.catalogue import source
+from sgimd_torch.catalogue import load
 from sgimd_torch.files import checksum, make_folder
-from sgimd_torch.record import DERIVED, InUseError, Record, RunError
+from sgimd_torch.record import DERIVED, Dims, InUseError, Record, RunError
 from sgimd_torch.runs.build import RunParts
-from sgimd_torch.runs.config import EVALUATES, MAY_CHANGE, Config, words
+from sgimd_torch.runs.config import EVALUATES, MAY_CHANGE, Config, code_of, words
 from sgimd_torch.runs.evaluations import EVALUATED
 
 FILE: Final = "run.sqlite"
-_LASTING: Final = ("events", "demonstrations")  # tables that only a new life would make again
-_SOURCE: Final = "source of "  # among the versions, before the word that names a part of a user's own
 LIBRARIES: Final = {"numpy": "numpy", "scipy": "scipy", "faiss": "faiss-cpu", "mujoco": "mujoco"}
 FORWARD: Final = ("torch", "lightning", "safetensors")  # of runs with a forward model
 
@@ -47,7 +44,6 @@ def open_run(parts: RunParts, *, resume: bool, accept_loss: bool = False) -> tup
     config, robot = parts.config, parts.environment
     spaces = {"contexts": robot.contexts, "policies": robot.policies, "outcomes": robot.outcomes}
     path, notes = config.directory / FILE, list[str]()
-    refuse_foreign(config.directory)
     about: dict[str, Any] = {
         "settings": config.settings,
         "files": parts.data,
@@ -58,24 +54,26 @@ def open_run(parts: RunParts, *, resume: bool, accept_loss: bool = False) -> tup
     }
     dims = robot.contexts.dim, robot.policies.dim, robot.outcomes.dim
     make_folder(config.directory)
-    if holds_run(path) and not resume:
-        raise RunError(f"{config.directory} holds a run already; go on with it by --resume, or choose another --out")
-    record = _whole(path, accept_loss, notes) if holds_run(path) else None
+    record = None
+    if holds_run(path):
+        if not resume:
+            raise RunError(f"{path.parent} holds a run already; go on with it by --resume, or choose another --out")
+        record = _readable(path, accept_loss, notes)
+    elif resume:
+        notes.append(f"{path.parent} holds no run yet: it starts from the beginning")
     if record is None:
-        notes += [f"{config.directory} holds no run yet: it starts from the beginning"] if resume and not notes else []
         record = Record.make(path, dims, about)
     else:
         try:
-            if "settings" not in record.about:
-                raise RunError(f"{path} is a life that Learner.save wrote, not a run; choose another --out")
-            _refuse_other(record, about)
-            if record.dims != dims:
-                was = f"dims {record.dims} of context, theta, outcome, the robot now has {dims}"
-                raise RunError(f"{path} was recorded with {was}; has the robot become another one?")
+            differ = _refuse_other(record, about, dims)
+            record = _whole(record, accept_loss, notes)
             if record.movements > config.movements:
                 raise RunError(f"{path} has {record.movements} movements already, {config.movements} were asked for")
+            made = list(dict.fromkeys(movements for movements, *_ in record.rows("evaluations")))
+            if made != config.evaluations[: len(made)] or differ & {*EVALUATES}:  # all of them are made again
+                for table in EVALUATED:
+                    record.replace_rows(table, ())
             about["versions"] = _with_earlier(record.about["versions"], about["versions"], notes)
-            _keep_evaluations(record, parts, about)
             record.settle(**about)
         except BaseException:
             record.close()
@@ -89,51 +87,50 @@ def holds_run(path: Path) -> bool:
     return path.is_file() and path.stat().st_size > 0
 
 
-def refuse_foreign(folder: Path) -> None:
-    """Refuse a folder with other things in it.
-
-    Raises:
-        RunError: it is a file, or holds something else than a run.
-    """
-    if folder.exists() and not folder.is_dir():
-        raise RunError(f"{folder} is a file, not a run directory; choose another --out")
-    if not folder.exists() or (folder / FILE).exists():
-        return
-    foreign = sorted(entry for entry in os.listdir(folder) if not entry.endswith(".part"))
-    if "config.json" in foreign:
-        raise RunError(f"{folder} holds a run of files that this version does not read; choose another --out")
-    if foreign:
-        raise RunError(f"{folder} holds {', '.join(foreign[:3])} but no run (no {FILE}); choose another --out")
-
-
-def _whole(path: Path, accept_loss: bool, notes: list[str]) -> Record | None:
-    """The record at ``path``, without what is damaged; None if nothing is left of it."""
+def _readable(path: Path, accept_loss: bool, notes: list[str]) -> Record | None:
+    """The record at ``path``, open for writing; None if nothing of it can be read."""
     try:
-        record = Record(path, write=True)
-        wrong = record.check()
+        return Record(path, write=True)
     except InUseError:
         raise
     except RunError as error:
         _accept(path, f"{error}; nothing of it can be read", "make them", accept_loss, notes)
         path.unlink()
         return None
+
+
+def _refuse_other(record: Record, about: dict[str, Any], dims: Dims) -> set[str]:
+    """Refuse what is not the beginning of this run; the names of the settings that differ, but may."""
+    if "settings" not in record.about:
+        raise RunError(f"{record.path} is a life that Learner.save wrote, not a run; choose another --out")
+    before, now = ({**each["settings"], **each["files"]} for each in (record.about, about))
+    differ = [name for name in dict.fromkeys((*now, *before)) if before.get(name) != now.get(name)]
+    if changed := [name for name in differ if name not in MAY_CHANGE]:
+        raise RunError(
+            f"{record.path.parent} belongs to another configuration: "
+            f"{'; '.join(f'{name} was {before.get(name)}, now {now.get(name)}' for name in changed)}. "
+            "Resume it with its own, or give the new variant another --name or --out"
+        )
+    if record.dims != dims:
+        was = f"dims {record.dims} of context, theta, outcome, the robot now has {dims}"
+        raise RunError(f"{record.path} was recorded with {was}; has the robot become another one?")
+    return {*differ}
+
+
+def _whole(record: Record, accept_loss: bool, notes: list[str]) -> Record:
+    """The record without what is damaged."""
+    wrong, path = record.check(), record.path
     if not wrong:
         return record
-    lost = [message for table, message in wrong.items() if table in _LASTING]
-    if lost:
-        record.close()
-        _accept(path, "; ".join(lost), "keep those before and make the others", accept_loss, notes)
-        record = Record(path, write=True)
-    try:
-        dropped = {*wrong, *(EVALUATED if wrong.keys() & {*EVALUATED} else ())}
-        whole = () if lost else [table for table in DERIVED if table not in dropped]
-        notes += [f"{message}; it is made again" for message in wrong.values() if message not in lost]
-        kept = record.rewrite(keep=whole)
-    finally:
-        record.close()
-    if lost:
-        notes.append(f"{kept} movements of {path} are kept, the others are made again")
-    return Record(path, write=True)
+    notes += [f"{message}; it is made again" for table, message in wrong.items() if table in DERIVED]
+    lost = [message for table, message in wrong.items() if table not in DERIVED]
+    if not lost:
+        return record.rewrite()
+    record.close()  # to copy it while it is open would give up its lock
+    _accept(path, "; ".join(lost), "keep those before and make the others", accept_loss, notes)
+    record = Record(path, write=True).rewrite()
+    notes.append(f"{record.movements} movements of {path} are kept, the others are made again")
+    return record
 
 
 def _accept(path: Path, what: str, how: str, accept_loss: bool, notes: list[str]) -> None:
@@ -145,63 +142,25 @@ def _accept(path: Path, what: str, how: str, accept_loss: bool, notes: list[str]
     notes.append(f"{what} It is kept as {copy}")
 
 
-def _refuse_other(record: Record, about: Mapping[str, Any]) -> None:
-    before = {**record.about["settings"], **record.about["files"]}
-    now = {**about["settings"], **about["files"]}
-    differ = [
-        f"{name} was {before.get(name)}, now {now.get(name)}"
-        for name in dict.fromkeys((*now, *before))
-        if name not in MAY_CHANGE and before.get(name) != now.get(name)
-    ]
-    if differ:
-        raise RunError(
-            f"{record.path.parent} belongs to another configuration: {'; '.join(differ)}. "
-            "Resume it with its own, or give the new variant another --name or --out"
-        )
-
-
 def _with_earlier(old: dict[str, Any], now: dict[str, Any], notes: list[str]) -> dict[str, Any]:
     """The versions ``now``; those of earlier parts of the run, where they differ, are kept beside them."""
     earlier = old.pop("before", [])
     differ = [name for name, version in now.items() if old.get(name) != version]
     if differ:
         changes = ", ".join(f"{name} {old.get(name)} -> {now[name]}" for name in differ)
-        notes += [f"resumed with other versions: {changes}", *changed_sources(old, now)]
+        notes.append(f"resumed with other versions: {changes}; only new movements and evaluations are by these")
         earlier = [*earlier, old]
     return {**now, "before": earlier} if earlier else now
-
-
-def _keep_evaluations(record: Record, parts: RunParts, about: Mapping[str, Any]) -> None:
-    """Of the evaluations so far only those that the whole run would have."""
-    before = {**record.about["settings"], **record.about["files"]}
-    now = {**about["settings"], **about["files"]}
-    alike = all(before.get(name) == now.get(name) for name in EVALUATES)
-    wanted = {*parts.config.evaluations} if alike else set()
-    for table in EVALUATED:
-        rows = list(record.rows(table))
-        kept = [row for row in rows if row[0] in wanted]
-        if len(kept) < len(rows):
-            record.replace_rows(table, kept)
 
 
 def sources(config: Config) -> dict[str, str]:
     """The file of each part of a user's own in a run, and its checksum, such as "toss.py, crc32 8f0a1b2c"."""
     found = {}
-    for word in config.own:
-        if (file := source(word)) is not None:
-            depth = word.partition(":")[0].count(".") + 1 + (file.stem == "__init__")
-            found[f"{_SOURCE}{word}"] = f"{Path(*file.parts[-depth:]).as_posix()}, crc32 {checksum(file)}"
+    for word in code_of(config.settings):
+        load(word)
+        if file := getattr(sys.modules[word.partition(":")[0]], "__file__", None):
+            found[f"source of {word}"] = f"{Path(file).name}, crc32 {checksum(Path(file))}"
     return found
-
-
-def changed_sources(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
-    """A note for each file of a user's own that is another one than ``before``."""
-    changed = {name: str(was) for name, was in before.items() if name.startswith(_SOURCE) and now.get(name, was) != was}
-    return [
-        f"{was.partition(',')[0]} has changed since this run was made ({was} -> {now[name]}): what is recorded was "
-        f"made by the earlier {name.removeprefix(_SOURCE)}, only new movements and evaluations are by this one"
-        for name, was in changed.items()
-    ]
 
 
 def versions(*, forward: bool) -> dict[str, Any]:

@@ -51,15 +51,6 @@ def read_evaluations(record: Record) -> dict[int, dict[str, Evaluation]]:
     }
 
 
-def sort_evaluations(record: Record) -> None:
-    """Bring evaluations that a replay has added to where they belong."""
-    for table in EVALUATED:
-        rows = list(record.rows(table))
-        ordered = sorted(rows, key=lambda row: row[0])
-        if ordered != rows:
-            record.replace_rows(table, ordered)
-
-
 def _evaluation(numbers: np.ndarray) -> Evaluation:
     unknown = np.full((len(numbers), 0), np.nan)
     return Evaluation(numbers[:, 0], unknown, unknown, numbers[:, 1], numbers[:, 3:], numbers[:, 2] > 0)

@@ -1,58 +1,72 @@
-"""Who listens to a run. A listener is its file and a line of ``listeners_of``."""
+"""What listens to a run is told: its movements, its evaluations, and where its time goes."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import Protocol
 
 from sgimd_torch.evaluation import Evaluation
-from sgimd_torch.record import Record
-from sgimd_torch.runs.build import RunParts
-from sgimd_torch.runs.clock import Seconds
 from sgimd_torch.spaces import Episode
 
 
 class Listener(Protocol):
-    """Is told what happens in a run. A resumed run tells it everything again, from its record."""
+    """Is told what happens in a run. A resumed run tells it everything again, from its record.
+
+    Whoever derives from it need only say what concerns them.
+    """
 
     def episode(self, episode: Episode, replayed: bool) -> None:
         """A movement was made, or replayed."""
-        ...
+        return
 
     def evaluated(self, movements: int, found: Mapping[str, Evaluation]) -> None:
         """The learner was evaluated after so many movements, by each of its answers."""
-        ...
+        return
 
     def begin(self) -> None:
         """The replay is over: from now on files may change."""
-        ...
+        return
 
     def flush(self) -> None:
         """What was told so far is to be on the disk."""
-        ...
+        return
 
     def close(self) -> None:
         """The run has ended, or was stopped."""
-        ...
+        return
 
 
-def listeners_of(parts: RunParts, record: Record, seconds: Seconds) -> list[Listener]:
-    """Those of a run, in the order in which they are told.
+class Seconds:
+    """Seconds spent so far. Those of a resumed run add to ``before``, but for those that a replay spends again."""
 
-    Args:
-        parts, record: of the run.
-        seconds: its clock.
-    """
-    found: list[Listener] = []
-    curves: Callable[[], Mapping[str, float]] = dict
-    if parts.model is not None and parts.trust is not None:
-        from sgimd_torch.runs.model_listener import ModelListener
+    def __init__(self, before: Mapping[str, float]) -> None:
+        self._spent = {part: before.get(f"seconds_{part}", 0.0) for part in ("physics", "evaluation")} | {
+            "learner": 0.0
+        }
 
-        model = ModelListener(record, parts.model, parts.trust.error, parts.learner.memory, seconds)
-        found.append(model)
-        curves = model.new_curves
-    if parts.config.board:
-        from sgimd_torch.board.listener import BoardListener
+    @contextmanager
+    def of(self, part: str) -> Iterator[None]:
+        """Times a block, or a function that it decorates. Physics does not count as the learner's time."""
+        begun = time.perf_counter()
+        try:
+            yield
+        finally:
+            taken = time.perf_counter() - begun
+            self._spent[part] = self._spent.get(part, 0.0) + taken
+            if part == "physics":
+                self._spent["learner"] -= taken
 
-        found.append(BoardListener(parts.config.directory, parts, seconds.summary, curves))
-    return found
+    def of_learner(self, episodes: Iterator[Episode]) -> Iterator[Episode]:
+        """``episodes``, timed: asking, telling, watching and the teacher's choice."""
+        while True:
+            with self.of("learner"):
+                episode = next(episodes, None)
+            if episode is None:
+                return
+            yield episode
+
+    def summary(self) -> dict[str, float]:
+        """By name, as the record has them."""
+        return {f"seconds_{part}": round(seconds, 3) for part, seconds in self._spent.items()}

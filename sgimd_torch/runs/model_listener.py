@@ -7,16 +7,14 @@ A replay makes its tables again, so a resumed run has them as if it had never st
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sgimd_torch.evaluation import Evaluation
 from sgimd_torch.forward_model.diagnostics import coverage, improved
 from sgimd_torch.memory import Memory
 from sgimd_torch.record import Record
-from sgimd_torch.runs.clock import Seconds
+from sgimd_torch.runs.listeners import Listener, Seconds
 from sgimd_torch.runs.process import say
 from sgimd_torch.spaces import Array, Episode
 
@@ -28,7 +26,7 @@ LATELY: Final = 500  # movements, over which the board shows how often refining 
 NOT_ASKED: Final = "the forward model is not asked, the learner goes on without it"
 
 
-class ModelListener:
+class ModelListener(Listener):
     """Refreshes the model after every movement and records what it predicts.
 
     Args:
@@ -53,15 +51,6 @@ class ModelListener:
         if not replayed:
             say(*self._news)
             self._news.clear()
-
-    def evaluated(self, movements: int, found: Mapping[str, Evaluation]) -> None:
-        """Nothing to do."""
-
-    def begin(self) -> None:
-        """Nothing to do: what a replay makes again is there."""
-
-    def flush(self) -> None:
-        """Nothing to do: the record is flushed by the run."""
 
     def close(self) -> None:
         """Say so if the model is not asked."""

@@ -105,11 +105,15 @@ def _stop(signum: int, frame: FrameType | None) -> None:
 
 
 class Stopping:
-    """In this block, SIGINT and SIGTERM wait for the next ``check()``, or for ``at_once()``; a context manager."""
+    """In this block, the first SIGINT or SIGTERM is ``heard``; the second raises ``Stopped`` wherever it comes. A
+    context manager.
+
+    Attributes:
+        heard: the number of the first signal, 0 before it.
+    """
 
     def __init__(self) -> None:
-        self._signum = self._heard = 0
-        self._enough: int | None = None  # signals that stop at once
+        self.heard = 0
         self._block = _on_signals(self._hear)
 
     def __enter__(self) -> Self:
@@ -120,29 +124,11 @@ class Stopping:
         self._block.__exit__(*error)
 
     def _hear(self, signum: int, frame: FrameType | None) -> None:
-        self._signum, self._heard = signum, self._heard + 1
-        if self._enough is None:
-            return
-        if self._heard >= self._enough:
-            self._enough = None
+        if self.heard:
             raise Stopped(signum)
-        say("stops after the movement under way; once more stops at once")
-
-    def check(self) -> None:
-        """Raise ``Stopped`` if a signal has come."""
-        if self._signum:
-            raise Stopped(self._signum)
-
-    @contextmanager
-    def at_once(self, enough: int = 1) -> Iterator[None]:
-        """In this block, so many signals, with those that came before, raise ``Stopped`` at once."""
-        self._enough = enough
-        try:
-            if self._heard >= enough:
-                self.check()
-            yield
-        finally:
-            self._enough = None
+        self.heard = signum
+        with suppress(OSError):  # not by say(): a print may be under way
+            os.write(2, b"\nstops after the movement under way; once more stops at once\n")
 
 
 class Progress:

@@ -8,17 +8,16 @@ from __future__ import annotations
 import os
 import re
 from array import array
-from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sgimd_torch.files import checksum
-from sgimd_torch.record import DERIVED, Event, Kind, Record, RunError
-from sgimd_torch.runs.config import FILES, OWN, PLACE, Config
+from sgimd_torch.record import DERIVED, Kind, Record, RunError, layout
+from sgimd_torch.runs.config import FILES, OWN, PLACE, Config, code_of
 from sgimd_torch.runs.directory import FILE
 from sgimd_torch.spaces import Array, Box, Demonstration
 
@@ -102,8 +101,7 @@ def read_run(path: str | os.PathLike[str]) -> Run:
     """
     path = Path(path)
     if not (path / FILE).exists():
-        what = "a run of files that this version does not read" if (path / "config.json").exists() else "no run"
-        raise RunError(f"{path} holds {what}; runs are in OUT/NAME/seed-000 and have a file {FILE}")
+        raise RunError(f"{path} holds no run; runs are in OUT/NAME/seed-000 and have a file {FILE}")
     with Record(path / FILE) as record:
         about = record.about
         if "settings" not in about:
@@ -113,13 +111,10 @@ def read_run(path: str | os.PathLike[str]) -> Run:
         if seed is not None and int(seed[1]) != settings["seed"]:
             raise RunError(f"{path} holds a run of seed {settings['seed']}; was it copied from another one?")
         shown = record.demonstrations()
-        events = _Movements(record.dims, shown)
-        for event in record.events(shown):
-            events.add(event)
+        arrays, requests, failed = _lived(record, shown)
         found: dict[str, Columns] = {table: _columns(record, table) for table in DERIVED}
         n = record.movements
     evaluated = found["evaluations"]["movements"]
-    arrays = events.arrays()
     nothing = not shown and not np.isfinite(arrays["outcomes"]).any()  # to infer a movement from
     finished = n == settings["movements"] and (settings["evaluate_at"] == [] or n in evaluated or nothing)
     return Run(
@@ -130,7 +125,7 @@ def read_run(path: str | os.PathLike[str]) -> Run:
         robot=about["robot"],
         words=about["words"],
         spaces={name: Box(*box) for name, box in about["spaces"].items()},
-        summary={"movements": n, "failed": events.failed, "finished": bool(finished), **about.get("seconds", {})},
+        summary={"movements": n, "failed": failed, "finished": bool(finished), **about.get("seconds", {})},
         **arrays,
         answers=_by_answer(found["evaluations"]),
         errors=found["errors"],
@@ -139,7 +134,7 @@ def read_run(path: str | os.PathLike[str]) -> Run:
         regions=_if_any(found["regions"]),
         predictions=_if_any(found["predictions"]),
         refreshes=_if_any(found["refreshes"]),
-        requests=events.requests(),
+        requests=requests,
     )
 
 
@@ -147,76 +142,59 @@ def _if_any(columns: Columns) -> Columns | None:
     return columns if len(next(iter(columns.values()))) else None
 
 
-class _Movements:
-    """Events as arrays of movements, and of requests."""
-
-    def __init__(self, dims: tuple[int, int, int], shown: list[Demonstration]) -> None:
-        c, p, t = dims
-        self.dims = {"contexts": c, "thetas": p, "goals": t, "outcomes": t}
-        self._vectors = {name: array("d") for name in self.dims}
-        self._row = {id(each): k for k, each in enumerate(shown)}
-        self._origins, self._shown, self._requests = list[str](), array("q"), list[tuple[Any, ...]]()
-        self._last, self.failed = -1, 0
-
-    def add(self, event: Event) -> None:
+def _lived(record: Record, shown: list[Demonstration]) -> tuple[dict[str, Any], Columns | None, int]:
+    """The movements as arrays; requests, None if there was none; how many movements have failed."""
+    c, p, t = record.dims
+    dims = {"contexts": c, "thetas": p, "goals": t, "outcomes": t}
+    vectors = {name: array("d") for name in dims}
+    row = {id(each): k for k, each in enumerate(shown)}
+    origins, before, requests = list[str](), array("q"), list[dict[str, Any]]()
+    last, failed = -1, 0
+    for event in record.events(shown):
         if event.lesson is not None:
-            self._last = self._row[id(event.lesson)]
-            if self._requests and self._requests[-1][3] == "shown" and self._requests[-1][4] is None:
-                self._requests[-1] = (*self._requests[-1][:4], event.lesson, *self._requests[-1][5:])
+            last = row[id(event.lesson)]
+            if requests and requests[-1]["reply"] == "shown" and requests[-1]["shown"] < 0:
+                requests[-1]["shown"] = last
         elif event.kind == Kind.ASKED and event.goal is not None:
-            asked = len(self._origins), event.who, event.strategy, event.reply, None, event.context, event.goal
-            self._requests.append(asked)
+            words = {"teacher": event.who, "strategy": event.strategy, "reply": event.reply}
+            requests.append({"index": len(origins), **words, "shown": -1, "wanted": (event.context, event.goal)})
         elif event.kind in (Kind.MOVED, Kind.RESTED, Kind.FAILED):
-            self.failed += event.kind == Kind.FAILED
-            self._origins.append(event.origin or "")
-            self._shown.append(self._last)
-            self._last = -1
+            failed += event.kind == Kind.FAILED
+            origins.append(event.origin or "")
+            before.append(last)
+            last = -1
             values = (event.context, event.theta, event.goal, event.outcome)
-            for (name, dim), value in zip(self.dims.items(), values, strict=True):
-                self._vectors[name].extend([np.nan] * dim if value is None else value.tolist())
+            for (name, dim), value in zip(dims.items(), values, strict=True):
+                vectors[name].extend([np.nan] * dim if value is None else value.tolist())
+    n = len(origins)
+    arrays = {name: np.array(vectors[name]).reshape(n, dim) for name, dim in dims.items()}
+    origin, demonstration = np.array(origins, dtype=np.str_), np.array(before, dtype=np.int64)
+    found = {"index": np.arange(n), "origin": origin, "demonstration": demonstration, **arrays}
+    return found, _requests(requests, shown, t) if requests else None, failed
 
-    def arrays(self) -> dict[str, Any]:
-        n = len(self._origins)
-        vectors = {
-            name: np.frombuffer(self._vectors[name]).reshape(n, dim) if n * dim else np.empty((n, dim))
-            for name, dim in self.dims.items()
-        }
-        shown = np.array(self._shown, dtype=np.int64)
-        origin = np.array(self._origins, dtype=np.str_)
-        return {"index": np.arange(n), "origin": origin, "demonstration": shown, **vectors}
 
-    def requests(self) -> Columns | None:
-        """index of the movement that came next, teacher, strategy, reply, shown (which demonstration, -1 for none),
-        wanted_* and got_*, points of C x T, and how far their outcomes are ``apart``."""
-        if not self._requests:
-            return None
-        index, teacher, strategy, reply, shown, contexts, goals = zip(*self._requests, strict=True)
-        wanted = np.stack([np.concatenate(each) for each in zip(contexts, goals, strict=True)])
-        nothing = np.full(wanted.shape[1], np.nan)
-        got = np.stack([nothing if each is None else np.concatenate((each.context, each.outcome)) for each in shown])
-        t = self.dims["outcomes"]
-        words = {"teacher": teacher, "strategy": strategy, "reply": reply}
-        return {
-            "index": np.array(index),
-            **{name: np.array(values, dtype=np.str_) for name, values in words.items()},
-            "shown": np.array([-1 if each is None else self._row[id(each)] for each in shown]),
-            **{f"wanted_{k}": column for k, column in enumerate(wanted.T)},
-            **{f"got_{k}": column for k, column in enumerate(got.T)},
-            "apart": np.array([np.linalg.norm(each) for each in got[:, -t:] - wanted[:, -t:]]),
-        }
+def _requests(requests: list[dict[str, Any]], shown: list[Demonstration], outcome_dim: int) -> Columns:
+    """index of the movement that came next, teacher, strategy, reply, shown (which demonstration, -1 for none),
+    wanted_* and got_*, points of C x T, and how far their outcomes are ``apart``."""
+    wanted = np.stack([np.concatenate(each.pop("wanted")) for each in requests])
+    got = np.full_like(wanted, np.nan)
+    for k, each in enumerate(requests):
+        if each["shown"] >= 0:
+            got[k] = np.concatenate((shown[each["shown"]].context, shown[each["shown"]].outcome))
+    return {
+        **{name: np.array([each[name] for each in requests]) for name in requests[0]},
+        **{f"wanted_{k}": column for k, column in enumerate(wanted.T)},
+        **{f"got_{k}": column for k, column in enumerate(got.T)},
+        "apart": np.array([np.linalg.norm(each) for each in (got - wanted)[:, -outcome_dim:]]),
+    }
 
 
 def _columns(record: Record, table: str) -> Columns:
-    names, rows = record.columns(table), list(record.rows(table))
-    columns = zip(*rows, strict=True) if rows else ([] for _ in names)
-    return {name: _column(name, column) for name, column in zip(names, columns, strict=True)}
+    rows, declared = list(record.rows(table)), (column.split() for column in layout(record.dims)[table][:-1])
+    return {name: np.array([row[k] for row in rows], dtype=_KINDS[kind]) for k, (name, kind) in enumerate(declared)}
 
 
-def _column(name: str, values: Any) -> np.ndarray:
-    if name in ("answer", "path"):
-        return np.array(values, dtype=np.str_)
-    whole = name in ("movements", "goal", "goals", "attempts", "exemplar", "exemplars", "steps", "diverged", "failed")
-    return np.array(values, dtype=np.int64 if whole else np.float64)
+_KINDS: Final = {"TEXT": np.str_, "INTEGER": np.int64, "REAL": np.float64}  # NULL is NaN
 
 
 def config_of(run: Run, *, trust: bool = False) -> Config:
@@ -229,22 +207,13 @@ def config_of(run: Run, *, trust: bool = False) -> Config:
     Raises:
         RunError: its settings name such code and are not trusted, or do not describe a run of this version.
     """
-    code = [] if trust else list(_code_of(run.config))
+    code = [] if trust else code_of(run.config)
     if code:
         raise RunError(f"{run.path} names code of its own, {', '.join(code)}; look at it, then execute it with --trust")
     try:
         return Config.from_settings(run.config)
     except (TypeError, ValueError) as error:
         raise RunError(f"the settings of {run.path} do not describe a run of this version: {error}") from error
-
-
-def _code_of(settings: Mapping[str, Any]) -> Iterator[str]:
-    """What is neither in the catalogue nor in this library."""
-    for name in sorted(settings.keys() - {*PLACE, *FILES}):
-        value = settings[name]
-        for word in value if isinstance(value, list) else [value]:
-            if isinstance(word, str) and ":" in word and not word.startswith("sgimd_torch."):
-                yield word
 
 
 def find_runs(place: str | os.PathLike[str]) -> dict[str, list[Path]]:

@@ -8,25 +8,24 @@ from __future__ import annotations
 import math
 import time
 import traceback
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
-from typing import Any, Final, Self
+from typing import TYPE_CHECKING, Any, Final, Self
 
 from sgimd_torch.environments.protocol import FAILURES, SimulationError
 from sgimd_torch.evaluation import Evaluation, evaluate
-from sgimd_torch.record import RunError
+from sgimd_torch.record import Record, RunError
 from sgimd_torch.runs.build import RunParts
-from sgimd_torch.runs.clock import Seconds
 from sgimd_torch.runs.config import OWN
 from sgimd_torch.runs.directory import open_run
-from sgimd_torch.runs.evaluations import read_evaluations, sort_evaluations, write_evaluation
-from sgimd_torch.runs.listeners import listeners_of
+from sgimd_torch.runs.evaluations import read_evaluations, write_evaluation
+from sgimd_torch.runs.listeners import Listener, Seconds
 from sgimd_torch.runs.process import Failed, Progress, Stopped, Stopping, say
 from sgimd_torch.session import NoOutcomeError, ReplayError, live, reason_of, run
 from sgimd_torch.spaces import Episode
-from sgimd_torch.teachers.answering import Demonstrator
-from sgimd_torch.teachers.awaited import Awaited
-from sgimd_torch.teachers.by_hand import ByHand
+
+if TYPE_CHECKING:
+    from sgimd_torch.teachers.answering import Demonstrator
 
 TOLD: Final = 3  # failed movements that are told one by one
 COMMIT_EVERY: Final = 1.0  # s; a killed run loses what came since
@@ -47,9 +46,9 @@ def carry_out(parts: RunParts, stopping: Stopping, *, resume: bool, accept_loss:
         Failed: it failed under way.
         Stopped: by a signal.
     """
-    with Life(parts, stopping, resume=resume, accept_loss=accept_loss) as life:
+    with Life(parts, resume=resume, accept_loss=accept_loss) as life:
         try:
-            life.go_on()
+            life.go_on(stopping)
         except Stopped:
             say(f"stopped after {life.movements} movements; to go on: {again}")
             raise
@@ -68,10 +67,10 @@ def carry_out(parts: RunParts, stopping: Stopping, *, resume: bool, accept_loss:
 
 class Life:
     """A run under way. After each movement it is recorded, then listeners are told, then it is evaluated. A context
-    manager; leaving it brings to the disk what was lived.
+    manager; leaving it brings to the disk what was lived, but where it was broken off, as by Ctrl-C.
 
     Args:
-        parts, stopping, resume, accept_loss: see ``carry_out``.
+        parts, resume, accept_loss: see ``carry_out``.
 
     Attributes:
         record: of the run; it is written from the end of the replay on.
@@ -81,8 +80,8 @@ class Life:
         RunError, OSError: see ``open_run``.
     """
 
-    def __init__(self, parts: RunParts, stopping: Stopping, *, resume: bool, accept_loss: bool = False) -> None:
-        self.parts, self.stopping = parts, stopping
+    def __init__(self, parts: RunParts, *, resume: bool, accept_loss: bool = False) -> None:
+        self.parts = parts
         self.record, notes = open_run(parts, resume=resume, accept_loss=accept_loss)
         say(*parts.notes, *notes)
         self.movements, self.recorded, self.failed = 0, self.record.movements, 0
@@ -96,18 +95,19 @@ class Life:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        self.close(failed=kind is not None)
+        broken_off = kind is not None and issubclass(kind, KeyboardInterrupt)
+        with suppress(*([] if kind is None else [OSError])):  # of a full disk the first error is told
+            self.close(keep=not broken_off)
 
-    def close(self, *, failed: bool = False) -> None:
-        """Bring to the disk what was lived, and let others have the record."""
+    def close(self, *, keep: bool = True) -> None:
+        """Let others have the record, and ``keep`` what came since the last commit."""
         try:
-            if not self.replaying and not self.record.failed:
+            if keep and not self.replaying and not self.record.failed:
                 self._settle()
         finally:
             self.record.close()
             for each in self.listeners:
-                with suppress(*([OSError] if failed else [])):  # of a full disk the first error is told
-                    each.close()
+                each.close()
 
     @property
     def replaying(self) -> bool:
@@ -129,8 +129,8 @@ class Life:
         failed = f" ({self.failed} failed)" if self.failed else ""
         return f"{self.parts.config.directory}: {self.movements} movements{failed}, {found}"
 
-    def go_on(self) -> None:
-        """From the first movement to the last."""
+    def go_on(self, stopping: Stopping) -> None:
+        """From the first movement to the last, or to the one after which ``stopping`` has heard a signal."""
         total, title = self.parts.config.movements, self.parts.config.title
         unit = self.parts.environment.outcomes.amount
         with Progress("replaying" if self.recorded else title, self.recorded or total) as progress:
@@ -139,13 +139,15 @@ class Life:
                 progress.show(self.movements, "" if last is None else f"error {unit(last.mean_error, '.4f')}")
                 if self.movements == self.recorded < total:
                     progress.begin(title, total, self.movements)
-                self.stopping.check()
+                if stopping.heard:
+                    if not self.replaying:
+                        self.commit()
+                    raise Stopped(stopping.heard)
         self.commit()
 
     def episodes(self) -> Iterator[Episode]:
         """The same, one movement after the other: first those that were recorded, then new ones."""
         parts, seed = self.parts, self.parts.config.seed
-        alive = self.stopping.at_once(2)(live(parts.environment, seed))
         episodes = run(
             parts.learner,
             parts.environment,
@@ -153,7 +155,7 @@ class Life:
             movements=parts.config.movements,
             teacher=parts.teacher,
             teachers={name: self._awaited(name, each) for name, each in parts.teachers.items()},
-            execute=self.seconds.of("physics")(alive),
+            execute=self.seconds.of("physics")(live(parts.environment, seed)),
             record=self.record,
             failures=parts.config.failures or FAILURES,
         )
@@ -176,9 +178,12 @@ class Life:
 
     def _awaited(self, name: str, teacher: Demonstrator) -> Demonstrator:
         """A person who teaches by hand is waited for by the page that they see."""
+        from sgimd_torch.teachers.awaited import Awaited  # most learners ask nobody
+        from sgimd_torch.teachers.by_hand import ByHand
+
         if isinstance(teacher, ByHand):
             return teacher
-        return Awaited(name, teacher, patience=self.parts.config.patience, say=say, waiting=self.stopping.at_once)
+        return Awaited(name, teacher, patience=self.parts.config.patience, say=say)
 
     @property
     def _last(self) -> Evaluation | None:
@@ -209,7 +214,7 @@ class Life:
         if found is None:
             if len(self.parts.learner.memory) == 0:
                 return
-            with self.seconds.of("evaluation"), self.stopping.at_once():
+            with self.seconds.of("evaluation"):
                 found = self.evaluations[self.movements] = evaluate_answers(self.parts, self.movements)
             near = self.parts.benchmark.side / 2
             write_evaluation(self.record, self.movements, found, near, self.parts.regions)
@@ -222,8 +227,24 @@ class Life:
         """The replay is over: from now on files change."""
         for each in self.listeners:
             each.begin()
-        sort_evaluations(self.record)
         self.commit()
+
+
+def listeners_of(parts: RunParts, record: Record, seconds: Seconds) -> list[Listener]:
+    """Who listens to a run, in the order in which they are told."""
+    found: list[Listener] = []
+    curves: Callable[[], Mapping[str, float]] = dict
+    if parts.model is not None and parts.trust is not None:
+        from sgimd_torch.runs.model_listener import ModelListener
+
+        model = ModelListener(record, parts.model, parts.trust.error, parts.learner.memory, seconds)
+        found.append(model)
+        curves = model.new_curves
+    if parts.config.board:
+        from sgimd_torch.board.listener import BoardListener
+
+        found.append(BoardListener(parts.config.directory, parts, seconds.summary, curves))
+    return found
 
 
 def evaluate_answers(parts: RunParts, movements: int) -> dict[str, Evaluation]:

@@ -31,11 +31,11 @@ from typing import Final, NamedTuple, TypeVar
 
 from sgimd_torch.files import make_folder
 from sgimd_torch.runs.command_line import parse
-from sgimd_torch.runs.config import FILES, Config, dashed
+from sgimd_torch.runs.config import FILES, Config, code_of, dashed
 from sgimd_torch.runs.engines.local import local
 from sgimd_torch.runs.engines.loop import Submit, sweep
 from sgimd_torch.runs.process import loading, say
-from sgimd_torch.runs.read import finished, movements_on_disk, read_run
+from sgimd_torch.runs.read import finished, movements_on_disk
 
 Item = TypeVar("Item")
 NOT_VARIED: Final = {
@@ -83,12 +83,6 @@ def carry_out(whole: Sequence[Config], options: argparse.Namespace, flags: Seque
     configs = options.shard.of(whole)
     left = [config for config in configs if not finished(config)]
     say(f"{len(configs)} runs{options.shard.note(whole)}, {len(configs) - len(left)} of them finished: {out}")
-    own = [config for config in configs if config.own and config not in left]
-    if own:
-        from sgimd_torch.runs.directory import changed_sources, sources
-
-        notes = ((each, changed_sources(read_run(each.directory).versions, sources(each))) for each in own)
-        say(*(f"{config.title}: {note}" for config, found in notes for note in found))
     if options.dry_run:
         for config in left:
             print(f"{config.directory}: {movements_on_disk(config.directory)} of {config.movements} movements")
@@ -172,7 +166,9 @@ def engine_of(options: argparse.Namespace, configs: Sequence[Config]) -> Abstrac
     except ModuleNotFoundError as error:
         hint = "pip install 'sgimd-torch[ray]' installs it"
         raise ImportError(f"--engine ray needs {error.name}, which is not installed; {hint}") from error
-    return on_ray(options.address, processes, ships=any(config.own for config in configs), out=configs[0].out)
+    return on_ray(
+        options.address, processes, ships=any(code_of(config.settings) for config in configs), out=configs[0].out
+    )
 
 
 class Shard(NamedTuple):

@@ -8,7 +8,6 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from concurrent.futures import Future, wait
-from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 from queue import SimpleQueue
 from threading import Thread
@@ -34,7 +33,6 @@ class Awaited:
         teacher: who answers.
         patience: seconds to wait for an answer; None for as long as it takes.
         say: gets the messages; None prints them on stderr.
-        waiting: a block to wait in, such as one that a signal may end.
 
     Raises:
         ValueError: ``patience`` is not above 0.
@@ -47,14 +45,12 @@ class Awaited:
         *,
         patience: float | None = None,
         say: Callable[[str], object] | None = None,
-        waiting: Callable[[], AbstractContextManager[object]] = nullcontext,
     ) -> None:
         if patience is not None and not patience > 0:
             raise ValueError(f"patience must be above 0 s, got {patience}; None waits for ever")
         self.name, self.teacher, self.takes = name, teacher, getattr(teacher, "takes", 0)
         self.patience = patience
         self._say = partial(print, file=sys.stderr) if say is None else say
-        self._waiting = waiting
         self._requests: SimpleQueue[tuple[Found, Callable[[], Demonstration | None]]] = SimpleQueue()
         # An executor's thread would keep a process alive whose teacher never answers.
         self._thread = Thread(target=self._work, daemon=True)
@@ -66,16 +62,15 @@ class Awaited:
             TimeoutError: no answer came in time.
         """
         found = Found()
-        with self._waiting():
-            if not self._thread.is_alive():
-                self._thread.start()
-            self._requests.put((found, partial(self.teacher.demonstrate, context, goal, memory)))
-            silent = SILENT_FOR if self.patience is None else min(SILENT_FOR, self.patience)
-            wait([found], silent)
-            if not found.done() and silent != self.patience:
-                limit = "for as long as it takes" if self.patience is None else f"for {self.patience:g} s at most"
-                self._say(f"waiting for teacher {self.name}, {limit}")
-                wait([found], None if self.patience is None else self.patience - silent)
+        if not self._thread.is_alive():
+            self._thread.start()
+        self._requests.put((found, partial(self.teacher.demonstrate, context, goal, memory)))
+        silent = SILENT_FOR if self.patience is None else min(SILENT_FOR, self.patience)
+        wait([found], silent)
+        if not found.done() and silent != self.patience:
+            limit = "for as long as it takes" if self.patience is None else f"for {self.patience:g} s at most"
+            self._say(f"waiting for teacher {self.name}, {limit}")
+            wait([found], None if self.patience is None else self.patience - silent)
         if not found.done():
             found.cancel()  # if it has not begun yet, it never does
             raise TimeoutError(f"it took longer than {self.patience:g} s")

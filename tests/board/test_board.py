@@ -26,7 +26,6 @@ from sgimd_torch.figures.sections import sections
 from sgimd_torch.inverses.local import LocalInverse
 from sgimd_torch.runs.build import build
 from sgimd_torch.runs.config import Config
-from sgimd_torch.runs.process import Stopping
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.run import Life
 from sgimd_torch.spaces import Box, Demonstration, Episode, Move, Request
@@ -411,8 +410,8 @@ def live_as(out, robot, make, **options):
         **{**alone, "environment": robot, "learner": learner, "answers": {"own": LocalInverse(learner.memory)}},
         benchmark=Benchmark("Slider", goals, 0.1),
     )
-    with Stopping() as stopping, Life(parts, stopping, resume=False) as life:
-        life.go_on()
+    with Life(parts, resume=False) as life:
+        list(life.episodes())
     return config.directory
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from runs import ROOT, content_of
-from sgimd_torch.catalogue import CATALOGUE, Entry, checked, colour, find, label, load
+from sgimd_torch.catalogue import CATALOGUE, colour, find, label, load
 from sgimd_torch.catalogue.options import parameters_of
 from sgimd_torch.runs import command_line
 from sgimd_torch.runs.build import build, task_of
@@ -201,11 +201,6 @@ def test_what_is_said_to_be_filmed_brings_a_picture(word):
     assert CATALOGUE["environment"][word].filmed == (task.picture is not None)
 
 
-def test_a_part_without_its_members_is_refused_by_name():
-    with pytest.raises(ValueError, match=r"gave a int without sample, add; wanted \(contexts, outcomes, rng\)"):
-        checked("goals", "mine:Own", lambda: 7)()
-
-
 CHANGED = [
     Config(),
     Config("sagg-riac", evaluate_at=(5, 6), parts={"goals": "grid", "goals.progress": "signed", "goals.window": 8}),
@@ -244,8 +239,6 @@ def test_dashes_and_underscores_mean_the_same():
 @pytest.mark.parametrize(
     ("options", "wanted"),
     [
-        ("--goals.window 12", "--goals.window: goals uniform has no such option; goals interest-map, grid have it"),
-        ("--goals grid --goals.windwo 12", "did you mean goals.window"),
         ("--window 12", r"no such option; goals interest-map, grid \(goals.window\) have it"),
         ("--algorithm random --budget 5", "--budget: algorithm random has .* sagg-riac, practice, .* have it"),
         ("--algorithm random --goals.window 5", "--goals.window: algorithm random .* sagg-riac, .* have it"),
@@ -259,7 +252,6 @@ def test_dashes_and_underscores_mean_the_same():
         ("--evaluated-by own,nearst", "unknown inverse 'nearst'; did you mean nearest"),
         ("--evaluated-by nearest", "evaluated_by must begin with own"),
         ("--seed x", "--seed must be a whole number, got x"),
-        ("--seed -1", "seed must be at least 0"),
         ("--movements 0", "movements must be at least 1"),
         ("--repeats 1", "repeats must be 0 or at least 2"),
         ("--evaluate-at 5,x", "--evaluate-at must be whole numbers such as 250,500, or .* or null, got 5,x"),
@@ -269,13 +261,11 @@ def test_dashes_and_underscores_mean_the_same():
         ("--global-range 1", "--global-range must be 2 numbers such as"),
         ("--board perhaps", "--board must be true or false, got perhaps"),
         ("--resume=3", "--resume takes no value"),
-        ("--seed", "--seed needs a value"),
-        ("x", "'x' belongs to no option"),
         ("--name ..", "name must be that of one directory"),
         ("--search.sd -1", "sd must be positive"),  # from here on by the part itself, before anything is written
         ("--algorithm sgim-d --goals.window 7", "window must be even"),
         ("--environment.task_space 0", "task_space must be above 0"),
-        ("--environment.noise .nan", "noise must be finite"),
+        ("--environment.noise nan", "noise must be finite"),
         ("--give-up 1", "give_up must be"),
         ("--social.epsilon -1", "epsilon must be"),
         ("--algorithm sgim-d --teacher.every 0", "every must be"),
@@ -298,7 +288,7 @@ def test_help_is_one_screen_and_a_parts_options_are_shown_once_it_is_chosen(caps
         assert stop.value.code == 0
     assert len(overview(command_line.__doc__).splitlines()) <= 60
     said = capsys.readouterr().out
-    assert said.count("--goals.window X") == 1
+    assert said.count("--goals.window ") == 2  # of which one is an example
     assert "how many recent goals the interest looks at" in " ".join(said.split())
 
 
@@ -332,8 +322,3 @@ def test_an_entry_that_is_not_installed_names_its_extra(monkeypatch):
     sys.modules.pop("sgimd_torch.searches.cma_es", None)
     with pytest.raises(ValueError, match=r"pip install 'sgimd-torch\[rivals\]'"):
         find("search", "cma-es").load()
-
-
-def test_the_environment_of_a_config_is_the_task_it_names():
-    assert len(task_of(Config(parts={"environment": "planar-arm-50"})).environment.policies.low) == 50
-    assert isinstance(find("environment", "planar-arm-7"), Entry)

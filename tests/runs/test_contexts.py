@@ -13,25 +13,6 @@ from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
 
-TOSS = "--environment toss --algorithm sagg-riac --movements 60 --evaluate-at 30 --repeats 2 --evaluated-by own,nearest"
-
-
-def live(out, *options):
-    return command(main, [*TOSS.split(), "--out", str(out), *map(str, options)])
-
-
-@pytest.fixture(scope="module")
-def run(tmp_path_factory):
-    out = tmp_path_factory.mktemp("toss")
-    assert live(out) == 0
-    return read_run(out / "sagg-riac/seed-000")
-
-
-def test_a_run_with_contexts_ends_the_same_however_often_it_was_stopped(run, tmp_path):
-    assert live(tmp_path, "--movements", 40) == 0
-    assert live(tmp_path, "--resume") == 0
-    assert content_of(tmp_path / "sagg-riac/seed-000") == content_of(run.path)
-
 
 @pytest.mark.parametrize(("word", "reach"), [("rod-wind", 0.05), ("rod-yaw", 0.5)])
 def test_the_contexts_of_the_rod_are_tasks(word, reach):

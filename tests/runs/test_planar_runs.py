@@ -5,7 +5,6 @@ import re
 import numpy as np
 import pytest
 
-from runs import content_of, files_of
 from sgimd_torch.catalogue import CATALOGUE
 from sgimd_torch.demonstrations import save_demonstrations
 from sgimd_torch.environments.fishing_rod import FishingRod
@@ -28,14 +27,6 @@ SHORT = "--algorithm sgim-d --environment planar-arm-7 --seed 3 --movements 70 -
 def live(out, *options):
     """The exit code of a short run; later options win."""
     return command(main, [*SHORT.split(), *map(str, ("--out", out, *options))])
-
-
-@pytest.fixture(scope="module")
-def reference(tmp_path_factory):
-    """Directory of a whole run of SGIM-D."""
-    out = tmp_path_factory.mktemp("arm")
-    assert live(out) == 0
-    return out / "sgim-d" / "seed-003"
 
 
 @pytest.mark.parametrize("environment", ARMS)
@@ -98,16 +89,6 @@ def test_demonstrations_for_an_arm_lead_from_rest_to_equal_bends_all_over_its_re
     assert arm.length - radius / 4 < far.max() <= arm.length
 
 
-def test_an_imitating_arm_varies_the_posture_that_it_was_shown(tmp_path):
-    assert live(tmp_path, "--algorithm", "imitation", "--epsilon", 0.03) == 0
-    run, arm = read_run(tmp_path / "imitation" / "seed-003"), PlanarArm()
-    assert np.flatnonzero(run.demonstration >= 0).tolist() == [30, 60]
-    shown = run.demonstrations[run.demonstration[30]]
-    assert shown.outcome.tolist() in [each.outcome.tolist() for each in arm_demonstrations(arm)]
-    assert np.array_equal(run.goals[30], shown.outcome)
-    assert (np.abs(run.thetas[30:60] - arm.correspondence(shown.times, shown.trajectory)) <= 0.03 + 1e-12).all()
-
-
 def test_own_demonstrations_and_goals_replace_those_of_the_arm(tmp_path, capsys):
     arm = PlanarArm()
     save_demonstrations(tmp_path / "own.npz", arm_demonstrations(arm)[:2])
@@ -145,19 +126,3 @@ def test_files_of_another_robot_are_refused(tmp_path, benchmark, capsys, environ
     assert re.search(message, errors)
     assert "Traceback" not in errors
     assert not (tmp_path / "out").exists()
-
-
-def test_a_run_on_an_arm_made_longer_equals_a_long_run(tmp_path, reference):
-    assert live(tmp_path, "--movements", 50) == 0
-    assert live(tmp_path, "--resume") == 0
-    assert content_of(tmp_path / "sgim-d" / "seed-003") == content_of(reference)
-
-
-@pytest.mark.parametrize("other", ["fishing-rod", "planar-arm-50"])
-def test_a_run_of_one_environment_is_not_resumed_in_another(tmp_path, capsys, other):
-    assert live(tmp_path, "--movements", 5) == 0
-    directory = tmp_path / "sgim-d" / "seed-003"
-    before = files_of(directory)
-    assert live(tmp_path, "--environment", other, "--resume") == 2
-    assert f"environment was planar-arm-7, now {other}" in capsys.readouterr().err
-    assert files_of(directory) == before

@@ -71,7 +71,7 @@ def test_whether_a_run_is_finished_is_counted_not_believed(run):
 
 def test_a_run_that_has_just_begun_is_read_as_empty(run):
     with Record(run / FILE, write=True) as record:
-        record.rewrite(n_events=0, keep=("goals",))
+        record.rewrite(n_events=0).close()
     found = read_run(run)
     assert found.thetas.shape == (0, 7)
     assert found.evaluation["mean_error"].shape == (0,)
@@ -82,14 +82,12 @@ def test_a_run_that_has_just_begun_is_read_as_empty(run):
 
 def test_what_is_no_run_is_refused(tmp_path, run):
     (tmp_path / "old").mkdir()
-    (tmp_path / "old" / "config.json").touch()
     random_exploration(PlanarArm(7), 0).save(tmp_path / "old" / FILE)
     (tmp_path / "csv").mkdir()
-    (tmp_path / "csv" / "config.json").touch()
     for path, message in (
         (tmp_path, "holds no run;"),
         (tmp_path / "nowhere", "holds no run;"),
-        (tmp_path / "csv", "holds a run of files that this version does not read"),
+        (tmp_path / "csv", "holds no run;"),
         (tmp_path / "old", r"is a life that Learner\.save wrote"),
     ):
         with pytest.raises(RunError, match=message):

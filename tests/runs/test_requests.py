@@ -70,24 +70,19 @@ def test_a_run_that_lost_its_robot_just_after_it_was_shown_something_has_that_an
     def execute(self, context, theta, rng, really=PlanarArm.execute):
         executed.append(theta)
         if len(executed) == lost + 1:
+            life.commit()
             raise KeyboardInterrupt
         return really(self, context, theta, rng)
 
     with monkeypatch.context() as patched:
         parts = build(parse([*ACTS, *SHORT, f"--out={tmp_path}", "--name=run"])[0])
         patched.setattr(PlanarArm, "execute", execute)
-        with Stopping() as stopping, pytest.raises(KeyboardInterrupt), Life(parts, stopping, resume=False) as life:
-            life.go_on()
+        with Stopping() as stopping, pytest.raises(KeyboardInterrupt), Life(parts, resume=False) as life:
+            life.go_on(stopping)
     cut = content_of(tmp_path / "run" / "seed-003")["events"]
     assert [row[1] for row in cut[-2:]] == ["asked", "shown"]
     assert movements_on_disk(tmp_path / "run" / "seed-003") == lost
     assert content_of(go(tmp_path, "--resume")) == content_of(whole)
-
-
-def test_a_run_that_does_not_ask_has_no_table(tmp_path):
-    words = "--environment=planar-arm-7 --algorithm=practice --name=run"
-    assert command(main, [*words.split(), *SHORT, f"--out={tmp_path}"]) == 0
-    assert read_run(tmp_path / "run" / "seed-000").requests is None
 
 
 @pytest.mark.parametrize("environment", ["fishing-rod", "rod-wind"])

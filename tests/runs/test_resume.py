@@ -9,13 +9,11 @@ import pytest
 from runs import (
     MOVEMENTS,
     STOPS,
-    about_of,
     arguments,
     content_of,
     edit,
     end,
     files_of,
-    settle,
     start,
     stopped,
     stopped_at,
@@ -271,19 +269,6 @@ def test_another_configuration_a_shorter_one_and_what_is_no_run_are_refused(tmp_
     assert files_of(copy) == before
 
 
-@pytest.mark.parametrize(
-    ("name", "message"),
-    [("thesis.tex", "holds thesis.tex but no run"), ("config.json", "that this version does not read")],
-)
-def test_a_directory_with_other_files_is_left_alone(tmp_path, go, capsys, name, message):
-    directory = tmp_path / "sgim-d" / "seed-003"
-    directory.mkdir(parents=True)
-    (directory / name).touch()
-    assert go(tmp_path) == go(tmp_path, "--resume") == 2
-    assert capsys.readouterr().err.count(message) == 2
-    assert files_of(directory) == {name: b""}
-
-
 @pytest.mark.parametrize("watched", ["false", "true"])
 def test_a_full_disk_is_reported_and_the_run_can_go_on(tmp_path, go, benchmark, reference, watched):
     words = (*arguments(tmp_path, benchmark), "--board", watched)
@@ -297,16 +282,3 @@ def test_a_full_disk_is_reported_and_the_run_can_go_on(tmp_path, go, benchmark, 
     assert movements_on_disk(directory) < MOVEMENTS
     assert go(tmp_path, "--board", watched, "--resume") == 0
     assert content_of(directory) == reference
-
-
-def test_the_versions_of_each_part_of_a_run_are_kept(tmp_path, go, capsys):
-    directory = tmp_path / "sgim-d" / "seed-003"
-    short = ("--movements", 3, "--evaluate_at", "[]")
-    assert go(tmp_path, *short) == 0
-    for other in ("1.0", "2.0"):
-        settle(directory, versions={**about_of(directory)["versions"], "numpy": other})
-        assert go(tmp_path, *short, "--resume") == 0
-        assert f"resumed with other versions: numpy {other} -> {np.__version__}" in capsys.readouterr().err
-    now = about_of(directory)["versions"]
-    assert now["numpy"] == np.__version__
-    assert [part["numpy"] for part in now["before"]] == ["1.0", "2.0"]

@@ -1,6 +1,5 @@
 """Runs with a forward model: what they record and report, what they refuse, and that a stop leaves no trace."""
 
-import importlib.metadata
 import re
 import shutil
 
@@ -10,7 +9,7 @@ from tensorboard.backend.event_processing.event_file_loader import EventFileLoad
 from tensorboard.plugins.custom_scalar import layout_pb2
 from tensorboard.util.tensor_util import make_ndarray
 
-from runs import LIVE, RUN, about_of, content_of, edit, end, start, stopped_at
+from runs import LIVE, RUN, content_of, edit, end, start, stopped_at
 from sgimd_torch.board.legend import LEGEND
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import Benchmark, save_benchmark
@@ -18,10 +17,10 @@ from sgimd_torch.forward_model.model import ForwardModel
 from sgimd_torch.memory import Memory
 from sgimd_torch.record import Record
 from sgimd_torch.runs.build import LEAST_NOISE, build
-from sgimd_torch.runs.clock import Seconds
 from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.directory import FILE
+from sgimd_torch.runs.listeners import Seconds
 from sgimd_torch.runs.model_listener import ModelListener
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
@@ -263,13 +262,6 @@ def test_an_option_of_the_model_changes_the_run(tmp_path, live, reference, optio
     assert changed[:50] == whole[:50]  # until it is asked
 
 
-def test_the_outcomes_of_a_search_change_its_next_movement_unless_they_are_left_out(tmp_path, live, reference):
-    assert live(tmp_path, *MODEL, "--search.residual", "false", "--movements", 100) == 0
-    left_out, counted = read_run(tmp_path / "sgim-d" / "seed-003"), read_run(reference)
-    first = np.flatnonzero((left_out.thetas != counted.thetas[:100]).any(axis=1))[0]
-    assert np.array_equal(left_out.goals[first], left_out.goals[first - 1])  # not the first movement for its goal
-
-
 def test_the_board_shows_how_the_model_does_and_explains_it(reference):
     curves, (_, refreshes) = curves_of(reference), table(reference, "refreshes")
     assert {tag for tag in curves if tag.startswith("model/")} == TAGS
@@ -291,19 +283,6 @@ def test_the_board_of_a_run_without_a_model_has_nothing_of_it(tmp_path, live):
     curves = curves_of(tmp_path / "sgim-d" / "seed-003")
     assert not [tag for tag in curves if tag.startswith("model/")]
     assert not [tag for tag in charts_of(curves) if tag.startswith("model/")]
-
-
-def test_its_libraries_are_recorded(reference):
-    forward, versions = ("torch", "lightning", "safetensors"), about_of(reference)["versions"]
-    assert {name: versions[name] for name in forward} == {name: importlib.metadata.version(name) for name in forward}
-
-
-def test_a_run_is_not_resumed_with_another_model(tmp_path, live, capsys):
-    assert live(tmp_path, *MODEL, "--movements", 10) == 0
-    assert live(tmp_path, *MODEL, "--movements", 10, "--resume", "--model.rate", 3, "--trust.anchors", "false") == 2
-    message = capsys.readouterr().err
-    assert "model.rate was 2.0, now 3.0" in message
-    assert "trust.anchors was True, now False" in message
 
 
 def test_a_run_that_learns_a_model_but_answers_without_it_is_evaluated_by_both(tmp_path, live):

@@ -19,7 +19,7 @@ from runs import content_of, start, sweep_here
 from sgimd_torch.runs.command_line import main as run
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.engines import loop
-from sgimd_torch.runs.process import Failed, Progress, command
+from sgimd_torch.runs.process import Failed, command
 from sgimd_torch.runs.read import finished, movements_on_disk
 from sgimd_torch.runs.sweep import main, variants_of
 
@@ -242,24 +242,6 @@ def test_failures_are_named_in_the_order_of_the_list_and_the_others_go_on(whole,
     assert sorted(ended_well) == [0, 2]
 
 
-def test_progress_begins_with_what_is_on_disk_and_does_not_wait_for_what_a_failed_run_will_never_make(
-    copied, tmp_path, monkeypatch
-):
-    shown = []
-
-    class Watched(Progress):
-        def begin(self, title, total, done=0):
-            shown.append((done, total, ""))
-            super().begin(title, total, done)
-
-        def show(self, done, note=""):
-            shown.append((done, self.total, note))
-
-    monkeypatch.setattr(loop, "Progress", Watched)
-    loop.sweep([copied, short(tmp_path, seed=1)], lambda config, flags: ended(Failed("broke") if config.seed else None))
-    assert shown == [(40, 80, ""), (40, 40, "1 of 2 runs, 1 failed")]
-
-
 def test_two_runs_with_one_directory_are_refused(tmp_path):
     with pytest.raises(ValueError, match=r"two runs would be written to .*seed-000"):
         sweep_here([short(tmp_path), short(tmp_path, inverse="nearest")])
@@ -302,14 +284,14 @@ def begun(odd, tmp_path, monkeypatch):
 
 
 def test_a_run_that_is_killed_is_named_and_goes_on_next_time(odd, begun, tmp_path):
-    foreign = tmp_path / "random/seed-001/thesis.txt"
+    foreign = tmp_path / "random/seed-001/run.sqlite"
     foreign.parent.mkdir(parents=True)
     foreign.write_text("not a run")
     options = ["--seeds", "0-1", "--processes", 1]
     said = said_by(begun(SWEEP, *options, at_20="dies"), 1)
     assert "0 runs ended well, 2 failed" in said
     assert "random seed 0 failed: stopped by SIGKILL; the same command goes on with it" in said
-    assert re.search(r"random seed 1 failed: \S*seed-001 holds thesis.txt", said)
+    assert re.search(r"random seed 1 failed: \S*seed-001/run.sqlite cannot be read as a record", said)
     assert f"Its whole log: {tmp_path / 'random/seed-001.log'}" in said
     assert foreign.read_text() == "not a run"
     shutil.rmtree(foreign.parent)

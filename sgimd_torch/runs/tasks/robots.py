@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.environments.toys import Toy
 from sgimd_torch.evaluation import SHIPPED as SHIPPED_BENCHMARK
 from sgimd_torch.evaluation import Benchmark, tile_goals
 from sgimd_torch.runs.tasks import Task
 from sgimd_torch.spaces import Array, Box, Demonstration, stream
+
+if TYPE_CHECKING:
+    from sgimd_torch.environments.toys import Toy
 
 DATA: Final = SHIPPED_BENCHMARK.parent
 SIDE: Final = 0.1  # m, of a benchmark tile; it leaves 311 goals in the disc of radius 1 m that these arms reach

@@ -21,7 +21,6 @@ from sgimd_torch.record import Record
 from sgimd_torch.runs.build import RunParts, build
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.directory import FILE, holds_run
-from sgimd_torch.runs.process import Stopping
 from sgimd_torch.runs.run import Life
 from sgimd_torch.runs.tasks import correspondence_of, hand_led_of
 from sgimd_torch.spaces import Array, Demonstration, stream
@@ -69,7 +68,7 @@ class TaughtRun:
         self.hand = next(asked, ByHand(parts.teacher))
         self.hand.ask = self._ask
         self.parts: RunParts = replace(parts, teacher=self.hand)
-        self.life = Life(self.parts, Stopping(), resume=holds_run(self.path))
+        self.life = Life(self.parts, resume=holds_run(self.path))
         with Record(self.path) as record:
             places = lessons_among(record.events())
         self.lessons = [movement for movement, _ in places]
@@ -136,7 +135,7 @@ class TaughtRun:
         shutil.copy(self.path, partial)
         os.replace(partial, copy)
         with Record(self.path, write=True) as record:
-            record.rewrite(n_events=lessons_among(record.events())[-1][1])
+            record.rewrite(n_events=lessons_among(record.events())[-1][1]).close()
         self.open()
 
     def chart(self) -> Chart:
