@@ -334,13 +334,12 @@ def test_the_commands_make_the_same_runs_again(pages, runs):
         (["a" * 40] * 2, ""),
     ],
 )
-def test_doubtful_versions_are_reported_and_only_a_clean_commit_is_checked_out(run, commits, warning):
+def test_doubtful_versions_are_reported(run, commits, warning):
     made_by = [replace(run, versions={**run.versions, "commit": commit}) for commit in commits]
     (few, *said) = record.doubts([Variant("sgim-d", made_by)])
     assert "Fewer than 5 seeds" in few
     assert len(said) == bool(warning)
     assert warning in "".join(said)
-    assert record.checkout([Variant("sgim-d", made_by)]) == ("" if warning else f"git checkout {'a' * 40}")
 
 
 @pytest.mark.parametrize(
@@ -364,16 +363,12 @@ def asked(tmp_path_factory):
     return read_run(out / "sgim-acts" / "seed-000")
 
 
-def test_a_learner_that_asks_has_a_line_and_a_figure_of_its_requests(asked, run, tmp_path):
+def test_a_learner_that_asks_has_a_line_on_its_requests(asked, run, tmp_path):
     requests = asked.requests
     shown = requests["reply"] == "shown"
     text = page(tmp_path, [Variant("sgim-acts", [asked])])
     told = f"asked for {len(shown)} demonstrations and was shown {shown.sum()}"
     assert f"{told}, {np.median(requests['apart'][shown]):.3f} m from its goal" in text
-    assert "Requests of SGIM-ACTS" in alts(text)
-    ax = drawn(figures.requests, asked).axes[0]
-    assert sum(bar.get_height() for bar in ax.patches) == len(shown)
-    assert {text.get_text() for text in ax.get_legend().get_texts()} == {*requests["strategy"]}
     assert requested(run) == ""
 
 

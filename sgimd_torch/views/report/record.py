@@ -63,13 +63,6 @@ def versions(variants: Sequence[Variant]) -> list[tuple[str, str]]:
     return [(name, " or ".join(values)) for name, values in found.items() if values]
 
 
-def checkout(variants: Sequence[Variant]) -> str:
-    """The command that checks out the commit of all runs; "" if they differ, or it had uncommitted changes."""
-    commits = {str(run.versions.get("commit")) for variant in variants for run in variant.runs}
-    name = commits.pop() if len(commits) == 1 else "None"
-    return "" if name == "None" or name.endswith("-dirty") else shlex.join(["git", "checkout", name])
-
-
 def commands(runs: Sequence[Run]) -> list[str]:
     """A line of shell for all runs of the same settings, defaults left out."""
     groups: dict[str, list[int]] = {}
