@@ -87,8 +87,6 @@ def test_about_as_many_goals_as_wanted_are_made_also_where_little_of_a_large_spa
     ("options", "message"),
     [
         ("nowhere --out g.npz", "nowhere does not exist; runs are in OUT/NAME/seed-000"),
-        ("sliders.py --out g.npz", "sliders.py is a file, not a folder"),
-        (". --out g.npz", ". holds no runs"),
         ("runs --out g.csv", "--out must be a .npz file in a folder that exists, got g.csv"),
         ("runs --out no/g.npz", "--out must be a .npz file in a folder that exists"),
         ("runs --out g.npz --side 0", "--side must be a positive number, got 0"),

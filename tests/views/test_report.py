@@ -27,7 +27,7 @@ from sgimd_torch.views.report.page import page, requested
 from sgimd_torch.views.statistics import interquartile_mean
 from sgimd_torch.views.variants import Variant
 
-FIGURES = [f"{what} of SGIM-D" for what in ("Error curve", "Misses", "Landing points", "Regions")]
+FIGURES = [f"{what} of SGIM-D" for what in ("Error curve", "Landing points", "Misses", "Regions")]
 ODD = "<b>&'$x\" "
 
 
@@ -286,16 +286,12 @@ def test_the_rows_of_a_figure_of_differences_are_two_or_three_lines_of_text_high
     assert 1.5 * line < (heights[1] - heights[0]) / 5 < 3 * line
 
 
-def test_differences_are_those_to_the_baseline_that_was_chosen(runs, pages, tmp_path, capsys):
+def test_differences_are_those_to_the_baseline_that_was_chosen(runs, pages, tmp_path):
     out = tmp_path / "page.html"
     assert report.main([str(runs), "--baseline", ODD, "--out", str(out)]) == 0
     captions = [f"Last error minus that of {escape(name)}, paired" for name in ("SGIM-D", ODD)]
     assert [caption in pages["many"] for caption in captions] == [True, False]
     assert [caption in out.read_text() for caption in captions] == [False, True]
-    out.unlink()
-    assert command(report.main, [str(runs), "--baseline", "observtion", "--out", str(out)]) == 2
-    assert "did you mean observation?" in capsys.readouterr().err
-    assert not out.exists()
 
 
 def test_only_settings_that_differ_are_compared(pages):
@@ -380,8 +376,6 @@ def test_the_same_runs_give_the_same_page(runs, pages, tmp_path):
 @pytest.mark.parametrize(
     ("words", "wanted"),
     [
-        (["nowhere"], "does not exist"),
-        (["file"], "is a file, not a folder"),
         (["empty"], "holds no runs"),
         (["RUNS", "--out", "empty"], "--out must be a file"),
         (["RUNS", "--out", "no/x.html"], "folder that exists"),
