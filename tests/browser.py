@@ -127,7 +127,7 @@ class Tab:
 
     def hand(self):
         """Where on the screen the hand is."""
-        return self.at(self.page.arm.leading.hand)
+        return self.at(self.page.leading.hand)
 
 
 def _square(place, side):

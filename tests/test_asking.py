@@ -130,12 +130,6 @@ def test_a_request_that_waits_for_its_answer_is_saved_too(tmp_path):
         sagg_riac(ARM, seed).load(tmp_path / "life.npz")
 
 
-def test_equal_seeds_ask_for_the_same_and_other_seeds_do_not():
-    first, same, other = (lines(live(acts(seed=seed), halves(), 80)) for seed in (1, 1, 2))
-    assert first == same
-    assert first != other
-
-
 def fails(context, goal, memory):
     raise OSError("the camera is off")
 
@@ -268,6 +262,3 @@ def test_sgim_im_asks_one_teacher_and_imitates_what_it_is_shown():
     assert {e.move.origin for e in asked} == {"imitate"}
     with pytest.raises(ValueError, match="sgim_im asks one teacher, got 2; is sgim_acts meant"):
         sgim_im(ARM, 0, correspondence=last_posture, teachers=halves())
-
-
-ACTS = ("--environment", "planar-arm-7", "--algorithm", "sgim-acts", "--teachers", "mislabelling,slow")

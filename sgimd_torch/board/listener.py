@@ -7,12 +7,9 @@ A resumed run tells everything again from its record, so the board is written an
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, Protocol
-
-import numpy as np
 
 from sgimd_torch.board.curves import Behaviour, Competent, of_regions
 from sgimd_torch.board.events import EventFile
@@ -21,10 +18,9 @@ from sgimd_torch.board.pictures import draw, where
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.evaluation import Benchmark, Evaluation
 from sgimd_torch.goals.regions import Region
-from sgimd_torch.spaces import Array, Box, Episode
+from sgimd_torch.spaces import Episode
 
 EVERY: Final = 50  # movements from one point of a curve to the next
-GOALS: Final = 100  # the last ones are drawn
 
 
 class Watched(Protocol):
@@ -64,8 +60,6 @@ class BoardListener:
         self._page: dict[str, dict[str, str]] = {}
         self._behaviour = Behaviour(getattr(parts.learner.autonomous, "tolerance", 0.02))
         self._competent = Competent(parts.benchmark.goals, parts.benchmark.side / 2, parts.environment.outcomes)
-        self._goals: deque[Array] = deque(maxlen=GOALS)
-        self._demonstrated: list[Array] = []
         settings = parts.config.settings
         rows = "\n".join(f"| {name} | {value} |" for name, value in settings.items())
         self._file.text(0, "about/settings", f"| option | value |\n|---|---|\n{rows}")
@@ -83,12 +77,6 @@ class BoardListener:
         """Count a movement; every 50th gives the curves a point. When a recorded one was made, nobody knows."""
         self._movements = episode.index + 1
         self._behaviour.episode(episode)
-        if episode.demonstration is not None:
-            self._demonstrated.append(episode.demonstration.outcome)
-        move = episode.move
-        goal = None if move is None or move.origin == "imitate" else move.goal
-        if goal is not None and not (self._goals and np.array_equal(goal, self._goals[-1])):
-            self._goals.append(goal)
         if self._movements % EVERY == 0:
             self._scalars({**self._behaviour.curves(), **of_regions(self._parts.regions)})
             if not replayed:
@@ -126,21 +114,7 @@ class BoardListener:
 
     def _draw(self, found: Evaluation) -> None:
         parts, space = self._parts, self._parts.environment.outcomes
-        pictures = draw(
-            parts.regions,
-            space,
-            self._competent,
-            outcomes=parts.learner.memory.outcomes,
-            goals=_stacked(self._goals, space),
-            demonstrated=_stacked(self._demonstrated, space),
-            benchmark=parts.benchmark.goals,
-            errors=found.errors,
-        )
-        for tag, png in pictures.items():
+        for tag, png in draw(parts.regions, space, self._competent, parts.benchmark.goals, found.errors).items():
             self._file.image(self._movements, tag, png)
         if parts.regions:
             self._file.text(self._movements, "about/regions", where(parts.regions))
-
-
-def _stacked(points: Sequence[Array] | deque[Array], space: Box) -> Array:
-    return np.array(points).reshape(-1, space.dim)

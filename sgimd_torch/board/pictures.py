@@ -1,6 +1,6 @@
-"""The pictures on the board: the water plane from above, coloured by competence, interest, landing points and error.
+"""The pictures on the board: T from above, coloured by where goals are met, by error and by competence.
 
-pictures = draw(regions, space, competent, outcomes=..., ...); pictures["map/competence"] is a png, by its tag
+pictures = draw(regions, space, competent, benchmark, errors); pictures["map/competence"] is a png, by its tag
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from matplotlib.patches import Rectangle
 
 from sgimd_torch.board.curves import DEPTH, Competent, branches, summary
 from sgimd_torch.figures.axes import colour_bar, plane
-from sgimd_torch.figures.learning import competence_map, interest_map, landing_points, misses
+from sgimd_torch.figures.learning import competence_map, misses
 from sgimd_torch.figures.sections import Section, sections
 from sgimd_torch.goals.regions import Region
 from sgimd_torch.spaces import Array, Box
@@ -27,43 +27,27 @@ WORST = -0.25
 SHARE = 0.15  # of the longest side of T: the error at the end of the colours
 NARROW = 0.2  # of the picture's width; the name of a narrower region stands upright
 THIN = 0.1  # of the picture's side; narrower than a name
+WIDE = 2.5  # inches, of the axes of a picture; beside them is the colour bar
+MARGIN = 0.9  # inches, above and below them together
 STYLE: Any = {"font.size": 8, "axes.titlesize": 8}
 
 
 def draw(
-    regions: Sequence[Region],
-    space: Box,
-    competent: Competent,
-    *,
-    outcomes: Array,
-    goals: Array,
-    demonstrated: Array,
-    benchmark: Array,
-    errors: Array,
+    regions: Sequence[Region], space: Box, competent: Competent, benchmark: Array, errors: Array
 ) -> dict[str, bytes]:
     """The pictures, as png, by tag.
 
     Args:
-        regions: of the goal model; no pictures of them if there are none.
+        regions: of the goal model; no picture of them if there are none.
         space: T; of more than two dimensions, a picture shows pairs next to each other.
         competent: where it is, since when; shown in the plane only.
-        outcomes, goals, demonstrated: ``(n, outcome_dim)`` m, where the float landed; the learner's last goals;
-            demonstrated.
-        benchmark, errors: ``(n, outcome_dim)`` and ``(n,)`` m, its goals and how far from each the float landed.
+        benchmark, errors: ``(n, outcome_dim)`` its goals, and ``(n,)`` how far from each its answer landed.
     """
-
-    def landed(ax: Axes, section: Section) -> None:
-        side, shown = float(section.box.sides[0]) / 40, demonstrated if len(demonstrated) else None
-        landing_points(ax, outcomes, space, demonstrated=shown, side=side, section=section)
-
-    pictures: dict[str, Callable[[Axes, Section], object]] = {
-        "map/landed": landed,
-        "map/error": lambda ax, section: _errors(ax, benchmark, errors, space, section),
-    }
+    pictures: dict[str, Callable[[Axes, Section], object]] = {}
     if space.dim == 2:
-        pictures = {"competent/since": lambda ax, section: _since(ax, competent), **pictures}
+        pictures["competent/since"] = lambda ax, section: _since(ax, competent)
+    pictures["map/error"] = lambda ax, section: _errors(ax, benchmark, errors, space, section)
     if regions:
-        pictures["map/interest"] = lambda ax, section: _interest(ax, regions, goals, section)
         pictures["map/competence"] = lambda ax, section: _competence(ax, regions, section)
     return {name: _png(picture, sections(space)) for name, picture in pictures.items()}
 
@@ -77,12 +61,6 @@ def where(regions: Sequence[Region]) -> str:
         competence, interest, goals = summary(below)
         lines.append(f"| {path} | {' | '.join(corners)} | {goals} | {competence:.2f} | {interest:.3f} |")
     return "\n".join(lines)
-
-
-def _interest(ax: Axes, regions: Sequence[Region], goals: Array, section: Section) -> None:
-    interests = np.array([region.interest() for region in regions])
-    interest_map(ax, *_boxes(regions), interests, goals=goals, section=section)
-    _name(ax, regions, section)
 
 
 def _competence(ax: Axes, regions: Sequence[Region], section: Section) -> None:
@@ -142,11 +120,12 @@ def _boxes(regions: Sequence[Region]) -> tuple[Array, Array]:
 
 def _png(picture: Callable[[Axes, Section], object], shown: Sequence[Section]) -> bytes:
     """A png, as large as TensorBoard shows it; the sections next to each other."""
-    n = len(shown)
+    n, height = len(shown), shown[0].height(WIDE) + MARGIN
     with rc_context(STYLE):
-        figure = Figure(figsize=(4.0 * n, 3.5), dpi=90)
+        figure = Figure(figsize=(4.0 * n, height), dpi=90)
         axes = figure.subplots(1, n, squeeze=False)
-        figure.subplots_adjust(left=0.13 / n, bottom=0.13, right=1 - 0.08 / n, top=0.88, wspace=0.4)
+        edge = MARGIN / 2 / height
+        figure.subplots_adjust(left=0.15 / n, bottom=edge, right=1 - 0.08 / n, top=1 - edge, wspace=0.4)
         for ax, section in zip(axes.flat, shown, strict=True):
             picture(ax, section)
         content = io.BytesIO()

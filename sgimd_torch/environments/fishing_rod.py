@@ -158,10 +158,6 @@ class FishingRod:
         outcome = self._cast(context[None], theta[None], [commands], np.array([end]))[0]
         return self._caster.record(outcome, commands, end, self._yaw_wind(context[None]))
 
-    def posture(self, recording: Recording, time: float) -> Array:
-        """``(7, 3)`` m: base, joints and tip of the rod at ``time`` (s) of a movement that was recorded."""
-        return self._caster.posture(recording, time)
-
     def replay(self, times: ArrayLike, trajectory: ArrayLike) -> Array:
         """Where the float lands when the arm follows a recorded trajectory, without noise, in the context 0.
 

@@ -3,15 +3,15 @@
 theta are the parameters of a controller, which gives the actions; the outcome is a function of what was observed.
     actions = Box(world.action_space.low, world.action_space.high)
     swimmer = FromGymnasium(world, Sinusoids(actions, (0.2, 2.0)), steps=150, outcome=travelled, outcomes=..., ...)
-A policy of your own fits instead of the controller: ``policies``, and ``act(theta, observation, time)``.
+Another controller needs the two members of `Controller`.
 The other direction is ``to_gymnasium.py``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from copy import deepcopy
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,22 +24,6 @@ try:
     import gymnasium
 except ImportError as error:
     raise ImportError(f"this environment needs gymnasium: pip install 'sgimd-torch[gym]' ({error})") from error
-
-SAME = 1e-6  # what a context may differ after ``place``, also relative to it: observations may be float32
-
-
-@runtime_checkable
-class ClosedLoop(Protocol):
-    """A policy that sees what it does."""
-
-    @property
-    def policies(self) -> Box:
-        """Pi."""
-        ...
-
-    def act(self, theta: Array, observation: Any, time: float) -> ArrayLike:
-        """The action at ``time`` (s) after the reset."""
-        ...
 
 
 def achieved_goal(observations: Sequence[Any]) -> Array:
@@ -62,8 +46,7 @@ class FromGymnasium:
 
     Args:
         world: of gymnasium, with a Box of actions; its wrappers are used as they are.
-        controller: makes actions from theta, open loop (``at``) or closed loop (``act``). Actions are clipped to the
-            action space.
+        controller: makes actions from theta; they are clipped to the action space.
         outcomes: T.
         rest: ``(outcome_dim,)`` the outcome of doing nothing, in T.
         outcome_noise: standard deviation of the outcomes of one movement, per dimension; see `measured_noise`.
@@ -71,20 +54,15 @@ class FromGymnasium:
         outcome: the observations of an episode, the first included -> ``(outcome_dim,)``; a slice of the last one; or
             `achieved_goal`.
         dt: s from one action to the next; None for that of the world, which those of MuJoCo have.
-        contexts: C; without it, where an episode starts is noise.
-        context: first observation -> ``(context_dim,)``; needed with ``contexts``.
-        place: (world, context) -> the first observation again, after it has put the world into this context; called
-            after each reset. Needed with ``contexts``, as several movements are tried in one context; without them it
-            may begin all episodes alike.
 
     Raises:
-        ValueError: no Box of actions, no ``dt``, ``rest`` outside T, or ``contexts`` without ``context`` and ``place``.
+        ValueError: no Box of actions, no ``dt``, or ``rest`` outside T.
     """
 
     def __init__(
         self,
         world: gymnasium.Env[Any, Any],
-        controller: Controller | ClosedLoop,
+        controller: Controller,
         *,
         outcomes: Box,
         rest: ArrayLike,
@@ -92,102 +70,72 @@ class FromGymnasium:
         steps: int,
         outcome: slice | Callable[[Sequence[Any]], ArrayLike] = achieved_goal,
         dt: float | None = None,
-        contexts: Box | None = None,
-        context: Callable[[Any], ArrayLike] | None = None,
-        place: Callable[[gymnasium.Env[Any, Any], Array], Any] | None = None,
     ) -> None:
         if not isinstance(world.action_space, gymnasium.spaces.Box) or len(world.action_space.shape) != 1:
             raise ValueError(f"needs continuous actions, a gymnasium Box of one axis, got {world.action_space}")
         dt = getattr(world.unwrapped, "dt", None) if dt is None else dt
         if dt is None or not 0 < dt < np.inf:
             raise ValueError(f"needs dt > 0, seconds from one action to the next, got {dt}; this world does not say it")
-        if contexts is not None and contexts.dim and (context is None or place is None):
-            raise ValueError("contexts need context=, which reads them, and place=, which puts the world into one")
-        self.world, self.controller = world, controller
+        self.world, self.controller, self._actions = world, controller, world.action_space
         self.policies, self.outcomes = controller.policies, outcomes
-        self.contexts = Box.cube(0.0, 1.0, 0) if contexts is None else contexts
+        self.contexts = Box.cube(0.0, 1.0, 0)
         self.rest = check_point("rest", rest, outcomes.dim).copy()
         self.rest.flags.writeable = False
         check_rest(self)
         self.outcome_noise, self.steps, self.dt = float(outcome_noise), check_count("steps", steps, 1), float(dt)
-        self._context, self._place = context, place
         if hasattr(controller, "correspondence"):
             self.correspondence = controller.correspondence
         self._outcome = (lambda seen: seen[-1][outcome]) if isinstance(outcome, slice) else outcome
 
     def observe(self, rng: np.random.Generator) -> Array:
-        """``(context_dim,)`` read off the first observation of an episode.
-
-        Raises:
-            ValueError: it lies outside C.
-        """
-        check_rng(rng)
-        if self._context is None or not self.contexts.dim:
-            return np.zeros(0)
-        observation, _ = self.world.reset(seed=_seed(rng))
-        return self.contexts.check("context of an observation", np.array(self._context(observation), dtype=np.float64))
+        """``(0,)``: where an episode starts is noise."""
+        return self.contexts.sample(rng)
 
     def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
         """``(outcome_dim,)`` of one episode.
 
         Raises:
-            ValueError: ``context`` is not one point of C or ``theta`` not one of Pi, ``place`` led elsewhere, or
-                the observations make no outcome.
+            ValueError: ``theta`` is not one point of Pi, or the observations make no outcome.
             TypeError: ``rng`` is not a Generator.
             SimulationError: MuJoCo gave a warning, or the last observation is not finite.
         """
-        context, theta = check_movement(self, context, theta)
-        return self._judged(self.episode(context, theta, rng))
+        _, theta = check_movement(self, context, theta)
+        actions = self.controller.at(theta, self.dt * np.arange(self.steps, dtype=np.float64))
+        return self._play(actions, rng, theta)
 
-    def episode(self, context: Array, theta: Array, rng: np.random.Generator) -> list[Any]:
-        """As ``execute``, but everything that was observed, the first observation included."""
-        observations = [self._begin(context, rng)]
-        return self._play(observations, self._actions(theta, observations), theta)
-
-    def replay(self, actions: ArrayLike, context: ArrayLike | None = None) -> Array:
-        """``(outcome_dim,)`` of recorded ``actions`` ``(n, action_dim)``, in a context and from the reset of seed 0.
+    def replay(self, actions: ArrayLike) -> Array:
+        """``(outcome_dim,)`` of recorded ``actions`` ``(n, action_dim)``, from the reset of seed 0.
 
         Raises:
             ValueError: actions of another shape, or more than the ``steps`` of a movement.
             SimulationError: as ``execute``.
         """
-        space = self.world.action_space
-        assert isinstance(space, gymnasium.spaces.Box)
-        actions = check_vector("actions", actions, space.shape[0])
+        actions = check_vector("actions", actions, self._actions.shape[0])
         if actions.ndim != 2 or not 0 < len(actions) <= self.steps:
             raise ValueError(
                 f"needs 1 to {self.steps} actions in rows, got shape {actions.shape}; was it recorded longer?"
             )
-        context = self.contexts.check("context", np.zeros(0) if context is None else context)
-        observations = [self._begin(context, stream(0, "replay"))]
-        return self._judged(self._play(observations, iter(np.clip(actions, space.low, space.high)), actions[-1]))
+        return self._play(actions, stream(0, "replay"), actions[-1])
 
     def misfit(self, demonstration: Demonstration) -> float:
         """How far a recording of actions is from what the controller can play, root mean square.
 
         Raises:
-            ValueError: the recording cannot be translated, or the controller has no ``correspondence`` or no ``at``.
+            ValueError: the recording cannot be translated, or the controller has no ``correspondence``.
         """
-        times, actions, controller = demonstration.times, demonstration.trajectory, self.controller
-        if not hasattr(controller, "correspondence") or isinstance(controller, ClosedLoop):
-            raise ValueError(f"{type(controller).__name__} cannot translate recorded actions")
-        played = controller.at(controller.correspondence(times, actions), times - times[0])
+        times, actions = demonstration.times, demonstration.trajectory
+        if not hasattr(self, "correspondence"):
+            raise ValueError(f"{type(self.controller).__name__} cannot translate recorded actions")
+        played = self.controller.at(self.correspondence(times, actions), times - times[0])
         return float(np.sqrt(np.mean(np.square(played - actions))))
 
-    def _begin(self, context: Array, rng: np.random.Generator) -> Any:
+    def _play(self, actions: Array, rng: np.random.Generator, theta: Array) -> Array:
+        """The outcome of an episode of these ``actions``; ``theta`` is named if it fails."""
         check_rng(rng)
-        observation, _ = self.world.reset(seed=_seed(rng))
-        if self._place is not None:
-            observation = self._place(self.world, context)
-        if self._context is not None and self.contexts.dim:
-            found = np.asarray(self._context(observation), dtype=np.float64)
-            if not np.allclose(found, context, rtol=SAME, atol=SAME):
-                raise ValueError(f"place= led to the context {found.tolist()}, {context.tolist()} was wanted")
-        return deepcopy(observation)
-
-    def _play(self, observations: list[Any], actions: Iterator[Array], theta: Array) -> list[Any]:
-        for action in actions:
-            observation, _, terminated, truncated, _ = self.world.step(action.astype(self.world.action_space.dtype))
+        observation, _ = self.world.reset(seed=int(rng.integers(2**31)))
+        observations = [deepcopy(observation)]
+        for action in np.clip(actions, self._actions.low, self._actions.high):
+            observation, _, terminated, truncated, _ = self.world.step(action.astype(self._actions.dtype))
             observations.append(deepcopy(observation))
             if terminated or truncated:
                 break
@@ -196,25 +144,7 @@ class FromGymnasium:
             raise SimulationError("MuJoCo gave a warning: the simulation diverged, or ran out of room", theta)
         if not all(np.isfinite(part).all() for part in _parts(observations[-1])):
             raise SimulationError("the last observation is not finite", theta)
-        return observations
-
-    def _judged(self, observations: list[Any]) -> Array:
         return check_point("outcome", np.array(self._outcome(observations), dtype=np.float64), self.outcomes.dim)
-
-    def _actions(self, theta: Array, observations: list[Any]) -> Iterator[Array]:
-        """One after the other, each made when it is needed."""
-        space, times = self.world.action_space, self.dt * np.arange(self.steps, dtype=np.float64)
-        assert isinstance(space, gymnasium.spaces.Box)
-
-        def action(command: ArrayLike) -> Array:
-            clipped: Array = np.clip(np.asarray(command, dtype=np.float64), space.low, space.high)
-            return clipped
-
-        if isinstance(self.controller, ClosedLoop):
-            for time in times:
-                yield action(self.controller.act(theta, observations[-1], float(time)))
-        else:
-            yield from map(action, self.controller.at(theta, times))
 
 
 def make_world(name: str, **options: Any) -> gymnasium.Env[Any, Any]:
@@ -237,10 +167,6 @@ def measured_noise(environment: FromGymnasium, rng: np.random.Generator, *, move
         outcomes = [environment.execute(context, theta, rng) for _ in range(3)]
         variances.append(np.var(outcomes, axis=0, ddof=1))
     return float(np.sqrt(np.mean(variances)))
-
-
-def _seed(rng: np.random.Generator) -> int:
-    return int(rng.integers(2**31))
 
 
 def _parts(observation: Any) -> list[Any]:

@@ -24,7 +24,6 @@ from sgimd_torch.spaces import Array
 
 TOP_SPEED = 500.0  # rad/s; 100,000 random movements stay far below, a diverging simulation exceeds it
 
-_ARM = ("base", "upper_arm", "forearm", "wrist", "hand", "rod", "tip")
 _STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
 
 
@@ -141,14 +140,6 @@ class Caster:
             states, floats = np.concatenate([states, run[0]]), np.concatenate([floats, seen[0]])
         kept = states[:n_steps], floats[:n_steps]
         return Recording(outcome, landed, let_out, self.timestep, *kept, push, self._gravity)
-
-    def posture(self, recording: Recording, time: float) -> Array:
-        """``(7, 3)`` m: base, joints and tip of the rod at ``time`` (s) of a movement."""
-        data = mujoco.MjData(self.model)
-        row = min(round(time / recording.step), len(recording.states) - 1)
-        mujoco.mj_setState(self.model, data, recording.states[row], _STATE)
-        mujoco.mj_kinematics(self.model, data)
-        return np.stack([data.body(name).xpos for name in _ARM])
 
     def _settle(self, posture: Array) -> tuple[Array, Array]:
         """c_org, the start configuration: the arm in its posture, the line hanging still."""

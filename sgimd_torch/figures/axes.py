@@ -5,7 +5,7 @@ Each function draws on the axes it is given.   mesh = ax.pcolormesh(x, y, z); co
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, Final
 
@@ -27,12 +27,6 @@ LEGEND: Final[dict[str, Any]] = {
     "borderaxespad": 0.2,
     "handletextpad": 0.2,
 }
-_PALETTE: Final = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#999933", "#882255")
-
-
-def colours(names: Iterable[str]) -> dict[str, str]:
-    """A colour for each name, in their order; of more than eight names, the first colours serve again."""
-    return {name: _PALETTE[k % len(_PALETTE)] for k, name in enumerate(sorted({*names}))}
 
 
 def limits(points: Array, space: Box) -> Box:
@@ -91,7 +85,7 @@ def colour_bar(axes: Sequence[Axes], drawn: ScalarMappable, label: str, *, exten
 def note(ax: Axes, text: str) -> None:
     """Text below the name of the x axis."""
     at = {"xycoords": "axes fraction", "textcoords": "offset points", "ha": "center", "va": "top"}
-    ax.annotate(text, (0.5, 0), (0, -34), fontsize="small", **at)  # type: ignore[arg-type]
+    ax.annotate(text, (0.5, 0), (0, -40), fontsize="small", **at)  # type: ignore[arg-type]
 
 
 def goal_rings(ax: Axes, points: ArrayLike, size: float) -> None:

@@ -83,10 +83,10 @@ def histogram(ax: Axes, points: Array, box: Box, *, side: float | Array, most: f
 
 
 def count_bar(axes: Sequence[Axes], mesh: QuadMesh, label: str) -> Colorbar:
-    """One colour bar, in whole numbers, for all histograms that share the scale of ``mesh``."""
+    """One colour bar, in numbers and not in powers of ten, for all histograms that share the scale of ``mesh``."""
     bar = colour_bar(axes, mesh, label)
     bar.ax.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-    bar.ax.yaxis.set_major_formatter("{x:.0f}")
+    bar.ax.yaxis.set_major_formatter("{x:g}")
     bar.ax.yaxis.set_minor_locator(NullLocator())
     return bar
 
@@ -120,12 +120,12 @@ def interest_map(
         ValueError: without a ``section``, regions not in the plane, such as those that include contexts.
     """
     most = max(float(interests.max()), 1e-6)
-    drawn = regions_in(ax, lows, highs, interests, "Oranges", (0, most), section)
+    drawn = _regions_in(ax, lows, highs, interests, "Oranges", (0, most), section)
     colour_bar([ax], drawn, "interest: recent change of competence")
     if goals is not None:
         shown = _section_of(lows, highs, section).points(goals)
         ax.plot(*shown.T, ".", color="#0072b2", markersize=4, label=f"last {len(goals)} goals")
-    frame_regions(ax, lows, highs, section)
+    _frame_regions(ax, lows, highs, section)
     return drawn
 
 
@@ -139,38 +139,10 @@ def competence_map(
         competences: ``(n_regions,)``; NaN, a region without goals, is left white.
         worst: the competence at the end of the colour scale.
     """
-    drawn = regions_in(ax, lows, highs, np.ma.masked_invalid(competences), "viridis", (worst, 0.0), section)
+    drawn = _regions_in(ax, lows, highs, np.ma.masked_invalid(competences), "viridis", (worst, 0.0), section)
     colour_bar([ax], drawn, "mean competence: 0 met, -1 not at all")
-    frame_regions(ax, lows, highs, section)
+    _frame_regions(ax, lows, highs, section)
     return drawn
-
-
-def regions_in(
-    ax: Axes,
-    lows: Array,
-    highs: Array,
-    values: Array,
-    colours: str,
-    limits: tuple[float, float],
-    section: Section | None = None,
-) -> PatchCollection:
-    """The regions that a ``section`` meets as rectangles, coloured by their ``values`` ``(n_regions,)``; nothing else.
-
-    Other arguments and result as for ``interest_map``.
-    """
-    lows, highs, met = _section_of(lows, highs, section).cut(lows, highs)
-    patches = [Rectangle((low[0], low[1]), *(high - low)) for low, high in zip(lows, highs, strict=True)]
-    drawn = PatchCollection(patches, cmap=colours, edgecolor="0.35", linewidth=0.8, array=values[met], clim=limits)
-    ax.add_collection(drawn)
-    return drawn
-
-
-def frame_regions(ax: Axes, lows: Array, highs: Array, section: Section | None, *, legend: bool = True) -> None:
-    """Limits and names of the axes for ``regions_in``, and a note on where regions are cut."""
-    section = _section_of(lows, highs, section)
-    section.frame(ax, legend=legend)
-    if where := section.cut_at(lows, highs):
-        note(ax, f"at {where}")
 
 
 def misses(ax: Axes, goals: Array, errors: Array, space: Box, section: Section, most: float) -> None:
@@ -203,6 +175,31 @@ def map_after(regions: Mapping[str, np.ndarray], movements: int) -> tuple[Array,
     dims = range(sum(name.startswith("low_") for name in regions))
     lows, highs = (np.stack([regions[f"{side}_{k}"][now] for k in dims], axis=1) for side in ("low", "high"))
     return lows, highs, regions["interest"][now]
+
+
+def _regions_in(
+    ax: Axes,
+    lows: Array,
+    highs: Array,
+    values: Array,
+    colours: str,
+    limits: tuple[float, float],
+    section: Section | None,
+) -> PatchCollection:
+    """The regions that a ``section`` meets as rectangles, coloured by their ``values`` ``(n_regions,)``."""
+    lows, highs, met = _section_of(lows, highs, section).cut(lows, highs)
+    patches = [Rectangle((low[0], low[1]), *(high - low)) for low, high in zip(lows, highs, strict=True)]
+    drawn = PatchCollection(patches, cmap=colours, edgecolor="0.35", linewidth=0.8, array=values[met], clim=limits)
+    ax.add_collection(drawn)
+    return drawn
+
+
+def _frame_regions(ax: Axes, lows: Array, highs: Array, section: Section | None) -> None:
+    """Limits and names of the axes, and a note on where regions are cut."""
+    section = _section_of(lows, highs, section)
+    section.frame(ax)
+    if where := section.cut_at(lows, highs):
+        note(ax, f"at {where}")
 
 
 def _section_of(lows: Array, highs: Array, section: Section | None) -> Section:

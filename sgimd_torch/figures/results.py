@@ -21,8 +21,7 @@ from sgimd_torch.spaces import Array, Box
 
 class SeedCurves(NamedTuple):
     """The runs of one learner: ``errors`` ``(n_seeds, n)`` m after ``movements`` ``(n,)``; over seeds their ``centre``
-    and the interval from ``low`` to ``high``, each ``(n,)`` m. ``algorithm`` gives the colour; noise ``floors`` are
-    ``(n,)`` m."""
+    and the interval from ``low`` to ``high``, each ``(n,)`` m. ``algorithm`` gives the colour."""
 
     algorithm: str
     label: str
@@ -32,7 +31,6 @@ class SeedCurves(NamedTuple):
     low: Array
     high: Array
     dashed: bool = False
-    floors: Array | None = None
 
 
 class Difference(NamedTuple):
@@ -60,14 +58,9 @@ def seed_curves(ax: Axes, runs: Sequence[SeedCurves]) -> list[Line2D]:
             ax.fill_between(run.movements, run.low, run.high, color=colour, alpha=0.22, linewidth=0)
         label = f"{run.label} ({_seeds(len(run.errors))})"
         lines += ax.plot(run.movements, run.centre, f"o{style}", color=colour, markersize=4, label=label)
-        if run.floors is not None:
-            ax.plot(run.movements, run.floors, "--", color=colour, linewidth=1.2)
     over_movements(ax, "mean distance to benchmark goals (m)")
     ax.set_ylim(bottom=0)
-    handles = list(lines)
-    if any(run.floors is not None for run in runs):
-        handles.append(Line2D([], [], color="black", linestyle="--", linewidth=1.2, label="noise floor of each"))
-    ax.legend(handles=handles, loc="upper right")
+    ax.legend(handles=lines, loc="upper right")
     return lines
 
 

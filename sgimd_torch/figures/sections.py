@@ -50,6 +50,11 @@ class Section:
         sides = self.box.sides
         return np.array([side, 1.0 if self.is_strip else side if alike(sides) else side * sides[1] / sides[0]])
 
+    def height(self, width: float) -> float:
+        """How high the axes of the picture are if they are ``width`` wide, with room for their labels."""
+        shape = float(self.box.sides[1] / self.box.sides[0]) if alike(self.box.sides) else 1.0
+        return width * (0.5 if self.is_strip else min(max(shape, 0.5), 1.5))
+
     def cut(self, lows: Array, highs: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
         """The regions that the picture meets: their corners in it, twice ``(n_met, 2)``, and ``(n,)`` which they are.
 

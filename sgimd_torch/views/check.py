@@ -24,20 +24,19 @@ Exit code: 0 it keeps them all, 2 it does not.
 from __future__ import annotations
 
 import argparse
-import time
 from collections.abc import Sequence
 
 import numpy as np
 
 from sgimd_torch.environments.check import check_environment
-from sgimd_torch.environments.protocol import execute_many
+from sgimd_torch.environments.protocol import Environment, execute_many
 from sgimd_torch.runs.build import task_of
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.tasks import Task, benchmark_of, demonstrations_of
-from sgimd_torch.spaces import Array, Box, check_count, stream
+from sgimd_torch.spaces import check_count, stream
 from sgimd_torch.views.demonstrations import check
 
-TIMED = 20  # movements
+TRIED = 20  # movements
 NARROW = 0.03  # of the volume of T; where random movements span less, most goals may be out of reach
 
 
@@ -69,7 +68,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         raise ValueError(f"environment {options.environment} cannot be made: {why}") from error
     check_environment(task.environment, movements=options.movements)
     _check_picture(task)
-    for line in (f"{type(task.environment).__name__} keeps every promise", *_sizes(task), *_lessons(task)):
+    for line in (f"{type(task.environment).__name__} keeps every promise", *_goals(task), *_lessons(task)):
         print(line)
     return 0
 
@@ -94,33 +93,26 @@ def _check_picture(task: Task) -> None:
         )
 
 
-def _sizes(task: Task) -> list[str]:
-    robot = task.environment
-    rngs = [stream(k, "check") for k in range(TIMED)]
-    contexts, thetas = [robot.observe(rng) for rng in rngs], [robot.policies.sample(rng) for rng in rngs]
-    begun = time.perf_counter()
-    outcomes = execute_many(robot, contexts, thetas, rngs)
-    milliseconds = 1e3 * (time.perf_counter() - begun) / TIMED
-    dims = f"context {robot.contexts.dim}, theta {robot.policies.dim}, outcome {robot.outcomes.dim}"
+def _goals(task: Task) -> list[str]:
     goals, notes, _ = benchmark_of(task, None)
-    return [
-        f"  dimensions: {dims}; {milliseconds:.3g} ms a movement, {TIMED} together",
-        f"  goals of evaluation: {len(goals.goals)}",
-        *(f"  {note}" for note in (*notes, *_narrow(outcomes, robot.outcomes))),
-    ]
+    found = [f"goals of evaluation: {len(goals.goals)}", *notes, *_narrow(task.environment)]
+    return [f"  {line}" for line in found]
 
 
-def _narrow(outcomes: Array, space: Box) -> list[str]:
+def _narrow(robot: Environment) -> list[str]:
     """A note if random movements end outside T, or span little of it."""
+    space, rngs = robot.outcomes, [stream(k, "check") for k in range(TRIED)]
+    contexts, thetas = [robot.observe(rng) for rng in rngs], [robot.policies.sample(rng) for rng in rngs]
+    outcomes = execute_many(robot, contexts, thetas, rngs)
     low, high = outcomes.min(axis=0), outcomes.max(axis=0)
     share = float(np.prod((high - low) / space.sides))
     spans = " x ".join(f"[{a:.3g}, {b:.3g}]" for a, b in zip(low, high, strict=True))
     if not space.contains(outcomes).any():
-        return [f"0 of {TIMED} random movements ended in T, they span {spans}; are T and outcomes in one unit?"]
+        return [f"0 of {TRIED} random movements ended in T, they span {spans}; are T and outcomes in one unit?"]
     if share >= NARROW:
         return []
     return [
-        f"{TIMED} random movements span only {100 * share:.2g} % of T, {spans}; if nothing gets much farther, make T "
+        f"{TRIED} random movements span only {100 * share:.2g} % of T, {spans}; if nothing gets much farther, make T "
         "smaller: learners draw goals from all of it"
     ]
 
@@ -130,7 +122,7 @@ def _lessons(task: Task) -> list[str]:
         return ["  demonstrations: none"]
     shown, notes, _ = demonstrations_of(task, None)
     places = np.array([each.outcome for each in shown])
-    tried = [check(task, each, row) for row, each in enumerate(shown[:TIMED])]
+    tried = [check(task, each, row) for row, each in enumerate(shown[:TRIED])]
     apart, spread = np.median([each.apart for each in tried]), np.linalg.norm(places.std(axis=0))
     if not apart < max(spread / 2, 3 * task.environment.outcome_noise):
         amount = task.environment.outcomes.amount(float(apart))

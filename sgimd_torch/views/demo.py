@@ -34,7 +34,6 @@ from sgimd_torch.runs.engines.local import local
 from sgimd_torch.runs.engines.loop import sweep
 from sgimd_torch.runs.process import Failed, loading, say
 from sgimd_torch.runs.read import finished, read_run
-from sgimd_torch.views.text_table import print_table
 
 LEARNERS: Final = {
     "random": "moves at random",
@@ -55,7 +54,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     with loading():  # after --help, and before the runs: it may not be installed
         from sgimd_torch.figures.save import save_figure
         from sgimd_torch.runs.build import build
-        from sgimd_torch.views.demo_figure import draw, table
+        from sgimd_torch.views import table
+        from sgimd_torch.views.demo_figure import draw
     began, base = time.monotonic(), configs["sgim-d"]
     for config in configs.values():
         build(config)  # a wrong option is refused before anything starts
@@ -69,8 +69,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     say("drawing where the float landed, and how far each goal is missed")
     runs = {algorithm: read_run(config.directory) for algorithm, config in configs.items()}
     (figure,) = save_figure(partial(draw, runs), base.out / "demo", "png")
-    print("\nMean distance to the benchmark goals after so many movements, and time spent\n")
-    print_table(table(runs))
+    print("\nMean distance to the benchmark goals after so many movements, and what a movement costs\n")
+    table.main([str(base.out)])
     print(f"\nFigure  {figure}\nRuns    {base.out}\nTime    {time.monotonic() - began:.0f} s\n\nNext, try")
     print(f"  sgimd film {base.directory} --time-lapse    # a film of how SGIM-D learns")
     print(f"  sgimd report {base.out}    # one page: curves, maps, where it is curious")

@@ -1,4 +1,4 @@
-"""The demo's figure and table: the results of its runs next to each other, made from their directories alone."""
+"""The demo's figure: the results of its runs next to each other, made from their directories alone."""
 
 from __future__ import annotations
 
@@ -39,22 +39,6 @@ def draw(runs: Mapping[str, Run]) -> Figure:
     about = f"{config['movements']} movements each, seed {config['seed']}"
     figure.suptitle(f"A simulated arm learns to place its float: {about}", fontsize="x-large")
     return figure
-
-
-def table(runs: Mapping[str, Run]) -> list[list[str]]:
-    """A row for each run: errors, the last one also as a share of the random learner's, noise floor and costs; the
-    first row has the heads."""
-    whens = runs["sgim-d"].evaluation["movements"].astype(int).tolist()
-    columns = [movements for movements in (1000, 2000, 5000) if movements in whens[:-1]] + whens[-1:]
-    heads = [*(f"error {movements} (m)" for movements in columns), "of Random's", "noise floor (m)"]
-    rows = [["learner", *heads, "physics (s)", "learning (s)", "evaluation (s)"]]
-    for algorithm, run in runs.items():
-        last = run.evaluation["mean_error"][-1]
-        errors = [f"{run.at(movements):.3f}" for movements in columns]
-        share, floor = last / runs["random"].evaluation["mean_error"][-1], run.at(columns[-1], "noise_floor")
-        seconds = [f"{run.summary[f'seconds_{part}']:.0f}" for part in ("physics", "learner", "evaluation")]
-        rows.append([NAMES[algorithm], *errors, f"{share:.2f}", f"{floor:.3f}", *seconds])
-    return rows
 
 
 def _curve(algorithm: str, run: Run) -> SeedCurves:

@@ -1,7 +1,7 @@
 """Demonstrations: are they right for a robot? And how do they get here from other files?
 
   check    a table with a line for each recording: what it says and where it lands on the simulated robot, how far it is
-           from what the robot can play, what lies outside its limits; --figure draws the curves and the places
+           from what the robot can play, what lies outside its limits
   import   recordings in CSV or in a LeRobot dataset (v3) become a file for sgimd run --demonstrations
 
 SOURCE is a file that save_demonstrations wrote (.npz); a CSV file or a folder of them, one for each recording; or the
@@ -10,7 +10,7 @@ observation.state is all its entries, observation.state[0:6] some. The outcome i
 the context in the first.
 
 Examples:
-  sgimd demonstrations check shown.npz --task fishing-rod --figure shown.png
+  sgimd demonstrations check shown.npz --task fishing-rod
   sgimd demonstrations check recordings --task mypackage.toss:make --joints shoulder,elbow --outcome x,y
   sgimd demonstrations import datasets/my_arm --joints observation.state[0:6] --outcome observation.place[0:2]
       --time timestamp --recording episode_index --degrees --out shown.npz
@@ -30,7 +30,7 @@ import numpy as np
 
 from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
 from sgimd_torch.demonstrations.columns import Columns, read_csv
-from sgimd_torch.demonstrations.lessons import beyond_limits, played
+from sgimd_torch.demonstrations.lessons import beyond_limits
 from sgimd_torch.environments.protocol import SimulationError, execute_many
 from sgimd_torch.runs.build import task_of
 from sgimd_torch.runs.config import Config
@@ -45,12 +45,11 @@ HEADS: Final = ("recording", "lasts (s)", "samples", "says", "lands", "apart", "
 class Checked:
     """One recording on a robot.
 
-    ``theta`` and ``lands`` ``(outcome_dim,)`` are None if it cannot be translated; ``refused`` says why. ``misfit`` is
-    NaN where the task cannot tell. ``remarks`` say what lies outside a limit.
+    ``lands`` ``(outcome_dim,)`` is None if it cannot be translated; ``refused`` says why. ``misfit`` is NaN where the
+    task cannot tell. ``remarks`` say what lies outside a limit.
     """
 
     shown: Demonstration
-    theta: Array | None
     lands: Array | None
     misfit: float
     remarks: list[str]
@@ -76,7 +75,6 @@ def parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(dest="command", required=True, metavar="check|import")
     checked = commands.add_parser("check", help="are they right for a robot?", parents=[source], **shown)
     checked.add_argument("--task", required=True, metavar="ENVIRONMENT", help="as sgimd run --environment")
-    checked.add_argument("--figure", type=Path, metavar="FILE.png", help="draw curves and places (needs extra plot)")
     imported = commands.add_parser("import", help="into a file for --demonstrations", parents=[source], **shown)
     imported.add_argument("--out", type=Path, required=True, metavar="FILE.npz")
     return parser
@@ -87,7 +85,6 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     Raises:
         ValueError: the source cannot be read, or the robot cannot use all of it.
-        ImportError: there is no matplotlib for the figure.
         OSError: a file cannot be read or written.
     """
     options = parser().parse_args(argv)
@@ -98,8 +95,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         save_demonstrations(options.out, shown)
         print(f"{options.out}: {len(shown)} recordings, {shown[0].trajectory.shape[1]} joints")
         return 0
-    if options.figure is not None and options.figure.suffix not in (".png", ".svg", ".pdf"):
-        raise ValueError(f"--figure must end in .png, .svg or .pdf, got {options.figure}")
     task = task_of(Config(parts={"environment": options.task}))
     contexts = task.environment.contexts
     if contexts.dim and not shown[0].context.size:
@@ -114,8 +109,6 @@ def main(argv: Sequence[str] | None = None) -> int:
             f"{len(apart)} of {len(found)} can be used; they land {np.median(apart):.3f} (median), "
             f"{max(apart):.3f} (most) from where they say; {remarked} have remarks"
         )
-    if options.figure is not None:
-        _draw(options.figure, task, found)
     refused = [row for row, each in enumerate(found) if each.refused]
     if refused:
         first = f"the first is recording {refused[0]}: {found[refused[0]].refused}"
@@ -166,8 +159,8 @@ def check(task: Task, shown: Demonstration, row: int) -> Checked:
         misfit = float("nan") if task.misfit is None else task.misfit(shown)
         lands = execute_many(robot, context[None], theta[None], [stream(row, "demonstrations check")])[0]
     except (ValueError, SimulationError) as error:
-        return Checked(shown, None, None, float("nan"), remarks, str(error))
-    return Checked(shown, theta, lands, misfit, remarks)
+        return Checked(shown, None, float("nan"), remarks, str(error))
+    return Checked(shown, lands, misfit, remarks)
 
 
 def _cells(row: int, found: Checked) -> tuple[str, ...]:
@@ -183,17 +176,6 @@ def _cells(row: int, found: Checked) -> tuple[str, ...]:
         "-" if np.isnan(found.misfit) else f"{found.misfit:.3f}",
         "; ".join([*refused, *found.remarks]),
     )
-
-
-def _draw(path: Path, task: Task, found: Sequence[Checked]) -> None:
-    try:  # matplotlib is loaded only when it is needed
-        from sgimd_torch.figures.demonstrations import draw
-        from sgimd_torch.figures.save import save_figure
-    except ModuleNotFoundError as error:
-        raise ImportError(f"--figure needs {error.name}: pip install 'sgimd-torch[plot]'") from error
-    shown, places = [each.shown for each in found], [each.lands for each in found]
-    instead = [None if each.theta is None else played(task.environment, each.theta, each.shown) for each in found]
-    save_figure(lambda: draw(shown, instead, places), path.with_suffix(""), path.suffix[1:])
 
 
 def _point(point: Array) -> str:

@@ -13,8 +13,8 @@ tasks only; the others are marked "new".
   sgimd suite --tasks toss crawler --algorithm sagg-riac --budget 4
   sgimd table study/toss                                  one task in its own unit
 
-Start the same command again after Ctrl-C or a power cut, or with more seeds: finished runs stay as they are. The
-figure is OUT/suite.png. With five seeds or more, ratios have bootstrap intervals of 95 %.
+Start the same command again after Ctrl-C or a power cut, or with more seeds: finished runs stay as they are. With five
+seeds or more, ratios have bootstrap intervals of 95 %.
 
 Exit code: 0 all runs are finished, 1 some failed, 2 the request is wrong, 130 or 143 stopped by Ctrl-C or SIGTERM.
 """
@@ -28,7 +28,6 @@ from typing import Any, Final
 
 from sgimd_torch.catalogue import ROD
 from sgimd_torch.runs.config import Config
-from sgimd_torch.runs.process import loading, say
 from sgimd_torch.runs.read import finished
 from sgimd_torch.runs.sweep import add_engines, add_options, add_vary, carry_out, variants_of
 from sgimd_torch.views.text_table import print_table
@@ -78,19 +77,14 @@ OWN: Final = ("environment", "benchmark", "demonstrations", "name")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run what is not finished, print the table, draw the figure; 1 where runs failed."""
+    """Run what is not finished, print the table; 1 where runs failed."""
     options, rest = _options(argv)
     configs, flags = runs_of(options, rest)
-    out = configs[0].out.parent
-    if options.dry_run:
-        return carry_out(configs, options, flags, out)
-    with loading():  # after --help, and before the runs: it may not be installed
-        from sgimd_torch.views.suite_figure import draw, errors_of, table
-    code = carry_out(configs, options, flags, out)
-    errors = errors_of([config for config in configs if finished(config)], titled)
-    if errors:
+    code = carry_out(configs, options, flags, configs[0].out.parent)
+    from sgimd_torch.views.suite_table import errors_of, table  # scipy's statistics take long to import
+
+    if not options.dry_run and (errors := errors_of([config for config in configs if finished(config)], titled)):
         print_table(table(errors))
-        say(*(f"figure: {path}" for path in draw(errors, out / "suite")))
     return code
 
 

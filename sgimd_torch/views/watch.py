@@ -25,7 +25,7 @@ Begin here:  {url}#custom_scalars&_smoothingWeight=0
 
 TensorBoard shows the boards of {runs}   (Ctrl-C ends it)
   {url}#images
-      The same as a map (competent/since); the regions that curves are named after; where movements landed.
+      The same as a map (competent/since); how far each goal is missed; the regions that curves are named after.
   {url}#scalars&_smoothingWeight=0
       Every curve by itself; steps are movements. A click on (i) explains a curve; so does the tab Text.
   {url}#hparams

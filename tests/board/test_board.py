@@ -421,7 +421,7 @@ def test_outcomes_of_any_dimension_have_curves_and_pictures(tmp_path, dim, conte
     curves = curves_of(directory)
     assert {"error/mean", "competence/R", "interest/R", "goals/missed_by", "about/regions"} < curves.keys()
     pictures = {tag for tag in curves if tag.startswith(("map/", "competent/"))}
-    wanted = {"map/landed", "map/error", "map/interest", "map/competence"}
+    wanted = {"map/error", "map/competence"}
     assert pictures == wanted | ({"competent/since"} if dim == 2 else set())
 
 
@@ -441,17 +441,7 @@ class Halves:
 def test_the_regions_of_any_goal_model_are_shown(tmp_path):
     curves = curves_of(live_as(tmp_path, Slider(2), sagg_riac, goals=Halves))
     assert curves["regions/count"] == {50: 2, 100: 2}
-    assert {"competence/R0", "interest/R", "map/interest"} < curves.keys()
-
-
-def test_the_map_of_interest_shows_the_last_hundred_goals(tmp_path, monkeypatch):
-    robot, drawn, draw = Slider(2), [], pictures.interest_map
-    monkeypatch.setattr(pictures, "interest_map", lambda *a, **k: (drawn.append(k["goals"]), draw(*a, **k))[1])
-    directory = live_as(tmp_path, robot, lambda environment, seed: sagg_riac(environment, seed, budget=1))
-    goals = read_run(directory).goals
-    goals = goals[np.isfinite(goals).all(axis=1)]
-    assert len(np.unique(goals, axis=0)) == len(goals) > 100
-    assert drawn[-1].tolist() == goals[-100:].tolist()
+    assert {"competence/R0", "interest/R", "map/competence"} < curves.keys()
 
 
 def test_a_learner_without_goals_has_a_board_without_regions(tmp_path):

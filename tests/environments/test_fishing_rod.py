@@ -225,14 +225,6 @@ def test_a_float_on_another_line_hangs_as_much_lower_and_lands_elsewhere(rod: Fi
     assert min(apart) > 0.005
 
 
-def test_dense_and_sparse_dynamics_agree(rod: FishingRod) -> None:
-    sparse = FishingRod(noise=0.0, threads=1)
-    assert rod.model.opt.jacobian == mujoco.mjtJacobian.mjJAC_DENSE
-    sparse.model.opt.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE
-    for theta in movements(3):
-        assert cast(sparse, theta) == pytest.approx(cast(rod, theta), abs=1e-7)
-
-
 def test_replaying_a_movement_lands_where_executing_it_does(rod: FishingRod) -> None:
     step = rod.model.opt.timestep
     for theta in movements(5):

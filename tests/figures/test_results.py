@@ -43,17 +43,10 @@ def test_curves_of_one_colour_are_told_apart_by_their_dashes(ax):
     assert lines[0].get_label() == "Mine (1 seed)"
 
 
-def test_a_single_seed_has_no_band_and_its_noise_floor_is_dashed_in_its_colour(ax):
-    curves = curves_of("sgim-d", [[0.3, 0.2]], floors=np.array([0.04, 0.05]))
-    (line,) = seed_curves(ax, [curves])
+def test_a_single_seed_has_no_band(ax):
+    (line,) = seed_curves(ax, [curves_of("sgim-d", [[0.3, 0.2]])])
     np.testing.assert_array_equal(line.get_xydata(), [[1000, 0.3], [2000, 0.2]])
-    drawn, floor = ax.lines
-    assert drawn is line
-    np.testing.assert_array_equal(floor.get_xydata(), [[1000, 0.04], [2000, 0.05]])
-    assert floor.get_linestyle() == "--"
-    assert floor.get_color() == COLOURS["sgim-d"]
     assert not ax.collections
-    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["Mine (1 seed)", "noise floor of each"]
 
 
 def test_goals_of_a_large_space_keep_its_shape(ax):

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from sgimd_torch.figures.learning import competence_map, interest_map, landing_points, map_after
-from sgimd_torch.figures.movements import interest_over_time
+from sgimd_torch.figures.learning import competence_map, interest_map, landing_points
 from sgimd_torch.figures.sections import Section, of_regions, sections
 from sgimd_torch.goals.interest_map import InterestMap
 from sgimd_torch.spaces import Box, stream
@@ -88,21 +87,15 @@ def test_every_figure_shows_outcomes_of_any_dimension(dim):
     space, rng = Box.cube(-1, 1, dim), stream(0, "test")
     outcomes = space.low + rng.random((50, dim)) * space.sides
     lows, highs = space.low[None], space.high[None]
-    columns = {f"{end}_{k}": value[:, k] for end, value in (("low", lows), ("high", highs)) for k in range(dim)}
-    regions = {"movements": np.array([50]), "interest": np.ones(1), **columns}
     for section in sections(space):
-        axes = Figure().subplots(4)
+        axes = Figure().subplots(3)
         mesh = landing_points(axes[0], outcomes, space, demonstrated=outcomes[:3], side=0.1, section=section)
         assert mesh.get_array().sum() == 50
         assert sorted(axes[0].lines[0].get_xdata()) == sorted(outcomes[:3, section.dims[0]])
         drawn = interest_map(axes[1], lows, highs, np.ones(1), goals=outcomes, section=section)
         assert len(drawn.get_paths()) == 1
         competence_map(axes[2], lows, highs, np.full(1, -0.5), section=section)
-        (last,) = interest_over_time([axes[3]], regions, section)
-        assert len(last.get_paths()) == 1
-        assert [ax.get_xlabel() for ax in axes] == [f"outcome {section.dims[0]}"] * 4
-    now = map_after(regions, 50)
-    assert now[0].shape == (1, dim)
+        assert [ax.get_xlabel() for ax in axes] == [f"outcome {section.dims[0]}"] * 3
 
 
 def test_sides_of_another_scale_are_not_drawn_in_proportion(ax):

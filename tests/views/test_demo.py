@@ -1,7 +1,7 @@
 """The demo: three runs of a few movements on a benchmark of a few goals, its figure and its table."""
 
 import shlex
-from dataclasses import replace
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +13,7 @@ from sgimd_torch.evaluation import Benchmark, save_benchmark
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.views.demo import configs_of, main
-from sgimd_torch.views.demo_figure import draw, table
+from sgimd_torch.views.demo_figure import draw
 
 LEARNERS = ("random", "sgim-d", "practice-taught")
 NAMES = ("Random", "SGIM-D", "Practice, taught")
@@ -50,33 +50,14 @@ def test_the_demo_ends_well_with_all_runs_a_figure_and_a_table(shown, runs):
     assert len(content) > 50_000  # an empty figure of this size has a tenth of that
     assert str(out / "demo.png") in printed
     assert "SGIM-D chooses goals" in said  # what it is doing
-    for row, line in zip(table(runs), printed.splitlines()[3:], strict=False):
-        assert line.split() == " ".join(row).split()
+    lines = {line.split()[0]: line.split() for line in printed.splitlines() if line}
+    assert all(lines[name][3] == f"{run.at(60):.3f}" for name, run in runs.items())
     commands = printed.partition("Next, try\n")[2].splitlines()
     assert len(commands) == 2
     for line in commands:
         program, name, *words = shlex.split(line, comments=True)
         assert (program, name in COMMANDS) == ("sgimd", True)
         assert any(Path(word).exists() for word in words)
-
-
-def test_the_table_compares_the_learners_in_error_noise_and_seconds(runs):
-    heads, *rows = table(runs)
-    assert heads[:4] == ["learner", "error 60 (m)", "of Random's", "noise floor (m)"]
-    random = runs["random"].at(60)
-    for row, name, run in zip(rows, NAMES, runs.values(), strict=True):
-        error, floor = run.at(60), run.evaluation["noise_floor"][-1]
-        assert row[:4] == [name, f"{error:.3f}", f"{error / random:.2f}", f"{floor:.3f}"]
-        assert row[4] == f"{run.summary['seconds_physics']:.0f}"
-
-
-def test_the_table_of_long_runs_has_columns_on_the_way_too(runs):
-    when = np.array([500, 1000, 2000, 3000])
-    columns = {"movements": when, "mean_error": 100.0 / when, "noise_floor": np.full(4, 0.01)}
-    longer = {algorithm: replace(run, answers=dict.fromkeys(run.answers, columns)) for algorithm, run in runs.items()}
-    heads, random, *_ = table(longer)
-    assert [head for head in heads if head.startswith("error")] == [f"error {n} (m)" for n in (1000, 2000, 3000)]
-    assert random[1:4] == ["0.100", "0.050", "0.033"]
 
 
 def test_the_figure_shows_the_data_of_the_runs(runs):
@@ -137,3 +118,18 @@ def test_options_of_a_run_are_those_of_all_three():
         (4, 0.0, (70,))
     }
     assert {config.out for config in configs_of([]).values()} == {Path("runs/demo")}
+
+
+def test_without_matplotlib_the_extra_is_named_before_anything_runs(tmp_path, monkeypatch, capsys):
+    from sgimd_torch.__main__ import _call
+
+    monkeypatch.chdir(tmp_path)
+    for name in [name for name in sys.modules if name.startswith(("sgimd_torch.views", "sgimd_torch.figures"))]:
+        monkeypatch.delitem(sys.modules, name)
+    for name in ("matplotlib", "matplotlib.axes", "matplotlib.figure"):
+        monkeypatch.setitem(sys.modules, name, None)
+    assert command(_call, ["demo"]) == 2
+    slip = "which is not installed; pip install 'sgimd-torch[plot]' installs it"
+    assert "error: sgimd demo needs matplotlib" in (said := capsys.readouterr().err)
+    assert slip in said
+    assert not list(tmp_path.iterdir())

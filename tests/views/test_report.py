@@ -27,7 +27,7 @@ from sgimd_torch.views.report.page import page, requested
 from sgimd_torch.views.statistics import interquartile_mean
 from sgimd_torch.views.variants import Variant
 
-FIGURES = [f"{what} of SGIM-D" for what in ("Error curve", "Misses", "Landing points", "Regions")]
+FIGURES = [f"{what} of SGIM-D" for what in ("Error curve", "Landing points", "Misses", "Regions")]
 ODD = "<b>&'$x\" "
 
 
@@ -126,25 +126,16 @@ def test_the_numbers_of_a_run_are_those_of_its_evaluations(pages, run):
     errors = dict(zip(*rows_of(pages["one"], "Errors"), strict=True))
     assert errors["last error (m)"] == f"{mean:.3f}"
     assert errors["by linear"] == f"{run.at(60, answer='linear'):.3f}"
-    assert errors["times the floor"] == f"{mean / floor:.2f}"
-    assert errors["error over life"] == f"{(run.at(30) + mean) / 2:.3f}"  # of one trapezoid
+    assert errors["noise floor"] == f"{floor:.3f}"
     assert errors["physics (s)"] == f"{run.summary['seconds_physics']:.1f}"
 
 
 def test_the_numbers_of_a_variant_are_interquartile_means_over_its_seeds(pages, runs):
     seeds = [read_run(runs / "sgim-d" / f"seed-00{seed}") for seed in (3, 4)]
-    errors, floors = (np.array([each.at(60, name) for each in seeds]) for name in ("mean_error", "noise_floor"))
+    errors = np.array([each.at(60) for each in seeds])
     row = next(row for row in rows_of(pages["many"], "Errors") if row[0] == "SGIM-D")
     assert row[1:3] == ["2", "60"]
     assert row[4] == f"{interquartile_mean(errors):.3f}"
-    assert row[7] == f"{errors.mean() / floors.mean():.2f}"
-
-
-def test_without_motor_noise_nothing_is_divided_by_the_floor(run):
-    quiet = {**run.answers["own"], "noise_floor": np.full(2, 1e-16)}
-    variant = Variant("sgim-d", [replace(run, answers={**run.answers, "own": quiet})])
-    assert variant.ratio is None
-    assert variant.at(60, "noise_floor").value < 1e-9
 
 
 def test_a_run_that_has_hardly_begun_is_reported_and_one_that_was_never_evaluated_comes_last(run, tmp_path):
@@ -286,16 +277,12 @@ def test_the_rows_of_a_figure_of_differences_are_two_or_three_lines_of_text_high
     assert 1.5 * line < (heights[1] - heights[0]) / 5 < 3 * line
 
 
-def test_differences_are_those_to_the_baseline_that_was_chosen(runs, pages, tmp_path, capsys):
+def test_differences_are_those_to_the_baseline_that_was_chosen(runs, pages, tmp_path):
     out = tmp_path / "page.html"
     assert report.main([str(runs), "--baseline", ODD, "--out", str(out)]) == 0
     captions = [f"Last error minus that of {escape(name)}, paired" for name in ("SGIM-D", ODD)]
     assert [caption in pages["many"] for caption in captions] == [True, False]
     assert [caption in out.read_text() for caption in captions] == [False, True]
-    out.unlink()
-    assert command(report.main, [str(runs), "--baseline", "observtion", "--out", str(out)]) == 2
-    assert "did you mean observation?" in capsys.readouterr().err
-    assert not out.exists()
 
 
 def test_only_settings_that_differ_are_compared(pages):
@@ -334,13 +321,12 @@ def test_the_commands_make_the_same_runs_again(pages, runs):
         (["a" * 40] * 2, ""),
     ],
 )
-def test_doubtful_versions_are_reported_and_only_a_clean_commit_is_checked_out(run, commits, warning):
+def test_doubtful_versions_are_reported(run, commits, warning):
     made_by = [replace(run, versions={**run.versions, "commit": commit}) for commit in commits]
     (few, *said) = record.doubts([Variant("sgim-d", made_by)])
     assert "Fewer than 5 seeds" in few
     assert len(said) == bool(warning)
     assert warning in "".join(said)
-    assert record.checkout([Variant("sgim-d", made_by)]) == ("" if warning else f"git checkout {'a' * 40}")
 
 
 @pytest.mark.parametrize(
@@ -364,16 +350,12 @@ def asked(tmp_path_factory):
     return read_run(out / "sgim-acts" / "seed-000")
 
 
-def test_a_learner_that_asks_has_a_line_and_a_figure_of_its_requests(asked, run, tmp_path):
+def test_a_learner_that_asks_has_a_line_on_its_requests(asked, run, tmp_path):
     requests = asked.requests
     shown = requests["reply"] == "shown"
     text = page(tmp_path, [Variant("sgim-acts", [asked])])
     told = f"asked for {len(shown)} demonstrations and was shown {shown.sum()}"
     assert f"{told}, {np.median(requests['apart'][shown]):.3f} m from its goal" in text
-    assert "Requests of SGIM-ACTS" in alts(text)
-    ax = drawn(figures.requests, asked).axes[0]
-    assert sum(bar.get_height() for bar in ax.patches) == len(shown)
-    assert {text.get_text() for text in ax.get_legend().get_texts()} == {*requests["strategy"]}
     assert requested(run) == ""
 
 
@@ -385,8 +367,6 @@ def test_the_same_runs_give_the_same_page(runs, pages, tmp_path):
 @pytest.mark.parametrize(
     ("words", "wanted"),
     [
-        (["nowhere"], "does not exist"),
-        (["file"], "is a file, not a folder"),
         (["empty"], "holds no runs"),
         (["RUNS", "--out", "empty"], "--out must be a file"),
         (["RUNS", "--out", "no/x.html"], "folder that exists"),

@@ -1,7 +1,5 @@
 """The suite: which runs it makes, what it shows of them, and what it refuses."""
 
-import sys
-
 import numpy as np
 import pytest
 
@@ -12,7 +10,7 @@ from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.tasks import goals_all_over
 from sgimd_torch.views.suite import RANDOM, TASKS, UNIFORM, _options, main, runs_of
-from sgimd_torch.views.suite_figure import figure, relative, table
+from sgimd_torch.views.suite_table import relative, table
 
 SHORT = ("--movements", "40", "--evaluate-at", "20", "--processes", "1")
 LEARNER = ("--goals", "uniform", "--search", "perturb", "--budget", "1")
@@ -86,7 +84,6 @@ def test_a_suite_is_run_shown_and_gone_on_with(tmp_path, capsys):
     words = ("--tasks", "toss", "half-reached", "--out", out, *LEARNER, *SHORT)
     assert suite(*words) == 0
     shown = capsys.readouterr().out
-    assert (out / "suite.png").read_bytes().startswith(b"\x89PNG")
     random, uniform = (read_run(out / "toss" / name / "seed-000").at(40) for name in (RANDOM, UNIFORM))
     line = next(line.split() for line in shown.splitlines() if line.startswith("40") and "toss" in line)
     assert line[2:4] == [f"{random:.4g}", f"{uniform / random:.2f}"]
@@ -118,27 +115,3 @@ def test_what_was_not_evaluated_is_a_dash_and_no_mean():
         ["100", "crawler (new)", "0.5", "-", "-"],
         ["100", "interquartile mean", "", "0.50", "1.50"],
     ]
-
-
-def test_the_figure_has_a_panel_for_each_task_with_a_curve_for_each_learner():
-    crawler = {("crawler (new)", learner, at): errors for (_, learner, at), errors in ERRORS.items()}
-    panels = [ax for ax in figure({**ERRORS, **crawler}).axes if ax.axison]
-    assert [ax.get_title() for ax in panels] == ["toss", "crawler (new)"]
-    assert [line.get_label() for line in panels[0].lines] == [RANDOM, "mine", "other"]
-    assert panels[0].lines[1].get_ydata() == pytest.approx([0.5])
-
-
-@pytest.mark.parametrize("words", [["suite"], ["demo"]])
-def test_without_matplotlib_the_extra_is_named_before_anything_runs(tmp_path, monkeypatch, capsys, words):
-    from sgimd_torch.__main__ import _call
-
-    monkeypatch.chdir(tmp_path)
-    for name in [name for name in sys.modules if name.startswith(("sgimd_torch.views", "sgimd_torch.figures"))]:
-        monkeypatch.delitem(sys.modules, name)
-    for name in ("matplotlib", "matplotlib.axes", "matplotlib.figure"):
-        monkeypatch.setitem(sys.modules, name, None)
-    assert command(_call, words) == 2
-    slip = "which is not installed; pip install 'sgimd-torch[plot]' installs it"
-    assert f"error: sgimd {words[0]} needs matplotlib" in (said := capsys.readouterr().err)
-    assert slip in said
-    assert not list(tmp_path.iterdir())

@@ -18,7 +18,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sgimd_torch.figures.axes import LEGEND, alike, limits, over_movements, rounded
-from sgimd_torch.figures.axes import colours as palette
 from sgimd_torch.figures.learning import COLOURS, competence_map, interest_map, landing_points, map_after
 from sgimd_torch.figures.learning import misses as draw_misses
 from sgimd_torch.figures.results import Difference, forest
@@ -32,7 +31,8 @@ P = ParamSpec("P")
 TILES: Final = 50  # along the longer side of a map, at most
 GOALS: Final = 100  # the last ones are shown
 MOST_CURVES: Final = 8
-PARTS: Final = 20  # of a run, each with its requests
+WIDE: Final = 4.3  # inches, of the axes of a map; beside them is the colour bar
+MARGIN: Final = 1.2  # inches, above and below them
 STYLE: Final[Any] = {
     "font.size": 11,
     "axes.titlesize": 11,
@@ -100,7 +100,7 @@ def curves(figure: Figure, variants: Sequence[Variant], colours: Mapping[str, st
     over_movements(ax, variants[0].space.in_unit("mean distance to benchmark goals"))
     ax.set_ylim(bottom=0)
     handles = [line for line in ax.lines if not str(line.get_label()).startswith("_")]
-    ax.legend(handles=handles, ncols=1 + (len(variants) > 4), loc="upper right")
+    ax.legend(handles=handles, **LEGEND)
 
 
 @png
@@ -146,7 +146,7 @@ def landing(figure: Figure, variant: Variant, plane: Box) -> None:
 def misses(figure: Figure, variant: Variant) -> None:
     """Where is it bad? Each goal of the last evaluation, coloured by its error; apart for thirds of the context."""
     goals, errors, contexts = variant.misses
-    parts = [("", np.ones(len(goals), bool))]
+    parts = [("all contexts" * bool(contexts.shape[1]), np.ones(len(goals), bool))]
     for k in range(contexts.shape[1]):
         box = variant.runs[0].spaces["contexts"]
         edges = np.linspace(box.low[k], box.high[k], 4)
@@ -179,26 +179,11 @@ def regions(figure: Figure, run: Run) -> None:
         interest_map(below, lows, highs, interests, goals=run.chosen_goals()[-GOALS:], section=section)
 
 
-@png
-def requests(figure: Figure, run: Run) -> None:
-    """How many demonstrations a learner asked for in each twentieth of its movements, by its strategies."""
-    assert run.requests is not None
-    ax, when, strategy = figure.subplots(), run.requests["index"], run.requests["strategy"]
-    edges = np.linspace(0, len(run.index), PARTS + 1)
-    below = np.zeros(PARTS)
-    for name, colour in palette(strategy).items():
-        counts, _ = np.histogram(when[strategy == name], edges)
-        ax.bar(edges[:-1], counts, np.diff(edges), below, align="edge", color=colour, label=name)
-        below += counts
-    over_movements(ax, "requests for a demonstration")
-    ax.legend(**LEGEND)
-
-
 def _panels(figure: Figure, shown: Sequence[Section]) -> list[Axes]:
-    """An axis for each section, below each other; a strip is low."""
-    height = 3 if shown[0].is_strip else 5.2 if len(shown) == 1 else 4.6
-    figure.set_size_inches(6, height * len(shown))
-    return list(figure.subplots(len(shown), 1, squeeze=False).flat)
+    """Axes below each other, which their sections fill."""
+    heights = [section.height(WIDE) for section in shown]
+    figure.set_size_inches(6, sum(heights) + MARGIN * len(shown))
+    return list(figure.subplots(len(shown), 1, squeeze=False, height_ratios=heights).flat)
 
 
 def _plain(name: str) -> str:

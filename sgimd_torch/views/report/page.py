@@ -72,4 +72,7 @@ def requested(run: Run) -> str:
         return ""
     shown = run.requests["reply"] == "shown"
     said = f"It asked for {len(shown)} demonstrations and was shown {shown.sum()}"
-    return f"{said}, {np.median(run.requests['apart'][shown]):.3f} m from its goal (median)." if shown.any() else said
+    if not shown.any():
+        return f"{said}."
+    apart = run.spaces["outcomes"].amount(float(np.median(run.requests["apart"][shown])), ".3f")
+    return f"{said}, {apart} from its goal (median)."

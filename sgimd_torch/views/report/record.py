@@ -33,9 +33,8 @@ def doubts(variants: Sequence[Variant]) -> Iterator[str]:
         yield f"Fewer than {LEAST_SEEDS} seeds: {', '.join(few)}. They have points, but no intervals and no verdict."
     if len({run.files.get("benchmark_crc32") for run in every}) > 1:
         yield "The runs were evaluated on different benchmarks, so their errors cannot be compared."
-    for name in dict.fromkeys(name for run in every for name in run.versions if name != "platform"):
-        values = dict.fromkeys(str(run.versions[name]) for run in every if name in run.versions)
-        if len(values) > 1:
+    for name, values in _versions(variants).items():
+        if len(values) > 1 and name != "platform":
             yield f"The runs were made with different versions of {name}: {', '.join(values)}."
     commits = [run.versions.get("commit") for run in every]
     if dirty := sum(str(commit).endswith("-dirty") for commit in commits):
@@ -56,18 +55,18 @@ def doubts(variants: Sequence[Variant]) -> Iterator[str]:
 
 def versions(variants: Sequence[Variant]) -> list[tuple[str, str]]:
     """Of each library and of this one, the commit first; where runs differ, all of them."""
+    return [(name, " or ".join(values)) for name, values in _versions(variants).items() if values]
+
+
+def _versions(variants: Sequence[Variant]) -> dict[str, dict[str, None]]:
+    """The same, by name; also those with which a run was made before it was resumed."""
     found: dict[str, dict[str, None]] = {"commit": {}}
     for run in [run for variant in variants for run in variant.runs]:
-        for name, value in run.versions.items():
-            found.setdefault(name, {})[shown(value)] = None
-    return [(name, " or ".join(values)) for name, values in found.items() if values]
-
-
-def checkout(variants: Sequence[Variant]) -> str:
-    """The command that checks out the commit of all runs; "" if they differ, or it had uncommitted changes."""
-    commits = {str(run.versions.get("commit")) for variant in variants for run in variant.runs}
-    name = commits.pop() if len(commits) == 1 else "None"
-    return "" if name == "None" or name.endswith("-dirty") else shlex.join(["git", "checkout", name])
+        for made_by in (run.versions, *run.versions.get("before", ())):
+            for name, value in made_by.items():
+                if name != "before":
+                    found.setdefault(name, {})[shown(value)] = None
+    return found
 
 
 def commands(runs: Sequence[Run]) -> list[str]:

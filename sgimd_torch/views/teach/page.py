@@ -1,8 +1,7 @@
 """The page: one loop that moves the led arm and shows how the session stands; nobody waits for it.
 
     with serving(8080) as server, Session(config) as session: Page(server, session).run()
-What viewers do is put into a queue for this loop. All viewers see the same, and each may do everything; the arm is held
-by one of them at a time.
+What viewers do is put into a queue for this loop. All viewers see the same, and each may do everything.
 """
 
 from __future__ import annotations
@@ -18,10 +17,10 @@ from typing import Any, Final
 import numpy as np
 import viser
 
+from sgimd_torch.demonstrations.leading import Leading
 from sgimd_torch.demonstrations.lessons import HandLesson
 from sgimd_torch.runs.tasks import hand_led_of
 from sgimd_torch.spaces import Array
-from sgimd_torch.views.teach.arm import LedArm
 from sgimd_torch.views.teach.chart import Chart, State, by_change, by_error
 from sgimd_torch.views.teach.panel import MAPS, SPEEDS, Panel
 from sgimd_torch.views.teach.scene import Scene
@@ -53,8 +52,9 @@ class Page:
         assert parts.task is not None
         led = hand_led_of(parts.task)
         self._outcomes = parts.environment.outcomes
-        self.arm = LedArm(led)
-        self.scene = Scene(server, led, self.arm.leading.links, self._outcomes, parts.benchmark.goals)
+        self.leading = Leading(led)
+        self._hand, self._offset = led.hand, np.zeros(3)  # (3,) m from the mouse to the held point
+        self.scene = Scene(server, led, self.leading.links, self._outcomes, parts.benchmark.goals)
         self.panel = Panel(server, self._act, self._outcomes, asks="teachers" in session.config)
         self.lesson: HandLesson | None = None
         """What the recording teaches; None until that is known."""
@@ -74,8 +74,8 @@ class Page:
                 self._carry_out(until=last + TICK)
                 now = time.monotonic()
                 with self.server.atomic():
-                    self.arm.leading.step(now - last)
-                    self.scene.draw_arm(self.arm.leading.data, self.arm.leading.hand)
+                    self.leading.step(now - last)
+                    self.scene.draw_arm(self.leading.data, self.leading.hand)
                     self._tell()
                 self.server.flush()
                 last = now
@@ -107,14 +107,13 @@ class Page:
 
         @self.server.on_client_disconnect
         async def _(client: viser.ClientHandle) -> None:
-            self._tasks.put(lambda: self._leave(client.client_id))
+            self._tasks.put(self._leave)
 
     def _listen_to(self, body: str, handle: Any) -> None:
         @handle.on_drag("left")  # type: ignore[untyped-decorator]
         async def _(event: Any) -> None:
-            client, phase = event.client, event.phase
-            start, end = np.array(event.start_position), np.array(event.end_position)
-            self._later(client, lambda: self._drag(client.client_id, phase, body, start, end))
+            phase, start, end = event.phase, np.array(event.start_position), np.array(event.end_position)
+            self._later(event.client, lambda: self._drag(phase, body, start, end))
 
     def _later(self, client: viser.ClientHandle, what: Callable[[], object]) -> None:
         """Have the loop do what a viewer wants; if it cannot be done, they are told why."""
@@ -133,8 +132,8 @@ class Page:
 
     def _act(self, name: str, client: viser.ClientHandle) -> None:
         actions: dict[str, Callable[[], object]] = {
-            "record": lambda: self._record(client),
-            "home": self.arm.leading.home,
+            "record": self._record,
+            "home": self.leading.home,
             "discard": lambda: self._say(None),
             "show": lambda: self._show(client),
             "undo": lambda: self._then(client, self.session.take_back(), lambda _: self._taken_back(client)),
@@ -143,33 +142,34 @@ class Page:
         }
         self._later(client, actions[name])
 
-    def _drag(self, viewer: int, phase: str, body: str, start: Array, end: Array) -> None:
+    def _drag(self, phase: str, body: str, start: Array, end: Array) -> None:
+        """The mouse takes hold of a ``body`` at ``start``, goes to ``end``, or lets go there; ``(3,)`` m."""
         if phase == "start":
             self.scene.hint.visible = False
-            self.arm.grab(viewer, body, start)
+            self.leading.grab(body, None if body == self._hand else start)
+            self._offset = self.leading.point - start
         if phase == "end":
-            self.arm.let_go(viewer)
-        else:
-            self.arm.drag(viewer, end)
+            self.leading.release()
+        elif self.leading.held:
+            self.leading.drag(end + self._offset)
 
-    def _leave(self, viewer: int) -> None:
-        """A tab was closed: it lets go, and what it was recording is over."""
-        self.arm.let_go(viewer)
-        if self.arm.recorder == viewer:
-            with contextlib.suppress(ValueError):
-                self.arm.stop()
+    def _leave(self) -> None:
+        """A tab was closed: the arm is let go, and a recording is over."""
+        self.leading.release()
+        if self.leading.recording:
+            self.leading.stop()
             self.panel.say_recording(False)
 
-    def _record(self, client: viser.ClientHandle) -> None:
+    def _record(self) -> None:
         """Begin a recording, or end the one under way and find out what it teaches."""
-        if not self.arm.leading.recording:
+        if not self.leading.recording:
             self._say(None)
-            self.arm.record(client.client_id)
+            self.leading.record()
             self.panel.say_recording(True)
             return
         self.panel.say_recording(False)
         try:
-            recording = self.arm.stop()
+            recording = self.leading.stop().moving()
         except ValueError as error:
             self._say(None, str(error))
             return

@@ -12,11 +12,9 @@ from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
 from browser import Tab, chromium, served
-from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.views.teach import serving
-from sgimd_torch.views.teach.arm import LedArm
 from sgimd_torch.views.teach.guard import guard, guarded
 from sgimd_torch.views.teach.session import Session
 
@@ -56,7 +54,7 @@ def rod(tmp_path):
 
 def lead(tab, path):
     """Drag the hand along points of the scene, with the mouse, and let go where it arrives."""
-    begun = tab.page.arm.leading.hand
+    begun = tab.page.leading.hand
     tab.tab.mouse.move(*tab.hand())
     tab.tab.mouse.down()
     for before, after in pairwise(path):
@@ -66,17 +64,17 @@ def lead(tab, path):
     # The mouse moves in the plane that faces the camera; on the screen the hand is where the path ends.
     tab.page.until(lambda: np.linalg.norm(np.subtract(tab.hand(), end)) < 25)
     tab.tab.mouse.up()
-    tab.page.until(lambda: not tab.page.arm.leading.held)
+    tab.page.until(lambda: not tab.page.leading.held)
 
 
 @pytest.mark.slow
 def test_a_person_leads_the_arm_teaches_it_and_sees_what_changed(open_tab, rod):
     tab = open_tab(rod)
     tab.tab.get_by_role("button", name="Record").click()
-    rod.until(lambda: rod.arm.leading.recording)
-    begun = rod.arm.leading.hand
+    rod.until(lambda: rod.leading.recording)
+    begun = rod.leading.hand
     lead(tab, PATH)
-    assert np.linalg.norm(rod.arm.leading.hand - begun) > 0.2
+    assert np.linalg.norm(rod.leading.hand - begun) > 0.2
     tab.tab.get_by_role("button", name="Stop").click()
     rod.until(lambda: rod.lesson is not None)
     lesson = rod.lesson
@@ -100,17 +98,17 @@ def test_a_person_leads_the_arm_teaches_it_and_sees_what_changed(open_tab, rod):
 def test_a_tab_closed_in_mid_drag_lets_go_its_recording_is_over_and_another_one_goes_on(open_tab, rod):
     tab, other = open_tab(rod), open_tab(rod)
     tab.tab.get_by_role("button", name="Record").click()
-    rod.until(lambda: rod.arm.leading.recording)
+    rod.until(lambda: rod.leading.recording)
     x, y = tab.hand()
     tab.tab.mouse.move(x, y)
     tab.tab.mouse.down()
     for k in range(5):
         tab.tab.mouse.move(x + 10 * k, y)
-    rod.until(lambda: rod.arm.leading.held)
-    assert rod.arm.leading.recording
+    rod.until(lambda: rod.leading.held)
+    assert rod.leading.recording
     tab.tab.close()
-    rod.until(lambda: not rod.arm.leading.held)
-    rod.until(lambda: not rod.arm.leading.recording)
+    rod.until(lambda: not rod.leading.held)
+    rod.until(lambda: not rod.leading.recording)
     rod.session.advance(1).result()  # the learner never noticed
     lead(other, PATH[::4])
 
@@ -120,7 +118,7 @@ def test_keys_do_what_buttons_do(open_tab, rod):
     tab = open_tab(rod)
     press = tab.tab.keyboard.press
     press("r")
-    rod.until(lambda: rod.arm.leading.recording)
+    rod.until(lambda: rod.leading.recording)
     lead(tab, PATH[::4])
     press("r")
     rod.until(lambda: rod.lesson is not None)
@@ -142,20 +140,6 @@ def test_a_page_whose_server_has_stopped_says_so_and_the_run_is_whole(open_tab, 
     assert len(read_run(page.session.run.path.parent).index) == 5
 
 
-def test_an_arm_that_one_viewer_holds_does_not_follow_another_one():
-    arm = LedArm(PlanarArm().hand_led)
-    ann, bob = 1, 2
-    arm.grab(ann, "end", np.array([1.0, 0.0, 0.0]))
-    arm.drag(ann, np.array([0.3, 0.6, 0.0]))
-    arm.grab(bob, "end", np.array([1.0, 0.0, 0.0]))
-    arm.drag(bob, np.array([-0.3, -0.6, 0.0]))
-    arm.let_go(bob)
-    arm.leading.step(3.0)
-    np.testing.assert_allclose(arm.leading.hand, [0.3, 0.6, 0.0], atol=1e-2)
-    arm.let_go(ann)
-    assert not arm.leading.held
-
-
 @pytest.mark.slow
 def test_the_first_minute(open_tab, rod):
     """It waits for a lesson, says what one sees, and what was wrong with a recording; an old throw goes away."""
@@ -165,12 +149,12 @@ def test_the_first_minute(open_tab, rod):
     assert not tab.tab.get_by_text("It waits for me when it asks").is_visible()  # this learner never asks
     show = tab.tab.get_by_role("button", name="Show it to the learner")
     tab.tab.get_by_role("button", name="Record").click()
-    rod.until(lambda: rod.arm.leading.recording)
+    rod.until(lambda: rod.leading.recording)
     tab.tab.get_by_role("button", name="Stop").click()
     tab.tab.get_by_text("you did not move the arm").wait_for()
     assert show.is_disabled()
     tab.tab.get_by_role("button", name="Record").click()
-    rod.until(lambda: rod.arm.leading.recording)
+    rod.until(lambda: rod.leading.recording)
     lead(tab, PATH[::4])
     tab.tab.get_by_role("button", name="Stop").click()
     tab.tab.get_by_text("It lands at").wait_for()

@@ -1,20 +1,14 @@
-"""The table and the figure of a suite: errors relative to those of one learner, by task and number of movements.
+"""The table of a suite: errors relative to those of one learner, by task and number of movements.
 
-errors = errors_of(configs, titled); print_table(table(errors)); draw(errors, Path("runs/suite/suite"))
+print_table(table(errors_of(configs, titled)))
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
-from typing import Final
 
 import numpy as np
-from matplotlib import pyplot as plt
-from matplotlib.figure import Figure
 
-from sgimd_torch.figures.axes import over_movements
-from sgimd_torch.figures.save import save_figure
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.spaces import Array
@@ -22,7 +16,6 @@ from sgimd_torch.views.statistics import Interval, interquartile_mean, interval,
 
 Key = tuple[str, str, int]
 """A task, a learner, and a number of movements."""
-_COLUMNS: Final = 4
 
 
 def errors_of(configs: Sequence[Config], titled: Callable[[str], str]) -> dict[Key, Array]:
@@ -69,31 +62,3 @@ def table(errors: Mapping[Key, Array]) -> list[list[str]]:
         means = [f"{interquartile_mean(np.array(values)):.2f}" if values else "-" for values in over_tasks]
         rows.append([str(movements), "interquartile mean", "", *means])
     return rows
-
-
-def draw(errors: Mapping[Key, Array], stem: Path) -> list[Path]:
-    """Write ``stem``.png: a panel for each task; returns the file."""
-    return save_figure(lambda: figure(errors), stem, "png")
-
-
-def figure(errors: Mapping[Key, Array]) -> Figure:
-    """Relative error against movements, a panel for each task."""
-    ratios = relative(errors)
-    tasks, (first, *others) = (list(dict.fromkeys(key[k] for key in errors)) for k in (0, 1))
-    rows, columns = -(-len(tasks) // _COLUMNS), min(len(tasks), _COLUMNS)
-    made, axes = plt.subplots(rows, columns, figsize=(4 * columns, 3.4 * rows), squeeze=False, layout="constrained")
-    for ax, task in zip(axes.flat, tasks, strict=False):
-        ax.axhline(1, color="0.45", linewidth=1, label=first)
-        for k, name in enumerate(others):
-            curve = sorted((m, ratio) for (t, n, m), ratio in ratios.items() if (t, n) == (task, name))
-            when, found = [movements for movements, _ in curve], [ratio for _, ratio in curve]
-            spread = [ratio.low for ratio in found], [ratio.high for ratio in found]
-            ax.fill_between(when, *spread, color=f"C{k}", alpha=0.2, linewidth=0)
-            ax.plot(when, [ratio.value for ratio in found], "o-", color=f"C{k}", label=name)
-        over_movements(ax, "relative error")
-        ax.set(yscale="log", title=task)
-    for ax in axes.flat[len(tasks) :]:
-        ax.axis("off")
-    axes.flat[0].legend(loc="upper right")
-    plt.close(made)
-    return made
