@@ -25,7 +25,7 @@ class Command(NamedTuple):
 COMMANDS: Final = {
     "run": Command("runs.command_line", "run one learner, evaluate it, write everything to a directory"),
     "sweep": Command("runs.sweep", "many runs: options crossed with each other and with seeds, in parallel"),
-    "check": Command("views.check", "does an environment keep every promise? each hint by name"),
+    "check": Command("views.check", "does an environment keep every promise? each slip by name"),
     "demonstrations": Command(
         "views.demonstrations", "are they right for a robot? import from CSV and LeRobot", "plot"
     ),

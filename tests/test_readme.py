@@ -170,10 +170,17 @@ def understand(name, words):
             importlib.import_module(f"sgimd_torch.{COMMANDS[name].module}").main(words)
 
 
-def test_the_example_of_the_readme_is_short_enough_to_read():
+def test_the_readme_and_its_example_are_short_enough_to_read():
     first = next(blocks("README.md", "python"))
     assert len([line for line in first.text.splitlines() if line.strip()]) <= 15
-    assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 120
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert len(text.split()) <= 800
+    assert max(map(len, text.splitlines())) <= 120
+
+
+def test_all_pages_together_can_be_read():
+    pages = [path for path in ROOT.rglob("*.md") if not {".venv", "site", "build"} & set(path.relative_to(ROOT).parts)]
+    assert sum(len(path.read_text(encoding="utf-8").split()) for path in pages) <= 30_000
 
 
 @pytest.mark.parametrize("name", PAGES)

@@ -46,7 +46,7 @@ class Config:
         evaluate_at: movements after which to evaluate, besides the end; null is 250, 500 and every 1000; [] never.
         evaluated_by: which inverse models answer in evaluations: own is that of --inverse, others are its words.
         repeats: how often each movement of an evaluation is executed again to measure the noise; 0 does not.
-        floor_at: which evaluations measure the noise, which takes ten times as long; null is all.
+        floor_at: which evaluations measure the noise, which takes four times as long; null is all.
         benchmark: file of the goals to evaluate on; null is the environment's own.
         demonstrations: file of recorded demonstrations; null is the environment's own.
         patience: seconds to wait for a teacher who is asked; null is as long as it takes.
