@@ -42,7 +42,7 @@ def filled(name: str, found: Evidence, folder: Path) -> tuple[str, Tables]:
     environment = jinja2.Environment(loader=loader, undefined=jinja2.StrictUndefined, keep_trailing_newline=True)
     tables = Tables(found, folder)
     template = environment.get_template(f"{name}.md.j2")
-    return template.render(tables=tables, rod=Prose(found), claimed=claimed), tables
+    return template.render(tables=tables, the=Prose(found), claimed=claimed), tables
 
 
 def into_readme(text: str, section: str) -> str:
@@ -73,9 +73,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--results", type=Path, default=results, help="folder of the rows (default: %(default)s)")
     parser.add_argument("--out", type=Path, default=results, help="folder of the pages (default: %(default)s)")
     parser.add_argument("--only", choices=PAGES, help="only this page")
-    parser.add_argument("--readme", type=Path, default=Path("README.md"), help="whose section of results is made again")
+    readme = "whose section of results is made again (default: README.md, with the pages in results/)"
+    parser.add_argument("--readme", type=Path, help=readme)
     options = parser.parse_args(argv)
-    names = [name for name in PAGES if options.only in (None, name)]
+    if options.readme is None and options.out == results:
+        options.readme = Path("README.md")
+    names = [name for name in PAGES if options.only in (None, name) and (name != README or options.readme)]
     paths = {name: options.readme if name == README else options.out / f"{name}.md" for name in names}
     for name in {*names} - {README}:
         _check_place(paths[name])
