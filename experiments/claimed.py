@@ -127,39 +127,39 @@ def learning(found: Evidence) -> list[Claim]:
 
     def proved(other: str) -> list[Part]:
         return [
-            at_most(1.02, found.ratio, name, f"{name} by {other}", at, name=f"memory of {name} at {at}")
+            at_most(1.02, found.ratio, name, f"{name} by {other}", at, name=f"{name} at {at}")
             for name in memories
             for at in TIMES
         ]
 
     return [
-        Claim("`practice-taught` needs few movements: ≤ 0.105, 0.070, 0.046 m at 250, 500, 1000",
+        Claim("`practice-taught` errs little early: ≤ 0.105, 0.070, 0.046 m at 250, 500, 1000",
               [at_most(bar, found.error, taught, at, name=f"at {at}", form=".4f")
                for at, bar in ((250, 0.105), (500, 0.070), (1000, 0.046))]),
-        Claim("... errs little at 5000: ≤ 0.0325 m", [at_most(0.0325, found.error, taught, form=".4f")]),
-        Claim("... as little as noise allows: ≤ 1.03 times its noise floor",
+        Claim("... and late: ≤ 0.0325 m at 5000", [at_most(0.0325, found.error, taught, form=".4f")]),
+        Claim("... ≤ 1.03 times its noise floor",
               [at_most(1.03, found.over_floor, taught, taught)]),
-        Claim("... less than four rivals shown the same, three every 30 movements, `-once` at the start: "
-              "differences at 500, 1000, 5000 < 0",
+        Claim("... less than four rivals shown the same, every 30, `-once` at the start: "
+              "< 0 at 500, 1000, 5000",
               [part for name in rivals for part in less(found, taught, f"{name}.rod", 500, 1000, LAST, name=name)]),
-        Claim("... less than SGIM-D, which is shown one every 30: differences at 500, 1000, 5000 < 0",
+        Claim("... less than SGIM-D, shown one every 30: < 0 at 500, 1000, 5000",
               less(found, taught, "sgim-d.rod", 500, 1000, LAST)),
-        Claim("... and no more than `practice` if all it is shown is one corner: ≤ 1.03 times at 250 to 5000",
+        Claim("... no more than `practice` if shown one corner only: ≤ 1.03 times, 250 to 5000",
               times_as_much(found, 1.03, "practice-corner.rod", alone, *WHOLE)),
-        Claim("`practice`, without a teacher, errs less than CMA-MAE: differences at 1000, 2000, 5000 < 0",
+        Claim("`practice`, without a teacher, errs less than CMA-MAE: < 0 at 1000, 2000, 5000",
               less(found, alone, "cma-mae.rod", 1000, 2000, LAST)),
-        Claim("SGIM-D errs less than the standard baseline, both shown one every 30: difference at 5000 < 0",
+        Claim("SGIM-D errs less than the standard baseline, both shown one every 30: < 0 at 5000",
               less(found, "sgim-d.rod", "uniform-nearest-taught.rod")),
-        Claim("Suite: `practice` never errs more than random movements: ≤ 1.02 times, ten tasks, four times",
+        Claim("Suite: `practice` never errs more than random movements: ≤ 1.02 times, 250 to 2000",
               on_each_task(RANDOM, 1.02)),
         Claim("... nor than the standard baseline: ≤ 1.05 times", on_each_task(UNIFORM, 1.05)),
-        Claim("... over tasks less than the standard baseline: mean ratio ≤ 0.75 at 1000",
+        Claim("... less over tasks: mean ratio ≤ 0.75 at 1000",
               over_tasks(UNIFORM, 0.75, 1000)),
         Claim("... than CMA-MAE and MAP-Elites: mean ratios < 1 at 500, 1000, 2000",
               [part for name in ("cma-mae", "map-elites") for part in over_tasks(name, 1.0, 500, 1000, 2000)]),
-        Claim("... and more movements never hurt: error at 2000 ≤ that at 500, ten tasks",
+        Claim("... and more movements never hurt: at 2000 ≤ at 500",
               [at_most(1.0, found.growth, f"practice.{task}", 2000, 500, name=task) for task in TASKS]),
-        Claim("`process` answers no worse than the nearest exemplar: ≤ 1.02 times on each of 48 memories, four times",
+        Claim("`process` answers no worse than the nearest exemplar: ≤ 1.02 times on 48 memories",
               proved("nearest")),
         Claim("... nor than `LocallyLinear`: ≤ 1.02 times", proved("linear")),
     ]  # fmt: skip
@@ -178,7 +178,7 @@ def curiosity(found: Evidence) -> list[Claim]:
               less(found, "sgim-d-absolute-large", "sgim-d-uniform-large")),
         Claim("Interest and simplex there: SGIM-D − the standard baseline, both shown one every 30, < 0",
               less(found, "sgim-d-large", "random-goals-demonstrations-large")),
-        Claim("Interest in the place of uniform goals in `practice`: differences at 1000, 5000 < 0",
+        Claim("Interest in the place of uniform goals in `practice`: < 0 at 1000, 5000",
               less(found, "practice-interest.rod", "practice.rod", 1000, LAST)),
     ]  # fmt: skip
 
@@ -191,7 +191,7 @@ def model(found: Evidence) -> list[Claim]:
         return [
             Claim(f"`{name}` needs fewer movements: SGIM-D's last error in ≤ 3000",
                   [at_most(3000, found.time_to_reach, ours, plain, form=".0f")]),
-            Claim("... errs less: differences at 1000, 2000, 5000 < 0", less(found, ours, plain, 1000, 2000, LAST)),
+            Claim("... errs less: < 0 at 1000, 2000, 5000", less(found, ours, plain, 1000, 2000, LAST)),
             Claim("... less than the noise floor of SGIM-D at 5000", [at_most(1.0, found.over_floor, ours, plain)]),
             Claim("... half as much on an arm of 50 joints at 2000: ratio ≤ 0.50",
                   times_as_much(found, 0.5, f"{name}-arm-50 by model", "sgim-d-arm-50", 2000)),
@@ -234,9 +234,9 @@ def asking(found: Evidence) -> list[Claim]:
         return found.less(ours, theirs, level=level)
 
     return [
-        Claim("When: SGIM-IM errs less than SGIM-D, shown one every 30: difference at 1000 < 0",
+        Claim("When: SGIM-IM errs less than SGIM-D, shown one every 30: < 0 at 1000",
               less(found, im, sgim_d, 1000)),
-        Claim("... no more than SGIM-D that is shown all 127 at the start: difference at 5000 ≤ 0",
+        Claim("... no more than SGIM-D that is shown all 127 at the start: ≤ 0 at 5000",
               less(found, im, "taught-at-start")),
         Claim("... nor than `practice-taught`, shown all at the start, too", less(found, im, "taught-at-start-once")),
         Claim("How few: with 83 demonstrations to ask for it errs no more than SGIM-D with 127",
@@ -250,9 +250,9 @@ def asking(found: Evidence) -> list[Claim]:
         Claim("Cost: when a demonstration costs ten movements, it is shown fewer",
               [at_most(0, more, "shown", dear, "shown", im, form="+.0f")]),
         Claim("... and errs less than SGIM-D at equal total cost", [at_most(0, at_equal_cost, form="+.4f")]),
-        Claim("Against information: less than asking by entropy: differences at 1000, 5000 < 0",
+        Claim("Against information: less than asking by entropy: < 0 at 1000, 5000",
               less(found, im, "sgim-eer", 1000, LAST)),
-        Claim("Contexts: on the toss less than a learner that does not feel the wind: differences at 1000, 2000 < 0",
+        Claim("Contexts: on the toss less than a learner that does not feel the wind: < 0 at 1000, 2000",
               less(found, toss, "alone-toss-blind", 1000, 2000)),
         Claim("... less than without a teacher", less(found, toss, "alone-toss", 1000, 2000)),
         Claim("... and asks more in a strong wind than in a weak one",

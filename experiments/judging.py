@@ -2,7 +2,7 @@
 
     judge([Claim("SGIM-D halves Random's error", [at_most(0.5, found.ratio, "sgim-d", "random")])])
 A part clears its bar only if its whole interval does. A claim of several parts holds if each of them does, which
-needs no correction. It fails if one of them does at a confidence corrected for their number. Else one cannot say.
+needs no correction. It fails if one of them does at a confidence corrected for their number. Else it is open.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from sgimd_torch.views.statistics import LEVEL, holm, show
 
 HOLDS: Final = "holds"
 FAILS: Final = "fails"
-OPEN: Final = "cannot say"
+OPEN: Final = "open"
 MISSING: Final = "not run"
 
 

@@ -15,13 +15,13 @@ from typing import Final
 
 import numpy as np
 
-from claimed import TIMES, WHOLE, paper
+from claimed import TIMES, paper
 from evidence import LAST, Evidence, Measure, NotRun
 from judging import MISSING, Verdict, judge
 from sgimd_torch.views.statistics import interquartile_mean, show
 from sgimd_torch.views.suite import RANDOM, TASKS, UNIFORM, titled
 from table import read_table
-from variants import ARMS, EXPERIMENTS, LEARNING, REFINING, ROBOTS, SUITED, TEACHERS, ladder
+from variants import ARMS, EXPERIMENTS, REFINING, ROBOTS, SUITED, TEACHERS, ladder
 
 SETTINGS: Final = (*ROBOTS, *TEACHERS)
 DEFAULT: Final = "default"  # setting of a rival
@@ -142,32 +142,20 @@ class Tables:
         ]
         return markdown(("memory of", "nearest", "`LocallyLinear`", "`process`"), _run(rows))
 
-    def rod(self) -> str:
-        """Every learner of few movements at all times, the best last."""
-        rows = [
-            [f"`{name.removesuffix('.rod')}`", *self.errors(name, WHOLE, ".3f")]
-            for name in sorted(LEARNING, key=self._last)
-        ]
-        return markdown(("learner", *map(str, WHOLE)), _run(rows))
-
     def suite(self, at: int = 1000) -> str:
-        """Errors over those of random movements on each task, then their interquartile mean over tasks at all times."""
+        """Errors over those of random movements on each task, then their interquartile mean over tasks."""
         learners = [name for name in SUITED if name != RANDOM]
 
         def known(name: str) -> list[str]:
             return [task for task in TASKS if task == "rod" or f"{name}.{task}" in EXPERIMENTS["suite"]]
 
         rows = [
-            [titled(task), self.cell(self.found.error, f"{RANDOM}.{task}", at, form=".3g"),
-             *(self.cell(self.found.ratio, f"{name}.{task}", f"{RANDOM}.{task}", at, form=".2f")
-               if task in known(name) else "–" for name in learners)]
+            [titled(task), *(self.cell(self.found.ratio, f"{name}.{task}", f"{RANDOM}.{task}", at, form=".2f")
+                             if task in known(name) else "–" for name in learners)]
             for task in TASKS
         ]  # fmt: skip
-        rows += [
-            [f"mean over tasks, {when}", "", *(self._over_tasks(name, known(name), when) for name in learners)]
-            for when in TIMES
-        ]
-        return markdown(("task", "random (its unit)", *learners), _run(rows))
+        rows.append(["mean over tasks", *(self._over_tasks(name, known(name), at) for name in learners)])
+        return markdown(("task", *learners), _run(rows))
 
     def gain(self) -> str:
         """What each step from random movements to practice brings; then learners with the same teacher."""
@@ -209,12 +197,13 @@ class Tables:
 
     def asking(self) -> str:
         """Learners that ask, and those they are compared with: errors on the rod, demonstrations that were shown."""
-        names = [name for name in EXPERIMENTS["asking"] if "toss" not in name]
+        names = [
+            name for name in EXPERIMENTS["asking"] if "toss" not in name and name != "sgim-acts-3"
+        ]  # it is sgim-im
         rows = [
-            [f"`{name}`", *self.errors(name, (250, 1000, LAST)), self._shown(name)]
-            for name in sorted(names, key=self._last)
+            [f"`{name}`", *self.errors(name, (1000, LAST)), self._shown(name)] for name in sorted(names, key=self._last)
         ]
-        return markdown(("learner", "250", "1000", "5000", "shown"), _run(rows))
+        return markdown(("learner", "1000", "5000", "shown"), _run(rows))
 
     def settings(self, at: int = 2000) -> str:
         """The error with an idea over that without it, in each setting; bold where its interval excludes 1."""
