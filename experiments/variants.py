@@ -182,11 +182,8 @@ UNTAUGHT: Final[dict[str, Variant]] = {
     "sagg-riac-uniform": {**SAGG_RIAC, "goals": "uniform"},
     "sagg-riac-model": {**SAGG_RIAC, **PROVED_MODEL},
     "practice": {"algorithm": "practice"},
-    "cma-mae": {"algorithm": "cma-mae"},
 }
 TAUGHT_ALIKE: Final[dict[str, Variant]] = {
-    "observation": {"algorithm": "observation"},
-    "imitation": {"algorithm": "imitation"},
     "uniform-taught": {**SGIM_D, **BASELINE},
     "sgim-d": SGIM_D,
     "sgim-d-uniform": {**SGIM_D, "goals": "uniform"},
@@ -257,10 +254,8 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
         "sagg-riac-large": {**SAGG_RIAC, **LARGE},
         "sgim-d-large": {**SGIM_D, **LARGE},
         "sgim-d-uniform-large": {**SGIM_D, **LARGE, "goals": "uniform"},
-        "sagg-riac-absolute-large": {**SAGG_RIAC, **LARGE, "goals.progress": "absolute"},
         "sgim-d-absolute-large": {**SGIM_D, **LARGE, "goals.progress": "absolute"},
         "random-goals-demonstrations-large": {**SGIM_D, **BASELINE, **LARGE},
-        "cma-mae-large": {"algorithm": "cma-mae", **LARGE},
         "sagg-riac-letter-large": {**SAGG_RIAC, **LETTER, **LARGE},
         "sgim-d-letter-large": {**SGIM_D, **LETTER, **LARGE},
     },

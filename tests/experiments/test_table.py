@@ -4,10 +4,10 @@ import re
 from pathlib import Path
 
 import pytest
+from quoted import TEMPLATES
 
 from claims import PAGES, main
 from made_up import row, write
-from quoted import TEMPLATES
 from sgimd_torch.runs.process import command
 from table import FILE, ResultsError, merge, read_table, write_table
 
