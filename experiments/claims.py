@@ -25,7 +25,7 @@ with loading():  # Ctrl-C shows no traceback
 
     import claimed
     from evidence import Evidence
-    from pages import Prose, Tables
+    from page_tables import Prose, Tables
     from sgimd_torch.files import make_folder, write_text
     from table import ResultsError
 

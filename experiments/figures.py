@@ -28,7 +28,7 @@ with loading():  # Ctrl-C shows no traceback
     from matplotlib.figure import Figure
 
     from evidence import LAST, Evidence, NotRun
-    from pages import GAIN, SETTINGS, TAUGHT
+    from page_tables import GAIN, SETTINGS, TAUGHT
     from sgimd_torch.figures.learning import COLOURS, NAMES
     from sgimd_torch.figures.save import save_figure
     from sgimd_torch.files import make_folder
