@@ -23,8 +23,8 @@ EVERY, COST = 30, 10  # movements from one demonstration to the next of SGIM-D; 
 
 def less(found: Evidence, ours: str, theirs: str, *times: int, name: str = "") -> list[Part]:
     """The parts that our error is smaller than theirs at each time."""
-    titled = (lambda at: f"{name} at {at}".strip()) if len(times) > 1 else (lambda at: name)
-    return [at_most(0.0, found.difference, ours, theirs, at, name=titled(at), form="+.4f") for at in times or (LAST,)]
+    names = {at: f"{name} at {at}".strip() if len(times) > 1 else name for at in times or (LAST,)}
+    return [at_most(0.0, found.difference, ours, theirs, at, name=each, form="+.4f") for at, each in names.items()]
 
 
 def times_as_much(found: Evidence, bar: float, ours: str, theirs: str, *times: int) -> list[Part]:

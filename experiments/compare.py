@@ -32,8 +32,8 @@ with loading():  # Ctrl-C shows no traceback
     from sgimd_torch.runs.engines.loop import sweep
     from sgimd_torch.runs.read import finished, read_run
     from sgimd_torch.runs.sweep import add_engines, add_options, engine_of
-    from table import ALIKE, ANSWERS, FILE, ROWS, Row, answers_of, merge, own_answer, read_table, result_rows
-    from variants import EXPERIMENTS, MADE, SEEDS, Variant, make_subsets, seeds_of, small_tables
+    from table import FILE, ROWS, Row, answers_of, merge, own_answer, read_table, result_rows
+    from variants import ALIKE, ANSWERS, EXPERIMENTS, MADE, SEEDS, Variant, make_subsets, seeds_of, small_tables
 
 EXAMPLES: Final = f"""experiments: {", ".join(EXPERIMENTS)}
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from claimed import TIMES, paper
 from evidence import LAST, Evidence, Measure, NotRun
-from judging import MISSING, Verdict, judge
+from judging import MISSING, Claim, Verdict, judge
 from sgimd_torch.views.statistics import interquartile_mean, show
 from sgimd_torch.views.suite import RANDOM, TASKS, UNIFORM, titled
 from table import read_table
@@ -87,7 +87,7 @@ class Tables:
     missing: list[str] = field(default_factory=list)
     verdicts: list[Verdict] = field(default_factory=list)
 
-    def claims(self, claims: Callable[[Evidence], Sequence[object]]) -> str:
+    def claims(self, claims: Callable[[Evidence], Sequence[Claim]]) -> str:
         """A row for each claim that was run."""
         return markdown(("claim", "number [95 %]", "verdict"), [
             (each.claim, each.number, f"**{each.verdict}**") for each in self.judged(claims(self.found))
@@ -103,7 +103,7 @@ class Tables:
         ]
         return markdown(("claim", "to the letter, by eq. (9)", "our SGIM-D, by `process`", "in a sentence"), cells)
 
-    def judged(self, claims: Sequence[object], *, keep: bool = False) -> list[Verdict]:
+    def judged(self, claims: Sequence[Claim], *, keep: bool = False) -> list[Verdict]:
         """Verdicts; ``keep`` those that were not run, too."""
         verdicts = judge(claims)
         self.missing += [each.claim for each in verdicts if each.verdict == MISSING]
@@ -212,12 +212,13 @@ class Tables:
             names = [f"{name}@{setting}" for name in (ours, theirs)]
             if not any(name in EXPERIMENTS["settings"] for name in names):
                 return "–"
-            names = [
-                name if name in EXPERIMENTS["settings"] else f"{name.partition('@')[0]}@as-it-is" for name in names
-            ]
-            names = [f"{name} by model-proved" if "-model@" in name else name for name in names]
+            first, second = (
+                (name if name in EXPERIMENTS["settings"] else f"{name.partition('@')[0]}@as-it-is")
+                + " by model-proved" * ("-model@" in name)
+                for name in names
+            )
             try:
-                ratio = self.found.ratio(*names, at)
+                ratio = self.found.ratio(first, second, at)
             except NotRun as missing:
                 self.missing.append(str(missing))
                 return "–"

@@ -15,7 +15,6 @@ from typing import Any, Final
 import numpy as np
 import pandas as pd
 
-from sgimd_torch.catalogue import ROD
 from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.files import make_folder, write_text
 from sgimd_torch.runs.build import task_of
@@ -153,7 +152,7 @@ def explored_rows(config: Config, run: Run) -> list[Row]:
     """The row of explored.csv: tiles of the benchmark that were reached, the goals that a learner chose for itself, and
     how many of them can be reached."""
     goals = run.chosen_goals()
-    benchmark, _ = benchmark_of(task_of(Config(parts={"environment": ROD})), config.benchmark)
+    benchmark = benchmark_of(task_of(Config()), config.benchmark)[0]
     tiles, near = tiles_reached(run.outcomes, benchmark), int((np.linalg.norm(goals, axis=1) <= NEAR).sum())
     return [{"variant": config.variant, "seed": config.seed, "tiles": tiles, "goals": len(goals), "near": near}]
 
