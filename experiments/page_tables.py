@@ -1,48 +1,73 @@
-"""The tables of the pages of results, in Markdown: of verdicts, variants, settings, answers, suite, teachers, rivals.
+"""The tables of the pages of results, in Markdown, and the numbers that their prose quotes.
 
-print(verdicts_table("claim", judge(PAPER_CLAIMS, results, "linear")))
+    Tables(found).rod(); Prose(found).error("sgim-d")
+What was not run is left out of the tables and noted in ``missing``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from functools import partial
-from itertools import product
+from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
 from typing import Final
 
 import numpy as np
-import pandas as pd
 
-from asking_claims import ON_TOSS
-from judging import LAST, NotRun, Results, Verdict
-from learning_claims import TIMES
-from sgimd_torch.views.statistics import Interval, interquartile_mean, point, ratio_interval, rng, show
+from claimed import TIMES, paper
+from evidence import LAST, Evidence, Measure, NotRun
+from judging import MISSING, Claim, Verdict, judge
+from sgimd_torch.views.statistics import interquartile_mean, show
 from sgimd_torch.views.suite import RANDOM, TASKS, UNIFORM, titled
-from table import ResultsError, read_table
-from variants import EVERYWHERE, EXPERIMENTS, HALVES, LEARNING, ROBOTS, SUITED, TAUGHT_ALIKE, TEACHERS, UNTAUGHT
+from table import read_table
+from variants import ARMS, EXPERIMENTS, REFINING, ROBOTS, SUITED, TEACHERS, ladder
 
-Cell = Callable[[str], str]  # the text of a variant in a column of a table; raises NotRun if there is none
-Ratios = Mapping[tuple[str, str], Mapping[str, Interval]]  # ours and theirs -> setting -> our error over theirs
-# The standard baseline as it is, and answered like the others.
-SUITE_COLUMNS: Final = ((UNIFORM, "nearest"), *((name, "process") for name in SUITED if name != RANDOM))
 SETTINGS: Final = (*ROBOTS, *TEACHERS)
-EVERYBODY: Final = (*UNTAUGHT, *TAUGHT_ALIKE)
+DEFAULT: Final = "default"  # setting of a rival
+# Rivals by schedule: no teacher; one demonstration every 30 movements, ten imitations each; all at the start, once.
+RIVALS: Final[Mapping[str, tuple[str, str, str]]] = {
+    "practice": ("practice.rod", "practice-taught-every-30.rod", "practice-taught.rod"),
+    "SAGG-RIAC; SGIM-D": ("sagg-riac.rod", "sgim-d.rod", "sgim-d-once.rod"),
+    "the standard baseline": (f"{UNIFORM}.rod", "uniform-nearest-taught.rod", "uniform-nearest-taught-once.rod"),
+    "CMA-MAE": ("cma-mae.rod", "cma-mae-taught.rod", "cma-mae-taught-once.rod"),
+    "MAP-Elites": ("map-elites.rod", "map-elites-taught.rod", "map-elites-taught-once.rod"),
+    "Random; Imitation": (f"{RANDOM}.rod", "imitation.rod", ""),
+    "isoline*": ("isoline", "isoline-demonstrations", ""),
+    "CMA-ME*": ("cma-me", "cma-me-demonstrations", ""),
+    "demonstrations and noise*": ("", "demonstrations-noise", ""),
+    "CMA-ME, CMA-MAE, tuned*": ("cma-me-tuned", "cma-mae-demonstrations-tuned", ""),
+    "MAP-Elites, tuned*": ("map-elites-tuned", "", ""),
+}
+# From random movements to practice, each step added to the one before; then the same teacher for all.
+GAIN: Final[Mapping[str, str]] = {
+    "random movements": RANDOM,
+    "the standard baseline": UNIFORM,
+    "... begun in the middle": "middle",
+    "... with `process`": "middle-process",
+    "... with its noise: `practice`": "practice",
+    "... with interest": "practice-interest",
+}
+TAUGHT: Final[Mapping[str, str]] = {
+    "the standard baseline, every 30": "uniform-nearest-taught",
+    "SGIM-D, every 30": "sgim-d",
+    "`practice`, every 30": "practice-taught-every-30",
+    "the standard baseline, at the start": "uniform-nearest-taught-once",
+    "SGIM-D, at the start": "sgim-d-once",
+    "`practice`, at the start": "practice-taught",
+}
 # What has the idea against what lacks it: without a teacher, and with one.
 IDEAS: Final = {
-    "Choosing goals by interest": (("sagg-riac", "sagg-riac-uniform"), ("sgim-d", "sgim-d-uniform")),
-    "Practice in the place of goal babbling": (("practice", "sagg-riac"), ("practice-taught", "sgim-d")),
-    "Being shown": (("sgim-d", "sagg-riac"), ("practice-taught", "practice")),
-    "The forward model": (("sagg-riac-model", "sagg-riac"), ("sgim-d-model", "sgim-d")),
-    "Choosing goals in the place of movements": (("sagg-riac", "random"),),
-    "Interest and simplex in the place of uniform goals and noise": (
+    "interest in the place of uniform goals": (("sagg-riac", "sagg-riac-uniform"), ("sgim-d", "sgim-d-uniform")),
+    "practice in the place of goal babbling": (("practice", "sagg-riac"), ("practice-taught", "sgim-d")),
+    "being shown": (("sgim-d", "sagg-riac"), ("practice-taught", "practice")),
+    "a forward model": (("sagg-riac-model", "sagg-riac"), ("sgim-d-model", "sgim-d")),
+    "goals in the place of movements": (("sagg-riac", "random"),),
+    "interest and simplex in the place of the standard baseline": (
         ("sagg-riac", "uniform"),
         ("sgim-d", "uniform-taught"),
     ),
 }
-DEFAULT: Final = "default"  # setting of a rival
-FIRST_ROUND: Final = (1000, 1001)  # seeds of all settings of rivals
 
 
 def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -53,203 +78,251 @@ def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
-def variants_table(names: Sequence[str], columns: Mapping[str, Cell]) -> str:
-    """One row for each variant, with a dash for what was not run."""
-    cells = [[_or_dash(partial(cell, name)) for cell in columns.values()] for name in names]
-    return markdown([*columns], cells)
+@dataclass
+class Tables:
+    """The tables of one page; the names of what was not run gather in ``missing``, verdicts in ``verdicts``."""
 
+    found: Evidence
+    folder: Path
+    missing: list[str] = field(default_factory=list)
+    verdicts: list[Verdict] = field(default_factory=list)
 
-def verdicts_table(what: str, verdicts: Sequence[Verdict]) -> str:
-    """One row for each claim; ``what`` heads the first column."""
-    cells = [
-        (
-            *(row.claim, row.bar, row.number, row.effect),
-            f"**{row.verdict}**" + (f" (alone: {row.alone})" if row.alone != row.verdict else ""),
-        )
-        for row in verdicts
-    ]
-    return markdown((what, "bar", "our number [95 % interval]", "difference [95 % interval]", "verdict"), cells)
+    def claims(self, claims: Callable[[Evidence], Sequence[Claim]]) -> str:
+        """A row for each claim that was run."""
+        return markdown(("claim", "number [95 %]", "verdict"), [
+            (each.claim, each.number, f"**{each.verdict}**") for each in self.judged(claims(self.found))
+        ])  # fmt: skip
 
-
-def said_table(said: pd.DataFrame, verdicts: Sequence[Verdict]) -> str:
-    """One row for each claim of an earlier version: what it said, and what is said now, bold where a verdict changed.
-
-    Raises:
-        ResultsError: a claim is not judged any more.
-    """
-    now = {row.claim: row for row in verdicts}
-    if lost := {*said.claim} - now.keys():
-        raise ResultsError(f"said.csv has {', '.join(sorted(lost))}, which is not judged any more; was it renamed?")
-    cells = [
-        (claim, number, verdict, now[claim].number, _bold(now[claim].verdict, now[claim].verdict != verdict))
-        for claim, number, verdict in said.itertuples(index=False)
-    ]
-    return markdown(("claim", "we said", "verdict then", "now we say", "verdict now"), cells)
-
-
-def answers_rows(results: Results) -> list[list[str]]:
-    """For each memory of the rod the error of `process` over that of the nearest and of `LocallyLinear`."""
-
-    def ratio(variant: str, other: str, when: int) -> str:
-        ours, theirs = (interquartile_mean(results.by(each).errors(variant, when)) for each in ("process", other))
-        return show(point(float(ours / theirs)))
-
-    return [
-        [
-            f"`{variant.removesuffix('.rod')}`",
-            f"`{other}`",
-            *(_or_dash(partial(ratio, variant, other, when)) for when in (*TIMES, LAST)),
+    def paper(self) -> str:
+        """A row for each of the paper's claims, to the letter and ours, all judged together."""
+        letter, ours = paper(self.found, letter=True), paper(self.found, letter=False)
+        verdicts = self.judged([*letter, *ours], keep=True)
+        cells = [
+            (our.text, *(f"**{each.verdict}** {each.number}".strip() for each in (theirs, mine)), our.note)
+            for our, theirs, mine in zip(ours, verdicts, verdicts[len(ours) :], strict=False)
         ]
-        for variant in LEARNING
-        for other in ("nearest", "linear")
-    ]
+        return markdown(("claim", "to the letter, by eq. (9)", "our SGIM-D, by `process`", "in a sentence"), cells)
 
+    def judged(self, claims: Sequence[Claim], *, keep: bool = False) -> list[Verdict]:
+        """Verdicts; ``keep`` those that were not run, too."""
+        verdicts = judge(claims)
+        self.missing += [each.claim for each in verdicts if each.verdict == MISSING]
+        self.verdicts += (run := [each for each in verdicts if each.verdict != MISSING])
+        return verdicts if keep else run
 
-def suite_rows(results: Results, at: int) -> list[list[str]]:
-    """A row for each task: how many seeds all have, the error of random movements answered by the nearest neighbour,
-    then that of ``SUITE_COLUMNS`` in it. At the end the interquartile mean over tasks."""
-    nearest = results.by("nearest")
-    lines, means = [], {each: list[float]() for each in SUITE_COLUMNS}
-    for task in TASKS:
-        random = f"{RANDOM}.{task}"
-        cells, seeds = [_or_dash(lambda random=random: show(nearest.iqm(random, at), ".3f"))], set[int]()  # type: ignore[misc]
-        for name, answer in SUITE_COLUMNS:
+    def cell(self, measure: Measure, *of: object, form: str = ".3f", between: bool = False) -> str:
+        """A number, with its interval ``between``, or a dash."""
+        try:
+            found = measure(*of) if between else measure(*of, level=None)
+        except NotRun as missing:
+            self.missing.append(str(missing))
+            return "–"
+        return show(found, form).replace("-", "−")
+
+    def errors(self, name: str, times: Sequence[int], form: str = ".3f", *, between: bool = False) -> list[str]:
+        """A cell for each time."""
+        return [self.cell(self.found.error, name, at, form=form, between=between) for at in times]
+
+    def rivals(self) -> str:
+        """Errors at 1000 and 5000, each rival by each schedule."""
+        rows = [
+            [label, *("–" if not name else ", ".join(self.errors(name, (1000, LAST))) for name in names)]
+            for label, names in RIVALS.items()
+        ]
+        head = ("learner", "no teacher", "one every 30, ten imitations each", "all at the start, once each")
+        return markdown(head, _run(rows))
+
+    def answers(self) -> str:
+        """Errors at 5000 by three answers."""
+        names = ("practice-taught", "practice", "sgim-d", "uniform-nearest-taught", "cma-mae", "cma-mae-taught")
+        rows = [
+            [f"`{name}`", *(self.cell(self.found.error, f"{name}.rod by {answer}") for answer in by)]
+            for by in [("nearest", "linear", "process")]
+            for name in names
+        ]
+        return markdown(("memory of", "nearest", "`LocallyLinear`", "`process`"), _run(rows))
+
+    def suite(self, at: int = 1000) -> str:
+        """Errors over those of random movements on each task, then their interquartile mean over tasks."""
+        learners = [name for name in SUITED if name != RANDOM]
+
+        def known(name: str) -> list[str]:
+            return [task for task in TASKS if task == "rod" or f"{name}.{task}" in EXPERIMENTS["suite"]]
+
+        rows = [
+            [titled(task), *(self.cell(self.found.ratio, f"{name}.{task}", f"{RANDOM}.{task}", at, form=".2f")
+                             if task in known(name) else "–" for name in learners)]
+            for task in TASKS
+        ]  # fmt: skip
+        rows.append(["mean over tasks", *(self._over_tasks(name, known(name), at) for name in learners)])
+        return markdown(("task", *learners), _run(rows))
+
+    def gain(self) -> str:
+        """What each step from random movements to practice brings; then learners with the same teacher."""
+        rows = [
+            [step, *self.errors(f"{name}.rod", (1000, LAST), between=True),
+             self._over_tasks(name, [*TASKS], 1000) if step in GAIN else ""]
+            for step, name in {**GAIN, **TAUGHT}.items()
+        ]  # fmt: skip
+        return markdown(("step", "rod, 1000 (m)", "rod, 5000 (m)", "suite, 1000"), _run(rows))
+
+    def changes(self) -> str:
+        """SGIM-D with one change: what it adds to the error."""
+        rows = [
+            [f"`{name}`", self.cell(self.found.difference, name, "sgim-d", form="+.4f", between=True)]
+            for experiment in ("ablations", "teaching")
+            for name in EXPERIMENTS[experiment]
+        ]
+        return markdown(("change", "difference to SGIM-D at 5000 (m)"), _run(rows))
+
+    def steps(self) -> str:
+        """The ladder from the letter to our defaults, in the small and in the large T."""
+        rows = [
+            [f"`{name}`", self.cell(self.found.error, f"{name}{self._own(name)}"),
+             *(self.cell(self.found.error, each) for each in (name, large))]
+            for name, large in zip(ladder(), ladder("-large"), strict=True)
+        ]  # fmt: skip
+        return markdown(("step", "T, by its own answer", "T, by `process`", "large T, by `process`"), _run(rows))
+
+    def models(self) -> str:
+        """Learners with and without a forward model: errors (m) by their own answer, at the end by `process`, too."""
+        ends = {"": (1000, LAST), **{f"-{arm.removeprefix('planar-')}": (2000,) for arm in ARMS}}
+        rows = []
+        for name, line in REFINING.items():
+            by = " by model" if line.get("inverse") == "model" else ""
+            found = [self.errors(f"{name}{ending}{by}", times, ".4f") for ending, times in ends.items()]
+            rows.append([f"`{name}`", *chain(*found), *self.errors(name, (LAST,), ".4f")])
+        head = ("learner", "rod, 1000", "rod, 5000", "arm of 7, 2000", "arm of 50, 2000", "rod, 5000, by `process`")
+        return markdown(head, _run(rows))
+
+    def asking(self) -> str:
+        """Learners that ask, and those they are compared with: errors on the rod, demonstrations that were shown."""
+        names = [
+            name for name in EXPERIMENTS["asking"] if "toss" not in name and name != "sgim-acts-3"
+        ]  # it is sgim-im
+        rows = [
+            [f"`{name}`", *self.errors(name, (1000, LAST)), self._shown(name)] for name in sorted(names, key=self._last)
+        ]
+        return markdown(("learner", "1000", "5000", "shown"), _run(rows))
+
+    def settings(self, at: int = 2000) -> str:
+        """The error with an idea over that without it, in each setting; bold where its interval excludes 1."""
+
+        def cell(ours: str, theirs: str, setting: str) -> str:
+            names = [f"{name}@{setting}" for name in (ours, theirs)]
+            if not any(name in EXPERIMENTS["settings"] for name in names):
+                return "–"
+            first, second = (
+                (name if name in EXPERIMENTS["settings"] else f"{name.partition('@')[0]}@as-it-is")
+                + " by model-proved" * ("-model@" in name)
+                for name in names
+            )
             try:
-                errors = results.by(answer).errors(f"{name}.{task}", at), nearest.errors(random, at)
-            except NotRun:
-                cells.append("-")
-                continue
-            found = ratio_interval(*errors, rng=rng())
-            means[name, answer].append(found.value)
-            cells.append(show(found))
-            seeds |= {len(each) for each in errors}
-        lines.append([titled(task), str(min(seeds, default=0)), *cells])
-    over = [f"{interquartile_mean(np.array(each)):.2f}" if each else "-" for each in means.values()]
-    return [*lines, ["interquartile mean over tasks", "", "", *over]]
+                ratio = self.found.ratio(first, second, at)
+            except NotRun as missing:
+                self.missing.append(str(missing))
+                return "–"
+            return f"**{show(ratio)}**" if ratio.low > 1 or ratio.high < 1 else show(ratio)
 
-
-def settings_rows(results: Results, at: int) -> list[list[str]]:
-    """A row for each learner, its errors (m) in each setting; a dash where it is the same as in `as-it-is`."""
-
-    def error(name: str) -> str:
-        return show(_in_settings(results, name).iqm(name, at), ".3f")
-
-    return [
-        [f"`{name}`", *(_or_dash(partial(error, f"{name}@{setting}")) for setting in SETTINGS)] for name in EVERYBODY
-    ]
-
-
-def ratios(results: Results) -> Ratios:
-    """By pair of `IDEAS` and by setting, our error over theirs at the end, paired by seed.
-
-    There is none where one of them was not run, or where the setting changes nothing for either. A learner without a
-    teacher is the same under every teacher.
-    """
-    at: int = EVERYWHERE["movements"]
-
-    def errors(learner: str, setting: str) -> dict[int, float]:
-        name = f"{learner}@{setting}" if f"{learner}@{setting}" in EXPERIMENTS["settings"] else f"{learner}@as-it-is"
-        return _in_settings(results, name).at(name, at)
-
-    found: dict[tuple[str, str], dict[str, Interval]] = {pair: {} for pairs in IDEAS.values() for pair in pairs}
-    for (ours, theirs), setting in product(found, SETTINGS):
-        if any(f"{name}@{setting}" in EXPERIMENTS["settings"] for name in (ours, theirs)):
-            with suppress(NotRun):
-                found[ours, theirs][setting] = results.paired_ratio(errors(ours, setting), errors(theirs, setting))
-    return found
-
-
-def ideas_rows(found: Ratios) -> list[list[str]]:
-    """A row for each comparison of `ratios`, a cell for each setting, bold where its interval excludes 1."""
-    return [
-        [
-            *(idea, f"`{ours}` / `{theirs}`"),
-            *(
-                _bold(show(ratio), _sign(ratio) != 0) if (ratio := found[ours, theirs].get(setting)) else "-"
-                for setting in SETTINGS
-            ),
-        ]
-        for idea, pairs in IDEAS.items()
-        for ours, theirs in pairs
-    ]
-
-
-def where_it_pays(found: Ratios) -> str:
-    """A line for each idea: the settings in which it lowers the error, and those in which it raises it."""
-
-    def listed(pairs: Sequence[tuple[str, str]], sign: int) -> str:
-        by_learner = {
-            ours: [setting for setting, each in found[ours, theirs].items() if _sign(each) == sign]
+        rows = [
+            [f"{idea}: `{ours}`", *(cell(ours, theirs, setting) for setting in SETTINGS)]
+            for idea, pairs in IDEAS.items()
             for ours, theirs in pairs
-        }
-        return "; ".join(f"`{ours}` in {', '.join(each)}" for ours, each in by_learner.items() if each) or "nowhere"
-
-    return "\n".join(
-        f"- **{idea}** seems to pay: {listed(pairs, -1)}. It seems to cost: {listed(pairs, 1)}."
-        for idea, pairs in IDEAS.items()
-    )
-
-
-def teachers_rows(asked: pd.DataFrame) -> list[list[str]]:
-    """Requests to each teacher, means over seeds: variant, teacher, all, answered, late, late in their own half."""
-    means = asked.groupby(["variant", "teacher"], sort=False)[["requests", "shown", "late", "late_own"]].mean()
-    order = [*EXPERIMENTS["asking"]]
-    return [
-        [f"`{variant}`", teacher, *(f"{mean:.1f}" for mean in row[:3]), f"{row[3]:.1f}" if teacher in HALVES else ""]
-        for (variant, teacher), *row in sorted(means.itertuples(name=None), key=lambda row: order.index(row[0][0]))
-    ]
-
-
-def contexts_rows(parts: pd.DataFrame) -> list[list[str]]:
-    """The error (m) by third of the wind at the end, interquartile means over seeds; none without a table."""
-    found = parts.groupby(["variant", "low", "high"])["error"].apply(interquartile_mean)
-    return [
-        [f"`{variant}`", f"{low:.3g} to {high:.3g}", f"{error:.4f}"]
-        for name in ON_TOSS
-        for (variant, low, high), error in found.items()
-        if variant == name
-    ]
-
-
-def rivals_rows(folder: Path) -> list[list[str]]:
-    """A row for each setting of each rival, the best of the first round first, the default bold: its errors (m) early
-    and late in the first round, and late on the seeds that the best got afterwards."""
-    table = read_table(folder, "rivals.csv")
-    table["round"] = np.where(table.seed.isin(FIRST_ROUND), 1, 2)
-    means = table.groupby(["round", "movements", "rival", "setting"])[["linear", "process"]].mean()
-
-    def cells(*place: object) -> list[str]:
-        return [f"{error:.4f}" for error in means.loc[place]] if place in means.index else ["-", "-"]
-
-    first = means.loc[1, LAST].sum(axis=1).sort_values(kind="stable") if len(means) else means
-    return [
-        [
-            f"`{rival}`",
-            _bold(setting, True) if setting == DEFAULT else f"`{setting}`",
-            *(cell for part in ((1, 1000), (1, LAST), (2, LAST)) for cell in cells(*part, rival, setting)),
         ]
-        for rival in dict.fromkeys(table.rival)
-        for each, setting in first.index
-        if each == rival
-    ]
+        return markdown(("idea", *SETTINGS), _run(rows))
+
+    def swimmer(self) -> str:
+        """Each learner on the swimmer, by `process`, and by its forward model at the end."""
+        rows = []
+        for name in EXPERIMENTS["swimmer"]:
+            model = self.cell(self.found.error, f"{name} by model", 2000) if "practice" not in name else "–"
+            rows.append([f"`{name.removesuffix('-swimmer')}`", *self.errors(name, TIMES, between=True), model])
+        return markdown(("explored by", *map(str, TIMES), "2000, by `model`"), _run(rows))
+
+    def by_hand(self) -> str:
+        """Each learner alone, with lessons by hand and with shipped demonstrations."""
+        rows = [[f"`{name}`", *self.errors(name, (300, 500, 1000), between=True)] for name in EXPERIMENTS["by-hand"]]
+        return markdown(("learner", "300", "500", "1000"), _run(rows))
+
+    def tuned(self) -> str:
+        """For each rival its default and the best setting of the first round, both with errors of all their seeds."""
+        table = read_table(self.folder, "rivals.csv")
+        at_end = table[table.movements == LAST]
+        first = at_end[at_end.seed < 1002].groupby(["rival", "setting"])[["linear", "process"]].mean().mean(axis=1)
+        later = at_end[at_end.seed >= 1002].groupby(["rival", "setting"])["process"].mean()
+        means = at_end[at_end.seed < 1002].groupby(["rival", "setting"])["process"].mean()
+        rows = []
+        for rival in dict.fromkeys(table.rival):
+            best = str(first.loc[rival].idxmin())
+            for setting in dict.fromkeys((DEFAULT, best)):
+                place = (rival, setting)
+                again = f"{later.loc[place]:.4f}" if place in later.index else "–"
+                rows.append([f"`{rival}`", f"`{setting}`", f"{means.loc[place]:.4f}", again])
+        return markdown(("rival", "setting", "first seeds", "later seeds"), rows)
+
+    def _last(self, name: str) -> float:
+        """Its error at the end, to sort by."""
+        with suppress(NotRun):
+            return self.found.error(name, level=None).value
+        return np.inf
+
+    def _own(self, name: str) -> str:
+        return " by paper" if name.endswith("letter") else " by linear" if name.startswith("ladder") else ""
+
+    def _over_tasks(self, name: str, tasks: Sequence[str], at: int) -> str:
+        names = [[f"{each}.{task}" for task in tasks] for each in (name, RANDOM)]
+        return self.cell(self.found.over_tasks, *names, at, form=".2f")
+
+    def _shown(self, name: str) -> str:
+        if not name.startswith("sgim"):
+            return "0" if name == "alone" else "all"
+        counts = self.found.counts("asked", name, "shown")
+        return f"{interquartile_mean(np.array([*counts.values()])):.0f}"
 
 
-def _in_settings(results: Results, name: str) -> Results:
-    """A learner with a forward model is answered by the model, all others by `process`."""
-    return results.by("own" if "-model@" in name else "process")
+def _run(rows: Sequence[Sequence[str]]) -> list[Sequence[str]]:
+    """Those that have a number."""
+    return [row for row in rows if any(cell not in ("–", "") for cell in row[1:])]
 
 
-def _or_dash(cell: Callable[[], str]) -> str:
+@dataclass(frozen=True)
+class Prose:
+    """The numbers that prose quotes, "(not run)" where rows are missing; ``at`` is a number of movements."""
+
+    found: Evidence
+
+    def error(self, name: str, at: int = LAST, form: str = ".3f") -> str:
+        """The error (m)."""
+        return _quoted(lambda: f"{self.found.error(name, at, level=None).value:{form}}")
+
+    def interval(self, name: str, at: int = LAST, form: str = ".3f") -> str:
+        """The same with its interval."""
+        return _quoted(lambda: show(self.found.error(name, at), form))
+
+    def less(self, ours: str, theirs: str, at: int = LAST, form: str = ".3f") -> str:
+        """How much less ours errs (m), with its interval."""
+        return _quoted(lambda: show(self.found.difference(theirs, ours, at), form).replace("-", "−"))
+
+    def ratio(self, ours: str, theirs: str, at: int = LAST) -> str:
+        """Our error over theirs, with its interval."""
+        return _quoted(lambda: show(self.found.ratio(ours, theirs, at)))
+
+    def over_floor(self, name: str) -> str:
+        """The error over its noise floor, with its interval."""
+        return _quoted(lambda: show(self.found.over_floor(name, name)))
+
+    def near(self, name: str) -> str:
+        """The share of the goals chosen by all seeds together that can be reached: ``43.4 %``."""
+
+        def share() -> str:
+            chosen, near = self.found.near_goals(name).sum(axis=0)
+            return f"{100 * near / chosen:.1f} %"
+
+        return _quoted(share)
+
+
+def _quoted(number: Callable[[], str]) -> str:
     try:
-        return cell()
+        return number()
     except NotRun:
-        return "-"
-
-
-def _bold(text: str, when: bool) -> str:
-    return f"**{text}**" if when else text
-
-
-def _sign(ratio: Interval) -> int:
-    """-1 below 1 for certain, 1 above it, 0 neither."""
-    return int(ratio.low > 1) - int(ratio.high < 1)
+        return "(not run)"

@@ -142,7 +142,7 @@ def test_the_source_distribution_has_what_builds_tests_and_explains_and_no_more(
         names = {name.partition("/")[2] for name in archive.getnames()}
     top = ["LICENSE", "README.md", "CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "constraints.txt"]
     tests = [each.relative_to(ROOT).as_posix() for each in (ROOT / "tests").rglob("*.py")]
-    assert {*top, *tests, "sgimd_torch/py.typed", "scripts/test", "results/paper.csv", "docs/runs.md"} <= names
+    assert {*top, *tests, "sgimd_torch/py.typed", "scripts/test", "results/results.csv", "docs/runs.md"} <= names
     assert not [
         name for name in names if "__pycache__" in name or name.startswith(("runs", ".venv", "results/model/g"))
     ]

@@ -1,5 +1,5 @@
 """Links between the pages lead somewhere, also to the heading that they name, as a code host reads them; the site's
-navigation has every page once; what a page quotes of the code or of a results page stands there."""
+navigation has every page once; what a page quotes of the code stands there."""
 
 import posixpath
 import re
@@ -13,7 +13,6 @@ PAGES = [*sources(), "experiments/README.md"]
 LINK = re.compile(r"(?<!`)\[[^\]]*\]\(([^)\s]*)\)")
 FENCED = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
 QUOTE = re.compile(r"^```py (\S+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
-RESULT = re.compile(r"^\|[^|]*\| ([^|]*\d[^|]*) \| ([^|]*?) ?\| \[\w+\]\(([^)]*)\) \|$", re.MULTILINE)
 
 
 def text_of(page):
@@ -63,12 +62,3 @@ def test_what_a_page_quotes_of_the_code_stands_there_in_this_order(page):
             if line.strip() not in ("", "..."):
                 assert line.strip() in there, f"{path} has no such line after the ones before: {line}"
                 there = there[there.index(line.strip()) + 1 :]
-
-
-def test_the_numbers_of_the_page_on_curiosity_stand_on_the_results_pages_with_that_verdict():
-    rows = RESULT.findall(text_of("docs/explained/curiosity.md"))
-    assert len(rows) == 20
-    for number, verdict, link in rows:
-        page = text_of(posixpath.normpath(posixpath.join("docs/explained", link)))
-        lines = [line for line in page.splitlines() if number.removesuffix(" times") in line]
-        assert any(not verdict or f"**{verdict}**" in line for line in lines), f"{number} {verdict} is not in {link}"

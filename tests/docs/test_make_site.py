@@ -20,7 +20,7 @@ def test_pages_lie_as_in_the_repository_with_the_files_that_they_link_to(copied)
         "docs/own-robot.md",
         "results/RESULTS.md",
         "results/results.csv",
-        "results/figures/errors.png",
+        "results/figures/learning.svg",
         "LICENSE",
     ):
         assert (copied / name).is_file(), name

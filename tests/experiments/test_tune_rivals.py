@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from claims import main as claims
 from made_up import write
 from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.environments.fishing_rod import FishingRod
@@ -71,21 +70,3 @@ def test_the_baseline_is_that_of_the_variants():
     learner = baseline(FishingRod(threads=1), 0, correspondence=FishingRod(threads=1).primitive.correspondence)
     parts = learner.autonomous
     assert [type(part).__name__ for part in (parts.goals, parts.inverse)] == ["UniformGoals", "NearestNeighbour"]
-
-
-def test_the_page_lists_settings_the_best_first_and_the_default_in_bold(tmp_path):
-    rows = [
-        ("isoline", setting, seed, when, error, error + 0.01)
-        for setting, error in (("default", 0.06), ("sd=0.01", 0.05), ("sd=0.05", 0.07))
-        for seed in (1000, 1001)
-        for when in (1000, 5000)
-    ]
-    rows.append(("isoline", "sd=0.01", 1002, 5000, 0.07, 0.08))
-    write(tmp_path, rows, "rivals.csv")
-    assert command(claims, ["--results", str(tmp_path), "--out", str(tmp_path / "pages"), "--only", "RIVALS"]) == 0
-    lines = (tmp_path / "pages/RIVALS.md").read_text().splitlines()
-    assert [line for line in lines if line.startswith("| `isoline`")] == [
-        "| `isoline` | `sd=0.01` | 0.0500 | 0.0600 | 0.0500 | 0.0600 | 0.0700 | 0.0800 |",
-        "| `isoline` | **default** | 0.0600 | 0.0700 | 0.0600 | 0.0700 | - | - |",
-        "| `isoline` | `sd=0.05` | 0.0700 | 0.0800 | 0.0700 | 0.0800 | - | - |",
-    ]

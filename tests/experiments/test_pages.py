@@ -1,0 +1,123 @@
+"""The pages of results: made of rows and templates alone, every row for a page, what is missing named."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from claims import PAGES, README, TEMPLATES, filled, main
+from evidence import LAST, Evidence
+from made_up import write, write_rows
+from runs import ROOT
+from sgimd_torch.runs.process import command
+from table import read_table
+
+SHIPPED = ROOT / "results"
+CONSTANTS = {  # of the method, and of what no rows are kept of
+    *("95 %", "50 %", "30 %", "2 %", ".25", ".05", ".95"),
+    *("1.6", "1.3"),  # seconds of refining
+}
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """The pages of the shipped rows, and of the shipped README whose numbers were spoilt."""
+    out = tmp_path_factory.mktemp("pages")
+    readme = out / "README.md"
+    readme.write_text(re.sub(r"\b0\.\d\d\d\b", "9.999", (ROOT / "README.md").read_text("utf-8")), encoding="utf-8")
+    assert command(main, ["--results", str(SHIPPED), "--out", str(out), "--readme", str(readme)]) == 0
+    return out
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_the_shipped_pages_are_what_the_shipped_rows_and_templates_make(made, name):
+    """Change a template or the rows in results/, then run experiments/claims.py."""
+    shipped = (ROOT if name == README else SHIPPED) / f"{name}.md"
+    assert (made / f"{name}.md").read_text(encoding="utf-8") == shipped.read_text(encoding="utf-8")
+
+
+class Reading(Evidence):
+    """Notes whose errors are read."""
+
+    read: set[tuple[str, str]] = set()  # noqa: RUF012
+
+    def at(self, name, movements=LAST, column="error"):
+        variant, _, answer = name.partition(" by ")
+        self.read.add((variant, answer or "process"))
+        return super().at(name, movements, column)
+
+    def curve(self, name):
+        self.read.add((name, "process"))
+        return super().curve(name)
+
+
+def test_every_variant_is_on_a_page_and_so_is_every_answer_of_an_experiment():
+    found = Reading.of(SHIPPED)
+    for name in PAGES:
+        filled(name, found, SHIPPED)
+    table = read_table(SHIPPED)
+    assert {*table.variant} <= {variant for variant, _ in found.read}
+    by_variant = {variant: experiment for experiment, variant in zip(table.experiment, table.variant, strict=True)}
+    answered = {(by_variant.get(variant), answer) for variant, answer in found.read}
+    assert {*zip(table.experiment, table.answer, strict=True)} <= answered | {("learners", "process")}
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_no_number_is_written_by_hand_into_the_text_of_a_template(name):
+    text = (TEMPLATES / f"{name}.md.j2").read_text(encoding="utf-8")
+    text = re.sub(r"\{\{.*?\}\}|`[^`]*`|\]\([^)]*\)|eqs?\. \([^)]*\)", "", text)
+    lines = [line for line in text.splitlines() if not line.startswith("|")]
+    by_hand = {found for line in lines for found in re.findall(r"\d*\.\d+|\d+ mm|\d+ %", line)}
+    assert by_hand <= CONSTANTS
+
+
+@pytest.mark.parametrize("name", sorted({*PAGES} - {README}))
+def test_a_page_of_another_kind_is_left_alone(tmp_path, capsys, name):
+    page = tmp_path / f"{name}.md"
+    page.write_text("# My thesis\n")
+    assert command(main, ["--results", str(SHIPPED), "--out", str(tmp_path)]) == 2
+    assert f"{page} was not made by claims.py" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == [page.name]
+
+
+def test_rows_of_ones_own_make_pages_and_leave_the_readme_alone(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    write_rows(Path("mine"))
+    assert command(main, ["--results", "mine", "--out", "mine", "--only", "CURIOSITY"]) == 0
+    assert "| **holds** |" in Path("mine/CURIOSITY.md").read_text()
+    said = capsys.readouterr()
+    assert "CURIOSITY: 6 holds" in said.out
+    assert "CURIOSITY: not run: sgim-d-letter at 5000; " in said.err
+    assert [path.name for path in tmp_path.iterdir()] == ["mine"]
+
+
+def test_a_readme_without_a_section_of_results_is_refused_and_no_page_made(tmp_path, capsys):
+    (tmp_path / "README.md").write_text("# Mine\n")
+    words = ["--results", SHIPPED, "--out", tmp_path / "pages", "--readme", tmp_path / "README.md", "--only", README]
+    assert command(main, [*map(str, words)]) == 2
+    assert "the README must have a section" in capsys.readouterr().err
+    assert not (tmp_path / "pages").exists()
+
+
+def test_what_was_not_run_is_left_out_of_a_table_and_named(tmp_path):
+    found = Evidence.of(write_rows(tmp_path, without=["practice-interest.rod", "sgim-d.rod"]))
+    text, tables = filled("GAIN", found, tmp_path)
+    assert "| `practice`, at the start | 0.0" in text
+    assert "... with interest |" not in text
+    assert {"practice-interest.rod at 1000", "sgim-d.rod at 1000"} <= {*tables.missing}
+
+
+def test_the_page_of_rivals_has_the_default_and_the_best_setting(tmp_path):
+    rows = [
+        ("isoline", setting, seed, when, error, error + 0.01)
+        for setting, error in (("default", 0.06), ("sd=0.01", 0.05), ("sd=0.05", 0.07))
+        for seed in (1000, 1001)
+        for when in (1000, 5000)
+    ]
+    write_rows(tmp_path)
+    write(tmp_path, [*rows, ("isoline", "sd=0.01", 1002, 5000, 0.07, 0.08)], "rivals.csv")
+    text, _ = filled("RIVALS", Evidence.of(tmp_path), tmp_path)
+    assert [line for line in text.splitlines() if line.startswith("| `isoline`")] == [
+        "| `isoline` | `default` | 0.0700 | – |",
+        "| `isoline` | `sd=0.01` | 0.0600 | 0.0800 |",
+    ]
