@@ -1,9 +1,9 @@
 """Run the experiments, every variant with several seeds, and collect the results in tables.
 
 variants.py says which variants there are. A run goes to OUT/VARIANT/seed-003. When it ends, each of its evaluations
-becomes rows of results.csv in RESULTS, one for each inverse model that answers. Requests and errors by context of
-asking are in asked.csv and contexts.csv, the goals chosen in the large task space in goals.csv. A variant in two
-experiments is run once, and has rows for each.
+becomes rows of results.csv in RESULTS, one for each answer that a page reads. Requests of learners that ask are in
+asked.csv; tiles reached and goals chosen in explored.csv. A variant in two experiments is run once,
+and has rows for each.
 
 Start the same command again after Ctrl-C or a power cut, or with more seeds: what is in the tables is not run again,
 and a run that was stopped goes on. If a run fails, the others go on.
@@ -32,7 +32,7 @@ with loading():  # Ctrl-C shows no traceback
     from sgimd_torch.runs.engines.loop import sweep
     from sgimd_torch.runs.read import finished, read_run
     from sgimd_torch.runs.sweep import add_engines, add_options, engine_of
-    from table import FILE, ROWS, Row, merge, own_answer, read_table, result_rows
+    from table import ALIKE, ANSWERS, FILE, ROWS, Row, answers_of, merge, own_answer, read_table, result_rows
     from variants import EXPERIMENTS, MADE, SEEDS, Variant, make_subsets, seeds_of, small_tables
 
 EXAMPLES: Final = f"""experiments: {", ".join(EXPERIMENTS)}
@@ -48,11 +48,10 @@ examples:
 Exit code: 0 all runs are in the tables, 1 some failed, 2 the request is wrong, 130 or 143 stopped by a signal.
 """
 # These measure the noise floor, which takes as long as everything else.
-FLOORS: Final = ("learners", "teachers", "long", "letter", "ladder", "forward-model")
-FLOOR_AT: Final = (5000, 10_000)
-ANSWERS: Final = (OWN, "linear", "process")  # every run is evaluated by each of them, unless its variant says otherwise
+FLOORS: Final = ("learners", "letter", "forward-model")
+FLOOR_AT: Final = 5000
 RUN: Final = ["experiment", "variant", "seed", "movements", "answer"]
-NUMBERS: Final = ["error", "floor", "tiles", "claimed", "met"]
+NUMBERS: Final = ["error", "floor"]
 ROUNDING: Final = 1e-5  # relative; another processor rounds differently, and errors grow over thousands of movements
 Wanted = tuple[str, Config]  # a run, and the experiment that its rows are for
 
@@ -151,7 +150,7 @@ def runs_of(experiments: Sequence[str], only: Sequence[str], seeds: Sequence[int
     found = []
     for seed in sorted({*chain(*SEEDS.values())}) if seeds is None else seeds:
         for experiment in experiments:
-            floors = FLOOR_AT if experiment in FLOORS else ()
+            floors = (FLOOR_AT,) if experiment in FLOORS else ()
             for variant, line in EXPERIMENTS[experiment].items():
                 if (only and variant not in only) or (seeds is None and seed not in seeds_of(experiment, variant)):
                     continue
@@ -159,19 +158,20 @@ def runs_of(experiments: Sequence[str], only: Sequence[str], seeds: Sequence[int
                     "seed": seed,
                     "out": out,
                     "name": variant,
-                    "evaluated_by": ANSWERS,
                     "floor_at": floors,
                     **line,
                 }
                 if run.get("demonstrations") in MADE:
                     run["demonstrations"] = out / "demonstrations" / run["demonstrations"]
-                found.append((experiment, Config.from_settings(run)))
+                config = Config.from_settings(run)
+                found.append((experiment, replace(config, evaluated_by=answers_of(experiment, config))))
     return found
 
 
 def last_rows(experiment: str, config: Config) -> set[tuple[Any, ...]]:
     """Keys of the rows of a run's last evaluation; if they are in the table, so are the others."""
     answers = {own_answer(config) if answer == OWN else answer for answer in config.answered}
+    answers.intersection_update(ANSWERS.get(experiment, ALIKE))
     return {(experiment, config.variant, config.seed, config.movements, answer) for answer in answers}
 
 

@@ -9,53 +9,41 @@ from __future__ import annotations
 
 import fcntl
 from collections.abc import Sequence
-from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 import pandas as pd
-from scipy.spatial import KDTree
 
 from sgimd_torch.catalogue import ROD
 from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.files import make_folder, write_text
 from sgimd_torch.runs.build import task_of
 from sgimd_torch.runs.config import OWN, Config
-from sgimd_torch.runs.read import Run, find_runs, read_run
+from sgimd_torch.runs.read import Run
 from sgimd_torch.runs.tasks import benchmark_of, demonstrations_of
 from sgimd_torch.spaces import Array
 from sgimd_torch.teachers.answering import middle
-from variants import ARMS, teacher_of
+from variants import ALIKE, ANSWERS
 
 Row = dict[str, Any]
 FILE: Final = "results.csv"
-ERROR, FLOOR, MET = "mean_error", "noise_floor", "goals_met"  # columns of a run's record
 _ASKED: Final = ("requests", "shown", "late", "late_own", "strong", "weak")
 # The columns of each table, and how many of them make its key, which no two rows share.
 TABLES: Final[dict[str, tuple[int, tuple[str, ...]]]] = {
-    FILE: (
-        5,
-        (
-            *("experiment", "variant", "seed", "movements", "answer", "own", "environment", "teacher", "task_space"),
-            *("error", "floor", "tiles", "claimed", "met"),
-        ),
-    ),
-    "goals.csv": (2, ("variant", "seed", "n_goals", "n_near")),
+    FILE: (6, ("experiment", "variant", "task", "seed", "movements", "answer", "error", "floor")),
+    "explored.csv": (2, ("variant", "seed", "tiles", "goals", "near")),
     "asked.csv": (3, ("variant", "seed", "teacher", *_ASKED)),
-    "contexts.csv": (3, ("variant", "seed", "low", "high", "error")),
-    "said.csv": (1, ("claim", "number", "verdict")),
     "rivals.csv": (4, ("rival", "setting", "seed", "movements", "linear", "process")),
 }
 TYPES: Final = {  # of columns, in every table; all others have numbers, whose empty fields are NaN
-    **dict.fromkeys(("experiment", "variant", "answer", "environment", "teacher", "rival", "setting"), "str"),
-    **dict.fromkeys(("claim", "number", "verdict"), "str"),
-    **dict.fromkeys(("seed", "movements", "own", "tiles", "n_goals", "n_near", *_ASKED), "int64"),
-    **dict.fromkeys(("claimed", "met"), "Int64"),  # may be empty
+    **dict.fromkeys(("experiment", "variant", "task", "answer", "teacher", "rival", "setting"), "str"),
+    **dict.fromkeys(("seed", "movements", "tiles", *_ASKED), "int64"),
+    **dict.fromkeys(("goals", "near"), "Int64"),  # may be empty
 }
 LATE: Final = 1000  # movements; from then on a learner should know whom to ask
-CORNER = -1.0  # m, where the tiles of a benchmark begin in x and y: the corner of T, of rod and arms
-NEAR = 1.5  # m from the base: goals farther away cannot be reached
+CORNER: Final = -1.0  # m, where the tiles of the rod's benchmark begin in x and y
+NEAR: Final = 1.5  # m from the base: goals farther away cannot be reached
 
 
 class ResultsError(ValueError):
@@ -83,7 +71,7 @@ def read_table(folder: Path, name: str = FILE) -> pd.DataFrame:
         table = pd.read_csv(path, dtype=others, converters=exact, keep_default_na=False).astype(types)
     except ValueError as error:
         raise ResultsError(f"{path} cannot be read: {error}") from error
-    numbers = table.drop(columns=["low", "high"], errors="ignore").select_dtypes("number").astype(float)
+    numbers = table.select_dtypes("number").astype(float)
     wrong = table.duplicated([*columns[:n_key]]) | (table[columns[0]] == "") | (numbers < 0).any(axis=1)
     wrong |= np.isinf(numbers).any(axis=1) | (numbers["error"].isna() if "error" in numbers else False)
     if wrong.any():
@@ -114,46 +102,29 @@ def write_table(folder: Path, name: str, table: pd.DataFrame) -> None:
     write_text(folder / name, table.to_csv(index=False, lineterminator="\n"))
 
 
-def read_seeds(folder: Path, variant: str) -> list[Run]:
-    """All runs of a variant in a folder of run directories, finished or not; there may be none.
-
-    Raises:
-        RunError: one is damaged.
-    """
-    if not (folder / variant).is_dir():
-        return []
-    return [read_run(path) for paths in find_runs(folder / variant).values() for path in paths]
-
-
 def result_rows(experiment: str, config: Config, run: Run) -> list[Row]:
-    """A row of results.csv for each evaluation of a finished run and each of its answers.
+    """A row of results.csv for each evaluation of a finished run by each of the answers that pages read.
 
-    The answer of the learner's own inverse model goes by the name of that model, with 1 in the column ``own``.
+    The answer of the learner's own inverse model goes by the name of that model.
     """
-    benchmark, low = _benchmark(config["environment"], config.benchmark)
-    corner = CORNER if config["environment"] in (ROD, *ARMS) else low
-    run_of = (experiment, config.variant, config.seed)
-    place = (config["environment"], teacher_of(config), config.values.get("environment.task_space", 1.0))
-    rows: dict[tuple[int, str], Row] = {}
-    for answer, found in sorted(run.answers.items(), key=lambda each: each[0] == OWN):  # own last: it has the floor
+    rows: list[Row] = []
+    for answer, found in run.answers.items():
         name = own_answer(config) if answer == OWN else answer
-        columns = (found["movements"].astype(int), found[ERROR], found[FLOOR], found[MET])
-        for movements, error, floor, met in zip(*(column.tolist() for column in columns), strict=True):
-            landed = run.outcomes[:movements]
-            reached = tiles_reached(landed, benchmark, corner), goals_claimed(landed, benchmark)
-            values = (
-                *run_of,
-                movements,
-                name,
-                int(answer == OWN),
-                *place,
-                error,
-                floor,
-                *reached,
-                None if np.isnan(met) else int(met),
-            )
-            rows[movements, name] = dict(zip(TABLES[FILE][1], values, strict=True))
-    return [*rows.values()]
+        if name in ANSWERS.get(experiment, ALIKE):
+            evaluations = (found[column].tolist() for column in ("movements", "mean_error", "noise_floor"))
+            for movements, error, floor in zip(*evaluations, strict=True):
+                values = (
+                    experiment,
+                    config.variant,
+                    task_name(config),
+                    config.seed,
+                    int(movements),
+                    name,
+                    error,
+                    floor,
+                )
+                rows.append(dict(zip(TABLES[FILE][1], values, strict=True)))
+    return rows
 
 
 def own_answer(config: Config) -> str:
@@ -161,14 +132,30 @@ def own_answer(config: Config) -> str:
     return str(config.values.get("inverse", "process"))
 
 
-def goal_rows(config: Config, run: Run) -> list[Row]:
-    """The row of goals.csv: how many goals a learner chose for itself, and how many of them can be reached; none for a
-    learner without goals."""
+def answers_of(experiment: str, config: Config) -> tuple[str, ...]:
+    """Who answers in the evaluations of a run: its own inverse model first, then the others that pages read.
+
+    A forward model and eq. (9) answer only for the learners that learn with them.
+    """
+    others = {"process", "linear", "nearest"}.intersection(ANSWERS.get(experiment, ALIKE)) - {own_answer(config)}
+    return (OWN, *sorted(others))
+
+
+def task_name(config: Config) -> str:
+    """The robot's word, and what is not as usual about it: ``fishing-rod task_space=100``."""
+    usual = Config.from_settings({"environment": config["environment"]}).values
+    options = {name.removeprefix("environment."): value for name, value in config.values.items()
+               if name.startswith("environment.") and value != usual[name]}  # fmt: skip
+    return " ".join([config["environment"], *(f"{name}={value:g}" for name, value in options.items())])
+
+
+def explored_rows(config: Config, run: Run) -> list[Row]:
+    """The row of explored.csv: tiles of the benchmark that were reached, the goals that a learner chose for itself, and
+    how many of them can be reached."""
     goals = run.chosen_goals()
-    near = int((np.linalg.norm(goals, axis=1) <= NEAR).sum())
-    return (
-        [{"variant": config.variant, "seed": config.seed, "n_goals": len(goals), "n_near": near}] if len(goals) else []
-    )
+    benchmark, _ = benchmark_of(task_of(Config(parts={"environment": ROD})), config.benchmark)
+    tiles, near = tiles_reached(run.outcomes, benchmark), int((np.linalg.norm(goals, axis=1) <= NEAR).sum())
+    return [{"variant": config.variant, "seed": config.seed, "tiles": tiles, "goals": len(goals), "near": near}]
 
 
 def asked_rows(config: Config, run: Run) -> list[Row]:
@@ -196,56 +183,19 @@ def asked_rows(config: Config, run: Run) -> list[Row]:
     return rows
 
 
-def context_rows(config: Config, run: Run) -> list[Row]:
-    """A row for each third of C that had goals in the last evaluation; none where there is no context, or several."""
-    if run.contexts.shape[1] != 1:
-        return []
-    errors, space = pd.DataFrame(run.errors), run.spaces["contexts"]
-    errors = errors[(errors["movements"] == errors["movements"].max()) & (errors["answer"] == OWN)]
-    edges = np.linspace(space.low[0], space.high[0], 4)
-    means = errors["error"].groupby(np.clip(np.searchsorted(edges, errors["context_0"], "right") - 1, 0, 2)).mean()
-    return [
-        {"variant": config.variant, "seed": config.seed, "low": edges[k], "high": edges[k + 1], "error": error}
-        for k, error in means.items()
-    ]
+ROWS: Final = {"explored.csv": explored_rows, "asked.csv": asked_rows}
 
 
-ROWS: Final = {"goals.csv": goal_rows, "asked.csv": asked_rows, "contexts.csv": context_rows}
-
-
-def tiles_reached(outcomes: Array, benchmark: Benchmark, corner: Array | float = CORNER) -> int:
+def tiles_reached(outcomes: Array, benchmark: Benchmark) -> int:
     """How many of the benchmark's tiles, one for each of its goals, hold one or more of the ``outcomes``.
 
     Args:
         outcomes: ``(n, 2)`` m, NaN where the robot was at rest.
-        benchmark: its tiles were laid out from ``corner``, those of rod and arms from -1 m, whatever their T.
+        benchmark: the rod's; its tiles were laid out from ``CORNER``, whatever its T.
     """
     landed = outcomes[np.isfinite(outcomes).all(axis=1)]
     reached, wanted = (
-        {tuple(tile) for tile in np.floor((points - corner) / benchmark.side).tolist()}
+        {tuple(tile) for tile in np.floor((points - CORNER) / benchmark.side).tolist()}
         for points in (landed, benchmark.goals)
     )
     return len(reached & wanted)
-
-
-def goals_claimed(outcomes: Array, benchmark: Benchmark) -> int:
-    """How many of the benchmark's goals have one or more of the ``outcomes`` within half a tile's side.
-
-    These are claims: noise may have carried a movement there once. Goals that are met were reached in an evaluation.
-
-    Args:
-        outcomes: ``(n, 2)`` m, NaN where the robot was at rest.
-        benchmark: its goals.
-    """
-    landed = outcomes[np.isfinite(outcomes).all(axis=1)]
-    if not len(landed):
-        return 0
-    distances, _ = KDTree(landed).query(benchmark.goals)
-    return int((distances <= benchmark.side / 2).sum())
-
-
-@cache
-def _benchmark(environment: str, path: Path | None) -> tuple[Benchmark, Array]:
-    """With the lower corner of T."""
-    task = task_of(Config(parts={"environment": environment}))
-    return benchmark_of(task, path)[0], task.environment.outcomes.low

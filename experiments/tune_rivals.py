@@ -27,7 +27,7 @@ from sgimd_torch.runs.process import command, loading, say
 with loading():  # Ctrl-C shows no traceback
     import pandas as pd
 
-    from page_tables import DEFAULT
+    from pages import DEFAULT
     from sgimd_torch import (
         FishingRod,
         InitialTeacher,

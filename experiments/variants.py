@@ -15,9 +15,8 @@ import numpy as np
 
 from sgimd_torch.demonstrations import SHIPPED, load_demonstrations, save_demonstrations
 from sgimd_torch.files import make_folder
-from sgimd_torch.runs.config import Config
 from sgimd_torch.spaces import stream
-from sgimd_torch.views.suite import REFERENCES, TASKS
+from sgimd_torch.views.suite import REFERENCES, TASKS, UNIFORM
 
 Variant = dict[str, Any]
 ARMS: Final = ("planar-arm-7", "planar-arm-50")
@@ -39,8 +38,17 @@ STEPS: Final[tuple[tuple[str, Variant, Variant], ...]] = (
 )
 LETTER: Final[Variant] = {option: value for _, was, _ in reversed(STEPS) for option, value in was.items()}
 INVERSE: Final[Variant] = {"inverse": "paper"}  # all that the letter changes in a learner without goals
-PROVED: Final = ("own", "nearest", "linear", "process")  # the answers of experiments on learning from few movements
-EVERY: Final = (*PROVED, "model")  # on the swimmer
+# The answers whose rows a page reads. Every learner is answered by `process`. Some are answered by others, too: the
+# paper's letter by eq. (9), a step of the ladder by what it learns with, a learner with a forward model by that model.
+ALIKE: Final = ("process",)
+ANSWERS: Final[dict[str, tuple[str, ...]]] = {
+    **dict.fromkeys(("letter", "letter-teachers", "large-space"), (*ALIKE, "paper")),
+    "ladder": (*ALIKE, "linear"),
+    **dict.fromkeys(("forward-model", "planar-arm-7", "planar-arm-50", "swimmer"), (*ALIKE, "model")),
+    "settings": (*ALIKE, "model-proved"),
+    "learning": (*ALIKE, "linear", "nearest", "model-proved"),
+    "suite": (*ALIKE, "linear", "nearest"),
+}
 LARGE: Final[Variant] = {"environment.task_space": 100.0}
 BASELINE: Final[Variant] = {"goals": "uniform", "inverse": "nearest", "search": "perturb"}  # the field's standard one
 SCHOOL: Final = ("map-elites", "isoline", "cma-me", "cma-mae")  # quality diversity
@@ -56,19 +64,14 @@ ALONE: Final[Variant] = {**SAGG_RIAC, "inverse": "model"}
 REFINING: Final[dict[str, Variant]] = {
     "sgim-d": SGIM_D,
     "sagg-riac": SAGG_RIAC,
-    "sgim-d-perturb": {**SGIM_D, "search": "perturb"},
-    "sagg-riac-perturb": {**SAGG_RIAC, "search": "perturb"},
     "model": MODEL,
     "gradient": GRADIENT,
     "gauss-newton": {**MODEL, "search": "gauss-newton"},
     "sagg-riac-model": ALONE,
     "sagg-riac-gradient": {**ALONE, "search": "gradient"},
-    "sagg-riac-gauss-newton": {**ALONE, "search": "gauss-newton"},
     "imitation": {"algorithm": "imitation"},
     "imitation-model": {"algorithm": "imitation", "inverse": "model"},
-    "gradient-linear": {**GRADIENT, "inverse": "linear"},
     "model-unanchored": {**MODEL, "trust.anchors": False},
-    "gradient-unanchored": {**GRADIENT, "trust.anchors": False},
     "gradient-no-residual": {**GRADIENT, "search.residual": False},
     "model-one-noise": {**MODEL, "model.noise_heads": False},
     "model-1": {**MODEL, "model.members": 1},
@@ -79,7 +82,6 @@ SWIMMER: Final[Variant] = {
     "environment": "swimmer",
     "movements": 2000,
     "evaluate_at": (250, 500, 1000),  # and at the end
-    "evaluated_by": EVERY,
 }
 # What a learner of the suite has to beat, and the rivals there.
 SUITED: Final[dict[str, Variant]] = {
@@ -88,15 +90,13 @@ SUITED: Final[dict[str, Variant]] = {
     "cma-mae": {"algorithm": "cma-mae"},
     "map-elites": {"algorithm": "map-elites"},
 }
-IN_SUITE: Final[Variant] = {"movements": 2000, "evaluate_at": (250, 500, 1000), "evaluated_by": PROVED}
-ONCE: Final[Variant] = {
-    "teacher": "initial",
-    "teacher.every": 1,
-}  # all demonstrations at the start, one for each movement
+IN_SUITE: Final[Variant] = {"movements": 2000, "evaluate_at": (250, 500, 1000)}
+ON_ROD: Final[Variant] = {"evaluate_at": (250, 500, 1000, 2000), "floor_at": (5000,)}
+ONCE: Final[Variant] = {"teacher": "initial", "teacher.every": 1}  # all at the start, one for each movement
 TAUGHT: Final[Variant] = {"algorithm": "practice-taught", **ONCE}
 # The rod, by the inverse model whose answers prove themselves; rivals with and without the demonstrations.
 LEARNING: Final[dict[str, Variant]] = {
-    f"{name}.rod": {**line, "evaluate_at": (250, 500, 1000, 2000), "evaluated_by": PROVED, "floor_at": (5000,)}
+    f"{name}.rod": {**line, **ON_ROD}
     for name, line in {
         **SUITED,
         "practice-taught": TAUGHT,
@@ -112,8 +112,22 @@ LEARNING: Final[dict[str, Variant]] = {
         "imitation": {"algorithm": "imitation", "inverse": "model-proved"},
     }.items()
 }
+# What the gain of practice is made of: the steps from the standard baseline to it that are no learner of LEARNING, and
+# learners taught by the schedule of the other one.
+MIDDLE: Final[Variant] = {**REFERENCES[UNIFORM], "explore": "widening", "global_range": (0.02, 0.3)}
+STEPS_OF_GAIN: Final[dict[str, Variant]] = {
+    "middle": MIDDLE,
+    "middle-process": {**MIDDLE, "inverse": "process"},
+    "practice-interest": {"algorithm": "practice", "goals": "interest-map"},
+}
+SCHEDULES: Final[dict[str, Variant]] = {
+    "practice-taught-every-30": {"algorithm": "practice-taught", "teacher": "periodic", "social.repeats": 10},
+    "sgim-d-once": {**SGIM_D, **ONCE, "social.repeats": 1},
+    "uniform-nearest-taught-once": {**SGIM_D, **BASELINE, **ONCE, "social.repeats": 1},
+    "map-elites-taught-once": {"algorithm": "map-elites-taught", "imitations": 1, **ONCE},
+}
 # Ten lessons, as a person gives them in a session: all of them early, in a short life.
-SESSION: Final[Variant] = {"movements": 1000, "evaluate_at": (300, 500), "evaluated_by": ("own",)}  # and at the end
+SESSION: Final[Variant] = {"movements": 1000, "evaluate_at": (300, 500)}  # and at the end
 SHOWN: Final[dict[str, Variant]] = {"goals": {**SGIM_D, "teacher": "initial"}, "practice": TAUGHT}
 # Movements of an arm take no time, so training may take more.
 ON_ARMS: Final[Variant] = {"movements": 2000, "evaluate_at": (250, 500, 1000)}  # and at the end
@@ -179,7 +193,7 @@ TAUGHT_ALIKE: Final[dict[str, Variant]] = {
     "sgim-d-model": {**SGIM_D, **PROVED_MODEL},
     "practice-taught": TAUGHT,
 }
-EVERYWHERE: Final[Variant] = {"movements": 2000, "evaluate_at": (500,), "evaluated_by": ("own", "process")}
+EVERYWHERE: Final[Variant] = {"movements": 2000, "evaluate_at": (500,)}
 
 
 def shipped(teacher: int) -> Path:
@@ -187,11 +201,16 @@ def shipped(teacher: int) -> Path:
     return SHIPPED.with_name(f"demonstrator_{teacher}.npz")
 
 
-def _of_teacher(teacher: int) -> dict[str, Variant]:
-    taught = ("sgim-d", "imitation", "observation")
+def _of_teacher(teacher: int, ending: str = "") -> dict[str, Variant]:
+    """Learners that demonstrator 1 or 2 teaches; ``ending`` "-letter" for those of the paper's letter."""
+    letter = {"sgim-d": LETTER, "imitation": INVERSE, "observation": INVERSE}
     return {
-        f"{algorithm}-teacher-{teacher}": {"algorithm": algorithm, "demonstrations": shipped(teacher)}
-        for algorithm in taught
+        f"{algorithm}{ending}-teacher-{teacher}": {
+            "algorithm": algorithm,
+            "demonstrations": shipped(teacher),
+            **(options if ending else {}),
+        }
+        for algorithm, options in letter.items()
     }
 
 
@@ -205,6 +224,16 @@ def _on_arm(arm: str) -> dict[str, Variant]:
             **ON_ARMS,
         }
         for name, line in REFINING.items()
+    }
+
+
+def _on_suite(learners: dict[str, Variant]) -> dict[str, Variant]:
+    """Each on all tasks but the rod, whose runs are longer; quality diversity knows one context only, so no toss."""
+    return {
+        f"{name}.{task}": {**line, **suited.options, **IN_SUITE}
+        for task, suited in TASKS.items()
+        for name, line in learners.items()
+        if task != "rod" and not (name in SCHOOL and task == "toss")
     }
 
 
@@ -235,11 +264,11 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
         "sagg-riac-letter-large": {**SAGG_RIAC, **LETTER, **LARGE},
         "sgim-d-letter-large": {**SGIM_D, **LETTER, **LARGE},
     },
-    "long": {"sgim-d-long": {**SGIM_D, "movements": 10_000}},
     "letter": {
         f"{algorithm}-letter": {"algorithm": algorithm, **(LETTER if algorithm in ("sagg-riac", "sgim-d") else INVERSE)}
         for algorithm in ("sagg-riac", "observation", "imitation", "sgim-d")
     },
+    "letter-teachers": {**_of_teacher(1, "-letter"), **_of_teacher(2, "-letter")},
     "ladder": _ladder("", {}),
     "ladder-large": _ladder("-large", LARGE),
     "ablations": {
@@ -249,18 +278,14 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
         "absolute-progress": {**SGIM_D, "goals.progress": "absolute"},
         "paired-progress": {**SGIM_D, "goals.progress": "paired"},
         "attempt-competence": {**SGIM_D, "goals.progress": "absolute", "judge": "attempt"},
-        "inverse-paper": {**SGIM_D, "inverse": "paper"},
-        "inverse-nearest": {**SGIM_D, "inverse": "nearest"},
         "search-nelder-mead-exact": {**SGIM_D, "search": "nelder-mead-exact"},
         "search-perturb": {**SGIM_D, "search": "perturb"},
         "search-cma-es": {**SGIM_D, "search": "cma-es"},
     },
-    "baselines": {
-        "random-goals": {**SAGG_RIAC, **BASELINE},
-        "random-goals-demonstrations": {**SGIM_D, **BASELINE},
+    "baselines": {  # those that are not among LEARNING's
         "demonstrations-noise": {"algorithm": "imitation", "teacher.choose": "random"},
-        **{name: {"algorithm": name} for name in SCHOOL},
-        **{f"{name}-demonstrations": {"algorithm": f"{name}-taught"} for name in SCHOOL},
+        **{name: {"algorithm": name} for name in ("isoline", "cma-me")},
+        **{f"{name}-demonstrations": {"algorithm": f"{name}-taught"} for name in ("isoline", "cma-me")},
         "map-elites-tuned": {"algorithm": "experiments.parts:map_elites"},
         "cma-me-tuned": {"algorithm": "experiments.parts:cma_me"},
         "cma-mae-demonstrations-tuned": {"algorithm": "experiments.parts:cma_mae_taught"},
@@ -273,7 +298,7 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
         "few-demonstrations": {**SGIM_D, "demonstrations": FEW},
         "half-plane": {**SGIM_D, "demonstrations": HALF},
     },
-    "asking": {name: {**line, "evaluated_by": ("own", "process")} for name, line in ASKING.items()},
+    "asking": ASKING,
     "forward-model": REFINING,
     **{arm: _on_arm(arm) for arm in ARMS},
     "swimmer": {
@@ -292,12 +317,10 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
         for name, line in {**(UNTAUGHT if setting in ROBOTS else {}), **TAUGHT_ALIKE}.items()
     },
     "learning": LEARNING,
-    "suite": {
-        f"{name}.{task}": {**line, **suited.options, **IN_SUITE}
-        for task, suited in TASKS.items()
-        for name, line in SUITED.items()
-        if task != "rod"  # whose runs are among LEARNING's
-        and not (name in SCHOOL and task == "toss")  # quality diversity knows one context only
+    "suite": _on_suite(SUITED),
+    "gain": {
+        **{f"{name}.rod": {**line, **ON_ROD} for name, line in {**STEPS_OF_GAIN, **SCHEDULES}.items()},
+        **_on_suite(STEPS_OF_GAIN),
     },
 }
 
@@ -305,18 +328,13 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
 # The seeds of each page: used once, with frozen defaults.
 SEEDS: Final[dict[str, range]] = {
     **dict.fromkeys(("learners", "large-space", "letter", "ladder", "ladder-large", "baselines"), range(100, 120)),
-    **dict.fromkeys(("teachers", "long", "ablations", "teaching"), range(100, 110)),
+    **dict.fromkeys(("teachers", "letter-teachers", "ablations", "teaching"), range(100, 110)),
     **dict.fromkeys(("forward-model", *ARMS, "swimmer"), range(100, 110)),
     "settings": range(100, 105),
-    **dict.fromkeys(("learning", "suite"), range(120, 140)),
+    **dict.fromkeys(("learning", "suite", "gain"), range(120, 140)),
     "asking": range(140, 160),
     "by-hand": range(150, 160),
 }
-# The experiments of the page of the paper.
-PAPER: Final = (
-    *("learners", "teachers", "large-space", "long", "letter", "ladder", "ladder-large", "ablations", "baselines"),
-    "teaching",
-)
 MAIN: Final = ("sgim-d", "sagg-riac", "model", "gradient")  # of the forward model, with as many seeds as learners
 
 
@@ -328,8 +346,8 @@ def seeds_of(experiment: str, variant: str) -> range:
 def small_tables(experiment: str) -> list[str]:
     """The tables besides results.csv that its runs write rows to."""
     if experiment == "asking":
-        return ["asked.csv", "contexts.csv"]
-    return ["goals.csv"] if experiment in ("large-space", "ladder-large") else []
+        return ["asked.csv"]
+    return ["explored.csv"] if experiment in ("learners", "letter", "large-space") else []
 
 
 def make_subsets(folder: Path, *, by_hand: bool = False) -> None:
@@ -355,17 +373,3 @@ def make_subsets(folder: Path, *, by_hand: bool = False) -> None:
         from parts import lessons_of_a_script  # MuJoCo is loaded only when it is needed
 
         save_demonstrations(folder / HAND, [lesson.demonstration for lesson in lessons_of_a_script()])
-
-
-def teacher_of(config: Config) -> str:
-    """Who demonstrates: the number of the demonstrator, the file's name, "structured" for the postures that an arm is
-    shown, "scripted" for the swimmer's teacher; who can be asked; "" for a learner without a teacher."""
-    if "teachers" in config:
-        return "+".join(config["teachers"])
-    if "teacher" not in config:
-        return ""
-    if config["environment"] in ARMS and config.demonstrations is None:
-        return "structured"
-    if config["environment"] == "swimmer" and config.demonstrations is None:
-        return "scripted"
-    return (config.demonstrations or SHIPPED).stem.removeprefix("demonstrator_")
