@@ -229,17 +229,6 @@ def common_differences(ours: Mapping[int, float], theirs: Mapping[int, float]) -
     return paired_differences({seed: ours[seed] for seed in both}, {seed: theirs[seed] for seed in both})
 
 
-def difference_interval(
-    ours: Mapping[int, float], theirs: Mapping[int, float], *, rng: np.random.Generator, level: float = LEVEL
-) -> Interval:
-    """Interquartile mean of the paired differences (m); wholly below 0 if our errors are smaller.
-
-    Raises:
-        ValueError: see ``paired_differences`` and ``interval``.
-    """
-    return iqm_interval(paired_differences(ours, theirs), rng=rng, level=level)
-
-
 def mean_over_life(movements: Array, errors: Array) -> Array:
     """Area under the error curve, divided by its width: the mean error (m) over the learner's life.
 
