@@ -48,6 +48,7 @@ LIBRARIES = {  # library: the only rooms that may import it; of a folder, where 
     "imageio_ffmpeg": {"views/film"},
     "viser": {"views/teach"},
     "trimesh": {"views/teach"},
+    "websockets": {"views/teach"},
     "jinja2": {"views/report"},
     "jsonargparse": {"runs/command_line"},
     "docstring_parser": {"catalogue/options"},

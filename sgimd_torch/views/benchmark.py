@@ -9,10 +9,9 @@ favour the one that made them, and seeds that no comparison uses later.
   sgimd run --environment mypackage.toss:make --algorithm sagg-riac --benchmark goals.npz
 
   sgimd benchmark pool --out goals.npz --tiles 100      fewer goals: an evaluation takes as long as they are many
-  sgimd benchmark pool --out goals.npz --side 0.1       tiles of this side, in the unit of T
   sgimd benchmark pool/random/seed-2000 more --out goals.npz
 
-Without --side, it is chosen so that there are about --tiles goals: a fortieth to a tenth of T's sides in the plane.
+The side of a tile is chosen so that there are about --tiles goals: a fortieth to a tenth of T's sides in the plane.
 The file names the class of the environment: a run of another one refuses it.
 
 Exit code: 0 the file was written, 2 the request is wrong; nothing is written then.
@@ -44,21 +43,19 @@ def main(argv: Sequence[str] | None = None) -> int:
     runs = [read_run(path) for path in dict.fromkeys(paths)]
     name, box = _reached_by(runs)
     outcomes = np.concatenate([run.outcomes[np.isfinite(run.outcomes).all(axis=1)] for run in runs])
-    side = options.side or tile_side(outcomes, box, options.tiles, at_least=options.at_least)
-    if side > box.sides.max():
-        raise ValueError(f"--side must be at most {box.sides.max():g}, the longest side of T, got {side:g}")
-    goals = tile_goals(outcomes, box, side, stream(options.seed, "benchmark"), at_least=options.at_least)
+    side = tile_side(outcomes, box, options.tiles)
+    goals = tile_goals(outcomes, box, side, stream(options.seed, "benchmark"))
     if not len(goals):
         inside = int(box.contains(outcomes).sum())
         raise ValueError(
-            f"no tile of {side:.4g} was reached {options.at_least} times: {inside} of {len(outcomes)} movements ended "
-            "in T; longer runs, a larger --side, or --at-least 1?"
+            f"no tile of {side:.4g} was reached twice: {inside} of {len(outcomes)} movements ended in T; longer runs, "
+            "or fewer --tiles?"
         )
     save_benchmark(options.out, Benchmark(name, goals, side))
     n, made = len(goals), f"{len(outcomes)} movements of {len(runs)} run{'s' * (len(runs) > 1)}"
     print(f"{n} goals, on tiles of {side:.4g} reached by {made}: {options.out}")
-    if options.side is None and n < options.tiles / 2:
-        say(f"{n} goals are few, {options.tiles} were wanted; longer runs, or --at-least 1, give more")
+    if n < options.tiles / 2:
+        say(f"{n} goals are few, {options.tiles} were wanted; longer runs give more")
     return 0
 
 
@@ -87,22 +84,15 @@ def parser() -> argparse.ArgumentParser:
         "runs", type=Path, nargs="+", metavar="RUN", help="a run's directory, a variant's folder, or an --out of runs"
     )
     parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="the goals, .npz")
-    size = parser.add_mutually_exclusive_group()
-    size.add_argument("--side", type=float, help="of a tile, in the unit of T (default: what leaves --tiles goals)")
-    size.add_argument("--tiles", type=int, default=TILES, help="about how many goals (default: %(default)s, as paper)")
-    parser.add_argument(
-        "--at-least", type=int, default=2, metavar="N", help="movements in a tile that counts (default: %(default)s)"
-    )
+    parser.add_argument("--tiles", type=int, default=TILES, help="about how many goals (default: %(default)s)")
     parser.add_argument("--seed", type=int, default=0, help="of the draw within tiles (default: %(default)s)")
     return parser
 
 
 def _options(argv: Sequence[str] | None) -> argparse.Namespace:
     options = parser().parse_args(argv)
-    for option, least in (("tiles", 1), ("at_least", 1), ("seed", 0)):
-        check_count(f"--{option.replace('_', '-')}", getattr(options, option), least)
-    if options.side is not None and not 0 < options.side < np.inf:
-        raise ValueError(f"--side must be a positive number, got {options.side:g}")
+    check_count("--tiles", options.tiles, 1)
+    check_count("--seed", options.seed, 0)
     if options.out.suffix != ".npz" or options.out.is_dir() or not options.out.parent.is_dir():
         raise ValueError(f"--out must be a .npz file in a folder that exists, got {options.out}")
     return options

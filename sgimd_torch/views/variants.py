@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import cached_property, reduce
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,18 +17,7 @@ from tqdm import tqdm
 from sgimd_torch.catalogue import label
 from sgimd_torch.runs.read import Run, find_runs, read_run
 from sgimd_torch.spaces import Array
-from sgimd_torch.views.statistics import (
-    LEAST_SEEDS,
-    Interval,
-    interquartile_mean,
-    mean_over_life,
-    over_seeds,
-    point,
-    ratio_interval,
-    rng,
-)
-
-NOISELESS: Final = 1e-9  # m; a lower noise floor is rounding, so errors are not divided by it
+from sgimd_torch.views.statistics import LEAST_SEEDS, Interval, over_seeds
 
 
 def read(place: Path) -> dict[str, list[Run]]:
@@ -138,23 +126,6 @@ class Variant:
         goals = self.typical.benchmark
         errors = [run.missed_by(self.last) for run in self.used if np.array_equal(run.benchmark, goals)]
         return goals, np.mean([each for each, _ in errors], axis=0), errors[0][1]
-
-    @property
-    def ratio(self) -> Interval | None:
-        """The last error over its noise floor; None where the robot moves without noise."""
-        errors, floors = self.values(self.last), self.values(self.last, "noise_floor")
-        if not len(errors) or not np.isfinite(errors).all() or not (floors >= NOISELESS).all():
-            return None
-        if self.few:
-            return point(float(interquartile_mean(errors) / interquartile_mean(floors)))
-        return ratio_interval(errors, floors, rng=rng(), paired=True)
-
-    @property
-    def area(self) -> Interval | None:
-        """Area under the error curve over its width (m)."""
-        if len(self.evaluated) < 2 or not np.isfinite(self.errors).all():
-            return None
-        return over_seeds(mean_over_life(self.evaluated.astype(np.float64), self.errors))
 
     @property
     def typical(self) -> Run:

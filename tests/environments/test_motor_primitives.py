@@ -43,13 +43,6 @@ def test_the_sharper_the_gaussians_the_nearer_the_trajectory_passes_to_its_knots
     assert misses[2] < 1e-9
 
 
-def test_rising_knots_make_a_rising_trajectory_that_stays_between_them() -> None:
-    _, trajectory = unit_joint(4, 6.0).trajectory(np.array([0.1, 0.2, 0.7, 0.9, 0.5]), rate=500)
-    assert (np.diff(trajectory[:, 0]) > 0).all()
-    assert trajectory.min() > 0.1
-    assert trajectory.max() < 0.9
-
-
 def test_a_longer_movement_is_the_same_movement_played_slower() -> None:
     short, long = stream(0, "theta").random(9), stream(0, "theta").random(9)
     short[-1], long[-1] = 0.0, 1.0
@@ -87,13 +80,6 @@ def test_the_correspondence_finds_theta_again(theta: list[float], sharpness: flo
     assert found == pytest.approx(np.array(theta), abs=1e-6)
     assert skill.policies.contains(found)
     assert skill.residual(found, times, trajectory) < 1e-6
-
-
-@pytest.mark.parametrize("corner", [0.0, 1.0])
-def test_the_correspondence_finds_the_outermost_corners_of_the_box(corner: float) -> None:
-    theta = np.full(25, corner)
-    skill = primitive(joints=Box.cube(-1.6, 1.4, 6))
-    assert skill.correspondence(*skill.trajectory(theta)) == pytest.approx(theta, abs=1e-6)
 
 
 def test_a_recording_with_an_uneven_rate_and_a_late_start_is_the_same_demonstration() -> None:

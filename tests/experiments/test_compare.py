@@ -299,7 +299,7 @@ def test_a_goal_is_claimed_where_something_landed_within_half_a_tile():
 def run_with(origins, goals):
     nothing = np.empty((len(goals), 0))
     return Run(
-        *(Path("nowhere"), {}, {}, {}, "Robot", {}, {}),
+        *(Path("nowhere"), {}, {}, {}, "Robot", [], {}, {}),
         *(np.arange(len(goals)), np.array(origins), np.full(len(goals), -1)),
         *(nothing, nothing, np.array(goals, dtype=np.float64), nothing, {"own": {}}),
     )

@@ -25,7 +25,7 @@ class Elsewhere(PlanarArm):
 
 
 def live(learner: Learner, n: int) -> Array:
-    for _ in run(learner, ARM, 0, movements=n):
+    for _ in run(learner, ARM, 0, movements=learner.movements + n):
         pass
     return learner.memory.thetas
 

@@ -49,21 +49,18 @@ def test_runs_are_named_one_by_one_by_variant_or_all_together(own):
         run("--environment", "sliders:Slider2", "--seed", seed)
     files = []
     for places in (["runs"], ["runs/random"], ["runs/random/seed-002", "runs/random/seed-001", "runs"]):
-        goals_of(*places, "--side", 0.2)
+        goals_of(*places, "--tiles", 20)
         files.append((own / "goals.npz").read_bytes())
     assert files[0] == files[1] == files[2]
-    both, one = (goals_of(place, "--side", 0.05) for place in ("runs", "runs/random/seed-001"))
-    assert len(both.goals) > len(one.goals) > 0
+    both, one = (goals_of(place, "--tiles", 60) for place in ("runs", "runs/random/seed-001"))
+    assert both.side != one.side
 
 
-def test_side_seed_and_reached_at_least_are_the_users(own):
+def test_the_seed_draws_within_the_same_tiles(own):
     run("--environment", "sliders:Slider2")
-    wide = goals_of("runs", "--side", 0.5, "--seed", 3)
-    assert wide.side == 0.5
-    other = goals_of("runs", "--side", 0.5, "--seed", 4)
-    assert (np.floor(wide.goals / 0.5) == np.floor(other.goals / 0.5)).all()
-    assert not (wide.goals == other.goals).any()
-    assert len(goals_of("runs", "--side", 0.1, "--at-least", 1).goals) > len(goals_of("runs", "--side", 0.1).goals)
+    one, other = (goals_of("runs", "--tiles", 20, "--seed", seed) for seed in (3, 4))
+    assert (np.floor((one.goals + 1) / one.side) == np.floor((other.goals + 1) / one.side)).all()
+    assert not (one.goals == other.goals).any()
 
 
 def test_the_sides_tried_in_the_plane_of_the_paper_are_five_to_twenty_centimetres():
@@ -89,16 +86,10 @@ def test_about_as_many_goals_as_wanted_are_made_also_where_little_of_a_large_spa
         ("nowhere --out g.npz", "nowhere does not exist; runs are in OUT/NAME/seed-000"),
         ("runs --out g.csv", "--out must be a .npz file in a folder that exists, got g.csv"),
         ("runs --out no/g.npz", "--out must be a .npz file in a folder that exists"),
-        ("runs --out g.npz --side 0", "--side must be a positive number, got 0"),
-        ("runs --out g.npz --side nan", "--side must be a positive number, got nan"),
-        ("runs --out g.npz --side 5", "--side must be at most 4, the longest side of T, got 5"),
-        ("runs --out g.npz --side 1e-9", "no tile of 1e-09 was reached 2 times: 60 of 60 movements ended in T"),
         ("runs --out g.npz --tiles 0", "--tiles must be a whole number >= 1, got 0"),
-        ("runs --out g.npz --at-least 0", "--at-least must be a whole number >= 1"),
         ("runs --out g.npz --seed -1", "--seed must be a whole number >= 0"),
         ("runs more --out g.npz", "all runs must be of one environment with one T: runs/random/seed-000 is of Slider2"),
         ("runs", "the following arguments are required: --out"),
-        ("runs --out g.npz --side 1 --tiles 9", "not allowed with argument"),
     ],
 )
 def test_what_cannot_be_made_is_refused_in_a_line_and_nothing_is_written(own, capsys, options, message):

@@ -126,25 +126,16 @@ def test_the_numbers_of_a_run_are_those_of_its_evaluations(pages, run):
     errors = dict(zip(*rows_of(pages["one"], "Errors"), strict=True))
     assert errors["last error (m)"] == f"{mean:.3f}"
     assert errors["by linear"] == f"{run.at(60, answer='linear'):.3f}"
-    assert errors["times the floor"] == f"{mean / floor:.2f}"
-    assert errors["error over life"] == f"{(run.at(30) + mean) / 2:.3f}"  # of one trapezoid
+    assert errors["noise floor"] == f"{floor:.3f}"
     assert errors["physics (s)"] == f"{run.summary['seconds_physics']:.1f}"
 
 
 def test_the_numbers_of_a_variant_are_interquartile_means_over_its_seeds(pages, runs):
     seeds = [read_run(runs / "sgim-d" / f"seed-00{seed}") for seed in (3, 4)]
-    errors, floors = (np.array([each.at(60, name) for each in seeds]) for name in ("mean_error", "noise_floor"))
+    errors = np.array([each.at(60) for each in seeds])
     row = next(row for row in rows_of(pages["many"], "Errors") if row[0] == "SGIM-D")
     assert row[1:3] == ["2", "60"]
     assert row[4] == f"{interquartile_mean(errors):.3f}"
-    assert row[7] == f"{errors.mean() / floors.mean():.2f}"
-
-
-def test_without_motor_noise_nothing_is_divided_by_the_floor(run):
-    quiet = {**run.answers["own"], "noise_floor": np.full(2, 1e-16)}
-    variant = Variant("sgim-d", [replace(run, answers={**run.answers, "own": quiet})])
-    assert variant.ratio is None
-    assert variant.at(60, "noise_floor").value < 1e-9
 
 
 def test_a_run_that_has_hardly_begun_is_reported_and_one_that_was_never_evaluated_comes_last(run, tmp_path):

@@ -3,7 +3,7 @@
 Section 4 of Nguyen & Oudeyer (2014). A film shows what ``FishingRod.record`` has simulated, in real time. Line and
 float are drawn thicker than they are, so that they can be seen. Light, shadow and reflection are those of
 ``fishing_rod.xml``.
-    with Camera(rod.model) as camera: write_film(Path("film.mp4"), shoot(camera, [Shot(recording, goal)]))
+    with Camera(rod.model) as camera: write_film(Path("film.mp4"), shoot(camera.frame, [Shot(recording, goal)]))
 
 Needs the extra ``film``, and OpenGL: without a display, set MUJOCO_GL=egl before anything imports mujoco.
 """

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
-from sgimd_torch.catalogue import colour
+from sgimd_torch.catalogue import colour, label
 from sgimd_torch.environments.protocol import Sketch
 from sgimd_torch.evaluation import evaluate
 from sgimd_torch.runs.build import RunParts, build
@@ -31,7 +31,7 @@ from sgimd_torch.runs.read import Run, config_of, read_run
 from sgimd_torch.spaces import Array, stream
 from sgimd_torch.strategies import Remember
 from sgimd_torch.views.film.panel import Panel
-from sgimd_torch.views.film.reel import RATES, Filming, Shot, shoot, write_film
+from sgimd_torch.views.film.reel import RATES, Shot, shoot, write_film
 from sgimd_torch.views.film.sketch import Sketchbook
 
 AFTER = (30, 100, 300, 1000, 3000)
@@ -70,7 +70,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         rate = RATES[options.out.suffix]
         n = sum(len(shot.moments(rate)) for shot in shots)
         interval = 0.2 if sys.stderr.isatty() else 10.0  # s; without a terminal a line now and then
-        write_film(options.out, tqdm(shoot(camera, shots, rate), "filming", n, unit=" frames", mininterval=interval))
+        write_film(
+            options.out, tqdm(shoot(camera.frame, shots, rate), "filming", n, unit=" frames", mininterval=interval)
+        )
     amount = parts.environment.outcomes.amount
     for k, movements in enumerate(stages):
         missed = np.array([shot.missed for shot in shots[k * len(goals) : (k + 1) * len(goals)]])
@@ -93,7 +95,7 @@ def _parts(run: Run, *, trust: bool) -> RunParts:
         raise ImportError(f"MUJOCO_GL={asked} does not work ({error}); set MUJOCO_GL=egl, or unset it") from error
 
 
-def _camera(robot: Any, shots: Sequence[Shot]) -> AbstractContextManager[Filming]:
+def _camera(robot: Any, shots: Sequence[Shot]) -> AbstractContextManager[Any]:
     """What draws these shots."""
     if isinstance(shots[0].recording, Sketch):
         return nullcontext(Sketchbook(robot.outcomes, shots))
@@ -118,7 +120,8 @@ def _cast(run: Run, parts: RunParts, goals: Array, stages: Sequence[int]) -> lis
             raise ValueError(f"{run.path} remembers nothing after {movements} movements, so it infers no movement")
         past = run.outcomes[:movements]
         past = past[np.isfinite(past[:, 0])]
-        title = f"{run.config['name'] or run.config['algorithm']}, seed {seed}, after {movements} movements"
+        who = label(run.config["name"] or run.config["algorithm"])
+        title = f"{who}, seed {seed}, after {movements} movements"
         for k, goal in enumerate(goals):
             recording = parts.record(context, parts.inverse(context, goal).theta, stream(seed, "film", k))
             # The first shot of a stage begins with what was learnt since the last one.

@@ -1,8 +1,8 @@
 """What every film is made of: shots one after the other, frame by frame, captions, a file.
 
-A camera draws ``frame(shot, time)``: ``camera.py`` those of the rod in MuJoCo, ``sketch.py`` robots in the plane.
-``panel.py`` draws what stands beside it.
-    write_film(Path("film.mp4"), shoot(camera, [Shot(recording, goal)]))
+``camera.py`` draws frames of the rod in MuJoCo, ``sketch.py`` those of robots in the plane, ``panel.py`` what stands
+beside them.
+    write_film(Path("film.mp4"), shoot(camera.frame, [Shot(recording, goal)]))
 
 Needs the extra ``film``.
 """
@@ -10,13 +10,13 @@ Needs the extra ``film``.
 from __future__ import annotations
 
 import subprocess
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from itertools import chain
 from pathlib import Path
 from threading import Timer
-from typing import Final, Protocol
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,19 +85,15 @@ class Shot:
         return f"{goal}   {time:.2f} s{'   line let out' if let_out is not None and time > let_out else ''}"
 
 
-class Filming(Protocol):
-    """What draws shots."""
-
-    def frame(self, shot: Shot, time: float) -> Image.Image:
-        """The scene at ``time`` (s); from its end on, how it ended."""
-        ...
+Draw = Callable[[Shot, float], Image.Image]
+"""(shot, time) -> the scene at ``time`` (s); from its end on, how it ended."""
 
 
-def shoot(camera: Filming, shots: Iterable[Shot], rate: float = RATES[".mp4"]) -> Iterator[Frame]:
+def shoot(draw: Draw, shots: Iterable[Shot], rate: float = RATES[".mp4"]) -> Iterator[Frame]:
     """The frames of a film: of each shot the landings since the last one, the movement, its end for a moment."""
     for shot in shots:
         for part, time in shot.moments(rate):
-            frame = captioned(camera.frame(part, time), part.title, part.caption(time))
+            frame = captioned(draw(part, time), part.title, part.caption(time))
             beside = shot.beside[time >= shot.recording.landed] if shot.beside else frame[:, :0]
             yield np.concatenate([frame, beside], axis=1)
 

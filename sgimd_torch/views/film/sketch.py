@@ -1,6 +1,6 @@
 """Films of robots in the plane: what their ``record`` gives, drawn as a chain of links, without OpenGL.
 
-    sketchbook = Sketchbook(arm.outcomes, shots); write_film(Path("film.mp4"), shoot(sketchbook, shots))
+    write_film(Path("film.mp4"), shoot(Sketchbook(arm.outcomes, shots).frame, shots))
 The goal is a ring, past outcomes are dots, the outcome is a cross, the end of the chain leaves a path. The first two
 dimensions of the outcome are x and y of the picture; an outcome of one dimension lies on y = 0.
 """
