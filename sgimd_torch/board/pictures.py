@@ -65,7 +65,7 @@ def where(regions: Sequence[Region]) -> str:
 
 def _competence(ax: Axes, regions: Sequence[Region], section: Section) -> None:
     means = [region.competences.mean() if len(region.goals) else np.nan for region in regions]
-    competence_map(ax, *_boxes(regions), np.array(means), worst=WORST, section=section)
+    competence_map(ax, *_boxes(regions), np.array(means), section, worst=WORST)
     _name(ax, regions, section)
 
 
@@ -83,7 +83,7 @@ def _since(ax: Axes, competent: Competent) -> None:
             ink = "white" if shares[name] < 0.6 else "black"
             middle = x[column : column + 2].mean(), y[row : row + 2].mean()
             ax.text(*middle, said, ha="center", va="center", color=ink, weight="bold" if name in since else "normal")
-    colour_bar([ax], mesh, "share of the goals met now")
+    colour_bar(ax, mesh, "share of the goals met now")
     plane(ax, box)
     ax.set_title("since when half of the goals are met, else the share")
 

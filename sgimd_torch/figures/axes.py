@@ -1,11 +1,10 @@
 """What figures share: the plane of outcomes, movements along the x axis, colour bars, notes.
 
-Each function draws on the axes it is given.   mesh = ax.pcolormesh(x, y, z); colour_bar([ax], mesh, "error (m)")
+Each function draws on the axes it is given.   mesh = ax.pcolormesh(x, y, z); colour_bar(ax, mesh, "error (m)")
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, Final
 
@@ -75,11 +74,11 @@ def over_movements(ax: Axes, label: str) -> None:
     ax.grid(alpha=0.3)
 
 
-def colour_bar(axes: Sequence[Axes], drawn: ScalarMappable, label: str, *, extend: str = "neither") -> Colorbar:
-    """One bar for all ``axes`` that share the scale of ``drawn``; ``extend`` is matplotlib's."""
-    figure = axes[0].get_figure()
+def colour_bar(ax: Axes, drawn: ScalarMappable, label: str, *, extend: str = "neither") -> Colorbar:
+    """The bar of what was ``drawn`` on ``ax``; ``extend`` is matplotlib's."""
+    figure = ax.get_figure()
     assert figure is not None
-    return figure.colorbar(drawn, ax=list(axes), label=label, extend=extend)
+    return figure.colorbar(drawn, ax=ax, label=label, extend=extend)
 
 
 def note(ax: Axes, text: str) -> None:

@@ -78,13 +78,13 @@ class Section:
             return f"the middle of {len(hidden)} others"
         return ", ".join(f"{names[k]} = {middle[k]:.3g}" for k in hidden)
 
-    def frame(self, ax: Axes, *, legend: bool = True) -> None:
+    def frame(self, ax: Axes) -> None:
         """Limits and names of the axes."""
         plane(ax, self.box)
         if self.is_strip:
             ax.set(aspect="auto", yticks=[])
             ax.xaxis.set_major_locator(MaxNLocator(6))
-        if legend and ax.get_legend_handles_labels()[0]:
+        if ax.get_legend_handles_labels()[0]:
             ax.legend(**LEGEND)
 
     def _flat(self, points: Array, height: float) -> Array:
@@ -109,14 +109,3 @@ def sections(space: Box) -> list[Section]:
 def of_regions(lows: Array, highs: Array, space: Box) -> list[Section]:
     """The pictures of the part of T, ``space``, that regions ``(n, context_dim + outcome_dim)`` fill."""
     return sections(replace(space, low=lows.min(axis=0)[-space.dim :], high=highs.max(axis=0)[-space.dim :]))
-
-
-def in_the_plane(box: Box) -> Section:
-    """The one picture of a T of two dimensions.
-
-    Raises:
-        ValueError: it has others.
-    """
-    if box.dim != 2:
-        raise ValueError(f"the water plane has 2 dimensions, got a box of {box.dim}; others need a section")
-    return Section(box, (0, 1))

@@ -2,7 +2,7 @@
 
 After Agarwal et al. (2021), "Deep reinforcement learning at the edge of the statistical precipice": few seeds, so every
 number comes with an interval. ``errors`` are mean benchmark errors (m), one for each seed; smaller is better.
-    iqm_interval(errors, rng=rng()); ratio_interval(ours, theirs, rng=rng()); show(iqm_interval(errors, rng=rng()))
+    found = iqm_interval(errors, rng=rng()); show(iqm_interval(errors, rng=rng()))
 """
 
 from __future__ import annotations
@@ -128,23 +128,6 @@ def over_seeds(values: Array) -> Interval | None:
     return point(float(values[0])) if len(values) == 1 else iqm_interval(values, rng=rng())
 
 
-def ratio_interval(
-    ours: Array, theirs: Array, *, rng: np.random.Generator, paired: bool = False, level: float = LEVEL
-) -> Interval:
-    """IQM(ours) / IQM(theirs), of ``(n_seeds,)`` each; ``paired`` when both were measured on the same runs.
-
-    Raises:
-        ValueError: ``theirs`` are not all above 0; see ``interval``.
-    """
-    if (np.asarray(theirs) <= 0).any():
-        raise ValueError(f"the values to divide by must be above 0, got {np.min(theirs)}")
-
-    def ratio(x: Array, y: Array) -> Array:
-        return interquartile_mean(x) / interquartile_mean(y)
-
-    return interval(ratio, ours, theirs, rng=rng, paired=paired, level=level)
-
-
 def improvement(ours: Array, theirs: Array) -> Array:
     """P(X < Y): how often ours ``(..., n)`` have a smaller error than theirs ``(..., m)``; a tie counts half.
 
@@ -229,34 +212,6 @@ def common_differences(ours: Mapping[int, float], theirs: Mapping[int, float]) -
     return paired_differences({seed: ours[seed] for seed in both}, {seed: theirs[seed] for seed in both})
 
 
-def difference_interval(
-    ours: Mapping[int, float], theirs: Mapping[int, float], *, rng: np.random.Generator, level: float = LEVEL
-) -> Interval:
-    """Interquartile mean of the paired differences (m); wholly below 0 if our errors are smaller.
-
-    Raises:
-        ValueError: see ``paired_differences`` and ``interval``.
-    """
-    return iqm_interval(paired_differences(ours, theirs), rng=rng, level=level)
-
-
-def mean_over_life(movements: Array, errors: Array) -> Array:
-    """Area under the error curve, divided by its width: the mean error (m) over the learner's life.
-
-    Trapezoids over movements, on a linear scale: each movement counts the same.
-
-    Args:
-        movements: ``(n,)``, increasing, 2 or more.
-        errors: ``(..., n)`` m.
-
-    Raises:
-        ValueError: ``movements`` do not increase, or values do not match them or are not finite.
-    """
-    movements, errors = _checked_curves(movements, errors)
-    areas: Array = np.trapezoid(errors, movements, axis=-1) / (movements[-1] - movements[0])
-    return areas
-
-
 def movements_to_reach(movements: Array, errors: Array, level: Array | float) -> Array:
     """After how many movements the error first falls to a level; straight lines between evaluations.
 
@@ -269,7 +224,7 @@ def movements_to_reach(movements: Array, errors: Array, level: Array | float) ->
         ``(...)``, the first evaluation at the earliest, inf if the level is never reached.
 
     Raises:
-        ValueError: see ``mean_over_life``.
+        ValueError: ``movements`` do not increase, or values do not match them or are not finite.
     """
     movements, errors = _checked_curves(movements, errors)
     level = np.asarray(level, dtype=np.float64)[..., None]

@@ -9,8 +9,6 @@ from sgimd_torch.figures.learning import (
     COLOURS,
     NAMES,
     competence_map,
-    count_bar,
-    histogram,
     interest_map,
     landing_points,
     misses,
@@ -20,6 +18,7 @@ from sgimd_torch.goals.interest_map import InterestMap
 from sgimd_torch.spaces import Box, stream
 
 T = Box.cube(-1.0, 1.0, 2, names=("x", "y"), unit="m")
+(PLANE,) = sections(T)
 LOWS, HIGHS = np.array([[-1.0, -1.0], [0.0, -1.0]]), np.array([[0.0, 1.0], [1.0, 1.0]])
 
 
@@ -35,31 +34,31 @@ def test_every_algorithm_has_a_name_and_a_colour_of_its_own():
 
 def test_each_landing_point_inside_is_counted_on_its_tile_and_those_outside_are_told(ax):
     outcomes = np.array([[-0.9, 0.9], [-0.8, 0.8], [0.9, -0.9], [3.0, 0.0]])
-    counts = landing_points(ax, outcomes, T, side=1.0).get_array()
+    counts = landing_points(ax, outcomes, T, PLANE, side=1.0).get_array()
     np.testing.assert_array_equal(counts.filled(0), [[0, 1], [2, 0]])  # rows are y, from below
     assert [text.get_text() for text in ax.texts] == ["1 of 4 landed outside: squares at the edge"]
     np.testing.assert_array_equal(ax.collections[1].get_offsets(), [[1.0, 0.0]])
 
 
 def test_two_histograms_can_share_their_scale(ax):
-    mesh = landing_points(ax, np.zeros((3, 2)), T, most=50)
+    mesh = landing_points(ax, np.zeros((3, 2)), T, PLANE, most=50)
     assert (mesh.norm.vmin, mesh.norm.vmax) == (1, 50)
 
 
 def test_no_landing_point_leaves_an_empty_plane(ax):
-    assert landing_points(ax, np.empty((0, 2)), T).get_array().mask.all()
+    assert landing_points(ax, np.empty((0, 2)), T, PLANE).get_array().mask.all()
 
 
 def test_demonstrated_outcomes_are_crosses(ax):
     demonstrated = np.array([[-0.3, 0.4], [0.1, 0.2]])
-    landing_points(ax, np.zeros((3, 2)), T, demonstrated=demonstrated)
+    landing_points(ax, np.zeros((3, 2)), T, PLANE, demonstrated=demonstrated)
     (crosses,) = ax.lines
     np.testing.assert_array_equal(crosses.get_xydata(), demonstrated)
 
 
 def test_what_was_demonstrated_several_times_is_one_demonstrated_outcome(ax):
     demonstrated = np.array([[0.1, 0.2], [-0.3, 0.4], [0.1, 0.2]])
-    landing_points(ax, np.zeros((3, 2)), T, demonstrated=demonstrated)
+    landing_points(ax, np.zeros((3, 2)), T, PLANE, demonstrated=demonstrated)
     assert ax.lines[0].get_label() == "2 demonstrated outcomes"
     np.testing.assert_array_equal(ax.lines[0].get_xydata(), demonstrated[[1, 0]])
 
@@ -84,11 +83,6 @@ def test_limits_of_few_points_hold_all_of_them(points):
     assert box.contains(points).all()
 
 
-def test_landing_points_need_a_plane(ax):
-    with pytest.raises(ValueError, match="2 dimensions, got a box of 3"):
-        landing_points(ax, np.zeros((3, 3)), Box.cube(-1, 1, 3))
-
-
 def test_the_rectangles_of_an_interest_map_are_its_regions_and_tile_the_task_space(ax):
     goals, rng = InterestMap(Box.cube(0, 1, 0), T, stream(0, "goals")), stream(0, "test")
     for _ in range(400):
@@ -98,7 +92,7 @@ def test_the_rectangles_of_an_interest_map_are_its_regions_and_tile_the_task_spa
     assert len(regions) > 4
     lows, highs = np.stack([region.low for region in regions]), np.stack([region.high for region in regions])
     interests = np.array([region.interest() for region in regions])
-    drawn = interest_map(ax, lows, highs, interests, goals=regions[0].goals)
+    drawn = interest_map(ax, lows, highs, interests, PLANE, goals=regions[0].goals)
     corners = np.stack([path.vertices for path in drawn.get_paths()])
     np.testing.assert_allclose(corners.min(axis=1), lows)
     np.testing.assert_allclose(corners.max(axis=1), highs)
@@ -110,46 +104,22 @@ def test_the_rectangles_of_an_interest_map_are_its_regions_and_tile_the_task_spa
 
 
 def test_a_map_without_any_interest_can_be_drawn(ax):
-    drawn = interest_map(ax, T.low[None], T.high[None], np.zeros(1))
+    drawn = interest_map(ax, T.low[None], T.high[None], np.zeros(1), PLANE, goals=np.empty((0, 2)))
     assert drawn.get_clim()[1] > 0
 
 
 def test_competence_is_shown_from_minus_one_to_zero_and_unknown_regions_are_left_white(ax):
-    drawn = competence_map(ax, LOWS, HIGHS, np.array([-0.3, np.nan]))
+    drawn = competence_map(ax, LOWS, HIGHS, np.array([-0.3, np.nan]), PLANE)
     assert drawn.get_clim() == (-1, 0)
     np.testing.assert_array_equal(np.ma.getmaskarray(drawn.get_array()), [False, True])
     corners = np.stack([path.vertices for path in drawn.get_paths()])
     np.testing.assert_array_equal(corners.min(axis=1), LOWS)
     np.testing.assert_array_equal(corners.max(axis=1), HIGHS)
-    assert (ax.get_xlabel(), ax.get_aspect(), ax.get_xlim()) == ("outcome 0", 1.0, (-1, 1))
-
-
-@pytest.mark.parametrize("draw", [interest_map, competence_map])
-def test_a_map_over_contexts_needs_a_section(ax, draw):
-    with pytest.raises(ValueError, match="section"):
-        draw(ax, np.zeros((1, 3)), np.ones((1, 3)), np.zeros(1))
-
-
-def test_one_colour_bar_serves_histograms_that_share_a_scale():
-    axes = list(Figure().subplots(1, 2))
-    mesh, _ = (landing_points(ax, np.zeros((3, 2)), T, most=40, colour_bar=False) for ax in axes)
-    figure = axes[0].get_figure()
-    assert len(figure.axes) == 2
-    bar = count_bar(axes, mesh, "movements")
-    assert len(figure.axes) == 3
-    assert bar.ax.get_ylabel() == "movements"
-    assert [tick for tick in bar.get_ticks() if 1 <= tick <= 40] == [1, 2, 5, 10, 20]
-    assert (bar.vmin, bar.vmax) == pytest.approx((1, 40))  # older releases come back from logarithms
-
-
-def test_a_histogram_is_nothing_but_tiles(ax):
-    counts = histogram(ax, np.array([[-0.9, 0.9], [0.9, -0.9], [0.8, -0.8]]), T, side=1.0).get_array()
-    np.testing.assert_array_equal(counts.filled(0), [[0, 2], [1, 0]])
-    assert not ax.lines
+    assert (ax.get_xlabel(), ax.get_aspect(), ax.get_xlim()) == ("x (m)", 1.0, (-1, 1))
 
 
 def test_axes_carry_the_names_and_the_unit_of_the_task_space_which_is_not_distorted(ax):
-    landing_points(ax, np.zeros((3, 2)), T)
+    landing_points(ax, np.zeros((3, 2)), T, PLANE)
     assert (ax.get_xlabel(), ax.get_ylabel(), ax.get_aspect()) == ("x (m)", "y (m)", 1.0)
     assert ax.get_xlim() == ax.get_ylim() == (-1, 1)
 

@@ -89,16 +89,16 @@ def test_every_figure_shows_outcomes_of_any_dimension(dim):
     lows, highs = space.low[None], space.high[None]
     for section in sections(space):
         axes = Figure().subplots(3)
-        mesh = landing_points(axes[0], outcomes, space, demonstrated=outcomes[:3], side=0.1, section=section)
+        mesh = landing_points(axes[0], outcomes, space, section, demonstrated=outcomes[:3], side=0.1)
         assert mesh.get_array().sum() == 50
         assert sorted(axes[0].lines[0].get_xdata()) == sorted(outcomes[:3, section.dims[0]])
-        drawn = interest_map(axes[1], lows, highs, np.ones(1), goals=outcomes, section=section)
+        drawn = interest_map(axes[1], lows, highs, np.ones(1), section, goals=outcomes)
         assert len(drawn.get_paths()) == 1
-        competence_map(axes[2], lows, highs, np.full(1, -0.5), section=section)
+        competence_map(axes[2], lows, highs, np.full(1, -0.5), section)
         assert [ax.get_xlabel() for ax in axes] == [f"outcome {section.dims[0]}"] * 3
 
 
 def test_sides_of_another_scale_are_not_drawn_in_proportion(ax):
     space = Box(np.zeros(2), np.array([100.0, 1.0]))
-    landing_points(ax, np.full((5, 2), 0.5), space, side=2.5, section=Section(space, (0, 1)))
+    landing_points(ax, np.full((5, 2), 0.5), space, Section(space, (0, 1)), side=2.5)
     assert (ax.get_aspect(), ax.get_xlim(), ax.get_ylim()) == ("auto", (0, 100), (0, 1))

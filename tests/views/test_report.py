@@ -277,6 +277,24 @@ def test_the_rows_of_a_figure_of_differences_are_two_or_three_lines_of_text_high
     assert 1.5 * line < (heights[1] - heights[0]) / 5 < 3 * line
 
 
+def test_differences_have_the_best_on_top_and_a_full_mark_where_zero_is_excluded(run):
+    baseline = made(run, "sgim-d", FIVE)
+    others = [
+        made(run, "worse", [error + 0.1 for error in FIVE]),
+        made(run, "alike", FIVE[::-1]),
+        made(run, "better", [error - 0.05 for error in FIVE]),
+        made(run, "few", [error + 0.2 for error in FIVE[:4]]),
+    ]
+    (ax,) = drawn(figures.differences, compare([baseline, *others], baseline), baseline).axes
+    named = [label.get_text() for label in ax.get_yticklabels()]
+    assert named == ["better (5 seeds)", "alike (5 seeds)", "worse (5 seeds)", "few (4 seeds)"]
+    marks = [line for line in ax.lines if line.get_marker() == "o"]
+    assert [mark.get_markerfacecolor() for mark in marks[:3]] == ["black", "white", "black"]
+    assert marks[0].get_xdata()[0] == pytest.approx(-0.05)
+    assert marks[3].get_xdata() == pytest.approx(np.full(4, 0.2))  # its seeds, and neither mark nor interval
+    assert (ax.get_xlabel(), ax.yaxis_inverted()) == ("error less that of SGIM-D, seed by seed (m)", True)
+
+
 def test_differences_are_those_to_the_baseline_that_was_chosen(runs, pages, tmp_path):
     out = tmp_path / "page.html"
     assert report.main([str(runs), "--baseline", ODD, "--out", str(out)]) == 0

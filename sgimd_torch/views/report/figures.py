@@ -17,10 +17,9 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from sgimd_torch.figures.axes import LEGEND, alike, limits, over_movements, rounded
+from sgimd_torch.figures.axes import GREY, LEGEND, alike, limits, over_movements, rounded
 from sgimd_torch.figures.learning import COLOURS, competence_map, interest_map, landing_points, map_after
 from sgimd_torch.figures.learning import misses as draw_misses
-from sgimd_torch.figures.results import Difference, forest
 from sgimd_torch.figures.sections import Section, of_regions, sections
 from sgimd_torch.runs.read import Run
 from sgimd_torch.spaces import Array, Box
@@ -92,7 +91,7 @@ def curves(figure: Figure, variants: Sequence[Variant], colours: Mapping[str, st
             ax.fill_between(variant.evaluated, low, high, color=colour, alpha=0.2, linewidth=0)
         if n > 1 and len(variants) == 1:
             ax.plot(variant.evaluated, variant.errors.T, color=colour, linewidth=0.7, alpha=0.4)
-        label = f"{_plain(variant.label)} ({n} seed{'s' * (n > 1)})"
+        label = f"{_plain(variant.label)} ({_seeds(n)})"
         ax.plot(variant.evaluated, centre, "o-", color=colour, markersize=4.5, label=label)
         if len(variants) == 1:
             floor = variant.floors.mean(axis=0)
@@ -105,7 +104,10 @@ def curves(figure: Figure, variants: Sequence[Variant], colours: Mapping[str, st
 
 @png
 def differences(figure: Figure, compared: Sequence[Comparison], baseline: Variant) -> None:
-    """How much larger last errors are than the baseline's, seed by seed; without intervals where there are few seeds.
+    """How much larger last errors are than the baseline's, seed by seed, the best on top, with intervals.
+
+    A filled mark: the interval excludes 0. Ticks behind are seeds. Where there are few seeds they are points, and there
+    is no mark.
 
     Args:
         figure: drawn on.
@@ -113,8 +115,22 @@ def differences(figure: Figure, compared: Sequence[Comparison], baseline: Varian
         baseline: what they are compared with.
     """
     figure.set_size_inches(6.8, 1.1 + 0.36 * len(compared))
-    rows = [Difference(_plain(each.variant.label), each.seeds, *each.found) for each in compared]
-    forest(figure.subplots(), rows, reference=_plain(baseline.label), space=baseline.space)
+    ax, ordered = figure.subplots(), sorted(compared, key=lambda row: row.found.value)
+    for height, row in enumerate(ordered):
+        (centre, low, high), heights = row.found, np.full(len(row.seeds), height)
+        if np.isnan(low):
+            ax.plot(row.seeds, heights, "o", color=GREY, markersize=4.5)
+            continue
+        ax.plot(row.seeds, heights, "|", color=GREY, markersize=7, alpha=0.6, zorder=1)
+        ax.plot([low, high], [height, height], color="black", linewidth=1.8, solid_capstyle="butt")
+        face = "black" if low > 0 or high < 0 else "white"
+        ax.plot(centre, height, "o", color="black", markerfacecolor=face, markersize=6.5)
+    ax.axvline(0, color=COLOURS["sgim-d"], zorder=0)
+    named = [f"{_plain(row.variant.label)} ({_seeds(len(row.seeds))})" for row in ordered]
+    ax.set_yticks(range(len(ordered)), named)
+    ax.set_ylim(len(ordered) - 0.4, -0.6)
+    ax.set_xlabel(baseline.space.in_unit(f"error less that of {_plain(baseline.label)}, seed by seed"))
+    ax.grid(axis="x", alpha=0.3)
 
 
 def planes_of(variants: Sequence[Variant]) -> dict[str, Box]:
@@ -139,7 +155,7 @@ def landing(figure: Figure, variant: Variant, plane: Box) -> None:
         sides = section.box.sides
         longest = float(sides[0] if section.is_strip or not alike(sides) else sides.max())
         side, crosses = rounded(longest / TILES), shown if len(shown) else None
-        landing_points(ax, variant.landed, plane, demonstrated=crosses, side=side, section=section)
+        landing_points(ax, variant.landed, plane, section, demonstrated=crosses, side=side)
 
 
 @png
@@ -175,8 +191,8 @@ def regions(figure: Figure, run: Run) -> None:
     panels = of_regions(lows, highs, run.spaces["outcomes"])
     axes = _panels(figure, [*panels, *panels])
     for above, below, section in zip(axes, axes[len(panels) :], panels, strict=False):
-        competence_map(above, lows, highs, competences, section=section)
-        interest_map(below, lows, highs, interests, goals=run.chosen_goals()[-GOALS:], section=section)
+        competence_map(above, lows, highs, competences, section)
+        interest_map(below, lows, highs, interests, section, goals=run.chosen_goals()[-GOALS:])
 
 
 def _panels(figure: Figure, shown: Sequence[Section]) -> list[Axes]:
@@ -190,3 +206,7 @@ def _plain(name: str) -> str:
     """A name as a label: not a formula, not hidden, not too long."""
     short = name if len(name) <= 32 else f"{name[:30]}…"
     return f"{' ' * short.startswith('_')}{short}".replace("$", r"\$")
+
+
+def _seeds(n: int) -> str:
+    return f"{n} seed{'s' * (n != 1)}"
