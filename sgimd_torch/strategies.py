@@ -173,7 +173,7 @@ class GoalBabbling:
 
     def _global_probability(self, context: Array, goal: Array) -> float:
         """Global exploration is the more likely, the farther the goal is from all that was reached."""
-        if len(self.memory) == 0:
+        if len(self.memory) == 0 or getattr(self.explore, "searching", False):
             return 1.0
         # Deviation: the paper's probability is -J itself. It is kept off 0 and 1, so that both regimes stay possible.
         return float(np.clip(-self.competence(context, goal), *self.global_range))
