@@ -46,7 +46,7 @@ class Effects:
         n, size = len(self.memory), float(_FIRST)
         while size * _GROWTH <= n:
             size *= _GROWTH
-        if self._looked < size <= n:
+        if self._looked < int(size) <= n:
             self._looked = int(size)
             self._plateau = self._look()
             self._acted, self._seen = Memory(self.memory.context_dim, self.memory.theta_dim, self.memory.outcome_dim), 0
