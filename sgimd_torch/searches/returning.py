@@ -16,13 +16,14 @@ from sgimd_torch.memory import Memory
 from sgimd_torch.searches.widening import Widening, Width
 from sgimd_torch.spaces import Array, Box
 
-_ANYWHERE: Final = 0.5  # of the movements, in search of other effects
+_SHARE: Final = 0.1  # of movements for exploration when some had an effect; more would scatter what was learnt
+_ANYWHERE: Final = 0.1  # of these, in search of other effects
 _NEAREST: Final = 10  # effects in the most similar contexts, of which one is varied
 
 
 class Returning:
     """`Widening` while every movement has an effect of its own. Else anywhere in Pi, until something had an effect, and
-    from then on every other time around a movement that had one in a similar context.
+    from then on nearly always around a movement that had one in a similar context.
 
     Args:
         policies, memory, rng: as in `Widening`.
@@ -38,10 +39,10 @@ class Returning:
         self._varied: Array | None = None  # the last variation
 
     @property
-    def searching(self) -> bool:
-        """Whether nothing had an effect yet, so that there is nothing to pursue a goal with."""
+    def share(self) -> float | None:
+        """Of all movements, that are explored: all until something had an effect, then few. None without a plateau."""
         acted = self._effects()
-        return acted is not None and not len(acted)
+        return None if acted is None else _SHARE if len(acted) else 1.0
 
     def __call__(self, context: Array) -> Array:
         """``(theta_dim,)`` the next movement."""
