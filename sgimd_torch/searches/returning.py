@@ -17,13 +17,13 @@ from sgimd_torch.searches.widening import Widening, Width
 from sgimd_torch.spaces import Array, Box
 
 _SHARE: Final = 0.1  # of movements for exploration when some had an effect; more would scatter what was learnt
-_ANYWHERE: Final = 0.1  # of these, in search of other effects
+_ANYWHERE: Final = 0.5  # of these, in search of other effects
 _NEAREST: Final = 10  # effects in the most similar contexts, of which one is varied
 
 
 class Returning:
     """`Widening` while every movement has an effect of its own. Else anywhere in Pi, until something had an effect, and
-    from then on nearly always around a movement that had one in a similar context.
+    from then on every other time around a movement that had one in a similar context.
 
     Args:
         policies, memory, rng: as in `Widening`.
