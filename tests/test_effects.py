@@ -3,14 +3,18 @@
 import numpy as np
 import pytest
 
+from sgimd_torch.algorithms import practice
 from sgimd_torch.environments.objects import fetch, puck
 from sgimd_torch.environments.toys import crawler, toss, two_elbows
+from sgimd_torch.evaluation import evaluate
 from sgimd_torch.inverses.among_effects import AmongEffects
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.memory import Memory
 from sgimd_torch.memory.effects import Effects
+from sgimd_torch.runs.tasks.robots import toy_benchmark
 from sgimd_torch.searches.returning import Returning
 from sgimd_torch.searches.widening import Widening
+from sgimd_torch.session import run
 from sgimd_torch.spaces import Box
 
 PI = Box.cube(0, 1, 3)
@@ -108,9 +112,30 @@ def test_it_looks_anywhere_until_something_had_an_effect_and_then_around_that():
     anywhere = np.array([look(np.zeros(1)) for _ in range(200)])
     assert anywhere.std(axis=0) == pytest.approx(np.full(3, np.sqrt(1 / 12)), rel=0.15)
     memory.add(np.zeros(1), np.array([0.1, 0.9, 0.5]), np.array([2.0]))
-    assert look.share < 0.5
     around = np.array([look(np.zeros(1)) for _ in range(200)])
     assert (np.abs(around - [0.1, 0.9, 0.5]).max(axis=1) < 0.25).mean() == pytest.approx(0.5, abs=0.15)
+
+
+def test_it_explores_less_when_there_are_effects_to_learn_from():
+    rng, memory = np.random.default_rng(0), Memory(1, 3, 1)
+    look = Returning(PI, memory, AmongEffects(memory), np.random.default_rng(1))
+    shares = []
+    for _ in range(200):
+        memory.add(*button(rng))
+        shares.append(look.share)
+    assert shares[40] == 1.0
+    assert shares[-1] == 0.1
+
+
+def test_practice_learns_to_fetch_a_ball_that_it_would_not_have_found_around_the_middle():
+    robot, errors = fetch(), []
+    goals = toy_benchmark(robot, 0.1).goals[::4]
+    for parts in ({}, {"inverse": LocalProcess, "explore": Widening}):
+        learner = practice(robot, 1, **parts)
+        for _ in run(learner, robot, 1, movements=400):
+            pass
+        errors.append(evaluate(learner.inverse, robot, goals, 1, 400, repeats=0).mean_error)
+    assert errors[0] < 0.3 * errors[1]
 
 
 def test_it_returns_to_effects_in_similar_contexts():

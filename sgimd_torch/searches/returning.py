@@ -16,7 +16,8 @@ from sgimd_torch.memory import Memory
 from sgimd_torch.searches.widening import Widening, Width
 from sgimd_torch.spaces import Array, Box
 
-_SHARE: Final = 0.1  # of movements for exploration when some had an effect; more would scatter what was learnt
+_ENOUGH: Final = 16  # effects, for an inverse model to learn from
+_SHARE: Final = 0.1  # of movements for exploration then; more would scatter what is learnt
 _ANYWHERE: Final = 0.5  # of these, in search of other effects
 _NEAREST: Final = 10  # effects in the most similar contexts, of which one is varied
 
@@ -40,9 +41,9 @@ class Returning:
 
     @property
     def share(self) -> float | None:
-        """Of all movements, that are explored: all until something had an effect, then few. None without a plateau."""
+        """Of movements, for exploration: all until enough of them had an effect, then few. None without a plateau."""
         acted = self._effects()
-        return None if acted is None else _SHARE if len(acted) else 1.0
+        return None if acted is None else _SHARE if len(acted) >= _ENOUGH else 1.0
 
     def __call__(self, context: Array) -> Array:
         """``(theta_dim,)`` the next movement."""

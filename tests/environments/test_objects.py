@@ -28,9 +28,9 @@ def test_not_moving_leaves_the_puck_where_it_lies():
 
 
 def slides(lies):
-    """How far (m) ``PUSH`` sends a puck that lies so far ahead: a swing of .54 m in .5 s, restitution .5, friction .3."""
+    """How far (m) ``PUSH``, .54 m in .5 s, sends a puck that lies so far ahead: restitution .5, friction .3."""
     times = np.roots([-2, 3, 0, -(lies - 0.1 - 0.3) / 0.54])
-    time = times[(0 < times) & (times < 1)].item()
+    time = times[(times > 0) & (times < 1)].item()
     return (1.5 * 0.54 * 6 * time * (1 - time) / 0.5) ** 2 / (2 * 0.3 * GRAVITY)
 
 
