@@ -250,6 +250,7 @@ def practice(environment: Environment, seed: int, **parts: Any) -> Learner:
     """Practice, which is ours: goals anywhere in T, and at each one movement, the answer of a local process plus noise.
 
     It has no teacher, and nothing in it knows a unit or a robot. What the answer gets wrong is what it learns next.
+    Where most movements do nothing, it first looks for some that have an effect, and learns from those alone.
     T should not be much larger than what can be reached: its goals are drawn from all of it.
     """
     return sagg_riac(environment, seed, **parts)

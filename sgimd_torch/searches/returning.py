@@ -23,8 +23,8 @@ _NEAREST: Final = 10  # effects in the most similar contexts, of which one is va
 
 
 class Returning:
-    """`Widening` while every movement has an effect of its own. Else anywhere in Pi, until something had an effect, and
-    from then on every other time around a movement that had one in a similar context.
+    """`Widening` while every movement has an effect of its own. Else anywhere in Pi, and as soon as something had an
+    effect, every other time around a movement that had one in a similar context.
 
     Args:
         policies, memory, rng: as in `Widening`.

@@ -56,7 +56,7 @@ TASKS: Final[dict[str, Suited]] = {
     "crawler": Suited({"environment": "crawler"}, new=True),
     "spatial-arm": Suited({"environment": "spatial-arm"}, new=True),
     "puck": Suited({"environment": "puck"}),
-    "fetch": Suited({"environment": "fetch"}),
+    "fetch": Suited({"environment": "fetch"}, new=True),
 }
 RANDOM, UNIFORM = "random-nearest", "uniform-nearest"
 REFERENCES: Final[dict[str, dict[str, Any]]] = {
