@@ -23,7 +23,8 @@ Judge = Callable[[Array, Array, Array], float]
 
 
 Explore = Callable[[Array], Array]
-"""context -> the next theta of global exploration."""
+"""context -> the next theta of global exploration. If it has an attribute ``share`` that is not None, this is the
+probability of the global regime, whatever the competence."""
 
 
 class Strategy(Protocol):
@@ -175,6 +176,9 @@ class GoalBabbling:
         """Global exploration is the more likely, the farther the goal is from all that was reached."""
         if len(self.memory) == 0:
             return 1.0
+        share: float | None = getattr(self.explore, "share", None)
+        if share is not None:
+            return share
         # Deviation: the paper's probability is -J itself. It is kept off 0 and 1, so that both regimes stay possible.
         return float(np.clip(-self.competence(context, goal), *self.global_range))
 

@@ -53,8 +53,9 @@ SGIM_D = {
 PRACTICE = {
     "budget": 1,
     "global_range": (0.02, 0.3),
-    "explore": "widening",
+    "explore": "returning",
     "goals": "uniform",
+    "inverse": "among-effects",
     "search": "practice",
     "search.sd": 0.02,
     "social.repeats": 1,

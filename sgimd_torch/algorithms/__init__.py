@@ -23,12 +23,13 @@ from sgimd_torch.environments.protocol import Environment, check_rest
 from sgimd_torch.goals.interest_map import InterestMap
 from sgimd_torch.goals.protocol import Goals
 from sgimd_torch.goals.uniform import UniformGoals
+from sgimd_torch.inverses.among_effects import AmongEffects
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Learner
 from sgimd_torch.memory import Memory
 from sgimd_torch.searches.perturb import practise
+from sgimd_torch.searches.returning import Returning
 from sgimd_torch.searches.simplex import nelder_mead
-from sgimd_torch.searches.widening import Widening
 from sgimd_torch.spaces import Array, Box, Estimate, Search, stream
 from sgimd_torch.strategies import (
     Babble,
@@ -235,8 +236,9 @@ def sgim_d(
 
 PRACTICE: Final[dict[str, Any]] = {
     "goals": UniformGoals,
+    "inverse": AmongEffects,
     "search": practise,
-    "explore": Widening,
+    "explore": Returning,
     "budget": 1,
     "global_range": (0.02, 0.3),
 }
@@ -248,6 +250,7 @@ def practice(environment: Environment, seed: int, **parts: Any) -> Learner:
     """Practice, which is ours: goals anywhere in T, and at each one movement, the answer of a local process plus noise.
 
     It has no teacher, and nothing in it knows a unit or a robot. What the answer gets wrong is what it learns next.
+    Where most movements do nothing, it first looks for some that have an effect, and learns from those alone.
     T should not be much larger than what can be reached: its goals are drawn from all of it.
     """
     return sagg_riac(environment, seed, **parts)

@@ -77,8 +77,8 @@ def _rod(about: str, **fixed: object) -> Entry:
     return _at("runs.tasks.rods:fishing_rod", about, fixed=fixed, filmed=True)
 
 
-def _toy(name: str, side: float, about: str, **more: object) -> Entry:
-    make = f"{_IN_THE_PACKAGE}.environments.toys:{name}"
+def _toy(name: str, side: float, about: str, *, module: str = "toys", **more: object) -> Entry:
+    make = f"{_IN_THE_PACKAGE}.environments.{module}:{name}"
     return _at("runs.tasks.robots:toy", about, fixed={"make": make, "side": side, **more}, hidden=("taught",))
 
 
@@ -154,6 +154,8 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
         "crawler": _toy("crawler", 0.1, "four legs, whose phases are periodic parameters"),
         "two-elbows": _toy("two_elbows", 0.1, "an arm with two separate families of postures"),
         "spatial-arm": _toy("spatial_arm", 25.0, "six joints, three outcomes, in cm"),
+        "puck": _toy("puck", 0.1, "a puck that has to be hit; where it lies is the context", module="objects"),
+        "fetch": _toy("fetch", 0.1, "a ball that has to be grasped", module="objects"),
     },
     "goals": {
         "interest-map": _at("goals.interest_map:InterestMap", "where competence changes, in regions"),
@@ -190,6 +192,9 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
     "explore": {
         "anywhere": _at("algorithms:anywhere", "uniformly from Pi"),
         "widening": _at("searches.widening:Widening", "around the middle of Pi, as wide as can be predicted"),
+        "returning": _at(
+            "searches.returning:Returning", "the same; where most movements do nothing, around what had an effect"
+        ),
     },
     "inverse": {
         "linear": _at("inverses.locally_linear:LocallyLinear", "eq. (9) corrected to first order"),
@@ -198,6 +203,9 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
         "process": _at(
             "inverses.local_process:LocalProcess",
             "what a local Gaussian process proposes, if it should beat the nearest",
+        ),
+        "among-effects": _at(
+            "inverses.among_effects:AmongEffects", "process, from movements with an effect where most have none"
         ),
         "model": _at(
             "inverses.through_model:ModelInverse",

@@ -54,6 +54,8 @@ TASKS: Final[dict[str, Suited]] = {
     "planar-arm-7": Suited({"environment": "planar-arm-7"}, new=True),
     "crawler": Suited({"environment": "crawler"}, new=True),
     "spatial-arm": Suited({"environment": "spatial-arm"}, new=True),
+    "puck": Suited({"environment": "puck"}),
+    "fetch": Suited({"environment": "fetch"}, new=True),
 }
 RANDOM, UNIFORM = "random-nearest", "uniform-nearest"
 REFERENCES: Final[dict[str, dict[str, Any]]] = {

@@ -5,13 +5,14 @@ import pytest
 
 from sgimd_torch.catalogue import CATALOGUE
 from sgimd_torch.environments.check import check_environment
+from sgimd_torch.environments.objects import fetch, puck
 from sgimd_torch.environments.toys import GRAVITY, Toy, crawler, spatial_arm, toss, two_elbows
 from sgimd_torch.runs.build import task_of
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.tasks import benchmark_of
 from sgimd_torch.spaces import stream
 
-TOYS = [toss, crawler, two_elbows, spatial_arm]
+TOYS = [toss, crawler, two_elbows, spatial_arm, puck, fetch]
 NO_CONTEXT, NO_WIND = np.zeros(0), np.zeros(1)
 
 
@@ -75,7 +76,7 @@ def test_the_stretched_spatial_arm_reaches_a_metre_ahead_in_cm():
     assert spatial_arm().rest == pytest.approx([100, 0, 0])
 
 
-@pytest.mark.parametrize("word", ["half-reached", "toss", "crawler", "two-elbows", "spatial-arm"])
+@pytest.mark.parametrize("word", ["half-reached", "toss", "crawler", "two-elbows", "spatial-arm", "puck", "fetch"])
 def test_a_toy_comes_with_goals_of_which_each_can_be_reached(word):
     assert word in CATALOGUE["environment"]
     task = task_of(Config(algorithm="random", parts={"environment": word}))
@@ -83,7 +84,8 @@ def test_a_toy_comes_with_goals_of_which_each_can_be_reached(word):
     assert 100 <= len(benchmark.goals) <= 400
     robot, rng = task.environment, stream(0, "reach")
     if isinstance(robot, Toy):
-        reached = robot.effect(np.zeros((20_000, robot.contexts.dim)), rng.uniform(size=(20_000, robot.policies.dim)))
+        middle = (robot.contexts.low + robot.contexts.high) / 2
+        reached = robot.effect(np.tile(middle, (20_000, 1)), rng.uniform(size=(20_000, robot.policies.dim)))
         distances = [np.linalg.norm(reached - goal, axis=1).min() for goal in benchmark.goals]
         assert max(distances) < np.sqrt(robot.outcomes.dim) * benchmark.side
     else:  # the disc within reach fills pi / 8 of T

@@ -295,7 +295,8 @@ def test_help_is_one_screen_and_a_parts_options_are_shown_once_it_is_chosen(caps
 PARTS_OF_PRACTICE = {
     "goals": "uniform",
     "search": "practice",
-    "explore": "widening",
+    "explore": "returning",
+    "inverse": "among-effects",
     "budget": 1,
     "global_range": (0.02, 0.3),
 }
@@ -304,11 +305,11 @@ PARTS_OF_PRACTICE = {
 def test_sagg_riac_with_every_part_of_practice_by_name_is_practice():
     def lived(config):
         parts = build(config)
-        episodes = run(parts.learner, parts.environment, 7, movements=80)
+        episodes = run(parts.learner, parts.environment, 7, movements=120)
         return np.concatenate([each.move.theta for each in episodes])
 
     def with_parts(algorithm, **changed):
-        return lived(Config(algorithm, parts={"environment": "two-elbows", **changed}))
+        return lived(Config(algorithm, parts={"environment": "puck", **changed}))
 
     practice = with_parts("practice")
     assert np.array_equal(with_parts("sagg-riac", **PARTS_OF_PRACTICE), practice)

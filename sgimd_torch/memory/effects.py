@@ -1,0 +1,90 @@
+"""Effects: which movements changed anything, where most change nothing?
+
+Our addition. A movement that misses an object leaves it where it lies. So the outcomes of all movements without an
+effect lie on one plateau: they depend on the context alone. It is looked for as RANSAC does (Fischler & Bolles 1981):
+an affine map of the context through few exemplars that fits as many others as possible, as closely as noise allows.
+    effects = Effects(memory, outcome_noise); acted = effects()
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from sgimd_torch.memory import Memory
+from sgimd_torch.spaces import Array, stream
+
+_FIRST, _GROWTH = 16, 1.5  # exemplars at the first look for a plateau, and how many times more at each later one
+_GUESSES: Final = 50  # maps through few exemplars
+_GUESSED_ON: Final = 300  # exemplars, drawn from all
+_REFINED: Final = 5  # times, by least squares
+_NEAR, _WITHIN = 2.0, 4.0  # standard deviations of the noise: most of a plateau lies near it, nothing of it farther out
+_ROUNDING: Final = 1e-9  # of the spread of outcomes: noise of an environment that has none
+_LEAST, _SHARE = 16, 0.1  # exemplars on a plateau, and their share of all
+_DENSE: Final = 0.9  # of those within, so many are near; of outcomes that go on beyond, half or fewer would be
+
+
+class Effects:
+    """The exemplars with an effect. It only reads, draws nothing, and depends on the memory alone.
+
+    Args:
+        memory: of the learner.
+        outcome_noise: standard deviation of each outcome dimension, ``outcome_noise`` of the environment.
+    """
+
+    def __init__(self, memory: Memory, outcome_noise: float) -> None:
+        self.memory = memory
+        self.noise = outcome_noise * np.sqrt(memory.outcome_dim)
+        self._looked = 0  # at so many exemplars for a plateau
+        self._plateau: Array | None = None  # (1 + context_dim, outcome_dim)
+        self._seen = 0
+
+    def __call__(self) -> Memory | None:
+        """Copies of the exemplars with an effect, perhaps none; another object when the plateau has changed. None while
+        there is no plateau: then every movement has its own effect."""
+        n, size = len(self.memory), float(_FIRST)
+        while size * _GROWTH <= n:
+            size *= _GROWTH
+        if self._looked < int(size) <= n:
+            self._looked = int(size)
+            self._plateau = self._look()
+            self._acted, self._seen = Memory(self.memory.context_dim, self.memory.theta_dim, self.memory.outcome_dim), 0
+        if self._plateau is None:
+            return None
+        new = slice(self._seen, n)
+        for row in self._seen + np.flatnonzero(self._distances(self._plateau, new) > _WITHIN * self._scale):
+            self._acted.add(self.memory.contexts[row], self.memory.thetas[row], self.memory.outcomes[row])
+        self._seen = n
+        return self._acted
+
+    def _look(self) -> Array | None:
+        """The plateau of the first ``_looked`` exemplars."""
+        n = self._looked
+        outcomes = self.memory.outcomes[:n]
+        self._scale = max(self.noise, _ROUNDING * float(np.sqrt(outcomes.var(axis=0).sum())))
+        rng = stream(n, "plateau")
+        drawn = rng.permutation(n)[:_GUESSED_ON]
+        guesses = [self._fit(rng.choice(drawn, 1 + self.memory.context_dim, replace=False)) for _ in range(_GUESSES)]
+        near = [self._distances(guess, drawn) <= _NEAR * self._scale for guess in guesses]
+        plateau = guesses[int(np.argmax([rows.sum() for rows in near]))]
+        for _ in range(_REFINED):
+            distances = self._distances(plateau, slice(n))
+            within = distances <= _WITHIN * self._scale
+            plateau = self._fit(np.flatnonzero(within))
+        on, close = within.sum(), (distances <= _NEAR * self._scale).sum()
+        return plateau if on >= max(_LEAST, _SHARE * n) and close >= _DENSE * on else None
+
+    def _fit(self, rows: np.ndarray) -> Array:
+        """The affine map of the contexts in ``rows``, by least squares."""
+        found: Array = np.linalg.lstsq(self._inputs(rows), self.memory.outcomes[rows], rcond=None)[0]
+        return found
+
+    def _distances(self, plateau: Array, rows: np.ndarray | slice) -> Array:
+        """``(n,)`` of the outcomes in ``rows`` to the plateau."""
+        found: Array = np.linalg.norm(self.memory.outcomes[rows] - self._inputs(rows) @ plateau, axis=1)
+        return found
+
+    def _inputs(self, rows: np.ndarray | slice) -> Array:
+        contexts = self.memory.contexts[rows]
+        return np.concatenate((np.ones((len(contexts), 1)), contexts), axis=1)
