@@ -54,7 +54,7 @@ PRACTICE = {
     "budget": 1,
     "global_range": (0.02, 0.3),
     "explore": "widening",
-    "goals": "uniform",
+    "goals": "within-reach",
     "search": "practice",
     "search.sd": 0.02,
     "social.repeats": 1,

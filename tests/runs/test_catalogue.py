@@ -303,7 +303,7 @@ def test_help_is_one_screen_and_a_parts_options_are_shown_once_it_is_chosen(caps
 
 
 PARTS_OF_PRACTICE = {
-    "goals": "uniform",
+    "goals": "within-reach",
     "search": "practice",
     "explore": "widening",
     "budget": 1,
