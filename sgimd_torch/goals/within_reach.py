@@ -3,18 +3,18 @@
 Our addition. Where T is far wider than what can be reached, nearly all of its points are hopeless, and a learner that
 aims at them learns its most extreme movements. The box stands around what was reached, with a margin on all sides. The
 margin grows with each goal there that is approached clearly more closely than ever before, and shrinks with the others.
+As long as the box grows, a wide margin is tried anew from time to time: only far goals lead to global exploration.
     goals = WithinReach(contexts, outcomes, rng, reached=memory)
 """
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from sgimd_torch.goals.protocol import check_attempt, check_in
-from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, Box
 
 _FIRST: Final = 21  # outcomes, so that a tail is at least one of them; before, goals are uniform in T
@@ -25,7 +25,18 @@ _FACTOR: Final = 1.05  # from one margin to the next
 _NEARER: Final = (
     0.2  # of what is left: an attempt that came nearer by this leads on. In many dimensions most come nearer
 )
+_AGAIN: Final = 0.5  # of the box, the margin that is tried anew,
+_GROWTH, _GROWN = 1.5, 1.1  # when there are so many times more outcomes, and the box is so many times larger
 _MOST: Final = 0.7  # of a side of T, in the geometric mean: the box is then as good as T
+
+
+class Reached(Protocol):
+    """What a `Memory` knows of outcomes."""
+
+    @property
+    def outcomes(self) -> Array:
+        """``(n, outcome_dim)``, all that were reached, in their order."""
+        ...
 
 
 class WithinReach:
@@ -41,9 +52,10 @@ class WithinReach:
         reached: the learner's memory; only read.
     """
 
-    def __init__(self, contexts: Box, outcomes: Box, rng: np.random.Generator, *, reached: Memory) -> None:
+    def __init__(self, contexts: Box, outcomes: Box, rng: np.random.Generator, *, reached: Reached) -> None:
         self.contexts, self.outcomes, self.reached, self._rng = contexts, outcomes, reached, rng
         self._margin: float | None = None  # in the unit of T
+        self._due = self._size = 0.0  # outcomes when the size of the box is next looked at; its size at the last look
         self._low, self._high = outcomes.low, outcomes.high  # of what was reached, without the margin
 
     def sample(self, context: ArrayLike) -> Array:
@@ -74,7 +86,7 @@ class WithinReach:
 
     def _box(self) -> tuple[Array, Array]:
         """Lower and upper corner ``(outcome_dim,)`` of where goals lie: T until anything had an effect."""
-        n = len(self.reached)
+        n = len(self.reached.outcomes)
         if n < _FIRST:
             return self.outcomes.low, self.outcomes.high
         known = self.reached.outcomes[:: 1 + n // _LOOKED_AT]
@@ -82,8 +94,13 @@ class WithinReach:
         sides = self._high - self._low
         if not sides.any():
             return self.outcomes.low, self.outcomes.high
+        size = float(sides.max())
         if self._margin is None:
-            self._margin = float(sides.max())
+            self._margin = size
+        if n >= self._due:
+            if size > _GROWN * self._size:
+                self._margin = max(self._margin, _AGAIN * size)
+            self._due, self._size = _GROWTH * n, size
         margins = np.maximum(self._margin, _LEAST * sides)
         self._margin = float(margins.min())
         return self.outcomes.clip(self._low - margins), self.outcomes.clip(self._high + margins)

@@ -227,7 +227,7 @@ def test_the_words_and_the_settings_of_a_config_make_it_again(config):
 
 def test_what_a_part_is_anyway_is_no_difference():
     own = Config("practice-taught")
-    assert (own["goals"], own["search"], own["budget"], own["teacher"]) == ("uniform", "practice", 1, "at-once")
+    assert (own["goals"], own["search"], own["budget"], own["teacher"]) == ("within-reach", "practice", 1, "at-once")
     assert Config("practice-taught", parts={"goals": "uniform", "budget": 1}) == own
     assert words(own) == ["--algorithm=practice-taught"]
     assert words(replace(own, parts={"goals": "interest-map"}))[1:] == ["--goals=interest-map"]
@@ -244,7 +244,7 @@ def test_dashes_and_underscores_mean_the_same():
 @pytest.mark.parametrize(
     ("options", "wanted"),
     [
-        ("--goals.window 12", "--goals.window: goals uniform has no such option; goals interest-map, grid have it"),
+        ("--goals.window 12", "--goals.window: goals within-reach has no such option; .* grid have it"),
         ("--goals grid --goals.windwo 12", "did you mean goals.window"),
         ("--window 12", r"no such option; goals interest-map, grid \(goals.window\) have it"),
         ("--algorithm random --budget 5", "--budget: algorithm random has .* sagg-riac, practice, .* have it"),
