@@ -22,9 +22,7 @@ _LOOKED_AT: Final = 1000  # outcomes, at about equal distances in time
 _TAIL: Final = 0.05  # of the outcomes on each side of a dimension: rare ones do not make the box larger
 _LEAST: Final = 1 / 18  # of the box, the margin on each side: what is uniform has .9 of itself between its tails
 _FACTOR: Final = 1.05  # from one margin to the next
-_NEARER: Final = (
-    0.2  # of what is left: an attempt that came nearer by this leads on. In many dimensions most come nearer
-)
+_NEARER: Final = 0.2  # of what is left: an attempt leads on if it came nearer by more. In 6 dimensions most come nearer
 _AGAIN: Final = 0.5  # of the box, the margin that is tried anew,
 _GROWTH, _GROWN = 1.5, 1.1  # when there are so many times more outcomes, and the box is so many times larger
 _MOST: Final = 0.7  # of a side of T, in the geometric mean: the box is then as good as T
