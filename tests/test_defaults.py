@@ -54,7 +54,7 @@ PRACTICE = {
     "budget": 1,
     "global_range": (0.02, 0.3),
     "explore": "returning",
-    "goals": "uniform",
+    "goals": "within-reach",
     "inverse": "among-effects",
     "search": "practice",
     "search.sd": 0.02,

@@ -47,7 +47,7 @@ COMMANDS = {
     "run --failures 0": "failures must be at least 1, got 0",
     "run --evaluate-at 100;200": "--evaluate-at must be whole numbers such as 250,500",
     "run --goals grid --goals.windw 3": "--goals.windw: goals grid has no such option; did you mean goals.window",
-    "run --goals.window 12": "--goals.window: goals uniform has no such option; goals interest-map, grid have it",
+    "run --goals.window 12": "--goals.window: goals within-reach has no such option; goals interest-map, grid have it",
     "run --noise 0.1": r"--noise: .* environment fishing-rod, .* \(environment.noise\)",
     "run --inverse gaussian": "unknown inverse 'gaussian'; known are linear",
     "run --teacher human": "unknown teacher 'human'; did you mean by-hand?",

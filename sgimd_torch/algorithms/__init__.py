@@ -22,7 +22,7 @@ from sgimd_torch.competence import AttemptCompetence, Competence, Performance, p
 from sgimd_torch.environments.protocol import Environment, check_rest
 from sgimd_torch.goals.interest_map import InterestMap
 from sgimd_torch.goals.protocol import Goals
-from sgimd_torch.goals.uniform import UniformGoals
+from sgimd_torch.goals.within_reach import WithinReach
 from sgimd_torch.inverses.among_effects import AmongEffects
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Learner
@@ -100,7 +100,8 @@ def goal_babbling(
         environment: its boxes, rest and outcome noise are read; it is not executed.
         seed: of all streams of this learner.
         memory: of the learner.
-        goals: (contexts, outcomes, rng) -> the goal model.
+        goals: (contexts, outcomes, rng) -> the goal model; it is given what was ``reached``, if it has such a keyword:
+            the ``effects`` that the inverse knows, or else ``memory``.
         inverse: (memory) -> the inverse model, where searches begin and by which the learner answers; it is given
             ``outcome_noise`` if it has such a keyword. Deviation: the paper infers by eq. (9) alone, which is
             `LocalInverse`; the answers of `LocalProcess` have to prove themselves.
@@ -124,6 +125,7 @@ def goal_babbling(
         measure = partial(performance, rest=environment.rest, d_min=noise)
     made = answering(environment, memory, inverse)
     explorer = explore(environment.policies, memory, made, stream(seed, "look"))
+    goals = given(goals, reached=getattr(made, "effects", memory))
     width = getattr(explorer, "width", None)
     if width is not None:  # how far to look, which both of them go by
         search = given(search, width=width)
@@ -235,7 +237,7 @@ def sgim_d(
 
 
 PRACTICE: Final[dict[str, Any]] = {
-    "goals": UniformGoals,
+    "goals": WithinReach,
     "inverse": AmongEffects,
     "search": practise,
     "explore": Returning,
@@ -247,11 +249,10 @@ PRACTICE: Final[dict[str, Any]] = {
 
 @hands_on(sagg_riac, **PRACTICE)
 def practice(environment: Environment, seed: int, **parts: Any) -> Learner:
-    """Practice, which is ours: goals anywhere in T, and at each one movement, the answer of a local process plus noise.
+    """Practice, which is ours: goals within reach, and at each one movement, the answer of a local process plus noise.
 
     It has no teacher, and nothing in it knows a unit or a robot. What the answer gets wrong is what it learns next.
     Where most movements do nothing, it first looks for some that have an effect, and learns from those alone.
-    T should not be much larger than what can be reached: its goals are drawn from all of it.
     """
     return sagg_riac(environment, seed, **parts)
 

@@ -162,6 +162,7 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
         "grid": _at("goals.progress_grid:ProgressGrid", "the same in cells that never split"),
         "alp-gmm": _at("goals.alp_gmm:AlpGmm", "Gaussians of high progress (extra rivals)"),
         "uniform": _at("goals.uniform:UniformGoals", "anywhere in T, all equally likely"),
+        "within-reach": _at("goals.within_reach:WithinReach", "the same where T is within reach, else around what is"),
     },
     "progress": {
         "gained": _at("goals.regions:gained_progress", "how much attempts raise the competence at their own goals"),

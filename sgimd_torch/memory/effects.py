@@ -40,6 +40,12 @@ class Effects:
         self._plateau: Array | None = None  # (1 + context_dim, outcome_dim)
         self._seen = 0
 
+    @property
+    def outcomes(self) -> Array:
+        """``(n, outcome_dim)`` of the exemplars with an effect, or of all while there is no plateau."""
+        acted = self()
+        return self.memory.outcomes if acted is None else acted.outcomes
+
     def __call__(self) -> Memory | None:
         """Copies of the exemplars with an effect, perhaps none; another object when the plateau has changed. None while
         there is no plateau: then every movement has its own effect."""

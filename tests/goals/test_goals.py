@@ -10,6 +10,8 @@ from sgimd_torch.goals.interest_map import InterestMap
 from sgimd_torch.goals.progress_grid import ProgressGrid
 from sgimd_torch.goals.regions import absolute_progress, gained_progress, paired_progress
 from sgimd_torch.goals.uniform import UniformGoals
+from sgimd_torch.goals.within_reach import WithinReach
+from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Box, stream
 
 NO_CONTEXTS, LINE, SQUARE = Box.cube(0, 1, 0), Box.cube(0, 1, 1), Box.cube(0, 1, 2)
@@ -29,8 +31,9 @@ ALL = pytest.mark.parametrize(
         partial(ProgressGrid, cells=3, progress=paired_progress),
         AlpGmm,
         UniformGoals,
+        lambda contexts, outcomes, rng: WithinReach(contexts, outcomes, rng, reached=Memory(1, 1, 2)),
     ],
-    ids=["map", "paired", "grid", "paired grid", "alp-gmm", "uniform"],
+    ids=["map", "paired", "grid", "paired grid", "alp-gmm", "uniform", "within-reach"],
 )
 
 

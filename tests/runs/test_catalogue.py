@@ -222,8 +222,8 @@ def test_the_words_and_the_settings_of_a_config_make_it_again(config):
 
 def test_what_a_part_is_anyway_is_no_difference():
     own = Config("practice-taught")
-    assert (own["goals"], own["search"], own["budget"], own["teacher"]) == ("uniform", "practice", 1, "at-once")
-    assert Config("practice-taught", parts={"goals": "uniform", "budget": 1}) == own
+    assert (own["goals"], own["search"], own["budget"], own["teacher"]) == ("within-reach", "practice", 1, "at-once")
+    assert Config("practice-taught", parts={"goals": "within-reach", "budget": 1}) == own
     assert words(own) == ["--algorithm=practice-taught"]
     assert words(replace(own, parts={"goals": "interest-map"}))[1:] == ["--goals=interest-map"]
     assert "goals.window" not in own
@@ -293,7 +293,7 @@ def test_help_is_one_screen_and_a_parts_options_are_shown_once_it_is_chosen(caps
 
 
 PARTS_OF_PRACTICE = {
-    "goals": "uniform",
+    "goals": "within-reach",
     "search": "practice",
     "explore": "returning",
     "inverse": "among-effects",

@@ -1,0 +1,140 @@
+"""Goals within reach: uniform where T is right, around what was reached where it is far too wide, in any unit."""
+
+import numpy as np
+import pytest
+
+from sgimd_torch.algorithms import practice
+from sgimd_torch.environments.toys import Toy, toss, two_elbows
+from sgimd_torch.goals.uniform import UniformGoals
+from sgimd_torch.goals.within_reach import WithinReach
+from sgimd_torch.memory import Memory
+from sgimd_torch.session import run
+from sgimd_torch.spaces import Box, stream
+
+NO_CONTEXTS, NO_CONTEXT = Box.cube(0, 1, 0), np.empty(0)
+
+
+def remembering(outcomes, context_dim=0) -> Memory:
+    """A memory of these outcomes, whatever the movements were."""
+    memory = Memory(context_dim, 1, outcomes.shape[1])
+    for outcome in outcomes:
+        memory.add(np.zeros(context_dim), [0.5], outcome)
+    return memory
+
+
+def scattered(dim, n=300, seed=0):
+    """Outcomes all over [-1, 1]^dim."""
+    return np.random.default_rng(seed).uniform(-1, 1, (n, dim))
+
+
+def missed(memory, goal):
+    """The distance of what came nearest to a goal."""
+    return np.linalg.norm(memory.outcomes - goal, axis=1).min()
+
+
+def drawn(memory, space, n=400, landed=None, contexts=NO_CONTEXTS):
+    """So many goals, each of them attempted; ``landed``: goal -> the outcome, an old one if there is none."""
+    goals, found = WithinReach(contexts, space, stream(0, "goals"), reached=memory), []
+    context = contexts.low
+    for _ in range(n):
+        goal = goals.sample(context)
+        outcome = memory.outcomes[0] if landed is None else landed(goal)
+        before = missed(memory, goal)
+        memory.add(context, [0.5], outcome)
+        after, far = missed(memory, goal), 100 * np.linalg.norm(space.sides)
+        goals.add(context, goal, -after / far, gain=(before - after) / far)
+        found.append(goal)
+    return np.array(found)
+
+
+@pytest.mark.parametrize("dim", [1, 2, 6])
+def test_where_most_of_t_is_near_what_was_reached_goals_are_the_uniform_ones_bit_for_bit(dim):
+    space = Box.cube(-1, 1, dim)
+    uniform = UniformGoals(NO_CONTEXTS, space, stream(0, "goals"))
+    found = drawn(remembering(scattered(dim)), space, landed=lambda goal: goal)
+    assert np.array_equal(found, [uniform.sample(NO_CONTEXT) for _ in found])
+
+
+@pytest.mark.parametrize(("dim", "near"), [(1, 1.5), (2, 1.5), (6, 2.5)])
+def test_where_t_is_a_hundred_times_too_wide_goals_stay_near_what_was_reached(dim, near):
+    space = Box.cube(-100, 100, dim)
+    found = drawn(remembering(scattered(dim)), space, n=1000, landed=lambda goal: goal.clip(-1, 1))
+    assert np.abs(found).max() <= 5  # at first three times as wide as what was reached
+    assert np.abs(found[-300:]).max() <= near
+    assert (np.abs(found[-300:]) > 0.9).any(axis=0).all()
+
+
+def test_the_step_beyond_grows_as_long_as_it_leads_nearer_to_goals_than_anything_before():
+    space = Box.cube(-100, 100, 2)
+    found = drawn(remembering(scattered(2)), space, landed=lambda goal: goal)
+    assert np.abs(found[300:]).max() > 3 * np.abs(found[:50]).max()
+
+
+def test_goals_are_uniform_until_anything_has_had_an_effect():
+    space = Box.cube(-100, 100, 2)
+    uniform = UniformGoals(NO_CONTEXTS, space, stream(0, "goals"))
+    found = drawn(remembering(np.zeros((50, 2))), space)
+    assert np.array_equal(found, [uniform.sample(NO_CONTEXT) for _ in found])
+
+
+def test_a_dimension_that_nothing_has_moved_yet_does_not_keep_the_others_from_being_aimed_at():
+    outcomes = scattered(2) * [1, 0]
+    found = drawn(remembering(outcomes), Box.cube(-100, 100, 2), landed=lambda goal: goal.clip(-1, 1) * [1, 0])
+    assert np.abs(found[200:]).max() <= 1.5
+
+
+def test_a_rare_outcome_far_away_is_not_chased():
+    outcomes = scattered(2, 21)
+    outcomes[7] = 90.0
+    found = drawn(remembering(outcomes), Box.cube(-100, 100, 2), landed=lambda goal: goal.clip(-1, 1))
+    assert np.abs(found).max() <= 4
+
+
+def test_a_context_changes_nothing_but_what_is_checked():
+    contexts, space = Box.cube(0, 1, 1), Box.cube(-100, 100, 2)
+    with_contexts = drawn(remembering(scattered(2), 1), space, contexts=contexts)
+    assert np.array_equal(with_contexts, drawn(remembering(scattered(2)), space))
+    goals = WithinReach(contexts, space, stream(0, "goals"), reached=remembering(scattered(2), 1))
+    with pytest.raises(ValueError, match="context"):
+        goals.sample([2.0])
+
+
+def test_outcomes_outside_t_lead_to_goals_at_its_border():
+    found = drawn(remembering(scattered(2) + np.array([10, 0])), Box.cube(-1, 1, 2), n=20)
+    assert np.abs(found).max() <= 1
+
+
+def wide(make, times: float, unit: float = 1.0) -> Toy:
+    """A toy whose T is so many times too wide, in another unit."""
+    toy = make()
+    middle, sides = (toy.outcomes.low + toy.outcomes.high) / 2, times * toy.outcomes.sides
+    space = Box(unit * (middle - sides / 2), unit * (middle + sides / 2))
+    return Toy(
+        toy.contexts,
+        toy.policies,
+        space,
+        lambda context, theta: unit * toy.effect(context, theta),
+        toy.still,
+        unit * toy.outcome_noise,
+    )
+
+
+def lived(robot: Toy, movements: int = 150):
+    learner = practice(robot, 1)
+    goals = [episode.move.goal for episode in run(learner, robot, 1, movements=movements)]
+    return np.array(goals), learner.memory.outcomes
+
+
+@pytest.mark.parametrize("make", [toss, two_elbows])
+def test_goals_of_practice_come_near_what_it_reaches_whatever_the_size_of_t(make):
+    goals, outcomes = lived(wide(make, 100))
+    reached = np.ptp(outcomes, axis=0)
+    assert (np.ptp(goals[-50:], axis=0) < 3 * reached).all()
+    assert (np.ptp(goals[-50:], axis=0) > 0.5 * reached).all()
+
+
+def test_in_a_unit_a_thousand_times_smaller_goals_are_a_thousand_times_as_large():
+    outcomes, space = scattered(3), Box.cube(-50, 50, 3)
+    metres = drawn(remembering(outcomes), space)
+    millimetres = drawn(remembering(1000 * outcomes), Box.cube(-50_000, 50_000, 3))
+    np.testing.assert_allclose(millimetres, 1000 * metres, rtol=1e-9)
