@@ -143,7 +143,7 @@ def model_page(folder: Path) -> Page:
 def gymnasium_page(folder: Path) -> Page:
     """The page results/GYMNASIUM.md: each way to explore, answered in each way."""
     results = Results.of(folder, ["swimmer"])
-    answers = {answer: results.by(answer) for answer in ("nearest", "linear", "model", "process")}
+    answers = {answer: results.by(answer) for answer in ("nearest", "linear", "model-alone", "process")}
     cells = [
         [
             *(f"`{name.removesuffix('-swimmer')}`", f"`{answer}`", str(len(found.at(name, ON_ARMS[-1])))),

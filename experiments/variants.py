@@ -40,7 +40,7 @@ STEPS: Final[tuple[tuple[str, Variant, Variant], ...]] = (
 LETTER: Final[Variant] = {option: value for _, was, _ in reversed(STEPS) for option, value in was.items()}
 INVERSE: Final[Variant] = {"inverse": "paper"}  # all that the letter changes in a learner without goals
 PROVED: Final = ("own", "nearest", "linear", "process")  # the answers of experiments on learning from few movements
-EVERY: Final = (*PROVED, "model")  # on the swimmer
+EVERY: Final = (*PROVED, "model-alone")  # on the swimmer
 LARGE: Final[Variant] = {"environment.task_space": 100.0}
 BASELINE: Final[Variant] = {"goals": "uniform", "inverse": "nearest", "search": "perturb"}  # the field's standard one
 SCHOOL: Final = ("map-elites", "isoline", "cma-me", "cma-mae")  # quality diversity
@@ -50,9 +50,9 @@ FEW, MANY, HALF, CORNER, SHUFFLED, TEN, HAND = MADE = tuple(
 )
 # Ways to refine a movement for a goal, and to answer in evaluations. Each line is a variant on the rod and, with a
 # longer name, on every arm.
-MODEL: Final[Variant] = {**SGIM_D, "inverse": "model"}
+MODEL: Final[Variant] = {**SGIM_D, "inverse": "model-alone"}
 GRADIENT: Final[Variant] = {**MODEL, "search": "gradient"}
-ALONE: Final[Variant] = {**SAGG_RIAC, "inverse": "model"}
+ALONE: Final[Variant] = {**SAGG_RIAC, "inverse": "model-alone"}
 REFINING: Final[dict[str, Variant]] = {
     "sgim-d": SGIM_D,
     "sagg-riac": SAGG_RIAC,
@@ -65,7 +65,7 @@ REFINING: Final[dict[str, Variant]] = {
     "sagg-riac-gradient": {**ALONE, "search": "gradient"},
     "sagg-riac-gauss-newton": {**ALONE, "search": "gauss-newton"},
     "imitation": {"algorithm": "imitation"},
-    "imitation-model": {"algorithm": "imitation", "inverse": "model"},
+    "imitation-model": {"algorithm": "imitation", "inverse": "model-alone"},
     "gradient-linear": {**GRADIENT, "inverse": "linear"},
     "model-unanchored": {**MODEL, "trust.anchors": False},
     "gradient-unanchored": {**GRADIENT, "trust.anchors": False},
@@ -109,7 +109,7 @@ LEARNING: Final[dict[str, Variant]] = {
         "cma-mae-taught": {"algorithm": "cma-mae-taught"},
         "cma-mae-taught-once": {"algorithm": "cma-mae-taught", "imitations": 1, **ONCE},
         "map-elites-taught": {"algorithm": "map-elites-taught"},
-        "imitation": {"algorithm": "imitation", "inverse": "model-proved"},
+        "imitation": {"algorithm": "imitation", "inverse": "model"},
     }.items()
 }
 # Ten lessons, as a person gives them in a session: all of them early, in a short life.
@@ -118,7 +118,9 @@ SHOWN: Final[dict[str, Variant]] = {"goals": {**SGIM_D, "teacher": "initial"}, "
 # Movements of an arm take no time, so training may take more.
 ON_ARMS: Final[Variant] = {"movements": 2000, "evaluate_at": (250, 500, 1000)}  # and at the end
 LONGER: Final[Variant] = {"model.rate": 2.0}
-BY_MODEL: Final = frozenset({"model", "gradient", "gauss-newton"})  # words of what learns a forward model
+BY_MODEL: Final = frozenset(
+    {"model", "model-alone", "gradient", "gauss-newton"}
+)  # words of what learns a forward model
 
 
 # Learners that ask. All are answered by ``process``, too, the answer of those that practise.
@@ -160,7 +162,7 @@ TEACHERS: Final[dict[str, Variant]] = {
     "one-corner": {"demonstrations": CORNER},
     "shuffled": {"demonstrations": SHUFFLED},
 }
-PROVED_MODEL: Final[Variant] = {"inverse": "model-proved"}  # it answers where `process` expects no more error of it
+PROVED_MODEL: Final[Variant] = {"inverse": "model"}  # it answers once it predicts better than `process`
 UNTAUGHT: Final[dict[str, Variant]] = {
     "random": {"algorithm": "random"},
     "uniform": {**SAGG_RIAC, **BASELINE},
@@ -277,7 +279,7 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
     "forward-model": REFINING,
     **{arm: _on_arm(arm) for arm in ARMS},
     "swimmer": {
-        **{f"{name}-swimmer": {"algorithm": name, "inverse": "model", **SWIMMER} for name in SWIMMERS},
+        **{f"{name}-swimmer": {"algorithm": name, "inverse": "model-alone", **SWIMMER} for name in SWIMMERS},
         "practice-swimmer": {"algorithm": "practice", "inverse": "process", **SWIMMER},
     },
     "by-hand": {
