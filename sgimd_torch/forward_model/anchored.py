@@ -106,7 +106,7 @@ class Anchored:
         return torch.tensor(values, dtype=torch.float32, device=self.model.input_mean.device)
 
     def predict(self, theta: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """Where ``theta`` ``(n, theta_dim)`` should land, ``(n, outcome_dim)``, and the spread ``(n,)`` about it, squared:
+        """Where ``theta`` ``(n, theta_dim)`` should land, ``(n, outcome_dim)``, and the variance ``(n,)`` about it:
         noise, disagreement of the members, and doubt weighted with ``caution``."""
         means, variances = self.model.landing(self.context, theta)
         landing = means.mean(dim=0)

@@ -233,7 +233,7 @@ class ForwardModel(Ensemble):
         write_bytes(path, save(state, {"model": json.dumps({**self.sizes, **self.shape})}))
 
     def _scale(self, inputs: Array, outcomes: Array) -> None:
-        """Measure inputs and outcomes in their standard deviations, and let the weights predict what they did before."""
+        """Measure inputs and outcomes in their standard deviations; predictions stay what they were."""
         n = len(inputs)
         (mean, scale), (new_mean, new_scale) = (self.input_mean, self.input_scale), self._spread(inputs)
         first, last = self.weights[0].data, self.weights[-1].data
