@@ -44,18 +44,17 @@ def goals():
 
 def test_where_outcomes_are_noisy_it_lands_nearer_than_what_it_starts_from(goals):
     arm = PlanarArm(7, noise=0.1)
-    memory, model = executed(arm, stream(0, "thetas").random((1500, 7))), ForwardModel(0, 7, 2, rate=0.7)
+    memory, model = executed(arm, stream(0, "thetas").random((1500, 7))), ForwardModel(0, 7, 2)
     model.refresh(memory)
 
     def mean_error(estimates):
-        noise = stream(2, "evaluation")
-        landed = [[arm.execute(NO_CONTEXT, estimate.theta, noise) for estimate in estimates] for _ in range(5)]
-        return np.linalg.norm(np.array(landed) - goals, axis=2).mean()
+        landed = [ARM.execute(NO_CONTEXT, estimate.theta, stream(2, "any")) for estimate in estimates]  # but for noise
+        return np.linalg.norm(np.array(landed) - goals, axis=1).mean()
 
     trust = Trust(share=1.0, error=0.3)  # what the model cannot predict is noise here
     inverse, start = ModelInverse(memory, model, arm.policies, trust=trust), LocallyLinear(memory)
     found = mean_error(inverse.many(NO_CONTEXT, goals))
-    assert found < 0.85 * mean_error([start(NO_CONTEXT, goal) for goal in goals])
+    assert found < 0.8 * mean_error([start(NO_CONTEXT, goal) for goal in goals])
 
 
 def test_without_steps_it_picks_among_what_is_known(taught, goals, monkeypatch):
@@ -88,9 +87,9 @@ def test_the_greater_the_caution_the_nearer_it_stays_to_what_was_tried(taught, g
         thetas = [estimate.theta for estimate in inverse.many(NO_CONTEXT, goals)]
         return np.mean([np.linalg.norm(memory.thetas - theta, axis=1).min() for theta in thetas])
 
-    careless, rational, timid = map(distance, (0.0, 1.0, 1000.0))
-    assert timid < 0.8 * rational
-    assert rational < 0.5 * careless
+    careless, default, timid = map(distance, (0.0, 10.0, 1000.0))
+    assert timid < 0.8 * default
+    assert default < 0.5 * careless
 
 
 def test_all_goals_together_find_what_each_finds_alone(taught, goals):
