@@ -67,7 +67,7 @@ SWIMMER_ANSWERS = {
     "nearest": "the nearest neighbour",
     "linear": "LocallyLinear",
     "process": "LocalProcess",
-    "model": "the forward model",
+    "model-alone": "the forward model",
 }
 MOVING = (("random", "sagg-riac"), ("imitation", "sgim-d"))  # the paper's learners that execute movements
 REACH = 1.5  # m; the float hardly ever lands farther from the base
@@ -248,7 +248,7 @@ def swimmer(data: Data) -> Figure:
     axes = figure.subplots(1, len(SWIMMER_ANSWERS), sharey=True)
     for ax, (answer, title) in zip(axes, SWIMMER_ANSWERS.items(), strict=True):
         answered = replace(data, results=data.results.by(answer))
-        explored = [*SWIMMERS, *(["practice"] if answer != "model" else [])]
+        explored = [*SWIMMERS, *(["practice"] if answer != "model-alone" else [])]
         seed_curves(ax, [answered.curves(f"{name}-swimmer", name, label(name)) for name in explored])
         ax.set_title(f"answered by {title}", fontsize=11)
         ax.label_outer()
