@@ -200,7 +200,7 @@ class ForwardModel(Ensemble):
         self._online.prepare()  # first the weights move to where they are trained, then the exemplars
         inputs, outcomes = np.hstack([memory.contexts, memory.thetas]), memory.outcomes
         predicted = self.predict(memory.contexts[seen:], memory.thetas[seen:]) if seen else None
-        if n >= 2 * int(self.n_scaled):
+        if n > 2 * int(self.n_scaled):
             self._scale(inputs, outcomes)
         x = (self._tensor(inputs) - self.input_mean) / self.input_scale
         y = (self._tensor(outcomes) - self.outcome_mean) / self.outcome_scale
@@ -233,7 +233,8 @@ class ForwardModel(Ensemble):
         write_bytes(path, save(state, {"model": json.dumps({**self.sizes, **self.shape})}))
 
     def _scale(self, inputs: Array, outcomes: Array) -> None:
-        """Measure inputs and outcomes in their standard deviations; predictions stay what they were."""
+        """Measure inputs and outcomes in their standard deviations; what is predicted stays what it was, but
+        for its noise, which keeps its share of the spread."""
         n = len(inputs)
         (mean, scale), (new_mean, new_scale) = (self.input_mean, self.input_scale), self._spread(inputs)
         first, last = self.weights[0].data, self.weights[-1].data
@@ -246,7 +247,6 @@ class ForwardModel(Ensemble):
             ratio, dim = scale / new_scale, len(mean)
             last[..., :dim] *= ratio
             self.biases[-1].data[..., :dim] = self.biases[-1].data[..., :dim] * ratio + (mean - new_mean) / new_scale
-            self.biases[-1].data[..., dim:] += 2 * ratio.log()
         self.outcome_mean.copy_(new_mean), self.outcome_scale.copy_(new_scale)
         self.n_scaled.fill_(n)
 

@@ -222,7 +222,7 @@ def test_a_refresh_that_is_interrupted_has_changed_nothing(monkeypatch):
                 model.refresh(remembered(200))
         assert torch.equal(weights(model), before)
         assert model.relative_error == error
-        assert model.refresh(remembered(200)).steps == 60 - 30 * (model is whole)
+        assert model.refresh(remembered(200)).steps == 200 - 100 * (model is whole)
     assert ForwardModel(0, 3, 2).relative_error == np.inf
 
 
@@ -323,3 +323,23 @@ def test_without_its_packages_it_says_what_to_install():
     program = "import sys; sys.modules['lightning'] = None\nimport sgimd_torch.forward_model.model"
     run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
     assert "ImportError: the forward model needs torch: pip install 'sgimd-torch[forward]'" in run.stderr
+
+
+def test_other_scales_leave_what_is_predicted_as_it_is():
+    model, more = taught(remembered(100)), remembered(300)
+    before = model.predict(NO_CONTEXT, more.thetas)
+    model._scale(0.1 + 3 * more.thetas, 7 - 2 * more.outcomes)
+    after = model.predict(NO_CONTEXT, more.thetas)
+    np.testing.assert_allclose(after.mean, before.mean, atol=1e-5)
+
+
+def test_it_learns_well_where_the_first_movements_all_had_the_same_effect():
+    memory, late = Memory(0, 3, 2), remembered(600)
+    for theta in late.thetas[:50]:
+        memory.add(NO_CONTEXT, theta, np.zeros(2))  # an object that was not touched
+    model = ForwardModel(0, 3, 2)
+    for theta, outcome in zip(late.thetas, late.outcomes, strict=True):
+        model.refresh(memory)
+        memory.add(NO_CONTEXT, theta, 1000 * outcome)  # far more than the unit
+    missed = np.linalg.norm(model.predict(NO_CONTEXT, late.thetas[300:]).mean - 1000 * late.outcomes[300:], axis=1)
+    assert missed.mean() < 0.4 * 1000 * np.linalg.norm(late.outcomes.std(axis=0))
