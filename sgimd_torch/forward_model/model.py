@@ -172,7 +172,8 @@ class ForwardModel(Ensemble):
         return Prediction(means.mean(axis=0), means.std(axis=0), np.sqrt(variances.mean(axis=0)))
 
     def refresh(self, memory: Memory, goal: Array | None = None) -> Refresh | None:
-        """Learn from the new exemplars in ``memory``, and again from old ones; None if fewer than ``every`` are new.
+        """Learn from the new exemplars in ``memory``, and again from old ones; None if fewer than ``every`` are new, or
+        all that is known had the same outcome.
 
         Args:
             memory: of the learner; only read.
@@ -190,6 +191,8 @@ class ForwardModel(Ensemble):
         if n < seen:
             raise ValueError(f"the model was trained on {seen} exemplars, the memory has {n}; is it another run's?")
         if n < _FEWEST_EXEMPLARS or n - seen < self.every:
+            return None
+        if not seen and not np.ptp(memory.outcomes, axis=0).any():  # no movement has had an effect yet
             return None
         near = None
         if goal is not None and self._online.focus:
