@@ -333,13 +333,11 @@ def test_other_scales_leave_what_is_predicted_as_it_is():
     np.testing.assert_allclose(after.mean, before.mean, atol=1e-5)
 
 
-def test_it_learns_well_where_the_first_movements_all_had_the_same_effect():
-    memory, late = Memory(0, 3, 2), remembered(600)
-    for theta in late.thetas[:50]:
+def test_nothing_is_learnt_before_anything_has_had_an_effect():
+    memory, model = Memory(0, 3, 2), ForwardModel(0, 3, 2)
+    for theta in remembered(80).thetas:
         memory.add(NO_CONTEXT, theta, np.zeros(2))  # an object that was not touched
-    model = ForwardModel(0, 3, 2)
-    for theta, outcome in zip(late.thetas, late.outcomes, strict=True):
-        model.refresh(memory)
-        memory.add(NO_CONTEXT, theta, 1000 * outcome)  # far more than the unit
-    missed = np.linalg.norm(model.predict(NO_CONTEXT, late.thetas[300:]).mean - 1000 * late.outcomes[300:], axis=1)
-    assert missed.mean() < 0.4 * 1000 * np.linalg.norm(late.outcomes.std(axis=0))
+    assert model.refresh(memory) is None
+    assert not model.trained
+    memory.add(NO_CONTEXT, np.full(3, 0.5), np.ones(2))
+    assert model.refresh(memory).first == 0
