@@ -202,7 +202,7 @@ def record(tmp_path):
 
 def test_a_divergence_is_told_and_recorded(record, capsys):
     model, memory = ForwardModel(0, 7, 2, rate=1.0), Memory(0, 7, 2)
-    listener = ModelListener(record, model, 1.0, memory, Seconds({}))
+    listener = ModelListener(record, model, 1.0, None, memory, Seconds({}))
     for episode in remember(memory, 150):
         if episode.index == 99:
             model.lr, model._online.optimizer = 1e30, None
@@ -217,7 +217,7 @@ def test_a_divergence_is_told_and_recorded(record, capsys):
 
 def test_the_curves_are_those_of_the_newest_refresh(record):
     model, memory = ForwardModel(0, 7, 2, rate=1.0), Memory(0, 7, 2)
-    listener = ModelListener(record, model, 1.0, memory, Seconds({}))
+    listener = ModelListener(record, model, 1.0, None, memory, Seconds({}))
     episodes = list(remember(Memory(0, 7, 2), 100))
     for episode in episodes:
         memory.add(NO_CONTEXT, episode.move.theta, episode.outcome)
