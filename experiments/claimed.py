@@ -187,22 +187,22 @@ def model(found: Evidence) -> list[Claim]:
     """What learners with a forward model have to show, answered by that model, beside SGIM-D, answered by `process`."""
 
     def of(name: str) -> list[Claim]:
-        ours, plain = f"{name} by model", "sgim-d"
+        ours, plain = f"{name} by model-alone", "sgim-d"
         return [
             Claim(f"`{name}` needs fewer movements: SGIM-D's last error in ≤ 3000",
                   [at_most(3000, found.time_to_reach, ours, plain, form=".0f")]),
             Claim("... errs less: < 0 at 1000, 2000, 5000", less(found, ours, plain, 1000, 2000, LAST)),
             Claim("... less than the noise floor of SGIM-D at 5000", [at_most(1.0, found.over_floor, ours, plain)]),
             Claim("... half as much on an arm of 50 joints at 2000: ratio ≤ 0.50",
-                  times_as_much(found, 0.5, f"{name}-arm-50 by model", "sgim-d-arm-50", 2000)),
+                  times_as_much(found, 0.5, f"{name}-arm-50 by model-alone", "sgim-d-arm-50", 2000)),
         ]  # fmt: skip
 
-    harmless = times_as_much(found, 1.03, "imitation.rod by model-proved", "imitation.rod", *WHOLE)
+    harmless = times_as_much(found, 1.03, "imitation.rod by model", "imitation.rod", *WHOLE)
     return [
         *of("model"),
         *of("gradient"),
         Claim(
-            "`model-proved` does Imitation no harm: ≤ 1.03 times `process` on the same memory, 250 to 5000", harmless
+            "`--inverse model` does Imitation no harm: ≤ 1.03 times `process` on the same memory, 250 to 5000", harmless
         ),
     ]
 

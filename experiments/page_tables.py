@@ -189,7 +189,7 @@ class Tables:
         ends = {"": (1000, LAST), **{f"-{arm.removeprefix('planar-')}": (2000,) for arm in ARMS}}
         rows = []
         for name, line in REFINING.items():
-            by = " by model" if line.get("inverse") == "model" else ""
+            by = " by model-alone" if line.get("inverse") == "model-alone" else ""
             found = [self.errors(f"{name}{ending}{by}", times, ".4f") for ending, times in ends.items()]
             rows.append([f"`{name}`", *chain(*found), *self.errors(name, (LAST,), ".4f")])
         head = ("learner", "rod, 1000", "rod, 5000", "arm of 7, 2000", "arm of 50, 2000", "rod, 5000, by `process`")
@@ -214,7 +214,7 @@ class Tables:
                 return "–"
             first, second = (
                 (name if name in EXPERIMENTS["settings"] else f"{name.partition('@')[0]}@as-it-is")
-                + " by model-proved" * ("-model@" in name)
+                + " by model" * ("-model@" in name)
                 for name in names
             )
             try:
@@ -235,7 +235,7 @@ class Tables:
         """Each learner on the swimmer, by `process`, and by its forward model at the end."""
         rows = []
         for name in EXPERIMENTS["swimmer"]:
-            model = self.cell(self.found.error, f"{name} by model", 2000) if "practice" not in name else "–"
+            model = self.cell(self.found.error, f"{name} by model-alone", 2000) if "practice" not in name else "–"
             rows.append([f"`{name.removesuffix('-swimmer')}`", *self.errors(name, TIMES, between=True), model])
         return markdown(("explored by", *map(str, TIMES), "2000, by `model`"), _run(rows))
 

@@ -44,9 +44,9 @@ ALIKE: Final = ("process",)
 ANSWERS: Final[dict[str, tuple[str, ...]]] = {
     **dict.fromkeys(("letter", "letter-teachers", "large-space"), (*ALIKE, "paper")),
     "ladder": (*ALIKE, "linear"),
-    **dict.fromkeys(("forward-model", "planar-arm-7", "planar-arm-50", "swimmer"), (*ALIKE, "model")),
-    "settings": (*ALIKE, "model-proved"),
-    "learning": (*ALIKE, "linear", "nearest", "model-proved"),
+    **dict.fromkeys(("forward-model", "planar-arm-7", "planar-arm-50", "swimmer"), (*ALIKE, "model-alone")),
+    "settings": (*ALIKE, "model"),
+    "learning": (*ALIKE, "linear", "nearest", "model"),
     "suite": (*ALIKE, "linear", "nearest"),
 }
 LARGE: Final[Variant] = {"environment.task_space": 100.0}
@@ -58,9 +58,9 @@ FEW, MANY, HALF, CORNER, SHUFFLED, TEN, HAND = MADE = tuple(
 )
 # Ways to refine a movement for a goal, and to answer in evaluations. Each line is a variant on the rod and, with a
 # longer name, on every arm.
-MODEL: Final[Variant] = {**SGIM_D, "inverse": "model"}
+MODEL: Final[Variant] = {**SGIM_D, "inverse": "model-alone"}
 GRADIENT: Final[Variant] = {**MODEL, "search": "gradient"}
-ALONE: Final[Variant] = {**SAGG_RIAC, "inverse": "model"}
+ALONE: Final[Variant] = {**SAGG_RIAC, "inverse": "model-alone"}
 REFINING: Final[dict[str, Variant]] = {
     "sgim-d": SGIM_D,
     "sagg-riac": SAGG_RIAC,
@@ -70,7 +70,7 @@ REFINING: Final[dict[str, Variant]] = {
     "sagg-riac-model": ALONE,
     "sagg-riac-gradient": {**ALONE, "search": "gradient"},
     "imitation": {"algorithm": "imitation"},
-    "imitation-model": {"algorithm": "imitation", "inverse": "model"},
+    "imitation-model": {"algorithm": "imitation", "inverse": "model-alone"},
     "model-unanchored": {**MODEL, "trust.anchors": False},
     "gradient-no-residual": {**GRADIENT, "search.residual": False},
     "model-one-noise": {**MODEL, "model.noise_heads": False},
@@ -109,7 +109,7 @@ LEARNING: Final[dict[str, Variant]] = {
         "cma-mae-taught": {"algorithm": "cma-mae-taught"},
         "cma-mae-taught-once": {"algorithm": "cma-mae-taught", "imitations": 1, **ONCE},
         "map-elites-taught": {"algorithm": "map-elites-taught"},
-        "imitation": {"algorithm": "imitation", "inverse": "model-proved"},
+        "imitation": {"algorithm": "imitation", "inverse": "model"},
     }.items()
 }
 # What the gain of practice is made of: the steps from the standard baseline to it that are no learner of LEARNING, and
@@ -132,7 +132,9 @@ SHOWN: Final[dict[str, Variant]] = {"goals": {**SGIM_D, "teacher": "initial"}, "
 # Movements of an arm take no time, so training may take more.
 ON_ARMS: Final[Variant] = {"movements": 2000, "evaluate_at": (250, 500, 1000)}  # and at the end
 LONGER: Final[Variant] = {"model.rate": 2.0}
-BY_MODEL: Final = frozenset({"model", "gradient", "gauss-newton"})  # words of what learns a forward model
+BY_MODEL: Final = frozenset(
+    {"model", "model-alone", "gradient", "gauss-newton"}
+)  # words of what learns a forward model
 
 
 # Learners that ask. All are answered by ``process``, too, the answer of those that practise.
@@ -174,7 +176,7 @@ TEACHERS: Final[dict[str, Variant]] = {
     "one-corner": {"demonstrations": CORNER},
     "shuffled": {"demonstrations": SHUFFLED},
 }
-PROVED_MODEL: Final[Variant] = {"inverse": "model-proved"}  # it answers where `process` expects no more error of it
+PROVED_MODEL: Final[Variant] = {"inverse": "model"}  # it answers once it predicts as well as `process`
 UNTAUGHT: Final[dict[str, Variant]] = {
     "random": {"algorithm": "random"},
     "uniform": {**SAGG_RIAC, **BASELINE},
@@ -297,7 +299,7 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
     "forward-model": REFINING,
     **{arm: _on_arm(arm) for arm in ARMS},
     "swimmer": {
-        **{f"{name}-swimmer": {"algorithm": name, "inverse": "model", **SWIMMER} for name in SWIMMERS},
+        **{f"{name}-swimmer": {"algorithm": name, "inverse": "model-alone", **SWIMMER} for name in SWIMMERS},
         "practice-swimmer": {"algorithm": "practice", "inverse": "process", **SWIMMER},
     },
     "by-hand": {

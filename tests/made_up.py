@@ -56,9 +56,9 @@ ERRORS = {  # name, as `Evidence` has it: its error (m) at 5000
     "uniform-nearest-taught.rod": 0.06,
     **{f"{name}.{task}": error for name, error in ON_TASKS.items() for task in TASKS if task != "rod"},
     # With a forward model.
-    "imitation.rod by model-proved": 0.3,
-    **{f"{name} by model": 0.03 for name in ("model", "gradient")},
-    **{f"{name}-arm-50 by model": 0.01 for name in ("model", "gradient")},
+    "imitation.rod by model": 0.3,
+    **{f"{name} by model-alone": 0.03 for name in ("model", "gradient")},
+    **{f"{name}-arm-50 by model-alone": 0.01 for name in ("model", "gradient")},
     "sgim-d-arm-50": 0.03,
     # Learners that ask.
     **dict.fromkeys(EXPERIMENTS["asking"], 0.03),

@@ -81,7 +81,7 @@ def test_the_defaults_are_those_that_results_were_made_with():
     assert Config(algorithm="practice-taught").values == {**left, **PRACTICE}
     learnt = Config(algorithm="sgim-d", parts={"search": "gradient"})
     model = {name.removeprefix("model."): value for name, value in learnt.values.items() if name.startswith("model.")}
-    assert {"members": 3, "noise_heads": True, "rate": 0.3, "focus": 0.0, "every": 50}.items() <= model.items()
+    assert {"members": 3, "noise_heads": True, "rate": 1.0, "focus": 0.0, "every": 50}.items() <= model.items()
     assert learnt["trust.anchors"] is learnt["search.residual"] is True
 
 

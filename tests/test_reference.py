@@ -23,7 +23,7 @@ VARIANTS = {
     "practice": {"algorithm": "practice", **ARM},
     "sagg-riac": {"algorithm": "sagg-riac", **ARM},
     "imitation": {"algorithm": "imitation"},
-    "model": {"algorithm": "sgim-d", **ARM, "inverse": "model", "search": "gradient"},
+    "model": {"algorithm": "sgim-d", **ARM, "inverse": "model-alone", "search": "gradient"},
     "sgim-acts": {"algorithm": "sgim-acts", "teachers": ("low-half", "high-half"), "base": "search", **ARM},
     "by-hand": {"algorithm": "sgim-d", "teacher": "by-hand"},
     "random": {"algorithm": "random"},

@@ -105,8 +105,8 @@ def goal_babbling(
         inverse: (memory) -> the inverse model, where searches begin and by which the learner answers; it is given
             ``outcome_noise`` if it has such a keyword. Deviation: the paper infers by eq. (9) alone, which is
             `LocalInverse`; the answers of `LocalProcess` have to prove themselves.
-        search: (policies, rng) -> the refinement of its estimate; it is given the ``width`` of the explorer, if it has
-            such a keyword and the explorer has one.
+        search: (policies, rng) -> the refinement of its estimate; it is given the ``inverse`` if it has such a keyword,
+            and the ``width`` of the explorer if both have one.
         explore: (policies, memory, inverse, rng) -> how the global regime draws movements; None: uniformly from Pi.
         judge: (memory, measure) -> the competence that the goal model is told.
         measure: J; None for eq. (7), relative to the distance from rest.
@@ -134,7 +134,7 @@ def goal_babbling(
         memory,
         goals(environment.contexts, environment.outcomes, stream(seed, "goals")),
         made,
-        search(environment.policies, stream(seed, "search")),
+        given(search, inverse=made)(environment.policies, stream(seed, "search")),
         Competence(memory, measure),
         judge(memory, measure),
         stream(seed, "regime"),

@@ -209,12 +209,13 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
             "inverses.among_effects:AmongEffects", "process, from movements with an effect where most have none"
         ),
         "model": _at(
-            "inverses.through_model:ModelInverse",
-            "linear when learning, through a forward model in evaluations (extra forward)",
+            "inverses.proved:ProvedModel",
+            "through a forward model once that has predicted movements better than process, which answers before "
+            "(extra forward)",
         ),
-        "model-proved": _at(
-            "inverses.proved:ProvedInverse",
-            "process when learning; in evaluations the forward model's answer where the process expects no more error",
+        "model-alone": _at(
+            "inverses.through_model:ModelInverse",
+            "linear when learning, through a forward model in evaluations, proved or not (extra forward)",
         ),
     },
     "judge": {
@@ -258,7 +259,7 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
 # Parts that several others share: made once for a run, and only if something takes a parameter of this name.
 SHARED: Final = {
     "model": _at("forward_model.model:ForwardModel", "the forward model (extra forward)", hidden=("seed",)),
-    "trust": _at("forward_model.anchored:Trust", "how far to trust the forward model", hidden=("noise",)),
+    "trust": _at("forward_model.anchored:Trust", "how far to trust the forward model"),
 }
 # What a thing of your own must have: how it is called, and the members of what it returns.
 _WANTED: Final[dict[str, tuple[str, tuple[str, ...]]]] = {

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -70,8 +70,8 @@ class ForwardModel(Ensemble):
             a quarter is drawn from the newest ``every`` exemplars.
         accelerator: Lightning's name of where to train: "cpu", the fastest for these sizes, "auto" or "cuda".
 
-    The first refresh fixes the scales. If its exemplars are variations of one movement, all later ones lie far outside
-    and are learnt badly; ``relative_error`` shows it.
+    Who wants to test it on exemplars that it has not learnt from is in ``before_learning``: called with the memory, and
+    with how many of its exemplars were learnt from.
 
     Raises:
         ValueError: a number out of its range.
@@ -82,6 +82,7 @@ class ForwardModel(Ensemble):
     outcome_mean: torch.Tensor  # (outcome_dim,)
     outcome_scale: torch.Tensor
     n_seen: torch.Tensor  # exemplars trained on
+    n_scaled: torch.Tensor  # exemplars that the scales were taken from
     missed: torch.Tensor  # see ``relative_error``
 
     def __init__(
@@ -94,7 +95,7 @@ class ForwardModel(Ensemble):
         members: int = 3,
         hidden: Sequence[int] = (64, 64),
         every: int = 50,
-        rate: float = 0.3,
+        rate: float = 1.0,
         focus: float = 0.0,
         noise_heads: bool = True,
         accelerator: str = "cpu",
@@ -116,11 +117,13 @@ class ForwardModel(Ensemble):
         self.sizes = sizes
         self.shape = dict(zip(("members", "hidden", "noise_heads"), shape, strict=True))
         self.every, self.rate = every, rate
+        self.before_learning: list[Callable[[Memory, int], object]] = []
         self._online = OnlineTrainer(self, generator, every, focus, accelerator)
         for name, dim in {"input": context_dim + theta_dim, "outcome": outcome_dim}.items():
             self.register_buffer(f"{name}_mean", torch.zeros(dim))
             self.register_buffer(f"{name}_scale", torch.ones(dim))
         self.register_buffer("n_seen", torch.zeros((), dtype=torch.int64))
+        self.register_buffer("n_scaled", torch.zeros((), dtype=torch.int64))
         self.register_buffer("missed", torch.zeros(()))
 
     @property
@@ -169,7 +172,8 @@ class ForwardModel(Ensemble):
         return Prediction(means.mean(axis=0), means.std(axis=0), np.sqrt(variances.mean(axis=0)))
 
     def refresh(self, memory: Memory, goal: Array | None = None) -> Refresh | None:
-        """Learn from the new exemplars in ``memory``, and again from old ones; None if fewer than ``every`` are new.
+        """Learn from the new exemplars in ``memory``, and again from old ones; None if fewer than ``every`` are new, or
+        all that is known had the same outcome.
 
         Args:
             memory: of the learner; only read.
@@ -188,17 +192,19 @@ class ForwardModel(Ensemble):
             raise ValueError(f"the model was trained on {seen} exemplars, the memory has {n}; is it another run's?")
         if n < _FEWEST_EXEMPLARS or n - seen < self.every:
             return None
+        if not seen and not np.ptp(memory.outcomes, axis=0).any():  # no movement has had an effect yet
+            return None
         near = None
         if goal is not None and self._online.focus:
             near = torch.as_tensor(memory.near_outcomes(memory.contexts[-1], goal, _NEAR_A_GOAL))
+        if seen:
+            for test in self.before_learning:
+                test(memory, seen)
         self._online.prepare()  # first the weights move to where they are trained, then the exemplars
         inputs, outcomes = np.hstack([memory.contexts, memory.thetas]), memory.outcomes
-        if not seen:  # only once: with other scales the weights would mean something else
-            for name, values in {"input": inputs, "outcome": outcomes}.items():
-                spread = values.std(axis=0)
-                getattr(self, f"{name}_mean").copy_(self._tensor(values.mean(axis=0)))
-                getattr(self, f"{name}_scale").copy_(self._tensor(np.where(spread > 1e-9, spread, 1.0)))
         predicted = self.predict(memory.contexts[seen:], memory.thetas[seen:]) if seen else None
+        if n > 2 * int(self.n_scaled):
+            self._scale(inputs, outcomes)
         x = (self._tensor(inputs) - self.input_mean) / self.input_scale
         y = (self._tensor(outcomes) - self.outcome_mean) / self.outcome_scale
         fit = self._online.fit(
@@ -228,6 +234,28 @@ class ForwardModel(Ensemble):
         """
         state = {name: values.cpu().contiguous() for name, values in self.state_dict().items()}
         write_bytes(path, save(state, {"model": json.dumps({**self.sizes, **self.shape})}))
+
+    def _scale(self, inputs: Array, outcomes: Array) -> None:
+        """Measure inputs and outcomes in their standard deviations; what is predicted stays what it was, but
+        for its noise, which keeps its share of the spread."""
+        n = len(inputs)
+        (mean, scale), (new_mean, new_scale) = (self.input_mean, self.input_scale), self._spread(inputs)
+        first, last = self.weights[0].data, self.weights[-1].data
+        if int(self.n_scaled):
+            self.biases[0].data += (((new_mean - mean) / scale) @ first)[:, None]
+            first *= (new_scale / scale)[:, None]
+        self.input_mean.copy_(new_mean), self.input_scale.copy_(new_scale)
+        (mean, scale), (new_mean, new_scale) = (self.outcome_mean, self.outcome_scale), self._spread(outcomes)
+        if int(self.n_scaled):
+            ratio, dim = scale / new_scale, len(mean)
+            last[..., :dim] *= ratio
+            self.biases[-1].data[..., :dim] = self.biases[-1].data[..., :dim] * ratio + (mean - new_mean) / new_scale
+        self.outcome_mean.copy_(new_mean), self.outcome_scale.copy_(new_scale)
+        self.n_scaled.fill_(n)
+
+    def _spread(self, values: Array) -> tuple[torch.Tensor, torch.Tensor]:
+        spread = values.std(axis=0)
+        return self._tensor(values.mean(axis=0)), self._tensor(np.where(spread > 0, spread, 1.0))
 
     def _tensor(self, values: Array) -> torch.Tensor:
         return torch.tensor(values, dtype=torch.float32, device=self.input_mean.device)

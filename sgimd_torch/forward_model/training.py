@@ -116,7 +116,7 @@ class OnlineTrainer:
         with torch.no_grad():
             mean, log_variance = self.ensemble(x)
             length = scale * torch.stack([mean.mean(dim=0) - y, y.mean(dim=0) - y])
-            error = torch.div(*length.norm(dim=-1).mean(dim=-1).clamp(min=1e-9))
+            error = torch.div(*length.norm(dim=-1).mean(dim=-1).clamp(min=torch.finfo().tiny))
             return float(nll(mean, log_variance, y).mean()), float(error)
 
     def __getstate__(self) -> dict[str, Any]:

@@ -22,7 +22,7 @@ class LocalInverse:
         k_max: the most exemplars in a neighbourhood K_h.
         dist_n: the paper's distN, radius of a neighbourhood in policy space. None: 0.6 in 25 dimensions, otherwise
             proportional to the square root of their number, like distances in a unit cube.
-        alpha: metres of distance to the goal that one metre of spread counts for.
+        alpha: how much distance to the goal a spread of 1 counts for.
         width: of the Gaussian of eq. (9), in mean distances between the neighbourhood's outcomes and the goal. A wide
             one averages the neighbourhood, a narrow one follows the exemplar nearest to the goal.
 
@@ -90,10 +90,10 @@ class NearestNeighbour:
 def gaussian_weights(goal: Array, outcomes: Array, width: float) -> Array:
     """beta of eq. (9): ``(k,)`` with sum 1, a Gaussian of the distances between ``outcomes`` and ``goal``.
 
-    The paper does not give its width: here it is ``width`` mean distances, and at least a millimetre.
+    The paper does not give its width: here it is ``width`` mean distances.
     """
     distances = _distances(outcomes, goal)
-    scaled = distances / max(1e-3, width * distances.mean())
+    scaled = distances / max(np.finfo(float).tiny, width * distances.mean())
     weights = np.exp(0.5 * (scaled.min() ** 2 - scaled**2))  # the nearest has 1, so the sum cannot be 0
     return weights / weights.sum()
 
@@ -106,7 +106,7 @@ def _near_goal(memory: Memory, context: Array, goal: Array, k: int) -> Rows:
 
 
 def _spreads(outcomes: Array, neighbourhoods: list[Rows]) -> Array:
-    """``(h,)`` metres: the standard deviation of the outcomes within each neighbourhood.
+    """``(h,)`` the standard deviation of the outcomes within each neighbourhood.
 
     Deviation: the paper takes the variance, which is neither a distance nor large enough to matter beside one. A
     movement without neighbours has no deviation, but is not certain: it gets the median of the others. If none has

@@ -14,7 +14,7 @@ from sgimd_torch.spaces import Array, Estimate
 
 # More exemplars in a neighbourhood, and a wider Gaussian, than `LocalInverse` averages: a slope needs them.
 _K_MAX, _WIDTH = 20, 1.0
-_COINCIDENT = 1e-12  # m: outcomes that spread less count as one outcome, which has no slope
+_COINCIDENT = 1e-12  # outcomes that spread less, relative to their size, count as one outcome, which has no slope
 
 
 class LocallyLinear:
@@ -52,7 +52,7 @@ class LocallyLinear:
         deviations = outcomes - mean_outcome
         covariance = (weights * deviations.T) @ deviations
         variance = covariance.trace()
-        if variance < _COINCIDENT**2:
+        if variance <= (_COINCIDENT * np.abs(outcomes).max()) ** 2:
             return estimate
         cross = (weights * deviations.T) @ (thetas - mean_theta)
         slope = np.linalg.solve(covariance + self.ridge * variance * np.eye(len(goal)), cross)

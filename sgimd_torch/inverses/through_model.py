@@ -78,6 +78,20 @@ class ModelInverse:
             found += self._descended(context, goals[some], estimates[some])
         return found
 
+    def predict(self, contexts: Array, thetas: Array) -> Array:
+        """``(n, outcome_dim)`` what movements should lead to, judging by the model and by those most like each.
+
+        Args:
+            contexts: ``(n, context_dim)``.
+            thetas: ``(n, theta_dim)``.
+
+        Raises:
+            RuntimeError: the memory is empty, or the model is not trained.
+        """
+        anchored = self._anchored(contexts, thetas)
+        with torch.no_grad():
+            return anchored.predict(anchored.tensor(thetas))[0].cpu().double().numpy()
+
     def _descended(self, context: Array, goals: Array, estimates: list[Estimate]) -> list[Estimate]:
         memory = self.memory
         starts = [
@@ -86,16 +100,20 @@ class ModelInverse:
         ]
         n_each = min(map(len, starts))
         candidates = self.policies.clip(np.vstack([thetas[:n_each] for thetas in starts]))
-        rows = [memory.near_policies(context, theta, _ANCHORS) for theta in candidates]
-        near = np.stack([row[: min(map(len, rows))] for row in rows])
-        anchored = Anchored(
-            self.model, context, memory.contexts[near], memory.thetas[near], memory.outcomes[near], self.trust
-        )
+        anchored = self._anchored(np.broadcast_to(context, (len(candidates), len(context))), candidates)
         aims = anchored.tensor(goals.repeat(n_each, axis=0))
-        theta = anchored.descend(anchored.tensor(candidates), aims, self.policies, steps=_STEPS, step=_STEP)
+        theta = anchored.descend(anchored.tensor(candidates), aims, steps=_STEPS, step=_STEP)
         with torch.no_grad():
             best = anchored.expected(theta, aims).reshape(len(goals), n_each).argmin(dim=1)
         chosen = theta.reshape(len(goals), n_each, -1)[torch.arange(len(goals)), best].cpu().double().numpy()
         return [
             estimate._replace(theta=self.policies.clip(row)) for estimate, row in zip(estimates, chosen, strict=True)
         ]
+
+    def _anchored(self, contexts: Array, thetas: Array) -> Anchored:
+        """Predictions for ``(n, theta_dim)`` in ``(n, context_dim)``, each with anchors of its own."""
+        memory = self.memory
+        rows = [memory.near_policies(*each, _ANCHORS) for each in zip(contexts, thetas, strict=True)]
+        near = np.stack([row[: min(map(len, rows))] for row in rows])
+        there = memory.contexts[near], memory.thetas[near], memory.outcomes[near]
+        return Anchored(self.model, self.policies, contexts, *there, self.trust)

@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     from sgimd_torch.teachers import Teacher
     from sgimd_torch.teachers.answering import Demonstrator
 
-LEAST_NOISE: Final = 0.01  # m; predictions are not better than this, even if outcomes have no noise
-
 
 @dataclass(frozen=True, eq=False)
 class RunParts:
@@ -192,7 +190,7 @@ class _Maker:
     @cached_property
     def trust(self) -> Any:
         """How far the run trusts its model."""
-        return self._with_options(self.parts["trust"])(noise=max(self._task.environment.outcome_noise, LEAST_NOISE))
+        return self._with_options(self.parts["trust"])()
 
     def _with_options(self, part: Part) -> Callable[..., Any]:
         values = part.set_by(self._config.values)

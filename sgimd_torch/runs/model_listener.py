@@ -1,7 +1,7 @@
 """The forward model of a run: it is trained, its predictions are recorded, and a message says when it is not asked.
 
 A replay makes its tables again, so a resumed run has them as if it had never stopped.
-    model = ModelListener(record, parts.model, trust, memory, seconds); model.episode(episode, replayed=False)
+    model = ModelListener(record, parts.model, trust, inverse, memory, seconds); model.episode(episode, replayed=False)
 """
 
 from __future__ import annotations
@@ -33,13 +33,16 @@ class ModelListener(Listener):
         record: of the run.
         model: of the run.
         trust: relative error above which the model is not asked.
+        inverse: of the run; if it knows whether the model can be ``trusted``, it decides whether the model is asked.
         memory: of the learner.
         seconds: of the run; those spent here are counted since movement 0, because a replay spends them again.
     """
 
-    def __init__(self, record: Record, model: ForwardModel, trust: float, memory: Memory, seconds: Seconds) -> None:
+    def __init__(
+        self, record: Record, model: ForwardModel, trust: float, inverse: object, memory: Memory, seconds: Seconds
+    ) -> None:
         self._model, self._trust, self._memory, self._seconds = model, trust, memory, seconds
-        self._record = record
+        self._record, self._inverse = record, inverse
         self._asked = False
         self._lately: deque[tuple[Array, Array, str]] = deque(maxlen=LATELY)
         self._news: list[str] = []
@@ -102,11 +105,12 @@ class ModelListener(Listener):
         return improved(np.stack(goals), np.stack(outcomes), np.array(origins))
 
     def _say_whether_asked(self, movements: int, error: float) -> None:
-        asked = error <= self._trust
-        if asked != self._asked:
+        asked = getattr(self._inverse, "trusted", error <= self._trust)
+        changed, self._asked = asked != self._asked, asked
+        if changed:
             who = "the forward model is asked from here on" if asked else NOT_ASKED
             self._news.append(f"movement {movements}: {who}: {self._how_wrong(error)}")
-        self._asked = asked
 
     def _how_wrong(self, error: float) -> str:
-        return f"its relative error is {error:.3f}, it is trusted up to {self._trust:g}"
+        proof = "" if self._asked or error > self._trust else ", once it predicts movements better than a local process"
+        return f"its relative error is {error:.3f}, it is trusted up to {self._trust:g}{proof}"

@@ -237,7 +237,7 @@ def listeners_of(parts: RunParts, record: Record, seconds: Seconds) -> list[List
     if parts.model is not None and parts.trust is not None:
         from sgimd_torch.runs.model_listener import ModelListener
 
-        model = ModelListener(record, parts.model, parts.trust.error, parts.learner.memory, seconds)
+        model = ModelListener(record, parts.model, parts.trust.error, parts.inverse, parts.learner.memory, seconds)
         found.append(model)
         curves = model.new_curves
     if parts.config.board:

@@ -19,8 +19,8 @@ from sgimd_torch.forward_model.model import ForwardModel
 from sgimd_torch.searches.simplex import nelder_mead
 from sgimd_torch.spaces import Array, Box, Estimate, Search
 
-Propose = Callable[[Anchored, torch.Tensor, torch.Tensor, Box, float], torch.Tensor]
-"""(anchored, starts ``(n, theta_dim)``, goal ``(1, outcome_dim)``, policies, radius) -> proposals within the radius of
+Propose = Callable[[Anchored, torch.Tensor, torch.Tensor, float], torch.Tensor]
+"""(anchored, starts ``(n, theta_dim)``, goal ``(1, outcome_dim)``, radius) -> proposals within the radius of
 their starts, see ``Anchored.descend``; the one that should be best is taken."""
 
 _CANDIDATES: Final = 5  # remembered movements to start from
@@ -32,40 +32,41 @@ def descend(
     anchored: Anchored,
     starts: torch.Tensor,
     goal: torch.Tensor,
-    policies: Box,
     radius: float,
     *,
     steps: int = 5,
     step: float = 0.03,
 ) -> torch.Tensor:
     """Descent of the gradient of the expected squared distance, noise included."""
-    return anchored.descend(starts, goal, policies, steps=steps, step=step, radius=radius)
+    return anchored.descend(starts, goal, steps=steps, step=step, radius=radius)
 
 
 def gauss_newton(
     anchored: Anchored,
     starts: torch.Tensor,
     goal: torch.Tensor,
-    policies: Box,
     radius: float,
     *,
     steps: int = 3,
     damping: float = 1e-3,
 ) -> torch.Tensor:
-    """Repeatedly the smallest change that meets the goal to first order; ``damping`` is in m^2 for a side squared.
+    """Repeatedly the smallest change that meets the goal to first order.
 
-    It only uses the predicted landing point, not its spread.
+    It only uses the predicted landing point, not its spread. ``damping`` is relative to the mean square of what a side
+    of Pi changes.
     """
-    low, high, sides = (anchored.tensor(values) for values in (policies.low, policies.high, policies.sides))
-    theta = starts
+    theta, n = starts, goal.shape[-1]
     for _ in range(steps):
         theta = theta.detach().requires_grad_(True)
         landing, _ = anchored.predict(theta)
         rows = [torch.autograd.grad(part.sum(), theta, retain_graph=True)[0] for part in landing.unbind(dim=1)]
-        jacobian = torch.stack(rows, dim=1) * sides  # (n, outcome_dim, theta_dim)
-        damped = jacobian @ jacobian.mT + damping * torch.eye(landing.shape[1], device=theta.device)
+        jacobian = torch.stack(rows, dim=1) * anchored.sides  # (n, outcome_dim, theta_dim)
+        squares = jacobian @ jacobian.mT
+        sizes = squares.diagonal(dim1=1, dim2=2).mean(dim=1) + torch.finfo().tiny
+        damped = squares + damping * sizes[:, None, None] * torch.eye(n, device=theta.device)
         change = jacobian.mT @ torch.linalg.solve(damped, (goal - landing.detach())[..., None])
-        theta = anchored.within(starts, theta.detach() + sides * change[..., 0], sides, radius).clamp(low, high)
+        theta = anchored.within(starts, theta.detach() + anchored.sides * change[..., 0], anchored.sides, radius)
+        theta = theta.clamp(anchored.low, anchored.high)
     return theta.detach()
 
 
@@ -78,6 +79,7 @@ def gradient_search(
     noise: float = 0.05,
     residual: bool = True,
     trust: Trust = TRUST,
+    inverse: object = None,
 ) -> Search:
     """Every movement is planned through the model, from theta_g and the movements that landed nearest; it never ends.
 
@@ -93,6 +95,7 @@ def gradient_search(
         noise: as in ``nelder_mead``: without it the memory soon holds too few different movements.
         residual: False leaves the outcomes of this search out of the anchors, for comparison.
         trust: how far to trust the model.
+        inverse: of the learner; if it knows whether the model can be ``trusted``, as `ProvedModel` does, it decides.
 
     Raises:
         ValueError: ``noise`` out of its range, or a model of other dimensions.
@@ -103,7 +106,7 @@ def gradient_search(
     simplex = nelder_mead(policies, rng)
 
     def search(start: Estimate, goal: Array) -> Generator[Array, Array, None]:
-        if not model.relative_error <= trust.error:
+        if not getattr(inverse, "trusted", model.relative_error <= trust.error):
             yield from simplex(start, goal)
             return
         radius = _RADIUS
@@ -111,9 +114,9 @@ def gradient_search(
         first = policies.check("theta of the estimate", start.theta)[None]
         while True:
             nearest = np.linalg.norm(outcomes - goal, axis=1).argsort(kind="stable")[:_CANDIDATES]
-            anchored = _anchored(model, start.context, thetas[:n_anchors], outcomes[:n_anchors], trust)
+            anchored = _anchored(model, policies, start.context, thetas[:n_anchors], outcomes[:n_anchors], trust)
             starts = anchored.tensor(np.vstack([first, thetas[nearest]]))
-            theta = _best(anchored, propose, starts, goal, policies, radius)
+            theta = _best(anchored, propose, starts, goal, radius)
             theta = policies.clip(rng.normal(theta, noise * policies.sides)) if noise else policies.clip(theta)
             with torch.no_grad():
                 predicted = anchored.predict(anchored.tensor(theta[None]))[0][0].cpu().double().numpy()
@@ -129,10 +132,12 @@ def gradient_search(
     return search
 
 
-def _anchored(model: ForwardModel, context: Array, thetas: Array, outcomes: Array, trust: Trust) -> Anchored:
+def _anchored(
+    model: ForwardModel, policies: Box, context: Array, thetas: Array, outcomes: Array, trust: Trust
+) -> Anchored:
     """Predictions with the same anchors for all candidates, as if all were from this ``context``."""
     contexts = np.broadcast_to(context, (1, len(thetas), len(context)))
-    return Anchored(model, context, contexts, thetas[None], outcomes[None], trust)
+    return Anchored(model, policies, context, contexts, thetas[None], outcomes[None], trust)
 
 
 def _best(
@@ -140,10 +145,9 @@ def _best(
     propose: Propose,
     starts: torch.Tensor,
     goal: Array,
-    policies: Box,
     radius: float,
 ) -> Array:
     aim = anchored.tensor(goal[None])
-    proposals = propose(anchored, starts, aim, policies, radius)
+    proposals = propose(anchored, starts, aim, radius)
     with torch.no_grad():
         return proposals[anchored.expected(proposals, aim).argmin()].cpu().double().numpy()

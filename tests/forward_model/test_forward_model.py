@@ -222,7 +222,7 @@ def test_a_refresh_that_is_interrupted_has_changed_nothing(monkeypatch):
                 model.refresh(remembered(200))
         assert torch.equal(weights(model), before)
         assert model.relative_error == error
-        assert model.refresh(remembered(200)).steps == 60 - 30 * (model is whole)
+        assert model.refresh(remembered(200)).steps == 200 - 100 * (model is whole)
     assert ForwardModel(0, 3, 2).relative_error == np.inf
 
 
@@ -323,3 +323,21 @@ def test_without_its_packages_it_says_what_to_install():
     program = "import sys; sys.modules['lightning'] = None\nimport sgimd_torch.forward_model.model"
     run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
     assert "ImportError: the forward model needs torch: pip install 'sgimd-torch[forward]'" in run.stderr
+
+
+def test_other_scales_leave_what_is_predicted_as_it_is():
+    model, more = taught(remembered(100)), remembered(300)
+    before = model.predict(NO_CONTEXT, more.thetas)
+    model._scale(0.1 + 3 * more.thetas, 7 - 2 * more.outcomes)
+    after = model.predict(NO_CONTEXT, more.thetas)
+    np.testing.assert_allclose(after.mean, before.mean, atol=1e-5)
+
+
+def test_nothing_is_learnt_before_anything_has_had_an_effect():
+    memory, model = Memory(0, 3, 2), ForwardModel(0, 3, 2)
+    for theta in remembered(80).thetas:
+        memory.add(NO_CONTEXT, theta, np.zeros(2))  # an object that was not touched
+    assert model.refresh(memory) is None
+    assert not model.trained
+    memory.add(NO_CONTEXT, np.full(3, 0.5), np.ones(2))
+    assert model.refresh(memory).first == 0

@@ -53,10 +53,15 @@ def test_theta_is_the_gaussian_weighted_mean_of_the_neighbourhood() -> None:
     assert theta[0] == pytest.approx(0.1 / (1 + np.e**4))
 
 
-def test_the_width_of_the_gaussian_has_a_floor_of_a_millimetre() -> None:
-    memory = line({0.0: 0.0, 0.1: 1e-3})
-    theta = LocalInverse(memory, width=1e-6)(NO_CONTEXT, np.zeros(1)).theta
-    assert theta[0] == pytest.approx(0.1 / (1 + np.exp(0.5)))  # a millimetre off weighs exp(-1/2)
+@pytest.mark.parametrize("unit", [1.0, 1e-3, 1e-9])
+def test_the_gaussian_is_as_wide_in_any_unit(unit: float) -> None:
+    memory = line({0.0: 0.0, 0.1: unit})
+    theta = LocalInverse(memory, width=2.0)(NO_CONTEXT, np.zeros(1)).theta  # wide as what lies farther is far
+    assert theta[0] == pytest.approx(0.1 / (1 + np.exp(0.5)))
+
+
+def test_outcomes_that_all_lie_on_the_goal_weigh_the_same() -> None:
+    assert LocalInverse(line({0.0: 0.0, 0.1: 0.0}))(NO_CONTEXT, np.zeros(1)).theta[0] == pytest.approx(0.05)
     copies = line({0.0: 0.5, 0.1: 0.5})
     assert LocalInverse(copies)(NO_CONTEXT, np.array([0.5])).theta[0] == pytest.approx(0.05)
 

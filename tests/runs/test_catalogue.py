@@ -243,7 +243,7 @@ def test_dashes_and_underscores_mean_the_same():
         ("--algorithm random --budget 5", "--budget: algorithm random has .* sagg-riac, practice, .* have it"),
         ("--algorithm random --goals.window 5", "--goals.window: algorithm random .* sagg-riac, .* have it"),
         ("--algorithm random --teacher.every 5", "--teacher.every: algorithm random .* sgim-d.* have it"),
-        ("--model.members 5", "--model.members: .*search gradient, gauss-newton and inverse model, model-proved"),
+        ("--model.members 5", "--model.members: .*search gradient, gauss-newton and inverse model, model-alone"),
         ("--search nelder-mead-exact --search.noise 0.1", "search nelder-mead-exact has no such option; .*nelder-mead"),
         ("--algorithm map-elites --epsilon 0.1", "--epsilon: algorithm map-elites .* map-elites-taught"),
         ("--sead 3", "did you mean seed"),

@@ -16,7 +16,7 @@ from sgimd_torch.evaluation import Benchmark, save_benchmark
 from sgimd_torch.forward_model.model import ForwardModel
 from sgimd_torch.memory import Memory
 from sgimd_torch.record import Record
-from sgimd_torch.runs.build import LEAST_NOISE, build
+from sgimd_torch.runs.build import build
 from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.directory import FILE
@@ -27,7 +27,7 @@ from sgimd_torch.runs.read import read_run
 from sgimd_torch.spaces import Episode, Move, stream
 
 MOVEMENTS = 170
-MODEL = ("--inverse", "model", "--search", "gradient", "--model.rate", 2)
+MODEL = ("--inverse", "model-alone", "--search", "gradient", "--model.rate", 2)
 TAGS = {tag for tag in LEGEND if tag.startswith("model/")}
 NO_CONTEXT = np.empty(0)
 
@@ -201,7 +201,7 @@ def record(tmp_path):
 
 def test_a_divergence_is_told_and_recorded(record, capsys):
     model, memory = ForwardModel(0, 7, 2, rate=1.0), Memory(0, 7, 2)
-    listener = ModelListener(record, model, 1.0, memory, Seconds({}))
+    listener = ModelListener(record, model, 1.0, None, memory, Seconds({}))
     for episode in remember(memory, 150):
         if episode.index == 99:
             model.lr, model._online.optimizer = 1e30, None
@@ -216,7 +216,7 @@ def test_a_divergence_is_told_and_recorded(record, capsys):
 
 def test_the_curves_are_those_of_the_newest_refresh(record):
     model, memory = ForwardModel(0, 7, 2, rate=1.0), Memory(0, 7, 2)
-    listener = ModelListener(record, model, 1.0, memory, Seconds({}))
+    listener = ModelListener(record, model, 1.0, None, memory, Seconds({}))
     episodes = list(remember(Memory(0, 7, 2), 100))
     for episode in episodes:
         memory.add(NO_CONTEXT, episode.move.theta, episode.outcome)
@@ -240,13 +240,12 @@ def test_the_curves_are_those_of_the_newest_refresh(record):
 
 @pytest.mark.parametrize("search", ["gradient", "gauss-newton"])
 def test_a_search_through_the_model_makes_one_of_the_size_of_its_robot(search):
-    environments = {"planar-arm-50": (50, LEAST_NOISE), "fishing-rod": (25, None)}
+    environments = {"planar-arm-50": 50, "fishing-rod": 25}
     networks = {"model.members": 2, "model.rate": 1.5, "model.noise_heads": False}
-    for environment, (theta_dim, noise) in environments.items():
+    for environment, theta_dim in environments.items():
         parts = build(Config(parts={"search": search, "environment": environment, **networks}))
         assert parts.model.sizes == {"context_dim": 0, "theta_dim": theta_dim, "outcome_dim": 2}
         assert (parts.model.members, parts.model.rate, parts.model.noise_heads) == (2, 1.5, False)
-        assert parts.trust.noise == (parts.environment.outcome_noise if noise is None else noise)
         assert parts.trust.anchors
     assert build(Config(parts={"search": "nelder-mead"})).model is None
 

@@ -19,7 +19,7 @@ from sgimd_torch.spaces import Box, stream
 
 NO_CONTEXT = np.zeros(0)
 ARM = PlanarArm(7)
-EXACT = Trust(noise=0.001)  # as this arm is
+EXACT = Trust(share=0.0)  # as this arm is
 FINE = partial(descend, steps=20, step=0.005)
 UNTRAINED = ForwardModel(0, 7, 2)
 
@@ -106,7 +106,7 @@ def test_the_outcomes_of_the_search_correct_the_models_error_here(memory, biased
         far = [np.linalg.norm(memory.outcomes - goal, axis=1).argmax()]
         return inverse(context, goal)._replace(thetas=memory.thetas[far], outcomes=memory.outcomes[far])
 
-    trust = Trust(noise=0.001, anchors=anchors)
+    trust = Trust(share=0.0, anchors=anchors)
     search = partial(gradient_search, model=biased, propose=FINE, noise=0.0, residual=residual, trust=trust)
     found = nearest(search, estimate, goals[:4], n=8)
     if residual and anchors:
@@ -128,11 +128,11 @@ def test_neighbours_of_the_estimate_already_correct_the_first_movement(memory, b
 def test_no_proposal_leaves_the_trust_region_of_its_start_or_the_box(model, inverse, goals, propose):
     lengths = []
 
-    def watched(anchored, starts, goal, policies, radius):
-        proposals = propose(anchored, starts, goal, policies, radius)
-        change = (proposals - starts).double().numpy() / policies.sides
+    def watched(anchored, starts, goal, radius):
+        proposals = propose(anchored, starts, goal, radius)
+        change = (proposals - starts).double().numpy() / ARM.policies.sides
         lengths.append(np.sqrt((change**2).mean(axis=1)) / radius)
-        assert policies.contains(proposals.numpy()).all()
+        assert ARM.policies.contains(proposals.numpy()).all()
         return proposals
 
     search = gradient_search(ARM.policies, stream(0, "search"), model=model, propose=watched, noise=0.0)
@@ -145,10 +145,10 @@ def radii(model, estimate, goal, outcome, n=5):
     """Those of ``n`` movements in a world where each lands as ``outcome`` (predicted, nearest so far) says."""
     seen, asked = [], []
 
-    def watched(anchored, starts, goal, policies, radius):
+    def watched(anchored, starts, goal, radius):
         seen.append(radius)
         asked[:] = [anchored]
-        return descend(anchored, starts, goal, policies, radius)
+        return descend(anchored, starts, goal, radius)
 
     search = gradient_search(ARM.policies, stream(0, "search"), model=model, propose=watched, noise=0.0)
     attempt, outcomes = search(estimate, goal), [*estimate.outcomes]
@@ -175,9 +175,9 @@ def test_the_trust_region_grows_where_the_prediction_is_right_and_shrinks_where_
 def test_it_starts_from_the_estimate_and_then_from_what_has_landed_nearest(model, memory, goals):
     estimate, goal, seen = NearestNeighbour(memory, k=6)(NO_CONTEXT, goals[0]), goals[0], []
 
-    def watched(anchored, starts, goal, policies, radius):
+    def watched(anchored, starts, goal, radius):
         seen.append(starts.numpy())
-        return descend(anchored, starts, goal, policies, radius)
+        return descend(anchored, starts, goal, radius)
 
     search = gradient_search(ARM.policies, stream(0, "search"), model=model, propose=watched)
     attempt = search(estimate, goal)
@@ -265,9 +265,10 @@ def test_contexts_reach_the_model():
 
 def test_gauss_newton_takes_the_least_change_that_meets_the_goal_to_first_order(model, memory):
     policies = Box(np.full(7, -5.0), 5.0 * np.arange(1, 8))  # sides of many lengths, and far borders
-    near = Anchored(model, NO_CONTEXT, np.zeros((1, 5, 0)), memory.thetas[None, :5], memory.outcomes[None, :5], EXACT)
+    five = memory.thetas[None, :5], memory.outcomes[None, :5]
+    near = Anchored(model, policies, NO_CONTEXT, np.zeros((1, 5, 0)), *five, EXACT)
     starts, goal = near.tensor(memory.thetas[10:14]), near.tensor([[0.2, 0.3]])
-    found = gauss_newton(near, starts, goal, policies, 10.0, steps=1, damping=1e-7)
+    found = gauss_newton(near, starts, goal, 10.0, steps=1, damping=1e-7)
     for start, proposal in zip(starts, found, strict=True):
         jacobian = torch.autograd.functional.jacobian(lambda theta: near.predict(theta[None])[0][0], start)
         missing = goal[0] - near.predict(start[None])[0][0].detach()
