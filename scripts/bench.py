@@ -5,6 +5,8 @@ Times are processor time; other programs still lengthen it, as they empty the ca
 
   movement  ms a movement that a learner takes on a planar arm of 25 joints, without the arm's own time, and a checksum
             of all outcomes, which says whether both learnt the same
+  practice  what learning costs `practice`: over the rod's physics in a life of 2000 movements, and ms a movement on a
+            planar arm of 50 joints, in the first fifth of the life and after it
   resume    a run on the fishing rod, and its replay once it has ended
   life      a long run on a planar arm of 7 joints: time, the largest memory of the process, and the size of its folder
 
@@ -35,6 +37,7 @@ from tqdm import tqdm
 HERE = Path(__file__).resolve().parents[1]
 LEARNERS = ("random", "sagg-riac", "sgim-d", "practice")
 JOINTS = 25
+ROBOTS = ("rod", "arm")
 Figures = dict[str, float]
 
 
@@ -71,6 +74,24 @@ def life_of(name: str, movements: int) -> Figures:
         checksum = zlib.crc32(np.asarray(episode.outcome).tobytes(), checksum)
     seconds = time.process_time() - begun - clock.seconds
     return {f"{name} (ms a movement)": 1000 * seconds / movements, f"{name}, checksum": checksum}
+
+
+def practised(robot: str, movements: int) -> Figures:
+    """What learning costs `practice` on the rod, over the physics; on an arm of 50 joints, ms a movement."""
+    from sgimd_torch import FishingRod, PlanarArm, practice, run
+
+    environment = FishingRod() if robot == "rod" else PlanarArm(50)
+    learner = practice(environment, 0)
+    vars(environment)["execute"] = clock = Clock(environment.execute)
+    found, last, before, begun = Figures(), 0, 0.0, time.process_time()
+    for episode in run(learner, environment, 0, movements=movements):
+        made, seconds = episode.index + 1, time.process_time() - begun - clock.seconds
+        if made == movements and robot == "rod":
+            found["practice on the rod, learning over physics"] = seconds / clock.seconds
+        if made in (movements // 5, movements) and robot == "arm":
+            found[f"practice on 50 joints, to {made} (ms)"] = 1000 * (seconds - before) / (made - last)
+            last, before = made, seconds
+    return found
 
 
 def measured(library: Path, name: str, movements: int) -> Figures:
@@ -133,10 +154,11 @@ def show(name: str, several: Sequence[Sequence[float]]) -> None:
 
 PARTS: dict[str, list[Callable[[Path, int], Figures]]] = {
     "movement": [partial(lambda name, *of: measured(of[0], name, of[1]), name) for name in LEARNERS],
+    "practice": [partial(lambda name, *of: measured(of[0], name, of[1]), name) for name in ROBOTS],
     "resume": [resume],
     "life": [long_life],
 }
-MOVEMENTS = {"movement": 2000, "resume": 5000, "life": 100_000}
+MOVEMENTS = {"movement": 2000, "practice": 2000, "resume": 5000, "life": 100_000}
 
 
 def main() -> int:
@@ -146,10 +168,11 @@ def main() -> int:
     parser.add_argument("--only", nargs="+", choices=PARTS, default=list(PARTS), metavar="PART", help=", ".join(PARTS))
     parser.add_argument("--rounds", type=PositiveInt, default=3, help="measurements of each figure (3)")
     parser.add_argument("--movements", type=PositiveInt, help=f"of each life ({MOVEMENTS})")
-    parser.add_argument("--child", choices=LEARNERS, help=argparse.SUPPRESS)
+    parser.add_argument("--child", choices=(*LEARNERS, *ROBOTS), help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.child:
-        print(json.dumps(life_of(options.child, options.movements)))
+        live = practised if options.child in ROBOTS else life_of
+        print(json.dumps(live(options.child, options.movements)))
         return 0
     if options.against is not None and not (options.against / "sgimd_torch").is_dir():
         parser.error(f"--against must be a folder with sgimd_torch in it, got {options.against}")

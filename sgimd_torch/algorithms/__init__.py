@@ -101,7 +101,7 @@ def goal_babbling(
         seed: of all streams of this learner.
         memory: of the learner.
         goals: (contexts, outcomes, rng) -> the goal model; it is given what was ``reached``, if it has such a keyword:
-            the ``effects`` that the inverse knows, or else ``memory``.
+            by ``effects`` of the inverse, or else ``memory``.
         inverse: (memory) -> the inverse model, where searches begin and by which the learner answers; it is given
             ``outcome_noise`` if it has such a keyword. Deviation: the paper infers by eq. (9) alone, which is
             `LocalInverse`; the answers of `LocalProcess` have to prove themselves.

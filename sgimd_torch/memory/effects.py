@@ -42,9 +42,9 @@ class Effects:
 
     @property
     def outcomes(self) -> Array:
-        """``(n, outcome_dim)`` of the exemplars with an effect, or of all while there is no plateau."""
-        acted = self()
-        return self.memory.outcomes if acted is None else acted.outcomes
+        """``(n, outcome_dim)`` by which reach can be told: all, but none where there is a plateau, since a few effects
+        say little of what others could be had. Goals drawn near them were tried on `puck` and `fetch`: twice the error."""
+        return self.memory.outcomes if self() is None else self.memory.outcomes[:0]
 
     def __call__(self) -> Memory | None:
         """Copies of the exemplars with an effect, perhaps none; another object when the plateau has changed. None while
