@@ -339,7 +339,10 @@ def checked(kind: str, word: str, make: Callable[..., Any]) -> Callable[..., Any
             raise ValueError(f"{kind} {word} cannot be called as {wanted}: {error}") from error
         except ValueError:  # a builtin may not name its parameters
             pass
-        part = make(*arguments, **options)
+        try:
+            part = make(*arguments, **options)
+        except SystemExit as end:  # it must not end the command, which would look like success
+            raise ValueError(f"{kind} {word} cannot be made: it calls exit({end})") from end
         robot = getattr(part, "environment", part) if kind == "environment" else part  # of a Task
         missing = [name for name in members if not hasattr(robot, name)]
         if missing:
@@ -369,12 +372,12 @@ def load(place: str, what: str = "") -> Any:
         sys.path.append(here)
     try:
         found: Any = importlib.import_module(module)
-    except Exception as error:  # whatever that module does when it is imported
+    except (Exception, SystemExit) as error:  # whatever that module does when it is imported
         if isinstance(error, ImportError) and module.startswith(_IN_THE_PACKAGE):
             raise ValueError(str(error)) from error  # it names the extra that is missing
+        where = f"; is it installed, or in {here}?" if isinstance(error, ImportError) else ""
         raise ValueError(
-            f"{what}: the module {module} cannot be imported: {type(error).__name__}: {error}; "
-            f"is it installed, or in {here}?"
+            f"{what}: the module {module} cannot be imported: {type(error).__name__}: {error}{where}"
         ) from error
     for name in attribute.split("."):
         if not hasattr(found, name):

@@ -55,7 +55,7 @@ class _RaisedError(Exception):
 def _movements(environment: Environment, n: int) -> Movements:
     box = environment.policies
     thetas = [*(box.sample(stream(k, "theta")) for k in range(n)), box.low.copy(), box.high.copy()]
-    return [(environment.observe(stream(k, "observe")), theta) for k, theta in enumerate(thetas)]
+    return [(_call(environment, "observe", stream(k, "observe")), theta) for k, theta in enumerate(thetas)]
 
 
 def _spaces(environment: Environment, _: Movements) -> Iterator[str]:
@@ -195,7 +195,7 @@ def _refusals(environment: Environment, tried: Movements) -> Iterator[str]:
                 if name in str(error) or "one movement" in str(error):
                     continue
                 found = found.format("refused") + f" without naming it ({error})"
-            except Exception as error:
+            except (Exception, SystemExit) as error:
                 found = found.format("failed at") + f" with {type(error).__name__}, a ValueError was wanted"
             else:
                 found = found.format("accepted")
@@ -215,14 +215,15 @@ def _invalid(point: Array, box: Box) -> list[Array]:
 def _call(environment: Environment, name: str, *arguments: Any) -> Any:
     try:
         return getattr(environment, name)(*arguments)
-    except Exception as error:  # whatever the user's code does
+    except (Exception, SystemExit) as error:  # whatever the user's code does
         given = f" for theta {_text(arguments[1])}" if name == "execute" else ""
         raise _RaisedError(f"{name}() raised {type(error).__name__}{given}: {error}") from error
 
 
 def _misshapen(what: str, value: Any, *shape: int) -> str | None:
     if not isinstance(value, np.ndarray):
-        return f"{what} must give an array of shape {shape}, got {type(value).__name__}; np.array([x]) makes one"
+        hint = "is its return missing?" if value is None else "np.array([x]) makes one"
+        return f"{what} must give an array of shape {shape}, got {type(value).__name__}; {hint}"
     if value.shape != shape or value.dtype != np.float64:
         hint = "is it called with one movement?" if value.ndim != len(shape) else "was an axis forgotten, or a dtype?"
         return f"{what} must give float64 of shape {shape}, got {value.dtype} {value.shape}; {hint}"

@@ -48,7 +48,9 @@ def command(main: Callable[[Sequence[str]], int], argv: Sequence[str] | None = N
         try:
             code = main(sys.argv[1:] if argv is None else argv)
         except SystemExit as end:
-            code = int(end.code or 0)
+            code = end.code if isinstance(end.code, int) else int(end.code is not None)
+            if code and not isinstance(end.code, int):
+                say(f"error: {end.code}")
         except KeyboardInterrupt as stop:
             code = getattr(stop, "exit_code", 130)
         except Failed as error:

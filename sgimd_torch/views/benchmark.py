@@ -45,15 +45,16 @@ def main(argv: Sequence[str] | None = None) -> int:
     outcomes = np.concatenate([run.outcomes[np.isfinite(run.outcomes).all(axis=1)] for run in runs])
     side = tile_side(outcomes, box, options.tiles)
     goals = tile_goals(outcomes, box, side, stream(options.seed, "benchmark"))
+    tile = box.amount(side, ".4g")
     if not len(goals):
         inside = int(box.contains(outcomes).sum())
         raise ValueError(
-            f"no tile of {side:.4g} was reached twice: {inside} of {len(outcomes)} movements ended in T; longer runs, "
+            f"no tile of {tile} was reached twice: {inside} of {len(outcomes)} movements ended in T; longer runs, "
             "or fewer --tiles?"
         )
     save_benchmark(options.out, Benchmark(name, goals, side))
     n, made = len(goals), f"{len(outcomes)} movements of {len(runs)} run{'s' * (len(runs) > 1)}"
-    print(f"{n} goals, on tiles of {side:.4g} reached by {made}: {options.out}")
+    print(f"{n} goals, on tiles of {tile} reached by {made}: {options.out}")
     if n < options.tiles / 2:
         say(f"{n} goals are few, {options.tiles} were wanted; longer runs give more")
     return 0

@@ -63,13 +63,17 @@ def main(argv: Sequence[str] | None = None) -> int:
         task = task_of(config)
     except (ValueError, OSError):
         raise
-    except Exception as error:  # whatever the user's code does
+    except (Exception, SystemExit) as error:  # whatever the user's code does
         why = f"{type(error).__name__}: {error}"
         raise ValueError(f"environment {options.environment} cannot be made: {why}") from error
-    check_environment(task.environment, movements=options.movements)
-    _check_picture(task)
-    for line in (f"{type(task.environment).__name__} keeps every promise", *_goals(task), *_lessons(task)):
-        print(line)
+    name = type(task.environment).__name__
+    try:
+        check_environment(task.environment, movements=options.movements)
+        _check_picture(task)
+        found = [f"{name} keeps every promise", *_goals(task), *_lessons(task)]
+    except SystemExit as end:  # as in record(); with code 0 it would look like success
+        raise ValueError(f"{name} calls exit({end}); raise an exception where a movement fails") from end
+    print("\n".join(found))
     return 0
 
 

@@ -142,6 +142,8 @@ def _last_common(runs: Sequence[Run]) -> int:
     moments = [set(run.answers["own"]["movements"].tolist()) for run in runs]
     common = set.intersection(*moments) if moments else {0}
     if not common:
+        if not any(moments):
+            raise RunError("no finished run was evaluated; were they made with --evaluate-at '[]'?")
         raise RunError("finished runs were never evaluated after the same number of movements; --at chooses one")
     return int(max(common))
 

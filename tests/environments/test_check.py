@@ -216,6 +216,21 @@ def task():
 def clumsy():
     return PlanarArm(3).nothing
 
+def leaves():
+    raise SystemExit(7)
+
+class Exits(PlanarArm):
+    def execute(self, context, theta, rng):
+        raise SystemExit(0)
+
+class Unseen(PlanarArm):
+    def record(self, context, theta, rng):
+        raise SystemExit(0)
+
+class Forgets(PlanarArm):
+    def execute(self, context, theta, rng):
+        super().execute(context, theta, rng)
+
 class Wide(PlanarArm):
     outcomes = property(lambda self: Box.cube(-100, 100, 2), lambda self, value: None)
 """
@@ -224,6 +239,7 @@ class Wide(PlanarArm):
 @pytest.fixture
 def arms(tmp_path, monkeypatch):
     (tmp_path / "my_arms.py").write_text(MODULE)
+    (tmp_path / "leaves.py").write_text("raise SystemExit('no licence')")
     monkeypatch.chdir(tmp_path)
     yield
     sys.path[:] = [place for place in sys.path if place != str(tmp_path)]
@@ -257,6 +273,11 @@ def test_a_task_space_much_larger_than_random_movements_reach_is_told(arms, caps
         (["rod"], "error: unknown environment 'rod'"),
         (["planar-arm-7", "--movements", "0"], "error: --movements must be a whole number >= 1"),
         (["planar-arm-7", "--movements", "some"], "invalid int value: 'some'"),
+        (["my_arms:leaves"], "error: environment my_arms:leaves cannot be made: it calls exit(7)"),
+        (["my_arms:Exits"], "execute() raised SystemExit for theta"),
+        (["my_arms:Unseen"], "error: Unseen calls exit(0); raise an exception where a movement fails"),
+        (["my_arms:Forgets"], "got NoneType; is its return missing?"),
+        (["leaves:make"], "error: environment leaves:make: the module leaves cannot be imported: SystemExit: no lic"),
         ([], "required: ENVIRONMENT"),
     ],
 )

@@ -115,6 +115,12 @@ def test_runs_without_a_common_evaluation_need_at(copied, tiny, capsys):
     assert "never evaluated after the same number of movements; --at chooses one" in capsys.readouterr().err
 
 
+def test_runs_that_were_never_evaluated_are_said_to_be_so(tmp_path, capsys):
+    assert live(["--algorithm=random", "--movements=5", "--evaluate-at=[]", f"--out={tmp_path}"]) == 0
+    assert table(tmp_path) == 2
+    assert "no finished run was evaluated; were they made with --evaluate-at '[]'?" in capsys.readouterr().err
+
+
 def test_a_run_that_is_too_short_is_named(runs, capsys):
     assert table(runs, "--at", 5000) == 2
     assert "seed-000 was not evaluated after 5000 movements" in capsys.readouterr().err
