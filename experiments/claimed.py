@@ -13,8 +13,8 @@ import numpy as np
 from evidence import LAST, Evidence, Level, shared
 from judging import Claim, Part, at_least, at_most
 from sgimd_torch.views.statistics import LEVEL, Interval
-from sgimd_torch.views.suite import RANDOM, TASKS, UNIFORM
-from variants import EXPERIMENTS, FOUR, HALVES, SUITED
+from sgimd_torch.views.suite import RANDOM, UNIFORM
+from variants import EXPERIMENTS, FOUR, HALVES, SUITE, SUITED
 
 TIMES: Final = (250, 500, 1000, 2000)
 WHOLE: Final = (*TIMES, LAST)
@@ -111,7 +111,7 @@ def learning(found: Evidence) -> list[Claim]:
     """Few movements, on the rod; then on the suite."""
     taught, alone = "practice-taught.rod", "practice.rod"
     rivals = ("cma-mae-taught", "cma-mae-taught-once", "map-elites-taught", "uniform-nearest-taught")
-    tasks = [(task, at) for task in TASKS for at in TIMES]
+    tasks = [(task, at) for task in SUITE for at in TIMES]
     memories = [*EXPERIMENTS["suite"], *(f"{name}.rod" for name in SUITED)]
 
     def on_each_task(theirs: str, bar: float) -> list[Part]:
@@ -121,7 +121,7 @@ def learning(found: Evidence) -> list[Claim]:
         ]
 
     def over_tasks(theirs: str, bar: float, *times: int) -> list[Part]:
-        known = [task for task in TASKS if f"{theirs}.{task}" in memories]
+        known = [task for task in SUITE if f"{theirs}.{task}" in memories]
         names = [[f"{name}.{task}" for task in known] for name in ("practice", theirs)]
         return [at_most(bar, found.over_tasks, *names, at, name=f"{theirs} at {at}") for at in times]
 
@@ -158,7 +158,7 @@ def learning(found: Evidence) -> list[Claim]:
         Claim("... than CMA-MAE and MAP-Elites: mean ratios < 1 at 500, 1000, 2000",
               [part for name in ("cma-mae", "map-elites") for part in over_tasks(name, 1.0, 500, 1000, 2000)]),
         Claim("... and more movements never hurt: at 2000 ≤ at 500",
-              [at_most(1.0, found.growth, f"practice.{task}", 2000, 500, name=task) for task in TASKS]),
+              [at_most(1.0, found.growth, f"practice.{task}", 2000, 500, name=task) for task in SUITE]),
         Claim("`process` answers no worse than the nearest exemplar: ≤ 1.02 times on 48 memories",
               proved("nearest")),
         Claim("... nor than `LocallyLinear`: ≤ 1.02 times", proved("linear")),

@@ -19,9 +19,9 @@ from claimed import TIMES, paper
 from evidence import LAST, Evidence, Measure, NotRun
 from judging import MISSING, Claim, Verdict, judge
 from sgimd_torch.views.statistics import interquartile_mean, show
-from sgimd_torch.views.suite import RANDOM, TASKS, UNIFORM, titled
+from sgimd_torch.views.suite import RANDOM, UNIFORM, titled
 from table import read_table
-from variants import ARMS, EXPERIMENTS, REFINING, ROBOTS, SUITED, TEACHERS, ladder
+from variants import ARMS, EXPERIMENTS, REFINING, ROBOTS, SUITE, SUITED, TEACHERS, ladder
 
 SETTINGS: Final = (*ROBOTS, *TEACHERS)
 DEFAULT: Final = "default"  # setting of a rival
@@ -147,12 +147,12 @@ class Tables:
         learners = [name for name in SUITED if name != RANDOM]
 
         def known(name: str) -> list[str]:
-            return [task for task in TASKS if task == "rod" or f"{name}.{task}" in EXPERIMENTS["suite"]]
+            return [task for task in SUITE if task == "rod" or f"{name}.{task}" in EXPERIMENTS["suite"]]
 
         rows = [
             [titled(task), *(self.cell(self.found.ratio, f"{name}.{task}", f"{RANDOM}.{task}", at, form=".2f")
                              if task in known(name) else "–" for name in learners)]
-            for task in TASKS
+            for task in SUITE
         ]  # fmt: skip
         rows.append(["mean over tasks", *(self._over_tasks(name, known(name), at) for name in learners)])
         return markdown(("task", *learners), _run(rows))
@@ -161,7 +161,7 @@ class Tables:
         """What each step from random movements to practice brings; then learners with the same teacher."""
         rows = [
             [step, *self.errors(f"{name}.rod", (1000, LAST), between=True),
-             self._over_tasks(name, [*TASKS], 1000) if step in GAIN else ""]
+             self._over_tasks(name, [*SUITE], 1000) if step in GAIN else ""]
             for step, name in {**GAIN, **TAUGHT}.items()
         ]  # fmt: skip
         return markdown(("step", "rod, 1000 (m)", "rod, 5000 (m)", "suite, 1000"), _run(rows))

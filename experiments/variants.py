@@ -23,6 +23,10 @@ ARMS: Final = ("planar-arm-7", "planar-arm-50")
 SWIMMERS: Final = ("random", "sagg-riac", "sgim-d")
 SGIM_D: Final[Variant] = {"algorithm": "sgim-d"}
 SAGG_RIAC: Final[Variant] = {"algorithm": "sagg-riac"}
+# The rows are of `practice` as it was before goals within reach became its default.
+PRACTICE: Final[Variant] = {"algorithm": "practice", "goals": "uniform"}
+# The tasks of the suite that have rows.
+SUITE: Final = {task: suited for task, suited in TASKS.items() if task not in ("puck", "fetch")}
 # From the paper to our defaults, one change at a time: what each step is called, what it was and what it becomes. The
 # paper gives no number for the budget and for g_max: 60 movements are more than come between two demonstrations.
 STEPS: Final[tuple[tuple[str, Variant, Variant], ...]] = (
@@ -86,14 +90,14 @@ SWIMMER: Final[Variant] = {
 # What a learner of the suite has to beat, and the rivals there.
 SUITED: Final[dict[str, Variant]] = {
     **REFERENCES,
-    "practice": {"algorithm": "practice"},
+    "practice": PRACTICE,
     "cma-mae": {"algorithm": "cma-mae"},
     "map-elites": {"algorithm": "map-elites"},
 }
 IN_SUITE: Final[Variant] = {"movements": 2000, "evaluate_at": (250, 500, 1000)}
 ON_ROD: Final[Variant] = {"evaluate_at": (250, 500, 1000, 2000), "floor_at": (5000,)}
 ONCE: Final[Variant] = {"teacher": "initial", "teacher.every": 1}  # all at the start, one for each movement
-TAUGHT: Final[Variant] = {"algorithm": "practice-taught", **ONCE}
+TAUGHT: Final[Variant] = {**PRACTICE, "algorithm": "practice-taught", **ONCE}
 # The rod, by the inverse model whose answers prove themselves; rivals with and without the demonstrations.
 LEARNING: Final[dict[str, Variant]] = {
     f"{name}.rod": {**line, **ON_ROD}
@@ -118,10 +122,15 @@ MIDDLE: Final[Variant] = {**REFERENCES[UNIFORM], "explore": "widening", "global_
 STEPS_OF_GAIN: Final[dict[str, Variant]] = {
     "middle": MIDDLE,
     "middle-process": {**MIDDLE, "inverse": "process"},
-    "practice-interest": {"algorithm": "practice", "goals": "interest-map"},
+    "practice-interest": {**PRACTICE, "goals": "interest-map"},
 }
 SCHEDULES: Final[dict[str, Variant]] = {
-    "practice-taught-every-30": {"algorithm": "practice-taught", "teacher": "periodic", "social.repeats": 10},
+    "practice-taught-every-30": {
+        **PRACTICE,
+        "algorithm": "practice-taught",
+        "teacher": "periodic",
+        "social.repeats": 10,
+    },
     "sgim-d-once": {**SGIM_D, **ONCE, "social.repeats": 1},
     "uniform-nearest-taught-once": {**SGIM_D, **BASELINE, **ONCE, "social.repeats": 1},
     "map-elites-taught-once": {"algorithm": "map-elites-taught", "imitations": 1, **ONCE},
@@ -147,7 +156,7 @@ ASKING: Final[dict[str, Variant]] = {
     "taught-every-30": SGIM_D,
     "taught-at-start": {**SGIM_D, "teacher": "initial"},
     "taught-at-start-once": TAUGHT,
-    "alone": {"algorithm": "practice"},
+    "alone": PRACTICE,
     "sgim-im": IM,
     "sgim-im-83": {**IM, "demonstrations": MANY},
     "sgim-im-cost-10": {**IM, "cost": 10.0},
@@ -157,8 +166,8 @@ ASKING: Final[dict[str, Variant]] = {
     "sgim-acts-four-search": {**ACTS, "teachers": FOUR, "base": "search"},
     "sgim-acts-halves": {**ACTS, "teachers": HALVES},
     "sgim-eer": {"algorithm": "sgim-eer"},
-    "alone-toss": {"algorithm": "practice", **TOSS},
-    "alone-toss-blind": {"algorithm": "practice", **TOSS, "environment": "experiments.parts:blind_toss"},
+    "alone-toss": {**PRACTICE, **TOSS},
+    "alone-toss-blind": {**PRACTICE, **TOSS, "environment": "experiments.parts:blind_toss"},
     "sgim-im-toss": {**IM, **TOSS},
 }
 
@@ -183,7 +192,7 @@ UNTAUGHT: Final[dict[str, Variant]] = {
     "sagg-riac": SAGG_RIAC,
     "sagg-riac-uniform": {**SAGG_RIAC, "goals": "uniform"},
     "sagg-riac-model": {**SAGG_RIAC, **PROVED_MODEL},
-    "practice": {"algorithm": "practice"},
+    "practice": PRACTICE,
 }
 TAUGHT_ALIKE: Final[dict[str, Variant]] = {
     "uniform-taught": {**SGIM_D, **BASELINE},
@@ -230,7 +239,7 @@ def _on_suite(learners: dict[str, Variant]) -> dict[str, Variant]:
     """Each on all tasks but the rod, whose runs are longer; quality diversity knows one context only, so no toss."""
     return {
         f"{name}.{task}": {**line, **suited.options, **IN_SUITE}
-        for task, suited in TASKS.items()
+        for task, suited in SUITE.items()
         for name, line in learners.items()
         if task != "rod" and not (name in SCHOOL and task == "toss")
     }
@@ -300,11 +309,11 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
     **{arm: _on_arm(arm) for arm in ARMS},
     "swimmer": {
         **{f"{name}-swimmer": {"algorithm": name, "inverse": "model-alone", **SWIMMER} for name in SWIMMERS},
-        "practice-swimmer": {"algorithm": "practice", "inverse": "process", **SWIMMER},
+        "practice-swimmer": {**PRACTICE, "inverse": "process", **SWIMMER},
     },
     "by-hand": {
         "goals-alone": {**SAGG_RIAC, **SESSION},
-        "practice-alone": {"algorithm": "practice", **SESSION},
+        "practice-alone": {**PRACTICE, **SESSION},
         **{f"{name}-by-hand": {**line, **SESSION, "demonstrations": HAND} for name, line in SHOWN.items()},
         **{f"{name}-ten-shipped": {**line, **SESSION, "demonstrations": TEN} for name, line in SHOWN.items()},
     },

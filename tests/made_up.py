@@ -4,9 +4,8 @@ import numpy as np
 import pandas as pd
 
 from claimed import TIMES
-from sgimd_torch.views.suite import TASKS
 from table import FILE, TABLES, write_table
-from variants import EXPERIMENTS, FOUR
+from variants import EXPERIMENTS, FOUR, SUITE
 
 MOVEMENTS = (*TIMES, 3000, 4000, 5000)
 SEEDS = 20
@@ -54,7 +53,7 @@ ERRORS = {  # name, as `Evidence` has it: its error (m) at 5000
     "sgim-d-uniform.rod": 0.05,
     "sagg-riac.rod": 0.07,
     "uniform-nearest-taught.rod": 0.06,
-    **{f"{name}.{task}": error for name, error in ON_TASKS.items() for task in TASKS if task != "rod"},
+    **{f"{name}.{task}": error for name, error in ON_TASKS.items() for task in SUITE if task != "rod"},
     # With a forward model.
     "imitation.rod by model": 0.3,
     **{f"{name} by model-alone": 0.03 for name in ("model", "gradient")},

@@ -43,7 +43,7 @@ class Effects:
     @property
     def outcomes(self) -> Array:
         """``(n, outcome_dim)`` by which reach can be told: all, but none where there is a plateau, since a few effects
-        say little of what others could be had. Goals drawn near them were tried on `puck` and `fetch`: twice the error."""
+        say little of what else could be had. With goals drawn near them the error on `puck` and `fetch` doubled."""
         return self.memory.outcomes if self() is None else self.memory.outcomes[:0]
 
     def __call__(self) -> Memory | None:
