@@ -23,8 +23,8 @@ ARMS: Final = ("planar-arm-7", "planar-arm-50")
 SWIMMERS: Final = ("random", "sagg-riac", "sgim-d")
 SGIM_D: Final[Variant] = {"algorithm": "sgim-d"}
 SAGG_RIAC: Final[Variant] = {"algorithm": "sagg-riac"}
-# The rows are of `practice` as it was before goals within reach became its default.
-PRACTICE: Final[Variant] = {"algorithm": "practice", "goals": "uniform"}
+# The rows are of `practice` as it was before it looked for goals within reach and for effects.
+PRACTICE: Final[Variant] = {"algorithm": "practice", "goals": "uniform", "explore": "widening", "inverse": "process"}
 # The tasks of the suite that have rows.
 SUITE: Final = {task: suited for task, suited in TASKS.items() if task not in ("puck", "fetch")}
 # From the paper to our defaults, one change at a time: what each step is called, what it was and what it becomes. The
@@ -309,7 +309,7 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
     **{arm: _on_arm(arm) for arm in ARMS},
     "swimmer": {
         **{f"{name}-swimmer": {"algorithm": name, "inverse": "model-alone", **SWIMMER} for name in SWIMMERS},
-        "practice-swimmer": {**PRACTICE, "inverse": "process", **SWIMMER},
+        "practice-swimmer": {**PRACTICE, **SWIMMER},
     },
     "by-hand": {
         "goals-alone": {**SAGG_RIAC, **SESSION},
