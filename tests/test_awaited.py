@@ -181,9 +181,14 @@ def test_a_resumed_run_agrees_on_who_was_given_up_and_asks_only_what_is_new(mine
     assert after.requests["index"][n] >= 15
 
 
-def test_ctrl_c_ends_the_wait_for_a_teacher(mine):
+def test_a_second_ctrl_c_ends_the_wait_for_a_teacher(mine):
     options, _ = mine
-    code, errors = end(stopped(LIVE, *options, "--teachers", "mine:Stuck", "--movements", "15"), signal.SIGINT)
+    process = stopped(LIVE, *options, "--teachers", "mine:Stuck", "--movements", "15")
+    process.send_signal(signal.SIGINT)
+    process.send_signal(signal.SIGCONT)
+    while "once more stops at once" not in process.stderr.readline():
+        assert process.poll() is None
+    code, errors = end(process, signal.SIGINT)
     assert code == 130
     assert "Traceback" not in errors
     assert re.search(r"stopped after \d+ movements; to go on", errors)
