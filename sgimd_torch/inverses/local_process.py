@@ -80,13 +80,6 @@ class LocalProcess:
         return estimate._replace(theta=candidates[chosen_one]) if clearly else estimate
 
     @one_thread
-    def expected_errors(self, context: Array, goal: Array, thetas: Array) -> Array | None:
-        """``(n,)`` squared errors (unit of T, squared) that it expects of ``thetas`` ``(n, theta_dim)``: its own
-        uncertainty is included, noise is not, as when it judges its own candidates. None as for `predict`."""
-        learnt = self._learn_near(context, goal)
-        return None if learnt is None else self._expected_errors(learnt[0], context, goal, learnt[2], thetas)
-
-    @one_thread
     def predict(self, context: Array, theta: Array) -> Array | None:
         """``(outcome_dim,)`` what ``theta`` should lead to, judging by the movements most like it, or by the last
         one while all led to the same. None while there are too few."""
