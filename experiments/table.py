@@ -127,8 +127,8 @@ def result_rows(experiment: str, config: Config, run: Run) -> list[Row]:
 
 
 def own_answer(config: Config) -> str:
-    """The name of the inverse model by which a learner answers."""
-    return str(config.values.get("inverse", "process"))
+    """The name of the inverse model by which a learner answers; that of practice is `process`, of its effects alone."""
+    return str(config.values.get("inverse", "process")).replace("among-effects", "process")
 
 
 def answers_of(experiment: str, config: Config) -> tuple[str, ...]:

@@ -7,6 +7,7 @@ A variant in two experiments has the same line in both; it is run once, and has 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
@@ -23,10 +24,15 @@ ARMS: Final = ("planar-arm-7", "planar-arm-50")
 SWIMMERS: Final = ("random", "sagg-riac", "sgim-d")
 SGIM_D: Final[Variant] = {"algorithm": "sgim-d"}
 SAGG_RIAC: Final[Variant] = {"algorithm": "sagg-riac"}
-# The rows are of `practice` as it was before it looked for goals within reach and for effects.
-PRACTICE: Final[Variant] = {"algorithm": "practice", "goals": "uniform", "explore": "widening", "inverse": "process"}
-# The tasks of the suite that have rows.
-SUITE: Final = {task: suited for task, suited in TASKS.items() if task not in ("puck", "fetch")}
+# `practice` before it looked for goals within reach and for effects. On the rod, taught, it lives the same life.
+UNIFORM_PRACTICE: Final[Variant] = {
+    "algorithm": "practice",
+    "goals": "uniform",
+    "explore": "widening",
+    "inverse": "process",
+}
+SPARSE: Final = ("puck", "fetch")  # tasks where most movements do nothing
+SUITE: Final = {task: suited for task, suited in TASKS.items() if task not in SPARSE}
 # From the paper to our defaults, one change at a time: what each step is called, what it was and what it becomes. The
 # paper gives no number for the budget and for g_max: 60 movements are more than come between two demonstrations.
 STEPS: Final[tuple[tuple[str, Variant, Variant], ...]] = (
@@ -49,7 +55,7 @@ ANSWERS: Final[dict[str, tuple[str, ...]]] = {
     **dict.fromkeys(("letter", "letter-teachers", "large-space"), (*ALIKE, "paper")),
     "ladder": (*ALIKE, "linear"),
     **dict.fromkeys(("forward-model", "planar-arm-7", "planar-arm-50", "swimmer"), (*ALIKE, "model-alone")),
-    "settings": (*ALIKE, "model"),
+    **dict.fromkeys(("settings", "practice"), (*ALIKE, "model")),
     "learning": (*ALIKE, "linear", "nearest", "model"),
     "suite": (*ALIKE, "linear", "nearest"),
 }
@@ -90,14 +96,14 @@ SWIMMER: Final[Variant] = {
 # What a learner of the suite has to beat, and the rivals there.
 SUITED: Final[dict[str, Variant]] = {
     **REFERENCES,
-    "practice": PRACTICE,
+    "practice-uniform": UNIFORM_PRACTICE,
     "cma-mae": {"algorithm": "cma-mae"},
     "map-elites": {"algorithm": "map-elites"},
 }
 IN_SUITE: Final[Variant] = {"movements": 2000, "evaluate_at": (250, 500, 1000)}
 ON_ROD: Final[Variant] = {"evaluate_at": (250, 500, 1000, 2000), "floor_at": (5000,)}
 ONCE: Final[Variant] = {"teacher": "initial", "teacher.every": 1}  # all at the start, one for each movement
-TAUGHT: Final[Variant] = {**PRACTICE, "algorithm": "practice-taught", **ONCE}
+TAUGHT: Final[Variant] = {**UNIFORM_PRACTICE, "algorithm": "practice-taught", **ONCE}
 # The rod, by the inverse model whose answers prove themselves; rivals with and without the demonstrations.
 LEARNING: Final[dict[str, Variant]] = {
     f"{name}.rod": {**line, **ON_ROD}
@@ -122,11 +128,11 @@ MIDDLE: Final[Variant] = {**REFERENCES[UNIFORM], "explore": "widening", "global_
 STEPS_OF_GAIN: Final[dict[str, Variant]] = {
     "middle": MIDDLE,
     "middle-process": {**MIDDLE, "inverse": "process"},
-    "practice-interest": {**PRACTICE, "goals": "interest-map"},
+    "practice-interest": {**UNIFORM_PRACTICE, "goals": "interest-map"},
 }
 SCHEDULES: Final[dict[str, Variant]] = {
     "practice-taught-every-30": {
-        **PRACTICE,
+        **UNIFORM_PRACTICE,
         "algorithm": "practice-taught",
         "teacher": "periodic",
         "social.repeats": 10,
@@ -156,7 +162,7 @@ ASKING: Final[dict[str, Variant]] = {
     "taught-every-30": SGIM_D,
     "taught-at-start": {**SGIM_D, "teacher": "initial"},
     "taught-at-start-once": TAUGHT,
-    "alone": PRACTICE,
+    "alone": UNIFORM_PRACTICE,
     "sgim-im": IM,
     "sgim-im-83": {**IM, "demonstrations": MANY},
     "sgim-im-cost-10": {**IM, "cost": 10.0},
@@ -166,8 +172,8 @@ ASKING: Final[dict[str, Variant]] = {
     "sgim-acts-four-search": {**ACTS, "teachers": FOUR, "base": "search"},
     "sgim-acts-halves": {**ACTS, "teachers": HALVES},
     "sgim-eer": {"algorithm": "sgim-eer"},
-    "alone-toss": {**PRACTICE, **TOSS},
-    "alone-toss-blind": {**PRACTICE, **TOSS, "environment": "experiments.parts:blind_toss"},
+    "alone-toss": {**UNIFORM_PRACTICE, **TOSS},
+    "alone-toss-blind": {**UNIFORM_PRACTICE, **TOSS, "environment": "experiments.parts:blind_toss"},
     "sgim-im-toss": {**IM, **TOSS},
 }
 
@@ -185,14 +191,16 @@ TEACHERS: Final[dict[str, Variant]] = {
     "one-corner": {"demonstrations": CORNER},
     "shuffled": {"demonstrations": SHUFFLED},
 }
+PRACTICE: Final[Variant] = {"algorithm": "practice"}
 PROVED_MODEL: Final[Variant] = {"inverse": "model"}  # it answers once it predicts as well as `process`
+BY_PROOF: Final[Variant] = {**SGIM_D, **PROVED_MODEL, "search": "gradient"}
 UNTAUGHT: Final[dict[str, Variant]] = {
     "random": {"algorithm": "random"},
     "uniform": {**SAGG_RIAC, **BASELINE},
     "sagg-riac": SAGG_RIAC,
     "sagg-riac-uniform": {**SAGG_RIAC, "goals": "uniform"},
     "sagg-riac-model": {**SAGG_RIAC, **PROVED_MODEL},
-    "practice": PRACTICE,
+    "practice": UNIFORM_PRACTICE,
 }
 TAUGHT_ALIKE: Final[dict[str, Variant]] = {
     "uniform-taught": {**SGIM_D, **BASELINE},
@@ -235,11 +243,11 @@ def _on_arm(arm: str) -> dict[str, Variant]:
     }
 
 
-def _on_suite(learners: dict[str, Variant]) -> dict[str, Variant]:
+def _on_suite(learners: dict[str, Variant], tasks: Iterable[str] = SUITE) -> dict[str, Variant]:
     """Each on all tasks but the rod, whose runs are longer; quality diversity knows one context only, so no toss."""
     return {
-        f"{name}.{task}": {**line, **suited.options, **IN_SUITE}
-        for task, suited in SUITE.items()
+        f"{name}.{task}": {**line, **TASKS[task].options, **IN_SUITE}
+        for task in tasks
         for name, line in learners.items()
         if task != "rod" and not (name in SCHOOL and task == "toss")
     }
@@ -309,11 +317,11 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
     **{arm: _on_arm(arm) for arm in ARMS},
     "swimmer": {
         **{f"{name}-swimmer": {"algorithm": name, "inverse": "model-alone", **SWIMMER} for name in SWIMMERS},
-        "practice-swimmer": {**PRACTICE, **SWIMMER},
+        "practice-swimmer": {**UNIFORM_PRACTICE, **SWIMMER},
     },
     "by-hand": {
         "goals-alone": {**SAGG_RIAC, **SESSION},
-        "practice-alone": {**PRACTICE, **SESSION},
+        "practice-alone": {**UNIFORM_PRACTICE, **SESSION},
         **{f"{name}-by-hand": {**line, **SESSION, "demonstrations": HAND} for name, line in SHOWN.items()},
         **{f"{name}-ten-shipped": {**line, **SESSION, "demonstrations": TEN} for name, line in SHOWN.items()},
     },
@@ -324,6 +332,12 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
     },
     "learning": LEARNING,
     "suite": _on_suite(SUITED),
+    "practice": {
+        "practice.rod": {**PRACTICE, **ON_ROD},
+        "sgim-d-model.rod": {**BY_PROOF, **ON_ROD},
+        **_on_suite({"practice": PRACTICE}, TASKS),
+        **_on_suite({**REFERENCES, "sagg-riac": SAGG_RIAC}, SPARSE),
+    },
     "gain": {
         **{f"{name}.rod": {**line, **ON_ROD} for name, line in {**STEPS_OF_GAIN, **SCHEDULES}.items()},
         **_on_suite(STEPS_OF_GAIN),
@@ -338,6 +352,7 @@ SEEDS: Final[dict[str, range]] = {
     **dict.fromkeys(("forward-model", *ARMS, "swimmer"), range(100, 110)),
     "settings": range(100, 105),
     **dict.fromkeys(("learning", "suite", "gain"), range(120, 140)),
+    "practice": range(160, 180),
     "asking": range(140, 160),
     "by-hand": range(150, 160),
 }

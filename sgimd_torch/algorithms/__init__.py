@@ -100,8 +100,8 @@ def goal_babbling(
         environment: its boxes, rest and outcome noise are read; it is not executed.
         seed: of all streams of this learner.
         memory: of the learner.
-        goals: (contexts, outcomes, rng) -> the goal model; it is given what was ``reached``, if it has such a keyword:
-            by ``effects`` of the inverse, or else ``memory``.
+        goals: (contexts, outcomes, rng) -> the goal model; it is given the ``memory`` as ``reached`` and
+            ``effects`` of the inverse, if it has such keywords.
         inverse: (memory) -> the inverse model, where searches begin and by which the learner answers; it is given
             ``outcome_noise`` if it has such a keyword. Deviation: the paper infers by eq. (9) alone, which is
             `LocalInverse`; the answers of `LocalProcess` have to prove themselves.
@@ -125,7 +125,8 @@ def goal_babbling(
         measure = partial(performance, rest=environment.rest, d_min=noise)
     made = answering(environment, memory, inverse)
     explorer = explore(environment.policies, memory, made, stream(seed, "look"))
-    goals = given(goals, reached=getattr(made, "effects", memory))
+    had_effect = {"effects": made.effects} if hasattr(made, "effects") else {}
+    goals = given(goals, reached=memory, **had_effect)
     width = getattr(explorer, "width", None)
     if width is not None:  # how far to look, which both of them go by
         search = given(search, width=width)

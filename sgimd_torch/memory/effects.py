@@ -40,12 +40,6 @@ class Effects:
         self._plateau: Array | None = None  # (1 + context_dim, outcome_dim)
         self._seen = 0
 
-    @property
-    def outcomes(self) -> Array:
-        """``(n, outcome_dim)`` by which reach can be told: all, but none where there is a plateau, since a few effects
-        say little of what else could be had. With goals drawn near them the error on `puck` and `fetch` doubled."""
-        return self.memory.outcomes if self() is None else self.memory.outcomes[:0]
-
     def __call__(self) -> Memory | None:
         """Copies of the exemplars with an effect, perhaps none; another object when the plateau has changed. None while
         there is no plateau: then every movement has its own effect."""
