@@ -2,7 +2,7 @@
 
     found = Evidence.of(Path("results")); show(found.ratio("sgim-d", "random"))
 A name is that of a variant, answered by `process`; "sgim-d-letter by paper" is answered by another inverse model. Two
-names are compared on their common seeds.
+names are compared on their common seeds, or, without any, as independent samples.
 """
 
 from __future__ import annotations
@@ -180,6 +180,12 @@ class Evidence:
 
     def less(self, ours: BySeed, theirs: BySeed, *, level: Level = LEVEL) -> Interval:
         """Ours less theirs."""
+        if not ours.keys() & theirs.keys():
+
+            def difference(x: Array, y: Array) -> Array:
+                return interquartile_mean(x) - interquartile_mean(y)
+
+            return _found(difference, _array(ours), _array(theirs), level=level)
         return _found(interquartile_mean, paired_differences(*shared(ours, theirs)), level=level)
 
     def over(self, ours: BySeed, theirs: BySeed, *, level: Level = LEVEL) -> Interval:
@@ -188,7 +194,9 @@ class Evidence:
         def ratio(x: Array, y: Array) -> Array:
             return interquartile_mean(x) / interquartile_mean(y)
 
-        return _found(ratio, *map(_array, shared(ours, theirs)), paired=True, level=level)
+        paired = bool(ours.keys() & theirs.keys())
+        samples = shared(ours, theirs) if paired else (ours, theirs)
+        return _found(ratio, *map(_array, samples), paired=paired, level=level)
 
     def share(self, parts: BySeed, wholes: BySeed, *, level: Level = LEVEL) -> Interval:
         """All ``parts`` over all ``wholes``, the seeds of both drawn together.

@@ -73,7 +73,7 @@ def curiosity(found: Evidence) -> Figure:
         "SGIM-D, T 10⁴ times larger, 5000": ("sgim-d-large", "sgim-d-uniform-large", LAST),
         "... by the paper's eq. (3), 5000": ("sgim-d-absolute-large", "sgim-d-uniform-large", LAST),
         "SGIM-D, 5000": ("sgim-d.rod", "sgim-d-uniform.rod", LAST),
-        "practice, 5000": ("practice-interest.rod", "practice.rod", LAST),
+        "practice, 5000": ("practice-interest.rod", "practice-uniform.rod", LAST),
         **{
             f"{NAMES[name]}, {setting}, 2000": (f"{name}@{setting}", f"{name}-uniform@{setting}", 2000)
             for name in ("sgim-d", "sagg-riac")

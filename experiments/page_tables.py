@@ -21,7 +21,7 @@ from judging import MISSING, Claim, Verdict, judge
 from sgimd_torch.views.statistics import interquartile_mean, show
 from sgimd_torch.views.suite import RANDOM, UNIFORM, titled
 from table import read_table
-from variants import ARMS, EXPERIMENTS, REFINING, ROBOTS, SUITE, SUITED, TEACHERS, ladder
+from variants import ARMS, EXPERIMENTS, REFINING, ROBOTS, SPARSE, SUITE, SUITED, TEACHERS, ladder
 
 SETTINGS: Final = (*ROBOTS, *TEACHERS)
 DEFAULT: Final = "default"  # setting of a rival
@@ -45,8 +45,9 @@ GAIN: Final[Mapping[str, str]] = {
     "the standard baseline": UNIFORM,
     "... begun in the middle": "middle",
     "... with `process`": "middle-process",
-    "... with its noise: `practice`": "practice",
-    "... with interest": "practice-interest",
+    "... with its noise": "practice-uniform",
+    "... with goals within reach: `practice`": "practice",
+    "the step before with interest": "practice-interest",
 }
 TAUGHT: Final[Mapping[str, str]] = {
     "the standard baseline, every 30": "uniform-nearest-taught",
@@ -134,7 +135,7 @@ class Tables:
 
     def answers(self) -> str:
         """Errors at 5000 by three answers."""
-        names = ("practice-taught", "practice", "sgim-d", "uniform-nearest-taught", "cma-mae", "cma-mae-taught")
+        names = ("practice-taught", "practice-uniform", "sgim-d", "uniform-nearest-taught", "cma-mae", "cma-mae-taught")
         rows = [
             [f"`{name}`", *(self.cell(self.found.error, f"{name}.rod by {answer}") for answer in by)]
             for by in [("nearest", "linear", "process")]
@@ -144,15 +145,17 @@ class Tables:
 
     def suite(self, at: int = 1000) -> str:
         """Errors over those of random movements on each task, then their interquartile mean over tasks."""
-        learners = [name for name in SUITED if name != RANDOM]
+        learners = ["practice", *(name for name in SUITED if name != RANDOM)]
+        every = (*SUITE, *SPARSE)
 
         def known(name: str) -> list[str]:
-            return [task for task in SUITE if task == "rod" or f"{name}.{task}" in EXPERIMENTS["suite"]]
+            run = {**EXPERIMENTS["suite"], **EXPERIMENTS["practice"], **EXPERIMENTS["learning"]}
+            return [task for task in every if f"{name}.{task}" in run]
 
         rows = [
             [titled(task), *(self.cell(self.found.ratio, f"{name}.{task}", f"{RANDOM}.{task}", at, form=".2f")
                              if task in known(name) else "–" for name in learners)]
-            for task in SUITE
+            for task in every
         ]  # fmt: skip
         rows.append(["mean over tasks", *(self._over_tasks(name, known(name), at) for name in learners)])
         return markdown(("task", *learners), _run(rows))

@@ -5,7 +5,7 @@ import pandas as pd
 
 from claimed import TIMES
 from table import FILE, TABLES, write_table
-from variants import EXPERIMENTS, FOUR, SUITE
+from variants import EXPERIMENTS, FOUR, SPARSE, SUITE
 
 MOVEMENTS = (*TIMES, 3000, 4000, 5000)
 SEEDS = 20
@@ -22,7 +22,7 @@ LETTER = {  # error at 5000 (m) of the paper's learners; those of its letter hav
     "sgim-d-large": 0.09,
 }
 TAUGHT = ("practice-taught", "practice-corner", "practice-shuffled")
-ON_TASKS = {"practice": 1.0, "random-nearest": 2.0, "uniform-nearest": 1.5, "cma-mae": 1.4, "map-elites": 1.3}
+ON_TASKS = {"practice-uniform": 1.0, "random-nearest": 2.0, "uniform-nearest": 1.5, "cma-mae": 1.4, "map-elites": 1.3}
 
 
 def lettered(name):
@@ -43,7 +43,7 @@ ERRORS = {  # name, as `Evidence` has it: its error (m) at 5000
     # Few movements, on the rod and on the suite.
     **{f"{name}.rod": 0.3 for name in ("cma-mae-taught", "cma-mae-taught-once", "map-elites-taught", "imitation")},
     **{f"{name}.rod": 0.02 for name in TAUGHT},
-    "practice.rod": 0.022,
+    **dict.fromkeys(("practice.rod", "practice-uniform.rod"), 0.022),
     "practice-interest.rod": 0.021,
     "cma-mae.rod": 0.04,
     "map-elites.rod": 0.05,
@@ -54,6 +54,9 @@ ERRORS = {  # name, as `Evidence` has it: its error (m) at 5000
     "sagg-riac.rod": 0.07,
     "uniform-nearest-taught.rod": 0.06,
     **{f"{name}.{task}": error for name, error in ON_TASKS.items() for task in SUITE if task != "rod"},
+    **{f"practice.{task}": 1.0 for task in (*SUITE, *SPARSE) if task != "rod"},
+    "practice.rod-large": 0.022,
+    **{f"{name}.{task}": ON_TASKS[name] for name in ("random-nearest", "uniform-nearest") for task in SPARSE},
     # With a forward model.
     "imitation.rod by model": 0.3,
     **{f"{name} by model-alone": 0.03 for name in ("model", "gradient")},
