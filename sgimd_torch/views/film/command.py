@@ -30,7 +30,7 @@ from sgimd_torch.runs.build import RunParts, build
 from sgimd_torch.runs.read import Run, config_of, read_run
 from sgimd_torch.spaces import Array, stream
 from sgimd_torch.strategies import Remember
-from sgimd_torch.views.film.panel import Panel
+from sgimd_torch.views.film.panel import panel
 from sgimd_torch.views.film.reel import RATES, Shot, shoot, write_film
 from sgimd_torch.views.film.sketch import Sketchbook
 
@@ -69,14 +69,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     with _camera(parts.environment, shots) as camera:
         rate = RATES[options.out.suffix]
         n = sum(len(shot.moments(rate)) for shot in shots)
-        interval = 0.2 if sys.stderr.isatty() else 10.0  # s; without a terminal a line now and then
-        write_film(
-            options.out, tqdm(shoot(camera.frame, shots, rate), "filming", n, unit=" frames", mininterval=interval)
-        )
-    amount = parts.environment.outcomes.amount
-    for k, movements in enumerate(stages):
-        missed = np.array([shot.missed for shot in shots[k * len(goals) : (k + 1) * len(goals)]])
-        mean, most = amount(missed.mean()), amount(missed.max())
+        write_film(options.out, tqdm(shoot(camera.frame, shots, rate), "filming", n, unit=" frames", delay=1.0))
+    amount, missed = parts.environment.outcomes.amount, np.reshape([shot.missed for shot in shots], (len(stages), -1))
+    for movements, each in zip(stages, missed, strict=True):
+        mean, most = amount(each.mean()), amount(each.max())
         print(f"after {movements} movements: mean distance to the goal {mean}, at most {most}")
     print(f"Film {options.out}")
     return 0
@@ -111,33 +107,26 @@ def _cast(run: Run, parts: RunParts, goals: Array, stages: Sequence[int]) -> lis
     assert parts.record is not None
     robot, seed = parts.environment, run.config["seed"]
     context = (robot.contexts.low + robot.contexts.high) / 2
-    shots: list[Shot] = []
-    errors = []
-    known = 0
+    who = label(run.config["name"] or run.config["algorithm"])
+    shots, errors = list[Shot](), list[Array]()
     for before, movements in zip((0, *stages), stages, strict=False):
         remember(run, parts, before, movements)
         if not len(parts.learner.memory):
             raise ValueError(f"{run.path} remembers nothing after {movements} movements, so it infers no movement")
         past = run.outcomes[:movements]
         past = past[np.isfinite(past[:, 0])]
-        who = label(run.config["name"] or run.config["algorithm"])
         title = f"{who}, seed {seed}, after {movements} movements"
         for k, goal in enumerate(goals):
             recording = parts.record(context, parts.inverse(context, goal).theta, stream(seed, "film", k))
-            # The first shot of a stage begins with what was learnt since the last one.
-            new = len(past) - known if len(stages) > 1 and k == 0 else 0
-            shots.append(Shot(recording, goal, title, robot.outcomes.unit, past, new))
-        known = len(past)
+            shots.append(Shot(recording, goal, title, robot.outcomes.unit, past))
         found = evaluate(parts.inverse, robot, parts.benchmark.goals, seed, movements, context=context, repeats=0)
         errors.append(found.errors)
     curve = np.array(stages), np.array([each.mean() for each in errors])
     if len(stages) == 1 and len(run.evaluation["movements"]):
         curve = run.evaluation["movements"], run.evaluation["mean_error"]
-    panel = Panel(robot.outcomes, parts.benchmark.goals, colour(run.config["algorithm"]), *curve)
-    return [
-        replace(shot, beside=panel.beside(stages[k], errors[k], shot.goal, shot.recording.outcome))
-        for k, shot in ((row // len(goals), shot) for row, shot in enumerate(shots))
-    ]
+    ink, goals_there = colour(run.config["algorithm"]), parts.benchmark.goals
+    beside = [panel(robot.outcomes, goals_there, errors[k], at, curve, ink) for k, at in enumerate(stages)]
+    return [replace(shot, beside=beside[row // len(goals)]) for row, shot in enumerate(shots)]
 
 
 def remember(run: Run, parts: RunParts, start: int, stop: int) -> None:
