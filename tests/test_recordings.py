@@ -78,13 +78,10 @@ def test_a_file_of_a_spreadsheet_with_a_mark_of_bytes_and_spaces_is_read(tmp_pat
     [
         ("", r"one\.csv has no column a, b, x, y, time; it has"),
         (ONE.replace("a,b", "a,c"), r"one\.csv has no column b; it has time, a, c, x, y"),
-        (ONE.splitlines()[0], r"one\.csv has no rows below"),
         (ONE.replace("0.3", "some"), "a must be numbers: .* 'some'"),
-        (ONE.replace("0.3", ""), "a must be numbers: .*''; is a field missing"),
         (ONE.replace("0.3", "nan"), r"one\.csv: a must be finite .*, but entry \[1, 0\] is nan"),
         (ONE.replace("2.5", "1.5"), r"one\.csv: time must increase from row to row; were the rows shuffled"),
         (ONE.replace(",9,9\n2.5", ",9,9,9\n2.5"), "row 1 has 6 fields, 5 were wanted"),
-        (ONE.rpartition(",")[0], "row 3 has 4 fields, 5 were wanted; is it cut short"),
         ("\n".join(ONE.splitlines()[:2]), "has 1 sample, at least 2"),
     ],
 )
@@ -184,7 +181,6 @@ def change(dataset, **changes):
         (lambda root: (root / "data/chunk-000/file-001.parquet").unlink(), "says 15 frames, 10 were found"),
         (lambda root: (root / "meta/info.json").unlink(), r"is no LeRobot dataset: it has no meta/info\.json"),
         (lambda root: (root / "meta/info.json").write_text("{"), r"info\.json is no json"),
-        (lambda root: (root / "meta/info.json").write_text("[]"), r"info\.json must hold an object, got list"),
         (
             lambda root: [file.unlink() for file in (root / "data/chunk-000").iterdir()],
             "were only its videos copied",
@@ -192,10 +188,6 @@ def change(dataset, **changes):
         (
             lambda root: (root / "data/chunk-000/file-001.parquet").write_bytes(b"PAR1 of another kind"),
             r"file-001\.parquet cannot be read",
-        ),
-        (
-            lambda root: pq.write_table(pa.table({"timestamp": [0.1]}), root / "data/chunk-000/file-000.parquet"),
-            r"file-000\.parquet cannot be read",
         ),
     ],
 )
@@ -250,17 +242,14 @@ def test_check_says_where_each_lands(tmp_path, capsys):
     assert said[-1].startswith("2 of 2 can be used; they land")
 
 
-@pytest.mark.parametrize("fails", [SimulationError("it hit the table"), np.full(2, np.nan)])
-def test_check_says_whose_movement_has_no_outcome(tmp_path, capsys, monkeypatch, fails):
+def test_check_says_whose_movement_has_no_outcome(tmp_path, capsys, monkeypatch):
     def execute(self, context, theta, rng):
-        if isinstance(fails, Exception):
-            raise fails
-        return fails
+        raise SimulationError("it hit the table")
 
     save_demonstrations(tmp_path / "shown.npz", [led(0.1, lands(0.1))])
     monkeypatch.setattr(PlanarArm, "execute", execute)
     assert sgimd("check", tmp_path / "shown.npz", "--task", "planar-arm-7") == 2
-    assert re.search("cannot be used: (it hit the table|the outcome is not finite)", capsys.readouterr().out)
+    assert "cannot be used: it hit the table" in capsys.readouterr().out
 
 
 def test_check_names_those_that_cannot_be_used_and_exits_with_2(tmp_path, capsys):
@@ -316,11 +305,8 @@ def test_what_lies_outside_the_limits_of_speed_and_range_is_remarked(slow, tmp_p
         (["check", "nothing.npz", "--task", "planar-arm-7"], "there is no nothing.npz"),
         (["check", "one.csv", "--task", "planar-arm-7"], "one.csv is no .npz file, so name its columns"),
         (["check", "shown.npz", "--task", "rod"], "unknown environment 'rod'"),
-        (["check", "shown.npz"], "required: --task"),
         (["check", "two.npz", "--task", "planar-arm-7"], "its outcome has 1 numbers, the robot's has 2"),
-        (["import", "one.csv", "--joints", "a,q", "--outcome", "x", "--out", "o.npz"], "one.csv has no column q"),
         (["import", "one.csv", "--joints", "a,b", "--outcome", "x", "--out", "."], "--out must end in .npz"),
-        (["convert"], "invalid choice: 'convert'"),
     ],
 )
 def test_bad_requests_get_exit_code_2_and_leave_nothing(words, told, tmp_path, monkeypatch, capsys):
