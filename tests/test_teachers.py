@@ -109,13 +109,6 @@ def test_tiles_without_a_demonstration_are_never_chosen_and_need_not_be_reached(
     assert set(choices(diagonal, reached([1.0, 1.0]))) == {(4.0, 4.0)}
 
 
-def test_outcomes_outside_the_demonstrated_box_count_for_no_tile() -> None:
-    far = reached(*[[x, y] for x in (-9.0, 2.0, 9.0) for y in (-9.0, 2.0, 9.0) if (x, y) != (2.0, 2.0)], [1e9, -1e9])
-    assert len(choices(QUARTERS, far)) == 4
-    just = reached([4.0 + 1e-9, 4.0], [4.0, 4.0 + 1e-9], [-1e-9, 0.0])
-    assert len(choices(QUARTERS, just)) == 4
-
-
 @pytest.mark.parametrize("tiles", [1, 2, 7, 49])
 def test_borders_belong_to_a_tile_the_outermost_included(tiles: int) -> None:
     # Whatever was demonstrated and then reached exactly counts there, however low + tiles * side was rounded.
@@ -149,11 +142,6 @@ def test_the_asked_teacher_is_silent_while_progress_is_made_and_demonstrates_whe
         offered += [10 * look] if teacher.offer(10 * look, memory) is goal else []
     # Distances 1, .5, .2, .199, .1, .1: the fall from .2 to .199 is less than a hundredth, and so is none at all.
     assert offered == [40, 60]
-
-
-def test_the_asked_teacher_demonstrates_to_a_learner_that_rests() -> None:
-    teacher = AskedTeacher([lesson(1.0, 0.0)], stream(0, "teacher"), patience=10)
-    assert list(course(teacher, reached(), 40)) == [10, 20, 30]
 
 
 @pytest.mark.parametrize(

@@ -115,16 +115,9 @@ class CarelessSlope(Slope):
         return theta
 
 
-class CarelessFastSlope(CarelessSlope):
-    def execute_many(self, contexts: Array, thetas: Array, rngs: Sequence[np.random.Generator]) -> Array:
-        thetas *= 2
-        return thetas
-
-
-@pytest.mark.parametrize("environment", [CarelessSlope(), CarelessFastSlope()])
-def test_an_environment_that_writes_into_a_batch_leaves_the_callers_arrays_as_they_were(environment):
+def test_an_environment_that_writes_into_a_batch_leaves_the_callers_arrays_as_they_were():
     thetas = np.array([[0.25], [0.5]])
-    outcomes = execute_many(environment, np.empty((2, 0)), thetas, [stream(seed, "row") for seed in range(2)])
+    outcomes = execute_many(CarelessSlope(), np.empty((2, 0)), thetas, [stream(seed, "row") for seed in range(2)])
     assert outcomes.tolist() == [[0.5], [1.0]]
     assert thetas.tolist() == [[0.25], [0.5]]
 
@@ -144,13 +137,6 @@ def test_rest_is_the_end_of_the_straight_arm():
 def test_two_links_up_and_then_right_end_at_half_a_metre_each():
     arm = PlanarArm(2, max_angle=np.pi)
     np.testing.assert_allclose(end_of(arm, [0.75, 0.25]), [0.5, 0.5], atol=1e-15)  # pi/2, then -pi/2
-
-
-def test_angles_are_those_of_the_joints_from_the_middle_to_both_limits():
-    arm = PlanarArm(3, max_angle=0.5)
-    np.testing.assert_allclose(arm.angles([[0.5, 0.5, 0.5], [1.0, 1.0, 0.0]]), [[0, 0, 0], [np.pi, 0.5, -0.5]])
-    with pytest.raises(ValueError, match="theta must"):
-        arm.angles([0.5, 0.5, 1.1])
 
 
 @given(n_joints=st.integers(2, 50), seed=st.integers(0, 1000))

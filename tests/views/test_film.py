@@ -279,18 +279,6 @@ def test_a_frame_shows_the_arm_as_it_was_and_rings_on_the_water_about_base_and_g
     assert 0 < (np.abs(seen["past"] - seen["landed"]).max(axis=2) > 30).sum() < 200  # two small tiles
 
 
-def test_what_is_filmed_after_some_movements_does_not_know_what_came_later(own):
-    live(ARM)
-    live(f"{ARM} --movements 20 --name short")
-    casts = []
-    for name in ("short", "sagg-riac"):
-        run = read_run(f"runs/{name}/seed-000")
-        casts += film._cast(run, build(film.config_of(run, trust=True)), np.array([[0.5, 0.5]]), [20])
-    assert casts[0].recording.outcome.tolist() == casts[1].recording.outcome.tolist()
-    assert (casts[0].past == casts[1].past).all()
-    assert len(casts[0].past) == 20
-
-
 @pytest.mark.parametrize("gl", ["disable", "bogus"])
 def test_without_opengl_the_error_says_what_to_set(run_path, tmp_path, gl):
     done = filmed(run_path, gl, "--out", str(tmp_path / "film.mp4"))

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from markupsafe import escape
-from matplotlib.collections import PatchCollection, PolyCollection
+from matplotlib.collections import PatchCollection
 from matplotlib.figure import Figure
 from PIL import Image
 
@@ -204,23 +204,6 @@ def test_five_seeds_have_intervals_and_a_verdict_and_four_have_points_and_a_note
     assert "Fewer than 5 seeds: few (4)." in text[: text.index('id="results"')]
 
 
-def test_with_few_seeds_a_curve_has_points_in_the_place_of_a_band(run):
-    for errors, bands in ((FIVE[:4], 1), (FIVE, 2)):
-        variants = [made(run, "sgim-d", errors), made(run, "other", FIVE)]
-        figure = drawn(figures.curves, variants, {"sgim-d": "red", "other": "blue"})
-        assert sum(isinstance(each, PolyCollection) for each in figure.axes[0].collections) == bands
-
-
-def test_a_variant_alone_shows_each_of_its_seeds_and_its_floor_and_several_only_their_means(run):
-    variant, colours = made(run, "sgim-d", FIVE), {"sgim-d": "red", "other": "blue"}
-    alone = drawn(figures.curves, [variant], colours).axes[0]
-    lines = [line.get_ydata().tolist() for line in alone.lines]
-    assert all(errors in lines for errors in variant.errors.tolist())
-    assert "noise floor" in [text.get_text() for text in alone.get_legend().get_texts()]
-    beside = drawn(figures.curves, [variant, made(run, "other", FIVE)], colours).axes[0]
-    assert [line.get_ydata().tolist() for line in beside.lines] == 2 * [variant.curve[0].tolist()]
-
-
 def test_variants_of_one_algorithm_have_colours_of_their_own_whatever_their_results(run):
     names = ["b", "a", "sgim-d", "c"]
     colours = figures.colours_of([Variant(name, [run]) for name in names])
@@ -239,13 +222,6 @@ def test_one_outlier_neither_shrinks_a_map_nor_is_lost(run):
     ax = drawn(figures.landing, far, plane).axes[0]
     assert np.ptp(ax.get_xlim()) < 4
     assert ax.collections[1].get_offsets()[:, 0].max() == plane.high[0]
-
-
-def test_what_was_shown_several_times_is_drawn_once(run):
-    assert (run.demonstration >= 0).any()
-    twice = Variant("sgim-d", [run, replace(run, config={**run.config, "seed": 9})])
-    ax = drawn(figures.landing, twice, figures.planes_of([twice])["fishing-rod"]).axes[0]
-    assert f"{len(run.demonstrations)} demonstrated outcomes" in [line.get_label() for line in ax.lines]
 
 
 def test_regions_are_shown_by_competence_and_by_interest(run):
@@ -287,9 +263,7 @@ def test_the_commands_make_the_same_runs_again(pages, runs):
 @pytest.mark.parametrize(
     ("commits", "warning"),
     [
-        (["a" * 40, "b" * 40], "different versions of commit: aaa"),
         (["a" * 40 + "-dirty"] * 2, "2 runs came from a checkout with uncommitted changes"),
-        ([None, None], "The commit of 2 runs is not known"),
         (["a" * 40] * 2, ""),
     ],
 )

@@ -124,13 +124,6 @@ def test_a_run_that_is_too_short_is_named(runs, capsys):
     assert "seed-000 was not evaluated after 5000 movements" in capsys.readouterr().err
 
 
-def test_a_table_of_one_variant_has_its_row_alone(runs, capsys, monkeypatch):
-    monkeypatch.chdir(runs / "random")
-    for place in (runs / "random", "."):
-        assert table(place) == 0
-        assert [line.split()[:2] for line in capsys.readouterr().out.splitlines()[1:]] == [["random", "5"]]
-
-
 def test_a_damaged_run_is_named_and_nothing_is_printed(copied, capsys):
     path = copied / "random" / "seed-001"
     damage(path)
@@ -138,13 +131,6 @@ def test_a_damaged_run_is_named_and_nothing_is_printed(copied, capsys):
     said = capsys.readouterr()
     assert not said.out
     assert str(path) in said.err
-
-
-def test_what_was_not_measured_is_a_dash(runs, capsys):
-    assert table(runs, "--at", 40) == 0  # nothing was evaluated after 1000 movements
-    said = capsys.readouterr().out
-    assert "nan" not in said
-    assert said.splitlines()[1].split()[2] == "-"
 
 
 def last_column(said):
