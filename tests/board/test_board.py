@@ -381,7 +381,7 @@ def live_as(out, robot, make, **options):
 def test_outcomes_of_any_dimension_have_curves_and_pictures(tmp_path, dim, context_dim):
     directory = live_as(tmp_path, Slider(dim, context_dim), sagg_riac)
     curves = curves_of(directory)
-    assert {"error/mean", "competence/R", "interest/R", "goals/missed_by", "about/regions"} < curves.keys()
+    assert {"error/mean", "competence/R", "interest/R", "goals/missed_by"} < curves.keys()
     pictures = {tag for tag in curves if tag.startswith(("map/", "competent/"))}
     wanted = {"map/error", "map/competence"}
     assert pictures == wanted | ({"competent/since"} if dim == 2 else set())

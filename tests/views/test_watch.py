@@ -12,6 +12,7 @@ import urllib.request
 import pytest
 
 from runs import ROOT
+from sgimd_torch.__main__ import _call
 from sgimd_torch.runs.process import command
 from sgimd_torch.views.watch import main
 
@@ -68,5 +69,5 @@ def test_runs_without_a_board_are_told_how_to_get_one(tmp_path, monkeypatch, cap
 
 def test_a_missing_package_is_named_with_its_extra(runs, monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "tensorboard", None)
-    assert command(main, [str(runs)]) == 2
+    assert command(_call, ["watch", str(runs)]) == 2
     assert "pip install 'sgimd-torch[board]'" in capsys.readouterr().err

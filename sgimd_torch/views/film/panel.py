@@ -11,13 +11,9 @@ from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
-
-try:
-    from matplotlib import rc_context
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-except ImportError as error:
-    raise ImportError(f"films need {error.name}; install the extra film: pip install 'sgimd-torch[film]'") from error
+from matplotlib import rc_context
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 
 from sgimd_torch.figures.axes import limits, over_movements, rounded
 from sgimd_torch.figures.learning import misses

@@ -18,17 +18,13 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
+from imageio_ffmpeg import get_ffmpeg_exe
 from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
 
 from sgimd_torch.environments.protocol import Recorded
 from sgimd_torch.files import replacing
 from sgimd_torch.spaces import Array
-
-try:
-    from imageio_ffmpeg import get_ffmpeg_exe
-    from PIL import Image, ImageDraw, ImageFont
-except ImportError as error:
-    raise ImportError(f"films need {error.name}; install the extra film: pip install 'sgimd-torch[film]'") from error
 
 Frame = NDArray[np.uint8]  # (height, width, 3)
 
