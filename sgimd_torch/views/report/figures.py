@@ -72,8 +72,7 @@ def colours_of(variants: Sequence[Variant]) -> dict[str, str]:
     return found | {name: free[k % len(free)] for k, name in enumerate(others)}
 
 
-@png
-def curves(figure: Figure, variants: Sequence[Variant], colours: Mapping[str, str]) -> None:
+def error_curves(figure: Figure, variants: Sequence[Variant], colours: Mapping[str, str]) -> None:
     """Error against movements: interquartile means over seeds with their intervals, points where there are few seeds.
 
     A single variant is shown with its seeds, thin, and its noise floor.
@@ -99,6 +98,16 @@ def curves(figure: Figure, variants: Sequence[Variant], colours: Mapping[str, st
     ax.set_ylim(bottom=0)
     handles = [line for line in ax.lines if not str(line.get_label()).startswith("_")]
     ax.legend(handles=handles, **LEGEND)
+
+
+curves = png(error_curves)
+
+
+def figure_of_curves(variants: Sequence[Variant]) -> Figure:
+    """Their error curves, as a figure."""
+    figure = Figure(layout="constrained")
+    error_curves(figure, variants, colours_of(variants))
+    return figure
 
 
 def planes_of(variants: Sequence[Variant]) -> dict[str, Box]:
