@@ -113,41 +113,20 @@ def test_columns_are_checked_before_anything_is_read():
 def dataset(tmp_path):
     """Three episodes in two files, in the layout of LeRobot's v3."""
     root = tmp_path / "arm"
-    vector = {"dtype": "float32", "names": None}
-    features = {
-        "observation.state": {**vector, "shape": [3]},
-        "observation.place": {**vector, "shape": [2]},
-        **{name: {"dtype": "int64", "shape": [1], "names": None} for name in ("episode_index", "frame_index", "index")},
-        "timestamp": {"dtype": "float32", "shape": [1], "names": None},
-    }
-    info = {
-        "codebase_version": "v3.0",
-        "robot_type": "arm",
-        "fps": 10,
-        "total_episodes": 3,
-        "total_frames": 15,
-        "data_path": "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet",
-        "features": features,
-    }
+    names = ("observation.state", "observation.place", "timestamp", "episode_index")
+    info = {"codebase_version": "v3.0", "total_episodes": 3, "total_frames": 15, "features": dict.fromkeys(names)}
     for folder in ("meta", "data/chunk-000"):
         (root / folder).mkdir(parents=True)
     (root / "meta/info.json").write_text(json.dumps(info))
     for file, episodes in enumerate([(0, 1), (2,)]):
         rows = [(episode, frame) for episode in episodes for frame in range(5)]
-        table = pa.table(
-            {
-                "observation.state": pa.array(
-                    [[episode, frame / 8, 7.0] for episode, frame in rows], pa.list_(pa.float32(), 3)
-                ),
-                "observation.place": pa.array(
-                    [[frame, episode / 2] for episode, frame in rows], pa.list_(pa.float32())
-                ),
-                "timestamp": pa.array([frame / 10 for _, frame in rows], pa.float32()),
-                "frame_index": pa.array([frame for _, frame in rows], pa.int64()),
-                "episode_index": pa.array([episode for episode, _ in rows], pa.int64()),
-                "index": pa.array([5 * episode + frame for episode, frame in rows], pa.int64()),
-            }
+        columns = (
+            pa.array([[episode, frame / 8, 7.0] for episode, frame in rows], pa.list_(pa.float32(), 3)),
+            pa.array([[frame, episode / 2] for episode, frame in rows], pa.list_(pa.float32())),
+            pa.array([frame / 10 for _, frame in rows], pa.float32()),
+            pa.array([episode for episode, _ in rows], pa.int64()),
         )
+        table = pa.table(dict(zip(names, columns, strict=True)))
         pq.write_table(table, root / f"data/chunk-000/file-00{file}.parquet")
     return root
 
