@@ -9,7 +9,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from markupsafe import escape
-from matplotlib.collections import PatchCollection
 from matplotlib.figure import Figure
 from PIL import Image
 
@@ -212,25 +211,6 @@ def test_variants_of_one_algorithm_have_colours_of_their_own_whatever_their_resu
     assert figures.colours_of([Variant(name, [run]) for name in names[::-1]]) == colours
     assert figures.colours_of([Variant("b", [run])]) == {"b": COLOURS["sgim-d"]}
     assert len(figures.colours_of([Variant(str(k), [run]) for k in range(30)])) == 30
-
-
-def test_one_outlier_neither_shrinks_a_map_nor_is_lost(run):
-    landed = run.outcomes.copy()
-    landed[np.flatnonzero(np.isfinite(landed).all(axis=1))[3]] = [400.0, 0.3]
-    far = Variant("far", [replace(run, outcomes=landed)])
-    plane = figures.planes_of([Variant("sgim-d", [run]), far])["fishing-rod"]
-    ax = drawn(figures.landing, far, plane).axes[0]
-    assert np.ptp(ax.get_xlim()) < 4
-    assert ax.collections[1].get_offsets()[:, 0].max() == plane.high[0]
-
-
-def test_regions_are_shown_by_competence_and_by_interest(run):
-    above, below, *_ = drawn(figures.regions, run).axes
-    last = run.regions["movements"] == 60
-    for ax, name in ((above, "competence"), (below, "interest")):
-        (patches,) = (each for each in ax.collections if isinstance(each, PatchCollection))
-        values = np.ma.filled(np.ma.masked_invalid(patches.get_array()), np.nan)
-        assert np.array_equal(values, run.regions[name][last], equal_nan=True)
 
 
 def test_differences_are_those_to_the_baseline_that_was_chosen(runs, pages, tmp_path):

@@ -83,10 +83,10 @@ class Page:
                 self.server.flush()
                 last = now
         finally:
-            self._learner.submit(self.taught.close).result()
-            self._learner.shutdown()
             self.panel.status.content = ENDED.format(escape(str(self.taught.config.directory)))
             self.server.flush()
+            self._learner.submit(self.taught.close).result()
+            self._learner.shutdown()
             time.sleep(FAREWELL)
 
     def _attend(self) -> None:

@@ -90,6 +90,8 @@ class TaughtRun:
         total = self.config.movements
         if self.cannot_be_taught:
             raise ValueError(self.cannot_be_taught)
+        if self._life.replaying:
+            raise ValueError("it still replays what was recorded; a lesson has to wait until that is done")
         if self._life.movements >= total:
             raise ValueError(NO_MORE.format(total, 2 * total))
         self.parts.environment.contexts.check("context of the lesson", demonstration.context)

@@ -86,6 +86,8 @@ def test_it_goes_on_where_it_was_stopped_with_or_without_a_person(taught, teache
     before = lived(learning)
     other = TaughtRun(learning.config)
     assert other.practise(15).replaying
+    with pytest.raises(ValueError, match="still replays"):
+        other.show(SHOWN[7])
     assert not other.practise(25).replaying
     other.practise(10)
     assert other.standing().lessons == 1
