@@ -72,7 +72,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     print("\nMean distance to the benchmark goals after so many movements, and what a movement costs\n")
     table.main([str(base.out)])
     print(f"\nFigure  {figure}\nRuns    {base.out}\nTime    {time.monotonic() - began:.0f} s\n\nNext, try")
-    print(f"  sgimd film {base.directory} --time-lapse    # a film of how SGIM-D learns")
+    print(f"  sgimd film {base.directory}    # a film of what SGIM-D has learnt")
     print(f"  sgimd report {base.out}    # one page: curves, maps, where it is curious")
     return 0
 

@@ -169,7 +169,7 @@ def test_the_memory_rebuilt_from_the_log_judges_as_the_living_one_did(tmp_path, 
     parts = build(film.config_of(run))
     assert (run.demonstration[:35] >= 0).any()
     film.remember(run, parts, 0, 20)
-    film.remember(run, parts, 20, 35)  # in two steps, as a time lapse does
+    film.remember(run, parts, 20, 35)  # in two steps, as a film of several stages does
     seen = evaluate(parts.inverse, parts.environment, parts.benchmark.goals, 3, 35, repeats=0)
     assert seen.mean_error == run.evaluation["mean_error"][0]
 
@@ -189,8 +189,7 @@ def test_a_forward_model_learns_again_what_it_learnt_in_the_run(tmp_path, go):
         ("--goals 0.3,0.6 1,2,3", "--goals must have shape"),
         ("--goals -0.3,far", "--goals: invalid numbers value: ' -0.3,far'"),
         ("--goals 0.3,0.6 -30,60", "outside"),
-        ("--after 20", "belongs to --time-lapse"),
-        ("--time-lapse --after 41", "--after must be from 1 to 40"),
+        ("--after 20 41", "--after must be from 1 to 40"),
         ("--out film.avi", "--out must be a .mp4 or .webp file"),
         ("--out nowhere/film.mp4", "--out"),
     ],
@@ -224,7 +223,7 @@ def filmed(run_path, gl, *options):
 @pytest.mark.slow
 def test_a_film_of_the_rod_is_made_without_a_display_or_the_lack_of_opengl_is_explained(run_path, tmp_path):
     out = tmp_path / "film.mp4"
-    done = filmed(run_path, "egl", "--goals", "0.2,0.5", "--time-lapse", "--after", "40", "--out", str(out))
+    done = filmed(run_path, "egl", "--goals", "0.2,0.5", "--after", "40", "--out", str(out))
     assert "Traceback" not in done.stderr
     if done.returncode:  # a machine without EGL
         assert done.returncode == 2
