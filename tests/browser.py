@@ -55,9 +55,9 @@ def chromium():
 
 
 @contextmanager
-def served(session):
-    """The page of a session, served; its ``address``, and ``until(condition)``, which waits until that holds after one
-    of its ticks."""
+def served(taught):
+    """The page of a taught run, served; its ``address``, ``end()``, and ``until(condition)``, which waits until that
+    holds after one of its ticks."""
     ended, ticked = threading.Event(), threading.Condition()
 
     def stopped():
@@ -70,16 +70,15 @@ def served(session):
             ticked.wait_for(condition)
 
     with serving(8300, TOKEN) as server:
-        page = Page(server, session)
-        page.address, page.until = f"http://127.0.0.1:{server.get_port()}/?token={TOKEN}", until
-        with session:
-            loop = threading.Thread(target=page.run, args=(stopped,))
-            loop.start()
-            try:
-                yield page
-            finally:
-                ended.set()
-                loop.join()
+        page = Page(server, taught)
+        page.address, page.until, page.end = f"http://127.0.0.1:{server.get_port()}/?token={TOKEN}", until, ended.set
+        loop = threading.Thread(target=page.run, args=(stopped,))
+        loop.start()
+        try:
+            yield page
+        finally:
+            ended.set()
+            loop.join()
 
 
 class Tab:

@@ -11,7 +11,6 @@ import sgimd_torch.teachers.awaited
 from runs import LIVE, end, stopped
 from sgimd_torch.algorithms.asking import sgim_im
 from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.record import Record
 from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
@@ -109,15 +108,6 @@ def test_a_teacher_has_one_request_at_a_time_and_never_sees_one_that_was_given_u
     assert slow.begun == begun + 1
 
 
-def test_what_a_teacher_raises_arrives():
-    class Fails:
-        def demonstrate(self, context, goal, memory):
-            raise OSError("the camera is off")
-
-    with pytest.raises(OSError, match="the camera is off"):
-        ask(awaited(Fails()))
-
-
 @pytest.mark.parametrize("patience", [0, -1.0, float("nan")])
 def test_no_patience_at_all_is_refused(patience):
     with pytest.raises(ValueError, match="patience must be above 0 s, got"):
@@ -133,19 +123,6 @@ def test_without_an_answer_in_time_the_learner_goes_on_alone():
     slow.let.set()
     assert {e.reply for e in episodes} == {"", "timed out"}
     assert all(e.move is not None and e.move.origin != "imitate" for e in episodes)
-
-
-def test_answers_on_record_are_given_again_and_nobody_is_asked(tmp_path):
-    teachers = {"ann": AnsweringTeacher(SHOWN, stream(0, "t"))}
-    learner, again = (sgim_im(ARM, 0, correspondence=last_posture, teachers=teachers) for _ in range(2))
-    with Record.make(tmp_path / "life.sqlite", (0, 4, 2), {}) as record:
-        first = list(run(learner, ARM, 0, movements=30, teachers=teachers, record=record))
-        record.commit()
-    assert any(e.request for e in first)
-    with Record(tmp_path / "life.sqlite") as record:
-        second = list(run(again, ARM, 0, movements=30, teachers={"ann": None}, record=record))
-    assert [e.move.theta.tolist() for e in second] == [e.move.theta.tolist() for e in first]
-    assert [e.reply for e in second] == [e.reply for e in first]
 
 
 @pytest.fixture

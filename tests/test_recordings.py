@@ -78,13 +78,10 @@ def test_a_file_of_a_spreadsheet_with_a_mark_of_bytes_and_spaces_is_read(tmp_pat
     [
         ("", r"one\.csv has no column a, b, x, y, time; it has"),
         (ONE.replace("a,b", "a,c"), r"one\.csv has no column b; it has time, a, c, x, y"),
-        (ONE.splitlines()[0], r"one\.csv has no rows below"),
         (ONE.replace("0.3", "some"), "a must be numbers: .* 'some'"),
-        (ONE.replace("0.3", ""), "a must be numbers: .*''; is a field missing"),
         (ONE.replace("0.3", "nan"), r"one\.csv: a must be finite .*, but entry \[1, 0\] is nan"),
         (ONE.replace("2.5", "1.5"), r"one\.csv: time must increase from row to row; were the rows shuffled"),
         (ONE.replace(",9,9\n2.5", ",9,9,9\n2.5"), "row 1 has 6 fields, 5 were wanted"),
-        (ONE.rpartition(",")[0], "row 3 has 4 fields, 5 were wanted; is it cut short"),
         ("\n".join(ONE.splitlines()[:2]), "has 1 sample, at least 2"),
     ],
 )
@@ -116,41 +113,20 @@ def test_columns_are_checked_before_anything_is_read():
 def dataset(tmp_path):
     """Three episodes in two files, in the layout of LeRobot's v3."""
     root = tmp_path / "arm"
-    vector = {"dtype": "float32", "names": None}
-    features = {
-        "observation.state": {**vector, "shape": [3]},
-        "observation.place": {**vector, "shape": [2]},
-        **{name: {"dtype": "int64", "shape": [1], "names": None} for name in ("episode_index", "frame_index", "index")},
-        "timestamp": {"dtype": "float32", "shape": [1], "names": None},
-    }
-    info = {
-        "codebase_version": "v3.0",
-        "robot_type": "arm",
-        "fps": 10,
-        "total_episodes": 3,
-        "total_frames": 15,
-        "data_path": "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet",
-        "features": features,
-    }
+    names = ("observation.state", "observation.place", "timestamp", "episode_index")
+    info = {"codebase_version": "v3.0", "total_episodes": 3, "total_frames": 15, "features": dict.fromkeys(names)}
     for folder in ("meta", "data/chunk-000"):
         (root / folder).mkdir(parents=True)
     (root / "meta/info.json").write_text(json.dumps(info))
     for file, episodes in enumerate([(0, 1), (2,)]):
         rows = [(episode, frame) for episode in episodes for frame in range(5)]
-        table = pa.table(
-            {
-                "observation.state": pa.array(
-                    [[episode, frame / 8, 7.0] for episode, frame in rows], pa.list_(pa.float32(), 3)
-                ),
-                "observation.place": pa.array(
-                    [[frame, episode / 2] for episode, frame in rows], pa.list_(pa.float32())
-                ),
-                "timestamp": pa.array([frame / 10 for _, frame in rows], pa.float32()),
-                "frame_index": pa.array([frame for _, frame in rows], pa.int64()),
-                "episode_index": pa.array([episode for episode, _ in rows], pa.int64()),
-                "index": pa.array([5 * episode + frame for episode, frame in rows], pa.int64()),
-            }
+        columns = (
+            pa.array([[episode, frame / 8, 7.0] for episode, frame in rows], pa.list_(pa.float32(), 3)),
+            pa.array([[frame, episode / 2] for episode, frame in rows], pa.list_(pa.float32())),
+            pa.array([frame / 10 for _, frame in rows], pa.float32()),
+            pa.array([episode for episode, _ in rows], pa.int64()),
         )
+        table = pa.table(dict(zip(names, columns, strict=True)))
         pq.write_table(table, root / f"data/chunk-000/file-00{file}.parquet")
     return root
 
@@ -184,7 +160,6 @@ def change(dataset, **changes):
         (lambda root: (root / "data/chunk-000/file-001.parquet").unlink(), "says 15 frames, 10 were found"),
         (lambda root: (root / "meta/info.json").unlink(), r"is no LeRobot dataset: it has no meta/info\.json"),
         (lambda root: (root / "meta/info.json").write_text("{"), r"info\.json is no json"),
-        (lambda root: (root / "meta/info.json").write_text("[]"), r"info\.json must hold an object, got list"),
         (
             lambda root: [file.unlink() for file in (root / "data/chunk-000").iterdir()],
             "were only its videos copied",
@@ -192,10 +167,6 @@ def change(dataset, **changes):
         (
             lambda root: (root / "data/chunk-000/file-001.parquet").write_bytes(b"PAR1 of another kind"),
             r"file-001\.parquet cannot be read",
-        ),
-        (
-            lambda root: pq.write_table(pa.table({"timestamp": [0.1]}), root / "data/chunk-000/file-000.parquet"),
-            r"file-000\.parquet cannot be read",
         ),
     ],
 )
@@ -250,17 +221,14 @@ def test_check_says_where_each_lands(tmp_path, capsys):
     assert said[-1].startswith("2 of 2 can be used; they land")
 
 
-@pytest.mark.parametrize("fails", [SimulationError("it hit the table"), np.full(2, np.nan)])
-def test_check_says_whose_movement_has_no_outcome(tmp_path, capsys, monkeypatch, fails):
+def test_check_says_whose_movement_has_no_outcome(tmp_path, capsys, monkeypatch):
     def execute(self, context, theta, rng):
-        if isinstance(fails, Exception):
-            raise fails
-        return fails
+        raise SimulationError("it hit the table")
 
     save_demonstrations(tmp_path / "shown.npz", [led(0.1, lands(0.1))])
     monkeypatch.setattr(PlanarArm, "execute", execute)
     assert sgimd("check", tmp_path / "shown.npz", "--task", "planar-arm-7") == 2
-    assert re.search("cannot be used: (it hit the table|the outcome is not finite)", capsys.readouterr().out)
+    assert "cannot be used: it hit the table" in capsys.readouterr().out
 
 
 def test_check_names_those_that_cannot_be_used_and_exits_with_2(tmp_path, capsys):
@@ -316,11 +284,8 @@ def test_what_lies_outside_the_limits_of_speed_and_range_is_remarked(slow, tmp_p
         (["check", "nothing.npz", "--task", "planar-arm-7"], "there is no nothing.npz"),
         (["check", "one.csv", "--task", "planar-arm-7"], "one.csv is no .npz file, so name its columns"),
         (["check", "shown.npz", "--task", "rod"], "unknown environment 'rod'"),
-        (["check", "shown.npz"], "required: --task"),
         (["check", "two.npz", "--task", "planar-arm-7"], "its outcome has 1 numbers, the robot's has 2"),
-        (["import", "one.csv", "--joints", "a,q", "--outcome", "x", "--out", "o.npz"], "one.csv has no column q"),
         (["import", "one.csv", "--joints", "a,b", "--outcome", "x", "--out", "."], "--out must end in .npz"),
-        (["convert"], "invalid choice: 'convert'"),
     ],
 )
 def test_bad_requests_get_exit_code_2_and_leave_nothing(words, told, tmp_path, monkeypatch, capsys):

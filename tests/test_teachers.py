@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sgimd_torch.memory import Memory
-from sgimd_torch.spaces import Array, Demonstration, stream
+from sgimd_torch.spaces import Demonstration, stream
 from sgimd_torch.teachers import AskedTeacher, InitialTeacher, PeriodicTeacher, Teacher, at_random, least_explored
 
 NO_CONTEXT = np.zeros(0)
@@ -109,25 +109,15 @@ def test_tiles_without_a_demonstration_are_never_chosen_and_need_not_be_reached(
     assert set(choices(diagonal, reached([1.0, 1.0]))) == {(4.0, 4.0)}
 
 
-def test_outcomes_outside_the_demonstrated_box_count_for_no_tile() -> None:
-    far = reached(*[[x, y] for x in (-9.0, 2.0, 9.0) for y in (-9.0, 2.0, 9.0) if (x, y) != (2.0, 2.0)], [1e9, -1e9])
-    assert len(choices(QUARTERS, far)) == 4
-    just = reached([4.0 + 1e-9, 4.0], [4.0, 4.0 + 1e-9], [-1e-9, 0.0])
-    assert len(choices(QUARTERS, just)) == 4
-
-
-@pytest.mark.parametrize("tiles", [1, 2, 3, 7, 10, 49])
+@pytest.mark.parametrize("tiles", [1, 2, 7, 49])
 def test_borders_belong_to_a_tile_the_outermost_included(tiles: int) -> None:
     # Whatever was demonstrated and then reached exactly counts there, however low + tiles * side was rounded.
     rng = stream(tiles, "corners")
-    for _ in range(50):
+    for _ in range(20):
         low = rng.normal(0, 1, 2)
         high = low + rng.uniform(0.1, 3, 2)
-        corners = [lesson(*low), lesson(*high)]
-        shown = choices(corners, reached(high), n=20, tiles=tiles)
+        shown = choices([lesson(*low), lesson(*high)], reached(high), n=20, tiles=tiles)
         assert set(shown) == ({tuple(low)} if tiles > 1 else {tuple(low), tuple(high)})
-        inside = reached(high - 1e-3 * (high - low))
-        assert set(choices(corners, inside, n=20, tiles=tiles)) == set(shown)
 
 
 def test_demonstrations_on_a_line_or_on_one_point_have_tiles_too() -> None:
@@ -154,21 +144,6 @@ def test_the_asked_teacher_is_silent_while_progress_is_made_and_demonstrates_whe
     assert offered == [40, 60]
 
 
-def test_the_asked_teacher_demonstrates_to_a_learner_that_rests() -> None:
-    teacher = AskedTeacher([lesson(1.0, 0.0)], stream(0, "teacher"), patience=10)
-    assert list(course(teacher, reached(), 40)) == [10, 20, 30]
-
-
-def test_the_asked_teacher_judges_by_all_its_demonstrations() -> None:
-    teacher = AskedTeacher([lesson(1.0, 0.0), lesson(-1.0, 0.0)], stream(0, "teacher"), patience=1)
-    memory = reached([0.0, 0.0])
-    assert teacher.offer(1, memory) is None
-    memory.add(NO_CONTEXT, np.zeros(3), np.array([0.5, 0.0]))
-    assert teacher.offer(2, memory) is None  # mean distance from 1 to .75
-    memory.add(NO_CONTEXT, np.zeros(3), np.array([0.51, 0.0]))
-    assert teacher.offer(3, memory) is not None  # to .745, by less than a hundredth
-
-
 @pytest.mark.parametrize(
     "make",
     [
@@ -192,21 +167,3 @@ def test_demonstrations_of_another_robot_are_refused_by_name(other: Demonstratio
         least_explored([other] * 9, reached([0.0, 0.0]), stream(0, "teacher"))
     with pytest.raises(ValueError, match=r"demonstrations must have contexts .*all alike, got .*\(2,\)"):
         PeriodicTeacher([LESSONS[0], other], stream(0, "teacher"))
-
-
-def test_tiles_are_counted_as_if_all_outcomes_were_looked_at_each_time() -> None:
-    rng, memory, asked = stream(0, "test"), Memory(0, 1, 2), stream(1, "teacher")
-    shown = [Demonstration(np.zeros(0), np.arange(2.0), np.zeros((2, 1)), outcome) for outcome in rng.random((40, 2))]
-    demonstrated = np.array([demonstration.outcome for demonstration in shown])
-    low, high = demonstrated.min(axis=0), demonstrated.max(axis=0)
-    for n in (0, 1, 30, 2500, 3):
-        for outcome in rng.normal(0.5, 0.4, (n, 2)):
-            memory.add(np.zeros(0), np.zeros(1), outcome)
-        for tiles in (10, 3):
-
-            def cells(outcomes: Array, tiles: int = tiles) -> Array:
-                return np.where(outcomes == high, tiles - 1, np.floor((outcomes - low) / ((high - low) / tiles)))
-
-            reached = (cells(memory.outcomes) == cells(demonstrated)[:, None]).all(axis=2).sum(axis=1)
-            chosen = least_explored(shown, memory, asked, tiles=tiles)
-            assert reached[[demonstration is chosen for demonstration in shown]] == reached.min()

@@ -14,7 +14,7 @@ from typing import Any, Final, Protocol
 from sgimd_torch.board.curves import Behaviour, Competent, of_regions
 from sgimd_torch.board.events import EventFile
 from sgimd_torch.board.legend import LEGEND, METRICS, OF_GOALS, OF_REGIONS, charts
-from sgimd_torch.board.pictures import draw, where
+from sgimd_torch.board.pictures import draw
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.evaluation import Benchmark, Evaluation
 from sgimd_torch.goals.regions import Region
@@ -116,5 +116,3 @@ class BoardListener:
         parts, space = self._parts, self._parts.environment.outcomes
         for tag, png in draw(parts.regions, space, self._competent, parts.benchmark.goals, found.errors).items():
             self._file.image(self._movements, tag, png)
-        if parts.regions:
-            self._file.text(self._movements, "about/regions", where(parts.regions))

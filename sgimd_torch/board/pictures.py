@@ -15,7 +15,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from sgimd_torch.board.curves import DEPTH, Competent, branches, summary
+from sgimd_torch.board.curves import DEPTH, Competent, branches
 from sgimd_torch.figures.axes import colour_bar, plane
 from sgimd_torch.figures.learning import competence_map, misses
 from sgimd_torch.figures.sections import Section, sections
@@ -50,17 +50,6 @@ def draw(
     if regions:
         pictures["map/competence"] = lambda ax, section: _competence(ax, regions, section)
     return {name: _png(picture, sections(space)) for name, picture in pictures.items()}
-
-
-def where(regions: Sequence[Region]) -> str:
-    """A table, in Markdown, of the regions that have curves of their own: corners, competence, interest."""
-    lines = ["| region | corner below | corner above | goals | competence | interest |", "|---|---|---|---|---|---|"]
-    for path, below in branches(regions, DEPTH).items():
-        lows, highs = _boxes(below)
-        corners = (", ".join(f"{x:.2f}" for x in corner) for corner in (lows.min(axis=0), highs.max(axis=0)))
-        competence, interest, goals = summary(below)
-        lines.append(f"| {path} | {' | '.join(corners)} | {goals} | {competence:.2f} | {interest:.3f} |")
-    return "\n".join(lines)
 
 
 def _competence(ax: Axes, regions: Sequence[Region], section: Section) -> None:

@@ -253,7 +253,6 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
         "high-half": _answering("has those of the upper half", "high_half"),
         "mislabelling": _answering("shows something else than is said", "mislabelled"),
         "slow": _answering("the nearest of all, for which the learner rests 10 movements", takes=10),
-        "by-hand": _at("teachers.by_hand:nobody", "a person, if there is one: sgimd teach"),
     },
 }
 # Parts that several others share: made once for a run, and only if something takes a parameter of this name.

@@ -1,8 +1,7 @@
-"""How a theta becomes a sequence of commands: sums of knots, or a sinusoid for each joint.
+"""How a theta becomes a sequence of commands: here, by a sinusoid for each joint.
 
 A controller has ``policies``, its Pi, and ``at(theta, times)``, the commands, as `GaussianPrimitive` has; so each can
-replace the others. Each translates a recording by its ``correspondence``, eq. (6) of Nguyen & Oudeyer
-(2014).
+replace the other. Both translate a recording by their ``correspondence``, eq. (6) of Nguyen & Oudeyer (2014).
     swim = Sinusoids(actions, frequencies=(0.2, 2.0)); commands = swim.at(theta, times)
 """
 
@@ -30,59 +29,6 @@ class Controller(Protocol):
     def at(self, theta: Array, times: Array) -> Array:
         """``(n_times, n_commands)`` at ``times`` ``(n_times,)`` s after the start."""
         ...
-
-
-class Knots:
-    """Commands at equally spaced times, with straight lines between them.
-
-    theta in [0, 1]^(n_commands * n_knots) holds the knots command by command, scaled to their ranges.
-
-    Args:
-        commands: ``(n_commands,)`` box of their ranges, such as the torques of motors.
-        duration: s, from the first knot to the last; the last one is held.
-        n_knots: for each command, at least 2.
-
-    Raises:
-        ValueError: a duration that is not positive, or fewer than two knots.
-    """
-
-    def __init__(self, commands: Box, duration: float, *, n_knots: int = 5) -> None:
-        if not 0 < duration < np.inf or n_knots < 2:
-            raise ValueError(f"needs a duration > 0 s and n_knots >= 2, got {duration} and {n_knots}")
-        self.commands, self.duration, self.n_knots = commands, duration, n_knots
-        self.policies = Box.cube(0.0, 1.0, commands.dim * n_knots)
-
-    def at(self, theta: Array, times: Array) -> Array:
-        """``(n_times, n_commands)`` at ``times`` (s)."""
-        knots = theta.reshape(self.commands.dim, self.n_knots)
-        return self.commands.low + self.commands.sides * (self._weights(times / self.duration) @ knots.T)
-
-    def correspondence(self, times: ArrayLike, trajectory: ArrayLike) -> Array:
-        """theta_d, the policy whose commands come nearest to the recorded ones, eq. (6); each knot inside its range.
-
-        Args:
-            times: ``(n_times,)`` s, increasing.
-            trajectory: ``(n_times, n_commands)``.
-
-        Raises:
-            ValueError: shapes that do not fit, values that are not finite, unsorted times, or a recording longer than
-                ``duration``.
-        """
-        from scipy.optimize import lsq_linear  # takes longer to import than this whole library
-
-        times, trajectory = check_recording(times, trajectory, self.commands.dim, longest=self.duration)
-        weights = self._weights((times - times[0]) / self.duration)
-        scaled = (trajectory - self.commands.low) / self.commands.sides
-        # A recording may end before the last knots; these then stay in the middle, as nothing else pulls at them.
-        steady = 1e-6 * np.eye(self.n_knots)
-        weights = np.vstack([weights, steady])
-        scaled = np.vstack([scaled, np.full((self.n_knots, self.commands.dim), 0.5e-6)])
-        knots = [lsq_linear(weights, column, bounds=(0.0, 1.0), tol=1e-12).x for column in scaled.T]
-        return self.policies.clip(np.concatenate(knots))
-
-    def _weights(self, phases: Array) -> Array:
-        places = np.clip(phases, 0.0, 1.0) * (self.n_knots - 1)
-        return np.maximum(0.0, 1.0 - np.abs(places[:, None] - np.arange(self.n_knots)))
 
 
 class Sinusoids:

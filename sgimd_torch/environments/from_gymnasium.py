@@ -26,18 +26,6 @@ except ImportError as error:
     raise ImportError(f"this environment needs gymnasium: pip install 'sgimd-torch[gym]' ({error})") from error
 
 
-def achieved_goal(observations: Sequence[Any]) -> Array:
-    """The outcome of a goal environment: ``achieved_goal`` of the last observation.
-
-    Raises:
-        ValueError: observations of another kind.
-    """
-    last = observations[-1]
-    if not isinstance(last, dict) or "achieved_goal" not in last:
-        raise ValueError(f"outcome= is needed: observations are no dict with achieved_goal, but {type(last).__name__}")
-    return np.asarray(last["achieved_goal"], dtype=np.float64)
-
-
 class FromGymnasium:
     """An environment of ours that plays episodes of a gymnasium environment.
 
@@ -51,8 +39,7 @@ class FromGymnasium:
         rest: ``(outcome_dim,)`` the outcome of doing nothing, in T.
         outcome_noise: standard deviation of the outcomes of one movement, per dimension; see `measured_noise`.
         steps: the most actions of an episode; it ends earlier when the world says so.
-        outcome: the observations of an episode, the first included -> ``(outcome_dim,)``; a slice of the last one; or
-            `achieved_goal`.
+        outcome: the observations of an episode, the first included -> ``(outcome_dim,)``.
         dt: s from one action to the next; None for that of the world, which those of MuJoCo have.
 
     Raises:
@@ -68,7 +55,7 @@ class FromGymnasium:
         rest: ArrayLike,
         outcome_noise: float,
         steps: int,
-        outcome: slice | Callable[[Sequence[Any]], ArrayLike] = achieved_goal,
+        outcome: Callable[[Sequence[Any]], ArrayLike],
         dt: float | None = None,
     ) -> None:
         if not isinstance(world.action_space, gymnasium.spaces.Box) or len(world.action_space.shape) != 1:
@@ -85,7 +72,7 @@ class FromGymnasium:
         self.outcome_noise, self.steps, self.dt = float(outcome_noise), check_count("steps", steps, 1), float(dt)
         if hasattr(controller, "correspondence"):
             self.correspondence = controller.correspondence
-        self._outcome = (lambda seen: seen[-1][outcome]) if isinstance(outcome, slice) else outcome
+        self._outcome = outcome
 
     def observe(self, rng: np.random.Generator) -> Array:
         """``(0,)``: where an episode starts is noise."""
@@ -97,7 +84,7 @@ class FromGymnasium:
         Raises:
             ValueError: ``theta`` is not one point of Pi, or the observations make no outcome.
             TypeError: ``rng`` is not a Generator.
-            SimulationError: MuJoCo gave a warning, or the last observation is not finite.
+            SimulationError: MuJoCo gave a warning, or the outcome is not finite.
         """
         _, theta = check_movement(self, context, theta)
         actions = self.controller.at(theta, self.dt * np.arange(self.steps, dtype=np.float64))
@@ -142,9 +129,10 @@ class FromGymnasium:
         warned = getattr(getattr(self.world.unwrapped, "data", None), "warning", None)
         if warned is not None and np.any(warned.number):
             raise SimulationError("MuJoCo gave a warning: the simulation diverged, or ran out of room", theta)
-        if not all(np.isfinite(part).all() for part in _parts(observations[-1])):
-            raise SimulationError("the last observation is not finite", theta)
-        return check_point("outcome", np.array(self._outcome(observations), dtype=np.float64), self.outcomes.dim)
+        outcome = np.array(self._outcome(observations), dtype=np.float64)
+        if not np.isfinite(outcome).all():
+            raise SimulationError("the outcome is not finite", theta)
+        return check_point("outcome", outcome, self.outcomes.dim)
 
 
 def make_world(name: str, **options: Any) -> gymnasium.Env[Any, Any]:
@@ -167,12 +155,3 @@ def measured_noise(environment: FromGymnasium, rng: np.random.Generator, *, move
         outcomes = [environment.execute(context, theta, rng) for _ in range(3)]
         variances.append(np.var(outcomes, axis=0, ddof=1))
     return float(np.sqrt(np.mean(variances)))
-
-
-def _parts(observation: Any) -> list[Any]:
-    """The arrays of an observation, which may be nested."""
-    if isinstance(observation, dict):
-        observation = tuple(observation.values())
-    if isinstance(observation, tuple):
-        return [part for each in observation for part in _parts(each)]
-    return [observation] if np.issubdtype(np.asarray(observation).dtype, np.number) else []

@@ -33,7 +33,6 @@ def landing_points(
     *,
     demonstrated: Array | None = None,
     side: float = 0.05,
-    most: float | None = None,
 ) -> QuadMesh:
     """Where movements landed, and how often: a histogram on a logarithmic scale, empty tiles white.
 
@@ -44,16 +43,15 @@ def landing_points(
         section: which dimensions to show.
         demonstrated: ``(n, outcome_dim)``, drawn as crosses, those that were demonstrated several times once.
         side: of a tile, in the unit of T.
-        most: the count at the end of the colour scale, so that two histograms can share it; None for their own.
 
     Returns:
         The tiles; their array holds the counts, ``(n_y, n_x)``, masked where 0.
     """
-    tile = section.tile(side)
-    tiles = np.ma.masked_equal(tile_counts(section.points(outcomes), section.box, tile), 0)
-    norm = LogNorm(1, max(2, float(tiles.filled(0).max()) if most is None else most))
+    edges, (x, y) = _edges(section.box, section.tile(side)), section.points(outcomes).T
+    tiles = np.ma.masked_equal(np.histogram2d(x, y, bins=edges)[0].T, 0)
+    norm = LogNorm(1, max(2, float(tiles.filled(0).max())))
     blues = ListedColormap(colormaps["Blues"](np.linspace(0.25, 1.0, 256)))  # a single point is visible on white
-    mesh = ax.pcolormesh(*_edges(section.box, tile), tiles, norm=norm, cmap=blues)
+    mesh = ax.pcolormesh(*edges, tiles, norm=norm, cmap=blues)
     same_scale = box.dim == 2 and alike(box.sides)
     label = f"movements on a tile of {box.amount(side)}" if same_scale else "movements on a tile"
     bar = colour_bar(ax, mesh, label)
@@ -71,12 +69,6 @@ def landing_points(
         note(ax, f"{len(outside)} of {len(outcomes)} landed outside: squares at the edge")
     section.frame(ax)
     return mesh
-
-
-def tile_counts(outcomes: Array, box: Box, side: float | Array) -> Array:
-    """``(n_y, n_x)`` how many of the ``outcomes`` ``(n, 2)`` lie on each tile of the plane."""
-    x, y = _edges(box, side)
-    return np.histogram2d(outcomes[:, 0], outcomes[:, 1], bins=(x, y))[0].T
 
 
 def interest_map(

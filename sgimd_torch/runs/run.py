@@ -177,12 +177,8 @@ class Life:
         self.record.commit()
 
     def _awaited(self, name: str, teacher: Demonstrator) -> Demonstrator:
-        """A person who teaches by hand is waited for by the page that they see."""
         from sgimd_torch.teachers.awaited import Awaited  # most learners ask nobody
-        from sgimd_torch.teachers.by_hand import ByHand
 
-        if isinstance(teacher, ByHand):
-            return teacher
         return Awaited(name, teacher, patience=self.parts.config.patience, say=say)
 
     @property

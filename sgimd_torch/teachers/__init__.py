@@ -9,10 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from typing import Final, Protocol
-from weakref import WeakKeyDictionary
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, Demonstration, check_count, check_rng, check_vector
@@ -50,42 +48,18 @@ def least_explored(
     """
     shown = [demonstration.outcome for demonstration in demonstrations]
     demonstrated = check_vector("outcomes of the demonstrations", shown, memory.outcome_dim, "of another robot?")
-    reached = _REACHED.get(memory)
-    if reached is None or reached.n_tiles != tiles or not np.array_equal(reached.demonstrated, demonstrated):
-        reached = _REACHED[memory] = _Reached(demonstrated, tiles)
-    counts = reached.counts(memory.outcomes)
-    tile = rng.choice(np.flatnonzero(counts == counts.min()))
-    return demonstrations[int(rng.choice(np.flatnonzero(reached.tile_of == tile)))]
+    low, high = demonstrated.min(axis=0), demonstrated.max(axis=0)
+    side = np.maximum(high - low, 1e-9) / tiles  # never 0, also for demonstrations on a line
 
-
-class _Reached:
-    """How many outcomes lie on each tile with demonstrations; asked again, it counts the newest ones only.
-
-    ``tile_of`` ``(n,)`` numbers the tiles of the ``demonstrated`` outcomes ``(n, outcome_dim)``.
-    """
-
-    def __init__(self, demonstrated: Array, n_tiles: int) -> None:
-        self.demonstrated, self.n_tiles = demonstrated, n_tiles
-        self._low, self._high = demonstrated.min(axis=0), demonstrated.max(axis=0)
-        self._side = np.maximum(self._high - self._low, 1e-9) / n_tiles  # never 0, also for demonstrations on a line
-        self._tiles, inverse = np.unique(self._cells(demonstrated), axis=0, return_inverse=True)
-        self.tile_of = inverse.ravel()
-        self._counts, self._counted = np.zeros(len(self._tiles), dtype=np.int64), 0
-
-    def counts(self, outcomes: Array) -> NDArray[np.int64]:
-        """``(n_tiles_with_demonstrations,)`` of ``outcomes`` ``(m, outcome_dim)``, to which rows were only added."""
-        new, self._counted = outcomes[self._counted :], len(outcomes)
-        for start in range(0, len(new), 1000):  # little memory
-            on_tile = (self._cells(new[start : start + 1000])[:, None] == self._tiles).all(axis=2)
-            self._counts += on_tile.sum(axis=0)
-        return self._counts
-
-    def _cells(self, outcomes: Array) -> Array:
+    def cells(outcomes: Array) -> Array:
         # The upper border belongs to the last tile; otherwise the farthest demonstrations would have their own tile.
-        return np.where(outcomes == self._high, self.n_tiles - 1, np.floor((outcomes - self._low) / self._side))
+        return np.where(outcomes == high, tiles - 1, np.floor((outcomes - low) / side))
 
-
-_REACHED: WeakKeyDictionary[Memory, _Reached] = WeakKeyDictionary()
+    occupied, tile_of = np.unique(cells(demonstrated), axis=0, return_inverse=True)
+    reached = cells(memory.outcomes)
+    counts = np.array([(reached == tile).all(axis=1).sum() for tile in occupied])
+    chosen = rng.choice(np.flatnonzero(counts == counts.min()))
+    return demonstrations[int(rng.choice(np.flatnonzero(tile_of.ravel() == chosen)))]
 
 
 class PeriodicTeacher:

@@ -1,4 +1,4 @@
-"""A person who teaches by hand: what they give is shown at once, and a learner that asks can ask them.
+"""A person who teaches by hand: what they give is shown at once.
 
 Section 2.3 of Nguyen & Oudeyer (2014): kinesthetic demonstrations.
     teacher = ByHand(teacher); teacher.give(demonstration); teacher.offer(120, memory)
@@ -7,20 +7,17 @@ Nothing is drawn here, and the record of a run keeps what was shown, so a replay
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
 
 from sgimd_torch.memory import Memory
-from sgimd_torch.spaces import Array, Demonstration
+from sgimd_torch.spaces import Demonstration
 from sgimd_torch.teachers import Teacher
 
 BY_HAND: Final = "by-hand"
 """Who has shown a lesson by hand, in the record; also the word of the command line."""
-
-Ask = Callable[[Array, Array, Memory], Demonstration | None]
-"""(context, goal, memory) -> what a person shows to a learner that asks, or None."""
 
 
 class ByHand:
@@ -32,13 +29,11 @@ class ByHand:
         teacher: another one, None if there is none.
 
     Attributes:
-        ask: asks the person who is there; None if nobody is.
         who: showed what was offered last, as the record has it.
     """
 
     def __init__(self, teacher: Teacher | None = None) -> None:
         self.teacher, self.who = teacher, "teacher"
-        self.ask: Ask | None = None
         self._given: Demonstration | None = None
 
     def give(self, demonstration: Demonstration) -> None:
@@ -51,10 +46,6 @@ class ByHand:
         given, self._given = self._given, None
         self.who = "teacher" if given is None else BY_HAND
         return offered if given is None else given
-
-    def demonstrate(self, context: Array, goal: Array, memory: Memory) -> Demonstration | None:
-        """See ``Demonstrator``."""
-        return None if self.ask is None else self.ask(context, goal, memory)
 
 
 def nobody(demonstrations: Sequence[Demonstration], rng: np.random.Generator) -> ByHand:

@@ -5,7 +5,7 @@ random. SGIM-D has curiosity and a teacher. The third, practice-taught, is this 
 at the start, then it practises, one movement for each goal. They write to --out (default: runs/demo):
 
   random/seed-000/ and so on   everything that happened (docs/runs.md explains the files)
-  demo.png                     how the error falls; where the float landed; how far each goal is missed
+  demo.png                     how the error falls
 
 Start it again after Ctrl-C or a power cut, and it goes on where it stopped; finished runs are used as they are. Options
 of sgimd run apply to all three; sgimd run --help lists them.
@@ -55,7 +55,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         from sgimd_torch.figures.save import save_figure
         from sgimd_torch.runs.build import build
         from sgimd_torch.views import table
-        from sgimd_torch.views.demo_figure import draw
+        from sgimd_torch.views.report.figures import figure_of_curves
+        from sgimd_torch.views.variants import Variant
     began, base = time.monotonic(), configs["sgim-d"]
     for config in configs.values():
         build(config)  # a wrong option is refused before anything starts
@@ -66,13 +67,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         failures = sweep(longest_first, submit)
     if failures:
         raise Failed("\n".join(failures))
-    say("drawing where the float landed, and how far each goal is missed")
-    runs = {algorithm: read_run(config.directory) for algorithm, config in configs.items()}
-    (figure,) = save_figure(partial(draw, runs), base.out / "demo", "png")
+    variants = [Variant(name, [read_run(config.directory)]) for name, config in configs.items()]
+    (figure,) = save_figure(partial(figure_of_curves, variants), base.out / "demo", "png")
     print("\nMean distance to the benchmark goals after so many movements, and what a movement costs\n")
     table.main([str(base.out)])
     print(f"\nFigure  {figure}\nRuns    {base.out}\nTime    {time.monotonic() - began:.0f} s\n\nNext, try")
-    print(f"  sgimd film {base.directory} --time-lapse    # a film of how SGIM-D learns")
+    print(f"  sgimd film {base.directory}    # a film of what SGIM-D has learnt")
     print(f"  sgimd report {base.out}    # one page: curves, maps, where it is curious")
     return 0
 

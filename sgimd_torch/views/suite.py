@@ -1,20 +1,18 @@
 """One learner on many robots: is it better than movements at random, on robots that it was not tuned for, too?
 
 Each task is run with the learner of your choice and with two others that it has to beat: random movements, and goals
-drawn anywhere, each with one movement: the nearest so far plus noise. Both answer with the nearest neighbour. What is
-shown is the error divided by that of random movements after as many movements: below 1 is better. Options of sgimd run
-choose the learner; --vary, as in sgimd sweep, compares several. Defaults of this library are chosen on half of the
-tasks only; the others are marked "new".
+drawn anywhere, each with one movement: the nearest so far plus noise. Both answer with the nearest neighbour. Each task
+has a table in its own unit, that of sgimd table: in the last column, errors minus those of random movements. Options
+of sgimd run choose the learner; --vary, as in sgimd sweep, compares several. Defaults of this library are chosen on
+half of the tasks only; the others are marked "new".
 
   sgimd suite                                             the default learner on the tasks that need no physics
   sgimd suite --seeds 0-9 --movements 2000 --out study    runs go to study/TASK/NAME/seed-000
   sgimd suite --vary inverse=linear,process --seeds 0-4   which inverse model?
   sgimd suite --tasks all                                 with fishing rod and swimmer (extra gym): minutes a run
   sgimd suite --tasks toss crawler --algorithm sagg-riac --budget 4
-  sgimd table study/toss                                  one task in its own unit
 
-Start the same command again after Ctrl-C or a power cut, or with more seeds: finished runs stay as they are. With five
-seeds or more, ratios have bootstrap intervals of 95 %.
+Start the same command again after Ctrl-C or a power cut, or with more seeds: finished runs stay as they are.
 
 Exit code: 0 all runs are finished, 1 some failed, 2 the request is wrong, 130 or 143 stopped by Ctrl-C or SIGTERM.
 """
@@ -30,7 +28,6 @@ from sgimd_torch.catalogue import ROD
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.read import finished
 from sgimd_torch.runs.sweep import add_engines, add_options, add_vary, carry_out, variants_of
-from sgimd_torch.views.text_table import print_table
 
 
 @dataclass(frozen=True)
@@ -79,14 +76,15 @@ OWN: Final = ("environment", "benchmark", "demonstrations", "name")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run what is not finished, print the table; 1 where runs failed."""
+    """Run what is not finished, print a table for each task; 1 where runs failed."""
     options, rest = _options(argv)
     configs, flags = runs_of(options, rest)
     code = carry_out(configs, options, flags, configs[0].out.parent)
-    from sgimd_torch.views.suite_table import errors_of, table  # scipy's statistics take long to import
+    from sgimd_torch.views import table  # scipy's statistics take long to import
 
-    if not options.dry_run and (errors := errors_of([config for config in configs if finished(config)], titled)):
-        print_table(table(errors))
+    for place in [] if options.dry_run else dict.fromkeys(config.out for config in configs if finished(config)):
+        print(f"\n{titled(place.name)}")
+        table.main([str(place), "--baseline", RANDOM])
     return code
 
 

@@ -120,12 +120,12 @@ class Variant:
         return np.array(shown, dtype=np.float64).reshape(len(shown), self.landed.shape[1])
 
     @cached_property
-    def misses(self) -> tuple[Array, Array, Array]:
-        """Goals ``(n, outcome_dim)`` of the last evaluation, their errors ``(n,)``, means over the seeds that have the
-        same goals, and contexts ``(n, context_dim)``."""
+    def misses(self) -> tuple[Array, Array]:
+        """Goals ``(n, outcome_dim)`` of the last evaluation, and their errors ``(n,)``, means over the seeds that have
+        the same goals."""
         goals = self.typical.benchmark
-        errors = [run.missed_by(self.last) for run in self.used if np.array_equal(run.benchmark, goals)]
-        return goals, np.mean([each for each, _ in errors], axis=0), errors[0][1]
+        errors = [run.missed_by(self.last)[0] for run in self.used if np.array_equal(run.benchmark, goals)]
+        return goals, np.mean(errors, axis=0)
 
     @property
     def typical(self) -> Run:

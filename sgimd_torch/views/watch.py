@@ -51,7 +51,6 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     Raises:
         ValueError: there is no board.
-        ImportError: tensorboard is not installed.
         Failed: TensorBoard cannot start.
     """
     options = parser().parse_args(argv)
@@ -70,13 +69,10 @@ def serve(runs: Path, port: int | None) -> str:
         port: of this machine; 0 for any that is free, None for the first free one from 6006 on.
 
     Raises:
-        ImportError: tensorboard is not installed.
         Failed: TensorBoard cannot start, such as on a port that is taken.
     """
-    try:
-        from tensorboard import program  # the extra "board"
-    except ImportError as error:
-        raise ImportError(f"sgimd watch needs {error.name}: pip install 'sgimd-torch[board]'") from error
+    from tensorboard import program  # the extra "board"; TensorBoard takes long to import
+
     kept = ",".join(f"{plugin}={POINTS}" for plugin in ("scalars", "images", "text"))
     words = ["", "--logdir", str(runs), "--host", "127.0.0.1", "--reload_interval", "5", "--samples_per_plugin", kept]
     board = program.TensorBoard()

@@ -15,7 +15,7 @@ from tensorboard.util.tensor_util import make_ndarray
 
 from runs import arguments, content_of, end, stopped_at
 from sgimd_torch import InterestMap, stream
-from sgimd_torch.algorithms import random_exploration, sagg_riac
+from sgimd_torch.algorithms import sagg_riac
 from sgimd_torch.board import pictures
 from sgimd_torch.board.curves import Behaviour, Competent, Grid, branches, cells_of, of_regions
 from sgimd_torch.board.events import EventFile
@@ -135,26 +135,6 @@ def test_a_region_that_was_cut_goes_on_as_the_mean_over_the_goals_of_its_parts()
     assert values["regions/count"] == len(regions)
 
 
-def test_the_names_of_regions_are_bounded_and_none_disappears_while_the_tree_grows():
-    goals, names, rng = interest_map(0), set(), stream(1, "goals")
-    for _ in range(2000):
-        goals.add([], PLANE.sample(rng), -rng.random())
-        if rng.random() < 0.05:
-            now = {tag for tag in of_regions(goals.regions) if tag.startswith("interest/")}
-            assert names <= now
-            names = now
-    assert len(goals.regions) > 20
-    assert names <= {f"interest/R{k:b}".replace("R1", "R") for k in range(1, 16)}  # 15, three levels below the root
-
-
-def test_cells_of_a_fixed_grid_lie_below_the_whole_and_have_no_curves_of_their_own():
-    (region,) = interest_map(0).regions
-    halves = [dataclasses.replace(region, path=path) for path in ("R.0", "R.1")]
-    assert branches(halves, 3) == {"R": halves}
-    assert of_regions(halves) == {"regions/count": 2}
-    assert of_regions([]) == {}
-
-
 def test_cells_of_the_grid_hold_each_point_once_the_border_included():
     grid = Grid(PLANE)
     assert len(grid.names) == len(set(grid.names)) == 16
@@ -162,7 +142,7 @@ def test_cells_of_the_grid_hold_each_point_once_the_border_included():
     assert means == {"x -1..-0.5, y -1..-0.5": 1, "x 0.5..1, y 0.5..1": 2, "x 0..0.5, y 0..0.5": 3.5}
 
 
-@pytest.mark.parametrize(("dim", "cells"), [(1, 16), (2, 16), (3, 8), (6, 1)])
+@pytest.mark.parametrize(("dim", "cells"), [(2, 16), (3, 8)])
 def test_a_grid_has_at_most_sixteen_cells_in_any_dimension(dim, cells):
     grid = Grid(Box.cube(0, 1, dim))
     assert len(grid.names) == cells
@@ -247,25 +227,12 @@ def test_earlier_event_files_stay_until_the_replay_is_over(tmp_path):
     assert before.keys().isdisjoint(path.name for path in tmp_path.iterdir())  # else an open TensorBoard ignores it
 
 
-def test_a_tag_without_an_explanation_is_refused(tmp_path):
-    with pytest.raises(KeyError, match="mine"):
-        EventFile(tmp_path).scalars(0, {"mine": 1.0})
-
-
 def test_a_run_that_is_not_watched_loads_no_tensorboard_and_nothing_else_that_takes_long_to_import():
     program = "import sys, sgimd_torch.runs.run; assert not {'tensorboard', 'torch', 'scipy.stats'} & set(sys.modules)"
     done = subprocess.run(
         [sys.executable, "-c", f"import sys; sys.path[:0] = {sys.path!r}; {program}"], capture_output=True, text=True
     )
     assert done.returncode == 0, done.stderr
-
-
-def test_a_board_loads_neither_torch_nor_tensorflow():
-    program = "import sys, sgimd_torch.board.listener; print({'torch', 'tensorflow'} & set(sys.modules))"
-    done = subprocess.run(
-        [sys.executable, "-c", f"import sys; sys.path[:0] = {sys.path!r}; {program}"], capture_output=True, text=True
-    )
-    assert done.stdout == "set()\n", done.stderr
 
 
 OPTIONS = ("--movements", "160", "--evaluate_at", "60,120", "--board", "true")
@@ -341,7 +308,7 @@ def test_the_page_of_charts_begins_with_where_it_is_competent_by_places_with_goa
     assert [len(tags) for _, tags in others] == [3, 5]
 
 
-@pytest.mark.parametrize("options", [("--algorithm", "random"), ("--goals", "grid", "--search", "perturb")])
+@pytest.mark.parametrize("options", [("--goals", "grid", "--search", "perturb")])
 def test_no_chart_is_empty_whatever_the_learner(tmp_path, go, options):
     assert go(tmp_path, "--board", "true", *options) == 0
     ((directory,),) = [list(path.glob("seed-*")) for path in tmp_path.iterdir()]
@@ -361,24 +328,19 @@ def assert_same_board(directory, whole):
     assert found == wanted
 
 
-@pytest.mark.parametrize(("signum", "movements"), [(signal.SIGKILL, 40), (signal.SIGINT, 130)])
-def test_a_run_that_was_stopped_and_resumed_has_the_board_of_one_that_never_was(
-    tmp_path, go, benchmark, watched, signum, movements
-):
+def test_a_run_that_was_killed_and_resumed_has_the_board_of_one_that_never_was(tmp_path, go, benchmark, watched):
     directory = tmp_path / "sgim-d" / "seed-003"
-    end(stopped_at(movements, *arguments(tmp_path, benchmark), *OPTIONS), signum)
+    end(stopped_at(130, *arguments(tmp_path, benchmark), *OPTIONS), signal.SIGKILL)
     assert go(tmp_path, *OPTIONS, "--resume") == 0
     assert_same_board(directory, watched)
 
 
-@pytest.mark.parametrize("before", [("--movements", 130), ("--board", "false"), ("--evaluate_at", "60")])
-def test_a_board_depends_only_on_the_last_request(tmp_path, go, watched, before):
-    assert go(tmp_path, *OPTIONS, *before) == 0
+def test_a_board_depends_only_on_the_last_request(tmp_path, go, watched):
+    assert go(tmp_path, *OPTIONS, "--movements", 130, "--board", "false", "--evaluate_at", "60") == 0
     assert go(tmp_path, *OPTIONS, "--resume") == 0
     directory = tmp_path / "sgim-d" / "seed-003"
     assert_same_board(directory, watched)
-    seconds = curves_of(directory).get("time/physics", {})
-    assert seconds.keys() == ({150} if "--movements" in before else set())  # nobody knows those of what was replayed
+    assert curves_of(directory)["time/physics"].keys() == {150}  # nobody knows those of what was replayed
 
 
 class Slider:
@@ -415,11 +377,11 @@ def live_as(out, robot, make, **options):
     return config.directory
 
 
-@pytest.mark.parametrize(("dim", "context_dim"), [(1, 0), (3, 0), (2, 0), (2, 1), (6, 0)])
+@pytest.mark.parametrize(("dim", "context_dim"), [(1, 0), (3, 0), (2, 1)])
 def test_outcomes_of_any_dimension_have_curves_and_pictures(tmp_path, dim, context_dim):
     directory = live_as(tmp_path, Slider(dim, context_dim), sagg_riac)
     curves = curves_of(directory)
-    assert {"error/mean", "competence/R", "interest/R", "goals/missed_by", "about/regions"} < curves.keys()
+    assert {"error/mean", "competence/R", "interest/R", "goals/missed_by"} < curves.keys()
     pictures = {tag for tag in curves if tag.startswith(("map/", "competent/"))}
     wanted = {"map/error", "map/competence"}
     assert pictures == wanted | ({"competent/since"} if dim == 2 else set())
@@ -442,8 +404,3 @@ def test_the_regions_of_any_goal_model_are_shown(tmp_path):
     curves = curves_of(live_as(tmp_path, Slider(2), sagg_riac, goals=Halves))
     assert curves["regions/count"] == {50: 2, 100: 2}
     assert {"competence/R0", "interest/R", "map/competence"} < curves.keys()
-
-
-def test_a_learner_without_goals_has_a_board_without_regions(tmp_path):
-    curves = curves_of(live_as(tmp_path, Slider(1), random_exploration))
-    assert not [tag for tag in curves if tag.startswith(("regions", "competence", "about/regions"))]

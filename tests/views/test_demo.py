@@ -13,10 +13,8 @@ from sgimd_torch.evaluation import Benchmark, save_benchmark
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.views.demo import configs_of, main
-from sgimd_torch.views.demo_figure import draw
 
 LEARNERS = ("random", "sgim-d", "practice-taught")
-NAMES = ("Random", "SGIM-D", "Practice, taught")
 DEMO = "import sys; from sgimd_torch.__main__ import main; sys.argv.insert(1, 'demo'); sys.exit(main())"
 
 
@@ -24,7 +22,7 @@ DEMO = "import sys; from sgimd_torch.__main__ import main; sys.argv.insert(1, 'd
 def options(tmp_path_factory):
     path = tmp_path_factory.mktemp("benchmark") / "small.npz"
     save_benchmark(path, Benchmark("FishingRod", np.array([[0.0, 0.5], [0.4, 0.3], [-0.5, 0.2]]), 0.1))
-    return ["--movements", "60", "--benchmark", str(path), "--repeats", "2", "--evaluate_at", "30"]
+    return ["--movements", "40", "--benchmark", str(path), "--repeats", "2", "--evaluate_at", "30"]
 
 
 @pytest.fixture(scope="module")
@@ -44,37 +42,19 @@ def runs(shown):
 
 def test_the_demo_ends_well_with_all_runs_a_figure_and_a_table(shown, runs):
     out, printed, said = shown
-    assert [len(run.index) for run in runs.values()] == [60, 60, 60]
+    assert [len(run.index) for run in runs.values()] == [40, 40, 40]
     content = (out / "demo.png").read_bytes()
     assert content.startswith(b"\x89PNG\r\n\x1a\n")
-    assert len(content) > 50_000  # an empty figure of this size has a tenth of that
     assert str(out / "demo.png") in printed
     assert "SGIM-D chooses goals" in said  # what it is doing
     lines = {line.split()[0]: line.split() for line in printed.splitlines() if line}
-    assert all(lines[name][3] == f"{run.at(60):.3f}" for name, run in runs.items())
+    assert all(lines[name][3] == f"{run.at(40):.3f}" for name, run in runs.items())
     commands = printed.partition("Next, try\n")[2].splitlines()
     assert len(commands) == 2
     for line in commands:
         program, name, *words = shlex.split(line, comments=True)
         assert (program, name in COMMANDS) == ("sgimd", True)
         assert any(Path(word).exists() for word in words)
-
-
-def test_the_figure_shows_the_data_of_the_runs(runs):
-    curves, *maps = [ax for ax in draw(runs).axes if ax.get_xlabel()]
-    for line, run in zip(curves.lines, runs.values(), strict=True):
-        np.testing.assert_array_equal(line.get_xdata(), [30, 60])
-        np.testing.assert_array_equal(line.get_ydata(), run.evaluation["mean_error"])
-    landed, missed = maps[::2], maps[1::2]
-    for ax, run in zip(landed, runs.values(), strict=True):
-        assert ax.collections[0].get_array().sum() == (np.abs(run.outcomes) <= 1).all(axis=1).sum()
-    assert len({ax.collections[0].norm.vmax for ax in landed}) == 1
-    assert [len(ax.lines) for ax in landed] == [0, 1, 1]  # demonstrated outcomes
-    for ax, name, run in zip(missed, NAMES, runs.values(), strict=True):
-        np.testing.assert_array_equal(ax.collections[0].get_offsets(), run.benchmark)
-        np.testing.assert_array_equal(ax.collections[0].get_array(), run.missed_by(60)[0])
-        assert ax.get_title() == f"{name} misses its goals by {run.evaluation['mean_error'][-1]:.3f} m"
-    assert len({ax.collections[0].norm.vmax for ax in missed}) == 1
 
 
 def test_a_second_start_uses_what_is_there_and_fewer_movements_are_refused(shown, options, capsys):
@@ -85,9 +65,9 @@ def test_a_second_start_uses_what_is_there_and_fewer_movements_are_refused(shown
     assert [content_of(out / name / "seed-000") for name in LEARNERS] == runs
     assert (out / "demo.png").read_bytes() == figure
     capsys.readouterr()
-    assert command(main, [*options, "--movements", "40", "--out", str(out)]) == 1
+    assert command(main, [*options, "--movements", "30", "--out", str(out)]) == 1
     said = capsys.readouterr().err
-    assert "60 movements already" in said
+    assert "40 movements already" in said
     assert "Traceback" not in said
 
 
@@ -96,12 +76,9 @@ def test_a_second_start_uses_what_is_there_and_fewer_movements_are_refused(shown
     [
         ("--seed -1", "seed must be"),
         ("--movements 0", "movements must be"),
-        ("--environment.noise -1", "noise must be"),
         ("--evaluate_at []", "--evaluate-at"),
         ("--environment planar-arm-7", "--environment cannot be given here"),
         ("--algorithm x", "--algorithm cannot be given here"),
-        ("--name=x", "--name cannot be given here"),
-        ("stray", "'stray'"),
     ],
 )
 def test_impossible_requests_are_refused_before_anything_is_written(tmp_path, monkeypatch, capsys, more, message):

@@ -23,9 +23,8 @@ from sgimd_torch.runs.read import read_run
 from sgimd_torch.spaces import Box, stream
 from sgimd_torch.views import check
 from sgimd_torch.views.film import command as film
-from sgimd_torch.views.film import reel
-from sgimd_torch.views.film.panel import Panel
-from sgimd_torch.views.film.reel import PAUSE, POUR, RATES, Shot, write_film
+from sgimd_torch.views.film.panel import panel
+from sgimd_torch.views.film.reel import PAUSE, RATES, Shot, write_film
 
 THETAS = stream(0, "film").random((100, 25))[40:]  # some reach the water before the line is let out
 RATE = RATES[".mp4"]
@@ -114,30 +113,14 @@ def test_states_and_floats_of_a_recording_belong_together_and_the_line_bends(rod
     assert max(bent) > 0.02  # m off the straight line
 
 
-def test_landings_since_the_last_shot_appear_before_the_movement(recordings):
-    past = stream(0, "past").random((100, 2))
-    shot = Shot(recordings[0], np.zeros(2), past=past, new=60)
-    shown = [len(part.past) for part, _ in shot.moments(RATE)]
-    pouring = round(POUR * RATE)
-    assert shown[:pouring] == sorted(shown[:pouring])
-    assert 40 < shown[0] < 50
-    assert set(shown[pouring - 1 :]) == {100}
-    assert {time for _, time in shot.moments(RATE)[:pouring]} == {0}
-    assert len(shown) - pouring == np.ceil((recordings[0].landed + PAUSE) * RATE)
-
-
-def test_the_panel_counts_the_goals_that_are_met_and_marks_the_landing():
+def test_the_panel_counts_the_goals_that_are_met():
     goals = np.stack(np.meshgrid(np.linspace(-1, 1, 5), np.linspace(-1, 1, 5)), axis=-1).reshape(-1, 2)
-    panel = Panel(Box.cube(-1, 1, 2, unit="m"), goals, "#d55e00", np.array([10, 100]), np.array([0.5, 0.05]))
-    assert panel.near == 0.05
-    early, _ = panel.beside(10, np.full(25, 0.5), goals[0], goals[-1])
-    late, landed = panel.beside(100, np.linspace(0, 0.1, 25), goals[0], goals[-1])
-    assert early.shape == late.shape == landed.shape == (480, 360, 3)
+    space, curve = Box.cube(-1, 1, 2, unit="m"), (np.array([10, 100]), np.array([0.5, 0.05]))
+    early = panel(space, goals, np.full(25, 0.5), 10, curve, "#d55e00")
+    late = panel(space, goals, np.linspace(0, 0.1, 25), 100, curve, "#d55e00")
+    assert early.shape == late.shape == (480, 360, 3)
     dark = [((p[..., 0] < 90) & (p[..., 1] < 30) & (p[..., 2] > 60)).sum() for p in (early, late)]
     assert dark[0] - dark[1] > 25 * 5  # of each goal, which is far away at first
-    rows, columns = np.nonzero(np.abs(late.astype(int) - landed).max(axis=2) > 30)
-    assert rows.max() < 60  # the cross, at the upper right
-    assert columns.min() > 240
 
 
 def test_the_caption_says_when_the_line_is_let_out_and_how_far_the_goal_was_missed(recordings):
@@ -186,33 +169,27 @@ def test_the_memory_rebuilt_from_the_log_judges_as_the_living_one_did(tmp_path, 
     parts = build(film.config_of(run))
     assert (run.demonstration[:35] >= 0).any()
     film.remember(run, parts, 0, 20)
-    film.remember(run, parts, 20, 35)  # in two steps, as a time lapse does
+    film.remember(run, parts, 20, 35)  # in two steps, as a film of several stages does
     seen = evaluate(parts.inverse, parts.environment, parts.benchmark.goals, 3, 35, repeats=0)
     assert seen.mean_error == run.evaluation["mean_error"][0]
 
 
 def test_a_forward_model_learns_again_what_it_learnt_in_the_run(tmp_path, go):
-    assert go(tmp_path, "--inverse", "model", "--movements", 150, "--evaluate_at", "[]") == 0
+    assert go(tmp_path, "--inverse", "model", "--movements", 80, "--evaluate_at", "[]") == 0
     run = read_run(tmp_path / "sgim-d" / "seed-003")
     parts = build(film.config_of(run))
     film.remember(run, parts, 0, 60)
-    film.remember(run, parts, 60, 150)
+    film.remember(run, parts, 60, 80)
     assert run.refreshes["relative_error"][-1] == parts.model.relative_error
 
 
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ("--goals 0.3", "--goals must have shape"),
         ("--goals 0.3,0.6 1,2,3", "--goals must have shape"),
-        ("--goals 0.3,", "--goals: invalid numbers value: '0.3,'"),
         ("--goals -0.3,far", "--goals: invalid numbers value: ' -0.3,far'"),
         ("--goals 0.3,0.6 -30,60", "outside"),
-        ("--goals nan,0", "must be finite"),
-        ("--after 20", "belongs to --time-lapse"),
-        ("--time-lapse --after 0,20", "--after must be from 1 to 40"),
-        ("--time-lapse --after 41", "--after must be from 1 to 40"),
-        ("--time-lapse --after 2.5", "--after"),
+        ("--after 20 41", "--after must be from 1 to 40"),
         ("--out film.avi", "--out must be a .mp4 or .webp file"),
         ("--out nowhere/film.mp4", "--out"),
     ],
@@ -227,13 +204,10 @@ def test_what_cannot_be_filmed_is_refused_with_its_reason(run_path, capsys, opti
 def test_a_run_without_movements_is_refused(run_path, tmp_path, capsys):
     empty = tmp_path / run_path.name
     empty.mkdir()
-    assert command(film.main, [str(empty)]) == 2
     with Record(run_path / FILE) as whole:
         Record.make(empty / FILE, whole.dims, whole.about).close()
     assert command(film.main, [str(empty)]) == 2
-    said = capsys.readouterr().err
-    assert "holds no run;" in said
-    assert "has no movements yet" in said
+    assert "has no movements yet" in capsys.readouterr().err
 
 
 def filmed(run_path, gl, *options):
@@ -246,9 +220,10 @@ def filmed(run_path, gl, *options):
     )
 
 
+@pytest.mark.slow
 def test_a_film_of_the_rod_is_made_without_a_display_or_the_lack_of_opengl_is_explained(run_path, tmp_path):
     out = tmp_path / "film.mp4"
-    done = filmed(run_path, "egl", "--goals", "0.2,0.5", "--time-lapse", "--after", "40", "--out", str(out))
+    done = filmed(run_path, "egl", "--goals", "0.2,0.5", "--after", "40", "--out", str(out))
     assert "Traceback" not in done.stderr
     if done.returncode:  # a machine without EGL
         assert done.returncode == 2
@@ -256,12 +231,9 @@ def test_a_film_of_the_rod_is_made_without_a_display_or_the_lack_of_opengl_is_ex
         assert not out.exists()
         return
     assert "after 40 movements" in done.stdout
-    pictures, _ = decoded(out, 480, 640 + 360)
-    pictures = pictures[:, :, :640]
+    pictures = decoded(out, 480, 640 + 360)[0][:, :, :640]
     red = (pictures[..., 0] - pictures[..., 1] > 60).sum(axis=(1, 2))
     assert 0 < red[0] < red[-1]  # the float, then also the path that it has taken
-    assert np.abs(pictures[-1] - pictures[-10]).mean() < 2  # the landing stands still
-    assert np.abs(pictures[-1] - pictures[0]).max() > 100  # and is not where it began
 
 
 SEEN = """
@@ -306,18 +278,6 @@ def test_a_frame_shows_the_arm_as_it_was_and_rings_on_the_water_about_base_and_g
     assert 0 < (np.abs(seen["past"] - seen["landed"]).max(axis=2) > 30).sum() < 200  # two small tiles
 
 
-def test_what_is_filmed_after_some_movements_does_not_know_what_came_later(own):
-    live(ARM)
-    live(f"{ARM} --movements 20 --name short")
-    casts = []
-    for name in ("short", "sagg-riac"):
-        run = read_run(f"runs/{name}/seed-000")
-        casts += film._cast(run, build(film.config_of(run, trust=True)), np.array([[0.5, 0.5]]), [20])
-    assert casts[0].recording.outcome.tolist() == casts[1].recording.outcome.tolist()
-    assert (casts[0].past == casts[1].past).all()
-    assert len(casts[0].past) == 20
-
-
 @pytest.mark.parametrize("gl", ["disable", "bogus"])
 def test_without_opengl_the_error_says_what_to_set(run_path, tmp_path, gl):
     done = filmed(run_path, gl, "--out", str(tmp_path / "film.mp4"))
@@ -351,30 +311,27 @@ def test_a_recorded_movement_of_an_arm_ends_where_the_executed_one_does():
     assert sketch.landed == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize("gl", ["disable", "bogus"])
-def test_an_arm_is_filmed_without_opengl(tmp_path, monkeypatch, gl):
-    monkeypatch.chdir(tmp_path)
+def test_an_arm_is_filmed_without_opengl(own):
     live(ARM)
-    process = filmed("runs/sagg-riac/seed-000", gl, "--goals", "0.5,0.5", "-0.4,-0.4")
+    process = filmed("runs/sagg-riac/seed-000", "bogus", "--goals", "0.5,0.5")
     assert process.returncode == 0, process.stderr
     assert "after 60 movements: mean distance to the goal" in process.stdout
-    pictures, _ = decoded(tmp_path / "runs/sagg-riac/seed-000.mp4", 480, 640 + 360)
-    pictures, half = pictures[:, :, :640], len(pictures) // 2
-    assert len(pictures) == 2 * np.ceil((1.0 + PAUSE) * RATE)
-    goal = [(p[..., 0] > 180) & (p[..., 2] < 90) & (p[..., 1] > 110) for p in pictures[[0, -1]]]  # the ring, in yellow
-    first, last = (np.argwhere(ring).mean(axis=0) for ring in goal)
-    assert first[1] > last[1]  # right, then left
-    assert first[0] < last[0]  # above, then below
-    assert np.abs(pictures[0] - pictures[half - 2]).max() > 100
-    assert np.abs(pictures[half - 15] - pictures[half - 2]).mean() < 2  # it has arrived
+    pictures, _ = decoded(own / "runs/sagg-riac/seed-000.mp4", 480, 640 + 360)
+    pictures = pictures[:, :, :640]
+    assert len(pictures) == np.ceil((1.0 + PAUSE) * RATE)
+    yellow = (pictures[-1, ..., 0] > 180) & (pictures[-1, ..., 2] < 100) & (pictures[-1, ..., 1] > 180)
+    assert np.argwhere(yellow)[:, 0].mean() < 240  # the ring
+    assert np.abs(pictures[0] - pictures[-1]).max() > 100
+    assert np.abs(pictures[-15] - pictures[-1]).mean() < 2  # it has arrived
 
 
-@pytest.mark.parametrize(("word", "goal"), [("Slider", "0.4"), ("Slider3", "0.4,0.2,0.9"), ("Slider6", "0,0,0,0,0,1")])
+@pytest.mark.parametrize(("word", "goal"), [("Slider", "0.4"), ("Slider3", "0.4,0.2,0.9")])
 def test_a_picture_of_ones_own_is_filmed_for_outcomes_of_any_dimension(own, capsys, word, goal):
     live(f"--environment sliders:{word} --algorithm random --movements 30 --evaluate-at [] --out runs")
     run = "runs/random/seed-000"
-    assert command(film.main, f"{run} --trust --out one.mp4 --goals {goal}".split()) == 0
-    assert len(decoded(own / "one.mp4", 480, 640 + 360)[0]) == np.ceil((1.0 + PAUSE) * RATE)
+    assert command(film.main, f"{run} --trust --out one.webp --goals {goal}".split()) == 0
+    with Image.open("one.webp") as moving:
+        assert moving.size == (640 + 360, 480)
     assert command(film.main, f"{run} --trust --goals 0.1,0.2,0.3,0.4".split()) == 2
     assert "--goals must have shape" in capsys.readouterr().err
 
@@ -383,9 +340,7 @@ def test_a_picture_of_ones_own_is_filmed_for_outcomes_of_any_dimension(own, caps
     ("word", "code", "message"),
     [
         ("sliders:Slider", 0, ""),
-        ("planar-arm-7", 0, ""),
         ("fishing-rod", 0, ""),
-        ("sliders:NoPicture", 0, ""),
         ("sliders:StillPicture", 2, "record() of StillPicture ends at [0.0], execute() with an equal stream at ["),
         ("sliders:OtherPicture", 2, "OtherPicture must give a Sketch with an outcome of 1 dimension, got one of 2"),
         ("sliders:LostPicture", 2, "record() of LostPicture failed: KeyError: 'where'"),
@@ -400,11 +355,8 @@ def test_the_check_of_an_environment_looks_at_its_picture(own, capsys, word, cod
     ("word", "message"),
     [
         ("sliders:NoPicture", "sliders:NoPicture, which cannot be filmed: it brings no picture of its movements, a "),
-        ("crawler", "is of crawler, which cannot be filmed"),
         ("sliders:WrongPicture", "WrongPicture must give a Sketch with an outcome of 1 dimension, got list"),
         ("sliders:FlatPicture", "chains of a Sketch must be finite numbers (n_steps, n_points, 2), got shape (5, 2)"),
-        ("sliders:OtherPicture", "with an outcome of 1 dimension, got one of 2"),
-        ("sliders:LostPicture", "record() of LostPicture failed: KeyError: 'where'"),
     ],
 )
 def test_what_has_no_picture_is_refused_in_a_line(own, capsys, word, message):
@@ -423,21 +375,3 @@ def test_code_that_somebody_elses_run_names_is_executed_only_with_trust(own, cap
     monkeypatch.setattr("sgimd_torch.catalogue.load", lambda *_: pytest.fail("it was imported"))
     assert command(film.main, ["runs/one/seed-000"]) == 2
     assert "names code of its own, sliders:Slider; look at it, then execute it with --trust" in capsys.readouterr().err
-
-
-def test_an_encoder_that_hangs_is_ended(tmp_path, monkeypatch):
-    (tmp_path / "hangs").write_text("#!/bin/sh\nexec sleep 100\n")
-    (tmp_path / "hangs").chmod(0o755)
-    monkeypatch.setattr(reel, "get_ffmpeg_exe", lambda: str(tmp_path / "hangs"))
-    monkeypatch.setattr(reel, "PATIENCE", 0.2)
-    with pytest.raises(OSError, match=r"did nothing for 0.2 s"):
-        write_film(tmp_path / "film.mp4", iter([np.zeros((480, 640, 3), np.uint8)] * 3))
-    assert not (tmp_path / "film.mp4").exists()
-
-
-def test_the_help_teaches(capsys):
-    with pytest.raises(SystemExit):
-        film.main(["--help"])
-    said = capsys.readouterr().out
-    assert "--time-lapse" in said
-    assert "sgimd film runs/sgim-d/seed-003 --goals 0.3,0.6" in said

@@ -1,7 +1,5 @@
 """The table of the results of runs."""
 
-import csv
-import io
 import shutil
 from dataclasses import replace
 
@@ -126,13 +124,6 @@ def test_a_run_that_is_too_short_is_named(runs, capsys):
     assert "seed-000 was not evaluated after 5000 movements" in capsys.readouterr().err
 
 
-def test_a_table_of_one_variant_has_its_row_alone(runs, capsys, monkeypatch):
-    monkeypatch.chdir(runs / "random")
-    for place in (runs / "random", "."):
-        assert table(place) == 0
-        assert [line.split()[:2] for line in capsys.readouterr().out.splitlines()[1:]] == [["random", "5"]]
-
-
 def test_a_damaged_run_is_named_and_nothing_is_printed(copied, capsys):
     path = copied / "random" / "seed-001"
     damage(path)
@@ -140,36 +131,6 @@ def test_a_damaged_run_is_named_and_nothing_is_printed(copied, capsys):
     said = capsys.readouterr()
     assert not said.out
     assert str(path) in said.err
-
-
-def test_all_movements_of_a_run_are_printed_as_csv_with_numbers_that_read_back_exactly(runs, capsys):
-    assert table(runs / "sgim-d" / "seed-000", "--episodes") == 0
-    head, *rows = csv.reader(io.StringIO(capsys.readouterr().out))
-    run = read_run(runs / "sgim-d" / "seed-000")
-    assert head[:5] == ["movement", "origin", "demonstration", "theta_0", "theta_1"]
-    assert head[-4:] == ["goal_0", "goal_1", "outcome_0", "outcome_1"]
-    columns = dict(zip(head, zip(*rows, strict=True), strict=True))
-    assert columns["movement"] == tuple(map(str, range(40)))
-    assert columns["origin"] == tuple(run.origin)
-    assert [int(cell or -1) for cell in columns["demonstration"]] == run.demonstration.tolist()
-    for name, values in (
-        ("theta_24", run.thetas[:, 24]),
-        ("goal_1", run.goals[:, 1]),
-        ("outcome_0", run.outcomes[:, 0]),
-    ):
-        assert np.array_equal([float(cell or "nan") for cell in columns[name]], values, equal_nan=True)
-
-
-def test_the_movements_of_several_runs_are_refused(runs, capsys):
-    assert table(runs, "--episodes") == 2
-    assert str(runs) in capsys.readouterr().err
-
-
-def test_what_was_not_measured_is_a_dash(runs, capsys):
-    assert table(runs, "--at", 40) == 0  # nothing was evaluated after 1000 movements
-    said = capsys.readouterr().out
-    assert "nan" not in said
-    assert said.splitlines()[1].split()[2] == "-"
 
 
 def last_column(said):
@@ -195,8 +156,3 @@ def test_a_baseline_that_is_no_variant_is_refused_with_the_near_name(runs, capsy
     assert not said.out
     assert "'randon'; did you mean random? Known are random, sgim-d" in said.err
     assert said.err.count("\n") == 1
-
-
-def test_the_help_teaches(capsys):
-    assert table("--help") == 0
-    assert "sgimd table study --at 2000" in capsys.readouterr().out

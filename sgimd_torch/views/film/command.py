@@ -30,17 +30,15 @@ from sgimd_torch.runs.build import RunParts, build
 from sgimd_torch.runs.read import Run, config_of, read_run
 from sgimd_torch.spaces import Array, stream
 from sgimd_torch.strategies import Remember
-from sgimd_torch.views.film.panel import Panel
+from sgimd_torch.views.film.panel import panel
 from sgimd_torch.views.film.reel import RATES, Shot, shoot, write_film
 from sgimd_torch.views.film.sketch import Sketchbook
 
-AFTER = (30, 100, 300, 1000, 3000)
 EXAMPLES = """examples:
   sgimd film runs/sgim-d/seed-003                               six goals, into runs/sgim-d/seed-003.mp4
   sgimd film runs/sgim-d/seed-003 --goals 0.3,0.6 -0.5,0.4      these two
-  sgimd film runs/sgim-d/seed-003 --time-lapse                  how it learns: two goals, early and late
-  sgimd film runs/sgim-d/seed-003 --time-lapse --after 50,200   after 50 and 200 movements
-  sgimd film runs/sgim-d/seed-003 --time-lapse --out film.webp  a moving picture, for a page
+  sgimd film runs/sgim-d/seed-003 --after 30 300 3000           how it learns: two goals, early and late
+  sgimd film runs/sgim-d/seed-003 --out film.webp               a moving picture, for a page
 """
 
 
@@ -60,7 +58,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         )
     if options.goals is None:
         known = np.unique(parts.benchmark.goals, axis=0)
-        goals = known[np.linspace(0, len(known) - 1, 2 if options.time_lapse else 6).round().astype(int)]
+        goals = known[np.linspace(0, len(known) - 1, 2 if options.after else 6).round().astype(int)]
     else:
         hint = "a goal is a place in T, such as 0.3,0.6"
         goals = np.stack([parts.environment.outcomes.check("--goals", goal, hint) for goal in options.goals])
@@ -69,14 +67,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     with _camera(parts.environment, shots) as camera:
         rate = RATES[options.out.suffix]
         n = sum(len(shot.moments(rate)) for shot in shots)
-        interval = 0.2 if sys.stderr.isatty() else 10.0  # s; without a terminal a line now and then
-        write_film(
-            options.out, tqdm(shoot(camera.frame, shots, rate), "filming", n, unit=" frames", mininterval=interval)
-        )
-    amount = parts.environment.outcomes.amount
-    for k, movements in enumerate(stages):
-        missed = np.array([shot.missed for shot in shots[k * len(goals) : (k + 1) * len(goals)]])
-        mean, most = amount(missed.mean()), amount(missed.max())
+        write_film(options.out, tqdm(shoot(camera.frame, shots, rate), "filming", n, unit=" frames", delay=1.0))
+    amount, missed = parts.environment.outcomes.amount, np.reshape([shot.missed for shot in shots], (len(stages), -1))
+    for movements, each in zip(stages, missed, strict=True):
+        mean, most = amount(each.mean()), amount(each.max())
         print(f"after {movements} movements: mean distance to the goal {mean}, at most {most}")
     print(f"Film {options.out}")
     return 0
@@ -111,33 +105,26 @@ def _cast(run: Run, parts: RunParts, goals: Array, stages: Sequence[int]) -> lis
     assert parts.record is not None
     robot, seed = parts.environment, run.config["seed"]
     context = (robot.contexts.low + robot.contexts.high) / 2
-    shots: list[Shot] = []
-    errors = []
-    known = 0
+    who = label(run.config["name"] or run.config["algorithm"])
+    shots, errors = list[Shot](), list[Array]()
     for before, movements in zip((0, *stages), stages, strict=False):
         remember(run, parts, before, movements)
         if not len(parts.learner.memory):
             raise ValueError(f"{run.path} remembers nothing after {movements} movements, so it infers no movement")
         past = run.outcomes[:movements]
         past = past[np.isfinite(past[:, 0])]
-        who = label(run.config["name"] or run.config["algorithm"])
         title = f"{who}, seed {seed}, after {movements} movements"
         for k, goal in enumerate(goals):
             recording = parts.record(context, parts.inverse(context, goal).theta, stream(seed, "film", k))
-            # The first shot of a stage begins with what was learnt since the last one.
-            new = len(past) - known if len(stages) > 1 and k == 0 else 0
-            shots.append(Shot(recording, goal, title, robot.outcomes.unit, past, new))
-        known = len(past)
+            shots.append(Shot(recording, goal, title, robot.outcomes.unit, past))
         found = evaluate(parts.inverse, robot, parts.benchmark.goals, seed, movements, context=context, repeats=0)
         errors.append(found.errors)
     curve = np.array(stages), np.array([each.mean() for each in errors])
     if len(stages) == 1 and len(run.evaluation["movements"]):
         curve = run.evaluation["movements"], run.evaluation["mean_error"]
-    panel = Panel(robot.outcomes, parts.benchmark.goals, colour(run.config["algorithm"]), *curve)
-    return [
-        replace(shot, beside=panel.beside(stages[k], errors[k], shot.goal, shot.recording.outcome))
-        for k, shot in ((row // len(goals), shot) for row, shot in enumerate(shots))
-    ]
+    ink, goals_there = colour(run.config["algorithm"]), parts.benchmark.goals
+    beside = [panel(robot.outcomes, goals_there, errors[k], at, curve, ink) for k, at in enumerate(stages)]
+    return [replace(shot, beside=beside[row // len(goals)]) for row, shot in enumerate(shots)]
 
 
 def remember(run: Run, parts: RunParts, start: int, stop: int) -> None:
@@ -161,10 +148,8 @@ def _stages(run: Run, options: argparse.Namespace) -> list[int]:
     lived = len(run.index)
     if not lived:
         raise ValueError(f"{run.path} has no movements yet; --resume goes on with it")
-    if not options.time_lapse:
-        return [lived]
     if options.after is None:
-        return [*(movements for movements in AFTER if movements < lived), lived]
+        return [lived]
     if not 1 <= min(options.after) <= max(options.after) <= lived:
         raise ValueError(f"--after must be from 1 to {lived}, the movements of {run.path}, got {options.after}")
     return sorted(set(options.after))
@@ -179,16 +164,10 @@ def parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("run", type=Path, help="a run's directory: OUT/NAME/seed-003")
-    parser.add_argument(
-        "--goals",
-        type=numbers,
-        nargs="+",
-        metavar="X,Y",
-        help="in the task space; without it, six of the benchmark's; in a time lapse two",
-    )
-    parser.add_argument("--time-lapse", action="store_true", help="the goals again and again, early and late")
-    after = f"movements, of a time lapse (default: {','.join(map(str, AFTER))})"
-    parser.add_argument("--after", type=whole_numbers, metavar="N,N", help=after)
+    goals = "in the task space; without it, six of the benchmark's, or two with --after"
+    parser.add_argument("--goals", type=numbers, nargs="+", metavar="X,Y", help=goals)
+    after = "movements; the goals again and again (default: once, after all movements)"
+    parser.add_argument("--after", type=int, nargs="+", metavar="N", help=after)
     parser.add_argument("--trust", action="store_true", help="execute code that the run's settings name")
     parser.add_argument("--out", type=Path, help="the film, .mp4 or .webp (default: .mp4 next to the run's directory)")
     return parser
@@ -198,10 +177,8 @@ def _options(argv: Sequence[str] | None) -> argparse.Namespace:
     # A minus with a number after it begins a goal, not an option.
     given = sys.argv[1:] if argv is None else argv
     options = parser().parse_args([f" {word}" if re.match(r"-[.\d]", word) else word for word in given])
-    if options.after and not options.time_lapse:
-        parser().error("--after belongs to --time-lapse")
     if options.out is None:
-        options.out = Path(f"{options.run.resolve()}{'-time-lapse' if options.time_lapse else ''}.mp4")
+        options.out = Path(f"{options.run.resolve()}.mp4")
     elif options.out.suffix not in RATES or not options.out.parent.is_dir():
         parser().error(f"--out must be a {' or '.join(RATES)} file in a folder that exists, got {options.out}")
     return options
@@ -210,8 +187,3 @@ def _options(argv: Sequence[str] | None) -> argparse.Namespace:
 def numbers(text: str) -> list[float]:
     """A goal of the command line, such as "0.3,0.6"; argparse names this function where it fails."""
     return [float(word) for word in text.split(",")]
-
-
-def whole_numbers(text: str) -> list[int]:
-    """Counts of the command line, such as "100,500"."""
-    return [int(word) for word in text.split(",")]

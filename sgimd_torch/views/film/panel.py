@@ -1,29 +1,21 @@
-"""Beside a film: which goals the learner meets already, and how its error falls.
+"""Beside a film: which goals of the benchmark the learner meets already, and how its error falls.
 
-    panel = Panel(space, goals, colour, movements, errors)
-    shot = Shot(recording, goal, beside=panel.beside(500, goal_errors, goal, recording.outcome))
-
-The map shows each goal of the benchmark in the first two dimensions of T, coloured by how far its answer misses it. A
-yellow ring is the present goal, a cross where its answer has landed. Needs the extra ``film``.
+    picture = panel(space, goals, errors, 500, (movements, mean_errors), colour)
+The map shows each goal in the first two dimensions of T, coloured by how far its answer misses it. Needs the extra
+``film``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
+from matplotlib import rc_context
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 
-try:
-    from matplotlib import rc_context
-    from matplotlib.axes import Axes
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-except ImportError as error:
-    raise ImportError(f"films need {error.name}; install the extra film: pip install 'sgimd-torch[film]'") from error
-
-from sgimd_torch.figures.axes import goal_rings, limits, over_movements, rounded
+from sgimd_torch.figures.axes import limits, over_movements, rounded
 from sgimd_torch.figures.learning import misses
 from sgimd_torch.figures.save import STYLE
 from sgimd_torch.figures.sections import sections
@@ -34,53 +26,39 @@ _DPI: Final = 100
 _TEXT: Final[Any] = {"font.size": 8, "axes.titlesize": 9, "axes.titlelocation": "left"}
 
 
-class Panel:
-    """Draws map and curve.
+def panel(space: Box, goals: Array, errors: Array, now: int, curve: tuple[Array, Array], colour: str) -> Frame:
+    """Map and curve after ``now`` movements.
 
     Args:
         space: T, which gives names and unit.
-        goals: ``(n, outcome_dim)`` of the benchmark.
+        goals: ``(n, outcome_dim)`` of the benchmark, which are missed by ``errors`` ``(n,)``.
+        now: movements of the learner.
+        curve: numbers of movements and the mean error after each of them, ``(m,)`` both; drawn up to ``now``.
         colour: of the curve.
-        movements, errors: ``(m,)`` each, m >= 1: the curve, mean errors after so many movements.
     """
+    shown, near = limits(goals, space), rounded(float(np.ptp(goals, axis=0).max() or 1.0) / 50)
+    margin = shown.sides / 20
+    section = sections(replace(shown, low=shown.low - margin, high=shown.high + margin))[0]
+    with rc_context({**STYLE, **_TEXT}):
+        figure = blank(0.75 * HEIGHT, layout="constrained")
+        above, below = figure.subplots(2, height_ratios=[2.2, 1])
+        misses(above, goals, errors, space, section, 6 * near)
+        above.set_title(f"{(errors <= near).sum()} of {len(errors)} met within {space.amount(near)}")
+        movements, means = curve
+        seen = movements <= now
+        below.plot(movements[seen], means[seen], "o-", color=colour, ms=4)
+        over_movements(below, space.in_unit("mean error"))
+        below.set(xlim=(0, 1.05 * float(movements.max())), ylim=(0, 1.1 * float(means.max()) or 1.0))
+        return pixels(figure)
 
-    def __init__(self, space: Box, goals: Array, colour: str, movements: Array, errors: Array) -> None:
-        self._goals, self._colour, self._movements, self._errors = goals, colour, movements, errors
-        shown = limits(goals, space)
-        margin = shown.sides / 20  # for rings at the edge
-        self._space = replace(shown, low=shown.low - margin, high=shown.high + margin)
-        self.near = rounded(float(np.ptp(goals, axis=0).max() or 1.0) / 50)
-        """Nearer than this, in the unit of T, is met."""
 
-    def beside(self, movements: int, errors: Array, goal: Array, outcome: Array) -> tuple[Frame, Frame]:
-        """After so many ``movements``, missing the goals by ``errors`` ``(n,)``: pictures before and after the answer
-        to ``goal`` has landed at ``outcome``."""
-        return self._draw(movements, errors, [goal]), self._draw(movements, errors, [goal, outcome])
+def blank(width: float, **options: Any) -> Figure:
+    """A figure of so many pixels, as high as the film; ``options`` are matplotlib's."""
+    return Figure(figsize=(width / _DPI, HEIGHT / _DPI), dpi=_DPI, **options)
 
-    def _draw(self, movements: int, errors: Array, marked: Sequence[Array]) -> Frame:
-        with rc_context({**STYLE, **_TEXT}):
-            figure = Figure(figsize=(0.75 * HEIGHT / _DPI, HEIGHT / _DPI), dpi=_DPI, layout="constrained")
-            above, below = figure.subplots(2, height_ratios=[2.2, 1])
-            self._map(above, errors, *marked)
-            self._curve(below, movements)
-            canvas: Any = FigureCanvasAgg(figure)
-            canvas.draw()
-            return np.array(canvas.buffer_rgba())[..., :3]
 
-    def _map(self, ax: Axes, errors: Array, goal: Array, outcome: Array | None = None) -> None:
-        section = sections(self._space)[0]
-        misses(ax, self._goals, errors, self._space, section, 6 * self.near)
-        if not section.is_strip:
-            goal_rings(ax, section.points(goal[None]), 14)
-            if outcome is not None:
-                ax.plot(*section.points(outcome[None]).T, "X", color="#d55e00", mec="white", ms=10, mew=1)
-        met = int((errors <= self.near).sum())
-        ax.set_title(f"{met} of {len(errors)} met within {self._space.amount(self.near)}")
-
-    def _curve(self, ax: Axes, movements: int) -> None:
-        seen = self._movements <= movements
-        ax.plot(self._movements[seen], self._errors[seen], "o-", color=self._colour, ms=4)
-        over_movements(ax, self._space.in_unit("mean error"))
-        ax.set(xlim=(0, 1.05 * float(self._movements.max())), ylim=(0, 1.1 * float(self._errors.max()) or 1.0))
-        if seen.any():
-            ax.set_title(f"{self._space.amount(self._errors[seen][-1])} after {movements} movements")
+def pixels(figure: Figure) -> Frame:
+    """What is drawn on a figure."""
+    canvas: Any = FigureCanvasAgg(figure)
+    canvas.draw()
+    return np.array(canvas.buffer_rgba())[..., :3]

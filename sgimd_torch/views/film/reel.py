@@ -11,33 +11,26 @@ from __future__ import annotations
 
 import subprocess
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field, replace
+from contextlib import suppress
+from dataclasses import dataclass, field
 from itertools import chain
 from pathlib import Path
-from threading import Timer
 from typing import Final
 
 import numpy as np
+from imageio_ffmpeg import get_ffmpeg_exe
 from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
 
 from sgimd_torch.environments.protocol import Recorded
 from sgimd_torch.files import replacing
 from sgimd_torch.spaces import Array
 
-try:
-    from imageio_ffmpeg import get_ffmpeg_exe
-    from PIL import Image, ImageDraw, ImageFont
-except ImportError as error:
-    raise ImportError(f"films need {error.name}; install the extra film: pip install 'sgimd-torch[film]'") from error
-
 Frame = NDArray[np.uint8]  # (height, width, 3)
 
 WIDTH: Final = 640  # pixels, of the robot's picture
 HEIGHT: Final = 480
-PATIENCE: Final = 60.0  # s, for ffmpeg to end once it has all frames
 PAUSE: Final = 0.8  # s, the landing is shown
-POUR: Final = 0.6  # s, in which the landings since the last shot appear
 RATES: Final = {".mp4": 25.0, ".webp": 12.5}
 """Frames a second of each kind of film: every player opens the first, every browser shows the second in a page."""
 
@@ -50,31 +43,23 @@ _CODECS: Final = {
 @dataclass(frozen=True, eq=False)
 class Shot:
     """One movement to film: the ``goal`` ``(outcome_dim,)`` that it is for, a ``title``, the ``unit`` of T, ``past``
-    outcomes ``(n, outcome_dim)``, the last ``new`` of them since the shot before, and pictures to stand ``beside`` it,
-    before and after the landing."""
+    outcomes ``(n, outcome_dim)``, and a picture to stand ``beside`` it."""
 
     recording: Recorded
     goal: Array
     title: str = ""
     unit: str = ""
     past: Array = field(default_factory=lambda: np.empty((0, 2)))
-    new: int = 0
-    beside: tuple[Frame, Frame] | None = None
+    beside: Frame | None = None
 
     @property
     def missed(self) -> float:
         """Distance between goal and outcome, in the unit of T."""
         return float(np.linalg.norm(self.recording.outcome - self.goal))
 
-    def moments(self, rate: float) -> list[tuple[Shot, float]]:
-        """What is shown, frame by frame, ``rate`` of them a second, and at which time (s) of the movement."""
-        counts = np.linspace(len(self.past) - self.new, len(self.past), round(POUR * rate) + 1).round().astype(int)
-        pouring = [
-            (replace(self, past=self.past[:count], title=f"learning: {count} landings"), 0.0)
-            for count in (counts[1:] if self.new else ())
-        ]
-        times = np.arange(0.0, self.recording.landed + PAUSE, 1 / rate).tolist()
-        return pouring + [(self, time) for time in times]
+    def moments(self, rate: float) -> list[float]:
+        """At which times (s) of the movement it is shown, ``rate`` of them a second."""
+        return list(np.arange(0.0, self.recording.landed + PAUSE, 1 / rate).tolist())
 
     def caption(self, time: float) -> str:
         """The text below the picture at ``time`` (s)."""
@@ -90,12 +75,11 @@ Draw = Callable[[Shot, float], Image.Image]
 
 
 def shoot(draw: Draw, shots: Iterable[Shot], rate: float = RATES[".mp4"]) -> Iterator[Frame]:
-    """The frames of a film: of each shot the landings since the last one, the movement, its end for a moment."""
+    """The frames of a film: of each shot the movement, and its end for a moment."""
     for shot in shots:
-        for part, time in shot.moments(rate):
-            frame = captioned(draw(part, time), part.title, part.caption(time))
-            beside = shot.beside[time >= shot.recording.landed] if shot.beside else frame[:, :0]
-            yield np.concatenate([frame, beside], axis=1)
+        for time in shot.moments(rate):
+            frame = captioned(draw(shot, time), shot.title, shot.caption(time))
+            yield frame if shot.beside is None else np.concatenate([frame, shot.beside], axis=1)
 
 
 def captioned(image: Image.Image, title: str, caption: str) -> Frame:
@@ -127,35 +111,14 @@ def write_film(path: Path, frames: Iterable[Frame]) -> None:
         size = f"{first.shape[1]}x{first.shape[0]}"
         given = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", size, "-r", str(RATES[kind]), "-i", "-"]
         command = [get_ffmpeg_exe(), "-v", "error", *given, *_CODECS[kind], "-y", str(partial)]
-        # In a session of its own, so that Ctrl-C reaches only the process that draws the frames.
-        with subprocess.Popen(
-            command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True
-        ) as encoder:
+        with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as encoder:
             assert encoder.stdin is not None
-            try:
-                with suppress(BrokenPipeError):  # it failed, and its error output says why
-                    for frame in chain([first], frames):
-                        with _at_most(PATIENCE, encoder):
-                            encoder.stdin.write(frame.tobytes())
-                with _at_most(PATIENCE, encoder):
-                    _, said = encoder.communicate()
-            except BaseException:
-                encoder.kill()
-                raise
+            with suppress(BrokenPipeError):  # it failed, and its error output says why
+                for frame in chain([first], frames):
+                    encoder.stdin.write(frame.tobytes())
+            _, said = encoder.communicate()
         if encoder.returncode:
-            silent = f"ffmpeg ended with {encoder.returncode}, or did nothing for {PATIENCE:g} s"
-            raise OSError(f"the film was not encoded: {said.decode(errors='replace').strip() or silent}")
-
-
-@contextmanager
-def _at_most(seconds: float, process: subprocess.Popen[bytes]) -> Iterator[None]:
-    """Kill a process that keeps this block waiting for so long."""
-    timer = Timer(seconds, process.kill)
-    timer.start()
-    try:
-        yield
-    finally:
-        timer.cancel()
+            raise OSError(f"the film was not encoded: {said.decode(errors='replace').strip()}")
 
 
 def _place(point: Array) -> str:

@@ -11,16 +11,18 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
-from PIL import Image, ImageDraw
+from matplotlib.patches import Rectangle
+from PIL import Image
 
 from sgimd_torch.environments.protocol import Sketch
+from sgimd_torch.figures.axes import goal_rings
 from sgimd_torch.spaces import Array, Box
+from sgimd_torch.views.film.panel import blank, pixels
 from sgimd_torch.views.film.reel import HEIGHT, WIDTH, Shot
 
 MARGINS: Final = (0.06, 0.11)  # of width and height of the picture, around all that happens
-_FINER: Final = 2  # supersampling factor
-_PAPER, _FRAME, _LINK, _JOINT = "#f7f5f0", "#c9c4b8", "#2b3a4a", "#ffffff"
-_PATH, _GOAL, _END, _PAST = "#e08a55", "#d99a00", "#d1341f", "#9db4c8"
+_PAPER, _FRAME, _LINK = "#f7f5f0", "#c9c4b8", "#2b3a4a"
+_PATH, _END, _PAST = "#e08a55", "#d1341f", "#9db4c8"
 
 
 class Sketchbook:
@@ -32,58 +34,34 @@ class Sketchbook:
     """
 
     def __init__(self, space: Box, shots: Sequence[Shot]) -> None:
-        self._frame = in_picture(np.stack([space.low, space.high])) if space.dim > 1 else None
+        self._space = space
         seen = [_chains(shot).reshape(-1, 2) for shot in shots]
         seen += [in_picture(space.clip([*shot.past, shot.goal, shot.recording.outcome])) for shot in shots]
         low, high = (end(np.concatenate(seen), axis=0) for end in (np.min, np.max))
-        self._size = np.array([WIDTH, HEIGHT]) * _FINER
-        room = self._size * (1 - 2 * np.array(MARGINS))
-        self._middle = (low + high) / 2
-        self._scale = float((room / np.maximum(high - low, 1e-9)).min())  # pixels for each unit
+        room = np.array([WIDTH, HEIGHT]) * (1 - 2 * np.array(MARGINS))
+        half = np.array([WIDTH, HEIGHT]) / (room / np.maximum(high - low, 1e-9)).min() / 2
+        self._low, self._high = (low + high) / 2 - half, (low + high) / 2 + half
+        self._figure = blank(WIDTH, facecolor=_PAPER)
+        self._ax = self._figure.add_axes((0, 0, 1, 1))
 
     def frame(self, shot: Shot, time: float) -> Image.Image:
         """The robot at ``time`` (s); from its end on, where it ended."""
-        sketch, chains = shot.recording, _chains(shot)
+        sketch, chains, ax = shot.recording, _chains(shot), self._ax
         assert isinstance(sketch, Sketch)
-        row = min(round(time / sketch.step), len(chains) - 1)
-        image = Image.new("RGB", tuple(self._size.tolist()), _PAPER)
-        pen = ImageDraw.Draw(image)
-        if self._frame is not None:
-            (left, bottom), (right, top) = self._pixels(self._frame)
-            pen.rectangle((left, top, right, bottom), outline=_FRAME, width=_FINER)
-        self._dots(pen, in_picture(shot.past), 1.5, fill=_PAST)
-        self._dots(pen, in_picture(shot.goal[None]), 9, outline=_GOAL, width=3 * _FINER)
-        self._line(pen, chains[: row + 1, -1], _PATH, 2)
-        self._line(pen, chains[row], _LINK, 5)
-        self._dots(pen, chains[row][:-1], 3, fill=_JOINT, outline=_LINK, width=_FINER)
-        self._dots(pen, chains[row][-1:], 5, fill=_END)
+        chain = chains[: min(round(time / sketch.step), len(chains) - 1) + 1]
+        ax.clear()
+        ax.set_axis_off()
+        ax.set(xlim=(self._low[0], self._high[0]), ylim=(self._low[1], self._high[1]))
+        if self._space.dim > 1:
+            ax.add_patch(Rectangle(self._space.low[:2], *self._space.sides[:2], fill=False, edgecolor=_FRAME))  # type: ignore[arg-type]
+        ax.plot(*in_picture(shot.past).T, "o", color=_PAST, ms=2, mec="none")
+        goal_rings(ax, in_picture(shot.goal[None]), 14)
+        ax.plot(*chain[:, -1].T, color=_PATH, lw=1.5)
+        ax.plot(*chain[-1].T, "o-", color=_LINK, mfc="white", lw=3.5, ms=4)
+        ax.plot(*chain[-1, -1:].T, "o", color=_END, ms=7)
         if time >= sketch.landed:
-            for slope in (-1, 1):
-                arm = np.array([[-8, -8 * slope], [8, 8 * slope]]) * _FINER / self._scale
-                self._line(pen, in_picture(sketch.outcome[None]) + arm, _END, 3)
-        return image.resize((WIDTH, HEIGHT), Image.Resampling.LANCZOS)
-
-    def _pixels(self, points: Array) -> Array:
-        """``(n, 2)`` from places in the plane, y upwards, to pixels, y downwards."""
-        return self._size / 2 + (points - self._middle) * np.array([self._scale, -self._scale])
-
-    def _line(self, pen: ImageDraw.ImageDraw, points: Array, colour: str, width: int) -> None:
-        if len(points) > 1:
-            pen.line([tuple(p) for p in self._pixels(points).tolist()], colour, width * _FINER, joint="curve")
-
-    def _dots(
-        self,
-        pen: ImageDraw.ImageDraw,
-        points: Array,
-        radius: float,
-        *,
-        fill: str | None = None,
-        outline: str | None = None,
-        width: int = 1,
-    ) -> None:
-        for at in self._pixels(points):
-            corners = (*(at - radius * _FINER), *(at + radius * _FINER))
-            pen.ellipse(corners, fill=fill, outline=outline, width=width)
+            ax.plot(*in_picture(sketch.outcome[None]).T, "x", color=_END, ms=12, mew=2)
+        return Image.fromarray(pixels(self._figure))
 
 
 def in_picture(points: Array) -> Array:

@@ -17,13 +17,12 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from sgimd_torch.figures.axes import GREY, LEGEND, alike, limits, over_movements, rounded
+from sgimd_torch.figures.axes import LEGEND, alike, limits, over_movements, rounded
 from sgimd_torch.figures.learning import COLOURS, competence_map, interest_map, landing_points, map_after
 from sgimd_torch.figures.learning import misses as draw_misses
 from sgimd_torch.figures.sections import Section, of_regions, sections
 from sgimd_torch.runs.read import Run
 from sgimd_torch.spaces import Array, Box
-from sgimd_torch.views.comparison import Comparison
 from sgimd_torch.views.variants import Variant
 
 P = ParamSpec("P")
@@ -73,8 +72,7 @@ def colours_of(variants: Sequence[Variant]) -> dict[str, str]:
     return found | {name: free[k % len(free)] for k, name in enumerate(others)}
 
 
-@png
-def curves(figure: Figure, variants: Sequence[Variant], colours: Mapping[str, str]) -> None:
+def error_curves(figure: Figure, variants: Sequence[Variant], colours: Mapping[str, str]) -> None:
     """Error against movements: interquartile means over seeds with their intervals, points where there are few seeds.
 
     A single variant is shown with its seeds, thin, and its noise floor.
@@ -102,35 +100,14 @@ def curves(figure: Figure, variants: Sequence[Variant], colours: Mapping[str, st
     ax.legend(handles=handles, **LEGEND)
 
 
-@png
-def differences(figure: Figure, compared: Sequence[Comparison], baseline: Variant) -> None:
-    """How much larger last errors are than the baseline's, seed by seed, the best on top, with intervals.
+curves = png(error_curves)
 
-    A filled mark: the interval excludes 0. Ticks behind are seeds. Where there are few seeds they are points, and there
-    is no mark.
 
-    Args:
-        figure: drawn on.
-        compared: one or more.
-        baseline: what they are compared with.
-    """
-    figure.set_size_inches(6.8, 1.1 + 0.36 * len(compared))
-    ax, ordered = figure.subplots(), sorted(compared, key=lambda row: row.found.value)
-    for height, row in enumerate(ordered):
-        (centre, low, high), heights = row.found, np.full(len(row.seeds), height)
-        if np.isnan(low):
-            ax.plot(row.seeds, heights, "o", color=GREY, markersize=4.5)
-            continue
-        ax.plot(row.seeds, heights, "|", color=GREY, markersize=7, alpha=0.6, zorder=1)
-        ax.plot([low, high], [height, height], color="black", linewidth=1.8, solid_capstyle="butt")
-        face = "black" if low > 0 or high < 0 else "white"
-        ax.plot(centre, height, "o", color="black", markerfacecolor=face, markersize=6.5)
-    ax.axvline(0, color=COLOURS["sgim-d"], zorder=0)
-    named = [f"{_plain(row.variant.label)} ({_seeds(len(row.seeds))})" for row in ordered]
-    ax.set_yticks(range(len(ordered)), named)
-    ax.set_ylim(len(ordered) - 0.4, -0.6)
-    ax.set_xlabel(baseline.space.in_unit(f"error less that of {_plain(baseline.label)}, seed by seed"))
-    ax.grid(axis="x", alpha=0.3)
+def figure_of_curves(variants: Sequence[Variant]) -> Figure:
+    """Their error curves, as a figure."""
+    figure = Figure(layout="constrained")
+    error_curves(figure, variants, colours_of(variants))
+    return figure
 
 
 def planes_of(variants: Sequence[Variant]) -> dict[str, Box]:
@@ -160,20 +137,12 @@ def landing(figure: Figure, variant: Variant, plane: Box) -> None:
 
 @png
 def misses(figure: Figure, variant: Variant) -> None:
-    """Where is it bad? Each goal of the last evaluation, coloured by its error; apart for thirds of the context."""
-    goals, errors, contexts = variant.misses
-    parts = [("all contexts" * bool(contexts.shape[1]), np.ones(len(goals), bool))]
-    for k in range(contexts.shape[1]):
-        box = variant.runs[0].spaces["contexts"]
-        edges = np.linspace(box.low[k], box.high[k], 4)
-        third = np.clip(np.searchsorted(edges, contexts[:, k], "right") - 1, 0, 2)
-        parts += [(f"{box.axis(k, 'context')} {edges[n]:.3g} to {edges[n + 1]:.3g}", third == n) for n in range(3)]
-    panels = [(section, *part) for part in parts for section in sections(variant.space) if part[1].any()]
-    axes = _panels(figure, [section for section, *_ in panels])
+    """Where is it bad? Each goal of the last evaluation, coloured by its error."""
+    goals, errors = variant.misses
+    panels = sections(variant.space)
     most = max(float(np.quantile(errors, 0.95)), 1e-12)
-    for ax, (section, title, here) in zip(axes, panels, strict=True):
-        draw_misses(ax, goals[here], errors[here], variant.space, section, most)
-        ax.set_title(title)
+    for ax, section in zip(_panels(figure, panels), panels, strict=True):
+        draw_misses(ax, goals, errors, variant.space, section, most)
 
 
 def has_regions(run: Run) -> bool:

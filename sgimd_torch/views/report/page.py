@@ -12,7 +12,6 @@ from typing import Final
 import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from sgimd_torch.runs.read import Run
 from sgimd_torch.views import comparison
 from sgimd_torch.views.report import figures, record
 from sgimd_torch.views.statistics import LEAST_SEEDS, Interval, show
@@ -55,7 +54,6 @@ def page(place: Path, variants: Sequence[Variant], baseline: str | None = None) 
         least_seeds=LEAST_SEEDS,
         figures=figures,
         record=record,
-        requested=requested,
         unit=unit_of(variants),
     )
     return html.encode(errors="backslashreplace").decode()  # a name may not be valid text
@@ -64,15 +62,3 @@ def page(place: Path, variants: Sequence[Variant], baseline: str | None = None) 
 def _interval(found: Interval | None, form: str = ".3f") -> str:
     """``0.060 [0.058, 0.062]``, a dash for nothing."""
     return "–" if found is None else show(found, form)
-
-
-def requested(run: Run) -> str:
-    """What a run asked its teachers for, in a sentence; "" for a learner that has asked nobody."""
-    if run.requests is None or not len(run.requests["index"]):
-        return ""
-    shown = run.requests["reply"] == "shown"
-    said = f"It asked for {len(shown)} demonstrations and was shown {shown.sum()}"
-    if not shown.any():
-        return f"{said}."
-    apart = run.spaces["outcomes"].amount(float(np.median(run.requests["apart"][shown])), ".3f")
-    return f"{said}, {apart} from its goal (median)."

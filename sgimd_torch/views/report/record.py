@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, Final, NamedTuple
+from collections.abc import Iterator, Sequence
+from typing import Any, Final
 
 from sgimd_torch.runs.config import PLACE
 from sgimd_torch.runs.read import Run
@@ -16,13 +16,6 @@ from sgimd_torch.views.statistics import LEAST_SEEDS
 from sgimd_torch.views.variants import Variant
 
 AGAIN: Final = "runs/again"  # a folder that holds no run yet
-
-
-class Table(NamedTuple):
-    """The ``head`` of the columns after the first; ``rows`` of a name and a cell for each of them."""
-
-    head: list[str]
-    rows: list[tuple[str, list[str]]]
 
 
 def doubts(variants: Sequence[Variant]) -> Iterator[str]:
@@ -80,17 +73,6 @@ def commands(runs: Sequence[Run]) -> list[str]:
         line = f"sgimd run {given} --seed={'$seed' if len(seeds) > 1 else seeds[0]} --out={AGAIN}"
         lines.append(f"for seed in {' '.join(map(str, seeds))}; do\n  {line}\ndone" if len(seeds) > 1 else line)
     return lines
-
-
-def settings(config: Mapping[str, Any]) -> str:
-    """A line for each setting, those of a part below it: ``goals: interest-map``, then ``  window: 12``."""
-    parts = dict.fromkeys(name.partition(".")[0] for name in config if "." in name)
-    lines = [f"{name}: {shown(value)}" for name, value in config.items() if name.partition(".")[0] not in parts]
-    for part in parts:
-        lines += ["", f"{part}: {shown(config.get(part))}"]
-        own = {name.partition(".")[2]: config[name] for name in config if name.startswith(f"{part}.")}
-        lines += [f"  {name}: {shown(value)}" for name, value in own.items()]
-    return "\n".join(lines)
 
 
 def differing(variants: Sequence[Variant]) -> dict[str, list[str]]:

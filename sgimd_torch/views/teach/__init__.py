@@ -4,7 +4,6 @@ Examples:
   sgimd teach                                           a new learner on the fishing rod, into runs/taught/seed-000
   sgimd teach runs/taught/seed-000                      go on with a run, taught or not
   sgimd teach --environment planar-arm-7 --seed 3       other options are those of sgimd run
-  sgimd teach --algorithm sgim-im                       a learner that asks you
 """
 
 from __future__ import annotations
@@ -21,8 +20,9 @@ from typing import TYPE_CHECKING, Final
 
 from sgimd_torch.runs.command_line import parse
 from sgimd_torch.runs.config import Config
-from sgimd_torch.runs.process import loading, say
+from sgimd_torch.runs.process import Failed, loading, say
 from sgimd_torch.runs.read import config_of, read_run
+from sgimd_torch.session import NoOutcomeError, ReplayError
 
 if TYPE_CHECKING:
     from viser import ViserServer
@@ -44,24 +44,21 @@ def main(argv: Sequence[str] | None = None) -> int:
     token = secrets.token_urlsafe(16)
     with loading():
         from sgimd_torch.runs.build import task_of
-        from sgimd_torch.runs.process import Failed
         from sgimd_torch.runs.tasks import hand_led_of
         from sgimd_torch.views.teach.page import Page
-        from sgimd_torch.views.teach.session import Session
+        from sgimd_torch.views.teach.taught import TaughtRun
     hand_led_of(task_of(config))  # what cannot be led is refused before anything is made
-    session = Session(config)
+    taught = TaughtRun(config)
     with serving(port, token) as server:
-        page = Page(server, session)
+        page = Page(server, taught)
         print(WHERE.format(port=server.get_port(), token=token, path=config.directory), flush=True)
-        session.pause(True)  # it waits for its first lesson
         try:
-            with session:
-                page.run()
+            page.run()
+        except (NoOutcomeError, ReplayError) as error:
+            raise Failed(str(error)) from error
         except KeyboardInterrupt:
             say(f"all of it is kept; to go on: sgimd teach {config.directory}")
             raise
-    if session.state.problem:
-        raise Failed(session.state.problem)
     return 0
 
 
@@ -111,8 +108,8 @@ def options_of(argv: Sequence[str]) -> tuple[Config, int]:
         if config.directory.resolve() != path.resolve():
             raise ValueError(f"{path} must be called {config.directory.name}, as sgimd run calls it; was it renamed?")
         return config, options.port
-    config, _ = parse([f"--name={NAME}", "--repeats=0", *words])
-    asked = ["--teachers=by-hand"] if "teachers" in config else []
-    shown = ["--teacher=by-hand"] if "teacher" in config else []
-    config, _ = parse([f"--name={NAME}", "--repeats=0", *asked, *shown, *words])
+    words = [f"--name={NAME}", "--repeats=0", *words]
+    config, _ = parse(words)
+    if "teacher" in config:
+        config, _ = parse(["--teacher=by-hand", *words])
     return config, options.port

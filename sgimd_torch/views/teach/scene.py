@@ -19,8 +19,7 @@ from sgimd_torch.environments.protocol import HandLed
 from sgimd_torch.spaces import Array, Box
 from sgimd_torch.views.teach.chart import CELLS, SKILL, Colours
 
-HAND, LEARNER, GOAL, MET, UNMET = (240, 120, 30), (60, 70, 190), (230, 60, 120), (10, 110, 50), (120, 140, 160)
-RINGS: Final = {"goal": (GOAL, 0.035), "landed": (LEARNER, 0.02), "asked": (GOAL, 0.06), "lesson": (HAND, 0.03)}
+HAND, LEARNER, MET, UNMET = (240, 120, 30), (60, 70, 190), (10, 110, 50), (120, 140, 160)
 ABOVE: Final = 0.002  # m, from one layer of the map to the next
 SEEN: Final = 1e-4  # of the map's side: a robot that has moved less is not drawn again
 
@@ -53,12 +52,9 @@ class Scene:
         shown = [k for k in range(model.ngeom) if model.geom_bodyid[k] in led_bodies]
         self._drawn = np.full((model.ngeom, 3), np.inf)
         self._geoms = {k: self._add_geom(k) for k in shown}
-        self._hand = self._ball("/hand", HAND, 0.026 * self.size)
-        self._marks = {name: self._ring(name, colour, radius) for name, (colour, radius) in RINGS.items()}
-        self._labels = {name: self._scene.add_label(f"/label/{name}", " ", anchor="bottom-left") for name in RINGS}
-        for name in RINGS:
-            self.mark(name, None)
-        self.hint = self._scene.add_label("/hint", "drag me", anchor="bottom-center")
+        self._hand = self._scene.add_icosphere("/hand", radius=0.026 * self.size, color=HAND, subdivisions=3)
+        ring = trimesh.creation.torus(0.03 * self.size, 0.006 * self.size, 32, 8)
+        self._mark = self._scene.add_mesh_simple("/mark", ring.vertices, ring.faces, color=HAND, visible=False)
         names = [model.body(model.geom_bodyid[k]).name for k in shown]
         self.grips = [(led.hand, self._hand), *zip(names, self._geoms.values(), strict=True)]
         """What can be dragged, the hand first: the name of a body, and its picture."""
@@ -77,15 +73,6 @@ class Scene:
         flat[..., 2] = layer * ABOVE * self.size
         return flat
 
-    def place(self, origin: Array, direction: Array) -> Array | None:
-        """``(outcome_dim,)`` in T at which a ray meets the ground; None if it does not, or beside T."""
-        if abs(direction[2]) < 1e-9 or -origin[2] / direction[2] <= 0:
-            return None
-        hit = origin - origin[2] / direction[2] * direction
-        place = (self._outcomes.low + self._outcomes.high) / 2
-        place[: min(2, self._outcomes.dim)] = hit[: min(2, self._outcomes.dim)]
-        return place if self._outcomes.contains(place) else None
-
     def draw_arm(self, data: Any, hand: Array) -> None:
         """The led robot in the posture of ``data``, its hand at ``(3,)`` m."""
         if np.allclose(data.geom_xpos, self._drawn, rtol=0, atol=SEEN * self.size):
@@ -94,8 +81,6 @@ class Scene:
         for k, handle in self._geoms.items():
             handle.position, handle.wxyz = data.geom_xpos[k], _quaternion(data.geom_xmat[k])
         self._hand.position = hand
-        if self.hint.visible:
-            self.hint.position = hand + np.array([0, 0, 0.04 * self.size])
 
     def draw_map(self, colours: Colours, met: NDArray[np.bool_]) -> None:
         """Another picture on the ground, and on it the goals of the benchmark; ``met`` ``(n,)`` are within reach."""
@@ -108,26 +93,16 @@ class Scene:
         if len(outcomes):
             self._landings.points = self.ground(outcomes, 5).astype(np.float16)
 
-    def mark(self, name: str, place: Array | None, text: str = "") -> None:
-        """Put "goal", "landed", "asked" or "lesson" at a place of T, or hide it; with a text beside it."""
-        mark, label = self._marks[name], self._labels[name]
-        mark.visible = place is not None
-        label.visible = place is not None and bool(text)
+    def mark(self, place: Array | None) -> None:
+        """Put the ring of a lesson at a place of T, or hide it."""
+        self._mark.visible = place is not None
         if place is not None:
-            mark.position = self.ground(place, 3)
-            label.position, label.text = self.ground(place, 3), text or " "
+            self._mark.position = self.ground(place, 3)
 
     def _points(self, name: str, points: Array, colour: tuple[int, int, int], size: float) -> Any:
         return self._scene.add_point_cloud(
             name, points, colour, point_size=size * self.size, point_shape="circle", point_shading="flat"
         )
-
-    def _ball(self, name: str, colour: tuple[int, int, int], radius: float) -> Any:
-        return self._scene.add_icosphere(name, radius=radius, color=colour, subdivisions=3)
-
-    def _ring(self, name: str, colour: tuple[int, int, int], radius: float) -> Any:
-        ring = trimesh.creation.torus(radius * self.size, 0.006 * self.size, 32, 8)
-        return self._scene.add_mesh_simple(f"/mark/{name}", ring.vertices, ring.faces, color=colour, cast_shadow=False)
 
     def _add_geom(self, k: int) -> Any:
         shape = _shape(self._model, k)

@@ -1,148 +1,112 @@
-"""The run that is taught: its parts and its record, what can be asked of it, and how a lesson is taken back.
+"""The run that is taught: it practises, is shown lessons by hand, and says how it stands.
 
-    run = TaughtRun(config, ask); run.give(demonstration); run.chart().mean_error; run.take_back(); run.close()
-All of it happens in one thread, that of the learner; ``session.py`` says when.
+    run = TaughtRun(config); run.practise(20); run.show(demonstration); run.standing().chart.mean_error; run.close()
+One thread at a time may use it. The directory is that of ``sgimd run``, which can go on with it.
 """
 
 from __future__ import annotations
 
-import os
-import shutil
-from collections.abc import Iterable
+from collections import deque
 from dataclasses import dataclass, replace
-from itertools import count
-from pathlib import Path
-from typing import Any, Final
+from itertools import islice
+from typing import Final
 
 import numpy as np
 
 from sgimd_torch.demonstrations.lessons import HandLesson, LedMovement, lesson_by_hand
-from sgimd_torch.record import Record
-from sgimd_torch.runs.build import RunParts, build
+from sgimd_torch.runs.build import build
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.directory import FILE, holds_run
 from sgimd_torch.runs.run import Life
 from sgimd_torch.runs.tasks import correspondence_of, hand_led_of
 from sgimd_torch.spaces import Array, Demonstration, stream
-from sgimd_torch.teachers.by_hand import BY_HAND, Ask, ByHand
+from sgimd_torch.teachers.by_hand import BY_HAND, ByHand
 from sgimd_torch.views.teach.chart import Chart, chart_of
 
+LATEST: Final = 60  # landings that a page shows
+ANSWER: Final = 10  # movements that answer a lesson, at most: as many as an imitation takes
 NO_MORE: Final = "it has made all its {0} movements; end this session, and go on with --movements {1}"
+ALONE: Final = "{0} cannot be shown a lesson by hand; sgim-d, practice-taught, imitation and observation can"
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
-    """``goal`` and ``outcome`` ``(outcome_dim,)`` of the movement ``theta``, from which nothing was learnt."""
+class Standing:
+    """How a run stands: after how many ``movements`` and ``lessons`` by hand, and whether it is still ``replaying``
+    what was recorded before. ``landed`` ``(n, outcome_dim)`` are the last outcomes, ``chart`` what it can do."""
 
-    goal: Array
-    theta: Array
-    outcome: Array
-
-    @property
-    def missed(self) -> float:
-        """The distance from the goal to the outcome."""
-        return float(np.linalg.norm(self.outcome - self.goal))
+    movements: int
+    lessons: int
+    replaying: bool
+    landed: Array
+    chart: Chart
 
 
 class TaughtRun:
     """A run on disk, open for lessons.
 
     Args:
-        config: of the run; it goes on with what is in its directory.
-        ask: asks the person who is there, for a learner that asks.
+        config: of the run; it goes on with what is in its directory. What is recorded is lived through again first.
 
     Raises:
         ValueError: the run cannot be made, or its directory belongs to another one.
         OSError: a file of it cannot be read.
     """
 
-    def __init__(self, config: Config, ask: Ask) -> None:
-        self.config, self._ask = config, ask
-        self._trials = 0
-        self.open()
-
-    def open(self) -> None:
-        """Take the run as it is on disk; its movements are lived through again by ``life.episodes()``."""
-        parts = build(self.config)
-        asked = (each for each in parts.teachers.values() if isinstance(each, ByHand))
-        self.hand = next(asked, ByHand(parts.teacher))
-        self.hand.ask = self._ask
-        self.parts: RunParts = replace(parts, teacher=self.hand)
-        self.life = Life(self.parts, resume=holds_run(self.path))
-        with Record(self.path) as record:
-            places = lessons_among(record.events())
-        self.lessons = [movement for movement, _ in places]
-        """Before which movements a lesson was given by hand."""
-
-    @property
-    def path(self) -> Path:
-        """Of the record."""
-        return self.config.directory / FILE
+    def __init__(self, config: Config) -> None:
+        self.config, parts = config, build(config)
+        self._hand = ByHand(parts.teacher)
+        self.parts = replace(parts, teacher=self._hand)
+        self._life = Life(self.parts, resume=holds_run(config.directory / FILE))
+        self._episodes = self._life.episodes()
+        self._lessons = sum(each.kind == "shown" and each.who == BY_HAND for each in self._life.record.events())
+        self._landed: deque[Array] = deque(maxlen=LATEST)
 
     @property
     def context(self) -> Array:
-        """``(context_dim,)`` of maps, lessons and trials: the middle of C."""
+        """``(context_dim,)`` of maps and lessons: the middle of C."""
         contexts = self.parts.environment.contexts
         return np.asarray((contexts.low + contexts.high) / 2)
 
     @property
     def cannot_be_taught(self) -> str:
         """Why the learner cannot be shown anything, "" if it can."""
-        if self.parts.learner.social is not None or self.parts.teachers:
-            return ""
-        can = "sgim-d, practice-taught, imitation, observation and sgim-im can"
-        return f"{self.config.algorithm} learns alone and cannot be shown anything; {can}: --algorithm sgim-d"
+        can = self.parts.learner.social is not None and not self.parts.teachers
+        return "" if can else ALONE.format(self.config.algorithm)
 
-    def close(self) -> None:
-        """Write what is left to write, and let others have the directory."""
-        self.life.close()
-
-    def check(self, demonstration: Demonstration, *, asked: bool) -> None:
-        """Refuse what cannot be shown now; ``asked``: the learner waits for an answer.
+    def practise(self, movements: int) -> Standing:
+        """Go on by so many movements, fewer where the run ends.
 
         Raises:
-            ValueError: the learner cannot be taught, or cannot use this.
+            SimulationError, ReplayError, ValueError, OSError: as ``sgimd run``.
+        """
+        return self._go_on(movements)
+
+    def give(self, demonstration: Demonstration) -> None:
+        """Have a lesson shown before the next movement.
+
+        Raises:
+            ValueError: the learner cannot be taught, or cannot use this; nothing has happened then.
         """
         total = self.config.movements
         if self.cannot_be_taught:
             raise ValueError(self.cannot_be_taught)
-        if self.life.movements >= total:
+        if self._life.replaying:
+            raise ValueError("it still replays what was recorded; a lesson has to wait until that is done")
+        if self._life.movements >= total:
             raise ValueError(NO_MORE.format(total, 2 * total))
-        if self.parts.teachers and not asked:
-            raise ValueError("this learner takes a lesson only when it asks for one; wait until it asks")
         self.parts.environment.contexts.check("context of the lesson", demonstration.context)
-        if asked:
-            self.parts.environment.outcomes.check("outcome of the lesson", demonstration.outcome)
         self.parts.learner.translate(demonstration)
+        self._hand.give(demonstration)
+        self._lessons += 1
 
-    def give(self, demonstration: Demonstration, *, asked: bool) -> None:
-        """Have a lesson shown before the next movement; one that was ``asked`` for goes to who has asked."""
-        self.lessons.append(self.life.movements)
-        if not asked:
-            self.hand.give(demonstration)
+    def answer(self) -> Standing:
+        """Let the learner make the movements that answer a lesson."""
+        return self._go_on(ANSWER, answer=True)
 
-    def take_back(self) -> None:
-        """Close the run, let its record end before the last lesson by hand, and open it again.
-
-        A copy of the record as it was stays beside it. Killed on the way, the run is as before.
-
-        Raises:
-            OSError: the record cannot be written.
-        """
-        self.close()
-        copy = next(place for n in count() if not (place := self.path.with_name(f"run.taken-back-{n}.sqlite")).exists())
-        partial = copy.with_suffix(".part")
-        shutil.copy(self.path, partial)
-        os.replace(partial, copy)
-        with Record(self.path, write=True) as record:
-            record.rewrite(n_events=lessons_among(record.events())[-1][1]).close()
-        self.open()
-
-    def chart(self) -> Chart:
-        """The map of what the learner can do now."""
-        robot, memory = self.parts.environment, self.parts.learner.memory
-        so_far = {"movements": self.life.movements, "lessons": len(self.lessons)}
-        return chart_of(memory, robot.outcomes, robot.rest, self.parts.benchmark, self.context, **so_far)
+    def show(self, demonstration: Demonstration) -> Standing:
+        """Give a lesson, and let the learner answer it; raises what both raise."""
+        self.give(demonstration)
+        return self.answer()
 
     def lesson_of(self, recording: LedMovement) -> HandLesson:
         """What a recording would teach.
@@ -152,31 +116,26 @@ class TaughtRun:
         """
         task, robot = self.parts.task, self.parts.environment
         assert task is not None
-        rng = stream(self.config.seed, "lessons", len(self.lessons))
+        rng = stream(self.config.seed, "lessons", self._lessons)
         return lesson_by_hand(recording, robot, correspondence_of(task), hand_led_of(task), rng, context=self.context)
 
-    def try_goal(self, goal: Array) -> Trial:
-        """Execute once what the run's inverse model infers for ``goal`` ``(outcome_dim,)``, with its own noise.
+    def standing(self) -> Standing:
+        """How it stands now."""
+        robot, memory = self.parts.environment, self.parts.learner.memory
+        landed = np.array(self._landed).reshape(-1, robot.outcomes.dim)
+        chart = chart_of(memory, robot.outcomes, robot.rest, self.parts.benchmark, self.context)
+        return Standing(self._life.movements, self._lessons, self._life.replaying, landed, chart)
 
-        Raises:
-            ValueError: nothing is remembered yet, or the goal is not one of T.
-        """
-        parts = self.parts
-        goal = parts.environment.outcomes.check("goal", goal, "a click beside the map?")
-        if not len(parts.learner.memory):
-            raise ValueError("it remembers no movement yet; let it move, or show it something first")
-        self._trials += 1
-        theta, rng = parts.inverse(self.context, goal).theta, stream(self.config.seed, "trials", self._trials)
-        return Trial(goal, theta, parts.environment.execute(self.context, theta.copy(), rng))
+    def close(self) -> None:
+        """Write what is left to write, and let others have the directory."""
+        self._life.close()
 
-
-def lessons_among(events: Iterable[Any]) -> list[tuple[int, int]]:
-    """For each lesson by hand the numbers of movements, and of events, that came before it and the question for it."""
-    found, movements, asked = list[tuple[int, int]](), 0, 0
-    for k, event in enumerate(events):
-        if event.kind in ("moved", "rested"):
-            movements += 1
-        elif event.kind == "shown" and event.who == BY_HAND:
-            found.append((movements, k - asked))
-        asked = event.kind == "asked"
-    return found
+    def _go_on(self, movements: int, *, answer: bool = False) -> Standing:
+        for episode in islice(self._episodes, movements):
+            if episode.outcome is not None:
+                self._landed.append(episode.outcome)
+            if answer and self.parts.learner.idle:
+                break
+        if not self._life.replaying:
+            self._life.commit()
+        return self.standing()
