@@ -9,14 +9,13 @@ one: so the box grows.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Final
+from collections.abc import Callable, Sequence
+from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from sgimd_torch.goals.uniform import UniformGoals
-from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, Box
 
 _FIRST: Final = 21  # exemplars; before, goals are uniform in T
@@ -26,6 +25,21 @@ _TAIL: Final = 0.02  # of these means on each side of a dimension: rare ones do 
 _BEYOND: Final = 0.2  # of the box's longest side, the step beyond it on all sides; at first the whole side
 _ROUNDING: Final = 1e-9  # of a side of T: outcomes so near each other are all alike
 _MOST: Final = 0.7  # of a side of T, in the geometric mean: the box is then as good as T
+
+
+class Reached(Protocol):
+    """What a `Memory` knows of outcomes."""
+
+    @property
+    def outcomes(self) -> Array:
+        """``(n, outcome_dim)``, all that were reached, in their order."""
+        ...
+
+    def __len__(self) -> int: ...
+
+    def neighbourhoods(self, rows: np.ndarray, k: int) -> Sequence[np.ndarray]:
+        """For each of ``rows`` those of the ``k`` movements most like it."""
+        ...
 
 
 def _all_had() -> None:
@@ -53,8 +67,8 @@ class WithinReach(UniformGoals):
         outcomes: Box,
         rng: np.random.Generator,
         *,
-        reached: Memory,
-        effects: Callable[[], Memory | None] = _all_had,
+        reached: Reached,
+        effects: Callable[[], object | None] = _all_had,
     ) -> None:
         super().__init__(contexts, outcomes, rng)
         self.reached, self._effects = reached, effects

@@ -9,9 +9,12 @@ Costs are milliseconds for each movement. Runs that were not evaluated there are
 With --baseline there is a column more: error minus that of the baseline, paired by seed, interquartile mean over the
 seeds that both have; with five seeds or more, its bootstrap interval of 95 % in brackets. Below 0 is better.
 
+With --episodes it prints all movements of one run instead, as csv: a line for each, numbers that read back exactly.
+
   sgimd table runs
   sgimd table study --at 2000                      such as while runs are under way
   sgimd table study --baseline goals=interest-map  what the others are compared with
+  sgimd table runs/sgim-d/seed-003 --episodes > movements.csv
 
 Exit code: 0 a table was printed, 2 there is nothing to show.
 """
@@ -19,6 +22,8 @@ Exit code: 0 a table was printed, 2 there is nothing to show.
 from __future__ import annotations
 
 import argparse
+import csv
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
@@ -26,8 +31,8 @@ from typing import Final
 import numpy as np
 
 from sgimd_torch.record import RunError
-from sgimd_torch.runs.process import say
-from sgimd_torch.runs.read import Run
+from sgimd_torch.runs.process import printable, say
+from sgimd_torch.runs.read import Run, read_run
 from sgimd_torch.spaces import Array
 from sgimd_torch.views.comparison import baseline_of, compare
 from sgimd_torch.views.statistics import LEAST_SEEDS, show
@@ -47,6 +52,7 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument("runs", type=Path, help="a run's directory, a variant's folder, or an --out of runs")
     parser.add_argument("--at", type=int, metavar="MOVEMENTS", help="compare after this number of movements")
     parser.add_argument("--baseline", metavar="NAME", help="variant that the others are compared with, seed by seed")
+    parser.add_argument("--episodes", action="store_true", help="all movements of one run, as csv")
     return parser
 
 
@@ -57,6 +63,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         ValueError: there is nothing to show, or a run is damaged.
     """
     options = parser().parse_args(argv)
+    if options.episodes:
+        print_episodes(read_run(options.runs))
+        return 0
     found = read(options.runs)
     at = options.at or _last_common([run for runs in found.values() for run in runs if run.summary["finished"]])
     every = best_first(Variant(name, runs, at) for name, runs in found.items())
@@ -118,3 +127,15 @@ def _row(variant: Variant) -> tuple[str, ...]:
 
 def _mean(lengths: Array) -> str:
     return f"{lengths.mean():.3f}" if np.isfinite(lengths.mean()) else "-"
+
+
+def print_episodes(run: Run) -> None:
+    """All movements of a run as csv; what there was not, such as a goal when babbling, is an empty field."""
+    parts = {"context": run.contexts, "theta": run.thetas, "goal": run.goals, "outcome": run.outcomes}
+    names = [f"{name}_{k}" for name, values in parts.items() for k in range(values.shape[1])]
+    writer = csv.writer(sys.stdout, lineterminator="\n")
+    writer.writerow(["movement", "origin", "demonstration", *names])
+    numbers = np.concatenate(list(parts.values()), axis=1).tolist()
+    for index, origin, shown, row in zip(run.index, run.origin, run.demonstration, numbers, strict=True):
+        cells = ["" if np.isnan(number) else repr(number) for number in row]
+        writer.writerow([index, printable(origin), shown if shown >= 0 else "", *cells])

@@ -1,5 +1,7 @@
 """The table of the results of runs."""
 
+import csv
+import io
 import shutil
 from dataclasses import replace
 
@@ -156,3 +158,26 @@ def test_a_baseline_that_is_no_variant_is_refused_with_the_near_name(runs, capsy
     assert not said.out
     assert "'randon'; did you mean random? Known are random, sgim-d" in said.err
     assert said.err.count("\n") == 1
+
+
+def test_all_movements_of_a_run_are_printed_as_csv_with_numbers_that_read_back_exactly(runs, capsys):
+    assert table(runs / "sgim-d" / "seed-000", "--episodes") == 0
+    head, *rows = csv.reader(io.StringIO(capsys.readouterr().out))
+    run = read_run(runs / "sgim-d" / "seed-000")
+    assert head[:5] == ["movement", "origin", "demonstration", "theta_0", "theta_1"]
+    assert head[-4:] == ["goal_0", "goal_1", "outcome_0", "outcome_1"]
+    columns = dict(zip(head, zip(*rows, strict=True), strict=True))
+    assert columns["movement"] == tuple(map(str, range(40)))
+    assert columns["origin"] == tuple(run.origin)
+    assert [int(cell or -1) for cell in columns["demonstration"]] == run.demonstration.tolist()
+    for name, values in (
+        ("theta_24", run.thetas[:, 24]),
+        ("goal_1", run.goals[:, 1]),
+        ("outcome_0", run.outcomes[:, 0]),
+    ):
+        assert np.array_equal([float(cell or "nan") for cell in columns[name]], values, equal_nan=True)
+
+
+def test_the_movements_of_several_runs_are_refused(runs, capsys):
+    assert table(runs, "--episodes") == 2
+    assert str(runs) in capsys.readouterr().err
