@@ -25,6 +25,7 @@ from sgimd_torch.runs.evaluations import EVALUATED
 
 FILE: Final = "run.sqlite"
 LIBRARIES: Final = {"numpy": "numpy", "scipy": "scipy", "faiss": "faiss-cpu", "mujoco": "mujoco"}
+OF_MODEL: Final = ("predictions", "refreshes")  # tables of a forward model
 FORWARD: Final = ("torch", "lightning", "safetensors")  # of runs with a forward model
 
 
@@ -70,9 +71,9 @@ def open_run(parts: RunParts, *, resume: bool, accept_loss: bool = False) -> tup
             if record.movements > config.movements:
                 raise RunError(f"{path} has {record.movements} movements already, {config.movements} were asked for")
             made = list(dict.fromkeys(movements for movements, *_ in record.rows("evaluations")))
-            if made != config.evaluations[: len(made)] or differ & {*EVALUATES}:  # all of them are made again
-                for table in EVALUATED:
-                    record.replace_rows(table, ())
+            others = made != config.evaluations[: len(made)] or differ & {*EVALUATES}
+            for table in (*OF_MODEL, *EVALUATED * bool(others)):  # the replay makes them again
+                record.replace_rows(table, ())
             about["versions"] = _with_earlier(record.about["versions"], about["versions"], notes)
             record.settle(**about)
         except BaseException:

@@ -78,7 +78,7 @@ class ModelListener(Listener):
             return
         error = self._model.relative_error
         learnt = refresh.steps, refresh.held_out, error, int(refresh.diverged)
-        self._record.remake_rows("refreshes", [(movements, len(memory), *learnt)])
+        self._record.add_rows("refreshes", [(movements, len(memory), *learnt)])
         self._curves = {
             "model/relative_error": error,
             "model/held_out": refresh.held_out,
@@ -93,7 +93,7 @@ class ModelListener(Listener):
 
     def _predicted(self, first: int, outcomes: Array, predicted: Prediction) -> None:
         values = np.hstack((outcomes, *predicted)).tolist()
-        self._record.remake_rows("predictions", ((row, *each) for row, each in enumerate(values, first)))
+        self._record.add_rows("predictions", ((row, *each) for row, each in enumerate(values, first)))
         spread = np.hypot(predicted.epistemic, predicted.aleatoric)
         self._curves["model/error"] = float(np.linalg.norm(outcomes - predicted.mean, axis=1).mean())
         self._curves["model/coverage"] = coverage(outcomes, predicted.mean, spread, LEVEL)
