@@ -6,13 +6,13 @@ parts = build(Config(seed=3)); for episode in run(parts.learner, parts.environme
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Final
 
 from sgimd_torch.catalogue import checked
 from sgimd_torch.catalogue.options import given
-from sgimd_torch.environments.protocol import Environment, Record
+from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.goals.regions import Region
 from sgimd_torch.learner import Learner
@@ -32,25 +32,25 @@ if TYPE_CHECKING:
 class RunParts:
     """What a run needs. ``config`` is what it was made from. ``answers`` are the inverses to evaluate by, the run's own
     first; they read the learner's memory. ``model`` is refreshed after each movement; it and its ``trust`` are None for
-    a run without a model. ``teacher`` demonstrates, ``teachers`` are asked for it; without any of them there are no
-    ``demonstrations``: those of the file, and what teachers have besides. ``data`` holds checksums of the files that
-    were read, ``notes`` messages for the user. ``record`` gives a movement to be filmed, None if the task has no
-    picture of its own."""
+    a run without a model. ``teacher`` demonstrates, ``teachers`` are asked for it. ``data`` holds checksums of the
+    files that were read, ``notes`` messages for the user."""
 
     config: Config
-    environment: Environment
+    task: Task
     learner: Learner
     teacher: Teacher | None
-    demonstrations: Sequence[Demonstration]
+    teachers: Mapping[str, Demonstrator]
     answers: dict[str, Callable[[Array, Array], Estimate]]
     benchmark: Benchmark
     data: dict[str, str | None]
     model: ForwardModel | None
     trust: Trust | None
-    notes: Sequence[str] = ()
-    record: Record | None = None
-    teachers: Mapping[str, Demonstrator] = field(default_factory=dict)
-    task: Task | None = None
+    notes: Sequence[str]
+
+    @property
+    def environment(self) -> Environment:
+        """The robot and its world."""
+        return self.task.environment
 
     @property
     def inverse(self) -> Callable[[Array, Array], Estimate]:
@@ -88,19 +88,16 @@ def build(config: Config) -> RunParts:
     learner = make(ALGORITHM, teachers=teachers)(task.environment, config.seed)
     return RunParts(
         config=config,
-        environment=task.environment,
+        task=task,
         learner=learner,
         teacher=teacher,
-        demonstrations=[*demonstrations, *_others(demonstrations, teachers)],
+        teachers=teachers,
         answers=make.answers(learner),
         benchmark=benchmark,
         data={"demonstrations_crc32": demonstrations_crc32, "benchmark_crc32": benchmark_crc32},
         model=make.model if config.uses_model else None,
         trust=make.trust if config.uses_model else None,
         notes=notes,
-        record=task.picture,
-        teachers=teachers,
-        task=task,
     )
 
 
@@ -134,15 +131,6 @@ def _place(config: Config) -> str:
 def _shown(config: Config) -> bool:
     """Whether its teachers need demonstrations, as a person does not."""
     return {config.values.get("teacher"), *config.values.get("teachers", ())} - {None} != {"by-hand"}
-
-
-def _others(demonstrations: Sequence[Demonstration], teachers: Mapping[str, Demonstrator]) -> list[Demonstration]:
-    """What teachers can show besides, each movement once."""
-    known = {
-        shown.trajectory.tobytes(): shown for each in teachers.values() for shown in getattr(each, "demonstrations", ())
-    }
-    played = {shown.trajectory.tobytes() for shown in demonstrations}
-    return [shown for trajectory, shown in known.items() if trajectory not in played]
 
 
 class _Maker:

@@ -21,6 +21,7 @@ from runs import (
 from sgimd_torch.evaluation import evaluate
 from sgimd_torch.inverses.locally_linear import LocallyLinear
 from sgimd_torch.record import Kind, Record
+from sgimd_torch.runs import evaluations
 from sgimd_torch.runs.directory import FILE
 from sgimd_torch.runs.read import movements_on_disk, read_run
 from sgimd_torch.spaces import stream

@@ -15,7 +15,6 @@ from typing import Final
 import numpy as np
 
 from sgimd_torch.algorithms import Correspondence
-from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.environments.protocol import Environment, HandLed, Record, check_instance, recorded
 from sgimd_torch.evaluation import Benchmark, load_benchmark
 from sgimd_torch.files import checksum
@@ -117,6 +116,8 @@ def demonstrations_of(task: Task, file: Path | None) -> tuple[Sequence[Demonstra
     if not isinstance(source, Path):
         made = source()
         return made, _fit(robot, made, []), None
+    from sgimd_torch.demonstrations import load_demonstrations  # most learners read none
+
     crc32 = _checksum("demonstrations", source)
     found = load_demonstrations(source, outcome_dim=robot.outcomes.dim, context_dim=robot.contexts.dim)
     misfits: list[float] = []
