@@ -14,7 +14,6 @@ from sgimd_torch.catalogue import checked
 from sgimd_torch.catalogue.options import given
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.evaluation import Benchmark
-from sgimd_torch.goals.regions import Region
 from sgimd_torch.learner import Learner
 from sgimd_torch.runs.chosen import ALGORITHM, Part, chosen, part_of
 from sgimd_torch.runs.config import OWN, Config
@@ -30,13 +29,17 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class RunParts:
-    """What a run needs. ``config`` is what it was made from. ``answers`` are the inverses to evaluate by, the run's own
-    first; they read the learner's memory. ``model`` is refreshed after each movement; it and its ``trust`` are None for
-    a run without a model. ``teacher`` demonstrates, ``teachers`` are asked for it. ``data`` holds checksums of the
-    files that were read, ``notes`` messages for the user."""
+    """What a run needs.
+
+    ``config`` is what it was made from; ``environment`` is that of its ``task``. ``answers`` are the inverses to
+    evaluate by, the run's own first; they read the learner's memory. ``model`` is refreshed after each movement; it and
+    its ``trust`` are None for a run without a model. ``teacher`` demonstrates, ``teachers`` are asked for it. ``data``
+    holds checksums of the files that were read, ``notes`` messages for the user.
+    """
 
     config: Config
     task: Task
+    environment: Environment
     learner: Learner
     teacher: Teacher | None
     teachers: Mapping[str, Demonstrator]
@@ -46,21 +49,6 @@ class RunParts:
     model: ForwardModel | None
     trust: Trust | None
     notes: Sequence[str]
-
-    @property
-    def environment(self) -> Environment:
-        """The robot and its world."""
-        return self.task.environment
-
-    @property
-    def inverse(self) -> Callable[[Array, Array], Estimate]:
-        """The run's own inverse for evaluations."""
-        return self.answers[OWN]
-
-    @property
-    def regions(self) -> Sequence[Region]:
-        """Of the learner's goal model as they are now, whichever it is; none if it has no regions."""
-        return list(getattr(getattr(self.learner.autonomous, "goals", None), "regions", ()))
 
 
 def build(config: Config) -> RunParts:
@@ -89,6 +77,7 @@ def build(config: Config) -> RunParts:
     return RunParts(
         config=config,
         task=task,
+        environment=task.environment,
         learner=learner,
         teacher=teacher,
         teachers=teachers,

@@ -1,20 +1,23 @@
 """Evaluations of a run by each of its answers: those in its record, and new ones, which are added to it.
 
-evaluations = Evaluations(parts, record); evaluations.after(500)["own"].mean_error
+evaluations = Evaluations(config, arm, benchmark, learner, {"own": learner.inverse}, record)
+evaluations.after(500)["own"].mean_error
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Final
 
 import numpy as np
 
-from sgimd_torch.evaluation import Evaluation, evaluate
+from sgimd_torch.environments.protocol import Environment
+from sgimd_torch.evaluation import Benchmark, Evaluation, evaluate
 from sgimd_torch.goals.regions import Region
+from sgimd_torch.learner import Learner
 from sgimd_torch.record import Record
-from sgimd_torch.runs.build import RunParts
-from sgimd_torch.runs.config import OWN
+from sgimd_torch.runs.config import OWN, Config
+from sgimd_torch.spaces import Array, Estimate
 
 EVALUATED: Final = ("evaluations", "errors", "regions")
 """Tables of evaluations; in each, rows begin with the number of movements."""
@@ -27,12 +30,22 @@ class Evaluations:
     """All of a run, by the number of movements before them.
 
     Args:
-        parts: of the run.
+        config, environment, benchmark, learner: of the run.
+        answers: by their words the inverses that answer, the run's own first; they read the learner's memory.
         record: of the run. Of a recorded evaluation it is not known which movements were executed.
     """
 
-    def __init__(self, parts: RunParts, record: Record) -> None:
-        self._parts, self._record = parts, record
+    def __init__(
+        self,
+        config: Config,
+        environment: Environment,
+        benchmark: Benchmark,
+        learner: Learner,
+        answers: Mapping[str, Callable[[Array, Array], Estimate]],
+        record: Record,
+    ) -> None:
+        self._config, self._environment, self._benchmark = config, environment, benchmark
+        self._learner, self._inverses, self._record = learner, answers, record
         rows: dict[int, dict[str, list[Any]]] = {}
         for movements, answer, _, *numbers in record.rows("errors"):
             rows.setdefault(movements, {}).setdefault(answer, []).append(numbers)
@@ -49,7 +62,7 @@ class Evaluations:
     def after(self, movements: int) -> Answers | None:
         """The recorded one after so many movements, or one of the learner as it is now. None without an exemplar to
         infer a movement from: the learner by observation has none before its first demonstration."""
-        if movements not in self._found and len(self._parts.learner.memory):
+        if movements not in self._found and len(self._learner.memory):
             self._found[movements] = self._evaluate(movements)
             self._write(movements, self._found[movements])
         return self._found.get(movements)
@@ -57,26 +70,25 @@ class Evaluations:
     def _evaluate(self, movements: int) -> Answers:
         """With streams that the run does not use. All answers get the same noise, goal by goal; it is measured for the
         run's own."""
-        parts, config = self._parts, self._parts.config
+        config, (own, *others) = self._config, self._inverses
         repeats = config.repeats if config.floor_at is None or movements in config.floor_at else 0
-        judged: tuple[Any, ...] = parts.environment, parts.benchmark.goals, config.seed, movements
-        own = evaluate(parts.inverse, *judged, repeats=repeats)
-        others = {answer: inverse for answer, inverse in parts.answers.items() if answer != OWN}
-        return {OWN: own} | {
-            answer: own.without_noise if inverse is parts.inverse else evaluate(inverse, *judged, repeats=0)
-            for answer, inverse in others.items()
-        }
+        judged: tuple[Any, ...] = self._environment, self._benchmark.goals, config.seed, movements
+        found = {own: evaluate(self._inverses[own], *judged, repeats=repeats)}
+        for answer in others:
+            same = self._inverses[answer] is self._inverses[own]
+            found[answer] = found[own].without_noise if same else evaluate(self._inverses[answer], *judged, repeats=0)
+        return found
 
     def _write(self, movements: int, found: Answers) -> None:
         """Add it to the record, and the regions of the goal model as they are now."""
         for answer, each in found.items():
-            errors, met = each.errors, each.met(self._parts.benchmark.side / 2)
+            errors, met = each.errors, each.met(self._benchmark.side / 2)
             summary = each.mean_error, np.median(errors), np.quantile(errors, 0.9), each.noise_floor, met
             self._record.add_rows("evaluations", [(movements, answer, *summary)])
             columns = zip(errors.tolist(), each.scatter.tolist(), each.failed.astype(int), each.contexts, strict=True)
             rows = [(movements, answer, k, *more, *context) for k, (*more, context) in enumerate(columns)]
             self._record.add_rows("errors", rows)
-        self._record.add_rows("regions", [(movements, *_fields(region)) for region in self._parts.regions])
+        self._record.add_rows("regions", [(movements, *_fields(region)) for region in self._learner.regions])
 
 
 def _evaluation(numbers: np.ndarray) -> Evaluation:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Final, Self
 from sgimd_torch.environments.protocol import FAILURES, SimulationError
 from sgimd_torch.record import Record, RunError
 from sgimd_torch.runs.build import RunParts
+from sgimd_torch.runs.config import OWN
 from sgimd_torch.runs.directory import open_run
 from sgimd_torch.runs.evaluations import Evaluations
 from sgimd_torch.runs.listeners import Listener, Seconds
@@ -84,7 +85,8 @@ class Life:
         say(*parts.notes, *notes)
         self.movements, self.recorded, self.failed = 0, self.record.movements, 0
         self.seconds = Seconds(self.record.about.get("seconds", {}))
-        self.evaluations = Evaluations(parts, self.record)
+        judged = parts.config, parts.environment, parts.benchmark, parts.learner, parts.answers
+        self.evaluations = Evaluations(*judged, self.record)
         self.listeners = listeners_of(parts, self.record, self.seconds)
         self._wanted = set(parts.config.evaluations)
         self._committed = time.monotonic()
@@ -223,7 +225,7 @@ def listeners_of(parts: RunParts, record: Record, seconds: Seconds) -> list[List
     if parts.model is not None and parts.trust is not None:
         from sgimd_torch.runs.model_listener import ModelListener
 
-        model = ModelListener(record, parts.model, parts.trust.error, parts.inverse, parts.learner.memory, seconds)
+        model = ModelListener(record, parts.model, parts.trust.error, parts.answers[OWN], parts.learner.memory, seconds)
         found.append(model)
         curves = model.new_curves
     if parts.config.board:

@@ -408,6 +408,7 @@ def live_as(out, robot, make, **options):
     parts = dataclasses.replace(
         build(config),
         task=Task(robot),
+        environment=robot,
         teacher=None,
         learner=learner,
         answers={"own": LocalInverse(learner.memory)},

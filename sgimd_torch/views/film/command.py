@@ -124,12 +124,14 @@ def _cast(run: Run, parts: RunParts, goals: Array, stages: Sequence[int]) -> lis
         who = label(run.config["name"] or run.config["algorithm"])
         title = f"{who}, seed {seed}, after {movements} movements"
         for k, goal in enumerate(goals):
-            recording = picture(context, parts.inverse(context, goal).theta, stream(seed, "film", k))
+            recording = picture(context, parts.answers["own"](context, goal).theta, stream(seed, "film", k))
             # The first shot of a stage begins with what was learnt since the last one.
             new = len(past) - known if len(stages) > 1 and k == 0 else 0
             shots.append(Shot(recording, goal, title, robot.outcomes.unit, past, new))
         known = len(past)
-        found = evaluate(parts.inverse, robot, parts.benchmark.goals, seed, movements, context=context, repeats=0)
+        found = evaluate(
+            parts.answers["own"], robot, parts.benchmark.goals, seed, movements, context=context, repeats=0
+        )
         errors.append(found.errors)
     curve = np.array(stages), np.array([each.mean() for each in errors])
     if len(stages) == 1 and len(run.evaluation["movements"]):

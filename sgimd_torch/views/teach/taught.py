@@ -165,7 +165,7 @@ class TaughtRun:
         if not len(parts.learner.memory):
             raise ValueError("it remembers no movement yet; let it move, or show it something first")
         self._trials += 1
-        theta, rng = parts.inverse(self.context, goal).theta, stream(self.config.seed, "trials", self._trials)
+        theta, rng = parts.answers["own"](self.context, goal).theta, stream(self.config.seed, "trials", self._trials)
         return Trial(goal, theta, parts.environment.execute(self.context, theta.copy(), rng))
 
 
