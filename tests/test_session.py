@@ -152,15 +152,14 @@ def test_a_replay_proposes_every_theta_again_without_executing(name: str, path: 
 
 
 @every_algorithm
-@pytest.mark.parametrize("stopped", [1, 30, 37, 95])
+@pytest.mark.parametrize("stopped", [30, 37])
 def test_a_run_resumed_from_its_record_ends_as_if_never_stopped(name: str, stopped: int, path: Path) -> None:
     arm = PlanarArm(5, noise=0.01)
     recorded(path, name, arm, stopped)
-    resumed = recorded(path, name, arm, 150)
-    assert summary(resumed) == summary(life(name, arm, 150))
-    assert [e.demonstration and e.demonstration.outcome.tolist() for e in resumed] == [
-        e.demonstration and e.demonstration.outcome.tolist() for e in life(name, arm, 150)
-    ]
+    resumed, whole = recorded(path, name, arm, 100), life(name, arm, 100)
+    assert summary(resumed) == summary(whole)
+    seen = [[e.demonstration and e.demonstration.outcome.tolist() for e in each] for each in (resumed, whole)]
+    assert seen[0] == seen[1]
 
 
 def test_a_movement_meets_the_same_noise_whatever_was_done_before_it() -> None:

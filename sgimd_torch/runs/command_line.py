@@ -116,7 +116,7 @@ def help_on(parts: Mapping[str, Part]) -> str:
         lines += ["", textwrap.fill(f"--{part.name or part.kind} {part.word}: {'; '.join(what)}", _WIDTH)]
         for name, option in part.options.items():
             meant = f"{_wanted(option.kind)}; default: {typed(option.default)}"
-            lines.append(_line(f"--{dashed(name)}", f"{about.get(name.rpartition('.')[2], '')} ({meant})"))
+            lines.append(_line(f"--{dashed(part.full(name))}", f"{about.get(name, '')} ({meant})"))
     return "\n".join(lines)
 
 
@@ -170,7 +170,7 @@ def _values(given: Mapping[str, str], parts: Mapping[str, Part]) -> dict[str, An
         ValueError: one is of another type.
     """
     kinds = get_type_hints(Config) | {
-        name: option.kind for part in parts.values() for name, option in part.options.items()
+        part.full(name): option.kind for part in parts.values() for name, option in part.options.items()
     }
     found: dict[str, Any] = {name: text for name, text in given.items() if name in parts}
     for name, text in given.items():

@@ -81,7 +81,7 @@ def toy_demonstrations(robot: Toy) -> list[Demonstration]:
 def arm_benchmark(arm: PlanarArm) -> Benchmark:
     """One random goal in each tile of T, without those that the arm cannot reach; always the same ones."""
     box = arm.outcomes
-    goals = tile_goals(_grid(box, SIDE), box, SIDE, stream(0, "goals for an arm"), at_least=1)
+    goals = tile_goals(np.tile(_grid(box, SIDE), (2, 1)), box, SIDE, stream(0, "goals for an arm"))
     return Benchmark(type(arm).__name__, goals[arm.reachable(goals)], SIDE)
 
 
