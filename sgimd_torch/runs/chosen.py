@@ -8,12 +8,13 @@ which leads to the next part.
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, Final
 
-from sgimd_torch.catalogue import CATALOGUE, ROD, SHARED, find, word_of
+from sgimd_torch.catalogue import CATALOGUE, ROD, SHARED, did_you_mean, find, word_of
 from sgimd_torch.catalogue.options import Option, options_of, parameters_of
 
 ALGORITHM: Final = ""  # the name of this part; its options have no prefix
@@ -134,3 +135,36 @@ def standards(parts: Mapping[str, Part]) -> dict[str, Any]:
 
 def _has_name(kind: str, default: Any) -> bool:
     return callable(default) and default is not inspect.Parameter.empty and word_of(kind, default) != ""
+
+
+def refused(name: str, parts: Mapping[str, Part], others: Iterable[str]) -> ValueError:
+    """The error for a name that is none of this run, with the part that has it.
+
+    Args:
+        name: of an option or a part.
+        parts: of the run.
+        others: options that every run has.
+    """
+    owner, _, last = name.rpartition(".")
+    kind = owner.partition(".")[0]
+    if owner not in parts:  # what it belongs to is no part of this run, either
+        owner, last = ALGORITHM, kind
+    part, spelt = parts[owner], name.replace("_", "-")
+    near = did_you_mean(name, [each for each in (*standards(parts), *others) if each.rpartition(".")[0] == owner], 2)
+    kinds = ("search", "inverse") if last in SHARED else (part.kind,)
+    having = [f"{each} {', '.join(_with(each, last))}" for each in kinds if _with(each, last)]
+    if not having and owner == ALGORITHM:  # spelt without its part
+        having = [f"{each} {', '.join(_with(each, last))} ({each}.{last})" for each in CATALOGUE if _with(each, last)]
+    said = f"--{spelt}: {part.kind} {part.word} has no such option"
+    return ValueError(f"{said}; {' and '.join(having)} have it" if having else f"{said}{near.replace('_', '-')}")
+
+
+def _with(kind: str, name: str) -> list[str]:
+    """The words of a kind whose parts have an option, or lead to a part, of this name."""
+    found = []
+    for word in CATALOGUE.get(kind, ()):
+        with suppress(ValueError):  # one that is not installed has nothing
+            part = part_of(ALGORITHM, kind, word)
+            if name in (*part.options, *part.choices, *SHARED.keys() & part.takes, part.teaching):
+                found.append(word)
+    return found

@@ -17,7 +17,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, get_type_hints
 
-from sgimd_torch.runs.chosen import Part, chosen, standards
+from sgimd_torch.runs.chosen import Part, chosen, refused, standards
 from sgimd_torch.runs.config import RUN, Config, dashed
 from sgimd_torch.runs.process import Stopping, loading
 
@@ -56,15 +56,13 @@ def parse(argv: Sequence[str], description: str | None = None) -> tuple[Config, 
         if "help" in asked and not given:
             from sgimd_torch.runs.help import overview  # most commands need no help
 
-            print(overview(description))
+            print(overview(description, FLAGS))
             raise SystemExit(0)
         if "algorithm" not in given:
             given["algorithm"] = _suited(given)
         parts = chosen(given["algorithm"], {name: text for name, text in given.items() if name != "teachers"})
         for name in given:
             if name not in RUN and name not in standards(parts):
-                from sgimd_torch.runs.help import refused
-
                 raise refused(name, parts, (*RUN, *FLAGS))
         if "help" in asked:
             from sgimd_torch.runs.help import help_on

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, Final, Self
 
 from sgimd_torch.catalogue import find
-from sgimd_torch.runs.chosen import chosen, part_of, standards
+from sgimd_torch.runs.chosen import chosen, part_of, refused, standards
 
 OWN: Final = "own"  # the answer of the inverse model that a run chose
 FILES: Final = ("benchmark", "demonstrations")  # options that name a file
@@ -79,8 +79,6 @@ class Config:
         standard = standards(parts)
         for name in given:
             if name not in standard:
-                from sgimd_torch.runs.help import refused  # which needs this module
-
                 raise refused(name, parts, RUN)
         differing = sorted((name, value) for name, value in given.items() if value != standard[name])
         object.__setattr__(self, "parts", tuple(differing))

@@ -1,19 +1,17 @@
-"""What ``sgimd run`` says of its options: their help, and what is wrong with one that this run does not have."""
+"""What ``sgimd run`` says of its options."""
 
 from __future__ import annotations
 
 import textwrap
 import types
 import typing
-from collections.abc import Iterable, Mapping
-from contextlib import suppress
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
-from sgimd_torch.catalogue import CATALOGUE, SHARED, did_you_mean
+from sgimd_torch.catalogue import CATALOGUE
 from sgimd_torch.catalogue.options import help_of
-from sgimd_torch.runs.chosen import ALGORITHM, Part, part_of, standards
-from sgimd_torch.runs.command_line import FLAGS
+from sgimd_torch.runs.chosen import Part
 from sgimd_torch.runs.config import RUN, Config, dashed, typed
 
 _PLACES: Final = {"progress": "goals.progress", "choose": "teacher.choose"}  # of kinds that another part chooses
@@ -22,11 +20,11 @@ _MANY: Final = {int: "whole numbers such as 250,500", float: "numbers such as .1
 _WIDTH: Final = 120
 
 
-def overview(description: str | None = None) -> str:
-    """What ``sgimd run --help`` prints: the options of every run, and the words for its parts."""
+def overview(description: str | None, flags: Mapping[str, str]) -> str:
+    """What ``sgimd run --help`` prints: the options of every run, its flags, and the words for its parts."""
     about = help_of(Config)
     shown = {name: typed(getattr(Config, name)) for name in RUN}
-    run = {name: about[name] + f" ({text})" * (text != "null") for name, text in shown.items()} | FLAGS
+    run = {name: about[name] + f" ({text})" * (text != "null") for name, text in shown.items()} | {**flags}
     algorithms = {word: entry.about for word, entry in CATALOGUE["algorithm"].items() if "rivals" not in entry.about}
     rivals = [word for word in CATALOGUE["algorithm"] if word not in algorithms]
     kinds = {kind: ", ".join(words) for kind, words in CATALOGUE.items() if kind != "algorithm"}
@@ -76,36 +74,3 @@ def wanted(kind: Any) -> str:
     if inner:  # of a union
         return " or ".join("null" if each is types.NoneType else wanted(each) for each in inner)
     return _WANTED.get(kind, "a value")
-
-
-def refused(name: str, parts: Mapping[str, Part], others: Iterable[str]) -> ValueError:
-    """The error for a name that is none of this run, with the part that has it.
-
-    Args:
-        name: of an option or a part.
-        parts: of the run.
-        others: options that every run has.
-    """
-    owner, _, last = name.rpartition(".")
-    kind = owner.partition(".")[0]
-    if owner not in parts:  # what it belongs to is no part of this run, either
-        owner, last = ALGORITHM, kind
-    part, spelt = parts[owner], name.replace("_", "-")
-    near = did_you_mean(name, [each for each in (*standards(parts), *others) if each.rpartition(".")[0] == owner], 2)
-    kinds = ("search", "inverse") if last in SHARED else (part.kind,)
-    having = [f"{each} {', '.join(_with(each, last))}" for each in kinds if _with(each, last)]
-    if not having and owner == ALGORITHM:  # spelt without its part
-        having = [f"{each} {', '.join(_with(each, last))} ({each}.{last})" for each in CATALOGUE if _with(each, last)]
-    said = f"--{spelt}: {part.kind} {part.word} has no such option"
-    return ValueError(f"{said}; {' and '.join(having)} have it" if having else f"{said}{near.replace('_', '-')}")
-
-
-def _with(kind: str, name: str) -> list[str]:
-    """The words of a kind whose parts have an option, or lead to a part, of this name."""
-    found = []
-    for word in CATALOGUE.get(kind, ()):
-        with suppress(ValueError):  # one that is not installed has nothing
-            part = part_of(ALGORITHM, kind, word)
-            if name in (*part.options, *part.choices, *SHARED.keys() & part.takes, part.teaching):
-                found.append(word)
-    return found

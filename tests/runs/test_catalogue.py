@@ -243,7 +243,7 @@ def test_help_is_one_screen_and_a_parts_options_are_shown_once_it_is_chosen(caps
         with pytest.raises(SystemExit) as stop:
             parse(argv, "What it does.")
         assert stop.value.code == 0
-    assert len(overview(command_line.__doc__).splitlines()) <= 60
+    assert len(overview(command_line.__doc__, command_line.FLAGS).splitlines()) <= 60
     said = capsys.readouterr().out
     assert said.count("--goals.window ") == 2  # of which one is an example
     assert "how many recent goals the interest looks at" in " ".join(said.split())
