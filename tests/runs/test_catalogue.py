@@ -62,7 +62,7 @@ class Worst:
     def add(self, context, goal, competence, strategy="autonomous", gain=0.0):
         pass
 '''
-SHORT = ("--movements", "40", "--evaluate-at", "20", "--repeats", "2")
+SHORT = ("--movements", "40", "--evaluate-at", "20", "--repeats", "2", "--inverse", "linear")
 
 
 @pytest.fixture

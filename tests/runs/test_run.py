@@ -99,6 +99,7 @@ def test_every_choice_runs_and_differs_from_the_others(tmp_path, go, kind, table
     common += ["--teacher.every", 20] if kind == "choose" else []
     common += ["--goals.window", 4] if kind == "progress" else []
     common += ["--environment", "fishing-rod"] if kind in ("teachers", "judge") else []
+    common += ["--movements", 120] if kind == "teachers" else []
     # See the next two tests; a person who is not there is like no teacher, and demonstrator 3 is all there are.
     left_out = *MODEL_SEARCHES, "model", "model-alone", "by-hand", "demonstrator-3"
     choices = [choice for choice in table if choice not in left_out]

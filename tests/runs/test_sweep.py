@@ -24,13 +24,14 @@ from sgimd_torch.runs.read import finished, movements_on_disk
 from sgimd_torch.runs.sweep import main, variants_of
 
 # An arm without physics; 40 movements and one evaluation take a moment.
-ALONE = ["--environment", "planar-arm-7", "--movements", "40", "--evaluate-at", "20", "--repeats", "0"]
+ARM = "--environment planar-arm-7 --movements 40 --evaluate-at 20 --repeats 0 --inverse linear"
+ALONE = ARM.split()
 SHORT = [*ALONE, "--algorithm", "random"]
 
 
 def short(out, **changes):
-    fixed = {"environment": "planar-arm-7", "algorithm": "random", "movements": 40, "repeats": 0, "evaluate_at": (20,)}
-    return Config.from_settings({**fixed, "out": out, **changes})
+    fixed = {"environment": "planar-arm-7", "algorithm": "random", "inverse": "linear", "movements": 40, "repeats": 0}
+    return Config.from_settings({**fixed, "evaluate_at": (20,), "out": out, **changes})
 
 
 def swept(*options):
