@@ -7,6 +7,7 @@ evaluations.after(500)["own"].mean_error
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -26,28 +27,26 @@ Answers = Mapping[str, Evaluation]
 """An evaluation by each answer, the run's own first."""
 
 
+@dataclass
 class Evaluations:
     """All of a run, by the number of movements before them.
 
     Args:
         config, environment, benchmark, learner: of the run.
-        answers: by their words the inverses that answer, the run's own first; they read the learner's memory.
+        inverses: by their words those that answer, the run's own first; they read the learner's memory.
         record: of the run. Of a recorded evaluation it is not known which movements were executed.
     """
 
-    def __init__(
-        self,
-        config: Config,
-        environment: Environment,
-        benchmark: Benchmark,
-        learner: Learner,
-        answers: Mapping[str, Callable[[Array, Array], Estimate]],
-        record: Record,
-    ) -> None:
-        self._config, self._environment, self._benchmark = config, environment, benchmark
-        self._learner, self._inverses, self._record = learner, answers, record
+    config: Config
+    environment: Environment
+    benchmark: Benchmark
+    learner: Learner
+    inverses: Mapping[str, Callable[[Array, Array], Estimate]]
+    record: Record
+
+    def __post_init__(self) -> None:
         rows: dict[int, dict[str, list[Any]]] = {}
-        for movements, answer, _, *numbers in record.rows("errors"):
+        for movements, answer, _, *numbers in self.record.rows("errors"):
             rows.setdefault(movements, {}).setdefault(answer, []).append(numbers)
         self._found: dict[int, Answers] = {
             movements: {answer: _evaluation(np.array(each, dtype=np.float64)) for answer, each in answers.items()}
@@ -62,7 +61,7 @@ class Evaluations:
     def after(self, movements: int) -> Answers | None:
         """The recorded one after so many movements, or one of the learner as it is now. None without an exemplar to
         infer a movement from: the learner by observation has none before its first demonstration."""
-        if movements not in self._found and len(self._learner.memory):
+        if movements not in self._found and len(self.learner.memory):
             self._found[movements] = self._evaluate(movements)
             self._write(movements, self._found[movements])
         return self._found.get(movements)
@@ -70,25 +69,25 @@ class Evaluations:
     def _evaluate(self, movements: int) -> Answers:
         """With streams that the run does not use. All answers get the same noise, goal by goal; it is measured for the
         run's own."""
-        config, (own, *others) = self._config, self._inverses
+        config, (own, *others) = self.config, self.inverses
         repeats = config.repeats if config.floor_at is None or movements in config.floor_at else 0
-        judged: tuple[Any, ...] = self._environment, self._benchmark.goals, config.seed, movements
-        found = {own: evaluate(self._inverses[own], *judged, repeats=repeats)}
+        judged: tuple[Any, ...] = self.environment, self.benchmark.goals, config.seed, movements
+        found = {own: evaluate(self.inverses[own], *judged, repeats=repeats)}
         for answer in others:
-            same = self._inverses[answer] is self._inverses[own]
-            found[answer] = found[own].without_noise if same else evaluate(self._inverses[answer], *judged, repeats=0)
+            same = self.inverses[answer] is self.inverses[own]
+            found[answer] = found[own].without_noise if same else evaluate(self.inverses[answer], *judged, repeats=0)
         return found
 
     def _write(self, movements: int, found: Answers) -> None:
         """Add it to the record, and the regions of the goal model as they are now."""
         for answer, each in found.items():
-            errors, met = each.errors, each.met(self._benchmark.side / 2)
+            errors, met = each.errors, each.met(self.benchmark.side / 2)
             summary = each.mean_error, np.median(errors), np.quantile(errors, 0.9), each.noise_floor, met
-            self._record.add_rows("evaluations", [(movements, answer, *summary)])
+            self.record.add_rows("evaluations", [(movements, answer, *summary)])
             columns = zip(errors.tolist(), each.scatter.tolist(), each.failed.astype(int), each.contexts, strict=True)
             rows = [(movements, answer, k, *more, *context) for k, (*more, context) in enumerate(columns)]
-            self._record.add_rows("errors", rows)
-        self._record.add_rows("regions", [(movements, *_fields(region)) for region in self._learner.regions])
+            self.record.add_rows("errors", rows)
+        self.record.add_rows("regions", [(movements, *_fields(region)) for region in self.learner.regions])
 
 
 def _evaluation(numbers: np.ndarray) -> Evaluation:
