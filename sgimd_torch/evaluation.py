@@ -177,7 +177,7 @@ def _landed(environment: Environment, contexts: Array, thetas: Array, seed: int,
     return landed
 
 
-def tile_goals(outcomes: Array, box: Box, side: float, rng: np.random.Generator, *, at_least: int = 2) -> Array:
+def tile_goals(outcomes: Array, box: Box, side: float, rng: np.random.Generator) -> Array:
     """One random goal in each tile of the apparent reachable space.
 
     Args:
@@ -185,16 +185,15 @@ def tile_goals(outcomes: Array, box: Box, side: float, rng: np.random.Generator,
         box: T.
         side: of a tile (m).
         rng: draws the goals.
-        at_least: outcomes on a tile for it to be reachable.
 
     Returns:
         ``(n_tiles, outcome_dim)`` m, in the order of the tiles.
     """
-    tiles = _reached(outcomes, box, side, at_least)
+    tiles = _reached(outcomes, box, side)
     return box.clip(box.low + (tiles + rng.random(tiles.shape)) * side)
 
 
-def tile_side(outcomes: Array, box: Box, tiles: int = TILES, *, at_least: int = 2) -> float:
+def tile_side(outcomes: Array, box: Box, tiles: int = TILES) -> float:
     """The side (m) that gives about ``tiles`` reachable tiles; other arguments as for `tile_goals`.
 
     Tried are sides of a fortieth to a tenth of T's in the plane, and in other dimensions those that leave as many tiles
@@ -204,11 +203,11 @@ def tile_side(outcomes: Array, box: Box, tiles: int = TILES, *, at_least: int = 
     reached = np.ptp(inside, axis=0) if len(inside) else box.sides
     lengths = np.where((reached > 0) & (reached < box.sides / 10), reached, box.sides)
     sides = np.prod(lengths) ** (1 / box.dim) * SIDES ** (2 / box.dim)
-    return float(min(sides, key=lambda side: abs(len(_reached(inside, box, side, at_least)) - tiles)))
+    return float(min(sides, key=lambda side: abs(len(_reached(inside, box, side)) - tiles)))
 
 
-def _reached(outcomes: Array, box: Box, side: float, at_least: int) -> Array:
-    """``(n_tiles, dim)`` the tiles of T with ``at_least`` outcomes, counted from its lower corner, in order."""
+def _reached(outcomes: Array, box: Box, side: float) -> Array:
+    """``(n_tiles, dim)`` the tiles of T with two outcomes or more, counted from its lower corner, in order."""
     inside = outcomes[box.contains(outcomes)]
     tiles = np.floor((inside - box.low) / side)
     per_side = np.floor(box.sides / side) + 1
@@ -218,7 +217,7 @@ def _reached(outcomes: Array, box: Box, side: float, at_least: int) -> Array:
         tiles = tiles[first]
     else:
         tiles, counts = np.unique(tiles, axis=0, return_counts=True)
-    return np.asarray(tiles[counts >= at_least])
+    return np.asarray(tiles[counts > 1])
 
 
 def save_benchmark(path: str | os.PathLike[str], benchmark: Benchmark) -> None:

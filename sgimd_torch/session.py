@@ -20,7 +20,7 @@ from sgimd_torch.environments.protocol import FAILURES, Environment, SimulationE
 from sgimd_torch.learner import Learner, ReplayError
 from sgimd_torch.learner.replay import TEACHER, BeforeMovement, replay
 from sgimd_torch.record import Event, Kind, Record
-from sgimd_torch.spaces import Array, Demonstration, Episode, Request, check_count, check_point, read_only, stream
+from sgimd_torch.spaces import Array, Demonstration, Episode, Move, Request, check_count, check_point, read_only, stream
 
 if TYPE_CHECKING:
     from sgimd_torch.teachers import Teacher
@@ -30,6 +30,9 @@ __all__ = ["Execute", "NoOutcomeError", "ReplayError", "live", "run"]
 
 Execute = Callable[[int, Array, Array], Array]
 """(index, context, theta) -> outcome of movement ``index``."""
+
+Note = Callable[[Event], object]
+"""Writes down what happened."""
 
 
 class NoOutcomeError(RuntimeError):
@@ -91,62 +94,87 @@ def run(
             f"movements must be above {made}, which the learner has made already and which count, got {movements}"
         )
     execute = live(environment, seed) if execute is None else execute
-    before = BeforeMovement()
+    before, note = BeforeMovement(), _nowhere if record is None else record.add
     if record is not None:
         before = yield from replay(learner, record.events(), teacher=teacher)
-
-    def note(kind: Kind, context: Array | None = None, **more: Any) -> None:
-        if record is not None:
-            record.add(Event(kind, context, **more))
-
     in_a_row = 0
     for index in range(learner.movements, movements):
-        (demonstration, request, reply), before = before, BeforeMovement()
-        asks = None if learner.lesson_waits else teacher
-        offered = None if asks is None else asks.offer(index, learner.memory)
-        if offered is not None:
-            learner.watch(offered, offered=True)
-            note(Kind.SHOWN, lesson=offered, who=getattr(teacher, "who", TEACHER))
-            demonstration = offered
-        context, move = None, None
+        before = _offered(learner, teacher, index, before, note)
+        context, move, outcome = None, None, None
         try:
-            if learner.idle:
-                context = _tried(
-                    "context", environment.contexts.dim, environment.observe, stream(seed, "context", index)
-                )
-            else:
-                context = learner.context
-            asked = learner.request(context) if teachers and request is None else None
-            if asked is not None and teachers is not None:
-                answer, reply = _asked(learner, environment, context, asked, teachers)
-                request = asked
-                note(Kind.ASKED, context, goal=asked.goal, who=asked.teacher, strategy=asked.strategy, reply=reply)
-                if answer is not None:
-                    learner.watch(answer)
-                    note(Kind.SHOWN, lesson=answer, who=asked.teacher)
-                    demonstration = answer
-            move, outcome = learner.ask(context), None
+            context = _observed(learner, environment, index, seed)
+            if teachers and before.request is None:
+                before = _asked(learner, environment, context, teachers, before, note)
+            move = learner.ask(context)
             if move is not None:
                 outcome = _tried("outcome", environment.outcomes.dim, execute, index, context, move.theta)
         except _NoOutcome as error:
-            failed, in_a_row = str(error), in_a_row + 1
+            failed, in_a_row, cause = str(error), in_a_row + 1, error.__cause__
             learner.fail(failed)
-            planned = {} if move is None else {"theta": move.theta, "goal": move.goal, "origin": move.origin}
-            note(Kind.FAILED, context, reply=failed, **planned)
+            note(_event(Kind.FAILED, context, move, reply=failed))
             seen = np.full(environment.contexts.dim, np.nan) if context is None else context
-            yield Episode(index, seen, move, None, demonstration, request, reply, failed)
+            yield Episode(index, seen, move, None, *before, failed)
             if in_a_row == failures:
-                raise NoOutcomeError(
-                    f"{failures} movements in a row failed, the last one: {failed}"
-                ) from error.__cause__
-            continue
-        if move is None or outcome is None:
-            note(Kind.RESTED, context)
+                raise NoOutcomeError(f"{failures} movements in a row failed, the last one: {failed}") from cause
         else:
-            in_a_row = 0
-            learner.tell(outcome)
-            note(Kind.MOVED, context, theta=move.theta, goal=move.goal, outcome=outcome, origin=move.origin)
-        yield Episode(index, context, move, outcome, demonstration, request, reply)
+            if outcome is not None:
+                in_a_row = 0
+                learner.tell(outcome)
+            note(_event(Kind.RESTED if outcome is None else Kind.MOVED, context, move, outcome))
+            yield Episode(index, context, move, outcome, *before)
+        before = BeforeMovement()
+
+
+def _offered(
+    learner: Learner, teacher: Teacher | None, index: int, before: BeforeMovement, note: Note
+) -> BeforeMovement:
+    """Let the teacher offer a demonstration, unless one waits for an answer."""
+    offered = None if teacher is None or learner.lesson_waits else teacher.offer(index, learner.memory)
+    if offered is None:
+        return before
+    learner.watch(offered, offered=True)
+    note(Event(Kind.SHOWN, lesson=offered, who=getattr(teacher, "who", TEACHER)))
+    return before._replace(demonstration=offered)
+
+
+def _observed(learner: Learner, environment: Environment, index: int, seed: int) -> Array:
+    """The context of the next movement: a new one if an attempt is to begin."""
+    if not learner.idle:
+        return learner.context
+    return _tried("context", environment.contexts.dim, environment.observe, stream(seed, "context", index))
+
+
+def _asked(
+    learner: Learner,
+    environment: Environment,
+    context: Array,
+    teachers: Mapping[str, Demonstrator],
+    before: BeforeMovement,
+    note: Note,
+) -> BeforeMovement:
+    """Let the learner ask one of the ``teachers`` for a demonstration, and show it the answer."""
+    request = learner.request(context)
+    if request is None:
+        return before
+    answer, reply = _answer(learner, environment, context, request, teachers)
+    note(Event(Kind.ASKED, context, goal=request.goal, who=request.teacher, strategy=request.strategy, reply=reply))
+    if answer is None:
+        return before._replace(request=request, reply=reply)
+    learner.watch(answer)
+    note(Event(Kind.SHOWN, lesson=answer, who=request.teacher))
+    return BeforeMovement(answer, request, reply)
+
+
+def _event(
+    kind: Kind, context: Array | None, move: Move | None, outcome: Array | None = None, reply: str | None = None
+) -> Event:
+    if move is None:
+        return Event(kind, context, reply=reply)
+    return Event(kind, context, move.theta, move.goal, outcome, move.origin, reply=reply)
+
+
+def _nowhere(event: Event) -> None:
+    """Writes nothing down."""
 
 
 class _NoOutcome(Exception):
@@ -168,7 +196,7 @@ def reason_of(error: BaseException) -> str:
     return "".join(sign if sign.isprintable() else " " for sign in said)[:300].strip()
 
 
-def _asked(
+def _answer(
     learner: Learner, environment: Environment, context: Array, request: Request, teachers: Mapping[str, Demonstrator]
 ) -> tuple[Demonstration | None, str]:
     """The answer to a request, None if there is none that is new and that the learner can use; and ``Episode.reply``.
@@ -190,7 +218,7 @@ def _asked(
     except Exception as error:  # whatever a teacher does, it must not end the learner's life
         said = f"gave no answer that can be used, so the learner goes on: {type(error).__name__}: {error}"
         reply = "failed"
-    warnings.warn(f"teacher {name} {said}", RuntimeWarning, stacklevel=3)
+    warnings.warn(f"teacher {name} {said}", RuntimeWarning, stacklevel=4)
     return None, reply
 
 

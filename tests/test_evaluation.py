@@ -166,23 +166,16 @@ def test_anything_but_goals_is_refused(goals: Array) -> None:
         evaluate(perfect(arm), arm, goals, 0, 0)
 
 
-def test_one_goal_is_drawn_in_each_tile_that_was_reached() -> None:
-    box = Box.cube(-1, 1, 2)  # tiles of .5 m, 4 x 4
-    outcomes = np.array([[-0.9, -0.9], [-0.6, -0.6], [0.1, 0.1], [0.9, -0.9]])
-    goals = tile_goals(outcomes, box, 0.5, stream(0, "benchmark"), at_least=1)
-    assert np.floor((goals + 1) / 0.5).tolist() == [[0, 0], [2, 2], [3, 0]]
-
-
-def test_a_tile_reached_less_often_than_asked_for_gets_no_goal_nor_does_one_outside_the_task_space() -> None:
-    outcomes = np.array([[-0.9, -0.9], [-0.6, -0.6], [0.1, 0.1], [1.2, 0.0], [1.3, 0.0]])
-    goals = tile_goals(outcomes, Box.cube(-1, 1, 2), 0.5, stream(0, "benchmark"), at_least=2)
-    assert np.floor((goals + 1) / 0.5).tolist() == [[0, 0]]
+def test_one_goal_is_drawn_in_each_tile_that_was_reached_twice_and_none_outside_the_task_space() -> None:
+    outcomes = np.array([[-0.9, -0.9], [-0.6, -0.6], [0.1, 0.1], [0.9, -0.9], [0.6, -0.6], [1.2, 0.0], [1.3, 0.0]])
+    goals = tile_goals(outcomes, Box.cube(-1, 1, 2), 0.5, stream(0, "benchmark"))  # tiles of .5 m, 4 x 4
+    assert np.floor((goals + 1) / 0.5).tolist() == [[0, 0], [3, 0]]
 
 
 def test_goals_are_uniform_in_their_tile_and_come_from_the_stream() -> None:
-    box, middle = Box.cube(-1, 1, 2), np.array([[0.1, -0.4]])
-    goals = np.concatenate([tile_goals(middle, box, 0.5, stream(seed, "benchmark"), at_least=1) for seed in range(400)])
-    assert np.array_equal(goals[:1], tile_goals(middle, box, 0.5, stream(0, "benchmark"), at_least=1))
+    box, middle = Box.cube(-1, 1, 2), np.array([[0.1, -0.4]] * 2)
+    goals = np.concatenate([tile_goals(middle, box, 0.5, stream(seed, "benchmark")) for seed in range(400)])
+    assert np.array_equal(goals[:1], tile_goals(middle, box, 0.5, stream(0, "benchmark")))
     # Of a side of .5: mean .25, sd .144; five standard errors of 400 draws are .036.
     assert goals.mean(axis=0) == pytest.approx([0.25, -0.25], abs=0.036)
     assert goals.std(axis=0) == pytest.approx([0.144, 0.144], abs=0.02)

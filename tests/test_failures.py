@@ -1,6 +1,7 @@
 """A movement may fail: it is counted and recorded, nothing is remembered of it, and the learner goes on."""
 
 import signal
+import sys
 from itertools import pairwise
 from pathlib import Path
 
@@ -8,12 +9,14 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
-from runs import LIVE, content_of, end, start, stopped_at
+from runs import content_of, end, stopped_at
 from sgimd_torch.algorithms import practice, sgim_d
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.environments.protocol import SimulationError
 from sgimd_torch.evaluation import evaluate
 from sgimd_torch.record import Kind, Record
+from sgimd_torch.runs.command_line import main
+from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.session import NoOutcomeError, run
 from sgimd_torch.spaces import Array, Episode, stream
@@ -183,7 +186,10 @@ def test_a_failed_answer_misses_its_goal_as_if_the_robot_had_not_moved(together:
 MODULE = """
 import os
 from pathlib import Path
+import numpy as np
 from sgimd_torch.environments.planar_arm import PlanarArm
+from sgimd_torch.evaluation import Benchmark
+from sgimd_torch.runs.tasks import Task
 class Lossy(PlanarArm):
     execute_many = None
     def execute(self, context, theta, rng):
@@ -196,8 +202,11 @@ class Broken(Lossy):
         if Path("repaired").exists():
             return PlanarArm.execute(self, context, theta, rng)
         raise SystemExit(0)
-def lossy(): return Lossy(5, noise=.01)
-def broken(): return Broken(5, noise=.01)
+def task(kind):
+    goals = np.random.default_rng(0).uniform(-.5, .5, (20, 2))
+    return Task(kind(5, noise=.01), lambda: Benchmark(kind.__name__, goals, .1))
+def lossy(): return task(Lossy)
+def broken(): return task(Broken)
 """
 
 
@@ -205,35 +214,34 @@ def broken(): return Broken(5, noise=.01)
 def robots(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "lossy_robots.py").write_text(MODULE)
     monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "lossy_robots", raising=False)
     return tmp_path
 
 
-def command(name: str, *more: str) -> list[str]:
+def words(name: str, *more: str) -> list[str]:
     fixed = ["--algorithm", "practice", "--movements", "90", "--evaluate-at", "40", "--repeats", "2", "--seed", "3"]
     return ["--environment", f"lossy_robots:{name}", *fixed, "--out", name, *more]
 
 
 @pytest.mark.parametrize("signum", [signal.SIGTERM, signal.SIGKILL])
-def test_a_stopped_run_with_failures_ends_as_if_it_had_never_stopped(robots: Path, signum: int) -> None:
-    code, errors = end(start(LIVE, *command("lossy", "--name", "whole")), 0)
-    assert code == 0, errors
-    assert "movements of the evaluation failed" in errors or "failed" in errors
-    end(stopped_at(50, *command("lossy", "--name", "parts")), signum)
-    code, errors = end(start(LIVE, *command("lossy", "--name", "parts", "--resume")), 0)
-    assert code == 0, errors
+def test_a_stopped_run_with_failures_ends_as_if_it_had_never_stopped(robots: Path, signum: int, capsys) -> None:
+    assert command(main, words("lossy", "--name", "whole")) == 0
+    assert "movements of the evaluation failed" in capsys.readouterr().out
+    end(stopped_at(50, *words("lossy", "--name", "parts")), signum)
+    assert command(main, words("lossy", "--name", "parts", "--resume")) == 0
     whole, parts = (content_of(robots / "lossy" / name / "seed-003") for name in ("whole", "parts"))
     assert parts == whole
     run_ = read_run(robots / "lossy" / "whole" / "seed-003")
     assert run_.summary["failed"] == (np.isnan(run_.outcomes) & np.isfinite(run_.thetas[:, :2])).all(axis=1).sum() > 5
 
 
-def test_a_run_whose_robot_is_broken_says_how_to_go_on_and_does(robots: Path) -> None:
-    code, errors = end(start(LIVE, *command("broken")), 0)
-    assert code == 1
+def test_a_run_whose_robot_is_broken_says_how_to_go_on_and_does(robots: Path, capsys) -> None:
+    assert command(main, words("broken")) == 1
+    errors = capsys.readouterr().err
     assert "SystemExit" in errors
     assert "10 movements in a row failed" in errors
     assert errors.rstrip().endswith("--resume")
     (robots / "repaired").touch()
-    code, errors = end(start(LIVE, *command("broken", "--resume")), 0)
-    assert code == 0, errors
+    assert command(main, words("broken", "--resume")) == 0
     assert read_run(robots / "broken" / "practice" / "seed-003").summary["failed"] == 10

@@ -13,13 +13,14 @@ from sgimd_torch.runs.read import read_run
 MODULE = '''
 import numpy as np
 from sgimd_torch.environments.planar_arm import PlanarArm
+from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.goals.uniform import UniformGoals
 from sgimd_torch.inverses.local import NearestNeighbour
 from sgimd_torch.spaces import Box, Demonstration
 from sgimd_torch.teachers import PeriodicTeacher
 from sgimd_torch.teachers.answering import AnsweringTeacher
 from sgimd_torch.runs.tasks import Task
-from sgimd_torch.runs.tasks.robots import arm_benchmark, arm_demonstrations
+from sgimd_torch.runs.tasks.robots import arm_demonstrations
 
 class Mute(Exception):
     def __str__(self):
@@ -65,7 +66,8 @@ class Arm(PlanarArm):
 
 def make(kind=Arm):
     arm = kind()
-    return Task(arm, lambda: arm_benchmark(Arm()), lambda: arm_demonstrations(Arm()), arm.correspondence)
+    goals = Benchmark(type(arm).__name__, np.array([[0.5, 0.5], [-0.3, 0.2]]), 0.1)
+    return Task(arm, lambda: goals, lambda: arm_demonstrations(Arm()), arm.correspondence)
 
 for habit in HABITS:
     for member in ("observe", "execute"):

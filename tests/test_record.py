@@ -163,15 +163,6 @@ def test_a_full_disk_is_told_and_what_was_committed_is_whole(tmp_path):
     assert read(path) == before
 
 
-def test_tables_that_a_replay_makes_again_keep_their_rows(tmp_path):
-    path = fill(tmp_path / "run.sqlite")
-    with Record(path, write=True) as record:
-        rows = list(record.rows("refreshes"))
-        record.remake_rows("refreshes", [*rows, (1, 2, 3, 0.5, 0.25, 0)])
-        record.commit()
-    assert read(path)["refreshes"] == [*rows, (1, 2, 3, 0.5, 0.25, 0)]
-
-
 @pytest.mark.parametrize(("n", "kept"), [(None, 40), (0, 0), (1, 1), (6, 5), (7, 6)])
 def test_the_first_events_alone_are_a_record_of_the_same_run(tmp_path, n, kept):
     path = fill(tmp_path / "run.sqlite")

@@ -22,15 +22,10 @@ from sgimd_torch.teachers import PeriodicTeacher
 @pytest.mark.parametrize(
     ("script", "options"),
     [
-        *(
-            (make_benchmark, f"--{name} {count}")
-            for name in ("movements", "runs", "tiles", "processes")
-            for count in (0, -5)
-        ),
+        *((make_benchmark, f"--{name} 0") for name in ("movements", "runs", "tiles", "processes")),
         (make_benchmark, "--seed -1"),
         (make_benchmark, "--runs 1.5"),
         (make_benchmark, "--out nowhere/benchmark.npz"),
-        (make_demonstrations, "--n 0"),
         (make_demonstrations, "--n -3"),
         (make_demonstrations, "--n 11 --candidates 10"),
         (make_demonstrations, "--n 10 --candidates 10"),  # not all of them land inside T
@@ -161,10 +156,11 @@ def test_a_pool_on_too_few_tiles_is_refused(pool):
 def test_the_bench_compares_two_checkouts_side_by_side(capsys, monkeypatch):
     options = ["--only", "movement", "life", "--rounds", "1", "--movements", "40", "--against", str(bench.HERE)]
     monkeypatch.setattr(sys, "argv", ["bench", *options])
+    monkeypatch.setitem(bench.PARTS, "movement", bench.PARTS["movement"][:2])  # two learners are enough here
     assert bench.main() == 0
     head, *lines = capsys.readouterr().out.splitlines()
     assert head.split() == ["here", "there", "here/there"]
-    assert len(lines) == 2 * len(bench.LEARNERS) + 3
+    assert len(lines) == 2 * 2 + 3
     for line in lines:
         if "checksum" in line:
             assert line.endswith(" equal")

@@ -140,27 +140,21 @@ def recorded(path: Path, name: str, arm: PlanarArm, movements: int, seed: int = 
 
 
 @every_algorithm
-def test_a_replay_proposes_every_theta_again_without_executing(name: str, path: Path) -> None:
+@pytest.mark.parametrize("stopped", [30, 37, 100])
+def test_a_run_resumed_from_its_record_executes_the_rest_alone_and_ends_as_if_never_stopped(
+    name: str, stopped: int, path: Path
+) -> None:
     arm = CountingArm(noise=0.01)
-    first = recorded(path, name, arm, 150)
+    recorded(path, name, arm, stopped)
     arm.executed.clear()
     teacher_of(arm)
-    n_for_the_teacher = len(arm.executed)
+    n_for_the_teacher = len(arm.executed) if name in TAUGHT else 0
     arm.executed.clear()
-    assert summary(recorded(path, name, arm, 150)) == summary(first)
-    assert len(arm.executed) == (n_for_the_teacher if name in TAUGHT else 0)
-
-
-@every_algorithm
-@pytest.mark.parametrize("stopped", [1, 30, 37, 95])
-def test_a_run_resumed_from_its_record_ends_as_if_never_stopped(name: str, stopped: int, path: Path) -> None:
-    arm = PlanarArm(5, noise=0.01)
-    recorded(path, name, arm, stopped)
-    resumed = recorded(path, name, arm, 150)
-    assert summary(resumed) == summary(life(name, arm, 150))
-    assert [e.demonstration and e.demonstration.outcome.tolist() for e in resumed] == [
-        e.demonstration and e.demonstration.outcome.tolist() for e in life(name, arm, 150)
-    ]
+    resumed, whole = recorded(path, name, arm, 100), life(name, PlanarArm(5, noise=0.01), 100)
+    assert len(arm.executed) == n_for_the_teacher + sum(e.move is not None for e in whole[stopped:])
+    assert summary(resumed) == summary(whole)
+    seen = [[e.demonstration and e.demonstration.outcome.tolist() for e in each] for each in (resumed, whole)]
+    assert seen[0] == seen[1]
 
 
 def test_a_movement_meets_the_same_noise_whatever_was_done_before_it() -> None:

@@ -1,11 +1,9 @@
 """The package as users get it: built, installed into an empty environment away from the checkout, and put to work."""
 
 import os
-import signal
 import subprocess
 import sys
 import tarfile
-import time
 import venv
 
 import pytest
@@ -64,38 +62,21 @@ def sgimd(installed, tmp_path_factory):
     """Runs the installed command in a folder of its own; returns exit code, stdout and stderr."""
     away = tmp_path_factory.mktemp("away")
 
-    def sgimd(*words, stop_after=None):
-        process = subprocess.Popen(
-            [str(installed / "sgimd"), *map(str, words)],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            cwd=away,
-            env=WITHOUT_CHECKOUT,
-        )
-        while stop_after is not None and process.poll() is None:
-            if stop_after.exists() and stop_after.read_bytes().count(b"\n") > 200:
-                process.send_signal(signal.SIGINT)
-                break
-            time.sleep(0.01)
-        said, errors = process.communicate(timeout=300)
-        return process.returncode, said, errors
+    def sgimd(*words):
+        command = [str(installed / "sgimd"), *map(str, words)]
+        done = subprocess.run(command, capture_output=True, text=True, cwd=away, env=WITHOUT_CHECKOUT)
+        return done.returncode, done.stdout, done.stderr
 
     sgimd.away = away
     return sgimd
 
 
-def test_it_runs_stops_resumes_and_is_looked_at_without_a_checkout(sgimd):
-    log = sgimd.away / "runs/sgim-d/seed-000/episodes.csv"
-    code, _, errors = sgimd("run", *SHORT, stop_after=log)
-    assert code == 130, errors
-    assert "to go on: " in errors
-    assert "Traceback" not in errors
-    stopped = log.read_bytes()
+def test_it_runs_resumes_and_is_looked_at_without_a_checkout(sgimd):
+    code, _, errors = sgimd("run", *SHORT, "--movements", "300")
+    assert code == 0, errors
     code, said, errors = sgimd("run", *SHORT, "--resume")
     assert code == 0, errors
     assert "3000 movements, mean error" in said
-    assert log.read_bytes().startswith(stopped)
     code, said, errors = sgimd("table", "runs")
     assert code == 0, errors
     assert "sgim-d" in said

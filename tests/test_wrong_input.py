@@ -1,6 +1,7 @@
 """Wrong commands and wrong calls: each is refused in one line that says what came, what was wanted, the likely slip."""
 
 import re
+import sys
 
 import numpy as np
 import pytest
@@ -32,20 +33,26 @@ class Toss:
     def execute(self, context, theta, rng):
         context, theta = check_movement(self, context, theta)
         return theta[:2] + theta[2]
+
+class Half:
+    outcomes, policies = Box.cube(0, 1, 1), Box.cube(0, 1, 1)
+
+def shown():
+    return []
+
+number = 7
 """
 CSV = "time,q0,q1,x,y\n0,0,0,1,0\n0.1,0.1,0.1,0.9,0.1\n"
 COLUMNS = "--joints q0,q1 --outcome x,y"
 COMMANDS = {
     "runn": "unknown command 'runn'; did you mean run?",
     "run --algorithm sgimd": r"unknown algorithm 'sgimd'; did you mean sgim-d\? Known are",
-    "run --algoritm sgim-d": "--algoritm: .* no such option; did you mean algorithm",
     "run sgim-d": "'sgim-d' belongs to no option",
     "run --resume yes": "'yes' belongs to no option; .* --resume, --accept-loss take none",
     "run --movements 1e3": "--movements must be a whole number, got 1e3",
     "run --movements": "--movements needs a value",
     "run --seed -3": "seed must be at least 0, got -3",
     "run --failures 0": "failures must be at least 1, got 0",
-    "run --evaluate-at 100;200": "--evaluate-at must be whole numbers such as 250,500",
     "run --goals grid --goals.windw 3": "--goals.windw: goals grid has no such option; did you mean goals.window",
     "run --goals.window 12": "--goals.window: goals within-reach has no such option; goals interest-map, grid have it",
     "run --noise 0.1": r"--noise: .* environment fishing-rod, .* \(environment.noise\)",
@@ -54,15 +61,20 @@ COMMANDS = {
     "run --environment toss.Toss": "unknown environment 'toss.Toss'; .*; is it toss:Toss?",
     "run --environment toss.py:Toss": "named without .py and with dots: toss:Toss",
     "run --environment toss:Tos": "toss has no Tos; did you mean Toss?",
+    "run --environment tos:make": "environment tos:make: the module tos cannot be imported: ModuleNotFoundError: No ",
+    "run --environment broken:make": "No module named 'nothing_of_that_name'; is it installed, or in ",
+    "run --environment toss:number": "must be called as .* but it is a int",
+    "run --environment toss:Half": "gave a Half without contexts, rest, .* execute; wanted .* which has contexts",
+    "run --goals toss:Toss": r"goals toss:Toss cannot be called as \(contexts, .* a goal model: too many",
+    "run --algorithm toss:shown": "algorithm toss:shown cannot be called as .*environment, seed",
+    "run --search nelder": r"unknown search 'nelder'; did you mean nelder-mead\? Known are nelder-mead, .*package",
     "run --environment toss:Toss --algorithm sgim-d": "Toss comes without demonstrations, .* --algorithm practice",
-    "run --environment toss:Toss --environment.noise 1": "--environment.noise: environment toss:Toss has no such",
+    "run --algorithm random --environment toss:Toss --environment.noise 1": "environment toss:Toss has no such option",
     "run --demonstrations nothing.npz": "demonstrations: there is no file nothing.npz",
     "run --demonstrations shown.csv": "shown.csv is no demonstration file: .* sgimd demonstrations import",
     "run --benchmark shown.csv": "shown.csv is no benchmark: it is not an npz file",
     "run --out shown.csv --environment planar-arm-7": "shown.csv is no folder; choose another --out",
-    "sweep --vary goals --seeds 0-2": "--vary must be like goals=interest-map,uniform, got 'goals'",
     "sweep --vary goals=interest-map,unifrm": "unknown goals 'unifrm'; did you mean uniform?",
-    "sweep --seed 4": "--seed cannot be given here: --seeds takes them",
     "table nowhere": "nowhere does not exist; runs are in OUT/NAME/seed-000",
     "report shown.csv": "shown.csv is a file, not a folder",
     "film nowhere": "nowhere holds no run; runs are in OUT/NAME/seed-000",
@@ -82,7 +94,9 @@ COMMANDS = {
 def test_a_wrong_command_is_refused_in_a_line_and_leaves_nothing(tmp_path, monkeypatch, capsys, words):
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)
+    sys.modules.pop("toss", None)
     files = {"toss.py": ROBOT, "shown.csv": CSV, "nul.csv": CSV.replace("0.9", "0.9\0")}
+    files["broken.py"] = "import nothing_of_that_name\n"
     for name, content in files.items():
         (tmp_path / name).write_text(content)
     assert command(_call, words.split()) == 2

@@ -37,8 +37,6 @@ LEGEND: Final[Mapping[str, str]] = {
     "model/error": "Distance from where the newest movements landed to where the model, before learning them, "
     "predicted that they would.",
     "model/coverage": "Share of the newest movements that landed in the model's 80 % region.",
-    "model/improved": "Share of the goals of the last 500 movements for which refining came nearer than the first "
-    "guess.",
     "time": "Seconds spent so far: on physics, by the learner and on evaluations. A resumed run shows them from there.",
     "competent/since": "Where half of the benchmark's goals are met, and since when; elsewhere the share now.",
     "map/competence": "The regions, named like the curves, coloured by the mean competence of the goals they remember.",
@@ -66,7 +64,6 @@ CHARTS: Final[Mapping[str, Mapping[str, str]]] = {
         "distance to where they landed": "model/error",
         "share in its 80 % region": "model/coverage",
         "relative error on what it never learns from; 1 is no better than their mean": "model/relative_error",
-        "share of refinements that helped, last 500 movements": "model/improved",
     },
 }
 METRICS: Final = ("error/mean", "error/noise_floor")  # that summarise a run

@@ -7,7 +7,7 @@ A resumed run tells everything again from its record, so the board is written an
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Final, Protocol
 
@@ -17,14 +17,13 @@ from sgimd_torch.board.legend import LEGEND, METRICS, OF_GOALS, OF_REGIONS, char
 from sgimd_torch.board.pictures import draw
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.evaluation import Benchmark, Evaluation
-from sgimd_torch.goals.regions import Region
 from sgimd_torch.spaces import Episode
 
 EVERY: Final = 50  # movements from one point of a curve to the next
 
 
 class Watched(Protocol):
-    """The parts of a run that a board looks at; ``regions`` are those of the goal model as they are now."""
+    """The parts of a run that a board looks at."""
 
     @property
     def config(self) -> Any: ...
@@ -34,8 +33,6 @@ class Watched(Protocol):
     def learner(self) -> Any: ...
     @property
     def benchmark(self) -> Benchmark: ...
-    @property
-    def regions(self) -> Sequence[Region]: ...
 
 
 class BoardListener:
@@ -70,7 +67,7 @@ class BoardListener:
             f"Steps are movements; distances are in the unit of T.\n\n| tag | what it shows |\n|---|---|\n{rows}",
         )
         has_goals = hasattr(parts.learner.autonomous, "goals")
-        metrics = [*METRICS, *[OF_GOALS] * has_goals, *[OF_REGIONS] * bool(parts.regions)]
+        metrics = [*METRICS, *[OF_GOALS] * has_goals, *[OF_REGIONS] * bool(parts.learner.regions)]
         self._file.settings(settings, metrics, f"{parts.config.variant}, {settings['environment']}")
 
     def episode(self, episode: Episode, replayed: bool) -> None:
@@ -78,7 +75,7 @@ class BoardListener:
         self._movements = episode.index + 1
         self._behaviour.episode(episode)
         if self._movements % EVERY == 0:
-            self._scalars({**self._behaviour.curves(), **of_regions(self._parts.regions)})
+            self._scalars({**self._behaviour.curves(), **of_regions(self._parts.learner.regions)})
             if not replayed:
                 self._scalars({f"time/{name.removeprefix('seconds_')}": s for name, s in self._seconds().items()})
         self._scalars(self._curves())
@@ -113,6 +110,6 @@ class BoardListener:
             self._file.layout(page)
 
     def _draw(self, found: Evaluation) -> None:
-        parts, space = self._parts, self._parts.environment.outcomes
-        for tag, png in draw(parts.regions, space, self._competent, parts.benchmark.goals, found.errors).items():
+        parts, space, regions = self._parts, self._parts.environment.outcomes, self._parts.learner.regions
+        for tag, png in draw(regions, space, self._competent, parts.benchmark.goals, found.errors).items():
             self._file.image(self._movements, tag, png)

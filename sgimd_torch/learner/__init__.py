@@ -10,7 +10,7 @@ be shown a goal: ``learner.request(context)``, before ``ask``, says by whom. Whi
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -36,6 +36,7 @@ from sgimd_torch.spaces import (
 from sgimd_torch.strategies import SocialStrategy, Strategy
 
 if TYPE_CHECKING:
+    from sgimd_torch.goals.regions import Region
     from sgimd_torch.teachers import Teacher
 
 __all__ = ["Learner", "ReplayError"]
@@ -99,6 +100,11 @@ class Learner:
     def lesson_waits(self) -> bool:
         """Whether no movement has answered yet what a teacher offered: a `run` that goes on here asks for no other."""
         return self._offered_at == self._movements
+
+    @property
+    def regions(self) -> Sequence[Region]:
+        """Of its goal model as they are now; none if that has no regions."""
+        return list(getattr(getattr(self.autonomous, "goals", None), "regions", ()))
 
     @property
     def waits_for_answer(self) -> bool:

@@ -55,7 +55,6 @@ from sgimd_torch.spaces import Demonstration
 
 __all__ = ["DERIVED", "Dims", "Event", "InUseError", "Kind", "Record", "RunError", "layout"]
 
-_APPLICATION: Final = 0x5347494D  # SQLite's application_id, so that other programs can tell what the file is
 _PATIENCE: Final = 60.0  # s, that a commit waits for readers
 _AT_ONCE: Final = 4096  # rows that are read together
 
@@ -83,7 +82,6 @@ class Record:
         self._written: dict[str, tuple[int, int]] = {}
         self._movements = 0
         self._shown: dict[bytes, int] = {}
-        self._remade: dict[str, int] = {}
         self.failed = False
         self._connection = _connect(self.path, write)
         try:
@@ -105,7 +103,6 @@ class Record:
         try:
             connection = sqlite3.connect(path, isolation_level=None)
             try:
-                connection.execute(f"PRAGMA application_id = {_APPLICATION}")
                 connection.execute("BEGIN IMMEDIATE")
                 for name, columns in layout(dims).items():
                     connection.execute(create(name, columns))
@@ -186,13 +183,6 @@ class Record:
     def add_rows(self, table: str, rows: Iterable[Sequence[Any]]) -> None:
         """More rows of one of the ``DERIVED`` tables; NaN becomes NULL."""
         self._append(table, [plain(row) for row in rows])
-
-    def remake_rows(self, table: str, rows: Iterable[Sequence[Any]]) -> None:
-        """The same for a table that a replay makes again from its beginning: rows that are there already stay."""
-        for row in rows:
-            made = self._remade[table] = self._remade.get(table, 0) + 1
-            if made > self._written[table][0]:
-                self.add_rows(table, [row])
 
     def replace_rows(self, table: str, rows: Iterable[Sequence[Any]]) -> None:
         """Other rows in the place of all rows of a table."""

@@ -6,15 +6,14 @@ parts = build(Config(seed=3)); for episode in run(parts.learner, parts.environme
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 from sgimd_torch.catalogue import checked
 from sgimd_torch.catalogue.options import given
-from sgimd_torch.environments.protocol import Environment, Record
+from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.evaluation import Benchmark
-from sgimd_torch.goals.regions import Region
 from sgimd_torch.learner import Learner
 from sgimd_torch.runs.chosen import ALGORITHM, Part, chosen, part_of
 from sgimd_torch.runs.config import OWN, Config
@@ -30,37 +29,26 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class RunParts:
-    """What a run needs. ``config`` is what it was made from. ``answers`` are the inverses to evaluate by, the run's own
-    first; they read the learner's memory. ``model`` is refreshed after each movement; it and its ``trust`` are None for
-    a run without a model. ``teacher`` demonstrates, ``teachers`` are asked for it; without any of them there are no
-    ``demonstrations``: those of the file, and what teachers have besides. ``data`` holds checksums of the files that
-    were read, ``notes`` messages for the user. ``record`` gives a movement to be filmed, None if the task has no
-    picture of its own."""
+    """What a run needs.
+
+    ``config`` is what it was made from; ``environment`` is that of its ``task``. ``answers`` are the inverses to
+    evaluate by, the run's own first; they read the learner's memory. ``model`` is refreshed after each movement; it and
+    its ``trust`` are None for a run without a model. ``teacher`` demonstrates, ``teachers`` are asked for it. ``data``
+    holds checksums of the files that were read, ``notes`` messages for the user.
+    """
 
     config: Config
+    task: Task
     environment: Environment
     learner: Learner
     teacher: Teacher | None
-    demonstrations: Sequence[Demonstration]
+    teachers: Mapping[str, Demonstrator]
     answers: dict[str, Callable[[Array, Array], Estimate]]
     benchmark: Benchmark
     data: dict[str, str | None]
     model: ForwardModel | None
     trust: Trust | None
-    notes: Sequence[str] = ()
-    record: Record | None = None
-    teachers: Mapping[str, Demonstrator] = field(default_factory=dict)
-    task: Task | None = None
-
-    @property
-    def inverse(self) -> Callable[[Array, Array], Estimate]:
-        """The run's own inverse for evaluations."""
-        return self.answers[OWN]
-
-    @property
-    def regions(self) -> Sequence[Region]:
-        """Of the learner's goal model as they are now, whichever it is; none if it has no regions."""
-        return list(getattr(getattr(self.learner.autonomous, "goals", None), "regions", ()))
+    notes: Sequence[str]
 
 
 def build(config: Config) -> RunParts:
@@ -88,19 +76,17 @@ def build(config: Config) -> RunParts:
     learner = make(ALGORITHM, teachers=teachers)(task.environment, config.seed)
     return RunParts(
         config=config,
+        task=task,
         environment=task.environment,
         learner=learner,
         teacher=teacher,
-        demonstrations=[*demonstrations, *_others(demonstrations, teachers)],
+        teachers=teachers,
         answers=make.answers(learner),
         benchmark=benchmark,
         data={"demonstrations_crc32": demonstrations_crc32, "benchmark_crc32": benchmark_crc32},
         model=make.model if config.uses_model else None,
         trust=make.trust if config.uses_model else None,
         notes=notes,
-        record=task.picture,
-        teachers=teachers,
-        task=task,
     )
 
 
@@ -110,39 +96,14 @@ def task_of(config: Config) -> Task:
     Raises:
         ValueError: it cannot be made, or is not an environment.
     """
-    found = _LOOKED_AT.pop(_place(config), None)
-    if found is not None:
-        return found
     part = part_of("environment", "environment", config["environment"])
     task = checked(part.kind, part.word, partial(part.make, **part.set_by(config.values)))()
     return task if isinstance(task, Task) else Task(task)
 
 
-def has_demonstrations(config: Config) -> bool:
-    """Whether its task comes with demonstrations. The next `task_of` gets the same task: some robots connect once."""
-    task = _LOOKED_AT[_place(config)] = task_of(config)
-    return task.demonstrations is not None
-
-
-_LOOKED_AT: Final[dict[str, Task]] = {}
-
-
-def _place(config: Config) -> str:
-    return str([(name, value) for name, value in config.values.items() if name.partition(".")[0] == "environment"])
-
-
 def _shown(config: Config) -> bool:
     """Whether its teachers need demonstrations, as a person does not."""
     return {config.values.get("teacher"), *config.values.get("teachers", ())} - {None} != {"by-hand"}
-
-
-def _others(demonstrations: Sequence[Demonstration], teachers: Mapping[str, Demonstrator]) -> list[Demonstration]:
-    """What teachers can show besides, each movement once."""
-    known = {
-        shown.trajectory.tobytes(): shown for each in teachers.values() for shown in getattr(each, "demonstrations", ())
-    }
-    played = {shown.trajectory.tobytes() for shown in demonstrations}
-    return [shown for trajectory, shown in known.items() if trajectory not in played]
 
 
 class _Maker:

@@ -31,9 +31,9 @@ class Part:
         kind, word: what was chosen; of a shared part both are its name.
         standard: the word if nobody chooses.
         make: the thing itself, with what its word fixes.
-        options: by their names in the run.
-        choices: the parameters that lead to other parts, and their defaults.
         takes: names of all its parameters, but those that its word fixes or hides.
+        options: those of them that a run can set.
+        choices: those that lead to other parts, and their defaults.
     """
 
     name: str
@@ -41,14 +41,16 @@ class Part:
     word: str
     standard: str
     make: Callable[..., Any]
+    takes: Collection[str]
     options: Mapping[str, Option]
     choices: Mapping[str, Callable[..., Any]]
-    takes: Collection[str]
 
     @property
     def teaching(self) -> str:
         """Of an algorithm: "teachers" that it asks, a "teacher" who shows it something, or "" if it learns alone."""
-        return next((who for has, who in _TAUGHT.items() if has in self.takes and self.kind == "algorithm"), "")
+        if self.kind != "algorithm":
+            return ""
+        return "teachers" if "teachers" in self.takes else "teacher" if "correspondence" in self.takes else ""
 
     def full(self, parameter: str) -> str:
         """The name of a parameter in the run."""
@@ -56,19 +58,7 @@ class Part:
 
     def set_by(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """The keywords that it gets from what a run has set."""
-        return {
-            each: values[self.full(each)]
-            for each in self.takes
-            if self.full(each) in self.options and each != "teachers"
-        }
-
-    def leads_to(self, name: str) -> bool:
-        """Whether an option or another part of this name belongs to it; without its own prefix."""
-        own = (*self.choices, *(name for name in SHARED if name in self.takes), self.teaching)
-        return self.full(name) in self.options or name in own
-
-
-_TAUGHT: Final = {"teachers": "teachers", "correspondence": "teacher"}
+        return {each: values[self.full(each)] for each in self.options if each != "teachers"}
 
 
 def part_of(name: str, kind: str, word: str, default: Callable[..., Any] | str = "") -> Part:
@@ -92,16 +82,13 @@ def part_of(name: str, kind: str, word: str, default: Callable[..., Any] | str =
 def _read(name: str, kind: str, word: str, standard: str, default: Callable[..., Any] | str) -> Part:
     entry = SHARED[kind] if kind in SHARED else find(kind, word)
     make = default if callable(default) and word == standard else entry.load()
-    takes = [each for each in parameters_of(make) if each not in entry.fixed and each not in entry.hidden]
-    every = {each: parameters_of(make)[each].default for each in takes}
-    choices = {each: value for each, value in every.items() if each in CATALOGUE and _has_name(each, value)}
-    prefix = f"{name}." if name else ""
-    options = {
-        f"{prefix}{each}": known for each, known in options_of(make).items() if each in takes and each != _HANDED
-    }
+    left_out = {*entry.fixed, *entry.hidden}
+    takes = {each: known.default for each, known in parameters_of(make).items() if each not in left_out}
+    options = {each: known for each, known in options_of(make).items() if each in takes and each != _HANDED}
     if kind == "algorithm" and "teachers" in takes:
         options["teachers"] = _TEACHERS
-    return Part(name, kind, word, standard or word, make, options, choices, takes)
+    choices = {each: value for each, value in takes.items() if each in CATALOGUE and _has_name(each, value)}
+    return Part(name, kind, word, standard or word, make, takes, options, choices)
 
 
 _READ: Final = cache(_read)
@@ -142,8 +129,12 @@ def standards(parts: Mapping[str, Part]) -> dict[str, Any]:
     for name, part in parts.items():
         if name != ALGORITHM and name not in SHARED:
             found[name] = part.standard
-        found |= {each: option.default for each, option in part.options.items()}
+        found |= {part.full(each): option.default for each, option in part.options.items()}
     return found
+
+
+def _has_name(kind: str, default: Any) -> bool:
+    return callable(default) and default is not inspect.Parameter.empty and word_of(kind, default) != ""
 
 
 def refused(name: str, parts: Mapping[str, Part], others: Iterable[str]) -> ValueError:
@@ -168,15 +159,12 @@ def refused(name: str, parts: Mapping[str, Part], others: Iterable[str]) -> Valu
     return ValueError(f"{said}; {' and '.join(having)} have it" if having else f"{said}{near.replace('_', '-')}")
 
 
-def _has_name(kind: str, default: Any) -> bool:
-    return callable(default) and default is not inspect.Parameter.empty and word_of(kind, default) != ""
-
-
 def _with(kind: str, name: str) -> list[str]:
     """The words of a kind whose parts have an option, or lead to a part, of this name."""
     found = []
     for word in CATALOGUE.get(kind, ()):
         with suppress(ValueError):  # one that is not installed has nothing
-            if part_of(ALGORITHM, kind, word).leads_to(name):
+            part = part_of(ALGORITHM, kind, word)
+            if name in (*part.options, *part.choices, *SHARED.keys() & part.takes, part.teaching):
                 found.append(word)
     return found

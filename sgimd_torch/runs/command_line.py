@@ -4,35 +4,27 @@ Examples:
   sgimd run --algorithm sgim-d --seed 3
   sgimd run --algorithm sgim-d --seed 3 --resume              after Ctrl-C, or with more --movements
   sgimd run --algorithm sagg-riac --goals grid --goals.window 12 --name grid --movements 2000
-  sgimd run --environment mypackage.toss:make                 on a robot of your own
+  sgimd run --environment mypackage.toss:make --algorithm practice      on a robot of your own
 """
 
 from __future__ import annotations
 
 import shlex
 import sys
-import textwrap
 import types
 import typing
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, get_type_hints
 
-from sgimd_torch.catalogue import CATALOGUE
-from sgimd_torch.catalogue.options import help_of
 from sgimd_torch.runs.chosen import Part, chosen, refused, standards
-from sgimd_torch.runs.config import RUN, Config, dashed, typed
+from sgimd_torch.runs.config import RUN, Config, dashed
 from sgimd_torch.runs.process import Stopping, loading
 
 FLAGS: Final = {
     "resume": "go on with a stopped or killed run, or lengthen a finished one.",
     "accept_loss": "with --resume: go on even if the log has lost movements; a copy of it is kept.",
 }
-ALONE: Final = "practice"  # the default learner of a robot without demonstrations
-_WANTED: Final = {int: "a whole number", float: "a number", bool: "true or false", str: "a word", Path: "a path"}
-_MANY: Final = {int: "whole numbers such as 250,500", float: "numbers such as .1,.2", str: "words such as own,nearest"}
-_PLACES: Final = {"progress": "goals.progress", "choose": "teacher.choose"}  # of kinds that another part chooses
-_WIDTH: Final = 120
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -61,14 +53,18 @@ def parse(argv: Sequence[str], description: str | None = None) -> tuple[Config, 
     try:
         given, asked = _read(argv)
         if "help" in asked and not given:
-            print(overview(description))
+            from sgimd_torch.runs.help import overview  # most commands need no help
+
+            print(overview(description, FLAGS))
             raise SystemExit(0)
-        algorithm = given.setdefault("algorithm", _suited(given))
-        parts = chosen(algorithm, {name: text for name, text in given.items() if name != "teachers"})
+        words = {name: text for name, text in given.items() if name != "teachers"}
+        parts = chosen(given.get("algorithm", Config.algorithm), words)
         for name in given:
             if name not in RUN and name not in standards(parts):
                 raise refused(name, parts, (*RUN, *FLAGS))
         if "help" in asked:
+            from sgimd_torch.runs.help import help_on
+
             print(help_on(parts))
             raise SystemExit(0)
         values = _values(given, parts)
@@ -77,51 +73,6 @@ def parse(argv: Sequence[str], description: str | None = None) -> tuple[Config, 
     except ValueError as error:
         print(f"error: {error}\n--help explains all options", file=sys.stderr)
         raise SystemExit(2) from None
-
-
-def overview(description: str | None = None) -> str:
-    """What ``sgimd run --help`` prints: the options of every run, and the words for its parts."""
-    about = help_of(Config)
-    shown = {name: typed(getattr(Config, name)) for name in RUN}
-    run = {name: about[name] + f" ({text})" * (text != "null") for name, text in shown.items()} | FLAGS
-    algorithms = {word: entry.about for word, entry in CATALOGUE["algorithm"].items() if "rivals" not in entry.about}
-    rivals = [word for word in CATALOGUE["algorithm"] if word not in algorithms]
-    kinds = {kind: ", ".join(words) for kind, words in CATALOGUE.items() if kind != "algorithm"}
-    lines = [
-        "usage: sgimd run [--OPTION VALUE ...] [--resume]",
-        "",
-        *(description or "").splitlines(),
-        "the run, with defaults (null, for no value, where there is none):",
-        *(_line(f"--{dashed(name)}", text) for name, text in run.items()),
-        "algorithms (--algorithm):",
-        *(_line(word, text) for word, text in algorithms.items()),
-        _line("extra rivals", ", ".join(rivals)),
-        "parts, each a word of these or package.module:attribute, one of your own:",
-        *(_line(f"--{_PLACES.get(kind, kind)}", words) for kind, words in kinds.items()),
-        "",
-        "Parts have options of their own: sgimd run --goals interest-map --help shows those of the parts that are",
-        "chosen, such as --goals.window 12.",
-    ]
-    return "\n".join(lines)
-
-
-def help_on(parts: Mapping[str, Part]) -> str:
-    """What ``sgimd run --goals grid --help`` prints: the options of the parts that are chosen."""
-    lines = ["usage: sgimd run [--OPTION VALUE ...] [--resume]; sgimd run --help shows the options of every run"]
-    for part in parts.values():
-        words, about = CATALOGUE.get(part.kind, {}), help_of(part.make)
-        what = [words[part.word].about] if part.word in words else []
-        leads_to = [f"--{part.full(each)}={parts[part.full(each)].word}" for each in part.choices]
-        what += [f"its parts: {' '.join(leads_to)}"] if leads_to else []
-        lines += ["", textwrap.fill(f"--{part.name or part.kind} {part.word}: {'; '.join(what)}", _WIDTH)]
-        for name, option in part.options.items():
-            meant = f"{_wanted(option.kind)}; default: {typed(option.default)}"
-            lines.append(_line(f"--{dashed(name)}", f"{about.get(name.rpartition('.')[2], '')} ({meant})"))
-    return "\n".join(lines)
-
-
-def _line(name: str, text: str) -> str:
-    return textwrap.fill(text, _WIDTH, initial_indent=f"  {name:17} ", subsequent_indent=" " * 20)
 
 
 def _read(argv: Sequence[str]) -> tuple[dict[str, str], set[str]]:
@@ -152,17 +103,6 @@ def _read(argv: Sequence[str]) -> tuple[dict[str, str], set[str]]:
     return given, asked
 
 
-def _suited(given: Mapping[str, str]) -> str:
-    """The default learner for a robot: one that is taught if there are demonstrations, else one that learns alone."""
-    robot = {name: text for name, text in given.items() if name.partition(".")[0] == "environment"}
-    if not robot or "demonstrations" in given:
-        return Config.algorithm
-    with loading():
-        from sgimd_torch.runs.build import has_demonstrations
-    config = Config(ALONE, parts=_values(robot, chosen(ALONE, robot)))
-    return Config.algorithm if has_demonstrations(config) else ALONE
-
-
 def _values(given: Mapping[str, str], parts: Mapping[str, Part]) -> dict[str, Any]:
     """What was typed, as values of the types of the options; words of parts stay words. Other names are left out.
 
@@ -170,7 +110,7 @@ def _values(given: Mapping[str, str], parts: Mapping[str, Part]) -> dict[str, An
         ValueError: one is of another type.
     """
     kinds = get_type_hints(Config) | {
-        name: option.kind for part in parts.values() for name, option in part.options.items()
+        part.full(name): option.kind for part in parts.values() for name, option in part.options.items()
     }
     found: dict[str, Any] = {name: text for name, text in given.items() if name in parts}
     for name, text in given.items():
@@ -178,7 +118,9 @@ def _values(given: Mapping[str, str], parts: Mapping[str, Part]) -> dict[str, An
             try:
                 found[name] = _value(text, kinds[name])
             except ValueError as error:
-                raise ValueError(f"--{dashed(name)} must be {_wanted(kinds[name])}, got {text}") from error
+                from sgimd_torch.runs.help import wanted
+
+                raise ValueError(f"--{dashed(name)} must be {wanted(kinds[name])}, got {text}") from error
     return found
 
 
@@ -202,14 +144,3 @@ def _value(text: str, kind: Any) -> Any:
     if not text:
         raise ValueError("nothing was typed")
     return kind(text)
-
-
-def _wanted(kind: Any) -> str:
-    """A type in words."""
-    inner = typing.get_args(kind)
-    if typing.get_origin(kind) is tuple:
-        many = _MANY.get(inner[0], "values")
-        return f"{many}, or []" if ... in inner else f"{len(inner)} {many}"
-    if inner:  # of a union
-        return " or ".join("null" if each is types.NoneType else _wanted(each) for each in inner)
-    return _WANTED.get(kind, "a value")

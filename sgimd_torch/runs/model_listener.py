@@ -6,12 +6,11 @@ A replay makes its tables again, so a resumed run has them as if it had never st
 
 from __future__ import annotations
 
-from collections import deque
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sgimd_torch.forward_model.diagnostics import coverage, improved
+from sgimd_torch.forward_model.diagnostics import coverage
 from sgimd_torch.memory import Memory
 from sgimd_torch.record import Record
 from sgimd_torch.runs.listeners import Listener, Seconds
@@ -22,7 +21,6 @@ if TYPE_CHECKING:
     from sgimd_torch.forward_model.model import ForwardModel, Prediction
 
 LEVEL: Final = 0.8  # of the regions whose coverage the board shows
-LATELY: Final = 500  # movements, over which the board shows how often refining a guess helped
 NOT_ASKED: Final = "the forward model is not asked, the learner goes on without it"
 
 
@@ -44,7 +42,6 @@ class ModelListener(Listener):
         self._model, self._trust, self._memory, self._seconds = model, trust, memory, seconds
         self._record, self._inverse = record, inverse
         self._asked = False
-        self._lately: deque[tuple[Array, Array, str]] = deque(maxlen=LATELY)
         self._news: list[str] = []
         self._curves: dict[str, float] = {}
 
@@ -70,20 +67,17 @@ class ModelListener(Listener):
     def _refresh(self, episode: Episode) -> None:
         memory = self._memory
         movements, move = episode.index + 1, episode.move
-        if move is not None and move.goal is not None and episode.outcome is not None:
-            self._lately.append((move.goal, episode.outcome, move.origin))
         with self._seconds.of("model"):
             refresh = self._model.refresh(memory, None if move is None else move.goal)
         if refresh is None:
             return
         error = self._model.relative_error
         learnt = refresh.steps, refresh.held_out, error, int(refresh.diverged)
-        self._record.remake_rows("refreshes", [(movements, len(memory), *learnt)])
+        self._record.add_rows("refreshes", [(movements, len(memory), *learnt)])
         self._curves = {
             "model/relative_error": error,
             "model/held_out": refresh.held_out,
             "model/steps": refresh.steps,
-            "model/improved": self._improved(),
         }
         if refresh.predicted is not None:
             self._predicted(refresh.first, memory.outcomes[refresh.first :], refresh.predicted)
@@ -93,16 +87,10 @@ class ModelListener(Listener):
 
     def _predicted(self, first: int, outcomes: Array, predicted: Prediction) -> None:
         values = np.hstack((outcomes, *predicted)).tolist()
-        self._record.remake_rows("predictions", ((row, *each) for row, each in enumerate(values, first)))
+        self._record.add_rows("predictions", ((row, *each) for row, each in enumerate(values, first)))
         spread = np.hypot(predicted.epistemic, predicted.aleatoric)
         self._curves["model/error"] = float(np.linalg.norm(outcomes - predicted.mean, axis=1).mean())
         self._curves["model/coverage"] = coverage(outcomes, predicted.mean, spread, LEVEL)
-
-    def _improved(self) -> float:
-        if not self._lately:
-            return float("nan")
-        goals, outcomes, origins = zip(*self._lately, strict=True)
-        return improved(np.stack(goals), np.stack(outcomes), np.array(origins))
 
     def _say_whether_asked(self, movements: int, error: float) -> None:
         asked = getattr(self._inverse, "trusted", error <= self._trust)

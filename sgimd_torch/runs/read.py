@@ -175,17 +175,16 @@ def _lived(record: Record, shown: list[Demonstration]) -> tuple[dict[str, Any], 
 
 def _requests(requests: list[dict[str, Any]], shown: list[Demonstration], outcome_dim: int) -> Columns:
     """index of the movement that came next, teacher, strategy, reply, shown (which demonstration, -1 for none),
-    wanted_* and got_*, points of C x T, and how far their outcomes are ``apart``."""
+    wanted_*, points of C x T, and how far the outcomes that were shown and wanted are ``apart``, NaN without any."""
     wanted = np.stack([np.concatenate(each.pop("wanted")) for each in requests])
-    got = np.full_like(wanted, np.nan)
+    apart = np.full(len(requests), np.nan)
     for k, each in enumerate(requests):
         if each["shown"] >= 0:
-            got[k] = np.concatenate((shown[each["shown"]].context, shown[each["shown"]].outcome))
+            apart[k] = np.linalg.norm(shown[each["shown"]].outcome - wanted[k, -outcome_dim:])
     return {
         **{name: np.array([each[name] for each in requests]) for name in requests[0]},
         **{f"wanted_{k}": column for k, column in enumerate(wanted.T)},
-        **{f"got_{k}": column for k, column in enumerate(got.T)},
-        "apart": np.array([np.linalg.norm(each) for each in (got - wanted)[:, -outcome_dim:]]),
+        "apart": apart,
     }
 
 

@@ -10,15 +10,14 @@ import time
 import traceback
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any, Final, Self
+from typing import TYPE_CHECKING, Final, Self
 
 from sgimd_torch.environments.protocol import FAILURES, SimulationError
-from sgimd_torch.evaluation import Evaluation, evaluate
 from sgimd_torch.record import Record, RunError
 from sgimd_torch.runs.build import RunParts
 from sgimd_torch.runs.config import OWN
 from sgimd_torch.runs.directory import open_run
-from sgimd_torch.runs.evaluations import read_evaluations, write_evaluation
+from sgimd_torch.runs.evaluations import Evaluations
 from sgimd_torch.runs.listeners import Listener, Seconds
 from sgimd_torch.runs.process import Failed, Progress, Stopped, Stopping, say
 from sgimd_torch.session import NoOutcomeError, ReplayError, live, reason_of, run
@@ -86,10 +85,11 @@ class Life:
         say(*parts.notes, *notes)
         self.movements, self.recorded, self.failed = 0, self.record.movements, 0
         self.seconds = Seconds(self.record.about.get("seconds", {}))
-        self.evaluations = read_evaluations(self.record)
+        judged = parts.config, parts.environment, parts.benchmark, parts.learner, parts.answers
+        self.evaluations = Evaluations(*judged, self.record)
+        self.listeners = listeners_of(parts, self.record, self.seconds)
         self._wanted = set(parts.config.evaluations)
         self._committed = time.monotonic()
-        self.listeners = listeners_of(parts, self.record, self.seconds)
 
     def __enter__(self) -> Self:
         return self
@@ -117,8 +117,7 @@ class Life:
     @property
     def summary(self) -> str:
         """What came of it, in a line."""
-        last = self._last
-        found = "not evaluated"
+        last, found = self.evaluations.last, "not evaluated"
         if last is not None:
             floor = last.noise_floor
             amount = self.parts.environment.outcomes.amount
@@ -135,7 +134,7 @@ class Life:
         unit = self.parts.environment.outcomes.amount
         with Progress("replaying" if self.recorded else title, self.recorded or total) as progress:
             for _ in self.episodes():
-                last = self._last
+                last = self.evaluations.last
                 progress.show(self.movements, "" if last is None else f"error {unit(last.mean_error, '.4f')}")
                 if self.movements == self.recorded < total:
                     progress.begin(title, total, self.movements)
@@ -181,11 +180,6 @@ class Life:
 
         return Awaited(name, teacher, patience=self.parts.config.patience, say=say)
 
-    @property
-    def _last(self) -> Evaluation | None:
-        """The last evaluation of the run's own answers, None before the first."""
-        return self.evaluations[max(self.evaluations)][OWN] if self.evaluations else None
-
     def _after(self, episode: Episode) -> None:
         replayed = self.replaying
         self.movements = episode.index + 1
@@ -204,16 +198,10 @@ class Life:
             self.commit()
 
     def _evaluate(self) -> None:
-        """Evaluate the learner as it is now, if that is not recorded. Without an exemplar there is nothing to infer a
-        movement from: the learner by observation has none before its first demonstration."""
-        found: Mapping[str, Evaluation] | None = self.evaluations.get(self.movements)
+        with self.seconds.of("evaluation"):
+            found = self.evaluations.after(self.movements)
         if found is None:
-            if len(self.parts.learner.memory) == 0:
-                return
-            with self.seconds.of("evaluation"):
-                found = self.evaluations[self.movements] = evaluate_answers(self.parts, self.movements)
-            near = self.parts.benchmark.side / 2
-            write_evaluation(self.record, self.movements, found, near, self.parts.regions)
+            return
         for each in self.listeners:
             each.evaluated(self.movements, found)
         if not self.replaying:
@@ -233,27 +221,11 @@ def listeners_of(parts: RunParts, record: Record, seconds: Seconds) -> list[List
     if parts.model is not None and parts.trust is not None:
         from sgimd_torch.runs.model_listener import ModelListener
 
-        model = ModelListener(record, parts.model, parts.trust.error, parts.inverse, parts.learner.memory, seconds)
+        model = ModelListener(record, parts.model, parts.trust.error, parts.answers[OWN], parts.learner.memory, seconds)
         found.append(model)
         curves = model.new_curves
     if parts.config.board:
         from sgimd_torch.board.listener import BoardListener
 
         found.append(BoardListener(parts.config.directory, parts, seconds.summary, curves))
-    return found
-
-
-def evaluate_answers(parts: RunParts, movements: int) -> dict[str, Evaluation]:
-    """Evaluate a learner by each of its answers, with streams that the run does not use.
-
-    All answers get the same noise, goal by goal; of the run's own it is measured, too.
-    """
-    config = parts.config
-    repeats = config.repeats if config.floor_at is None or movements in config.floor_at else 0
-    judged: tuple[Any, ...] = parts.environment, parts.benchmark.goals, config.seed, movements
-    found = {OWN: evaluate(parts.inverse, *judged, repeats=repeats)}
-    for answer, inverse in parts.answers.items():
-        if answer != OWN:
-            same = inverse is parts.inverse
-            found[answer] = found[OWN].without_noise if same else evaluate(inverse, *judged, repeats=0)
     return found

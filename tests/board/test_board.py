@@ -28,6 +28,7 @@ from sgimd_torch.runs.build import build
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.run import Life
+from sgimd_torch.runs.tasks import Task
 from sgimd_torch.spaces import Box, Demonstration, Episode, Move, Request
 
 PLANE = Box.cube(-1.0, 1.0, 2, names=("x", "y"), unit="m")
@@ -366,10 +367,13 @@ def live_as(out, robot, make, **options):
     )
     goals = np.linspace(0.2, 0.9, 5)[:, None].repeat(robot.outcomes.dim, axis=1)
     learner = make(robot, 0, **options)
-    alone = {"teacher": None, "demonstrations": [], "model": None, "trust": None}
     parts = dataclasses.replace(
         build(config),
-        **{**alone, "environment": robot, "learner": learner, "answers": {"own": LocalInverse(learner.memory)}},
+        task=Task(robot),
+        environment=robot,
+        teacher=None,
+        learner=learner,
+        answers={"own": LocalInverse(learner.memory)},
         benchmark=Benchmark("Slider", goals, 0.1),
     )
     with Life(parts, resume=False) as life:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sgimd_torch.forward_model.diagnostics import coverage, improved
+from sgimd_torch.forward_model.diagnostics import coverage
 from sgimd_torch.spaces import stream
 
 LEVELS = (0.1, 0.5, 0.8, 0.95, 0.99)
@@ -40,37 +40,3 @@ def test_the_region_is_an_ellipse_along_the_axes_not_a_box_or_circle():
     for row, inside in zip(outcomes * 0.1, [1, 0, 1, 0, 0], strict=True):
         assert coverage(row[None], mean[:1], spread[:1], 0.8) == inside
     assert coverage(outcomes * 0.1, mean, spread, 0.8) == pytest.approx(2 / 5)
-
-
-# goal, outcome, origin: of outcomes on a line, goals are at 1 and 2.
-LIFE = [
-    (None, 0.0, "babble"),
-    (1.0, 0.5, "local"),  # first
-    (1.0, 0.99, "global"),  # no refinement, though it comes nearest
-    (1.0, 0.7, "local"),
-    (1.0, 0.6, "local"),
-    (3.0, 3.0, "imitate"),
-    (3.0, 3.1, "imitate"),
-    (2.0, 1.9, "local"),  # the second goal: nothing better follows
-    (2.0, 1.0, "local"),
-    (None, None, ""),
-    (2.0, 1.8, "local"),  # the first goal again, with one movement only
-    (1.0, 0.0, "global"),  # never more than that
-]
-
-
-def lived(life, dim=1):
-    goals, outcomes = (
-        np.array([np.full(dim, np.nan if row[k] is None else row[k]) for row in life]).reshape(-1, dim) for k in (0, 1)
-    )
-    return goals, outcomes, np.array([row[2] for row in life], dtype=np.str_)
-
-
-@pytest.mark.parametrize("dim", [1, 3])
-def test_refinements_are_counted_goal_by_goal_without_imitation_and_chance(dim):
-    assert improved(*lived(LIFE, dim)) == 0.5  # of the two goals with a second movement
-
-
-@pytest.mark.parametrize("life", [[], LIFE[:1], LIFE[5:7], LIFE[10:]])
-def test_without_refinements_there_is_no_share(life):
-    assert np.isnan(improved(*lived(life)))

@@ -7,11 +7,12 @@ from runs import content_of
 from sgimd_torch.catalogue import CATALOGUE
 from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.evaluation import contexts_of_goals
-from sgimd_torch.runs.build import build, task_of
+from sgimd_torch.runs.build import task_of
 from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
+from sgimd_torch.runs.tasks import demonstrations_of
 
 
 @pytest.mark.parametrize(("word", "reach"), [("rod-wind", 0.05), ("rod-yaw", 0.5)])
@@ -21,9 +22,8 @@ def test_the_contexts_of_the_rod_are_tasks(word, reach):
     robot = task_of(config).environment
     assert (robot.contexts.low.tolist(), robot.contexts.high.tolist()) == ([-reach], [reach])
     assert robot.noise == 0.01
-    parts = build(config)
-    assert {shown.context.tolist()[0] for shown in parts.demonstrations} == {0.0}
-    assert len(parts.demonstrations) == 127
+    demonstrations, *_ = demonstrations_of(task_of(config), None)
+    assert [shown.context.tolist() for shown in demonstrations] == [[0.0]] * 127
     contexts = contexts_of_goals(robot, 200)
     assert np.ptp(contexts) > 1.8 * reach
 

@@ -11,6 +11,7 @@ from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import Benchmark, save_benchmark
 from sgimd_torch.runs.command_line import main
+from sgimd_torch.runs.directory import FILE
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.tasks.robots import arm_benchmark, arm_demonstrations
@@ -21,7 +22,7 @@ ALGORITHMS = CATALOGUE["algorithm"]
 ARMS = {"planar-arm-7": 7, "planar-arm-50": 50}
 
 
-SHORT = "--algorithm sgim-d --environment planar-arm-7 --seed 3 --movements 70 --evaluate_at 40 --repeats 2"
+SHORT = "--algorithm sgim-d --environment planar-arm-7 --seed 3 --movements 70 --evaluate_at 20,40 --repeats 2"
 
 
 def live(out, *options):
@@ -29,20 +30,45 @@ def live(out, *options):
     return command(main, [*SHORT.split(), *map(str, ("--out", out, *options))])
 
 
-@pytest.mark.parametrize("environment", ARMS)
-@pytest.mark.parametrize("algorithm", ALGORITHMS)
-def test_every_algorithm_lives_on_every_arm_and_writes_a_whole_run_directory(tmp_path, environment, algorithm):
-    assert live(tmp_path, "--environment", environment, "--algorithm", algorithm) == 0
-    run = read_run(tmp_path / algorithm / "seed-003")
+@pytest.fixture(scope="module")
+def few(tmp_path_factory):
+    """A file of three goals for an arm."""
+    path = tmp_path_factory.mktemp("goals") / "few.npz"
+    save_benchmark(path, Benchmark("PlanarArm", np.array([[0.1, 0.2], [0.5, -0.5], [-0.4, 0.3]]), 0.1))
+    return path
+
+
+LIVES = [*((algorithm, "planar-arm-7") for algorithm in ALGORITHMS), ("practice-taught", "planar-arm-50")]
+
+
+@pytest.mark.parametrize(("algorithm", "environment"), LIVES)
+def test_every_algorithm_lives_and_writes_a_whole_run_directory(tmp_path, few, capsys, algorithm, environment):
+    assert live(tmp_path, "--environment", environment, "--algorithm", algorithm, "--benchmark", few) == 0
+    directory = tmp_path / algorithm / "seed-003"
+    assert f"{directory}: 70 movements, mean error" in capsys.readouterr().out
+    assert [path.name for path in directory.iterdir()] == [FILE]
+    run = read_run(directory)
+    assert run.index.tolist() == list(range(70))
     assert run.thetas.shape == (70, ARMS[environment])
     assert run.outcomes.shape == (70, 2)
-    assert run.evaluation["movements"].tolist() == [40, 70]
-    assert run.config["environment"] == environment
-    assert run.files["benchmark_crc32"] is run.files["demonstrations_crc32"] is None
+    assert (run.regions is not None) == (algorithm in ("sagg-riac", "sgim-d", "sgim-im", "sgim-acts"))
+    assert {*run.evaluation} == {"movements", *("mean_error", "median_error", "p90_error", "noise_floor", "goals_met")}
+    # Observation and imitation have seen nothing before movement 30, so they have nothing to be evaluated by after 20.
+    wanted = [40, 70] if algorithm in ("observation", "imitation") else [20, 40, 70]
+    assert run.evaluation["movements"].tolist() == wanted
+    assert np.all(run.evaluation["noise_floor"] < 1e-12)  # without noise all repetitions end in one point
+    for mean, movements in zip(run.evaluation["mean_error"], wanted, strict=True):  # of the errors of all goals
+        errors, _ = run.missed_by(movements)
+        assert mean == pytest.approx(errors.mean())
+        assert len(errors) == len(run.benchmark) == 3
+    assert {"seconds_physics", "seconds_learner", "seconds_evaluation"} < set(run.summary)
+    assert (run.summary["movements"], run.summary["finished"]) == (70, True)
+    assert (run.config["algorithm"], run.config["environment"]) == (algorithm, environment)
+    assert {"python", "numpy", "scipy", "faiss", "mujoco", "sgimd_torch", "platform", "commit"} == set(run.versions)
+    assert run.files["demonstrations_crc32"] is None
     moved, arm = np.flatnonzero(run.origin != ""), PlanarArm(ARMS[environment])
     for k in moved[-3:]:
         assert np.array_equal(arm.execute(NO_CONTEXT, run.thetas[k], stream(0, "any")), run.outcomes[k])
-    assert np.all(run.evaluation["noise_floor"] < 1e-12)  # without noise all repetitions end in one point
 
 
 @pytest.mark.parametrize("n_joints", ARMS.values())
@@ -102,15 +128,19 @@ def test_own_demonstrations_and_goals_replace_those_of_the_arm(tmp_path, capsys)
     assert run.evaluation["mean_error"].tolist() == run.evaluation["median_error"].tolist()  # of one goal
     assert None not in (run.files["benchmark_crc32"], run.files["demonstrations_crc32"])
     assert "2 demonstrations; how far the correspondence misses them is not measured" in capsys.readouterr().err
+    assert live(tmp_path, "--algorithm", "random", "--movements", 5, "--evaluated-by", "own") == 0
+    run = read_run(tmp_path / "random" / "seed-003")
+    assert run.benchmark.tolist() == arm_benchmark(arm).goals.tolist()
+    assert run.files["benchmark_crc32"] is run.files["demonstrations_crc32"] is None
 
 
 @pytest.mark.parametrize(
     ("environment", "options", "message"),
     [
         ("planar-arm-7", ["--benchmark", "{rod}"], "the benchmark was made for FishingRod .* got PlanarArm"),
-        ("planar-arm-50", ["--demonstrations", "{seven}"], "has 7 joints, the robot has 50"),
+        ("planar-arm-50", ["--demonstrations", "{seven}"], r"seven.npz: recording 0 .*shape \(..., 50\), got \(5, 7\)"),
         ("planar-arm-7", ["--demonstrations", "{degrees}"], "recording 0 cannot be translated: .* is it in deg"),
-        ("fishing-rod", ["--demonstrations", "{seven}"], "has 7 joints, the robot has 6"),
+        ("fishing-rod", ["--demonstrations", "{seven}"], r"seven.npz: recording 0 .*shape \(..., 6\), got \(5, 7\)"),
     ],
 )
 def test_files_of_another_robot_are_refused(tmp_path, benchmark, capsys, environment, options, message):

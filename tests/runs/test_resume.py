@@ -21,7 +21,7 @@ from runs import (
 from sgimd_torch.evaluation import evaluate
 from sgimd_torch.inverses.locally_linear import LocallyLinear
 from sgimd_torch.record import Kind, Record
-from sgimd_torch.runs import run as run_script
+from sgimd_torch.runs import evaluations
 from sgimd_torch.runs.directory import FILE
 from sgimd_torch.runs.read import movements_on_disk, read_run
 from sgimd_torch.spaces import stream
@@ -137,7 +137,7 @@ def test_a_resumed_run_keeps_its_evaluations_until_floor_at_changes(tmp_path, go
             evaluated.append((movements, options["repeats"]))
         return evaluate(inverse, environment, goals, seed, movements, **options)
 
-    monkeypatch.setattr(run_script, "evaluate", evaluate_and_note)
+    monkeypatch.setattr(evaluations, "evaluate", evaluate_and_note)
     assert go(tmp_path, "--movements", 60, "--floor_at", "30,90") == 0
     assert evaluated == [(30, 2), (60, 0)]
     assert go(tmp_path, "--resume", "--floor_at", "30,90") == 0

@@ -13,7 +13,9 @@ from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.directory import sources
 from sgimd_torch.runs.process import command
 
-SHORT = "--environment sliders:Slider --algorithm random --movements 40 --evaluate-at 20 --repeats 0 --out"
+SHORT = (
+    "--environment sliders:Slider --algorithm random --movements 40 --evaluate-at 20 --repeats 0 --inverse linear --out"
+)
 OWN = [*SHORT.split(), "runs"]
 
 

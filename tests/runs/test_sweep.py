@@ -24,13 +24,14 @@ from sgimd_torch.runs.read import finished, movements_on_disk
 from sgimd_torch.runs.sweep import main, variants_of
 
 # An arm without physics; 40 movements and one evaluation take a moment.
-ALONE = ["--environment", "planar-arm-7", "--movements", "40", "--evaluate-at", "20", "--repeats", "0"]
+ARM = "--environment planar-arm-7 --movements 40 --evaluate-at 20 --repeats 0 --inverse linear"
+ALONE = ARM.split()
 SHORT = [*ALONE, "--algorithm", "random"]
 
 
 def short(out, **changes):
-    fixed = {"environment": "planar-arm-7", "algorithm": "random", "movements": 40, "repeats": 0, "evaluate_at": (20,)}
-    return Config.from_settings({**fixed, "out": out, **changes})
+    fixed = {"environment": "planar-arm-7", "algorithm": "random", "inverse": "linear", "movements": 40, "repeats": 0}
+    return Config.from_settings({**fixed, "evaluate_at": (20,), "out": out, **changes})
 
 
 def swept(*options):
@@ -144,16 +145,6 @@ def test_shards_are_consecutive_parts_of_the_list_and_together_the_whole(tmp_pat
     assert "2 runs, shard 3/4 of 10 runs, 0 of them finished: runs" in said
 
 
-def test_a_shard_carries_out_its_runs_alone_and_what_is_finished_does_not_shift_it(tmp_path, capsys):
-    options = [*SHORT, "--seeds", "0-1", "--out", tmp_path]
-    assert swept(*options, "--shard", "2/2") == 0
-    assert [finished(short(tmp_path, seed=seed)) for seed in (0, 1)] == [False, True]
-    assert listed(capsys, *options, "--shard", "1/2")[0] == [f"{tmp_path}/random/seed-000: 0 of 40 movements"]
-    assert listed(capsys, *options, "--shard", "2/2")[0] == []
-    assert swept(*options, "--shard", "1/9") == 0  # more parts than runs: an empty one
-    assert not finished(short(tmp_path, seed=0))
-
-
 def test_without_ray_the_extra_that_brings_it_is_named(tmp_path):
     program = f"import sys; sys.modules['ray'] = None; {SWEEP}"
     process = start(program, *SHORT, "--engine", "ray", "--out", tmp_path / "study")
@@ -180,8 +171,9 @@ def test_every_run_is_what_it_would_be_alone_and_a_second_start_does_nothing(tmp
     assert swept(*options) == 0
     assert "2 of them finished" in capsys.readouterr().err
     assert {path: path.stat().st_mtime_ns for path in (tmp_path / "study").rglob("*")} == before
-    lines, _ = listed(capsys, *options, "--seeds", "0-1")
-    assert [Path(line.partition(":")[0]).name for line in lines] == ["seed-001", "seed-001"]
+    for shard, left in (("1/1", 2), ("1/2", 0), ("2/2", 2)):  # what is finished does not shift the others
+        lines, _ = listed(capsys, *options, "--seeds", "0-1", "--shard", shard)
+        assert [Path(line.partition(":")[0]).name for line in lines] == ["seed-001"] * left
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,6 @@ from typing import Final
 import numpy as np
 
 from sgimd_torch.algorithms import Correspondence
-from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.environments.protocol import Environment, HandLed, Record, check_instance, recorded
 from sgimd_torch.evaluation import Benchmark, load_benchmark
 from sgimd_torch.files import checksum
@@ -35,10 +34,6 @@ class Task:
         correspondence: (times, trajectory) -> theta_d, eq. (6); None for the environment's own, if it has one.
         misfit: demonstration -> how far (rad) it is from what the robot can play; raises ValueError if it cannot be
             translated. None for the correspondence alone.
-        n_joints: columns of a demonstrated trajectory; None for any.
-        record: (context, theta, rng) -> a movement that `sgimd film` shows, see ``Sketch`` in environments/protocol.py;
-            None for the environment's own, if it has one.
-        hand_led: what a person can lead by the hand to teach it; None for the environment's own, if it has one.
 
     Raises:
         ValueError: a class in the place of an environment.
@@ -49,17 +44,14 @@ class Task:
     demonstrations: Path | Callable[[], Sequence[Demonstration]] | None = None
     correspondence: Correspondence | None = None
     misfit: Callable[[Demonstration], float] | None = None
-    n_joints: int | None = None
-    record: Record | None = None
-    hand_led: HandLed | None = None
 
     def __post_init__(self) -> None:
         check_instance(self.environment)
 
     @property
     def picture(self) -> Record | None:
-        """``record``, or that of the environment, which is then checked; None if neither has one that can be called."""
-        found = self.record or getattr(self.environment, "record", None)
+        """The environment's ``record``, which gives a movement to be filmed, checked; None if it has none."""
+        found = getattr(self.environment, "record", None)
         return partial(recorded, self.environment, found) if callable(found) else None
 
 
@@ -124,10 +116,10 @@ def demonstrations_of(task: Task, file: Path | None) -> tuple[Sequence[Demonstra
     if not isinstance(source, Path):
         made = source()
         return made, _fit(robot, made, []), None
+    from sgimd_torch.demonstrations import load_demonstrations  # most learners read none
+
     crc32 = _checksum("demonstrations", source)
-    found = load_demonstrations(
-        source, n_joints=task.n_joints, outcome_dim=robot.outcomes.dim, context_dim=robot.contexts.dim
-    )
+    found = load_demonstrations(source, outcome_dim=robot.outcomes.dim, context_dim=robot.contexts.dim)
     misfits: list[float] = []
     for row, demonstration in enumerate(found):
         try:
@@ -176,14 +168,14 @@ def hand_led_of(task: Task) -> HandLed:
     """What a person can lead by the hand to teach this task.
 
     Raises:
-        ValueError: neither the task nor its environment has it, or nothing translates what is led.
+        ValueError: its environment has no such thing, or nothing translates what is led.
     """
-    found = task.hand_led or getattr(task.environment, "hand_led", None)
+    found = getattr(task.environment, "hand_led", None)
     if not isinstance(found, HandLed):
         raise ValueError(
             f"{type(task.environment).__name__} cannot be led by the hand: it does not say which joints of which model "
             "a hand moves; give it an attribute hand_led, a HandLed(model, joints, hand) with a MuJoCo model (see "
-            "sgimd_torch.environments.protocol), or return Task(environment, hand_led=...)"
+            "sgimd_torch.environments.protocol)"
         )
     correspondence_of(task)
     return found

@@ -27,7 +27,7 @@ REACHING: Final = 20_000  # uniform movements that show what a toy can reach
 def planar_arm(*, n_joints: int) -> Task:
     """An arm without noise; its outcome is the position of its end."""
     arm = PlanarArm(n_joints)
-    return Task(arm, partial(arm_benchmark, arm), partial(arm_demonstrations, arm), arm.correspondence, None, n_joints)
+    return Task(arm, partial(arm_benchmark, arm), partial(arm_demonstrations, arm))
 
 
 def swimmer() -> Task:
@@ -35,7 +35,7 @@ def swimmer() -> Task:
     from sgimd_torch.environments.swimmer import Swimmer  # gymnasium is loaded only when it is needed
 
     robot, goals, shown = Swimmer(), DATA / "swimmer_benchmark.npz", DATA / "swimmer_demonstrations.npz"
-    return Task(robot, goals, shown, misfit=robot.misfit, n_joints=2)
+    return Task(robot, goals, shown, misfit=robot.misfit)
 
 
 def half_reached() -> Task:
@@ -81,7 +81,7 @@ def toy_demonstrations(robot: Toy) -> list[Demonstration]:
 def arm_benchmark(arm: PlanarArm) -> Benchmark:
     """One random goal in each tile of T, without those that the arm cannot reach; always the same ones."""
     box = arm.outcomes
-    goals = tile_goals(_grid(box, SIDE), box, SIDE, stream(0, "goals for an arm"), at_least=1)
+    goals = tile_goals(np.tile(_grid(box, SIDE), (2, 1)), box, SIDE, stream(0, "goals for an arm"))
     return Benchmark(type(arm).__name__, goals[arm.reachable(goals)], SIDE)
 
 

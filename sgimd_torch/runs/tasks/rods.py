@@ -11,7 +11,7 @@ import numpy as np
 from sgimd_torch.catalogue.options import hands_on
 from sgimd_torch.demonstrations import SHIPPED as SHIPPED_DEMONSTRATIONS
 from sgimd_torch.demonstrations import load_demonstrations
-from sgimd_torch.environments.fishing_rod import JOINTS, FishingRod
+from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.evaluation import SHIPPED as SHIPPED_BENCHMARK
 from sgimd_torch.runs.tasks import Task
 from sgimd_torch.spaces import Box, Demonstration
@@ -48,7 +48,6 @@ def fishing_rod(*, task_space: float = 1.0, threads: int = 1, **physics: Any) ->
         partial(_in_context_zero, rod.contexts.dim) if rod.contexts.dim else SHIPPED_DEMONSTRATIONS,
         rod.primitive.correspondence,
         partial(_misfit, rod),
-        len(JOINTS),
     )
 
 

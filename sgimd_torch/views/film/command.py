@@ -51,7 +51,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     options = _options(argv)
     run = read_run(options.run)
     parts = _parts(run, trust=options.trust)
-    if parts.record is None:
+    if parts.task.picture is None:
         raise ValueError(
             f"{run.path} is of {run.config['environment']}, which cannot be filmed: it brings no picture of its "
             "movements, a method record(context, theta, rng) -> Sketch"
@@ -102,7 +102,8 @@ def _cast(run: Run, parts: RunParts, goals: Array, stages: Sequence[int]) -> lis
     """For each stage the run's answer to each goal, which has the same motor noise at every stage. Beside it: how far
     the goals of the benchmark are missed in the same context, and the curve of the mean error over the stages; in a
     film of one stage, that of the run's own evaluations."""
-    assert parts.record is not None
+    picture = parts.task.picture
+    assert picture is not None
     robot, seed = parts.environment, run.config["seed"]
     context = (robot.contexts.low + robot.contexts.high) / 2
     who = label(run.config["name"] or run.config["algorithm"])
@@ -115,9 +116,11 @@ def _cast(run: Run, parts: RunParts, goals: Array, stages: Sequence[int]) -> lis
         past = past[np.isfinite(past[:, 0])]
         title = f"{who}, seed {seed}, after {movements} movements"
         for k, goal in enumerate(goals):
-            recording = parts.record(context, parts.inverse(context, goal).theta, stream(seed, "film", k))
+            recording = picture(context, parts.answers["own"](context, goal).theta, stream(seed, "film", k))
             shots.append(Shot(recording, goal, title, robot.outcomes.unit, past))
-        found = evaluate(parts.inverse, robot, parts.benchmark.goals, seed, movements, context=context, repeats=0)
+        found = evaluate(
+            parts.answers["own"], robot, parts.benchmark.goals, seed, movements, context=context, repeats=0
+        )
         errors.append(found.errors)
     curve = np.array(stages), np.array([each.mean() for each in errors])
     if len(stages) == 1 and len(run.evaluation["movements"]):

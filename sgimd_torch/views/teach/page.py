@@ -49,7 +49,6 @@ class Page:
     def __init__(self, server: viser.ViserServer, taught: TaughtRun) -> None:
         self.server, self.taught = server, taught
         parts = taught.parts
-        assert parts.task is not None
         led = hand_led_of(parts.task)
         self._outcomes = parts.environment.outcomes
         self.leading = Leading(led)

@@ -115,7 +115,6 @@ class TaughtRun:
             ValueError: the robot cannot make this movement.
         """
         task, robot = self.parts.task, self.parts.environment
-        assert task is not None
         rng = stream(self.config.seed, "lessons", self._lessons)
         return lesson_by_hand(recording, robot, correspondence_of(task), hand_led_of(task), rng, context=self.context)
 
