@@ -49,7 +49,7 @@ examples:
   sgimd demo                                         see it learn, in a minute or two
   sgimd run --algorithm sgim-d --seed 3              one run of 5000 movements, into runs/sgim-d/seed-003
   sgimd run --algorithm sgim-d --seed 3 --resume     after Ctrl-C or a power cut
-  sgimd run --environment mypackage.toss:make --algorithm practice     on a robot of your own
+  sgimd run --environment mypackage.toss:make        on a robot of your own
   sgimd check mypackage.toss:make                    what is wrong with it, if anything
   sgimd benchmark pool --out goals.npz               goals for it, where runs in pool have been
   sgimd demonstrations check shown.npz --task fishing-rod

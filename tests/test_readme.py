@@ -52,7 +52,7 @@ PAGES = [
 SMALLER = {
     "--movements 500": "--movements 60 --repeats 0",
     "--movements 800": "--movements 80",
-    "--movements 1000": "--movements 200",
+    "--movements 1000": "--movements 300",
     "--movements 2000": "--movements 110 --repeats 0",
     "--seeds 0-4": "--seeds 0",
     "--seeds 2000-2001": "--seeds 2000",

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from sgimd_torch.catalogue import checked
 from sgimd_torch.catalogue.options import given
@@ -96,9 +96,25 @@ def task_of(config: Config) -> Task:
     Raises:
         ValueError: it cannot be made, or is not an environment.
     """
+    found = _LOOKED_AT.pop(_place(config), None)
+    if found is not None:
+        return found
     part = part_of("environment", "environment", config["environment"])
     task = checked(part.kind, part.word, partial(part.make, **part.set_by(config.values)))()
     return task if isinstance(task, Task) else Task(task)
+
+
+def has_demonstrations(config: Config) -> bool:
+    """Whether its task comes with demonstrations. The next `task_of` gets the same task: some robots connect once."""
+    task = _LOOKED_AT[_place(config)] = task_of(config)
+    return task.demonstrations is not None
+
+
+_LOOKED_AT: Final[dict[str, Task]] = {}
+
+
+def _place(config: Config) -> str:
+    return str([(name, value) for name, value in config.values.items() if name.partition(".")[0] == "environment"])
 
 
 def _shown(config: Config) -> bool:

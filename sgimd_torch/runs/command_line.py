@@ -4,7 +4,7 @@ Examples:
   sgimd run --algorithm sgim-d --seed 3
   sgimd run --algorithm sgim-d --seed 3 --resume              after Ctrl-C, or with more --movements
   sgimd run --algorithm sagg-riac --goals grid --goals.window 12 --name grid --movements 2000
-  sgimd run --environment mypackage.toss:make --algorithm practice      on a robot of your own
+  sgimd run --environment mypackage.toss:make                 on a robot of your own
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ FLAGS: Final = {
     "resume": "go on with a stopped or killed run, or lengthen a finished one.",
     "accept_loss": "with --resume: go on even if the log has lost movements; a copy of it is kept.",
 }
+ALONE: Final = "practice"  # the default learner of a robot without demonstrations
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -57,8 +58,9 @@ def parse(argv: Sequence[str], description: str | None = None) -> tuple[Config, 
 
             print(overview(description, FLAGS))
             raise SystemExit(0)
-        words = {name: text for name, text in given.items() if name != "teachers"}
-        parts = chosen(given.get("algorithm", Config.algorithm), words)
+        if "algorithm" not in given:
+            given["algorithm"] = _suited(given)
+        parts = chosen(given["algorithm"], {name: text for name, text in given.items() if name != "teachers"})
         for name in given:
             if name not in RUN and name not in standards(parts):
                 raise refused(name, parts, (*RUN, *FLAGS))
@@ -101,6 +103,17 @@ def _read(argv: Sequence[str]) -> tuple[dict[str, str], set[str]]:
         else:
             raise ValueError(f"{word} needs a value")
     return given, asked
+
+
+def _suited(given: Mapping[str, str]) -> str:
+    """The default learner for a robot: one that is taught if there are demonstrations, else one that learns alone."""
+    robot = {name: text for name, text in given.items() if name.partition(".")[0] == "environment"}
+    if not robot or "demonstrations" in given:
+        return Config.algorithm
+    with loading():
+        from sgimd_torch.runs.build import has_demonstrations
+    config = Config(ALONE, parts=_values(robot, chosen(ALONE, robot)))
+    return Config.algorithm if has_demonstrations(config) else ALONE
 
 
 def _values(given: Mapping[str, str], parts: Mapping[str, Part]) -> dict[str, Any]:
