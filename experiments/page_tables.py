@@ -145,7 +145,7 @@ class Tables:
 
     def suite(self, at: int = 1000) -> str:
         """Errors over those of random movements on each task, then their interquartile mean over tasks."""
-        learners = ["practice", *(name for name in SUITED if name != RANDOM)]
+        learners = ["practice", *(name for name in SUITED if name not in (RANDOM, "practice-uniform", "cma-mae"))]
         every = (*SUITE, *SPARSE)
 
         def known(name: str) -> list[str]:
