@@ -169,10 +169,3 @@ def test_a_second_ctrl_c_ends_the_wait_for_a_teacher(mine):
     assert code == 130
     assert "Traceback" not in errors
     assert re.search(r"stopped after \d+ movements; to go on", errors)
-
-
-def test_no_time_to_answer_is_refused_on_the_command_line(mine, capsys):
-    options, directory = mine
-    assert command(main, [*options, "--patience", "0"]) == 2
-    assert "patience must be above 0 s" in capsys.readouterr().err
-    assert not directory.exists()

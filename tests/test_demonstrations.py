@@ -95,15 +95,6 @@ def test_a_file_that_cannot_be_right_is_refused_by_name(
     assert "bad.npz" in str(raised.value)
 
 
-def test_what_cannot_be_saved_leaves_nothing_behind(tmp_path: Path) -> None:
-    (tmp_path / "folder").mkdir()
-    with pytest.raises(IsADirectoryError, match="is a directory"):
-        save_demonstrations(tmp_path / "folder", some())
-    with pytest.raises(ValueError, match="no demonstration"):
-        save_demonstrations(tmp_path / "mine.npz", [])
-    assert [path.name for path in tmp_path.rglob("*")] == ["folder"]
-
-
 @pytest.mark.parametrize(
     ("robot", "message"),
     [({"n_joints": 7}, "6 joints, the robot has 7"), ({"outcome_dim": 3}, "outcome"), ({"context_dim": 1}, "context")],
@@ -111,14 +102,6 @@ def test_what_cannot_be_saved_leaves_nothing_behind(tmp_path: Path) -> None:
 def test_recordings_of_another_robot_are_refused(robot: dict[str, int], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         load_demonstrations(**robot)
-
-
-def test_recordings_of_whole_numbers_are_saved_as_floating_point_ones(tmp_path: Path) -> None:
-    whole = Demonstration(np.zeros(0, int), np.arange(3), np.arange(6).reshape(3, 2), np.array([1, 2]))
-    save_demonstrations(tmp_path / "whole.npz", [whole])
-    (loaded,) = load_demonstrations(tmp_path / "whole.npz")
-    assert loaded.trajectory.dtype == np.float64
-    assert loaded.trajectory.tolist() == [[0, 1], [2, 3], [4, 5]]
 
 
 def spoilt(name: str, value: Array) -> list[Demonstration]:

@@ -24,8 +24,7 @@ from sgimd_torch.runs.read import config_of, read_run
 from sgimd_torch.searches.cma_es import cma_es
 from sgimd_torch.searches.through_model import gradient_search
 from sgimd_torch.session import run
-from sgimd_torch.spaces import Demonstration, Move, stream
-from sgimd_torch.strategies import Babble
+from sgimd_torch.spaces import Demonstration, stream
 from sgimd_torch.teachers import PeriodicTeacher
 from worlds import ALGORITHMS, NO_CONTEXT, TAUGHT, demonstrate, demonstrations, last_posture
 
@@ -341,22 +340,3 @@ def test_a_correspondence_that_leaves_pi_is_refused_where_it_enters(name, theta_
         learner.watch(demonstrate(PlanarArm(4), [0.5, 0.5]))
     assert learner.idle
     assert len(learner.memory) == 0
-
-
-def test_a_strategy_without_a_builder_is_saved_too(tmp_path):
-    class Sweep:
-        def attempt(self, context):
-            for k in range(3):
-                yield Move(np.full(4, k / 10), None, "sweep")
-            yield None
-
-    whole, again = (Learner(Memory(0, 4, 2), Sweep()) for _ in range(2))
-    moves = [step(whole) for _ in range(6)]
-    assert [move is None for move in moves] == [False, False, False, True, False, False]
-    whole.save(tmp_path / "life.sqlite")
-    again.load(tmp_path / "life.sqlite")
-    assert again.movements == 6
-    assert step(again).theta[0] == step(whole).theta[0] == 0.2
-    other = Learner(Memory(0, 4, 2), Babble(ARM.policies, stream(0, "babble")))
-    with pytest.raises(ReplayError, match="movement 0 was recorded with another theta"):
-        other.load(tmp_path / "life.sqlite")

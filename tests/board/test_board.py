@@ -2,8 +2,6 @@
 
 import dataclasses
 import signal
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -226,14 +224,6 @@ def test_earlier_event_files_stay_until_the_replay_is_over(tmp_path):
     assert curves_of(tmp_path) == {"error/mean": {50: 3.0, 100: 4.0}}
     third.close()
     assert before.keys().isdisjoint(path.name for path in tmp_path.iterdir())  # else an open TensorBoard ignores it
-
-
-def test_a_run_that_is_not_watched_loads_no_tensorboard_and_nothing_else_that_takes_long_to_import():
-    program = "import sys, sgimd_torch.runs.run; assert not {'tensorboard', 'torch', 'scipy.stats'} & set(sys.modules)"
-    done = subprocess.run(
-        [sys.executable, "-c", f"import sys; sys.path[:0] = {sys.path!r}; {program}"], capture_output=True, text=True
-    )
-    assert done.returncode == 0, done.stderr
 
 
 OPTIONS = ("--movements", "160", "--evaluate_at", "60,120", "--board", "true")

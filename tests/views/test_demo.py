@@ -71,23 +71,6 @@ def test_a_second_start_uses_what_is_there_and_fewer_movements_are_refused(shown
     assert "Traceback" not in said
 
 
-@pytest.mark.parametrize(
-    ("more", "message"),
-    [
-        ("--seed -1", "seed must be"),
-        ("--movements 0", "movements must be"),
-        ("--evaluate_at []", "--evaluate-at"),
-        ("--environment planar-arm-7", "--environment cannot be given here"),
-        ("--algorithm x", "--algorithm cannot be given here"),
-    ],
-)
-def test_impossible_requests_are_refused_before_anything_is_written(tmp_path, monkeypatch, capsys, more, message):
-    monkeypatch.chdir(tmp_path)
-    assert command(main, more.split()) == 2
-    assert message in capsys.readouterr().err
-    assert not list(tmp_path.iterdir())
-
-
 def test_options_of_a_run_are_those_of_all_three():
     configs = configs_of(["--seed", "4", "--movements=70", "--environment.noise", "0"])
     assert [*configs] == [*LEARNERS]
