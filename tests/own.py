@@ -43,10 +43,6 @@ class WrongPicture(Slider):
     def record(self, context, theta, rng):
         return [0.0, 1.0]
 
-class FlatPicture(Slider):
-    def record(self, context, theta, rng):
-        return Sketch(np.zeros(1), 0.1, np.zeros((5, 2)))
-
 class StillPicture(Slider):
     def record(self, context, theta, rng):
         return Sketch(np.zeros(1), 0.1, np.zeros((5, 1, 2)))

@@ -2,7 +2,6 @@
 
 import re
 import signal
-import sys
 from threading import Event
 
 import pytest
@@ -126,14 +125,11 @@ def test_without_an_answer_in_time_the_learner_goes_on_alone():
 
 
 @pytest.fixture
-def mine(tmp_path, monkeypatch):
+def mine(module):
     """The options of a run with a teacher who gives three answers at first; its directory."""
-    (tmp_path / "mine.py").write_text(STUCK)
-    monkeypatch.chdir(tmp_path)
+    place = module("mine", STUCK)
     options = "--environment planar-arm-7 --algorithm sgim-im --evaluate-at [] --evaluated-by own"
-    yield [*options.split(), "--repeats", "0", "--out", str(tmp_path)], tmp_path / "sgim-im" / "seed-000"
-    sys.path[:] = [place for place in sys.path if place != str(tmp_path)]
-    sys.modules.pop("mine", None)
+    return [*options.split(), "--repeats", "0", "--out", str(place)], place / "sgim-im" / "seed-000"
 
 
 def test_a_resumed_run_agrees_on_who_was_given_up_and_asks_only_what_is_new(mine, tmp_path):

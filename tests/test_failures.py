@@ -1,7 +1,6 @@
 """A movement may fail: it is counted and recorded, nothing is remembered of it, and the learner goes on."""
 
 import signal
-import sys
 from itertools import pairwise
 from pathlib import Path
 
@@ -211,12 +210,8 @@ def broken(): return task(Broken)
 
 
 @pytest.fixture
-def robots(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    (tmp_path / "lossy_robots.py").write_text(MODULE)
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.delitem(sys.modules, "lossy_robots", raising=False)
-    return tmp_path
+def robots(module) -> Path:
+    return module("lossy_robots", MODULE)
 
 
 def words(name: str, *more: str) -> list[str]:

@@ -2,7 +2,6 @@
 
 import json
 import re
-import sys
 
 import numpy as np
 import pyarrow as pa
@@ -249,13 +248,10 @@ ROD = 'import numpy as np\nfrom sgimd_torch import GaussianPrimitive, PlanarArm,
 
 
 @pytest.fixture
-def slow(tmp_path, monkeypatch):
+def slow(module):
     """A robot with ranges and durations, in the working directory."""
-    write(tmp_path / "my_slow.py", ROD)
-    monkeypatch.chdir(tmp_path)
-    yield "my_slow:Slow"
-    sys.path[:] = [place for place in sys.path if place != str(tmp_path)]
-    sys.modules.pop("my_slow", None)
+    module("my_slow", ROD)
+    return "my_slow:Slow"
 
 
 def test_what_lies_outside_the_limits_of_speed_and_range_is_remarked(slow, tmp_path, capsys):

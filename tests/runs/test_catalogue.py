@@ -65,14 +65,9 @@ SHORT = ("--movements", "40", "--evaluate-at", "20", "--repeats", "2", "--invers
 
 
 @pytest.fixture
-def toss(tmp_path, monkeypatch):
+def toss(module):
     """A module of the user's, in the working directory."""
-    (tmp_path / "toss.py").write_text(TOSS)
-    sys.modules.pop("toss", None)
-    monkeypatch.chdir(tmp_path)
-    yield tmp_path
-    sys.path[:] = [place for place in sys.path if place != str(tmp_path)]
-    sys.modules.pop("toss", None)
+    return module("toss", TOSS)
 
 
 @pytest.mark.parametrize(("kind", "word", "entry"), ENTRIES, ids=lambda each: each if isinstance(each, str) else "")

@@ -9,7 +9,6 @@ import re
 import shutil
 import signal
 from concurrent.futures import Future
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -125,30 +124,6 @@ def test_every_run_is_what_it_would_be_alone_and_a_second_start_does_nothing(tmp
         assert [Path(line.partition(":")[0]).name for line in lines] == ["seed-001"] * left
 
 
-@pytest.fixture(scope="module")
-def whole(tmp_path_factory):
-    """A finished run."""
-    config = short(tmp_path_factory.mktemp("whole"))
-    assert sweep_here([config]) == []
-    return config
-
-
-@pytest.fixture
-def copied(whole, tmp_path):
-    shutil.copytree(whole.out, tmp_path, dirs_exist_ok=True)
-    return short(tmp_path)
-
-
-def test_a_run_is_finished_when_it_has_all_movements_and_evaluations_with_these_options(copied):
-    assert finished(copied)
-    assert movements_on_disk(copied.directory) == 40
-    assert movements_on_disk(copied.directory / "nowhere") == 0
-    out = copied.out
-    for changes in ({"movements": 50}, {"inverse": "nearest"}, {"seed": 1}, {"floor_at": ()}, {"repeats": 2}):
-        assert not finished(short(out, **changes)), changes
-    assert not finished(replace(copied, evaluate_at=(30,)))
-
-
 def test_a_file_of_goals_that_has_changed_makes_a_run_unfinished(benchmark, tmp_path, go):
     goals = tmp_path / "goals.npz"
     shutil.copy(benchmark, goals)
@@ -166,7 +141,7 @@ def ended(error=None):
     return future
 
 
-def test_failures_are_named_in_the_order_of_the_list_and_the_others_go_on(whole, tmp_path):
+def test_failures_are_named_in_the_order_of_the_list_and_the_others_go_on(tmp_path):
     errors = {1: ValueError("refused"), 3: Failed("broke"), 4: OSError("no disk")}
     configs, ended_well = [short(tmp_path, seed=seed) for seed in range(5)], []
 
@@ -254,21 +229,6 @@ def test_stopped_it_stops_its_runs_and_goes_on_as_if_nothing_had_happened(
     assert not (tmp_path / "random/seed-001").exists()
     said_by(begun(SWEEP, *options), 0)
     assert as_alone(odd, tmp_path, (0, 1))
-
-
-def test_a_run_that_another_process_writes_is_named_and_the_same_command_takes_it_up(odd, begun, tmp_path):
-    alone = (
-        "import sys; from sgimd_torch.runs import command_line, process; sys.exit(process.command(command_line.main))"
-    )
-    other = begun(alone, at_20="stands still")
-    os.waitpid(other.pid, os.WUNTRACED)
-    said = said_by(begun(SWEEP, "--seeds", "0"), 1)
-    assert re.search("random seed 0 failed: .*in use by another process", said)
-    os.kill(other.pid, signal.SIGTERM)
-    os.kill(other.pid, signal.SIGCONT)
-    said_by(other, 143)
-    said_by(begun(SWEEP, "--seeds", "0"), 0)
-    assert as_alone(odd, tmp_path, (0,))
 
 
 def test_no_library_for_figures_or_learning_is_loaded_to_watch_processes(tmp_path):

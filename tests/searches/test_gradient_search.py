@@ -12,24 +12,15 @@ from sgimd_torch.forward_model.anchored import Anchored, Trust
 from sgimd_torch.forward_model.model import ForwardModel
 from sgimd_torch.inverses.local import NearestNeighbour
 from sgimd_torch.inverses.locally_linear import LocallyLinear
-from sgimd_torch.memory import Memory
 from sgimd_torch.searches.simplex import limit, nelder_mead
 from sgimd_torch.searches.through_model import descend, gauss_newton, gradient_search
 from sgimd_torch.spaces import Box, stream
+from worlds import NO_CONTEXT, executed
 
-NO_CONTEXT = np.zeros(0)
 ARM = PlanarArm(7)
 EXACT = Trust(share=0.0)  # as this arm is
 FINE = partial(descend, steps=20, step=0.005)
 UNTRAINED = ForwardModel(0, 7, 2)
-
-
-def executed(arm, thetas):
-    memory, rng = Memory(arm.contexts.dim, arm.policies.dim, 2), stream(0, "exemplars")
-    for theta in thetas:
-        context = arm.observe(rng)
-        memory.add(context, theta, arm.execute(context, theta, rng))
-    return memory
 
 
 @pytest.fixture(scope="module")

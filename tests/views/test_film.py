@@ -356,7 +356,6 @@ def test_the_check_of_an_environment_looks_at_its_picture(own, capsys, word, cod
     [
         ("sliders:NoPicture", "sliders:NoPicture, which cannot be filmed: it brings no picture of its movements, a "),
         ("sliders:WrongPicture", "WrongPicture must give a Sketch with an outcome of 1 dimension, got list"),
-        ("sliders:FlatPicture", "chains of a Sketch must be finite numbers (n_steps, n_points, 2), got shape (5, 2)"),
     ],
 )
 def test_what_has_no_picture_is_refused_in_a_line(own, capsys, word, message):
