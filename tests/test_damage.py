@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from records import fill, read
-from runs import MOVEMENTS, content_of, edit
+from runs import MOVEMENTS, edit
 from sgimd_torch.record import Record, RunError, layout
-from sgimd_torch.runs.directory import FILE
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.spaces import stream
 
@@ -128,20 +127,6 @@ def test_no_damage_reads_as_something_else(tmp_path, two, what):
 
 
 # Runs with rows in every table: with contexts, a model, and teachers who are asked.
-@pytest.mark.parametrize("what", DAMAGES)
-def test_a_damaged_run_of_the_rod_is_refused_or_goes_on_to_the_same_record(
-    tmp_path, go, undisturbed, reference, what, capsys
-):
-    path = tmp_path / "sgim-d/seed-003" / FILE
-    path.parent.mkdir(parents=True)
-    damaged(path, undisturbed / FILE, undisturbed / FILE, what, 1)
-    code = go(tmp_path, "--resume")
-    assert code in (0, 2), capsys.readouterr().err
-    assert "Traceback" not in capsys.readouterr().err
-    if code == 0:
-        assert content_of(path.parent) == reference
-
-
 def test_the_file_of_another_seed_is_told_by_its_folder(tmp_path, go, undisturbed, capsys):
     path = tmp_path / "sgim-d/seed-004"
     shutil.copytree(undisturbed, path)

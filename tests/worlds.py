@@ -1,6 +1,7 @@
 """What the tests of the learning side share: a planar arm, demonstrations on it, and the five learners of the paper."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Generator, Sequence
+from typing import TypeVar
 
 import numpy as np
 
@@ -33,6 +34,22 @@ def demonstrations(arm: PlanarArm, n: int = 20, seed: int = 0) -> list[Demonstra
     turns = rng.uniform(-np.pi, np.pi, n)
     goals = radii[:, None] * np.stack([np.cos(turns), np.sin(turns)], axis=1)
     return [demonstrate(arm, goal) for goal in goals]
+
+
+Sent = TypeVar("Sent")
+
+
+def drive(search: Generator[Array, Sent, None], execute: Callable[[Array], Sent], n: int = 10_000) -> list[Array]:
+    """The first ``n`` thetas that a search executes."""
+    thetas: list[Array] = []
+    try:
+        theta = next(search)
+        while len(thetas) < n:
+            thetas.append(theta.copy())
+            theta = search.send(execute(theta))
+    except StopIteration:
+        pass
+    return thetas
 
 
 def remember(thetas: Array, outcomes: Array, contexts: Array | None = None) -> Memory:

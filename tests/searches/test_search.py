@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Generator
 from functools import partial
-from typing import TypeVar
 
 import numpy as np
 import pytest
@@ -11,27 +10,12 @@ from scipy.optimize import minimize, rosen
 from sgimd_torch.searches.perturb import perturb, practise
 from sgimd_torch.searches.simplex import limit, nelder_mead, simplex_descent
 from sgimd_torch.spaces import Array, Box, Estimate, Search, stream
+from worlds import drive
 
 
 def rough(x: Array) -> float:
     """A bowl full of pits, where simplices shrink."""
     return float((x**2).sum() + 0.3 * np.abs(np.sin(40 * x)).sum())
-
-
-Sent = TypeVar("Sent")
-
-
-def drive(search: Generator[Array, Sent, None], execute: Callable[[Array], Sent], n: int = 10_000) -> list[Array]:
-    """The first ``n`` thetas that a search executes."""
-    thetas: list[Array] = []
-    try:
-        theta = next(search)
-        while len(thetas) < n:
-            thetas.append(theta.copy())
-            theta = search.send(execute(theta))
-    except StopIteration:
-        pass
-    return thetas
 
 
 @pytest.mark.parametrize("adaptive", [False, True])
