@@ -8,16 +8,14 @@ import pytest
 
 import sgimd_torch.teachers.awaited
 from runs import LIVE, end, stopped
-from sgimd_torch.algorithms.asking import sgim_im
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
-from sgimd_torch.session import run
 from sgimd_torch.spaces import stream
 from sgimd_torch.teachers.answering import AnsweringTeacher
 from sgimd_torch.teachers.awaited import Awaited
-from worlds import NO_CONTEXT, demonstrations, last_posture
+from worlds import NO_CONTEXT, demonstrations
 
 ARM = PlanarArm(4, noise=0.02)
 SHOWN = demonstrations(PlanarArm(4))
@@ -111,17 +109,6 @@ def test_a_teacher_has_one_request_at_a_time_and_never_sees_one_that_was_given_u
 def test_no_patience_at_all_is_refused(patience):
     with pytest.raises(ValueError, match="patience must be above 0 s, got"):
         awaited(Slow(), patience=patience)
-
-
-def test_without_an_answer_in_time_the_learner_goes_on_alone():
-    slow = Slow()
-    teachers = {"ann": awaited(slow, patience=0.01)}
-    learner = sgim_im(ARM, 0, correspondence=last_posture, teachers=teachers)
-    with pytest.warns(RuntimeWarning, match=r"teacher ann did not answer in time, .*: it took longer than 0\.01 s"):
-        episodes = list(run(learner, ARM, 0, movements=20, teachers=teachers))
-    slow.let.set()
-    assert {e.reply for e in episodes} == {"", "timed out"}
-    assert all(e.move is not None and e.move.origin != "imitate" for e in episodes)
 
 
 @pytest.fixture

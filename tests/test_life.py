@@ -189,10 +189,6 @@ def saved(tmp_path):
             lambda: Learner(Memory(0, 4, 2), ALGORITHMS["observation"](ARM, 6).autonomous),
             "movement 0 was recorded as a movement, the learner now rests",
         ),
-        (
-            lambda: sgim_d(ARM, 6, correspondence=last_posture, memory=exemplars(3)),
-            r"life\.sqlite began with 0 exemplars in memory, this learner with 3",
-        ),
     ],
 )
 def test_a_learner_that_would_have_moved_otherwise_is_refused(saved, learner, message):

@@ -47,12 +47,6 @@ def test_the_simplex_visits_the_same_points_as_scipy(
     assert len(ours) > 20
 
 
-def test_on_a_plateau_the_simplex_contracts_inside_and_then_shrinks_to_its_first_vertex() -> None:
-    descent = simplex_descent(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), np.ones(3))
-    points = drive(descent, lambda x: 1.0, 4)
-    assert np.array_equal(points, [[1.0, -1.0], [0.25, 0.5], [0.5, 0.0], [0.0, 0.5]])
-
-
 def test_the_simplex_changes_neither_its_arguments_nor_what_it_has_proposed() -> None:
     simplex, values = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), np.array([0.0, 1.0, 1.0])
     before = simplex.copy(), values.copy()
@@ -104,13 +98,6 @@ def reflection(world: World, vertices: Array) -> Array:
     """The worst vertex mirrored at the mean of the others."""
     order = np.argsort([world.distance(vertex) for vertex in vertices])
     return 2 * vertices[order[:-1]].mean(axis=0) - vertices[order[-1]]
-
-
-def test_with_enough_neighbours_the_first_reflection_is_the_second_movement() -> None:
-    world = World(dim=6, k=6)
-    executed = world.run(simplex_search(world.policies, rng()), n=2)
-    assert np.array_equal(executed[0], world.theta)
-    assert executed[1] == pytest.approx(reflection(world, np.vstack((world.theta, world.thetas))))
 
 
 def test_remembered_outcomes_are_used_as_they_are_and_not_executed_again() -> None:
