@@ -117,10 +117,12 @@ def test_a_file_that_sqlite_has_written_anew_is_the_same_record(tmp_path, two):
     assert unnoticed(tmp_path / "run.sqlite", read(two[0]))
 
 
+@pytest.mark.parametrize("n", [6, pytest.param(50, marks=pytest.mark.slow)])  # the slow ones are 1,000 in all
 @pytest.mark.parametrize("what", DAMAGES)
-def test_no_damage_reads_as_something_else(tmp_path, two, what):
+def test_no_damage_reads_as_something_else(tmp_path, two, what, n):
     content = read(two[0])
-    for k in range(6):
+    assert all(content.values())
+    for k in range(n):
         damaged(tmp_path / "run.sqlite", *two, what, k)
         found = unnoticed(tmp_path / "run.sqlite", content)
         assert found is None or what not in TOLD_ALWAYS
