@@ -44,10 +44,24 @@ def reference(undisturbed):
 
 
 @pytest.fixture
-def own(tmp_path, monkeypatch):
-    """Environments of a user's own, the module ``sliders`` of the working directory, which is ``tmp_path``."""
-    (tmp_path / "sliders.py").write_text(MODULE)
+def module(tmp_path, monkeypatch):
+    """Writes a module of a user's own into the working directory, which is ``tmp_path``; forgotten afterwards."""
     monkeypatch.chdir(tmp_path)
-    yield tmp_path
+    names = []
+
+    def write(name, text):
+        (tmp_path / f"{name}.py").write_text(text)
+        sys.modules.pop(name, None)
+        names.append(name)
+        return tmp_path
+
+    yield write
     sys.path[:] = [place for place in sys.path if place != str(tmp_path)]
-    sys.modules.pop("sliders", None)
+    for name in names:
+        sys.modules.pop(name, None)
+
+
+@pytest.fixture
+def own(module):
+    """Environments of a user's own, the module ``sliders``; returns the working directory."""
+    return module("sliders", MODULE)

@@ -35,7 +35,6 @@ def kill_the_task_once():
 WAYS = {
     "": lambda: None,
     "dies": lambda: os.kill(os.getpid(), signal.SIGKILL),
-    "stands still": lambda: os.kill(os.getpid(), signal.SIGSTOP),
     "stops the sweep": stop_the_sweep,
     "stops the sweep far away": stop_the_sweep_far_away,
     "kills the task once": kill_the_task_once,

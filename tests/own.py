@@ -33,9 +33,6 @@ class Slider2(Slider):
 class Slider3(Slider):
     dim = 3
 
-class Slider6(Slider):
-    dim = 6
-
 class Shifted(Slider2):
     context_dim = 2
 
@@ -46,10 +43,6 @@ class WrongPicture(Slider):
     def record(self, context, theta, rng):
         return [0.0, 1.0]
 
-class FlatPicture(Slider):
-    def record(self, context, theta, rng):
-        return Sketch(np.zeros(1), 0.1, np.zeros((5, 2)))
-
 class StillPicture(Slider):
     def record(self, context, theta, rng):
         return Sketch(np.zeros(1), 0.1, np.zeros((5, 1, 2)))
@@ -57,19 +50,6 @@ class StillPicture(Slider):
 class OtherPicture(Slider):
     def record(self, context, theta, rng):
         return Sketch(np.zeros(2), 0.1, np.zeros((5, 1, 2)))
-
-class LostConnection(Slider):
-    left = 10
-
-    def execute(self, context, theta, rng):
-        self.left -= 1
-        if not self.left:
-            raise ConnectionResetError("the robot closed the connection")
-        return super().execute(context, theta, rng)
-
-class Steps(Slider):
-    def execute(self, context, theta, rng):
-        return np.rint(2 * super().execute(context, theta, rng)).astype(int)
 
 class LostPicture(Slider):
     def record(self, context, theta, rng):

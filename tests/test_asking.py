@@ -9,6 +9,7 @@ from sgimd_torch.algorithms import sagg_riac
 from sgimd_torch.algorithms.asking import searched, sgim_acts, sgim_im
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.learner import ReplayError
+from sgimd_torch.rivals.entropy import sgim_eer
 from sgimd_torch.runs.tasks.robots import arm_demonstrations
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Demonstration, Lesson, Request, stream
@@ -94,12 +95,18 @@ def test_it_asks_both_teachers_for_goals_and_uses_the_answers_in_both_ways():
     assert np.array_equal(imitated.move.theta, imitated.demonstration.trajectory[-1])
 
 
-@pytest.mark.parametrize("arm", [ARM, TURNED], ids=["no context", "context"])
-def test_a_life_that_asked_goes_on_as_if_it_had_never_stopped_without_asking_again(arm, tmp_path):
+def by_entropy(arm, seed, teachers):
+    return sgim_eer(arm, seed, correspondence=last_posture, teachers={"low": teachers["low"]})
+
+
+@pytest.mark.parametrize(
+    ("arm", "make"), [(ARM, acts), (TURNED, acts), (ARM, by_entropy)], ids=["no context", "context", "by entropy"]
+)
+def test_a_life_that_asked_goes_on_as_if_it_had_never_stopped_without_asking_again(arm, make, tmp_path):
     context = np.zeros(arm.contexts.dim)
     shown = [demonstrate(arm, each.outcome, context) for each in SHOWN]
     teachers = halves(shown=shown, takes=3)
-    whole, episodes = acts(arm, 1, teachers), []
+    whole, episodes = make(arm, 1, teachers), []
     for episode in run(whole, arm, 1, movements=140, teachers=teachers):
         episodes.append(episode)
         if episode.index in (0, 13, 40, 77, 99):
@@ -107,7 +114,7 @@ def test_a_life_that_asked_goes_on_as_if_it_had_never_stopped_without_asking_aga
     assert any(e.request for e in episodes[:78])
     assert any(e.move is None for e in episodes)
     for last in (0, 13, 40, 77, 99):
-        again = acts(arm, 1, teachers)
+        again = make(arm, 1, teachers)
         again.load(tmp_path / f"{last}.npz")  # the teachers' answers are in the file
         rest = live(again, teachers, 140, arm, 1)
         assert lines(rest) == lines(episodes[last + 1 :])

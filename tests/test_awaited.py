@@ -2,23 +2,20 @@
 
 import re
 import signal
-import sys
 from threading import Event
 
 import pytest
 
 import sgimd_torch.teachers.awaited
 from runs import LIVE, end, stopped
-from sgimd_torch.algorithms.asking import sgim_im
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
-from sgimd_torch.session import run
 from sgimd_torch.spaces import stream
 from sgimd_torch.teachers.answering import AnsweringTeacher
 from sgimd_torch.teachers.awaited import Awaited
-from worlds import NO_CONTEXT, demonstrations, last_posture
+from worlds import NO_CONTEXT, demonstrations
 
 ARM = PlanarArm(4, noise=0.02)
 SHOWN = demonstrations(PlanarArm(4))
@@ -114,26 +111,12 @@ def test_no_patience_at_all_is_refused(patience):
         awaited(Slow(), patience=patience)
 
 
-def test_without_an_answer_in_time_the_learner_goes_on_alone():
-    slow = Slow()
-    teachers = {"ann": awaited(slow, patience=0.01)}
-    learner = sgim_im(ARM, 0, correspondence=last_posture, teachers=teachers)
-    with pytest.warns(RuntimeWarning, match=r"teacher ann did not answer in time, .*: it took longer than 0\.01 s"):
-        episodes = list(run(learner, ARM, 0, movements=20, teachers=teachers))
-    slow.let.set()
-    assert {e.reply for e in episodes} == {"", "timed out"}
-    assert all(e.move is not None and e.move.origin != "imitate" for e in episodes)
-
-
 @pytest.fixture
-def mine(tmp_path, monkeypatch):
+def mine(module):
     """The options of a run with a teacher who gives three answers at first; its directory."""
-    (tmp_path / "mine.py").write_text(STUCK)
-    monkeypatch.chdir(tmp_path)
+    place = module("mine", STUCK)
     options = "--environment planar-arm-7 --algorithm sgim-im --evaluate-at [] --evaluated-by own"
-    yield [*options.split(), "--repeats", "0", "--out", str(tmp_path)], tmp_path / "sgim-im" / "seed-000"
-    sys.path[:] = [place for place in sys.path if place != str(tmp_path)]
-    sys.modules.pop("mine", None)
+    return [*options.split(), "--repeats", "0", "--out", str(place)], place / "sgim-im" / "seed-000"
 
 
 def test_a_resumed_run_agrees_on_who_was_given_up_and_asks_only_what_is_new(mine, tmp_path):
@@ -169,10 +152,3 @@ def test_a_second_ctrl_c_ends_the_wait_for_a_teacher(mine):
     assert code == 130
     assert "Traceback" not in errors
     assert re.search(r"stopped after \d+ movements; to go on", errors)
-
-
-def test_no_time_to_answer_is_refused_on_the_command_line(mine, capsys):
-    options, directory = mine
-    assert command(main, [*options, "--patience", "0"]) == 2
-    assert "patience must be above 0 s" in capsys.readouterr().err
-    assert not directory.exists()

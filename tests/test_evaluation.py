@@ -134,18 +134,6 @@ def test_a_count_out_of_its_range_is_refused(counts: dict[str, int]) -> None:
         evaluate(perfect(arm), arm, np.array([[0.5, 0.5]]), **{"seed": 0, "step": 0} | counts)
 
 
-def test_bias_raises_the_error_and_leaves_the_noise_floor() -> None:
-    arm = PlanarArm(5, noise=0.001)
-    goals = np.tile([0.0, 0.5], (50, 1))
-
-    def biased(context: Array, goal: Array) -> Estimate:
-        return perfect(arm)(context, goal + np.array([0.3, 0.0]))
-
-    evaluation = evaluate(biased, arm, goals, 0, 0, repeats=10)
-    assert evaluation.mean_error == pytest.approx(0.3, abs=0.01)
-    assert evaluation.noise_floor < 0.01
-
-
 def test_the_same_streams_give_the_same_and_every_evaluation_of_a_run_has_its_own() -> None:
     arm, goals = PlanarArm(5, noise=0.05), np.array([[0.5, 0.5], [-0.3, 0.2]])
 

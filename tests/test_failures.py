@@ -1,7 +1,6 @@
 """A movement may fail: it is counted and recorded, nothing is remembered of it, and the learner goes on."""
 
 import signal
-import sys
 from itertools import pairwise
 from pathlib import Path
 
@@ -144,17 +143,6 @@ def test_a_life_with_failures_goes_on_from_its_record_as_if_it_had_never_stopped
         assert {event.reply for event in one.events() if event.kind == Kind.FAILED} == {"ConnectionError: lost"}
 
 
-def test_a_saved_life_keeps_its_failures(tmp_path: Path) -> None:
-    learner, _ = failing_life(tmp_path / "run", 100)
-    learner.save(tmp_path / "life")
-    arm = PlanarArm(5, noise=0.01)
-    for path in (tmp_path / "life", tmp_path / "run"):
-        loaded = sgim_d(arm, 0, correspondence=arm.correspondence)
-        loaded.load(path)
-        assert loaded.movements == 100
-        assert loaded.memory.outcomes.tobytes() == learner.memory.outcomes.tobytes()
-
-
 @pytest.mark.parametrize("together", [False, True])
 def test_a_failed_answer_misses_its_goal_as_if_the_robot_had_not_moved(together: bool) -> None:
     arm = PlanarArm(5)
@@ -211,12 +199,8 @@ def broken(): return task(Broken)
 
 
 @pytest.fixture
-def robots(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    (tmp_path / "lossy_robots.py").write_text(MODULE)
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.delitem(sys.modules, "lossy_robots", raising=False)
-    return tmp_path
+def robots(module) -> Path:
+    return module("lossy_robots", MODULE)
 
 
 def words(name: str, *more: str) -> list[str]:

@@ -8,7 +8,7 @@ from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.learner import Learner
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, Attempt, Demonstration, Move, stream
-from sgimd_torch.strategies import Imitate, Remember, Rest
+from sgimd_torch.strategies import Imitate, Rest
 from worlds import NO_CONTEXT, demonstrate, last_posture
 
 ARM = PlanarArm(4)
@@ -130,16 +130,6 @@ def test_a_demonstration_interrupts_a_search_after_any_movement() -> None:
         assert len(robot.memory) == n + 1
 
 
-def test_after_the_imitation_the_learner_is_on_its_own_again_with_a_new_attempt() -> None:
-    pursuit = Pursuit(n=3)
-    robot = learner(pursuit, repeats=2)
-    step(robot)
-    robot.watch(LESSON)
-    origins = [step(robot).origin for _ in range(4)]
-    assert origins == ["imitate", "imitate", "pursuit", "pursuit"]
-    assert robot.memory.thetas[-2:, 0].tolist() == [0.0, 0.1]
-
-
 def test_a_demonstration_interrupts_the_imitation_of_the_one_before() -> None:
     robot = learner(Pursuit(), repeats=None)
     robot.watch(LESSON)
@@ -149,18 +139,6 @@ def test_a_demonstration_interrupts_the_imitation_of_the_one_before() -> None:
     moves = [step(robot) for _ in range(5)]
     assert all(np.array_equal(move.goal, SECOND.outcome) for move in moves)
     assert np.array_equal(moves[0].theta, SECOND.trajectory[-1])
-
-
-def test_a_demonstration_is_not_remembered_unless_the_strategy_does() -> None:
-    robot = learner(Pursuit())
-    robot.watch(LESSON)
-    assert len(robot.memory) == 0
-    memory = Memory(0, 4, 2)
-    observer = Learner(memory, Rest(), social=Remember(memory), correspondence=last_posture)
-    observer.watch(LESSON)
-    assert observer.memory.outcomes.tolist() == [LESSON.outcome.tolist()]
-    assert observer.idle
-    assert observer.ask(NO_CONTEXT) is None
 
 
 def test_after_resting_there_is_nothing_to_tell_and_the_next_ask_may_follow() -> None:
@@ -208,12 +186,6 @@ def test_an_interrupted_learner_forgets_what_it_asked_for_and_begins_again() -> 
     assert len(robot.memory) == 2
 
 
-@pytest.mark.parametrize("context", [[0.0, 0.0], [np.nan], 0.0, "north"])
-def test_a_context_of_another_kind_is_refused(context: object) -> None:
-    with pytest.raises(ValueError, match="context"):
-        learner(Pursuit(), context_dim=1).ask(context)
-
-
 def test_a_demonstration_that_does_not_fit_is_refused_and_interrupts_nothing() -> None:
     pursuit = Pursuit()
     robot = learner(pursuit)
@@ -231,11 +203,6 @@ def test_a_demonstration_that_does_not_fit_is_refused_and_interrupts_nothing() -
     assert step(robot).theta[0] == 0.1
 
 
-def test_a_learner_without_a_social_strategy_cannot_be_taught() -> None:
-    with pytest.raises(RuntimeError, match="social"):
-        Learner(Memory(0, 4, 2), Pursuit()).watch(LESSON)
-
-
 def test_a_social_strategy_without_a_correspondence_is_refused() -> None:
     with pytest.raises(ValueError, match="correspondence"):
         Learner(Memory(0, 4, 2), Pursuit(), social=Imitate(ARM.policies, stream(0, "imitate")))
@@ -244,17 +211,6 @@ def test_a_social_strategy_without_a_correspondence_is_refused() -> None:
 def test_a_strategy_without_any_movement_is_an_error_not_an_endless_loop() -> None:
     with pytest.raises(RuntimeError, match="yield"):
         learner(Pursuit(n=0)).ask(NO_CONTEXT)
-
-
-def test_a_context_is_kept_as_it_was_asked_with() -> None:
-    arm = PlanarArm(4, context=True)
-    learner = sagg_riac(arm, 0)
-    context = np.array([0.1])
-    move = learner.ask(context)
-    context[0] = 0.3
-    assert move is not None
-    learner.tell(arm.rest)
-    assert learner.memory.contexts.tolist() == [[0.1]]
 
 
 def test_there_is_no_context_to_keep_while_nothing_is_under_way() -> None:
@@ -290,13 +246,3 @@ def test_what_the_learner_hands_out_is_read_only() -> None:
 def test_a_context_of_another_shape_or_kind_is_refused(context: object) -> None:
     with pytest.raises(ValueError, match=r"context must .*got"):
         learner(Pursuit(), context_dim=1).ask(context)
-
-
-def test_a_correspondence_to_another_robots_policies_is_refused_and_interrupts_nothing() -> None:
-    pursuit = Pursuit()
-    imitate = Imitate(ARM.policies, stream(0, "imitate"))
-    robot = Learner(Memory(0, 4, 2), pursuit, social=imitate, correspondence=lambda times, trajectory: np.zeros(5))
-    step(robot)
-    with pytest.raises(ValueError, match=r"theta_d of the correspondence must have shape \(..., 4\), got \(5,\)"):
-        robot.watch(LESSON)
-    assert pursuit.n_ended == 0

@@ -126,24 +126,3 @@ def test_a_benchmark_that_cannot_be_is_refused_in_few_words(tmp_path, changes, w
     with pytest.raises(ValueError, match=rf"goals\.npz: .*{words}") as raised:
         load_benchmark(path)
     assert len(str(raised.value)) < 400
-
-
-def recordings(**changes):
-    """The arrays of two recordings of 2 and 3 samples, as in their file."""
-    arrays = {"lengths": np.array([2, 3]), "times": np.array([0, 0.1, 0, 0.1, 0.2]), "trajectories": np.zeros((5, 1))}
-    return {**arrays, "outcomes": np.zeros((2, 2)), "contexts": np.zeros((2, 0)), **changes}
-
-
-def test_lengths_whose_sum_overflows_are_refused(tmp_path):
-    lengths = np.array([2**62, 2**62, 2**62, 2**62 + 5])
-    assert lengths.sum() == 5
-    write_npz(tmp_path / "long.npz", recordings(lengths=lengths, outcomes=np.zeros((4, 2)), contexts=np.zeros((4, 0))))
-    with pytest.raises(ValueError, match=r"long\.npz: lengths"):
-        load_demonstrations(tmp_path / "long.npz")
-
-
-def test_recordings_of_another_precision_are_given_as_float64(tmp_path):
-    path = tmp_path / "single.npz"
-    write_npz(path, recordings(trajectories=np.ones((5, 1), dtype=np.float32), outcomes=np.ones((2, 2), dtype=">f8")))
-    for recording in load_demonstrations(path):
-        assert recording.trajectory.dtype == recording.outcome.dtype == np.float64

@@ -5,16 +5,7 @@ import pytest
 
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, stream
-
-NO_CONTEXT = np.zeros(0)
-
-
-def remember(thetas: Array, outcomes: Array, contexts: Array | None = None) -> Memory:
-    contexts = np.zeros((len(thetas), 0)) if contexts is None else contexts
-    memory = Memory(contexts.shape[1], thetas.shape[1], outcomes.shape[1])
-    for exemplar in zip(contexts, thetas, outcomes, strict=True):
-        memory.add(*exemplar)
-    return memory
+from worlds import NO_CONTEXT, remember
 
 
 def nearest(points: Array, query: Array | float, k: int, within: float = np.inf) -> list[int]:

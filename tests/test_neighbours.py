@@ -68,14 +68,6 @@ def test_what_is_proposed_is_nearest_and_the_rest_lies_beyond_while_the_table_gr
         assert beyond == pytest.approx(np.square(rows[expected[-1]] - query).sum(), rel=1e-5)
 
 
-def test_policies_are_compared_with_all_up_to_the_stated_number() -> None:
-    rows = structured(EXACT_UP_TO, 5)
-    side = PolicyNeighbours(table(rows))
-    queries = rows[:: EXACT_UP_TO // 20]
-    for query, found in zip(queries, side.nearest(queries, 10), strict=True):
-        assert found.tolist() == nearest(rows, query, 10)
-
-
 def test_above_it_nearly_all_are_found_nearest_first_and_within_the_radius() -> None:
     rows = structured(3 * EXACT_UP_TO, 10)
     side = PolicyNeighbours(table(rows))

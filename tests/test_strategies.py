@@ -260,13 +260,6 @@ def test_imitation_is_exact_first_and_then_varied_by_less_than_epsilon() -> None
     assert (variations.max(axis=0) > 0.04).all()
 
 
-def test_imitation_of_a_policy_on_the_border_is_clipped_to_the_policy_space() -> None:
-    imitate = Imitate(ARM.policies, stream(0, "imitate"), repeats=50, epsilon=0.05)
-    thetas = np.array([move.theta for move in live(imitate.attempt(NO_CONTEXT, np.array([0, 1, 0, 1, 0.5]), LESSON))])
-    assert ARM.policies.contains(thetas).all()
-    assert (thetas[:, :4] == [0, 1, 0, 1]).mean() == pytest.approx(0.5, abs=0.2)  # half of the variations lead outside
-
-
 def test_a_demonstrated_outcome_becomes_a_goal_of_the_social_strategy_after_its_imitation() -> None:
     goals = Diary()
     live(imitation(goals, repeats=3).attempt(NO_CONTEXT, THETA_D, LESSON))

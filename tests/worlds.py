@@ -1,12 +1,14 @@
 """What the tests of the learning side share: a planar arm, demonstrations on it, and the five learners of the paper."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Generator, Sequence
+from typing import TypeVar
 
 import numpy as np
 
 from sgimd_torch.algorithms import imitation, observation, random_exploration, sagg_riac, sgim_d
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.learner import Learner
+from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, Demonstration, stream
 
 NO_CONTEXT = np.zeros(0)
@@ -32,6 +34,40 @@ def demonstrations(arm: PlanarArm, n: int = 20, seed: int = 0) -> list[Demonstra
     turns = rng.uniform(-np.pi, np.pi, n)
     goals = radii[:, None] * np.stack([np.cos(turns), np.sin(turns)], axis=1)
     return [demonstrate(arm, goal) for goal in goals]
+
+
+Sent = TypeVar("Sent")
+
+
+def drive(search: Generator[Array, Sent, None], execute: Callable[[Array], Sent], n: int = 10_000) -> list[Array]:
+    """The first ``n`` thetas that a search executes."""
+    thetas: list[Array] = []
+    try:
+        theta = next(search)
+        while len(thetas) < n:
+            thetas.append(theta.copy())
+            theta = search.send(execute(theta))
+    except StopIteration:
+        pass
+    return thetas
+
+
+def remember(thetas: Array, outcomes: Array, contexts: Array | None = None) -> Memory:
+    """A memory of these exemplars, one a row."""
+    contexts = np.zeros((len(thetas), 0)) if contexts is None else contexts
+    memory = Memory(contexts.shape[1], thetas.shape[1], outcomes.shape[1])
+    for exemplar in zip(contexts, thetas, outcomes, strict=True):
+        memory.add(*exemplar)
+    return memory
+
+
+def executed(arm: PlanarArm, thetas: Array) -> Memory:
+    """A memory of them, each in a context that was observed."""
+    rng, memory = stream(0, "exemplars"), Memory(arm.contexts.dim, arm.policies.dim, arm.outcomes.dim)
+    for theta in thetas:
+        context = arm.observe(rng)
+        memory.add(context, theta, arm.execute(context, theta, rng))
+    return memory
 
 
 ALGORITHMS = {

@@ -1,34 +1,26 @@
 """The board: what its curves count, what its file holds, and that a resumed run leaves one continuous board."""
 
-import dataclasses
 import signal
-import subprocess
-import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from tensorboard.backend.event_processing.event_file_loader import EventFileLoader
-from tensorboard.plugins.custom_scalar import layout_pb2
 from tensorboard.plugins.hparams import metadata as hparams
-from tensorboard.util.tensor_util import make_ndarray
 
+from boards import charts_of, curves_of, values_of
 from runs import arguments, content_of, end, stopped_at
 from sgimd_torch import InterestMap, stream
-from sgimd_torch.algorithms import sagg_riac
 from sgimd_torch.board import pictures
 from sgimd_torch.board.curves import Behaviour, Competent, Grid, branches, cells_of, of_regions
 from sgimd_torch.board.events import EventFile
 from sgimd_torch.board.legend import LEGEND
 from sgimd_torch.environments.fishing_rod import FishingRod
-from sgimd_torch.evaluation import Benchmark, Evaluation, load_benchmark
+from sgimd_torch.evaluation import Evaluation, load_benchmark
 from sgimd_torch.figures.sections import sections
-from sgimd_torch.inverses.local import LocalInverse
-from sgimd_torch.runs.build import build
-from sgimd_torch.runs.config import Config
+from sgimd_torch.runs.command_line import main
+from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
-from sgimd_torch.runs.run import Life
-from sgimd_torch.runs.tasks import Task
 from sgimd_torch.spaces import Box, Demonstration, Episode, Move, Request
 
 PLANE = Box.cube(-1.0, 1.0, 2, names=("x", "y"), unit="m")
@@ -45,31 +37,6 @@ def evaluation(errors):
     errors = np.array(errors)
     nothing = np.full((len(errors), 0), np.nan)
     return Evaluation(errors, nothing, nothing, np.full(len(errors), 0.01), nothing, errors < 0)
-
-
-def values_of(directory):
-    (path,) = directory.glob("events.out.tfevents.*")
-    return [(event.step, value) for event in EventFileLoader(str(path)).Load() for value in event.summary.value]
-
-
-def curves_of(directory):
-    """By tag: {step: value}; a step that is there twice fails."""
-    found = {}
-    for step, value in values_of(directory):
-        tensor = make_ndarray(value.tensor)
-        assert step not in found.setdefault(value.tag, {}), (value.tag, step)
-        found[value.tag][step] = tensor.item() if tensor.dtype == np.float32 and tensor.size else tensor.tolist()
-    return found
-
-
-def charts_of(directory):
-    """Of the last page of charts: the tags by category."""
-    (*_, last) = curves_of(directory)["custom_scalars__config__"].values()
-    layout = layout_pb2.Layout.FromString(last)
-    return {
-        each.title: [tag.strip("^$").replace("\\", "") for chart in each.chart for tag in chart.multiline.tag]
-        for each in layout.category
-    }
 
 
 def interest_map(n=400):
@@ -228,14 +195,6 @@ def test_earlier_event_files_stay_until_the_replay_is_over(tmp_path):
     assert before.keys().isdisjoint(path.name for path in tmp_path.iterdir())  # else an open TensorBoard ignores it
 
 
-def test_a_run_that_is_not_watched_loads_no_tensorboard_and_nothing_else_that_takes_long_to_import():
-    program = "import sys, sgimd_torch.runs.run; assert not {'tensorboard', 'torch', 'scipy.stats'} & set(sys.modules)"
-    done = subprocess.run(
-        [sys.executable, "-c", f"import sys; sys.path[:0] = {sys.path!r}; {program}"], capture_output=True, text=True
-    )
-    assert done.returncode == 0, done.stderr
-
-
 OPTIONS = ("--movements", "160", "--evaluate_at", "60,120", "--board", "true")
 
 
@@ -344,52 +303,25 @@ def test_a_board_depends_only_on_the_last_request(tmp_path, go, watched):
     assert curves_of(directory)["time/physics"].keys() == {150}  # nobody knows those of what was replayed
 
 
-class Slider:
-    """A robot of ``dim`` sliders, whose outcome is their position; a context, if there is one, shifts them."""
-
-    outcome_noise = 0.0
-
-    def __init__(self, dim, context_dim=0):
-        self.contexts, self.policies = Box.cube(-0.1, 0.1, context_dim), Box.cube(0, 1, dim)
-        self.outcomes, self.rest = Box.cube(0, 1, dim), np.zeros(dim)
-
-    def observe(self, rng):
-        return self.contexts.sample(rng)
-
-    def execute(self, context, theta, rng):
-        return np.asarray(theta) + np.sum(context)
+def live_as(robot, *options):
+    """A watched run of a user's robot; returns its directory."""
+    words = f"--environment sliders:{robot} --algorithm sagg-riac --movements 120 --evaluate-at 60 --repeats 0"
+    assert command(main, [*words.split(), "--board", "true", "--out", "runs", *options]) == 0
+    return Path("runs/sagg-riac/seed-000")
 
 
-def live_as(out, robot, make, **options):
-    """A watched run of a user's robot and learner; returns its directory."""
-    config = Config(
-        movements=120, evaluate_at=(60,), repeats=0, board=True, out=out, parts={"environment": "planar-arm-7"}
-    )
-    goals = np.linspace(0.2, 0.9, 5)[:, None].repeat(robot.outcomes.dim, axis=1)
-    learner = make(robot, 0, **options)
-    parts = dataclasses.replace(
-        build(config),
-        task=Task(robot),
-        environment=robot,
-        teacher=None,
-        learner=learner,
-        answers={"own": LocalInverse(learner.memory)},
-        benchmark=Benchmark("Slider", goals, 0.1),
-    )
-    with Life(parts, resume=False) as life:
-        list(life.episodes())
-    return config.directory
-
-
-@pytest.mark.parametrize(("dim", "context_dim"), [(1, 0), (3, 0), (2, 1)])
-def test_outcomes_of_any_dimension_have_curves_and_pictures(tmp_path, dim, context_dim):
-    directory = live_as(tmp_path, Slider(dim, context_dim), sagg_riac)
-    curves = curves_of(directory)
+@pytest.mark.parametrize("robot", ["Slider", "Slider3", "Shifted"])
+def test_outcomes_of_any_dimension_have_curves_and_pictures(own, robot):
+    curves = curves_of(live_as(robot))
     assert {"error/mean", "competence/R", "interest/R", "goals/missed_by"} < curves.keys()
     pictures = {tag for tag in curves if tag.startswith(("map/", "competent/"))}
     wanted = {"map/error", "map/competence"}
-    assert pictures == wanted | ({"competent/since"} if dim == 2 else set())
+    assert pictures == wanted | ({"competent/since"} if robot == "Shifted" else set())
 
+
+HALVES = '''
+import numpy as np
+from sgimd_torch import InterestMap
 
 class Halves:
     """A user's goal model; a run knows only its two regions."""
@@ -402,9 +334,11 @@ class Halves:
 
     def add(self, context, goal, competence, strategy="autonomous", gain=0.0):
         self.regions = [self.regions[0].extend(np.array(goal), competence, gain, strategy), self.regions[1]]
+'''
 
 
-def test_the_regions_of_any_goal_model_are_shown(tmp_path):
-    curves = curves_of(live_as(tmp_path, Slider(2), sagg_riac, goals=Halves))
+def test_the_regions_of_any_goal_model_are_shown(own, module):
+    module("halves", HALVES)
+    curves = curves_of(live_as("Slider2", "--goals", "halves:Halves"))
     assert curves["regions/count"] == {50: 2, 100: 2}
     assert {"competence/R0", "interest/R", "map/competence"} < curves.keys()

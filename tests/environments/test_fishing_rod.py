@@ -128,21 +128,6 @@ def test_the_duration_crosses_the_steps_of_the_simulation_without_a_jump(rod: Fi
         assert np.abs(cast(rod, below) - cast(rod, above)).max() < 1e-6
 
 
-def test_a_batch_on_two_threads_equals_one_thread_and_single_movements_bit_for_bit() -> None:
-    thetas = movements(6)
-    thetas[:, -1] = np.linspace(0, 1, 6)  # different lengths
-    batches = [
-        FishingRod(noise=0.03, threads=threads).execute_many(
-            np.zeros((6, 0)), thetas, [stream(i, "environment") for i in range(6)]
-        )
-        for threads in (1, 2)
-    ]
-    single = FishingRod(noise=0.03, threads=1)
-    ones = [cast(single, theta, seed=i) for i, theta in enumerate(thetas)]
-    assert np.array_equal(batches[0], batches[1])
-    assert np.array_equal(batches[0], ones)
-
-
 def test_the_number_of_draws_does_not_depend_on_theta() -> None:
     noisy = FishingRod(noise=0.03, threads=1)
     short, long = movements(2)

@@ -157,14 +157,6 @@ def test_a_run_that_ended_without_its_last_evaluation_is_no_result(go, benchmark
     assert not (tmp_path / "results").exists()
 
 
-def test_looking_at_what_is_to_be_done_writes_nothing(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    assert command(main, ["ablations", "--seeds", "0-1", "--dry-run", "--only", "grid", "uniform-goals"]) == 0
-    wanted = [f"ablations: {name} seed {seed}" for seed in (0, 1) for name in ("uniform-goals", "grid")]
-    assert capsys.readouterr().out.splitlines() == wanted
-    assert not list(tmp_path.iterdir())
-
-
 @pytest.mark.parametrize(
     ("options", "message"),
     [
@@ -193,15 +185,6 @@ def test_impossible_requests_are_refused_with_their_reason(tmp_path, monkeypatch
     assert "Traceback" not in said
     written = set(tmp_path.rglob("*")) - set(before)
     assert not [path for path in written if path.suffix in (".csv", ".log")]
-
-
-def test_a_run_that_cannot_start_fails_alone(compare, tmp_path):
-    (tmp_path / "runs").mkdir()
-    (tmp_path / "runs/random").write_text("a file where its directory should be")
-    code, _, errors = ended(compare("learners", "planar-arm-7"))
-    assert code == 1
-    assert re.search("random seed 0 failed: .*random is no folder", errors)
-    assert {name for name, *_ in rows_of(tmp_path)} == {"sgim-d-arm-7"}
 
 
 def test_every_variant_is_a_valid_run_with_its_own_name_in_its_table(tmp_path):

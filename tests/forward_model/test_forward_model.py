@@ -1,8 +1,6 @@
 """The forward model: what it learns, how sure it is, and what it refuses."""
 
 import pickle
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -317,12 +315,6 @@ def test_another_robots_memory_or_another_runs_is_refused():
 def test_numbers_out_of_their_range_are_refused(options):
     with pytest.raises(ValueError, match=next(iter(options))):
         ForwardModel(0, 3, 2, **options)
-
-
-def test_without_its_packages_it_says_what_to_install():
-    program = "import sys; sys.modules['lightning'] = None\nimport sgimd_torch.forward_model.model"
-    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
-    assert "ImportError: the forward model needs torch: pip install 'sgimd-torch[forward]'" in run.stderr
 
 
 def test_other_scales_leave_what_is_predicted_as_it_is():

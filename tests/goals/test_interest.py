@@ -68,17 +68,6 @@ def test_the_three_modes_share_the_goals_7_to_2_to_1():
     assert chi_square(np.bincount(is_near[in_last], minlength=2), [1 - probability, probability]) < 10.8  # 1 in 1000
 
 
-def test_goals_are_uniform_while_all_interests_are_equal():
-    goals = InterestMap(NO_CONTEXTS, LINE, stream(2, "goals"), modes=(1, 0, 0))
-    for goal in stream(2, "planted").uniform(size=300) ** 3:  # crowded at 0: leaves of very different sizes
-        goals.add(NO_CONTEXT, [goal], -1)
-    sizes = [region.high[0] - region.low[0] for region in goals.regions]
-    assert len(sizes) > 4
-    assert max(sizes) > 10 * min(sizes)
-    counts = np.histogram([goals.sample(NO_CONTEXT) for _ in range(10_000)], 20, (0, 1))[0]
-    assert chi_square(counts, np.full(20, 1 / 20)) < 43.8  # 19 degrees of freedom: odds 1 in 1000
-
-
 def test_goals_are_uniform_in_every_context_while_all_interests_are_equal():
     goals = InterestMap(LINE, LINE, stream(3, "goals"), modes=(1, 0, 0))
     for context, goal in stream(3, "planted").uniform(size=(400, 2)) ** [2, 3]:
@@ -286,11 +275,6 @@ def share_near_the_origin(seed: int, side: float, *, n: int, teach_every: int | 
         goals.add(NO_CONTEXT, goal, -1 + min(1, reached / 300) if can_progress else -1)
     samples = np.array([goals.sample(NO_CONTEXT) for _ in range(200)])
     return float(np.mean(np.abs(samples).max(axis=1) <= 2))
-
-
-def test_goals_concentrate_where_progress_is_in_a_hundredfold_larger_space():
-    shares = [share_near_the_origin(seed, 10, n=600) for seed in range(5)]
-    assert np.median(shares) > 0.6  # of .8 that follow interest; uniform goals: .04
 
 
 def test_goals_concentrate_where_a_teacher_shows_progress_in_a_ten_thousandfold_larger_space():

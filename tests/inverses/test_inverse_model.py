@@ -10,8 +10,8 @@ from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.inverses.locally_linear import LocallyLinear
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, Box, Estimate, stream
+from worlds import NO_CONTEXT, remember
 
-NO_CONTEXT = np.zeros(0)
 Inverse = Callable[[Array, Array], Estimate]
 
 INVERSES: dict[str, Callable[[Memory], Inverse]] = {
@@ -21,13 +21,6 @@ INVERSES: dict[str, Callable[[Memory], Inverse]] = {
     "local process": LocalProcess,
 }
 every_inverse = pytest.mark.parametrize("inverse_of", INVERSES.values(), ids=INVERSES.keys())
-
-
-def remember(thetas: Array, outcomes: Array) -> Memory:
-    memory = Memory(0, thetas.shape[1], outcomes.shape[1])
-    for theta, outcome in zip(thetas, outcomes, strict=True):
-        memory.add(NO_CONTEXT, theta, outcome)
-    return memory
 
 
 def line(pairs: dict[float, float]) -> Memory:

@@ -11,18 +11,10 @@ from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.inverses.locally_linear import LocallyLinear
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, stream
+from worlds import NO_CONTEXT, remember
 
-NO_CONTEXT = np.zeros(0)
 SMOOTH = Kernel(scale=1.0, finer=1.0, share=0.0, noise=1e-6)
 ROUGH = Kernel(scale=0.5, finer=4.0, share=0.3, noise=0.1)
-
-
-def remember(thetas: Array, outcomes: Array, contexts: Array | None = None) -> Memory:
-    contexts = np.zeros((len(thetas), 0)) if contexts is None else contexts
-    memory = Memory(contexts.shape[1], thetas.shape[1], outcomes.shape[1])
-    for exemplar in zip(contexts, thetas, outcomes, strict=True):
-        memory.add(*exemplar)
-    return memory
 
 
 def played(toy: Toy, n: int, seed: int = 0) -> Memory:
@@ -171,14 +163,6 @@ def test_it_does_not_matter_how_far_from_0_an_input_is(value: float) -> None:
     wind = stream(0, "wind").uniform(-1, 1, size=(220, 1))
     assert in_wind(value * (1 + 1e-9 * wind)) == pytest.approx(in_wind(wind), rel=0.1)
     assert in_wind(np.full((220, 1), value)) == pytest.approx(in_wind(np.zeros((220, 0))), rel=0.1)
-
-
-def test_an_input_far_from_0_is_told_apart_as_well() -> None:
-    toy = two_elbows()
-    memory, goals = played(toy, 200), played(toy, 10, seed=1).outcomes
-    inverse, far = LocalProcess(memory), LocalProcess(remember(memory.thetas + 2.0**26, memory.outcomes))
-    for goal in goals:
-        assert far(NO_CONTEXT, goal).theta - 2.0**26 == pytest.approx(inverse(NO_CONTEXT, goal).theta, abs=1e-3)
 
 
 @pytest.mark.parametrize("far", [25.0, 50.0])

@@ -14,18 +14,9 @@ from sgimd_torch.inverses.proved import ProvedModel
 from sgimd_torch.inverses.through_model import ModelInverse
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Box, stream
+from worlds import NO_CONTEXT, executed
 
-NO_CONTEXT = np.zeros(0)
 ARM = PlanarArm(7)
-
-
-def executed(arm, thetas):
-    """A memory of them, each in a context that was observed."""
-    memory, rng = Memory(arm.contexts.dim, arm.policies.dim, 2), stream(0, "exemplars")
-    for theta in thetas:
-        context = arm.observe(rng)
-        memory.add(context, theta, arm.execute(context, theta, rng))
-    return memory
 
 
 @pytest.fixture(scope="module")

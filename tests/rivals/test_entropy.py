@@ -6,11 +6,9 @@ import pytest
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.goals.strategic import AUTONOMOUS
 from sgimd_torch.memory import Memory
-from sgimd_torch.rivals.entropy import EntropyGoals, doubt, sgim_eer
-from sgimd_torch.session import run
+from sgimd_torch.rivals.entropy import EntropyGoals, doubt
 from sgimd_torch.spaces import Box, stream
-from sgimd_torch.teachers.answering import AnsweringTeacher
-from worlds import NO_CONTEXT, demonstrations, last_posture
+from worlds import NO_CONTEXT, demonstrations
 
 ARM = PlanarArm(4, noise=0.02)
 SHOWN = demonstrations(PlanarArm(4))
@@ -23,22 +21,6 @@ COSTS = {AUTONOMOUS: 1.0, IMITATE: 1.0}
 def cluster(n=40):
     """``(n, 2)`` exemplars around the middle of a square whose sides are 1."""
     return 0.5 + 0.02 * stream(0, "cluster").standard_normal((n, 2))
-
-
-def taught(seed=0):
-    teachers = {"all": AnsweringTeacher(SHOWN, stream(0, "t"))}
-    return sgim_eer(ARM, seed, correspondence=last_posture, teachers=teachers), teachers
-
-
-def live(learner, teachers, movements=60, seed=0, **options):
-    return list(run(learner, ARM, seed, movements=movements, teachers=teachers, **options))
-
-
-def lines(episodes):
-    return [
-        (e.index, e.move.theta.tobytes(), e.move.origin, e.request and e.request.goal.tobytes(), e.reply)
-        for e in episodes
-    ]
 
 
 def test_where_nothing_is_known_doubt_is_one_and_two_places_have_less_in_common_the_farther_they_are():
@@ -101,21 +83,3 @@ def test_who_shows_what_is_known_already_is_asked_no_more():
         memory.add(NO_CONTEXT, np.zeros(1), goal)
         goals.add(NO_CONTEXT, goal, 0.0, AUTONOMOUS, 0.5)
     assert {goals.choose(NO_CONTEXT, COSTS)[0] for _ in range(20)} == {AUTONOMOUS}
-
-
-def test_a_life_goes_on_as_if_it_had_never_stopped_and_equal_seeds_live_alike(tmp_path):
-    whole, teachers = taught()
-    episodes = []
-    for episode in run(whole, ARM, 0, movements=60, teachers=teachers):
-        episodes.append(episode)
-        if episode.index in (11, 40):
-            whole.save(tmp_path / f"{episode.index}.npz")
-    asked = [e for e in episodes if e.reply == "shown"]
-    assert len(asked) > 3
-    assert all(e.move.origin == "imitate" for e in asked)
-    assert lines(live(*taught())) == lines(episodes)
-    assert lines(live(*taught(seed=1), seed=1)) != lines(episodes)
-    for last in (11, 40):
-        again, _ = taught()
-        again.load(tmp_path / f"{last}.npz")  # asks nobody
-        assert lines(live(again, teachers)) == lines(episodes[last + 1 :])

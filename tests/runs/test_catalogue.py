@@ -4,7 +4,6 @@ import json
 import re
 import subprocess
 import sys
-from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -66,14 +65,9 @@ SHORT = ("--movements", "40", "--evaluate-at", "20", "--repeats", "2", "--invers
 
 
 @pytest.fixture
-def toss(tmp_path, monkeypatch):
+def toss(module):
     """A module of the user's, in the working directory."""
-    (tmp_path / "toss.py").write_text(TOSS)
-    sys.modules.pop("toss", None)
-    monkeypatch.chdir(tmp_path)
-    yield tmp_path
-    sys.path[:] = [place for place in sys.path if place != str(tmp_path)]
-    sys.modules.pop("toss", None)
+    return module("toss", TOSS)
 
 
 @pytest.mark.parametrize(("kind", "word", "entry"), ENTRIES, ids=lambda each: each if isinstance(each, str) else "")
@@ -191,51 +185,6 @@ def test_dashes_and_underscores_mean_the_same():
     assert parse(["--goals", "grid", "--goals.window=8", "--give-up", "-1"]) == parse(
         ["--goals=grid", "--goals.window", "8", "--give_up=-1"]
     )
-
-
-@pytest.mark.parametrize(
-    ("options", "wanted"),
-    [
-        ("--window 12", r"no such option; goals interest-map, grid \(goals.window\) have it"),
-        ("--algorithm random --budget 5", "--budget: algorithm random has .* sagg-riac, practice, .* have it"),
-        ("--algorithm random --goals.window 5", "--goals.window: algorithm random .* sagg-riac, .* have it"),
-        ("--algorithm random --teacher.every 5", "--teacher.every: algorithm random .* sgim-d.* have it"),
-        ("--model.members 5", "--model.members: .*search gradient, gauss-newton and inverse model, model-alone"),
-        ("--search nelder-mead-exact --search.noise 0.1", "search nelder-mead-exact has no such option; .*nelder-mead"),
-        ("--algorithm map-elites --epsilon 0.1", "--epsilon: algorithm map-elites .* map-elites-taught"),
-        ("--sead 3", "did you mean seed"),
-        ("--goals grit", "unknown goals 'grit'; did you mean grid"),
-        ("--teachers al --algorithm sgim-im", "unknown teachers 'al'; did you mean all"),
-        ("--evaluated-by own,nearst", "unknown inverse 'nearst'; did you mean nearest"),
-        ("--evaluated-by nearest", "evaluated_by must begin with own"),
-        ("--seed x", "--seed must be a whole number, got x"),
-        ("--movements 0", "movements must be at least 1"),
-        ("--repeats 1", "repeats must be 0 or at least 2"),
-        ("--evaluate-at 5,x", "--evaluate-at must be whole numbers such as 250,500, or .* or null, got 5,x"),
-        ("--evaluate-at 0", "evaluate_at must be numbers of movements"),
-        ("--patience 0", "patience must be above 0 s"),
-        ("--budget 1.5", "--budget must be a whole number, got 1.5"),
-        ("--global-range 1", "--global-range must be 2 numbers such as"),
-        ("--board perhaps", "--board must be true or false, got perhaps"),
-        ("--resume=3", "--resume takes no value"),
-        ("--name ..", "name must be that of one directory"),
-        ("--search.sd -1", "sd must be positive"),  # from here on by the part itself, before anything is written
-        ("--algorithm sgim-d --goals.window 7", "window must be even"),
-        ("--environment.task_space 0", "task_space must be above 0"),
-        ("--environment.noise nan", "noise must be finite"),
-        ("--give-up 1", "give_up must be"),
-        ("--social.epsilon -1", "epsilon must be"),
-        ("--algorithm sgim-d --teacher.every 0", "every must be"),
-    ],
-)
-def test_what_makes_no_sense_is_refused_on_one_line_and_nothing_is_written(options, wanted, tmp_path, capsys):
-    out = tmp_path / "runs"
-    with suppress(SystemExit):
-        assert command(main, ["--out", str(out), *options.split()]) == 2
-    said = capsys.readouterr().err
-    line = next(line for line in said.splitlines() if line.startswith("error: "))
-    assert re.search(wanted, line), said
-    assert not out.exists()
 
 
 def test_help_is_one_screen_and_a_parts_options_are_shown_once_it_is_chosen(capsys):

@@ -58,8 +58,11 @@ def test_whether_a_run_is_finished_is_counted_not_believed(run):
     assert read_run(run).summary["finished"] is True
     assert finished(config)
     assert finished(replace(config, board=True))
-    assert not finished(replace(config, movements=9))
-    assert not finished(replace(config, seed=4))
+    changes = {"movements": 9, "seed": 4, "evaluate_at": (6,), "floor_at": (), "repeats": 2}
+    for name, value in changes.items():
+        assert not finished(replace(config, **{name: value})), name
+    assert not finished(replace(config, parts=dict(config.parts) | {"inverse": "nearest"}))
+    assert movements_on_disk(run / "nowhere") == 0
     assert config_of(read_run(run)).settings == config.settings
     with Record(run / FILE, write=True) as record:
         record.replace_rows("evaluations", [row for row in record.rows("evaluations") if row[0] == 5])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from runs import content_of, end, stopped_at
+from runs import content_of
 from sgimd_torch.demonstrations import SHIPPED, load_demonstrations
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.runs.build import build, task_of
@@ -55,12 +55,6 @@ def test_each_request_has_a_row_that_says_what_came_of_it(whole):
     assert np.isnan(asked["apart"][~answered]).all()
     for teacher, goal, shown in zip(asked["teacher"][answered], wanted[answered], got[answered], strict=True):
         assert shown.tolist() == teachers[teacher].demonstrate(np.zeros(0), goal, None).outcome.tolist()
-
-
-@pytest.mark.parametrize("movements", [30, 31, 47])
-def test_a_killed_run_asks_nobody_again_for_what_is_recorded(whole, tmp_path, movements):
-    end(stopped_at(movements, *ACTS, *SHORT, f"--out={tmp_path}", "--name=run"))
-    assert content_of(go(tmp_path, "--resume")) == content_of(whole)
 
 
 def test_a_run_that_lost_its_robot_just_after_it_was_shown_something_has_that_answer(whole, tmp_path, monkeypatch):

@@ -19,8 +19,6 @@ from sgimd_torch.runs.process import Stopped, Stopping
 from sgimd_torch.runs.read import config_of, read_run
 from sgimd_torch.spaces import Demonstration
 
-MODEL_SEARCHES = ["gradient", "gauss-newton"]
-
 
 @pytest.mark.parametrize("threads", [1, 2])
 def test_the_same_seed_makes_the_same_record_whatever_the_threads(tmp_path, go, reference, capsys, threads):
@@ -34,26 +32,6 @@ def answers_of(out, go, *options):
     assert go(out, *options) == 0
     (path,) = out.glob("*/seed-003")
     return read_run(path).answers, content_of(path)["events"]
-
-
-def test_an_inverse_answers_alike_whether_it_is_the_runs_own_or_another(tmp_path, go):
-    """Imitators with different inverses remember the same, so nearest and linear land at the same places."""
-    found, logs = zip(
-        *(
-            answers_of(
-                tmp_path / own, go, "--algorithm", "imitation", "--inverse", own, "--evaluated-by", f"own,{other}"
-            )
-            for own, other in (("nearest", "linear"), ("linear", "nearest"))
-        ),
-        strict=True,
-    )
-    assert logs[0] == logs[1]
-    for mine, theirs in ((found[0]["own"], found[1]["nearest"]), (found[1]["own"], found[0]["linear"])):
-        assert mine["mean_error"].tolist() == theirs["mean_error"].tolist()
-        assert mine["goals_met"].tolist() == theirs["goals_met"].tolist()
-        assert np.isfinite(mine["noise_floor"]).all()
-        assert np.isnan(theirs["noise_floor"]).all()
-    assert found[0]["own"]["mean_error"].tolist() != found[0]["linear"]["mean_error"].tolist()
 
 
 def test_what_a_run_learns_with_answers_once_for_both_of_its_names(tmp_path, go):
@@ -100,53 +78,14 @@ def test_every_choice_runs_and_differs_from_the_others(tmp_path, go, kind, table
     common += ["--goals.window", 4] if kind == "progress" else []
     common += ["--environment", "fishing-rod"] if kind in ("teachers", "judge") else []
     common += ["--movements", 120] if kind == "teachers" else []
-    # See the next two tests; a person who is not there is like no teacher, and demonstrator 3 is all there are.
-    left_out = *MODEL_SEARCHES, "model", "model-alone", "by-hand", "demonstrator-3"
+    # Models have test_run_model.py; a person who is not there is like no teacher, and demonstrator 3 is all there are.
+    left_out = "gradient", "gauss-newton", "model", "model-alone", "by-hand", "demonstrator-3"
     choices = [choice for choice in table if choice not in left_out]
     for choice in choices:
         assert go(tmp_path, "--name", choice, f"--{option}", choice, *common) == 0
         logs.add(tuple(content_of(tmp_path / choice / "seed-003")["events"]))
     # On an arm, whose T is right, where every movement has an effect, these are `uniform`, `widening` and `process`.
     assert len(logs) == len(choices) - len({"within-reach", "returning", "among-effects"}.intersection(choices))
-
-
-ON_THE_ARM = "--environment planar-arm-7 --benchmark null --movements 400 --evaluate_at 200 --repeats 0"
-
-
-def on_the_arm(tmp_path, go, option, word):
-    """A run of 400 movements that is named after what was chosen; its model learns quickly, if it has one."""
-    learning = ("--model.rate", 4) if word in MODEL_SEARCHES or word.startswith("model") else ()
-    return go(tmp_path, "--name", word, option, word, *ON_THE_ARM.split(), *learning)
-
-
-@pytest.mark.slow
-def test_every_search_through_the_model_runs_and_differs_from_the_others(tmp_path, go):
-    searches = ("nelder-mead", *MODEL_SEARCHES)
-    for search in searches:
-        assert on_the_arm(tmp_path, go, "--search", search) == 0
-    runs = [read_run(tmp_path / search / "seed-003") for search in searches]
-    assert len({run.thetas.tobytes() for run in runs}) == len(searches)
-
-
-@pytest.mark.slow
-def test_the_inverse_through_the_model_lives_as_the_linear_one_and_answers_better(tmp_path, go):
-    runs = {}
-    for inverse in ("linear", "model-alone"):
-        assert on_the_arm(tmp_path, go, "--inverse", inverse) == 0
-        runs[inverse] = read_run(tmp_path / inverse / "seed-003")
-    np.testing.assert_array_equal(runs["model-alone"].thetas, runs["linear"].thetas)
-    assert runs["model-alone"].evaluation["mean_error"][-1] < 0.7 * runs["linear"].evaluation["mean_error"][-1]
-
-
-@pytest.mark.slow
-def test_a_model_that_predicts_worse_than_the_process_changes_nothing(tmp_path, go):
-    runs = {}
-    for name, more in (("process", ()), ("model", ("--search", "gradient", "--model.rate", 2))):
-        options = (*ON_THE_ARM.split(), "--algorithm", "sgim-d", "--inverse", name, *more)
-        assert go(tmp_path, "--name", name, *options) == 0
-        runs[name] = read_run(tmp_path / name / "seed-003")
-    np.testing.assert_array_equal(runs["model"].thetas, runs["process"].thetas)
-    np.testing.assert_array_equal(*(run.evaluation["mean_error"] for run in runs.values()))
 
 
 @pytest.mark.parametrize("slip", ["three samples", "degrees", "milliseconds", "a few milliseconds"])

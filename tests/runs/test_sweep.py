@@ -9,13 +9,13 @@ import re
 import shutil
 import signal
 from concurrent.futures import Future
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from odd import ODD, SWEEP, as_alone, odd_place, said_by
 from runs import content_of, start, sweep_here
+from sgimd_torch.demonstrations import SHIPPED
 from sgimd_torch.runs.command_line import main as run
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.engines import loop
@@ -73,58 +73,6 @@ def test_values_and_further_options_become_those_of_the_runs():
     assert flags == ["--accept-loss"]
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ("--vary gaols=uniform", "--gaols"),
-        ("--vary goals=unifrom,grid", "goals"),
-        ("--vary budget=5,x", "budget"),
-        ("--vary goals", "--vary"),
-        ("--vary goals=", "--vary"),
-        ("--vary =uniform", "--vary"),
-        ("--vary goals=grid,,uniform", "--vary"),
-        ("--vary seed=0,1", "--seed .*--seeds"),
-        ("--vary name=a,b", "--name"),
-        ("--vary out=a,b", "--out"),
-        ("--seed 3", "--seed .*--seeds"),
-        ("--name=mine", "--name"),
-        ("--shard 0/4", "--shard.*'0/4'"),
-        ("--shard 5/4", "--shard.*'5/4'"),
-        ("--shard 2", "--shard"),
-        ("--shard 1/x", "--shard"),
-        ("--engine slurm", "--engine"),
-        ("--address auto", "--address .*--engine ray"),
-        ("--engine ray --address auto --processes 2", "--processes .*--address"),
-        ("--engine ray --board true", "--board .*--engine ray"),
-        ("--engine ray --demonstrations ../shown.npz", "--engine ray .*shown.npz"),
-        ("--vary goals=grid --vary goals=uniform", "--goals is there twice"),
-        ("--vary budget=1,2 --budget 3", "--budget is there twice"),
-        ("--gaols uniform", "--gaols"),
-        ("stray", "'stray'"),
-        ("--seeds 5-3", "--seeds.*'5-3'"),
-        ("--seeds=-1", "--seeds"),
-        ("--seeds 1,,2", "--seeds"),
-        ("--seeds five", "--seeds"),
-        ("--processes 0", "--processes"),
-        ("--processes two", "--processes"),
-        ("--demonstrations nowhere.npz", "nowhere.npz"),
-        ("--out file", "file cannot be made"),
-    ],
-)
-def test_impossible_requests_are_refused_before_anything_starts(tmp_path, monkeypatch, capsys, options, message):
-    place = tmp_path / "here"
-    place.mkdir()
-    (tmp_path / "shown.npz").write_text("")
-    (place / "file").write_text("")
-    monkeypatch.chdir(place)
-    monkeypatch.setattr("sgimd_torch.runs.build.build", lambda config: None) if "../" in options else None
-    assert swept(*options.split()) == 2
-    said = capsys.readouterr().err
-    assert re.search(message, said)
-    assert "Traceback" not in said
-    assert [path.name for path in place.iterdir()] == ["file"]
-
-
 def test_seeds_are_one_or_a_range_or_a_list(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     for seeds, wanted in (("5", [5]), ("0-2", [0, 1, 2]), ("0,3,7-9", [0, 3, 7, 8, 9]), ("1,0-1", [1, 0])):
@@ -176,30 +124,6 @@ def test_every_run_is_what_it_would_be_alone_and_a_second_start_does_nothing(tmp
         assert [Path(line.partition(":")[0]).name for line in lines] == ["seed-001"] * left
 
 
-@pytest.fixture(scope="module")
-def whole(tmp_path_factory):
-    """A finished run."""
-    config = short(tmp_path_factory.mktemp("whole"))
-    assert sweep_here([config]) == []
-    return config
-
-
-@pytest.fixture
-def copied(whole, tmp_path):
-    shutil.copytree(whole.out, tmp_path, dirs_exist_ok=True)
-    return short(tmp_path)
-
-
-def test_a_run_is_finished_when_it_has_all_movements_and_evaluations_with_these_options(copied):
-    assert finished(copied)
-    assert movements_on_disk(copied.directory) == 40
-    assert movements_on_disk(copied.directory / "nowhere") == 0
-    out = copied.out
-    for changes in ({"movements": 50}, {"inverse": "nearest"}, {"seed": 1}, {"floor_at": ()}, {"repeats": 2}):
-        assert not finished(short(out, **changes)), changes
-    assert not finished(replace(copied, evaluate_at=(30,)))
-
-
 def test_a_file_of_goals_that_has_changed_makes_a_run_unfinished(benchmark, tmp_path, go):
     goals = tmp_path / "goals.npz"
     shutil.copy(benchmark, goals)
@@ -217,7 +141,7 @@ def ended(error=None):
     return future
 
 
-def test_failures_are_named_in_the_order_of_the_list_and_the_others_go_on(whole, tmp_path):
+def test_failures_are_named_in_the_order_of_the_list_and_the_others_go_on(tmp_path):
     errors = {1: ValueError("refused"), 3: Failed("broke"), 4: OSError("no disk")}
     configs, ended_well = [short(tmp_path, seed=seed) for seed in range(5)], []
 
@@ -307,21 +231,6 @@ def test_stopped_it_stops_its_runs_and_goes_on_as_if_nothing_had_happened(
     assert as_alone(odd, tmp_path, (0, 1))
 
 
-def test_a_run_that_another_process_writes_is_named_and_the_same_command_takes_it_up(odd, begun, tmp_path):
-    alone = (
-        "import sys; from sgimd_torch.runs import command_line, process; sys.exit(process.command(command_line.main))"
-    )
-    other = begun(alone, at_20="stands still")
-    os.waitpid(other.pid, os.WUNTRACED)
-    said = said_by(begun(SWEEP, "--seeds", "0"), 1)
-    assert re.search("random seed 0 failed: .*in use by another process", said)
-    os.kill(other.pid, signal.SIGTERM)
-    os.kill(other.pid, signal.SIGCONT)
-    said_by(other, 143)
-    said_by(begun(SWEEP, "--seeds", "0"), 0)
-    assert as_alone(odd, tmp_path, (0,))
-
-
 def test_no_library_for_figures_or_learning_is_loaded_to_watch_processes(tmp_path):
     program = (
         "import sys, sgimd_torch.runs.sweep as sweep; sweep.main(sys.argv[1:]);"
@@ -329,3 +238,10 @@ def test_no_library_for_figures_or_learning_is_loaded_to_watch_processes(tmp_pat
     )
     code = start(program, "--dry-run", "--out", tmp_path)
     assert code.communicate()[0].splitlines()[-1] == "[]"
+
+
+def test_a_file_outside_the_working_directory_does_not_travel_to_a_cluster(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert swept("--engine", "ray", "--demonstrations", SHIPPED) == 2
+    assert re.search(f"--engine ray .*{SHIPPED.name}", capsys.readouterr().err)
+    assert not list(tmp_path.iterdir())

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from sgimd_torch.searches.cma_es import cma_es
-from sgimd_torch.searches.simplex import limit
 from sgimd_torch.spaces import Array, Box, Estimate, Search, stream
+from worlds import drive
 
 BUDGET = 15
 
@@ -28,15 +28,7 @@ class World:
 
     def run(self, search: Search, n: int = BUDGET) -> list[Array]:
         start = Estimate(self.theta, self.theta[None], self.execute(self.theta)[None])
-        movements = limit(search(start, self.goal), n)
-        thetas: list[Array] = []
-        theta = next(movements)
-        try:
-            while True:
-                thetas.append(theta)
-                theta = movements.send(self.execute(theta))
-        except StopIteration:
-            return thetas
+        return drive(search(start, self.goal), self.execute, n)
 
 
 UNIT = Box.cube(0, 1, 25)

@@ -12,24 +12,15 @@ from sgimd_torch.forward_model.anchored import Anchored, Trust
 from sgimd_torch.forward_model.model import ForwardModel
 from sgimd_torch.inverses.local import NearestNeighbour
 from sgimd_torch.inverses.locally_linear import LocallyLinear
-from sgimd_torch.memory import Memory
 from sgimd_torch.searches.simplex import limit, nelder_mead
 from sgimd_torch.searches.through_model import descend, gauss_newton, gradient_search
 from sgimd_torch.spaces import Box, stream
+from worlds import NO_CONTEXT, executed
 
-NO_CONTEXT = np.zeros(0)
 ARM = PlanarArm(7)
 EXACT = Trust(share=0.0)  # as this arm is
 FINE = partial(descend, steps=20, step=0.005)
 UNTRAINED = ForwardModel(0, 7, 2)
-
-
-def executed(arm, thetas):
-    memory, rng = Memory(arm.contexts.dim, arm.policies.dim, 2), stream(0, "exemplars")
-    for theta in thetas:
-        context = arm.observe(rng)
-        memory.add(context, theta, arm.execute(context, theta, rng))
-    return memory
 
 
 @pytest.fixture(scope="module")
@@ -188,21 +179,6 @@ def test_it_starts_from_the_estimate_and_then_from_what_has_landed_nearest(model
     for starts in seen[1:]:
         np.testing.assert_allclose(starts, np.vstack([first, estimate.thetas[:4]]), rtol=1e-6)
     assert not np.array_equal(first, second)
-
-
-def test_of_two_ways_to_a_goal_the_reliable_one_is_tried():
-    memory, rng = Memory(0, 2, 2), stream(0, "exemplars")
-    for theta in rng.random((1500, 2)):  # theta_1 moves nothing, but the larger, the noisier
-        memory.add(NO_CONTEXT, theta, np.array([theta[0], 0.0]) + 0.3 * theta[1] * rng.standard_normal(2))
-    model, policies = ForwardModel(0, 2, 2, rate=0.4), Box.cube(0.0, 1.0, 2)
-    model.refresh(memory)
-    search = gradient_search(policies, rng, model=model, propose=FINE, noise=0.0, trust=Trust(error=1.0))
-    near = NearestNeighbour(memory, k=10)
-    for goal in np.array([[0.2, 0.0], [0.4, 0.0], [0.6, 0.0], [0.8, 0.0]]):
-        estimate = near(NO_CONTEXT, goal)
-        first = next(search(estimate, goal))
-        assert abs(first[0] - goal[0]) < 0.15
-        assert first[1] < 0.5 * np.median(estimate.thetas[:, 1])
 
 
 def test_with_a_model_that_is_not_trusted_it_is_the_simplex_bit_for_bit(model, inverse, goals):

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Generator
 from functools import partial
-from typing import TypeVar
 
 import numpy as np
 import pytest
@@ -11,27 +10,12 @@ from scipy.optimize import minimize, rosen
 from sgimd_torch.searches.perturb import perturb, practise
 from sgimd_torch.searches.simplex import limit, nelder_mead, simplex_descent
 from sgimd_torch.spaces import Array, Box, Estimate, Search, stream
+from worlds import drive
 
 
 def rough(x: Array) -> float:
     """A bowl full of pits, where simplices shrink."""
     return float((x**2).sum() + 0.3 * np.abs(np.sin(40 * x)).sum())
-
-
-Sent = TypeVar("Sent")
-
-
-def drive(search: Generator[Array, Sent, None], execute: Callable[[Array], Sent], n: int = 10_000) -> list[Array]:
-    """The first ``n`` thetas that a search executes."""
-    thetas: list[Array] = []
-    try:
-        theta = next(search)
-        while len(thetas) < n:
-            thetas.append(theta.copy())
-            theta = search.send(execute(theta))
-    except StopIteration:
-        pass
-    return thetas
 
 
 @pytest.mark.parametrize("adaptive", [False, True])
@@ -61,12 +45,6 @@ def test_the_simplex_visits_the_same_points_as_scipy(
     ours = drive(descent, function, 2000 - len(simplex))
     assert np.array_equal(np.array(ours), np.array(visited[dim + 1 :]))
     assert len(ours) > 20
-
-
-def test_on_a_plateau_the_simplex_contracts_inside_and_then_shrinks_to_its_first_vertex() -> None:
-    descent = simplex_descent(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), np.ones(3))
-    points = drive(descent, lambda x: 1.0, 4)
-    assert np.array_equal(points, [[1.0, -1.0], [0.25, 0.5], [0.5, 0.0], [0.0, 0.5]])
 
 
 def test_the_simplex_changes_neither_its_arguments_nor_what_it_has_proposed() -> None:
@@ -120,13 +98,6 @@ def reflection(world: World, vertices: Array) -> Array:
     """The worst vertex mirrored at the mean of the others."""
     order = np.argsort([world.distance(vertex) for vertex in vertices])
     return 2 * vertices[order[:-1]].mean(axis=0) - vertices[order[-1]]
-
-
-def test_with_enough_neighbours_the_first_reflection_is_the_second_movement() -> None:
-    world = World(dim=6, k=6)
-    executed = world.run(simplex_search(world.policies, rng()), n=2)
-    assert np.array_equal(executed[0], world.theta)
-    assert executed[1] == pytest.approx(reflection(world, np.vstack((world.theta, world.thetas))))
 
 
 def test_remembered_outcomes_are_used_as_they_are_and_not_executed_again() -> None:

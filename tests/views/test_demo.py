@@ -1,7 +1,6 @@
 """The demo: three runs of a few movements on a benchmark of a few goals, its figure and its table."""
 
 import shlex
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -71,23 +70,6 @@ def test_a_second_start_uses_what_is_there_and_fewer_movements_are_refused(shown
     assert "Traceback" not in said
 
 
-@pytest.mark.parametrize(
-    ("more", "message"),
-    [
-        ("--seed -1", "seed must be"),
-        ("--movements 0", "movements must be"),
-        ("--evaluate_at []", "--evaluate-at"),
-        ("--environment planar-arm-7", "--environment cannot be given here"),
-        ("--algorithm x", "--algorithm cannot be given here"),
-    ],
-)
-def test_impossible_requests_are_refused_before_anything_is_written(tmp_path, monkeypatch, capsys, more, message):
-    monkeypatch.chdir(tmp_path)
-    assert command(main, more.split()) == 2
-    assert message in capsys.readouterr().err
-    assert not list(tmp_path.iterdir())
-
-
 def test_options_of_a_run_are_those_of_all_three():
     configs = configs_of(["--seed", "4", "--movements=70", "--environment.noise", "0"])
     assert [*configs] == [*LEARNERS]
@@ -95,18 +77,3 @@ def test_options_of_a_run_are_those_of_all_three():
         (4, 0.0, (70,))
     }
     assert {config.out for config in configs_of([]).values()} == {Path("runs/demo")}
-
-
-def test_without_matplotlib_the_extra_is_named_before_anything_runs(tmp_path, monkeypatch, capsys):
-    from sgimd_torch.__main__ import _call
-
-    monkeypatch.chdir(tmp_path)
-    for name in [name for name in sys.modules if name.startswith(("sgimd_torch.views", "sgimd_torch.figures"))]:
-        monkeypatch.delitem(sys.modules, name)
-    for name in ("matplotlib", "matplotlib.axes", "matplotlib.figure"):
-        monkeypatch.setitem(sys.modules, name, None)
-    assert command(_call, ["demo"]) == 2
-    slip = "which is not installed; pip install 'sgimd-torch[plot]' installs it"
-    assert "error: sgimd demo needs matplotlib" in (said := capsys.readouterr().err)
-    assert slip in said
-    assert not list(tmp_path.iterdir())

@@ -220,22 +220,6 @@ def filmed(run_path, gl, *options):
     )
 
 
-@pytest.mark.slow
-def test_a_film_of_the_rod_is_made_without_a_display_or_the_lack_of_opengl_is_explained(run_path, tmp_path):
-    out = tmp_path / "film.mp4"
-    done = filmed(run_path, "egl", "--goals", "0.2,0.5", "--after", "40", "--out", str(out))
-    assert "Traceback" not in done.stderr
-    if done.returncode:  # a machine without EGL
-        assert done.returncode == 2
-        assert "MUJOCO_GL" in done.stderr
-        assert not out.exists()
-        return
-    assert "after 40 movements" in done.stdout
-    pictures = decoded(out, 480, 640 + 360)[0][:, :, :640]
-    red = (pictures[..., 0] - pictures[..., 1] > 60).sum(axis=(1, 2))
-    assert 0 < red[0] < red[-1]  # the float, then also the path that it has taken
-
-
 SEEN = """
 import sys
 from dataclasses import replace
@@ -356,7 +340,6 @@ def test_the_check_of_an_environment_looks_at_its_picture(own, capsys, word, cod
     [
         ("sliders:NoPicture", "sliders:NoPicture, which cannot be filmed: it brings no picture of its movements, a "),
         ("sliders:WrongPicture", "WrongPicture must give a Sketch with an outcome of 1 dimension, got list"),
-        ("sliders:FlatPicture", "chains of a Sketch must be finite numbers (n_steps, n_points, 2), got shape (5, 2)"),
     ],
 )
 def test_what_has_no_picture_is_refused_in_a_line(own, capsys, word, message):

@@ -52,11 +52,6 @@ def test_few_seeds_have_a_value_and_no_interval():
     assert statistics.show(found) == "0.50"
 
 
-def test_the_same_stream_gives_the_same_interval():
-    values = np.arange(10.0)
-    assert iqm_interval(values, rng=stream(1, "a")) == iqm_interval(values, rng=stream(1, "a"))
-
-
 def test_each_number_draws_from_a_stream_of_its_own_and_is_told_with_its_interval():
     values = np.array([0.3, 0.4, 0.5, 0.6, 0.7])
     found = iqm_interval(values, rng=statistics.rng())

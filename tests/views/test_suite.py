@@ -57,24 +57,6 @@ def test_what_is_varied_gives_a_learner_for_each_value():
     assert [config.variant for config in configs] == [RANDOM, UNIFORM, "inverse=process", "inverse=nearest"]
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        ("--environment toss", "--environment cannot be given here: each task has its own"),
-        ("--environment.task_space=2", "--environment cannot be given here"),
-        ("--vary environment=toss,crawler", "--environment cannot be given here"),
-        ("--tasks tos", "invalid choice: 'tos'"),
-        ("--tasks crawler --algorithm imitation", "comes without demonstrations"),
-        ("--tasks toss --vary seed=1,2", "--seed cannot be given here: --seeds takes them"),
-    ],
-)
-def test_what_makes_no_sense_is_refused_before_anything_is_written(tmp_path, monkeypatch, capsys, words, message):
-    monkeypatch.chdir(tmp_path)
-    assert suite(*words.split(), *SHORT) == 2
-    assert message in capsys.readouterr().err
-    assert not list(tmp_path.iterdir())
-
-
 def test_a_suite_is_run_shown_and_gone_on_with(tmp_path, capsys):
     out = tmp_path / "study"
     words = ("--tasks", "toss", "--out", out, *LEARNER, *SHORT)
