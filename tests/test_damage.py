@@ -6,8 +6,12 @@ import numpy as np
 import pytest
 
 from records import fill, read
-from runs import MOVEMENTS, edit
+from runs import MOVEMENTS, content_of, edit
+from sgimd_torch.evaluation import Benchmark, save_benchmark
 from sgimd_torch.record import Record, RunError, layout
+from sgimd_torch.runs.command_line import main
+from sgimd_torch.runs.directory import FILE
+from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.spaces import stream
 
@@ -117,18 +121,58 @@ def test_a_file_that_sqlite_has_written_anew_is_the_same_record(tmp_path, two):
     assert unnoticed(tmp_path / "run.sqlite", read(two[0]))
 
 
-@pytest.mark.parametrize("n", [6, pytest.param(50, marks=pytest.mark.slow)])  # the slow ones are 1,000 in all
 @pytest.mark.parametrize("what", DAMAGES)
-def test_no_damage_reads_as_something_else(tmp_path, two, what, n):
+def test_no_damage_reads_as_something_else(tmp_path, two, what):
     content = read(two[0])
-    assert all(content.values())
-    for k in range(n):
+    for k in range(6):
         damaged(tmp_path / "run.sqlite", *two, what, k)
         found = unnoticed(tmp_path / "run.sqlite", content)
         assert found is None or what not in TOLD_ALWAYS
 
 
 # Runs with rows in every table: with contexts, a model, and teachers who are asked.
+ALL = "--environment toss --algorithm sgim-acts --teachers all --base search --inverse model"
+SHORT = "--movements 110 --evaluate_at 60 --repeats 2 --model.rate 0.5 --model.members 2"
+
+
+@pytest.fixture(scope="module")
+def lives(tmp_path_factory):
+    """How to go on with such a run, the file of it, and that of the next seed."""
+    out = tmp_path_factory.mktemp("all")
+    save_benchmark(out / "toss.npz", Benchmark("Toy", np.array([[0.5, 0.5], [1.0, 0.5], [0.8, 0.2]]), 0.1))
+    words = [*ALL.split(), *SHORT.split(), "--benchmark", str(out / "toss.npz"), "--name", "run"]
+
+    def live(place, *options):
+        return command(main, [*words, "--seed", "0", "--out", str(place), *map(str, options)])
+
+    assert live(out) == live(out, "--seed", 1) == 0
+    return live, *(out / f"run/seed-00{seed}/{FILE}" for seed in (0, 1))
+
+
+@pytest.mark.slow
+def test_no_damage_of_a_run_with_all_tables_reads_as_something_else(tmp_path, lives):
+    _, *files = lives
+    content = read(files[0])
+    assert all(content.values())
+    for k in range(1000):
+        damaged(tmp_path / "run.sqlite", *files, DAMAGES[k % len(DAMAGES)], k)
+        unnoticed(tmp_path / "run.sqlite", content)
+
+
+@pytest.mark.parametrize("what", DAMAGES)
+def test_a_damaged_run_of_the_rod_is_refused_or_goes_on_to_the_same_record(
+    tmp_path, go, undisturbed, reference, what, capsys
+):
+    path = tmp_path / "sgim-d/seed-003" / FILE
+    path.parent.mkdir(parents=True)
+    damaged(path, undisturbed / FILE, undisturbed / FILE, what, 1)
+    code = go(tmp_path, "--resume")
+    assert code in (0, 2), capsys.readouterr().err
+    assert "Traceback" not in capsys.readouterr().err
+    if code == 0:
+        assert content_of(path.parent) == reference
+
+
 def test_the_file_of_another_seed_is_told_by_its_folder(tmp_path, go, undisturbed, capsys):
     path = tmp_path / "sgim-d/seed-004"
     shutil.copytree(undisturbed, path)

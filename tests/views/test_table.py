@@ -18,6 +18,14 @@ from sgimd_torch.views.table import main
 SEEDS = 5
 
 
+def damage(path):
+    """Change some bytes in the middle of the largest file of a run."""
+    file = max(path.iterdir(), key=lambda each: each.stat().st_size)
+    content = bytearray(file.read_bytes())
+    content[len(content) // 2 : len(content) // 2 + 4] = b"junk"
+    file.write_bytes(content)
+
+
 FEW = "fewer than 5 seeds, too few for a verdict or a deviation: sgim-d (1)\n"
 
 
@@ -116,6 +124,15 @@ def test_runs_that_were_never_evaluated_are_said_to_be_so(tmp_path, capsys):
 def test_a_run_that_is_too_short_is_named(runs, capsys):
     assert table(runs, "--at", 5000) == 2
     assert "seed-000 was not evaluated after 5000 movements" in capsys.readouterr().err
+
+
+def test_a_damaged_run_is_named_and_nothing_is_printed(copied, capsys):
+    path = copied / "random" / "seed-001"
+    damage(path)
+    assert table(copied) == 2
+    said = capsys.readouterr()
+    assert not said.out
+    assert str(path) in said.err
 
 
 def last_column(said):
