@@ -56,8 +56,8 @@ def test_a_robot_that_has_become_another_one_is_refused(own, capsys):
     assert "has the robot become another one?" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("module", ["sweep", "views.suite"])
-def test_processes_of_many_runs_find_the_working_directory(own, module):
+@pytest.mark.parametrize("what", ["sweep", "views.suite"])
+def test_processes_of_many_runs_find_the_working_directory(own, what):
     """Also where Python does not put it on the path by itself."""
     (own / "learners.py").write_text(
         "from sgimd_torch import random_exploration\n"
@@ -67,7 +67,7 @@ def test_processes_of_many_runs_find_the_working_directory(own, module):
     words = {
         "sweep": "sweep --environment sliders:Slider3 --vary algorithm=learners:mine",
         "views.suite": "suite --tasks crawler --algorithm learners:mine",
-    }[module]
+    }[what]
     done = subprocess.run(
         [sys.executable, "-c", program, *words.split(), *["--movements", "30", "--evaluate-at", "20", "--out", "runs"]],
         capture_output=True,
