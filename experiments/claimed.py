@@ -120,7 +120,7 @@ def learning(found: Evidence) -> list[Claim]:
         ]
 
     def over_tasks(theirs: str, bar: float, *times: int) -> list[Part]:
-        known = [task for task in SUITE if f"{theirs}.{task}" in {**EXPERIMENTS["suite"], **EXPERIMENTS["learning"]}]
+        known = [task for task in SUITE if task == "rod" or f"{theirs}.{task}" in EXPERIMENTS["suite"]]
         names = [[f"{name}.{task}" for task in known] for name in ("practice", theirs)]
         return [at_most(bar, found.over_tasks, *names, at, name=f"{theirs} at {at}") for at in times]
 

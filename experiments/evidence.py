@@ -23,7 +23,6 @@ from sgimd_torch.views.statistics import (
     interquartile_mean,
     interval,
     movements_to_reach,
-    paired_differences,
     point,
     rng,
 )
@@ -180,13 +179,14 @@ class Evidence:
 
     def less(self, ours: BySeed, theirs: BySeed, *, level: Level = LEVEL) -> Interval:
         """Ours less theirs."""
-        if not ours.keys() & theirs.keys():
+        x, y, paired = _samples(ours, theirs)
+        if paired:
+            return _found(interquartile_mean, x - y, level=level)
 
-            def difference(x: Array, y: Array) -> Array:
-                return interquartile_mean(x) - interquartile_mean(y)
+        def difference(x: Array, y: Array) -> Array:
+            return interquartile_mean(x) - interquartile_mean(y)
 
-            return _found(difference, _array(ours), _array(theirs), level=level)
-        return _found(interquartile_mean, paired_differences(*shared(ours, theirs)), level=level)
+        return _found(difference, x, y, level=level)
 
     def over(self, ours: BySeed, theirs: BySeed, *, level: Level = LEVEL) -> Interval:
         """Ours over theirs."""
@@ -194,9 +194,8 @@ class Evidence:
         def ratio(x: Array, y: Array) -> Array:
             return interquartile_mean(x) / interquartile_mean(y)
 
-        paired = bool(ours.keys() & theirs.keys())
-        samples = shared(ours, theirs) if paired else (ours, theirs)
-        return _found(ratio, *map(_array, samples), paired=paired, level=level)
+        x, y, paired = _samples(ours, theirs)
+        return _found(ratio, x, y, paired=paired, level=level)
 
     def share(self, parts: BySeed, wholes: BySeed, *, level: Level = LEVEL) -> Interval:
         """All ``parts`` over all ``wholes``, the seeds of both drawn together.
@@ -223,6 +222,14 @@ def shared(ours: BySeed, theirs: BySeed) -> tuple[dict[int, float], dict[int, fl
     if len(seeds) < 2:
         raise NotRun("fewer than two seeds in common")
     return {seed: ours[seed] for seed in seeds}, {seed: theirs[seed] for seed in seeds}
+
+
+def _samples(ours: BySeed, theirs: BySeed) -> tuple[Array, Array, bool]:
+    """Errors of both, and whether they are paired: on common seeds, or independent where there are none."""
+    paired = bool(ours.keys() & theirs.keys())
+    if paired:
+        ours, theirs = shared(ours, theirs)
+    return _array(ours), _array(theirs), paired
 
 
 def _found(statistic: Callable[..., Array], *samples: Array, level: Level, paired: bool = False) -> Interval:

@@ -21,7 +21,7 @@ from judging import MISSING, Claim, Verdict, judge
 from sgimd_torch.views.statistics import interquartile_mean, show
 from sgimd_torch.views.suite import RANDOM, UNIFORM, titled
 from table import read_table
-from variants import ARMS, EXPERIMENTS, REFINING, ROBOTS, SPARSE, SUITE, SUITED, TEACHERS, ladder
+from variants import ARMS, EXPERIMENTS, REFINING, ROBOTS, SPARSE, SUITE, TEACHERS, ladder
 
 SETTINGS: Final = (*ROBOTS, *TEACHERS)
 DEFAULT: Final = "default"  # setting of a rival
@@ -145,19 +145,15 @@ class Tables:
 
     def suite(self, at: int = 1000) -> str:
         """Errors over those of random movements on each task, then their interquartile mean over tasks."""
-        learners = ["practice", *(name for name in SUITED if name not in (RANDOM, "practice-uniform", "cma-mae"))]
-        every = (*SUITE, *SPARSE)
-
-        def known(name: str) -> list[str]:
-            run = {**EXPERIMENTS["suite"], **EXPERIMENTS["practice"], **EXPERIMENTS["learning"]}
-            return [task for task in every if f"{name}.{task}" in run]
-
+        learners, every = ("practice", UNIFORM, "map-elites"), (*SUITE, *SPARSE)
+        run = {*EXPERIMENTS["learning"], *EXPERIMENTS["suite"], *EXPERIMENTS["practice"]}
+        known = {name: [task for task in every if f"{name}.{task}" in run] for name in learners}
         rows = [
             [titled(task), *(self.cell(self.found.ratio, f"{name}.{task}", f"{RANDOM}.{task}", at, form=".2f")
-                             if task in known(name) else "–" for name in learners)]
+                             if task in known[name] else "–" for name in learners)]
             for task in every
         ]  # fmt: skip
-        rows.append(["mean over tasks", *(self._over_tasks(name, known(name), at) for name in learners)])
+        rows.append(["mean over tasks", *(self._over_tasks(name, known[name], at) for name in learners)])
         return markdown(("task", *learners), _run(rows))
 
     def gain(self) -> str:

@@ -125,8 +125,7 @@ def goal_babbling(
         measure = partial(performance, rest=environment.rest, d_min=noise)
     made = answering(environment, memory, inverse)
     explorer = explore(environment.policies, memory, made, stream(seed, "look"))
-    had_effect = {"effects": made.effects} if hasattr(made, "effects") else {}
-    goals = given(goals, reached=memory, **had_effect)
+    goals = given(goals, reached=memory, effects=getattr(made, "effects", lambda: None))
     width = getattr(explorer, "width", None)
     if width is not None:  # how far to look, which both of them go by
         search = given(search, width=width)

@@ -42,10 +42,6 @@ class Reached(Protocol):
         ...
 
 
-def _all_had() -> None:
-    """Every movement has an effect of its own."""
-
-
 class WithinReach(UniformGoals):
     """Uniform goals in a box around what was reached, which is T where that is nearly as large; see `Goals`.
 
@@ -68,7 +64,7 @@ class WithinReach(UniformGoals):
         rng: np.random.Generator,
         *,
         reached: Reached,
-        effects: Callable[[], object | None] = _all_had,
+        effects: Callable[[], object | None] = lambda: None,
     ) -> None:
         super().__init__(contexts, outcomes, rng)
         self.reached, self._effects = reached, effects
