@@ -160,7 +160,7 @@ class Tables:
         """What each step from random movements to practice brings; then learners with the same teacher."""
         rows = [
             [step, *self.errors(f"{name}.rod", (1000, LAST), between=True),
-             self._over_tasks(name, [*SUITE], 1000) if step in GAIN else ""]
+             self._over_tasks(name, [*SUITE], 1000) if step in GAIN and name != "practice-interest" else ""]
             for step, name in {**GAIN, **TAUGHT}.items()
         ]  # fmt: skip
         return markdown(("step", "rod, 1000 (m)", "rod, 5000 (m)", "suite, 1000"), _run(rows))

@@ -125,9 +125,9 @@ LEARNING: Final[dict[str, Variant]] = {
 # What the gain of practice is made of: the steps from the standard baseline to it that are no learner of LEARNING, and
 # learners taught by the schedule of the other one.
 MIDDLE: Final[Variant] = {**REFERENCES[UNIFORM], "explore": "widening", "global_range": (0.02, 0.3)}
+BEGUN: Final[dict[str, Variant]] = {"middle": MIDDLE, "middle-process": {**MIDDLE, "inverse": "process"}}
 STEPS_OF_GAIN: Final[dict[str, Variant]] = {
-    "middle": MIDDLE,
-    "middle-process": {**MIDDLE, "inverse": "process"},
+    **BEGUN,
     "practice-interest": {**UNIFORM_PRACTICE, "goals": "interest-map"},
 }
 SCHEDULES: Final[dict[str, Variant]] = {
@@ -337,10 +337,11 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
         "sgim-d-model.rod": {**BY_PROOF, **ON_ROD},
         **_on_suite({"practice": PRACTICE}, TASKS),
         **_on_suite({**REFERENCES, "sagg-riac": SAGG_RIAC}, SPARSE),
+        **_on_suite({"sgim-d-model": BY_PROOF}, ARMS),
     },
     "gain": {
         **{f"{name}.rod": {**line, **ON_ROD} for name, line in {**STEPS_OF_GAIN, **SCHEDULES}.items()},
-        **_on_suite(STEPS_OF_GAIN),
+        **_on_suite(BEGUN),
     },
 }
 

@@ -41,7 +41,9 @@ ERRORS = {  # name, as `Evidence` has it: its error (m) at 5000
     "sgim-d-absolute-large": 0.10,
     "random-goals-demonstrations-large": 0.13,
     # Few movements, on the rod and on the suite.
-    **{f"{name}.rod": 0.3 for name in ("cma-mae-taught", "cma-mae-taught-once", "map-elites-taught", "imitation")},
+    **{f"{name}.rod": 0.3 for name in ("cma-mae-taught", "map-elites-taught", "imitation")},
+    **{f"{name}-once.rod": 0.3 for name in ("cma-mae-taught", "map-elites-taught", "uniform-nearest-taught", "sgim-d")},
+    "practice-taught-every-30.rod": 0.03,
     **{f"{name}.rod": 0.02 for name in TAUGHT},
     **dict.fromkeys(("practice.rod", "practice-uniform.rod"), 0.022),
     "practice-interest.rod": 0.021,
@@ -61,7 +63,8 @@ ERRORS = {  # name, as `Evidence` has it: its error (m) at 5000
     "imitation.rod by model": 0.3,
     **{f"{name} by model-alone": 0.03 for name in ("model", "gradient")},
     **{f"{name}-arm-50 by model-alone": 0.01 for name in ("model", "gradient")},
-    "sgim-d-arm-50": 0.03,
+    **{f"sgim-d-arm-{joints}": 0.03 for joints in (7, 50)},
+    **{f"sgim-d-model.{task} by model": 0.03 for task in ("rod", "planar-arm-7", "planar-arm-50")},
     # Learners that ask.
     **dict.fromkeys(EXPERIMENTS["asking"], 0.03),
     "taught-every-30": 0.046,

@@ -38,7 +38,7 @@ SPOILT = {
     "learning": {
         0: {"practice-taught.rod": {500: 1.4}},
         1: {"practice-taught.rod": {5000: 1.8}},
-        3: {"cma-mae-taught.rod": {1000: 0.05}},
+        3: {"cma-mae-taught-once.rod": {1000: 0.05}},
         4: {"sgim-d.rod": {500: 0.3}},
         5: {"practice-corner.rod": {250: 1.3}},
         6: {"cma-mae.rod": 0.4},
@@ -70,7 +70,9 @@ SPOILT = {
         **{at: {"gradient by model-alone": {1000: 2.0, 2000: 3.0, 3000: 3.0}} for at in (4, 5)},
         6: {"gradient by model-alone": 3.0},
         7: {"gradient-arm-50 by model-alone": 2.0},
-        8: {"imitation.rod by model": {500: 1.1}},
+        8: {"sgim-d-model.rod by model": {2000: 2.0}},
+        9: {"sgim-d-model.planar-arm-7 by model": {500: 1.5}},
+        10: {"imitation.rod by model": {500: 1.1}},
     },
     "asking": {
         0: {"sgim-im": {1000: 2.0}},
