@@ -159,7 +159,7 @@ class Tables:
     def gain(self) -> str:
         """What each step from random movements to practice brings; then learners with the same teacher."""
         rows = [
-            [step, *self.errors(f"{name}.rod", (1000, LAST), between=True),
+            [step, *self.errors(f"{name}.rod", (1000,), between=True), *self.errors(f"{name}.rod", (LAST,)),
              self._over_tasks(name, [*SUITE], 1000) if step in GAIN and name != "practice-interest" else ""]
             for step, name in {**GAIN, **TAUGHT}.items()
         ]  # fmt: skip
