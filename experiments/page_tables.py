@@ -46,8 +46,8 @@ GAIN: Final[Mapping[str, str]] = {
     "... begun in the middle": "middle",
     "... with `process`": "middle-process",
     "... with its noise": "practice-uniform",
-    "... with goals within reach: `practice`": "practice",
-    "the step before with interest": "practice-interest",
+    "... and goals by interest": "practice-interest",
+    "... or within reach: `practice`": "practice",
 }
 TAUGHT: Final[Mapping[str, str]] = {
     "the standard baseline, every 30": "uniform-nearest-taught",
