@@ -157,14 +157,13 @@ class Record:
         if (n, seal) != self._written[table]:
             raise RunError(f"{self.path}: {table} has {n} rows, {self._written[table][0]} were written; {HINT}")
 
-    def events(self, shown: Sequence[Demonstration] | None = None) -> Iterator[Event]:
-        """What happened, in order; ``shown`` are its ``demonstrations``, if they were read already.
+    def events(self) -> Iterator[Event]:
+        """What happened, in order.
 
         Raises:
             RunError: see ``rows``.
         """
-        read = event_reader(self.dims, self.demonstrations() if shown is None else shown)
-        yield from map(read, self.rows("events"))
+        yield from map(event_reader(self.dims, self.demonstrations()), self.rows("events"))
 
     def demonstrations(self) -> list[Demonstration]:
         """What was shown, each once, in the order in which it was shown first."""
