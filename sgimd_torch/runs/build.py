@@ -15,8 +15,7 @@ from sgimd_torch.catalogue.options import given
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.learner import Learner
-from sgimd_torch.runs.chosen import ALGORITHM, Part, chosen, part_of
-from sgimd_torch.runs.config import OWN, Config
+from sgimd_torch.runs.config import ALGORITHM, OWN, Config, Part, part_of
 from sgimd_torch.runs.tasks import Task, benchmark_of, correspondence_of, demonstrations_of
 from sgimd_torch.spaces import Array, Demonstration, Estimate, stream
 
@@ -126,7 +125,7 @@ class _Maker:
     """Makes the parts of one run: each as something to be called, with its options and the parts that it leads to."""
 
     def __init__(self, config: Config, task: Task) -> None:
-        self.parts = chosen(config.algorithm, dict(config.parts))
+        self.parts = config.chosen
         self._config, self._task = config, task
 
     def __call__(self, name: str, **shared: Any) -> Callable[..., Any]:

@@ -3,21 +3,25 @@
 Each default is the library's own; a run with one changed option is an ablation.
     config = Config(algorithm="sagg-riac", parts={"goals": "grid", "goals.window": 12}); config["search.noise"]
 The keywords of a part's signature are its options (`sgimd_torch.catalogue.options`): one keyword more, one option more.
+A keyword with the name of a kind of the catalogue is a choice, which leads to the next part.
 """
 
 from __future__ import annotations
 
 import importlib.util
+import inspect
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, fields
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any, Final, Self
 
-from sgimd_torch.catalogue import find
-from sgimd_torch.runs.chosen import chosen, part_of, refused, standards
+from sgimd_torch.catalogue import CATALOGUE, ROD, SHARED, did_you_mean, find, word_of
+from sgimd_torch.catalogue.options import Option, options_of, parameters_of
+from sgimd_torch.environments.protocol import FAILURES
 
 OWN: Final = "own"  # the answer of the inverse model that a run chose
 FILES: Final = ("benchmark", "demonstrations")  # options that name a file
@@ -30,6 +34,9 @@ MAY_CHANGE: Final = (
 )
 """When a run is resumed, as they only say how long it lasts, where it is or how it is shown. Files count by their
 content, of which a checksum is recorded; a benchmark may be another one."""
+ALGORITHM: Final = ""  # the name of this part; its options have no prefix
+_HANDED: Final = ("outcome_noise", "seed", "strategy")  # no options: whoever makes a part gives it these
+_TEACHERS: Final = Option(tuple[str, ...], ("all",))
 
 
 @dataclass(frozen=True)
@@ -50,7 +57,7 @@ class Config:
         benchmark: file of the goals to evaluate on; null is the environment's own.
         demonstrations: file of recorded demonstrations; null is the environment's own.
         patience: seconds to wait for a teacher who is asked; null is as long as it takes.
-        failures: failed movements in a row that stop the run; null is ten.
+        failures: failed movements in a row that stop the run.
         parts: by name, such as "goals" or "goals.window", what is chosen for it; what differs from its default is kept.
 
     Raises:
@@ -70,23 +77,20 @@ class Config:
     benchmark: Path | None = None
     demonstrations: Path | None = None
     patience: float | None = None
-    failures: int | None = None
+    failures: int = FAILURES
     parts: Mapping[str, Any] | tuple[tuple[str, Any], ...] = ()
 
     def __post_init__(self) -> None:
         given = {name: tuple(value) if isinstance(value, list) else value for name, value in dict(self.parts).items()}
-        parts = chosen(self.algorithm, given)
-        standard = standards(parts)
+        standard = standards(self.chosen)
         for name in given:
             if name not in standard:
-                raise refused(name, parts, RUN)
+                raise refused(name, self.chosen, RUN)
         differing = sorted((name, value) for name, value in given.items() if value != standard[name])
         object.__setattr__(self, "parts", tuple(differing))
-        for name, least in (("seed", 0), ("movements", 1), ("repeats", 0)):
+        for name, least in (("seed", 0), ("movements", 1), ("repeats", 0), ("failures", 1)):
             if getattr(self, name) < least:
                 raise ValueError(f"{name} must be at least {least}, got {getattr(self, name)}")
-        if self.failures is not None and self.failures < 1:
-            raise ValueError(f"failures must be at least 1, got {self.failures}")
         if self.repeats == 1:
             raise ValueError("repeats must be 0 or at least 2, got 1; one landing point does not scatter")
         for name in ("evaluate_at", "floor_at"):
@@ -119,9 +123,14 @@ class Config:
         return name in RUN or name in self.values
 
     @cached_property
+    def chosen(self) -> dict[str, Part]:
+        """The parts that the run is put together from, by name."""
+        return chosen(self.algorithm, dict(self.parts))
+
+    @cached_property
     def values(self) -> dict[str, Any]:
         """By name, every part and every option of a part."""
-        return {**standards(chosen(self.algorithm, dict(self.parts))), **dict(self.parts)}
+        return {**standards(self.chosen), **dict(self.parts)}
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -181,6 +190,153 @@ class Config:
 
 RUN: Final = tuple(each.name for each in fields(Config) if each.name != "parts")
 """The options that every run has."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of a run.
+
+    Args:
+        name: of the part in the run, "goals" or "goals.progress" say.
+        kind, word: what was chosen; of a shared part both are its name.
+        standard: the word if nobody chooses.
+        make: the thing itself, with what its word fixes.
+        takes: names of all its parameters, but those that its word fixes.
+        options: those of them that a run can set.
+        choices: those that lead to other parts, and their defaults.
+    """
+
+    name: str
+    kind: str
+    word: str
+    standard: str
+    make: Callable[..., Any]
+    takes: Collection[str]
+    options: Mapping[str, Option]
+    choices: Mapping[str, Callable[..., Any]]
+
+    @property
+    def teaching(self) -> str:
+        """Of an algorithm: "teachers" that it asks, a "teacher" who shows it something, or "" if it learns alone."""
+        if self.kind != "algorithm":
+            return ""
+        return "teachers" if "teachers" in self.takes else "teacher" if "correspondence" in self.takes else ""
+
+    def full(self, parameter: str) -> str:
+        """The name of a parameter in the run."""
+        return f"{self.name}.{parameter}" if self.name else parameter
+
+    def set_by(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """The keywords that it gets from what a run has set."""
+        return {each: values[self.full(each)] for each in self.options if each != "teachers"}
+
+
+def part_of(name: str, kind: str, word: str, default: Callable[..., Any] | str = "") -> Part:
+    """The part that a word names.
+
+    Args:
+        name: of the part in the run.
+        kind: of the catalogue, or the name of a shared part.
+        word: of that kind, or package.module:attribute; "" for the default.
+        default: the word if nobody chooses, or the default of the parameter that leads here, which may have options
+            of its own.
+
+    Raises:
+        ValueError: there is no such thing, or a package that it needs is not installed.
+    """
+    standard = default if isinstance(default, str) else word_of(kind, default)
+    word = word or standard
+    return (_read if ":" in word else _READ)(name, kind, word, standard, default)  # a user's own may change
+
+
+def _read(name: str, kind: str, word: str, standard: str, default: Callable[..., Any] | str) -> Part:
+    entry = SHARED[kind] if kind in SHARED else find(kind, word)
+    make = default if callable(default) and word == standard else entry.load()
+    takes = {each: known.default for each, known in parameters_of(make).items() if each not in entry.fixed}
+    options = {each: known for each, known in options_of(make).items() if each in takes and each not in _HANDED}
+    if kind == "algorithm" and "teachers" in takes:
+        options["teachers"] = _TEACHERS
+    choices = {each: value for each, value in takes.items() if each in CATALOGUE and _has_name(each, value)}
+    return Part(name, kind, word, standard or word, make, takes, options, choices)
+
+
+_READ: Final = cache(_read)
+
+
+def chosen(algorithm: str, given: Mapping[str, Any]) -> dict[str, Part]:
+    """The parts of a run by name: first the algorithm and the environment, then those that others lead to.
+
+    Args:
+        algorithm: which learner.
+        given: by name, what was chosen; what names no part of this run is passed over.
+
+    Raises:
+        ValueError: see ``part_of``.
+    """
+    found: dict[str, Part] = {}
+
+    def take(name: str, kind: str, default: Callable[..., Any] | str) -> None:
+        part = found[name] = part_of(name, kind, given.get(name, ""), default)
+        for parameter, value in part.choices.items():
+            take(part.full(parameter), parameter, value)
+        for each in SHARED:
+            if each in part.takes and each not in found:
+                take(each, each, each)
+
+    take("environment", "environment", ROD)
+    take(ALGORITHM, "algorithm", algorithm)
+    if found[ALGORITHM].teaching == "teacher":
+        take("teacher", "teacher", find("algorithm", algorithm).teacher)
+    for word in given.get("teachers", ()) if found[ALGORITHM].teaching == "teachers" else ():
+        find("teachers", word)
+    return found
+
+
+def standards(parts: Mapping[str, Part]) -> dict[str, Any]:
+    """By name, what every part and every option is unless a run says otherwise."""
+    found: dict[str, Any] = {}
+    for name, part in parts.items():
+        if name != ALGORITHM and name not in SHARED:
+            found[name] = part.standard
+        found |= {part.full(each): option.default for each, option in part.options.items()}
+    return found
+
+
+def _has_name(kind: str, default: Any) -> bool:
+    return callable(default) and default is not inspect.Parameter.empty and word_of(kind, default) != ""
+
+
+def refused(name: str, parts: Mapping[str, Part], others: Iterable[str]) -> ValueError:
+    """The error for a name that is none of this run, with the part that has it.
+
+    Args:
+        name: of an option or a part.
+        parts: of the run.
+        others: options that every run has.
+    """
+    owner, _, last = name.rpartition(".")
+    if owner not in parts:  # what it belongs to is no part of this run, either
+        owner, last = ALGORITHM, owner.partition(".")[0]
+    part, spelt = parts[owner], name.replace("_", "-")
+    having = []
+    for kind in (part.kind,) if owner != ALGORITHM or _with(part.kind, last) else CATALOGUE:
+        if words := ", ".join(_with(kind, last)):
+            spelt_so = "" if kind == part.kind or last in SHARED else f" (--{kind}.{last})"
+            having.append(f"{kind} {words}{spelt_so}")
+    near = did_you_mean(name, [each for each in (*standards(parts), *others) if each.rpartition(".")[0] == owner], 2)
+    said = f"--{spelt}: {part.kind} {part.word} has no such option"
+    return ValueError(f"{said}; {' and '.join(having)} have it" if having else f"{said}{near.replace('_', '-')}")
+
+
+def _with(kind: str, name: str) -> list[str]:
+    """The words of a kind whose parts have an option, or lead to a part, of this name."""
+    found = []
+    for word in CATALOGUE.get(kind, ()):
+        with suppress(ValueError):  # one that is not installed has nothing
+            part = part_of(ALGORITHM, kind, word)
+            if name in (*part.options, *part.choices, *SHARED.keys() & part.takes, part.teaching):
+                found.append(word)
+    return found
 
 
 def code_of(settings: Mapping[str, Any]) -> list[str]:
