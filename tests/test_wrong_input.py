@@ -69,7 +69,7 @@ COMMANDS = {
     "run --search nelder": r"unknown search 'nelder'; did you mean nelder-mead\? Known are nelder-mead, .*package",
     "run --environment toss:Toss --algorithm sgim-d": "Toss comes without demonstrations, .* --algorithm practice",
     "run --algorithm random --environment toss:Toss --environment.noise 1": "environment toss:Toss has no such option",
-    "run --demonstrations nothing.npz": "demonstrations: there is no file nothing.npz",
+    "run --demonstrations nothing.npz": "nothing.npz cannot be read or written: No such file",
     "run --demonstrations shown.csv": "shown.csv is no demonstration file: .* sgimd demonstrations import",
     "run --benchmark shown.csv": "shown.csv is no benchmark: it is not an npz file",
     "run --out shown.csv --environment planar-arm-7": "shown.csv.* cannot be made: .* a file in its place",

@@ -61,8 +61,8 @@ _SCHOOL: Final = (  # of quality diversity
 )
 
 
-def _at(place: str, about: str, *more: str, **others: Any) -> Entry:
-    return Entry(f"{_IN_THE_PACKAGE}.{place}", about, *more, **others)
+def _at(place: str, about: str, label: str = "", colour: str = "black", **more: Any) -> Entry:
+    return Entry(f"{_IN_THE_PACKAGE}.{place}", about, label, colour, **more)
 
 
 def _rod(about: str, **fixed: object) -> Entry:
@@ -85,9 +85,7 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
     "algorithm": {
         "random": _at("algorithms:random_exploration", "uniform movements", "Random", "#7f7f7f"),
         "sagg-riac": _at("algorithms:sagg_riac", "goal babbling", "SAGG-RIAC", "#0072b2"),
-        "practice": _at(
-            "algorithms:practice", "one movement a goal, as a local process answers", "Practice", "#332288"
-        ),
+        "practice": _at("algorithms:practice", "one movement a goal, by a local process", "Practice", "#332288"),
         "practice-taught": _at(
             "algorithms:practice_taught",
             "the same, and does once what it is shown",
@@ -96,25 +94,11 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
             teacher="at-once",
         ),
         "observation": _at("algorithms:observation", "watches and remembers, never moves", "Observation", "#cc79a7"),
-        "imitation": _at(
-            "algorithms:imitation", "repeats the last demonstration with variations", "Imitation", "#009e73"
-        ),
+        "imitation": _at("algorithms:imitation", "varies the last demonstration", "Imitation", "#009e73"),
         "sgim-d": _at("algorithms:sgim_d", "goal babbling and short imitations", "SGIM-D", "#d55e00"),
-        "sgim-im": _at(
-            "algorithms.asking:sgim_im", "decides when to ask the one teacher of --teachers", "SGIM-IM", "#661100"
-        ),
-        "sgim-acts": _at(
-            "algorithms.asking:sgim_acts",
-            "decides when to ask which of --teachers for what, and how to use the answer",
-            "SGIM-ACTS",
-            "#cc6677",
-        ),
-        "sgim-eer": _at(
-            "rivals.entropy:sgim_eer",
-            "asks the one teacher of --teachers when that should take away more doubt",
-            "By entropy",
-            "#117733",
-        ),
+        "sgim-im": _at("algorithms.asking:sgim_im", "decides when to ask the one of --teachers", "SGIM-IM", "#661100"),
+        "sgim-acts": _at("algorithms.asking:sgim_acts", "and which of them for what, and how", "SGIM-ACTS", "#cc6677"),
+        "sgim-eer": _at("rivals.entropy:sgim_eer", "asks when that takes away more doubt", "By entropy", "#117733"),
         **{
             f"{name}{ending}": _at(
                 f"rivals.quality_diversity:{name.replace('-', '_')}",
@@ -135,9 +119,7 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
         "planar-arm-7": _at("runs.tasks.robots:planar_arm", "7 joints, no noise", fixed={"n_joints": 7}),
         "planar-arm-50": _at("runs.tasks.robots:planar_arm", "50 joints, no noise", fixed={"n_joints": 50}),
         "swimmer": _at("runs.tasks.robots:swimmer", "gymnasium's Swimmer-v5: three links, two motors (extra gym)"),
-        "half-reached": _at(
-            "runs.tasks.robots:half_reached", "7 joints, and a T of which less than half can be reached"
-        ),
+        "half-reached": _at("runs.tasks.robots:half_reached", "7 joints, less than half of T can be reached"),
         "toss": _toy("toss", 0.4, "a ball in the wind, which is the context", taught=True),
         "crawler": _toy("crawler", 0.1, "four legs, whose phases are periodic parameters"),
         "two-elbows": _toy("two_elbows", 0.1, "an arm with two separate families of postures"),
@@ -169,9 +151,7 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
         "perturb": _at("searches.perturb:perturb", "the best so far plus noise"),
         "practice": _at("searches.perturb:practise", "what the inverse model infers plus a little noise"),
         "cma-es": _at("searches.cma_es:cma_es", "an evolution strategy (extra rivals)"),
-        "gradient": _at(
-            "searches.through_model:gradient_search", "down the gradient of a forward model (extra forward)"
-        ),
+        "gradient": _at("searches.through_model:gradient_search", "by the gradient of a forward model (extra forward)"),
         "gauss-newton": _at(
             "searches.through_model:gradient_search",
             "a new plan through it for each movement (extra forward)",
@@ -181,29 +161,18 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
     "explore": {
         "anywhere": _at("algorithms:anywhere", "uniformly from Pi"),
         "widening": _at("searches.widening:Widening", "around the middle of Pi, as wide as can be predicted"),
-        "returning": _at(
-            "searches.returning:Returning", "the same; where most movements do nothing, around what had an effect"
-        ),
+        "returning": _at("searches.returning:Returning", "the same; if effects are rare, around what had one"),
     },
     "inverse": {
         "linear": _at("inverses.locally_linear:LocallyLinear", "eq. (9) corrected to first order"),
         "paper": _at("inverses.local:LocalInverse", "the weighted mean of eq. (9)"),
         "nearest": _at("inverses.local:NearestNeighbour", "the movement that came nearest"),
-        "process": _at(
-            "inverses.local_process:LocalProcess",
-            "what a local Gaussian process proposes, if it should beat the nearest",
-        ),
-        "among-effects": _at(
-            "inverses.among_effects:AmongEffects", "process, from movements with an effect where most have none"
-        ),
-        "model": _at(
-            "inverses.proved:ProvedModel",
-            "through a forward model once that has predicted movements better than process, which answers before "
-            "(extra forward)",
-        ),
+        "process": _at("inverses.local_process:LocalProcess", "a local Gaussian process, where it beats the nearest"),
+        "among-effects": _at("inverses.among_effects:AmongEffects", "the same; if effects are rare, from them alone"),
+        "model": _at("inverses.proved:ProvedModel", "process, then a forward model that beats it (extra forward)"),
         "model-alone": _at(
             "inverses.through_model:ModelInverse",
-            "linear when learning, through a forward model in evaluations, proved or not (extra forward)",
+            "linear when learning, a forward model in evaluations, proved or not (extra forward)",
         ),
     },
     "judge": {

@@ -82,7 +82,7 @@ def benchmark_of(task: Task, file: Path | None) -> tuple[Benchmark, list[str], s
     """
     source, robot, notes, crc32 = file or task.benchmark, task.environment, list[str](), None
     if isinstance(source, Path):
-        crc32 = _checksum("benchmark", source)
+        crc32 = checksum(source)
         benchmark = load_benchmark(source)
     elif source is not None:
         benchmark = source()
@@ -118,12 +118,15 @@ def demonstrations_of(task: Task, file: Path | None) -> tuple[Sequence[Demonstra
     if isinstance(source, Path):
         from sgimd_torch.demonstrations import load_demonstrations  # most learners read none
 
-        crc32 = _checksum("demonstrations", source)
+        crc32 = checksum(source)
         shown = load_demonstrations(source, outcome_dim=robot.outcomes.dim, context_dim=robot.contexts.dim)
-        check = task.misfit or (lambda each: correspondence_of(task)(each.times, each.trajectory))
+        translate = correspondence_of(task)
         for row, demonstration in enumerate(shown):
             try:
-                check(demonstration)
+                if task.misfit is None:
+                    translate(demonstration.times, demonstration.trajectory)
+                else:
+                    task.misfit(demonstration)
             except ValueError as error:
                 raise ValueError(f"{source}: recording {row} cannot be translated: {error}") from error
     else:
@@ -167,12 +170,3 @@ def hand_led_of(task: Task) -> HandLed:
         )
     correspondence_of(task)
     return found
-
-
-def _checksum(what: str, path: Path) -> str:
-    """Of the content of a file that the user named."""
-    if path.is_dir():
-        raise IsADirectoryError(f"{what}: {path} is a directory, a file was wanted")
-    if not path.is_file():
-        raise FileNotFoundError(f"{what}: there is no file {path}")
-    return checksum(path)
