@@ -21,13 +21,9 @@ from typing import Any, Final, get_type_hints
 
 from sgimd_torch.catalogue import CATALOGUE
 from sgimd_torch.catalogue.options import help_of
-from sgimd_torch.runs.config import RUN, Config, Part, chosen, dashed, refused, standards, typed
+from sgimd_torch.runs.config import FLAGS, RUN, Config, Part, chosen, dashed, typed
 from sgimd_torch.runs.process import Stopping, loading
 
-FLAGS: Final = {
-    "resume": "go on with a stopped or killed run, or lengthen a finished one.",
-    "accept_loss": "with --resume: go on even if the log has lost movements; a copy of it is kept.",
-}
 ALONE: Final = "practice"  # the default learner of a robot without demonstrations
 _PLACES: Final = {"progress": "goals.progress", "choose": "teacher.choose"}  # of kinds that another part chooses
 _WIDTH: Final = 120
@@ -64,9 +60,6 @@ def parse(argv: Sequence[str], description: str | None = None) -> tuple[Config, 
         if "algorithm" not in given:
             given["algorithm"] = _suited(given)
         parts = chosen(given["algorithm"], {name: text for name, text in given.items() if name != "teachers"})
-        for name in given:
-            if name not in RUN and name not in standards(parts):
-                raise refused(name, parts, (*RUN, *FLAGS))
         if "help" in asked:
             print(help_on(parts))
             raise SystemExit(0)
@@ -118,15 +111,14 @@ def _suited(given: Mapping[str, str]) -> str:
 
 
 def _values(given: Mapping[str, str], parts: Mapping[str, Part]) -> dict[str, Any]:
-    """What was typed, as values of the types of the options; words of parts stay words. Other names are left out.
+    """What was typed, as values of the types of the options; words of parts, and what there is not, stay words.
 
     Raises:
         ValueError: one is of another type.
     """
-    kinds = get_type_hints(Config) | {
-        part.full(name): option.kind for part in parts.values() for name, option in part.options.items()
-    }
-    found: dict[str, Any] = {name: text for name, text in given.items() if name in parts}
+    hints, found = get_type_hints(Config), dict[str, Any](given)
+    kinds = {name: hints[name] for name in RUN}
+    kinds |= {part.full(name): option.kind for part in parts.values() for name, option in part.options.items()}
     for name, text in given.items():
         if name in kinds and name not in parts:
             try:

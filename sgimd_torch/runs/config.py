@@ -12,7 +12,7 @@ import importlib.util
 import inspect
 import json
 import math
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, fields
 from functools import cache, cached_property
@@ -82,11 +82,10 @@ class Config:
 
     def __post_init__(self) -> None:
         given = {name: tuple(value) if isinstance(value, list) else value for name, value in dict(self.parts).items()}
-        standard = standards(self.chosen)
         for name in given:
-            if name not in standard:
-                raise refused(name, self.chosen, RUN)
-        differing = sorted((name, value) for name, value in given.items() if value != standard[name])
+            if name not in self.standards:
+                raise self._refused(name)
+        differing = sorted((name, value) for name, value in given.items() if value != self.standards[name])
         object.__setattr__(self, "parts", tuple(differing))
         for name, least in (("seed", 0), ("movements", 1), ("repeats", 0), ("failures", 1)):
             if getattr(self, name) < least:
@@ -128,9 +127,19 @@ class Config:
         return chosen(self.algorithm, dict(self.parts))
 
     @cached_property
+    def standards(self) -> dict[str, Any]:
+        """By name, what every part and every option of a part is unless a run says otherwise."""
+        found: dict[str, Any] = {}
+        for name, part in self.chosen.items():
+            if name != ALGORITHM and name not in SHARED:
+                found[name] = part.standard
+            found |= {part.full(each): option.default for each, option in part.options.items()}
+        return found
+
+    @cached_property
     def values(self) -> dict[str, Any]:
         """By name, every part and every option of a part."""
-        return {**standards(self.chosen), **dict(self.parts)}
+        return {**self.standards, **dict(self.parts)}
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -187,9 +196,27 @@ class Config:
             return list(self.evaluated_by)
         return [word for word in self.evaluated_by if word == OWN or "model" not in part_of("", "inverse", word).takes]
 
+    def _refused(self, name: str) -> ValueError:
+        """The error for a name that is none of this run, with the part that has it."""
+        owner, _, last = name.rpartition(".")
+        if owner not in self.chosen:  # what it belongs to is no part of this run, either
+            owner, last = ALGORITHM, owner.partition(".")[0]
+        part, having = self.chosen[owner], []
+        for kind in (part.kind,) if owner != ALGORITHM or _with(part.kind, last) else CATALOGUE:
+            if words := ", ".join(_with(kind, last)):
+                spelt_so = "" if kind == part.kind or last in SHARED else f" (--{kind}.{last})"
+                having.append(f"{kind} {words}{spelt_so}")
+        near = [each for each in (*self.standards, *RUN, *FLAGS) if each.rpartition(".")[0] == owner]
+        more = f"; {' and '.join(having)} have it" if having else dashed(did_you_mean(name, near, 2))
+        return ValueError(f"--{dashed(name)}: {part.kind} {part.word} has no such option{more}")
+
 
 RUN: Final = tuple(each.name for each in fields(Config) if each.name != "parts")
 """The options that every run has."""
+FLAGS: Final = {
+    "resume": "go on with a stopped or killed run, or lengthen a finished one.",
+    "accept_loss": "with --resume: go on even if the log has lost movements; a copy of it is kept.",
+}
 
 
 @dataclass(frozen=True)
@@ -292,40 +319,8 @@ def chosen(algorithm: str, given: Mapping[str, Any]) -> dict[str, Part]:
     return found
 
 
-def standards(parts: Mapping[str, Part]) -> dict[str, Any]:
-    """By name, what every part and every option is unless a run says otherwise."""
-    found: dict[str, Any] = {}
-    for name, part in parts.items():
-        if name != ALGORITHM and name not in SHARED:
-            found[name] = part.standard
-        found |= {part.full(each): option.default for each, option in part.options.items()}
-    return found
-
-
 def _has_name(kind: str, default: Any) -> bool:
     return callable(default) and default is not inspect.Parameter.empty and word_of(kind, default) != ""
-
-
-def refused(name: str, parts: Mapping[str, Part], others: Iterable[str]) -> ValueError:
-    """The error for a name that is none of this run, with the part that has it.
-
-    Args:
-        name: of an option or a part.
-        parts: of the run.
-        others: options that every run has.
-    """
-    owner, _, last = name.rpartition(".")
-    if owner not in parts:  # what it belongs to is no part of this run, either
-        owner, last = ALGORITHM, owner.partition(".")[0]
-    part, spelt = parts[owner], name.replace("_", "-")
-    having = []
-    for kind in (part.kind,) if owner != ALGORITHM or _with(part.kind, last) else CATALOGUE:
-        if words := ", ".join(_with(kind, last)):
-            spelt_so = "" if kind == part.kind or last in SHARED else f" (--{kind}.{last})"
-            having.append(f"{kind} {words}{spelt_so}")
-    near = did_you_mean(name, [each for each in (*standards(parts), *others) if each.rpartition(".")[0] == owner], 2)
-    said = f"--{spelt}: {part.kind} {part.word} has no such option"
-    return ValueError(f"{said}; {' and '.join(having)} have it" if having else f"{said}{near.replace('_', '-')}")
 
 
 def _with(kind: str, name: str) -> list[str]:
