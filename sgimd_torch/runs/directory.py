@@ -80,8 +80,13 @@ def _reopened(
 
     ``about``, what makes the run now, gets the versions of its earlier parts, ``notes`` messages for the user.
     """
-    record = _readable(path, accept_loss, notes)
-    if record is None:
+    try:
+        record = Record(path, write=True)
+    except InUseError:
+        raise
+    except RunError as error:
+        _accept(path, f"{error}; nothing of it can be read", "make them", accept_loss, notes)
+        path.unlink()
         return None
     try:
         differ = _refuse_other(record, about, dims)
@@ -98,18 +103,6 @@ def _reopened(
         record.close()
         raise
     return record
-
-
-def _readable(path: Path, accept_loss: bool, notes: list[str]) -> Record | None:
-    """The record at ``path``, open for writing; None if nothing of it can be read."""
-    try:
-        return Record(path, write=True)
-    except InUseError:
-        raise
-    except RunError as error:
-        _accept(path, f"{error}; nothing of it can be read", "make them", accept_loss, notes)
-        path.unlink()
-        return None
 
 
 def _refuse_other(record: Record, about: dict[str, Any], dims: Dims) -> set[str]:

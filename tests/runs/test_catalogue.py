@@ -2,7 +2,6 @@
 
 import json
 import re
-import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from runs import ROOT, content_of
+from runs import content_of
 from sgimd_torch.catalogue import CATALOGUE, colour, find, label, load
 from sgimd_torch.catalogue.options import parameters_of
 from sgimd_torch.runs import command_line
@@ -18,7 +17,7 @@ from sgimd_torch.runs.build import build
 from sgimd_torch.runs.command_line import main, overview, parse
 from sgimd_torch.runs.config import Config, words
 from sgimd_torch.runs.process import command
-from sgimd_torch.runs.read import movements_on_disk, read_run
+from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.tasks import MOST_GOALS, goals_all_over
 from sgimd_torch.session import run
 
@@ -115,15 +114,6 @@ def test_an_option_of_a_users_goal_model_is_its_parameter_and_nothing_else(toss,
     assert re.search(r"--goals.window .*\n? *how many are .*default: 8", said), said
     assert command(main, [*words_, "--goals.window", "x"]) == 2
     assert "--goals.window must be int, got x" in capsys.readouterr().err
-
-
-def test_the_installed_command_finds_modules_in_the_working_directory(toss):
-    words_ = [sys.executable, "-c", "import sys; from sgimd_torch.__main__ import main; sys.exit(main())"]
-    sys_path = {"PYTHONPATH": str(ROOT), "PATH": "/usr/bin:/bin", "PYTHONSAFEPATH": "1"}
-    own = ["run", "--environment", "toss:Toss", "--algorithm", "random", "--out", "runs", *SHORT]
-    done = subprocess.run([*words_, *own], capture_output=True, text=True, env=sys_path, cwd=toss)
-    assert done.returncode == 0, done.stderr
-    assert movements_on_disk(toss / "runs/random/seed-000") == 40
 
 
 def test_goals_all_over_a_space_are_at_most_500_and_inside():

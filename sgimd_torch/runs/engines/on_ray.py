@@ -158,13 +158,11 @@ def _connect(address: str | None, processes: int, options: Mapping[str, Any]) ->
     if address is None:
         options = {**options, "num_cpus": processes, "object_store_memory": STORE, "include_dashboard": False}
     elif address != "auto":
-        host, colon, port = address.rpartition(":")
-        if "://" in address or not colon or not port.isdecimal():
-            raise ValueError(f"--address must be host:port, or auto, got {address}; start the sweep on a node of it")
+        host, _, port = address.rpartition(":")
         try:
             socket.create_connection((host, int(port)), ANSWER_WITHIN).close()  # Ray would try for minutes, then abort
-        except (OSError, OverflowError) as error:
-            hint = "is its head running, and is this the port of ray start?"
+        except (OSError, OverflowError, ValueError) as error:
+            hint = "--address is host:port of its head, or auto, on a node of it; is it running?"
             raise ValueError(f"no Ray cluster answers at {address}: {error}; {hint}") from error
     try:
         ray.init(address or "local", log_to_driver=False, configure_logging=False, **options)
