@@ -21,7 +21,6 @@ from typing import Any, Final, Self
 
 from sgimd_torch.catalogue import CATALOGUE, ROD, SHARED, did_you_mean, find, word_of
 from sgimd_torch.catalogue.options import Option, options_of, parameters_of
-from sgimd_torch.environments.protocol import FAILURES
 
 OWN: Final = "own"  # the answer of the inverse model that a run chose
 FILES: Final = ("benchmark", "demonstrations")  # options that name a file
@@ -57,7 +56,7 @@ class Config:
         benchmark: file of the goals to evaluate on; null is the environment's own.
         demonstrations: file of recorded demonstrations; null is the environment's own.
         patience: seconds to wait for a teacher who is asked; null is as long as it takes.
-        failures: failed movements in a row that stop the run.
+        failures: failed movements in a row that stop the run; null is ten.
         parts: by name, such as "goals" or "goals.window", what is chosen for it; what differs from its default is kept.
 
     Raises:
@@ -77,7 +76,7 @@ class Config:
     benchmark: Path | None = None
     demonstrations: Path | None = None
     patience: float | None = None
-    failures: int = FAILURES
+    failures: int | None = None
     parts: Mapping[str, Any] | tuple[tuple[str, Any], ...] = ()
 
     def __post_init__(self) -> None:
@@ -87,9 +86,11 @@ class Config:
                 raise self._refused(name)
         differing = sorted((name, value) for name, value in given.items() if value != self.standards[name])
         object.__setattr__(self, "parts", tuple(differing))
-        for name, least in (("seed", 0), ("movements", 1), ("repeats", 0), ("failures", 1)):
+        for name, least in (("seed", 0), ("movements", 1), ("repeats", 0)):
             if getattr(self, name) < least:
                 raise ValueError(f"{name} must be at least {least}, got {getattr(self, name)}")
+        if self.failures is not None and self.failures < 1:
+            raise ValueError(f"failures must be at least 1, got {self.failures}")
         if self.repeats == 1:
             raise ValueError("repeats must be 0 or at least 2, got 1; one landing point does not scatter")
         for name in ("evaluate_at", "floor_at"):

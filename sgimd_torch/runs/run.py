@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from typing import TYPE_CHECKING, Final, Self
 
-from sgimd_torch.environments.protocol import SimulationError
+from sgimd_torch.environments.protocol import FAILURES, SimulationError
 from sgimd_torch.record import Record, RunError
 from sgimd_torch.runs.build import RunParts
 from sgimd_torch.runs.config import OWN
@@ -156,7 +156,7 @@ class Life:
             teachers={name: self._awaited(name, each) for name, each in parts.teachers.items()},
             execute=self.seconds.of("physics")(live(parts.environment, seed)),
             record=self.record,
-            failures=parts.config.failures,
+            failures=parts.config.failures or FAILURES,
         )
         if not self.recorded:
             self._begin()
