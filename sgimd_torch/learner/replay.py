@@ -67,7 +67,10 @@ def replay(
             case Kind.SHOWN:
                 if event.who == TEACHER and teacher is not None:
                     _check_lesson(index, event.lesson, offered)
-                _watch(learner, event)
+                if learner.social is None and not learner.waits_for_answer:
+                    found = f"before movement {index} it asked for a demonstration, the learner now does not"
+                    raise ReplayError(f"{found}; is it built in the same way, with the same seed?")
+                learner.watch(event.lesson, offered=event.who is not None)
                 offered, before = None, before._replace(demonstration=event.lesson)
             case Kind.ASKED:
                 assert event.context is not None
@@ -102,14 +105,6 @@ def replay(
                 yield Episode(index, event.context, move, event.outcome, *before, failed)
                 before = BeforeMovement()
     return before
-
-
-def _watch(learner: Any, event: Event) -> None:
-    assert event.lesson is not None
-    if learner.social is None and not learner.waits_for_answer:
-        found = f"before movement {learner.movements} it asked for a demonstration, the learner now does not"
-        raise ReplayError(f"{found}; is it built in the same way, with the same seed?")
-    learner.watch(event.lesson, offered=event.who is not None)
 
 
 def _check_repeats(index: int, name: str, recorded: Array | None, now: Array | None) -> None:
