@@ -18,8 +18,7 @@ from jsonargparse.typing import NonNegativeInt, Path_fc, PositiveInt
 
 from sgimd_torch.evaluation import SHIPPED
 from sgimd_torch.runs.config import Config
-from sgimd_torch.runs.engines.local import local
-from sgimd_torch.runs.engines.loop import sweep
+from sgimd_torch.runs.engines.loop import local, sweep
 from sgimd_torch.runs.process import Failed
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.spaces import Array

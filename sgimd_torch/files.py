@@ -113,7 +113,6 @@ def make_folder(path: Path) -> None:
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        inside = (place for place in (path, *path.parents) if os.path.lexists(place) and not place.is_dir())
-        blocker = next(inside, None)
-        why = f"{blocker} is no folder" if blocker else f"{error.strerror}"
-        raise OSError(f"{path} cannot be made: {why}; choose another --out") from error
+        raise OSError(
+            f"{path} cannot be made: {error.strerror}; is a file in its place? Choose another --out"
+        ) from error

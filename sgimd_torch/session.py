@@ -94,7 +94,8 @@ def run(
             f"movements must be above {made}, which the learner has made already and which count, got {movements}"
         )
     execute = live(environment, seed) if execute is None else execute
-    before, note = BeforeMovement(), _nowhere if record is None else record.add
+    before = BeforeMovement()
+    note: Note = (lambda event: None) if record is None else record.add
     if record is not None:
         before = yield from replay(learner, record.events(), teacher=teacher)
     in_a_row = 0
@@ -171,10 +172,6 @@ def _event(
     if move is None:
         return Event(kind, context, reply=reply)
     return Event(kind, context, move.theta, move.goal, outcome, move.origin, reply=reply)
-
-
-def _nowhere(event: Event) -> None:
-    """Writes nothing down."""
 
 
 class _NoOutcome(Exception):

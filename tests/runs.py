@@ -67,8 +67,7 @@ def files_of(directory):
 
 def sweep_here(configs, processes=1, **options):
     """On this machine; the failures."""
-    from sgimd_torch.runs.engines.local import local
-    from sgimd_torch.runs.engines.loop import sweep
+    from sgimd_torch.runs.engines.loop import local, sweep
 
     with local(processes) as submit:
         return sweep(configs, submit, **options)

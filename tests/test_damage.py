@@ -92,7 +92,7 @@ def damaged(path, whole, other, what, k):
     with Record(path) as record:
         n_rows = {table: len(list(record.rows(table))) for table in layout(record.dims)}
         table = str(rng.choice([table for table, n in n_rows.items() if n > 2]))
-        column = str(rng.choice([*record.columns(table), "seal"]))
+        column = str(rng.choice([column.split()[0] for column in layout(record.dims)[table]]))
     first, second = map(int, rng.choice(n_rows[table], 2, replace=False) + 1)
     names = {"table": table, "column": column, "first": first, "second": second, "n": n_rows[table]}
     edit(path, f"ATTACH '{other}' AS other", *(statement.format(**names) for statement in SQL[what]))

@@ -38,9 +38,9 @@ def test_a_folder_is_not_replaced(tmp_path):
     assert os.listdir(tmp_path) == []
 
 
-def test_a_folder_that_cannot_be_made_names_what_is_in_the_way(tmp_path):
+def test_a_folder_that_cannot_be_made_is_named(tmp_path):
     make_folder(tmp_path / "a" / "b")
     make_folder(tmp_path / "a" / "b")
     (tmp_path / "file").touch()
-    with pytest.raises(OSError, match=r"file/runs/x cannot be made: .*file is no folder; choose another --out"):
+    with pytest.raises(OSError, match=r"file/runs/x cannot be made: .*a file in its place"):
         make_folder(tmp_path / "file" / "runs" / "x")

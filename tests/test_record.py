@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from records import DIMS, fill, moved, read, shown
 from runs import edit, end, start, stopped
-from sgimd_torch.record import DERIVED, Event, InUseError, Kind, Record, RunError
+from sgimd_torch.record import Event, InUseError, Kind, Record, RunError
 from sgimd_torch.spaces import Demonstration
 
 numbers = st.floats(allow_nan=False)
@@ -161,18 +161,6 @@ def test_a_full_disk_is_told_and_what_was_committed_is_whole(tmp_path):
         with pytest.raises(OSError, match="lost"):  # but it does not know what it had handed over
             record.commit()
     assert read(path) == before
-
-
-@pytest.mark.parametrize(("n", "kept"), [(None, 40), (0, 0), (1, 1), (6, 5), (7, 6)])
-def test_the_first_events_alone_are_a_record_of_the_same_run(tmp_path, n, kept):
-    path = fill(tmp_path / "run.sqlite")
-    before = read(path)
-    with Record(path, write=True) as record, record.rewrite(n_events=n) as new:
-        assert new.movements == kept
-    after = read(path)
-    assert after["events"] == before["events"][:n]
-    assert all(after[table] == [] for table in DERIVED)
-    assert dict(after["about"])["settings"] == dict(before["about"])["settings"]
 
 
 def test_a_record_is_read_from_a_folder_that_cannot_be_written(tmp_path):

@@ -67,15 +67,6 @@ def test_a_run_has_exactly_as_many_movements_as_asked_for(name: str) -> None:
         assert np.array_equal(learner.memory.outcomes, executed)
 
 
-@every_algorithm
-def test_the_same_seed_makes_the_same_run_and_another_seed_another(name: str) -> None:
-    arm = PlanarArm(5, noise=0.01)
-    first, again, other = (summary(life(name, arm, 100, seed)) for seed in (1, 1, 2))
-    assert first == again
-    if name != "observation":
-        assert first != other
-
-
 def test_sgim_d_imitates_exactly_first_and_then_returns_to_its_own_goals() -> None:
     arm = PlanarArm(5)
     learner = sgim_d(arm, 0, correspondence=last_posture, social=partial(imitating, repeats=7))

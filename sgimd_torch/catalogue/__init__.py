@@ -25,22 +25,18 @@ class Entry:
     Args:
         at: where it is, ``package.module:attribute``.
         about: what it is, for ``--help``.
+        label, colour: what figures call an algorithm, and how they draw it.
         fixed: its parameter -> value, where the word is a preset of something more general; a text with a colon is an
             attribute, loaded like ``at``.
-        hidden: parameters that are no options of it, besides those that are fixed.
-        label, colour: what figures call an algorithm, and how they draw it.
         teacher: of an algorithm that is shown something: when, unless a run says otherwise.
-        filmed: of an environment: whether `sgimd film` shows it.
     """
 
     at: str
     about: str
-    fixed: Mapping[str, object] = field(default_factory=dict)
-    hidden: tuple[str, ...] = ()
     label: str = ""
     colour: str = "black"
+    fixed: Mapping[str, object] = field(default_factory=dict)
     teacher: str = "periodic"
-    filmed: bool = False
 
     def load(self) -> Any:
         """The thing itself, with what is fixed.
@@ -56,7 +52,7 @@ class Entry:
 
 
 _IN_THE_PACKAGE: Final = "sgimd_torch"
-_ALONE: Final = ("correspondence", "imitations", "epsilon")  # hidden: a learner without a teacher
+_ALONE: Final = {"correspondence": None, "imitations": 0, "epsilon": 0.0}  # a learner without a teacher
 _SCHOOL: Final = (  # of quality diversity
     ("map-elites", "fills an archive of outcomes", "MAP-Elites", ("#56b4e9", "#1f78a8")),
     ("isoline", "the same along lines between elites", "Isoline", ("#999933", "#5c5c1f")),
@@ -65,21 +61,17 @@ _SCHOOL: Final = (  # of quality diversity
 )
 
 
-def _at(place: str, about: str, **more: Any) -> Entry:
-    return Entry(f"{_IN_THE_PACKAGE}.{place}", about, **more)
-
-
-def _learner(place: str, about: str, label: str, colour: str, **more: Any) -> Entry:
-    return _at(place, about, label=label, colour=colour, **more)
+def _at(place: str, about: str, label: str = "", colour: str = "black", **more: Any) -> Entry:
+    return Entry(f"{_IN_THE_PACKAGE}.{place}", about, label, colour, **more)
 
 
 def _rod(about: str, **fixed: object) -> Entry:
-    return _at("runs.tasks.rods:fishing_rod", about, fixed=fixed, filmed=True)
+    return _at("runs.tasks.rods:fishing_rod", about, fixed=fixed)
 
 
 def _toy(name: str, side: float, about: str, *, module: str = "toys", **more: object) -> Entry:
     make = f"{_IN_THE_PACKAGE}.environments.{module}:{name}"
-    return _at("runs.tasks.robots:toy", about, fixed={"make": make, "side": side, **more}, hidden=("taught",))
+    return _at("runs.tasks.robots:toy", about, fixed={"make": make, "side": side, "taught": False, **more})
 
 
 def _answering(about: str, knows: str = "", **fixed: object) -> Entry:
@@ -91,47 +83,29 @@ ROD: Final = "fishing-rod"
 # Colours after Okabe & Ito: distinct with any colour vision, and in grey.
 CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
     "algorithm": {
-        "random": _learner("algorithms:random_exploration", "uniform movements", "Random", "#7f7f7f"),
-        "sagg-riac": _learner("algorithms:sagg_riac", "goal babbling", "SAGG-RIAC", "#0072b2"),
-        "practice": _learner(
-            "algorithms:practice", "one movement a goal, as a local process answers", "Practice", "#332288"
-        ),
-        "practice-taught": _learner(
+        "random": _at("algorithms:random_exploration", "uniform movements", "Random", "#7f7f7f"),
+        "sagg-riac": _at("algorithms:sagg_riac", "goal babbling", "SAGG-RIAC", "#0072b2"),
+        "practice": _at("algorithms:practice", "one movement a goal, by a local process", "Practice", "#332288"),
+        "practice-taught": _at(
             "algorithms:practice_taught",
             "the same, and does once what it is shown",
             "Practice, taught",
             "#aa4499",
             teacher="at-once",
         ),
-        "observation": _learner(
-            "algorithms:observation", "watches and remembers, never moves", "Observation", "#cc79a7"
-        ),
-        "imitation": _learner(
-            "algorithms:imitation", "repeats the last demonstration with variations", "Imitation", "#009e73"
-        ),
-        "sgim-d": _learner("algorithms:sgim_d", "goal babbling and short imitations", "SGIM-D", "#d55e00"),
-        "sgim-im": _learner(
-            "algorithms.asking:sgim_im", "decides when to ask the one teacher of --teachers", "SGIM-IM", "#661100"
-        ),
-        "sgim-acts": _learner(
-            "algorithms.asking:sgim_acts",
-            "decides when to ask which of --teachers for what, and how to use the answer",
-            "SGIM-ACTS",
-            "#cc6677",
-        ),
-        "sgim-eer": _learner(
-            "rivals.entropy:sgim_eer",
-            "asks the one teacher of --teachers when that should take away more doubt",
-            "By entropy",
-            "#117733",
-        ),
+        "observation": _at("algorithms:observation", "watches and remembers, never moves", "Observation", "#cc79a7"),
+        "imitation": _at("algorithms:imitation", "varies the last demonstration", "Imitation", "#009e73"),
+        "sgim-d": _at("algorithms:sgim_d", "goal babbling and short imitations", "SGIM-D", "#d55e00"),
+        "sgim-im": _at("algorithms.asking:sgim_im", "decides when to ask the one of --teachers", "SGIM-IM", "#661100"),
+        "sgim-acts": _at("algorithms.asking:sgim_acts", "and which of them for what, and how", "SGIM-ACTS", "#cc6677"),
+        "sgim-eer": _at("rivals.entropy:sgim_eer", "asks when that takes away more doubt", "By entropy", "#117733"),
         **{
-            f"{name}{ending}": _learner(
+            f"{name}{ending}": _at(
                 f"rivals.quality_diversity:{name.replace('-', '_')}",
                 f"{about}{shown} (extra rivals)",
                 f"{label}, taught" if shown else label,
                 colours[bool(shown)],
-                hidden=() if shown else _ALONE,
+                fixed={} if shown else _ALONE,
             )
             for ending, shown in (("", ""), ("-taught", ", and imitates what it is shown"))
             for name, about, label, colours in _SCHOOL
@@ -142,14 +116,10 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
         "rod-wind": _rod("the same in a side wind, up to a quarter of the float's weight: a context", max_wind=0.05),
         "rod-yaw": _rod("the same with its base turned by up to half a radian: a context", max_yaw=0.5),
         "rod-long": _rod("the same with a line half as long again, taught with the shorter one", line=1.5),
-        "planar-arm-7": _at("runs.tasks.robots:planar_arm", "7 joints, no noise", fixed={"n_joints": 7}, filmed=True),
-        "planar-arm-50": _at(
-            "runs.tasks.robots:planar_arm", "50 joints, no noise", fixed={"n_joints": 50}, filmed=True
-        ),
+        "planar-arm-7": _at("runs.tasks.robots:planar_arm", "7 joints, no noise", fixed={"n_joints": 7}),
+        "planar-arm-50": _at("runs.tasks.robots:planar_arm", "50 joints, no noise", fixed={"n_joints": 50}),
         "swimmer": _at("runs.tasks.robots:swimmer", "gymnasium's Swimmer-v5: three links, two motors (extra gym)"),
-        "half-reached": _at(
-            "runs.tasks.robots:half_reached", "7 joints, and a T of which less than half can be reached", filmed=True
-        ),
+        "half-reached": _at("runs.tasks.robots:half_reached", "7 joints, less than half of T can be reached"),
         "toss": _toy("toss", 0.4, "a ball in the wind, which is the context", taught=True),
         "crawler": _toy("crawler", 0.1, "four legs, whose phases are periodic parameters"),
         "two-elbows": _toy("two_elbows", 0.1, "an arm with two separate families of postures"),
@@ -181,9 +151,7 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
         "perturb": _at("searches.perturb:perturb", "the best so far plus noise"),
         "practice": _at("searches.perturb:practise", "what the inverse model infers plus a little noise"),
         "cma-es": _at("searches.cma_es:cma_es", "an evolution strategy (extra rivals)"),
-        "gradient": _at(
-            "searches.through_model:gradient_search", "down the gradient of a forward model (extra forward)"
-        ),
+        "gradient": _at("searches.through_model:gradient_search", "by the gradient of a forward model (extra forward)"),
         "gauss-newton": _at(
             "searches.through_model:gradient_search",
             "a new plan through it for each movement (extra forward)",
@@ -193,29 +161,18 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
     "explore": {
         "anywhere": _at("algorithms:anywhere", "uniformly from Pi"),
         "widening": _at("searches.widening:Widening", "around the middle of Pi, as wide as can be predicted"),
-        "returning": _at(
-            "searches.returning:Returning", "the same; where most movements do nothing, around what had an effect"
-        ),
+        "returning": _at("searches.returning:Returning", "the same; if effects are rare, around what had one"),
     },
     "inverse": {
         "linear": _at("inverses.locally_linear:LocallyLinear", "eq. (9) corrected to first order"),
         "paper": _at("inverses.local:LocalInverse", "the weighted mean of eq. (9)"),
         "nearest": _at("inverses.local:NearestNeighbour", "the movement that came nearest"),
-        "process": _at(
-            "inverses.local_process:LocalProcess",
-            "what a local Gaussian process proposes, if it should beat the nearest",
-        ),
-        "among-effects": _at(
-            "inverses.among_effects:AmongEffects", "process, from movements with an effect where most have none"
-        ),
-        "model": _at(
-            "inverses.proved:ProvedModel",
-            "through a forward model once that has predicted movements better than process, which answers before "
-            "(extra forward)",
-        ),
+        "process": _at("inverses.local_process:LocalProcess", "a local Gaussian process, where it beats the nearest"),
+        "among-effects": _at("inverses.among_effects:AmongEffects", "the same; if effects are rare, from them alone"),
+        "model": _at("inverses.proved:ProvedModel", "process, then a forward model that beats it (extra forward)"),
         "model-alone": _at(
             "inverses.through_model:ModelInverse",
-            "linear when learning, through a forward model in evaluations, proved or not (extra forward)",
+            "linear when learning, a forward model in evaluations, proved or not (extra forward)",
         ),
     },
     "judge": {
@@ -223,8 +180,8 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
         "attempt": _at("algorithms:attempted", "by those made for this goal"),
     },
     "social": {
-        "imitate": _at("algorithms:imitating", "repeat a demonstration a few times", hidden=("strategy",)),
-        "emulate": _at("algorithms:emulating", "pursue its outcome in the learner's own way", hidden=("strategy",)),
+        "imitate": _at("algorithms:imitating", "repeat a demonstration a few times"),
+        "emulate": _at("algorithms:emulating", "pursue its outcome in the learner's own way"),
     },
     "base": {
         "practice": _at("algorithms.asking:practised", "one movement a goal, and once what is shown"),
@@ -257,7 +214,7 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
 }
 # Parts that several others share: made once for a run, and only if something takes a parameter of this name.
 SHARED: Final = {
-    "model": _at("forward_model.model:ForwardModel", "the forward model (extra forward)", hidden=("seed",)),
+    "model": _at("forward_model.model:ForwardModel", "the forward model (extra forward)"),
     "trust": _at("forward_model.anchored:Trust", "how far to trust the forward model"),
 }
 # What a thing of your own must have: how it is called, and the members of what it returns.
@@ -336,12 +293,7 @@ def checked(kind: str, word: str, make: Callable[..., Any]) -> Callable[..., Any
             inspect.signature(make).bind(*arguments, **options)
         except TypeError as error:
             raise ValueError(f"{kind} {word} cannot be called as {wanted}: {error}") from error
-        except ValueError:  # a builtin may not name its parameters
-            pass
-        try:
-            part = make(*arguments, **options)
-        except SystemExit as end:  # it must not end the command, which would look like success
-            raise ValueError(f"{kind} {word} cannot be made: it calls exit({end})") from end
+        part = make(*arguments, **options)
         robot = getattr(part, "environment", part) if kind == "environment" else part  # of a Task
         missing = [name for name in members if not hasattr(robot, name)]
         if missing:

@@ -33,12 +33,8 @@ def options_of(make: Callable[..., Any]) -> dict[str, Option]:
 
 
 def parameters_of(make: Callable[..., Any]) -> dict[str, inspect.Parameter]:
-    """The parameters that can be given by name; none of a builtin that does not name its own."""
-    try:
-        every = inspect.signature(make).parameters.values()
-    except (TypeError, ValueError):
-        return {}
-    return {each.name: each for each in every if each.kind in _NAMED}
+    """The parameters that can be given by name."""
+    return {each.name: each for each in inspect.signature(make).parameters.values() if each.kind in _NAMED}
 
 
 def help_of(make: Callable[..., Any]) -> dict[str, str]:

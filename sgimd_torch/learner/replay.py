@@ -8,13 +8,12 @@ attempt, too. So nothing but events has to be kept; ``record.py`` keeps them.
 from __future__ import annotations
 
 from collections.abc import Generator, Iterable
-from typing import TYPE_CHECKING, Final, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from sgimd_torch.memory import Memory
 from sgimd_torch.record import Event, Kind
-from sgimd_torch.spaces import Array, Demonstration, Episode, Move, Request
+from sgimd_torch.spaces import Array, Demonstration, Episode, Request
 
 if TYPE_CHECKING:
     from sgimd_torch.teachers import Teacher
@@ -36,40 +35,13 @@ class BeforeMovement(NamedTuple):
     reply: str = ""
 
 
-class Lives(Protocol):
-    """What can live through a life again: a `Learner`, which this file cannot import, since that imports this file."""
-
-    memory: Memory
-
-    @property
-    def movements(self) -> int: ...
-
-    @property
-    def social(self) -> object: ...
-
-    @property
-    def waits_for_answer(self) -> bool: ...
-
-    def ask(self, context: Array, /) -> Move | None: ...
-
-    def request(self, context: Array, /) -> Request | None: ...
-
-    def watch(self, demonstration: Demonstration, /, *, offered: bool) -> None: ...
-
-    def tell(self, outcome: Array, /) -> object: ...
-
-    def fail(self, reason: str, /) -> object: ...
-
-    def interrupt(self) -> object: ...
-
-
 def replay(
-    learner: Lives, events: Iterable[Event], *, teacher: Teacher | None = None
+    learner: Any, events: Iterable[Event], *, teacher: Teacher | None = None
 ) -> Generator[Episode, None, BeforeMovement]:
     """Let ``learner`` live through ``events``. Nothing is executed and nobody is asked for a demonstration.
 
     Args:
-        learner: freshly built.
+        learner: a `Learner` freshly built; its file imports this one.
         events: of the record.
         teacher: freshly built, too: it is asked before each movement what it offers, so that its draws go on as they
             would have. None for what was recorded alone.
@@ -95,7 +67,10 @@ def replay(
             case Kind.SHOWN:
                 if event.who == TEACHER and teacher is not None:
                     _check_lesson(index, event.lesson, offered)
-                _watch(learner, event)
+                if learner.social is None and not learner.waits_for_answer:
+                    found = f"before movement {index} it asked for a demonstration, the learner now does not"
+                    raise ReplayError(f"{found}; is it built in the same way, with the same seed?")
+                learner.watch(event.lesson, offered=event.who is not None)
                 offered, before = None, before._replace(demonstration=event.lesson)
             case Kind.ASKED:
                 assert event.context is not None
@@ -130,14 +105,6 @@ def replay(
                 yield Episode(index, event.context, move, event.outcome, *before, failed)
                 before = BeforeMovement()
     return before
-
-
-def _watch(learner: Lives, event: Event) -> None:
-    assert event.lesson is not None
-    if learner.social is None and not learner.waits_for_answer:
-        found = f"before movement {learner.movements} it asked for a demonstration, the learner now does not"
-        raise ReplayError(f"{found}; is it built in the same way, with the same seed?")
-    learner.watch(event.lesson, offered=event.who is not None)
 
 
 def _check_repeats(index: int, name: str, recorded: Array | None, now: Array | None) -> None:

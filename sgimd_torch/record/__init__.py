@@ -23,7 +23,7 @@ import sqlite3
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from itertools import islice, takewhile
+from itertools import takewhile
 from pathlib import Path
 from typing import Any, Final, Self
 
@@ -157,18 +157,13 @@ class Record:
         if (n, seal) != self._written[table]:
             raise RunError(f"{self.path}: {table} has {n} rows, {self._written[table][0]} were written; {HINT}")
 
-    def columns(self, table: str) -> list[str]:
-        """Names of the columns, without the seal."""
-        return [column.split()[0] for column in layout(self.dims)[table][:-1]]
-
-    def events(self, shown: Sequence[Demonstration] | None = None) -> Iterator[Event]:
-        """What happened, in order; ``shown`` are its ``demonstrations``, if they were read already.
+    def events(self) -> Iterator[Event]:
+        """What happened, in order.
 
         Raises:
             RunError: see ``rows``.
         """
-        read = event_reader(self.dims, self.demonstrations() if shown is None else shown)
-        yield from map(read, self.rows("events"))
+        yield from map(event_reader(self.dims, self.demonstrations()), self.rows("events"))
 
     def demonstrations(self) -> list[Demonstration]:
         """What was shown, each once, in the order in which it was shown first."""
@@ -221,11 +216,8 @@ class Record:
                 wrong[table] = str(error)
         return wrong
 
-    def rewrite(self, *, n_events: int | None = None) -> Record:
-        """Replace the file by one with the first events of this one, and close this one.
-
-        Args:
-            n_events: how many; None for all up to the first that is damaged.
+    def rewrite(self) -> Record:
+        """Replace the file by one with the events up to the first that is damaged, and close this one.
 
         Returns:
             The new one, open for writing; what a replay makes again is not in it.
@@ -234,12 +226,10 @@ class Record:
             OSError: it cannot be written.
         """
         about = {name: value for name, value in self.about.items() if name not in ("run", "dims")}
-        lesson = self.columns("events").index("demonstration")
         with replacing(self.path) as partial:
             with Record.make(partial, self.dims, about) as new:
                 shown = new._take("demonstrations", self.rows("demonstrations"))
-                rows = takewhile(lambda row: row[lesson] is None or row[lesson] < shown, self.rows("events"))
-                new._take("events", islice(rows, n_events))
+                new._take("events", takewhile(lambda row: row[-4] is None or row[-4] < shown, self.rows("events")))
                 new.commit()
             self.close()
         return Record(self.path, write=True)
@@ -340,14 +330,10 @@ def _connect(path: Path, write: bool) -> sqlite3.Connection:
         raise RunError(f"there is no record {path}")
     if not path.stat().st_size:
         raise RunError(f"{path} holds nothing yet")
-    place = path.resolve().as_uri()
     try:
-        mode = "rw" if os.access(path, os.W_OK) and os.access(path.parent, os.W_OK) else "ro"
-        # Read-only, SQLite could not clean up after a writer that was killed.
-        patience = 0.5 if write else 10.0
-        # One thread opens a run that is taught, and another one then lives it; never two at a time.
-        return sqlite3.connect(
-            f"{place}?mode={mode}", uri=True, isolation_level=None, timeout=patience, check_same_thread=False
-        )
+        # Readers, too, may have to clean up after a writer that was killed; of a file that may not be written, SQLite
+        # reads alone. One thread opens a run that is taught, and another one then lives it; never two at a time.
+        place, patience = f"{path.resolve().as_uri()}?mode=rw", 0.5 if write else 10.0
+        return sqlite3.connect(place, uri=True, isolation_level=None, timeout=patience, check_same_thread=False)
     except (sqlite3.Error, OSError) as error:
         raise RunError(f"{path} cannot be opened: {error}") from error

@@ -10,13 +10,12 @@ from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Final
 
-from sgimd_torch.catalogue import checked
+from sgimd_torch.catalogue import SHARED, checked
 from sgimd_torch.catalogue.options import given
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.learner import Learner
-from sgimd_torch.runs.chosen import ALGORITHM, Part, chosen, part_of
-from sgimd_torch.runs.config import OWN, Config
+from sgimd_torch.runs.config import ALGORITHM, OWN, Config, Part, part_of
 from sgimd_torch.runs.tasks import Task, benchmark_of, correspondence_of, demonstrations_of
 from sgimd_torch.spaces import Array, Demonstration, Estimate, stream
 
@@ -126,26 +125,25 @@ class _Maker:
     """Makes the parts of one run: each as something to be called, with its options and the parts that it leads to."""
 
     def __init__(self, config: Config, task: Task) -> None:
-        self.parts = chosen(config.algorithm, dict(config.parts))
+        self.parts = config.chosen
         self._config, self._task = config, task
 
     def __call__(self, name: str, **shared: Any) -> Callable[..., Any]:
         """The part of this name; ``shared`` is what it gets if it asks for it."""
         part = self.parts[name]
-        made = self._with_options(part)
+        values = part.set_by(self._config.values)
+        made = partial(part.make, **values) if values else part.make
         for parameter in part.choices:
             child = self(part.full(parameter))
             if parameter == "inverse":
                 child = getattr(self.parts[part.full(parameter)].make, "learns_with", child)
             made = partial(made, **{parameter: child})
-        if "correspondence" in part.takes:
-            shared["correspondence"] = correspondence_of(self._task)
-        return self._checked(part, given(made, **shared))
+        return self._given(part, made, **shared)
 
     def other(self, kind: str, word: str) -> Callable[..., Any]:
         """Another word of a kind, with its defaults."""
         part = part_of(kind, kind, word)
-        return self._checked(part, self._given(part.make, part))
+        return self._given(part, part.make)
 
     def answers(self, learner: Learner) -> dict[str, Callable[[Array, Array], Estimate]]:
         """The inverses to evaluate by; what the learner infers by answers as its own, but for one by a model."""
@@ -162,24 +160,20 @@ class _Maker:
         """The forward model of the run."""
         robot = self._task.environment
         dims = robot.contexts.dim, robot.policies.dim, robot.outcomes.dim
-        return self._with_options(self.parts["model"])(*dims, seed=self._config.seed)
+        return self("model")(*dims, seed=self._config.seed)
 
     @cached_property
     def trust(self) -> Any:
         """How far the run trusts its model."""
-        return self._with_options(self.parts["trust"])()
+        return self("trust")()
 
-    def _with_options(self, part: Part) -> Callable[..., Any]:
-        values = part.set_by(self._config.values)
-        return self._given(partial(part.make, **values) if values else part.make, part)
-
-    def _given(self, make: Callable[..., Any], part: Part) -> Callable[..., Any]:
-        """With the things of the run that it names."""
+    def _given(self, part: Part, make: Callable[..., Any], **things: Any) -> Callable[..., Any]:
+        """With the things of the run that it names; one of a user's own is checked."""
         robot = self._task.environment
-        things = {name: getattr(self, name) for name in ("model", "trust") if name in part.takes}
+        things |= {name: getattr(self, name) for name in SHARED if name in part.takes}
         if part.kind == "inverse":
             things |= {"policies": robot.policies, "outcome_noise": robot.outcome_noise}
-        return given(make, **things)
-
-    def _checked(self, part: Part, make: Callable[..., Any]) -> Callable[..., Any]:
+        if "correspondence" in part.takes:
+            things["correspondence"] = correspondence_of(self._task)
+        make = given(make, **things)
         return checked(part.kind, part.word, make) if ":" in part.word else make

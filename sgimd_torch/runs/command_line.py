@@ -9,23 +9,24 @@ Examples:
 
 from __future__ import annotations
 
+import inspect
 import shlex
 import sys
+import textwrap
 import types
 import typing
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, get_type_hints
 
-from sgimd_torch.runs.chosen import Part, chosen, refused, standards
-from sgimd_torch.runs.config import RUN, Config, dashed
+from sgimd_torch.catalogue import CATALOGUE
+from sgimd_torch.catalogue.options import help_of
+from sgimd_torch.runs.config import FLAGS, RUN, Config, Part, chosen, dashed, typed
 from sgimd_torch.runs.process import Stopping, loading
 
-FLAGS: Final = {
-    "resume": "go on with a stopped or killed run, or lengthen a finished one.",
-    "accept_loss": "with --resume: go on even if the log has lost movements; a copy of it is kept.",
-}
 ALONE: Final = "practice"  # the default learner of a robot without demonstrations
+_PLACES: Final = {"progress": "goals.progress", "choose": "teacher.choose"}  # of kinds that another part chooses
+_WIDTH: Final = 120
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -54,19 +55,12 @@ def parse(argv: Sequence[str], description: str | None = None) -> tuple[Config, 
     try:
         given, asked = _read(argv)
         if "help" in asked and not given:
-            from sgimd_torch.runs.help import overview  # most commands need no help
-
             print(overview(description, FLAGS))
             raise SystemExit(0)
         if "algorithm" not in given:
             given["algorithm"] = _suited(given)
         parts = chosen(given["algorithm"], {name: text for name, text in given.items() if name != "teachers"})
-        for name in given:
-            if name not in RUN and name not in standards(parts):
-                raise refused(name, parts, (*RUN, *FLAGS))
         if "help" in asked:
-            from sgimd_torch.runs.help import help_on
-
             print(help_on(parts))
             raise SystemExit(0)
         values = _values(given, parts)
@@ -117,23 +111,20 @@ def _suited(given: Mapping[str, str]) -> str:
 
 
 def _values(given: Mapping[str, str], parts: Mapping[str, Part]) -> dict[str, Any]:
-    """What was typed, as values of the types of the options; words of parts stay words. Other names are left out.
+    """What was typed, as values of the types of the options; words of parts, and what there is not, stay words.
 
     Raises:
         ValueError: one is of another type.
     """
-    kinds = get_type_hints(Config) | {
-        part.full(name): option.kind for part in parts.values() for name, option in part.options.items()
-    }
-    found: dict[str, Any] = {name: text for name, text in given.items() if name in parts}
+    hints, found = get_type_hints(Config), dict[str, Any](given)
+    kinds = {name: hints[name] for name in RUN}
+    kinds |= {part.full(name): option.kind for part in parts.values() for name, option in part.options.items()}
     for name, text in given.items():
         if name in kinds and name not in parts:
             try:
                 found[name] = _value(text, kinds[name])
             except ValueError as error:
-                from sgimd_torch.runs.help import wanted
-
-                raise ValueError(f"--{dashed(name)} must be {wanted(kinds[name])}, got {text}") from error
+                raise ValueError(f"--{dashed(name)} must be {_wanted(kinds[name])}, got {text}") from error
     return found
 
 
@@ -157,3 +148,54 @@ def _value(text: str, kind: Any) -> Any:
     if not text:
         raise ValueError("nothing was typed")
     return kind(text)
+
+
+def _wanted(kind: Any) -> str:
+    """A type, as one types its values."""
+    text = inspect.formatannotation(kind).replace("bool", "true or false").replace("None", "null")
+    return f"{text}, with commas" if "tuple" in text else text
+
+
+def overview(description: str | None, flags: Mapping[str, str]) -> str:
+    """What ``sgimd run --help`` prints: the options of every run, its flags, and the words for its parts."""
+    about = help_of(Config)
+    shown = {name: typed(getattr(Config, name)) for name in RUN}
+    run = {name: about[name] + f" ({text})" * (text != "null") for name, text in shown.items()} | {**flags}
+    algorithms = {word: entry.about for word, entry in CATALOGUE["algorithm"].items() if "rivals" not in entry.about}
+    rivals = [word for word in CATALOGUE["algorithm"] if word not in algorithms]
+    kinds = {kind: ", ".join(words) for kind, words in CATALOGUE.items() if kind != "algorithm"}
+    lines = [
+        "usage: sgimd run [--OPTION VALUE ...] [--resume]",
+        "",
+        *(description or "").splitlines(),
+        "the run, with defaults (null, for no value, where there is none):",
+        *(_line(f"--{dashed(name)}", text) for name, text in run.items()),
+        "algorithms (--algorithm):",
+        *(_line(word, text) for word, text in algorithms.items()),
+        _line("extra rivals", ", ".join(rivals)),
+        "parts, each a word of these or package.module:attribute, one of your own:",
+        *(_line(f"--{_PLACES.get(kind, kind)}", words) for kind, words in kinds.items()),
+        "",
+        "Parts have options of their own: sgimd run --goals interest-map --help shows those of the parts that are",
+        "chosen, such as --goals.window 12.",
+    ]
+    return "\n".join(lines)
+
+
+def help_on(parts: Mapping[str, Part]) -> str:
+    """What ``sgimd run --goals grid --help`` prints: the options of the parts that are chosen."""
+    lines = ["usage: sgimd run [--OPTION VALUE ...] [--resume]; sgimd run --help shows the options of every run"]
+    for part in parts.values():
+        words, about = CATALOGUE.get(part.kind, {}), help_of(part.make)
+        what = [words[part.word].about] if part.word in words else []
+        leads_to = [f"--{part.full(each)}={parts[part.full(each)].word}" for each in part.choices]
+        what += [f"its parts: {' '.join(leads_to)}"] if leads_to else []
+        lines += ["", textwrap.fill(f"--{part.name or part.kind} {part.word}: {'; '.join(what)}", _WIDTH)]
+        for name, option in part.options.items():
+            meant = f"{_wanted(option.kind)}; default: {typed(option.default)}"
+            lines.append(_line(f"--{dashed(part.full(name))}", f"{about.get(name, '')} ({meant})"))
+    return "\n".join(lines)
+
+
+def _line(name: str, text: str) -> str:
+    return textwrap.fill(text, _WIDTH, initial_indent=f"  {name:17} ", subsequent_indent=" " * 20)

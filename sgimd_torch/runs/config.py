@@ -3,21 +3,24 @@
 Each default is the library's own; a run with one changed option is an ablation.
     config = Config(algorithm="sagg-riac", parts={"goals": "grid", "goals.window": 12}); config["search.noise"]
 The keywords of a part's signature are its options (`sgimd_torch.catalogue.options`): one keyword more, one option more.
+A keyword with the name of a kind of the catalogue is a choice, which leads to the next part.
 """
 
 from __future__ import annotations
 
 import importlib.util
+import inspect
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, fields
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any, Final, Self
 
-from sgimd_torch.catalogue import find
-from sgimd_torch.runs.chosen import chosen, part_of, refused, standards
+from sgimd_torch.catalogue import CATALOGUE, ROD, SHARED, did_you_mean, find, word_of
+from sgimd_torch.catalogue.options import Option, options_of, parameters_of
 
 OWN: Final = "own"  # the answer of the inverse model that a run chose
 FILES: Final = ("benchmark", "demonstrations")  # options that name a file
@@ -30,6 +33,9 @@ MAY_CHANGE: Final = (
 )
 """When a run is resumed, as they only say how long it lasts, where it is or how it is shown. Files count by their
 content, of which a checksum is recorded; a benchmark may be another one."""
+ALGORITHM: Final = ""  # the name of this part; its options have no prefix
+_HANDED: Final = ("outcome_noise", "seed", "strategy")  # no options: whoever makes a part gives it these
+_TEACHERS: Final = Option(tuple[str, ...], ("all",))
 
 
 @dataclass(frozen=True)
@@ -75,12 +81,10 @@ class Config:
 
     def __post_init__(self) -> None:
         given = {name: tuple(value) if isinstance(value, list) else value for name, value in dict(self.parts).items()}
-        parts = chosen(self.algorithm, given)
-        standard = standards(parts)
         for name in given:
-            if name not in standard:
-                raise refused(name, parts, RUN)
-        differing = sorted((name, value) for name, value in given.items() if value != standard[name])
+            if name not in self.standards:
+                raise self._refused(name)
+        differing = sorted((name, value) for name, value in given.items() if value != self.standards[name])
         object.__setattr__(self, "parts", tuple(differing))
         for name, least in (("seed", 0), ("movements", 1), ("repeats", 0)):
             if getattr(self, name) < least:
@@ -119,9 +123,24 @@ class Config:
         return name in RUN or name in self.values
 
     @cached_property
+    def chosen(self) -> dict[str, Part]:
+        """The parts that the run is put together from, by name."""
+        return chosen(self.algorithm, dict(self.parts))
+
+    @cached_property
+    def standards(self) -> dict[str, Any]:
+        """By name, what every part and every option of a part is unless a run says otherwise."""
+        found: dict[str, Any] = {}
+        for name, part in self.chosen.items():
+            if name != ALGORITHM and name not in SHARED:
+                found[name] = part.standard
+            found |= {part.full(each): option.default for each, option in part.options.items()}
+        return found
+
+    @cached_property
     def values(self) -> dict[str, Any]:
         """By name, every part and every option of a part."""
-        return {**standards(chosen(self.algorithm, dict(self.parts))), **dict(self.parts)}
+        return {**self.standards, **dict(self.parts)}
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -178,9 +197,142 @@ class Config:
             return list(self.evaluated_by)
         return [word for word in self.evaluated_by if word == OWN or "model" not in part_of("", "inverse", word).takes]
 
+    def _refused(self, name: str) -> ValueError:
+        """The error for a name that is none of this run, with the part that has it."""
+        owner, _, last = name.rpartition(".")
+        if owner not in self.chosen:  # what it belongs to is no part of this run, either
+            owner, last = ALGORITHM, owner.partition(".")[0]
+        part, having = self.chosen[owner], []
+        for kind in (part.kind,) if owner != ALGORITHM or _with(part.kind, last) else CATALOGUE:
+            if words := ", ".join(_with(kind, last)):
+                spelt_so = "" if kind == part.kind or last in SHARED else f" (--{kind}.{last})"
+                having.append(f"{kind} {words}{spelt_so}")
+        near = [each for each in (*self.standards, *RUN, *FLAGS) if each.rpartition(".")[0] == owner]
+        more = f"; {' and '.join(having)} have it" if having else dashed(did_you_mean(name, near, 2))
+        return ValueError(f"--{dashed(name)}: {part.kind} {part.word} has no such option{more}")
+
 
 RUN: Final = tuple(each.name for each in fields(Config) if each.name != "parts")
 """The options that every run has."""
+FLAGS: Final = {
+    "resume": "go on with a stopped or killed run, or lengthen a finished one.",
+    "accept_loss": "with --resume: go on even if the log has lost movements; a copy of it is kept.",
+}
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of a run.
+
+    Args:
+        name: of the part in the run, "goals" or "goals.progress" say.
+        kind, word: what was chosen; of a shared part both are its name.
+        standard: the word if nobody chooses.
+        make: the thing itself, with what its word fixes.
+        takes: names of all its parameters, but those that its word fixes.
+        options: those of them that a run can set.
+        choices: those that lead to other parts, and their defaults.
+    """
+
+    name: str
+    kind: str
+    word: str
+    standard: str
+    make: Callable[..., Any]
+    takes: Collection[str]
+    options: Mapping[str, Option]
+    choices: Mapping[str, Callable[..., Any]]
+
+    @property
+    def teaching(self) -> str:
+        """Of an algorithm: "teachers" that it asks, a "teacher" who shows it something, or "" if it learns alone."""
+        if self.kind != "algorithm":
+            return ""
+        return "teachers" if "teachers" in self.takes else "teacher" if "correspondence" in self.takes else ""
+
+    def full(self, parameter: str) -> str:
+        """The name of a parameter in the run."""
+        return f"{self.name}.{parameter}" if self.name else parameter
+
+    def set_by(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """The keywords that it gets from what a run has set."""
+        return {each: values[self.full(each)] for each in self.options if each != "teachers"}
+
+
+def part_of(name: str, kind: str, word: str, default: Callable[..., Any] | str = "") -> Part:
+    """The part that a word names.
+
+    Args:
+        name: of the part in the run.
+        kind: of the catalogue, or the name of a shared part.
+        word: of that kind, or package.module:attribute; "" for the default.
+        default: the word if nobody chooses, or the default of the parameter that leads here, which may have options
+            of its own.
+
+    Raises:
+        ValueError: there is no such thing, or a package that it needs is not installed.
+    """
+    standard = default if isinstance(default, str) else word_of(kind, default)
+    word = word or standard
+    return (_read if ":" in word else _READ)(name, kind, word, standard, default)  # a user's own may change
+
+
+def _read(name: str, kind: str, word: str, standard: str, default: Callable[..., Any] | str) -> Part:
+    entry = SHARED[kind] if kind in SHARED else find(kind, word)
+    make = default if callable(default) and word == standard else entry.load()
+    takes = {each: known.default for each, known in parameters_of(make).items() if each not in entry.fixed}
+    options = {each: known for each, known in options_of(make).items() if each in takes and each not in _HANDED}
+    if kind == "algorithm" and "teachers" in takes:
+        options["teachers"] = _TEACHERS
+    choices = {each: value for each, value in takes.items() if each in CATALOGUE and _has_name(each, value)}
+    return Part(name, kind, word, standard or word, make, takes, options, choices)
+
+
+_READ: Final = cache(_read)
+
+
+def chosen(algorithm: str, given: Mapping[str, Any]) -> dict[str, Part]:
+    """The parts of a run by name: first the algorithm and the environment, then those that others lead to.
+
+    Args:
+        algorithm: which learner.
+        given: by name, what was chosen; what names no part of this run is passed over.
+
+    Raises:
+        ValueError: see ``part_of``.
+    """
+    found: dict[str, Part] = {}
+
+    def take(name: str, kind: str, default: Callable[..., Any] | str) -> None:
+        part = found[name] = part_of(name, kind, given.get(name, ""), default)
+        for parameter, value in part.choices.items():
+            take(part.full(parameter), parameter, value)
+        for each in SHARED:
+            if each in part.takes and each not in found:
+                take(each, each, each)
+
+    take("environment", "environment", ROD)
+    take(ALGORITHM, "algorithm", algorithm)
+    if found[ALGORITHM].teaching == "teacher":
+        take("teacher", "teacher", find("algorithm", algorithm).teacher)
+    for word in given.get("teachers", ()) if found[ALGORITHM].teaching == "teachers" else ():
+        find("teachers", word)
+    return found
+
+
+def _has_name(kind: str, default: Any) -> bool:
+    return callable(default) and default is not inspect.Parameter.empty and word_of(kind, default) != ""
+
+
+def _with(kind: str, name: str) -> list[str]:
+    """The words of a kind whose parts have an option, or lead to a part, of this name."""
+    found = []
+    for word in CATALOGUE.get(kind, ()):
+        with suppress(ValueError):  # one that is not installed has nothing
+            part = part_of(ALGORITHM, kind, word)
+            if name in (*part.options, *part.choices, *SHARED.keys() & part.takes, part.teaching):
+                found.append(word)
+    return found
 
 
 def code_of(settings: Mapping[str, Any]) -> list[str]:

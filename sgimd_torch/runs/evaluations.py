@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
@@ -19,9 +19,6 @@ from sgimd_torch.learner import Learner
 from sgimd_torch.record import Record
 from sgimd_torch.runs.config import OWN, Config
 from sgimd_torch.spaces import Array, Estimate
-
-EVALUATED: Final = ("evaluations", "errors", "regions")
-"""Tables of evaluations; in each, rows begin with the number of movements."""
 
 Answers = Mapping[str, Evaluation]
 """An evaluation by each answer, the run's own first."""

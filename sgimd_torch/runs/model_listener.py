@@ -42,15 +42,29 @@ class ModelListener(Listener):
         self._model, self._trust, self._memory, self._seconds = model, trust, memory, seconds
         self._record, self._inverse = record, inverse
         self._asked = False
-        self._news: list[str] = []
         self._curves: dict[str, float] = {}
 
     def episode(self, episode: Episode, replayed: bool) -> None:
         """Refresh after a movement; say what is new."""
-        self._refresh(episode)
+        memory, movements, move = self._memory, episode.index + 1, episode.move
+        with self._seconds.of("model"):
+            refresh = self._model.refresh(memory, None if move is None else move.goal)
+        if refresh is None:
+            return
+        error = self._model.relative_error
+        learnt = refresh.steps, refresh.held_out, error, int(refresh.diverged)
+        self._record.add_rows("refreshes", [(movements, len(memory), *learnt)])
+        self._curves = {"model/relative_error": error, "model/held_out": refresh.held_out, "model/steps": refresh.steps}
+        if refresh.predicted is not None:
+            self._predicted(refresh.first, memory.outcomes[refresh.first :], refresh.predicted)
+        news = ["training diverged; the forward model keeps its last good weights"] if refresh.diverged else []
+        asked = getattr(self._inverse, "trusted", error <= self._trust)
+        if asked != self._asked:
+            self._asked = asked
+            who = "the forward model is asked from here on" if asked else NOT_ASKED
+            news.append(f"{who}: {self._how_wrong(error)}")
         if not replayed:
-            say(*self._news)
-            self._news.clear()
+            say(*(f"movement {movements}: {each}" for each in news))
 
     def close(self) -> None:
         """Say so if the model is not asked."""
@@ -64,40 +78,12 @@ class ModelListener(Listener):
         curves, self._curves = self._curves, {}
         return curves
 
-    def _refresh(self, episode: Episode) -> None:
-        memory = self._memory
-        movements, move = episode.index + 1, episode.move
-        with self._seconds.of("model"):
-            refresh = self._model.refresh(memory, None if move is None else move.goal)
-        if refresh is None:
-            return
-        error = self._model.relative_error
-        learnt = refresh.steps, refresh.held_out, error, int(refresh.diverged)
-        self._record.add_rows("refreshes", [(movements, len(memory), *learnt)])
-        self._curves = {
-            "model/relative_error": error,
-            "model/held_out": refresh.held_out,
-            "model/steps": refresh.steps,
-        }
-        if refresh.predicted is not None:
-            self._predicted(refresh.first, memory.outcomes[refresh.first :], refresh.predicted)
-        if refresh.diverged:
-            self._news.append(f"movement {movements}: training diverged; the forward model keeps its last good weights")
-        self._say_whether_asked(movements, error)
-
     def _predicted(self, first: int, outcomes: Array, predicted: Prediction) -> None:
         values = np.hstack((outcomes, *predicted)).tolist()
         self._record.add_rows("predictions", ((row, *each) for row, each in enumerate(values, first)))
         spread = np.hypot(predicted.epistemic, predicted.aleatoric)
         self._curves["model/error"] = float(np.linalg.norm(outcomes - predicted.mean, axis=1).mean())
         self._curves["model/coverage"] = coverage(outcomes, predicted.mean, spread, LEVEL)
-
-    def _say_whether_asked(self, movements: int, error: float) -> None:
-        asked = getattr(self._inverse, "trusted", error <= self._trust)
-        changed, self._asked = asked != self._asked, asked
-        if changed:
-            who = "the forward model is asked from here on" if asked else NOT_ASKED
-            self._news.append(f"movement {movements}: {who}: {self._how_wrong(error)}")
 
     def _how_wrong(self, error: float) -> str:
         proof = "" if self._asked or error > self._trust else ", once it predicts movements better than a local process"

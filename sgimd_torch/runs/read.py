@@ -34,9 +34,11 @@ class Run:
     there was none: a movement that failed has a theta and no outcome. ``answers`` has, for each answer, the columns of
     its evaluations; ``errors`` those of every goal at every evaluation, ``benchmark`` ``(n_goals, outcome_dim)`` the
     goals; ``regions`` those of the goal model at every evaluation, None for a goal model without regions;
-    ``predictions`` and ``refreshes`` those of a forward model, None without one; ``requests`` those of what was asked
-    for, None if nothing was. ``config``: all options by name; ``robot``: the class of the environment; ``spaces``: its
-    contexts, policies and outcomes; ``summary``: movements, how many ``failed``, whether it is finished, and seconds.
+    ``predictions`` and ``refreshes`` those of a forward model, None without one; ``requests`` what was asked for, None
+    if nothing was: ``index`` of the next movement, ``teacher``, ``strategy``, ``reply``, ``shown`` (row of the
+    demonstration, -1 for none) and ``wanted_0`` and so on, a point of C x T. ``config``: all options by name;
+    ``robot``: the class of the environment; ``spaces``: its contexts, policies and outcomes; ``summary``: movements,
+    how many ``failed``, whether it is finished, and seconds.
     """
 
     path: Path
@@ -111,7 +113,7 @@ def read_run(path: str | os.PathLike[str]) -> Run:
         if seed is not None and int(seed[1]) != settings["seed"]:
             raise RunError(f"{path} holds a run of seed {settings['seed']}; was it copied from another one?")
         shown = record.demonstrations()
-        arrays, requests, failed = _lived(record, shown)
+        arrays, requests, failed = _lived(record)
         found: dict[str, Columns] = {table: _columns(record, table) for table in DERIVED}
         n = record.movements
     evaluated = found["evaluations"]["movements"]
@@ -142,50 +144,32 @@ def _if_any(columns: Columns) -> Columns | None:
     return columns if len(next(iter(columns.values()))) else None
 
 
-def _lived(record: Record, shown: list[Demonstration]) -> tuple[dict[str, Any], Columns | None, int]:
+def _lived(record: Record) -> tuple[dict[str, Any], Columns | None, int]:
     """The movements as arrays; requests, None if there was none; how many movements have failed."""
     c, p, t = record.dims
-    dims = {"contexts": c, "thetas": p, "goals": t, "outcomes": t}
-    vectors = {name: array("d") for name in dims}
-    row = {id(each): k for k, each in enumerate(shown)}
-    origins, before, requests = list[str](), array("q"), list[dict[str, Any]]()
+    origins, shown, cells, requests = list[str](), array("q"), array("d"), list[dict[str, Any]]()
     last, failed = -1, 0
-    for event in record.events(shown):
-        if event.lesson is not None:
-            last = row[id(event.lesson)]
+    for _, kind, origin, *vectors, lesson, who, strategy, reply in record.rows("events"):
+        if lesson is not None:
+            last = lesson
             if requests and requests[-1]["reply"] == "shown" and requests[-1]["shown"] < 0:
-                requests[-1]["shown"] = last
-        elif event.kind == Kind.ASKED and event.goal is not None:
-            words = {"teacher": event.who, "strategy": event.strategy, "reply": event.reply}
-            requests.append({"index": len(origins), **words, "shown": -1, "wanted": (event.context, event.goal)})
-        elif event.kind in (Kind.MOVED, Kind.RESTED, Kind.FAILED):
-            failed += event.kind == Kind.FAILED
-            origins.append(event.origin or "")
-            before.append(last)
+                requests[-1]["shown"] = lesson
+        elif kind == Kind.ASKED and who is not None:
+            asked = {"index": len(origins), "teacher": who, "strategy": strategy, "reply": reply, "shown": -1}
+            wanted = enumerate((*vectors[:c], *vectors[c + p : c + p + t]))
+            requests.append(asked | {f"wanted_{k}": value for k, value in wanted})
+        elif kind in (Kind.MOVED, Kind.RESTED, Kind.FAILED):
+            failed += kind == Kind.FAILED
+            origins.append(origin or "")
+            shown.append(last)
             last = -1
-            values = (event.context, event.theta, event.goal, event.outcome)
-            for (name, dim), value in zip(dims.items(), values, strict=True):
-                vectors[name].extend([np.nan] * dim if value is None else value.tolist())
+            cells.extend(np.nan if value is None else value for value in vectors)
     n = len(origins)
-    arrays = {name: np.array(vectors[name]).reshape(n, dim) for name, dim in dims.items()}
-    origin, demonstration = np.array(origins, dtype=np.str_), np.array(before, dtype=np.int64)
-    found = {"index": np.arange(n), "origin": origin, "demonstration": demonstration, **arrays}
-    return found, _requests(requests, shown, t) if requests else None, failed
-
-
-def _requests(requests: list[dict[str, Any]], shown: list[Demonstration], outcome_dim: int) -> Columns:
-    """index of the movement that came next, teacher, strategy, reply, shown (which demonstration, -1 for none),
-    wanted_*, points of C x T, and how far the outcomes that were shown and wanted are ``apart``, NaN without any."""
-    wanted = np.stack([np.concatenate(each.pop("wanted")) for each in requests])
-    apart = np.full(len(requests), np.nan)
-    for k, each in enumerate(requests):
-        if each["shown"] >= 0:
-            apart[k] = np.linalg.norm(shown[each["shown"]].outcome - wanted[k, -outcome_dim:])
-    return {
-        **{name: np.array([each[name] for each in requests]) for name in requests[0]},
-        **{f"wanted_{k}": column for k, column in enumerate(wanted.T)},
-        "apart": apart,
-    }
+    vectors_of = np.split(np.array(cells).reshape(n, c + p + 2 * t), (c, c + p, c + p + t), axis=1)
+    found = {"index": np.arange(n), "origin": np.array(origins, np.str_), "demonstration": np.array(shown, np.int64)}
+    found |= dict(zip(("contexts", "thetas", "goals", "outcomes"), vectors_of, strict=True))
+    columns = {name: np.array([each[name] for each in requests]) for name in requests[0]} if requests else None
+    return found, columns, failed
 
 
 def _columns(record: Record, table: str) -> Columns:

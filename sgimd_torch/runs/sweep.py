@@ -32,8 +32,7 @@ from typing import Final, NamedTuple, TypeVar
 from sgimd_torch.files import make_folder
 from sgimd_torch.runs.command_line import parse
 from sgimd_torch.runs.config import FILES, Config, code_of, dashed
-from sgimd_torch.runs.engines.local import local
-from sgimd_torch.runs.engines.loop import Submit, sweep
+from sgimd_torch.runs.engines.loop import Submit, local, sweep
 from sgimd_torch.runs.process import loading, say
 from sgimd_torch.runs.read import finished, movements_on_disk
 

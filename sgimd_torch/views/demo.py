@@ -30,8 +30,7 @@ from typing import Final
 from sgimd_torch.catalogue import ROD, label
 from sgimd_torch.runs.command_line import parse
 from sgimd_torch.runs.config import Config
-from sgimd_torch.runs.engines.local import local
-from sgimd_torch.runs.engines.loop import sweep
+from sgimd_torch.runs.engines.loop import local, sweep
 from sgimd_torch.runs.process import Failed, loading, say
 from sgimd_torch.runs.read import finished, read_run
 

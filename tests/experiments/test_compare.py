@@ -68,7 +68,7 @@ def test_each_evaluation_is_a_row_the_failed_are_reported_and_a_second_start_doe
     code, _, errors = ended(compare("learners", "large-space", "broken"))
     assert code == 1
     assert sorted(rows_of(tmp_path)) == WHOLE
-    assert "untaught seed 0 failed: demonstrations: there is no file nowhere.npz" in errors
+    assert "untaught seed 0 failed: nowhere.npz cannot be read or written: No such file" in errors
     assert "2 runs ended well, 1 failed" in errors
     assert "Traceback" not in errors
     table = read_table(tmp_path / "results")

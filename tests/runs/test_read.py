@@ -8,7 +8,7 @@ import pytest
 from runs import edit, settle
 from sgimd_torch.algorithms import random_exploration
 from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.record import Kind, Record, RunError
+from sgimd_torch.record import DERIVED, Kind, Record, RunError
 from sgimd_torch.runs.command_line import parse
 from sgimd_torch.runs.directory import FILE
 from sgimd_torch.runs.read import config_of, find_runs, finished, movements_on_disk, read_run, variant_of
@@ -74,7 +74,9 @@ def test_whether_a_run_is_finished_is_counted_not_believed(run):
 
 def test_a_run_that_has_just_begun_is_read_as_empty(run):
     with Record(run / FILE, write=True) as record:
-        record.rewrite(n_events=0).close()
+        for table in ("events", *DERIVED):
+            record.replace_rows(table, ())
+        record.commit()
     found = read_run(run)
     assert found.thetas.shape == (0, 7)
     assert found.evaluation["mean_error"].shape == (0,)

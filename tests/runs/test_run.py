@@ -24,8 +24,7 @@ from sgimd_torch.spaces import Demonstration
 def test_the_same_seed_makes_the_same_record_whatever_the_threads(tmp_path, go, reference, capsys, threads):
     assert go(tmp_path, "--environment.threads", threads) == 0
     assert content_of(tmp_path / "sgim-d" / "seed-003") == reference
-    said = capsys.readouterr().err
-    assert re.search(r"127 demonstrations; correspondence misses them by 0\.\d+ rad \(median\)", said)
+    assert "127 demonstrations" in capsys.readouterr().err
 
 
 def answers_of(out, go, *options):
@@ -111,7 +110,7 @@ def test_recordings_whose_float_lands_outside_the_task_space_are_noted(tmp_path,
     far = Demonstration(shown.context, shown.times, shown.trajectory, 100 * shown.outcome)
     save_demonstrations(tmp_path / "own.npz", [shown, far])
     assert go(tmp_path, "--demonstrations", tmp_path / "own.npz", "--movements", 5) == 0
-    assert re.search(r"recording 1 lands at \(.*\), outside T; were they not recorded in m\?", capsys.readouterr().err)
+    assert re.search(r"recording 1 lands outside T; were they not recorded in m\?", capsys.readouterr().err)
 
 
 def test_an_error_of_a_part_keeps_its_traceback_and_says_how_to_go_on(tmp_path, go, capsys, monkeypatch):

@@ -14,7 +14,7 @@ from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import Benchmark, save_benchmark
 from sgimd_torch.forward_model.model import ForwardModel
 from sgimd_torch.memory import Memory
-from sgimd_torch.record import Record
+from sgimd_torch.record import Record, layout
 from sgimd_torch.runs.build import build
 from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.config import Config
@@ -61,7 +61,8 @@ def reference(tmp_path_factory, live):
 def table(directory, name):
     """The names of the columns of a table, and its rows."""
     with Record(directory / FILE) as record:
-        return record.columns(name), np.array(list(record.rows(name)), dtype=np.float64)
+        columns = [column.split()[0] for column in layout(record.dims)[name][:-1]]
+        return columns, np.array(list(record.rows(name)), dtype=np.float64)
 
 
 def test_every_movement_after_the_first_refresh_was_predicted_and_is_recorded_with_its_outcome(reference):

@@ -3,23 +3,31 @@
 with local(processes=4) as submit: failures = sweep([Config(seed=seed) for seed in range(20)], submit)
 
 An engine is a context manager that gives ``submit(config, flags)``. It starts runs in the order in which they come, as
-many at a time as it has room for, and stops those that have not ended when its block is left.
+many at a time as it has room for, and stops those that have not ended when its block is left. ``local`` is the engine
+of one machine: a process for each run.
 """
 
 from __future__ import annotations
 
 import signal
+import subprocess
+import sys
+import time
 from collections import Counter
-from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, wait
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from threading import Lock
 from typing import Final
 
+from sgimd_torch.files import make_folder
 from sgimd_torch.runs.config import Config, words
 from sgimd_torch.runs.process import Failed, Progress, say
 from sgimd_torch.runs.read import movements_on_disk
 
 REFRESH: Final = 1.0  # s, from one look at the movements on disk to the next; the end of a run is shown at once
+PATIENCE: Final = 20.0  # s, for stopped runs to write what they have; then they are killed and lose a second at most
 
 Submit = Callable[[Config, Sequence[str]], Future[None]]
 """Starts a run with these flags of ``sgimd run``, or goes on with it; the future ends with the run. It raises what
@@ -74,6 +82,46 @@ def sweep(
         say("stopping all runs; the same command goes on from here")
         raise
     return [failures[config] for config in configs if config in failures]
+
+
+@contextmanager
+def local(processes: int) -> Iterator[Submit]:
+    """An engine: so many processes of this machine at a time."""
+    running, stopped = set[subprocess.Popen[bytes]](), False
+    starting = Lock()  # no run starts after all have been stopped
+
+    def carry_out(config: Config, flags: Sequence[str]) -> None:
+        make_folder(config.directory.parent)
+        command = [sys.executable, "-m", "sgimd_torch", *run_words(config, flags)]
+        with log_of(config).open("ab") as log:
+            before = log.tell()
+            with starting:
+                if stopped:
+                    return
+                # In a group of its own: only we get Ctrl-C, and pass it on.
+                process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log, stderr=log, process_group=0)
+                running.add(process)
+            code = process.wait()
+        running.discard(process)
+        check_end(config, code, log_of(config).read_bytes()[before:])
+
+    # Threads that each wait for a process of their own: a pool of processes would break, for all runs, when the system
+    # kills one of its processes.
+    pool = ThreadPoolExecutor(processes)
+    try:
+        yield lambda config, flags: pool.submit(carry_out, config, flags)
+    finally:
+        with starting:
+            stopped = True
+        left = [*running]
+        for process in left:
+            process.terminate()
+        deadline = time.monotonic() + PATIENCE
+        for process in left:
+            with suppress(subprocess.TimeoutExpired):
+                process.wait(max(0.0, deadline - time.monotonic()))
+            process.kill()
+        pool.shutdown(cancel_futures=True)
 
 
 def run_words(config: Config, flags: Sequence[str]) -> list[str]:

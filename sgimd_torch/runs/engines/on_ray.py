@@ -29,10 +29,10 @@ from ray.exceptions import RayError
 
 from sgimd_torch.files import make_folder, write_bytes
 from sgimd_torch.runs.config import FILES, Config
+from sgimd_torch.runs.directory import FILE
 from sgimd_torch.runs.engines.loop import Submit, check_end, log_of, run_words
 from sgimd_torch.runs.process import SIGNALS, Failed
 
-RECORD: Final = "run.sqlite"  # in the directory of a run: all that there is of it
 ANSWER_WITHIN: Final = 10.0  # s, for a cluster
 STORE: Final = 100 * 2**20  # bytes, for what is on its way; Ray would take a third of the memory
 # A process whose task was killed must not go on alone: prctl(PR_SET_PDEATHSIG, SIGKILL).
@@ -92,12 +92,12 @@ def on_ray(address: str | None, processes: int = 1, *, ships: bool = False, out:
                 future.set_result(None)
 
         away = replace(config, out=Path("runs"))
-        record = f"{away.directory}/{RECORD}"
+        record = f"{away.directory}/{FILE}"
         named = [path for path in (getattr(config, option) for option in FILES) if path is not None]
         try:
             files = {str(path): path.read_bytes() for path in named}
-            if (config.directory / RECORD).exists():
-                files[record] = _snapshot(config.directory / RECORD)
+            if (config.directory / FILE).exists():
+                files[record] = _snapshot(config.directory / FILE)
         except (OSError, sqlite3.Error) as error:
             future.set_exception(ValueError(f"it cannot be sent: {error}"))
         else:
@@ -138,7 +138,7 @@ def _keep(config: Config, ended: Ended) -> None:
     with log_of(config).open("ab") as log:
         log.write(said)
     if record is not None:
-        write_bytes(config.directory / RECORD, record)
+        write_bytes(config.directory / FILE, record)
     check_end(config, code, said)
 
 
@@ -158,13 +158,11 @@ def _connect(address: str | None, processes: int, options: Mapping[str, Any]) ->
     if address is None:
         options = {**options, "num_cpus": processes, "object_store_memory": STORE, "include_dashboard": False}
     elif address != "auto":
-        host, colon, port = address.rpartition(":")
-        if "://" in address or not colon or not port.isdecimal():
-            raise ValueError(f"--address must be host:port, or auto, got {address}; start the sweep on a node of it")
+        host, _, port = address.rpartition(":")
         try:
             socket.create_connection((host, int(port)), ANSWER_WITHIN).close()  # Ray would try for minutes, then abort
-        except (OSError, OverflowError) as error:
-            hint = "is its head running, and is this the port of ray start?"
+        except (OSError, OverflowError, ValueError) as error:
+            hint = "--address is host:port of its head, or auto, on a node of it; is it running?"
             raise ValueError(f"no Ray cluster answers at {address}: {error}; {hint}") from error
     try:
         ray.init(address or "local", log_to_driver=False, configure_logging=False, **options)

@@ -82,7 +82,7 @@ def benchmark_of(task: Task, file: Path | None) -> tuple[Benchmark, list[str], s
     """
     source, robot, notes, crc32 = file or task.benchmark, task.environment, list[str](), None
     if isinstance(source, Path):
-        crc32 = _checksum("benchmark", source)
+        crc32 = checksum(source)
         benchmark = load_benchmark(source)
     elif source is not None:
         benchmark = source()
@@ -97,7 +97,7 @@ def benchmark_of(task: Task, file: Path | None) -> tuple[Benchmark, list[str], s
 
 
 def demonstrations_of(task: Task, file: Path | None) -> tuple[Sequence[Demonstration], list[str], str | None]:
-    """What a teacher can show, messages on how well it fits the robot, and the checksum of the file.
+    """What a teacher can show, messages on it, and the checksum of the file.
 
     Args:
         task: has the demonstrations if there is no file.
@@ -113,40 +113,31 @@ def demonstrations_of(task: Task, file: Path | None) -> tuple[Sequence[Demonstra
             f"{type(robot).__name__} comes without demonstrations, and this algorithm needs a teacher; "
             "give --demonstrations FILE, or choose one that learns alone: --algorithm practice"
         )
-    if not isinstance(source, Path):
-        made = source()
-        return made, _fit(robot, made, []), None
-    from sgimd_torch.demonstrations import load_demonstrations  # most learners read none
+    shown: Sequence[Demonstration]
+    crc32: str | None = None
+    if isinstance(source, Path):
+        from sgimd_torch.demonstrations import load_demonstrations  # most learners read none
 
-    crc32 = _checksum("demonstrations", source)
-    found = load_demonstrations(source, outcome_dim=robot.outcomes.dim, context_dim=robot.contexts.dim)
-    misfits: list[float] = []
-    for row, demonstration in enumerate(found):
-        try:
-            if task.misfit is None:
-                correspondence_of(task)(demonstration.times, demonstration.trajectory)
-            else:
-                misfits.append(task.misfit(demonstration))
-        except ValueError as error:
-            raise ValueError(f"{source}: recording {row} cannot be translated: {error}") from error
-    return found, _fit(robot, found, misfits), crc32
-
-
-def _fit(robot: Environment, shown: Sequence[Demonstration], misfits: Sequence[float]) -> list[str]:
-    """How well the robot can play what it will be shown, and what lands outside T."""
-    if not shown:
-        return []
-    size = "how far the correspondence misses them is not measured"
-    if misfits:
-        size = f"correspondence misses them by {np.median(misfits):.4f} rad (median), {max(misfits):.4f} rad at most"
-    notes = [f"{len(shown)} demonstrations; {size}"]
+        crc32 = checksum(source)
+        shown = load_demonstrations(source, outcome_dim=robot.outcomes.dim, context_dim=robot.contexts.dim)
+        translate = correspondence_of(task)
+        for row, demonstration in enumerate(shown):
+            try:
+                if task.misfit is None:
+                    translate(demonstration.times, demonstration.trajectory)
+                else:
+                    task.misfit(demonstration)
+            except ValueError as error:
+                raise ValueError(f"{source}: recording {row} cannot be translated: {error}") from error
+    else:
+        shown = source()
+    notes = [f"{len(shown)} demonstrations"] if shown else []
     outside = [row for row, each in enumerate(shown) if not robot.outcomes.contains(each.outcome)]
     if outside:
-        place = ", ".join(f"{x:g}" for x in shown[outside[0]].outcome)
         unit = robot.outcomes.unit or "the unit of T"
         more = f", as do {len(outside) - 1} more" if len(outside) > 1 else ""
-        notes.append(f"recording {outside[0]} lands at ({place}), outside T{more}; were they not recorded in {unit}?")
-    return notes
+        notes.append(f"recording {outside[0]} lands outside T{more}; were they not recorded in {unit}?")
+    return shown, notes, crc32
 
 
 def correspondence_of(task: Task) -> Correspondence:
@@ -179,12 +170,3 @@ def hand_led_of(task: Task) -> HandLed:
         )
     correspondence_of(task)
     return found
-
-
-def _checksum(what: str, path: Path) -> str:
-    """Of the content of a file that the user named."""
-    if path.is_dir():
-        raise IsADirectoryError(f"{what}: {path} is a directory, a file was wanted")
-    if not path.is_file():
-        raise FileNotFoundError(f"{what}: there is no file {path}")
-    return checksum(path)
