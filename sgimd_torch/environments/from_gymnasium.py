@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from sgimd_torch.environments.controllers import Controller
 from sgimd_torch.environments.protocol import SimulationError, check_movement, check_rest
-from sgimd_torch.spaces import Array, Box, Demonstration, check_count, check_point, check_rng, check_vector, stream
+from sgimd_torch.spaces import Array, Box, check_count, check_point, check_rng, check_vector, stream
 
 try:
     import gymnasium
@@ -103,18 +103,6 @@ class FromGymnasium:
                 f"needs 1 to {self.steps} actions in rows, got shape {actions.shape}; was it recorded longer?"
             )
         return self._play(actions, stream(0, "replay"), actions[-1])
-
-    def misfit(self, demonstration: Demonstration) -> float:
-        """How far a recording of actions is from what the controller can play, root mean square.
-
-        Raises:
-            ValueError: the recording cannot be translated, or the controller has no ``correspondence``.
-        """
-        times, actions = demonstration.times, demonstration.trajectory
-        if not hasattr(self, "correspondence"):
-            raise ValueError(f"{type(self.controller).__name__} cannot translate recorded actions")
-        played = self.controller.at(self.correspondence(times, actions), times - times[0])
-        return float(np.sqrt(np.mean(np.square(played - actions))))
 
     def _play(self, actions: Array, rng: np.random.Generator, theta: Array) -> Array:
         """The outcome of an episode of these ``actions``; ``theta`` is named if it fails."""

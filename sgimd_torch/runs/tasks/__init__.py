@@ -21,6 +21,7 @@ from sgimd_torch.files import checksum
 from sgimd_torch.spaces import Demonstration
 
 MOST_GOALS: Final = 500  # of a task that has none
+TOO_FAR: Final = 0.25  # of a joint's range: a robot that misses a demonstration by more cannot make that movement
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,8 +33,6 @@ class Task:
         benchmark: goals of evaluation: a file, or a function that makes them; None for goals all over T.
         demonstrations: what a teacher has to show: a file, or a function that makes it; None for no teacher.
         correspondence: (times, trajectory) -> theta_d, eq. (6); None for the environment's own, if it has one.
-        misfit: demonstration -> how far (rad) it is from what the robot can play; raises ValueError if it cannot be
-            translated. None for the correspondence alone.
 
     Raises:
         ValueError: a class in the place of an environment.
@@ -43,7 +42,6 @@ class Task:
     benchmark: Path | Callable[[], Benchmark] | None = None
     demonstrations: Path | Callable[[], Sequence[Demonstration]] | None = None
     correspondence: Correspondence | None = None
-    misfit: Callable[[Demonstration], float] | None = None
 
     def __post_init__(self) -> None:
         check_instance(self.environment)
@@ -117,16 +115,20 @@ def demonstrations_of(task: Task, file: Path | None) -> tuple[Sequence[Demonstra
         made = source()
         return made, _fit(robot, made, []), None
     from sgimd_torch.demonstrations import load_demonstrations  # most learners read none
+    from sgimd_torch.demonstrations.lessons import misfit_of, ranges_of
 
     crc32 = _checksum("demonstrations", source)
     found = load_demonstrations(source, outcome_dim=robot.outcomes.dim, context_dim=robot.contexts.dim)
+    translate, ranges = correspondence_of(task), ranges_of(robot)
     misfits: list[float] = []
-    for row, demonstration in enumerate(found):
+    for row, shown in enumerate(found):
         try:
-            if task.misfit is None:
-                correspondence_of(task)(demonstration.times, demonstration.trajectory)
-            else:
-                misfits.append(task.misfit(demonstration))
+            misfits.append(misfit_of(robot, translate(shown.times, shown.trajectory), shown))
+            if ranges is not None and misfits[-1] > TOO_FAR * ranges.sides.mean():
+                raise ValueError(
+                    f"it is {misfits[-1]:.2f} (root mean square) away from anything that the robot can play; was it "
+                    "recorded in degrees, or with the joints in another order?"
+                )
         except ValueError as error:
             raise ValueError(f"{source}: recording {row} cannot be translated: {error}") from error
     return found, _fit(robot, found, misfits), crc32
@@ -137,7 +139,7 @@ def _fit(robot: Environment, shown: Sequence[Demonstration], misfits: Sequence[f
     if not shown:
         return []
     size = "how far the correspondence misses them is not measured"
-    if misfits:
+    if np.isfinite(misfits).any():
         size = f"correspondence misses them by {np.median(misfits):.4f} rad (median), {max(misfits):.4f} rad at most"
     notes = [f"{len(shown)} demonstrations; {size}"]
     outside = [row for row, each in enumerate(shown) if not robot.outcomes.contains(each.outcome)]

@@ -34,8 +34,7 @@ def swimmer() -> Task:
     """gymnasium's Swimmer-v5; its demonstrations are torques."""
     from sgimd_torch.environments.swimmer import Swimmer  # gymnasium is loaded only when it is needed
 
-    robot, goals, shown = Swimmer(), DATA / "swimmer_benchmark.npz", DATA / "swimmer_demonstrations.npz"
-    return Task(robot, goals, shown, misfit=robot.misfit)
+    return Task(Swimmer(), DATA / "swimmer_benchmark.npz", DATA / "swimmer_demonstrations.npz")
 
 
 def half_reached() -> Task:
