@@ -84,7 +84,6 @@ COMMANDS = {
     f"demonstrations check nul.csv --task planar-arm-7 {COLUMNS}": "nul.csv has a NUL",
     f"demonstrations import shown.csv {COLUMNS} --out shown.txt": "--out must end in .npz, got shown.txt",
     "suite --environment toss": "--environment cannot be given here: each task has its own",
-    "watch nowhere": "nowhere holds no board; start a run with --board true",
     "run --algorithm random --budget 5": "--budget: algorithm random has .* sagg-riac, practice, .* have it",
     "run --algorithm random --teacher.every 5": "--teacher.every: algorithm random .* sgim-d.* have it",
     "run --model.members 5": "--model.members: .*search gradient, gauss-newton and inverse model, model-alone",

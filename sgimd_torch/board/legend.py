@@ -66,9 +66,6 @@ CHARTS: Final[Mapping[str, Mapping[str, str]]] = {
         "relative error on what it never learns from; 1 is no better than their mean": "model/relative_error",
     },
 }
-METRICS: Final = ("error/mean", "error/noise_floor")  # that summarise a run
-OF_GOALS: Final = "goals/reached_share"  # of a learner with goals
-OF_REGIONS: Final = "competence/R"  # of one with regions
 
 
 def sentence(tag: str) -> str:

@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from tensorboard.plugins.hparams import metadata as hparams
 
 from boards import charts_of, curves_of, values_of
 from runs import arguments, content_of, end, stopped_at
@@ -228,36 +227,9 @@ def test_the_curves_of_a_run_are_those_of_its_record(watched):
 def test_every_tag_is_explained_once_in_the_file_and_in_the_legend(watched):
     explained = [value.tag for _, value in values_of(watched) if value.metadata.summary_description]
     curves = curves_of(watched)
-    assert sorted(explained) == sorted(tag for tag in curves if not tag.startswith(("_hparams_", "custom_scalars")))
+    assert sorted(explained) == sorted(tag for tag in curves if not tag.startswith("custom_scalars"))
     (legend,) = curves["about/legend"].values()
     assert all(f"**{tag}" in legend.decode() for tag in LEGEND)
-
-
-def test_runs_can_be_compared_by_settings_and_results(watched):
-    contents = {value.tag: value.metadata.plugin_data.content for _, value in values_of(watched)}
-    begun = hparams.parse_session_start_info_plugin_data(contents[hparams.SESSION_START_INFO_TAG])
-    assert begun.hparams["seed"].number_value == 3
-    assert begun.hparams["algorithm"].string_value == "sgim-d"
-    assert begun.hparams["board"].bool_value is True
-    compared = hparams.parse_experiment_plugin_data(contents[hparams.EXPERIMENT_TAG])
-    assert {info.name for info in compared.hparam_infos} >= begun.hparams.keys()
-    assert {info.name.tag for info in compared.metric_infos} <= curves_of(watched).keys()
-
-
-def test_options_of_parts_come_after_the_parts_and_one_that_is_not_set_is_left_out(tmp_path):
-    file = EventFile(tmp_path)
-    file.settings({"goals.window": 12, "goals": "interest-map", "floor_at": None}, ["error/mean"], "grid")
-    file.begin()
-    file.close()
-    contents = {value.tag: value.metadata.plugin_data.content for _, value in values_of(tmp_path)}
-    infos = hparams.parse_experiment_plugin_data(contents[hparams.EXPERIMENT_TAG]).hparam_infos
-    assert [(info.name, info.differs) for info in infos] == [
-        ("goals", True),
-        ("floor_at", True),
-        ("goals.window", False),
-    ]
-    begun = hparams.parse_session_start_info_plugin_data(contents[hparams.SESSION_START_INFO_TAG])
-    assert begun.hparams.keys() == {"goals", "goals.window"}
 
 
 def test_the_page_of_charts_begins_with_where_it_is_competent_by_places_with_goals(watched):
@@ -280,7 +252,7 @@ def test_no_chart_is_empty_whatever_the_learner(tmp_path, go, options):
 def assert_same_board(directory, whole):
     """By tag, step and value; but for seconds, which a replayed movement does not have."""
     found, wanted = (
-        {tag: curve for tag, curve in curves_of(each).items() if not tag.startswith(("time/", "_hparams_"))}
+        {tag: curve for tag, curve in curves_of(each).items() if not tag.startswith("time/")}
         for each in (directory, whole)
     )
     for found_settings in (found, wanted):
