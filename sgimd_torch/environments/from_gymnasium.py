@@ -123,18 +123,6 @@ class FromGymnasium:
         return check_point("outcome", outcome, self.outcomes.dim)
 
 
-def make_world(name: str, **options: Any) -> gymnasium.Env[Any, Any]:
-    """``gymnasium.make``, without its checks of every step.
-
-    Raises:
-        ValueError: gymnasium does not know the name, or misses a package.
-    """
-    try:
-        return gymnasium.make(name, disable_env_checker=True, **options)
-    except gymnasium.error.Error as error:
-        raise ValueError(f"{name} cannot be made: {error}") from error
-
-
 def measured_noise(environment: FromGymnasium, rng: np.random.Generator, *, movements: int = 20) -> float:
     """``outcome_noise`` as it is: root mean square over random movements, each executed three times."""
     variances = []
