@@ -38,7 +38,6 @@ LEGEND: Final[Mapping[str, str]] = {
     "predicted that they would.",
     "model/coverage": "Share of the newest movements that landed in the model's 80 % region.",
     "time": "Seconds spent so far: on physics, by the learner and on evaluations. A resumed run shows them from there.",
-    "competent/since": "Where half of the benchmark's goals are met, and since when; elsewhere the share now.",
     "map/competence": "The regions, named like the curves, coloured by the mean competence of the goals they remember.",
     "map/error": "How far from each benchmark goal the movement for it landed at this evaluation.",
     "about": "What this run is, and how to read its board.",

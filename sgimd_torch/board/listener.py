@@ -81,7 +81,7 @@ class BoardListener:
         as 100 movements, so they are drawn when the number of movements has doubled, and at the end."""
         own = found["own"]
         others = {f"answers/{answer}": each.mean_error for answer, each in found.items() if answer != "own"}
-        self._scalars({**self._competent.evaluated(movements, own), **others})
+        self._scalars({**self._competent.curves(own), **others})
         if movements >= 2 * self._drawn_at or movements == self._parts.config.movements:
             self._drawn_at = movements
             self._draw(own)
@@ -107,5 +107,5 @@ class BoardListener:
 
     def _draw(self, found: Evaluation) -> None:
         parts, space, regions = self._parts, self._parts.environment.outcomes, self._parts.learner.regions
-        for tag, png in draw(regions, space, self._competent, parts.benchmark.goals, found.errors).items():
+        for tag, png in draw(regions, space, parts.benchmark.goals, found.errors).items():
             self._file.image(self._movements, tag, png)
