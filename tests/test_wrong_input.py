@@ -97,7 +97,6 @@ COMMANDS = {
     "run --repeats 1": "repeats must be 0 or at least 2",
     "run --evaluate-at 5,x": "--evaluate-at must be whole numbers such as 250,500, or .* or null, got 5,x",
     "run --evaluate-at 0": "evaluate_at must be numbers of movements",
-    "run --patience 0": "patience must be above 0 s",
     "run --budget 1.5": "--budget must be a whole number, got 1.5",
     "run --global-range 1": "--global-range must be 2 numbers such as",
     "run --board perhaps": "--board must be true or false, got perhaps",
