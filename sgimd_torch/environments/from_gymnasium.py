@@ -21,7 +21,7 @@ from sgimd_torch.environments.protocol import SimulationError, check_movement, c
 from sgimd_torch.spaces import Array, Box, check_count, check_point, check_rng, check_vector, stream
 
 try:
-    import gymnasium
+    import gymnasium as gymnasium
 except ImportError as error:
     raise ImportError(f"this environment needs gymnasium: pip install 'sgimd-torch[gym]' ({error})") from error
 

@@ -85,11 +85,7 @@ class Memory:
             outcome = check_point("outcome", outcome, self.outcome_dim, "did the simulation diverge, or is it a theta?")
         except ValueError as error:
             raise ValueError(f"{error}; its theta was {theta.tolist()}") from None
-        for table, row in ((self._contexts, context), (self._thetas, theta), (self._outcomes, outcome)):
-            table.append(row[None])
-        if self.context_dim:
-            self._outcome_side.keys.append(np.concatenate((context, outcome))[None])
-            self._policy_side.keys.append(np.concatenate((context, theta))[None])
+        self._append(context[None], theta[None], outcome[None])
 
     def near_outcomes(self, context: ArrayLike, goal: ArrayLike, k: int) -> Rows:
         """``(min(k, n),)`` rows whose outcomes lie nearest to ``goal`` ``(outcome_dim,)``, nearest first; of equally
@@ -113,6 +109,19 @@ class Memory:
     def neighbourhoods(self, rows: Rows, k: int, within: float = np.inf) -> list[Rows]:
         """For each of ``rows`` what :meth:`near_policies` gives for its context and theta; it is its own neighbour."""
         return self._policy_side.nearest(self._policy_side.keys.rows[rows], k, within)
+
+    def copy(self) -> Memory:
+        """The same exemplars, in a memory that grows on its own."""
+        same = Memory(self.context_dim, self.theta_dim, self.outcome_dim)
+        same._append(self.contexts, self.thetas, self.outcomes)
+        return same
+
+    def _append(self, contexts: Array, thetas: Array, outcomes: Array) -> None:
+        for table, rows in ((self._contexts, contexts), (self._thetas, thetas), (self._outcomes, outcomes)):
+            table.append(rows)
+        if self.context_dim:
+            self._outcome_side.keys.append(np.concatenate((contexts, outcomes), axis=1))
+            self._policy_side.keys.append(np.concatenate((contexts, thetas), axis=1))
 
     def _key(self, context: ArrayLike, point: Array) -> Array:
         context = check_point("context", context, self.context_dim, _NO_CONTEXT)
