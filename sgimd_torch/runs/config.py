@@ -41,7 +41,7 @@ class Config:
         movements: number of movements, those at rest included.
         out: folder for runs; this one goes to OUT/NAME/seed-003.
         name: NAME in that path, to keep a variant apart; null is the algorithm's.
-        board: whether TensorBoard shows the run: tensorboard --logdir OUT.
+        board: whether curves and pictures for TensorBoard are written, into its folder.
         evaluate_at: movements after which to evaluate, besides the end; null is 250, 500 and every 1000; [] never.
         evaluated_by: which inverse models answer in evaluations: own is that of --inverse, others are its words.
         repeats: how often each movement of an evaluation is executed again to measure the noise; 0 does not.
