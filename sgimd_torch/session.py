@@ -67,8 +67,7 @@ def run(
         movements: in all, counting those that ``learner`` has made before: its run goes on.
         teacher: is asked before every movement whether it demonstrates.
         teachers: by name, for a learner that asks for demonstrations. One that fails, or shows what this robot cannot
-            use, counts as one without an answer, with a `RuntimeWarning`; so does one that raises TimeoutError, see
-            `sgimd_torch.teachers.awaited`.
+            use, counts as one without an answer, with a `RuntimeWarning`; so does one that raises TimeoutError.
         execute: is called instead of the environment's, see ``live``.
         record: what it holds is lived through again first, without executing anything or asking ``teachers``; what
             happens then is added to it. It is for a learner and a teacher freshly built.

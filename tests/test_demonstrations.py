@@ -1,13 +1,17 @@
 """Demonstrations on disk: what is saved is loaded again, what is broken is refused by name, and what is shipped."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from sgimd_torch.demonstrations import SHIPPED, load_demonstrations, save_demonstrations
+from sgimd_torch.demonstrations.lessons import misfit_of
 from sgimd_torch.environments.fishing_rod import JOINT_RANGES, FishingRod
+from sgimd_torch.runs.tasks import demonstrations_of
+from sgimd_torch.runs.tasks.rods import fishing_rod
 from sgimd_torch.spaces import Array, Demonstration, stream
 
 
@@ -166,10 +170,17 @@ def test_every_joint_is_led_monotonically_inside_its_range() -> None:
 
 
 def test_no_recording_is_exactly_a_motor_primitive() -> None:
-    skill = FishingRod(noise=0.0, threads=1).primitive
-    residuals = [skill.residual(skill.correspondence(r.times, r.trajectory), r.times, r.trajectory) for r in RECORDINGS]
-    assert np.mean(residuals) > 1e-3
-    assert np.max(residuals) < 0.2  # but the correspondence can translate all of them
+    rod = FishingRod(noise=0.0, threads=1)
+    translate = rod.primitive.correspondence
+    misfits = [misfit_of(rod, translate(shown.times, shown.trajectory), shown) for shown in RECORDINGS]
+    assert np.mean(misfits) > 1e-3
+    assert np.max(misfits) < 0.2  # but the correspondence can translate all of them
+
+
+def test_a_run_refuses_recordings_in_degrees(tmp_path: Path) -> None:
+    save_demonstrations(tmp_path / "deg.npz", [replace(RECORDINGS[0], trajectory=np.rad2deg(RECORDINGS[0].trajectory))])
+    with pytest.raises(ValueError, match=r"deg\.npz: recording 0 cannot be translated: .* recorded in degrees"):
+        demonstrations_of(fishing_rod(), tmp_path / "deg.npz")
 
 
 def test_the_recorded_landing_points_are_those_of_the_recorded_trajectories() -> None:

@@ -5,7 +5,7 @@ import pytest
 
 from sgimd_torch.competence import Competence, performance
 from sgimd_torch.memory import Memory
-from sgimd_torch.memory.neighbours import EXACT_UP_TO, PolicyNeighbours, Table, TreeNeighbours, _Flat
+from sgimd_torch.memory.neighbours import EXACT_UP_TO, PolicyNeighbours, Table, TreeNeighbours
 from sgimd_torch.spaces import Array, stream
 
 
@@ -55,17 +55,6 @@ def test_many_copies_of_one_outcome_make_no_deep_tree() -> None:
     side = TreeNeighbours(table(rows))
     for query in (np.zeros(2), np.full(2, 0.25), np.ones(2)):
         assert side.nearest(query, 20).tolist() == nearest(rows, query, 20)
-
-
-def test_what_is_proposed_is_nearest_and_the_rest_lies_beyond_while_the_table_grows() -> None:
-    rows, query, keys = structured(3000, 25), stream(1, "query").random(25), Table(25)
-    proposing = _Flat(keys, 0)  # whose failures nobody would see: all rows are looked at where too few are proposed
-    for start, stop in ((0, 1000), (1000, 1001), (1001, 3000)):
-        keys.append(rows[start:stop])
-        (proposed,), beyond = proposing.propose(query[None], 40)
-        expected = nearest(rows[:stop], query, 40)
-        assert sorted(proposed.tolist()) == sorted(expected)
-        assert beyond == pytest.approx(np.square(rows[expected[-1]] - query).sum(), rel=1e-5)
 
 
 def test_above_it_nearly_all_are_found_nearest_first_and_within_the_radius() -> None:

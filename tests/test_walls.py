@@ -42,7 +42,7 @@ LIBRARIES = {  # library: the only rooms that may import it; of a folder, where 
     "torch": {"forward_model", "inverses/through_model", "searches/through_model"},
     "lightning": {"forward_model"},
     "safetensors": {"forward_model"},
-    "tensorboard": {"board/events", "views/watch"},
+    "tensorboard": {"board/events"},
     "matplotlib": {"figures", "board/pictures", "views"},
     "PIL": {"views/film"},
     "imageio_ffmpeg": {"views/film"},

@@ -89,7 +89,6 @@ def test_it_runs_resumes_and_is_looked_at_without_a_checkout(sgimd):
     ("words", "extra"),
     [
         (["run", *SHORT, "--name", "watched", "--board", "true"], "board"),
-        (["watch", "runs"], "board"),
         (["film", "runs/sgim-d/seed-000"], "film"),
         (["run", *SHORT, "--name", "modelled", "--inverse", "model"], "forward"),
         (["run", *SHORT, "--name", "rival", "--goals", "alp-gmm"], "rivals"),

@@ -30,7 +30,7 @@ def demonstrate(arm: PlanarArm, goal: Sequence[float] | Array, context: Array = 
 def demonstrations(arm: PlanarArm, n: int = 20, seed: int = 0) -> list[Demonstration]:
     """``n`` of them in the directions of a whole turn, all within reach."""
     rng = stream(seed, "demonstrations")
-    radii = np.sqrt(rng.uniform(0.1, 0.9, n)) * arm.length
+    radii = np.sqrt(rng.uniform(0.1, 0.9, n))
     turns = rng.uniform(-np.pi, np.pi, n)
     goals = radii[:, None] * np.stack([np.cos(turns), np.sin(turns)], axis=1)
     return [demonstrate(arm, goal) for goal in goals]

@@ -20,21 +20,16 @@ from sgimd_torch.goals.regions import Region
 from sgimd_torch.spaces import Array, Box, Episode, check_vector
 
 DEPTH: Final = 3  # of the tree of regions: so many levels below the root have curves of their own, 15 at most
-MET: Final = 0.5  # share of the goals of a cell from which on a learner counts as competent there
-CELLS: Final = 16  # at most, on the map of where a learner is competent: 4 x 4 in the plane
 PLACES: Final = 8  # at most, that have curves of their own: 2 x 2 in the plane
 _RECENT: Final = 50  # goals
 
 
 class Grid:
-    """``box`` cut into cells of equal size, at ``most`` 16: 4 x 4 in the plane.
+    """``box`` cut into cells of equal size; ``names`` tell their bounds, such as "x -1..0, y 0..1"."""
 
-    ``names`` tell each cell's bounds, such as "x -1..-0.5, y 0..0.5".
-    """
-
-    def __init__(self, box: Box, most: int = CELLS) -> None:
+    def __init__(self, box: Box) -> None:
         self.box = box
-        self.per_side = max(1, int(most ** (1 / max(1, box.dim)) + 1e-9))
+        self.per_side = max(1, int(PLACES ** (1 / max(1, box.dim)) + 1e-9))
         axes = box.names or [f"outcome_{k}" for k in range(box.dim)]
         edges = np.linspace(box.low, box.high, self.per_side + 1).T
         bounds = [
@@ -108,10 +103,7 @@ class Behaviour:
 
 
 class Competent:
-    """Where the goals of a benchmark are met, and since when.
-
-    ``shares`` are those of its goals that were met at the last evaluation, by cell of the ``grid``; ``since`` is for
-    each cell where half of them or more are met now the number of movements from which on this was so.
+    """Which goals of a benchmark are met, everywhere and by place.
 
     Args:
         goals: ``(n, outcome_dim)`` m of the benchmark.
@@ -120,16 +112,11 @@ class Competent:
     """
 
     def __init__(self, goals: Array, near: float, space: Box) -> None:
-        self._goals, self.near = goals, near
-        self.grid, self._places = Grid(cells_of(space, goals)), Grid(cells_of(space, goals), PLACES)
-        self.shares: dict[str, float] = {}
-        self.since: dict[str, int] = {}
+        self._goals, self.near, self._places = goals, near, Grid(cells_of(space, goals))
 
-    def evaluated(self, movements: int, found: Evaluation) -> dict[str, float]:
-        """Note where it is competent after these ``movements``; the curves of the evaluation."""
+    def curves(self, found: Evaluation) -> dict[str, float]:
+        """Of an evaluation: errors, and the share of the goals that are met."""
         met = (found.errors <= self.near).astype(np.float64)
-        self.shares = self.grid.means(self._goals, met)
-        self.since = {name: self.since.get(name, movements) for name, share in self.shares.items() if share >= MET}
         return {
             "error/mean": found.mean_error,
             "error/median": float(np.median(found.errors)),

@@ -1,4 +1,4 @@
-"""The event file of a board, which TensorBoard reads: numbers, pictures, texts, settings and a page of charts.
+"""The event file of a board, which TensorBoard reads: numbers, pictures, texts and a page of charts.
 
 file = EventFile(folder); file.scalars(50, {"error/mean": 0.2}); file.begin(); file.flush(); file.close()
 """
@@ -9,7 +9,7 @@ import math
 import re
 import struct
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
@@ -17,9 +17,6 @@ from tensorboard.compat.proto.event_pb2 import Event, SessionLog
 from tensorboard.compat.proto.summary_pb2 import Summary
 from tensorboard.plugins.custom_scalar import layout_pb2
 from tensorboard.plugins.custom_scalar import metadata as charts
-from tensorboard.plugins.hparams import api_pb2, plugin_data_pb2
-from tensorboard.plugins.hparams import metadata as hparams
-from tensorboard.plugins.hparams.summary_v2 import hparams_pb
 from tensorboard.plugins.image import metadata as images
 from tensorboard.plugins.scalar.summary_v2 import scalar_pb
 from tensorboard.plugins.text.summary_v2 import text_pb
@@ -90,29 +87,6 @@ class EventFile:
     def text(self, step: int, tag: str, markdown: str) -> None:
         """A page of text."""
         self._write(step, text_pb(tag, markdown, sentence(tag)))
-
-    def settings(self, settings: Mapping[str, object], metrics: Iterable[str], learner: str) -> None:
-        """The options of this run, for the tab HParams: those of parts, such as "goals.window", after the others.
-
-        Args:
-            settings: by name.
-            metrics: tags of the numbers that summarise it.
-            learner: runs of one learner make one row.
-        """
-        shown = {
-            name: value if isinstance(value, bool | int | float) else str(value)
-            for name, value in settings.items()
-            if value is not None  # else some runs had a number and others a text, which cannot be sorted
-        }
-        kinds = {bool: api_pb2.DATA_TYPE_BOOL, str: api_pb2.DATA_TYPE_STRING}
-        compared = api_pb2.Experiment(metric_infos=[{"name": {"tag": tag}} for tag in metrics])
-        for name in sorted(settings, key=lambda name: "." in name):
-            kind = kinds.get(type(shown.get(name)), api_pb2.DATA_TYPE_FLOAT64)
-            compared.hparam_infos.add(name=name, type=kind, differs="." not in name)
-        metadata = hparams.create_summary_metadata(plugin_data_pb2.HParamsPluginData(experiment=compared))
-        value = Summary.Value(tag=hparams.EXPERIMENT_TAG, metadata=metadata, tensor=hparams.NULL_TENSOR)
-        self._write(0, Summary(value=[value]))
-        self._write(0, hparams_pb(shown, learner, time.time()))
 
     def layout(self, page: Mapping[str, Mapping[str, str]]) -> None:
         """The page of charts, category -> title -> tag; the largest counts."""

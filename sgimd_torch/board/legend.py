@@ -38,7 +38,6 @@ LEGEND: Final[Mapping[str, str]] = {
     "predicted that they would.",
     "model/coverage": "Share of the newest movements that landed in the model's 80 % region.",
     "time": "Seconds spent so far: on physics, by the learner and on evaluations. A resumed run shows them from there.",
-    "competent/since": "Where half of the benchmark's goals are met, and since when; elsewhere the share now.",
     "map/competence": "The regions, named like the curves, coloured by the mean competence of the goals they remember.",
     "map/error": "How far from each benchmark goal the movement for it landed at this evaluation.",
     "about": "What this run is, and how to read its board.",
@@ -66,9 +65,6 @@ CHARTS: Final[Mapping[str, Mapping[str, str]]] = {
         "relative error on what it never learns from; 1 is no better than their mean": "model/relative_error",
     },
 }
-METRICS: Final = ("error/mean", "error/noise_floor")  # that summarise a run
-OF_GOALS: Final = "goals/reached_share"  # of a learner with goals
-OF_REGIONS: Final = "competence/R"  # of one with regions
 
 
 def sentence(tag: str) -> str:

@@ -2,7 +2,7 @@
 
 A resumed run tells everything again from its record, so the board is written anew and holds each point once.
     board = BoardListener(folder, parts, seconds); board.episode(episode, replayed=False); board.flush(); board.close()
-``sgimd watch RUNS`` opens TensorBoard on it.
+``tensorboard --logdir RUNS`` shows it.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any, Final, Protocol
 
 from sgimd_torch.board.curves import Behaviour, Competent, of_regions
 from sgimd_torch.board.events import EventFile
-from sgimd_torch.board.legend import LEGEND, METRICS, OF_GOALS, OF_REGIONS, charts
+from sgimd_torch.board.legend import LEGEND, charts
 from sgimd_torch.board.pictures import draw
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.evaluation import Benchmark, Evaluation
@@ -57,8 +57,7 @@ class BoardListener:
         self._page: dict[str, dict[str, str]] = {}
         self._behaviour = Behaviour(getattr(parts.learner.autonomous, "tolerance", 0.02))
         self._competent = Competent(parts.benchmark.goals, parts.benchmark.side / 2, parts.environment.outcomes)
-        settings = parts.config.settings
-        rows = "\n".join(f"| {name} | {value} |" for name, value in settings.items())
+        rows = "\n".join(f"| {name} | {value} |" for name, value in parts.config.settings.items())
         self._file.text(0, "about/settings", f"| option | value |\n|---|---|\n{rows}")
         rows = "\n".join(f"| **{tag if '/' in tag else f'{tag}/…'}** | {what} |" for tag, what in LEGEND.items())
         self._file.text(
@@ -66,9 +65,6 @@ class BoardListener:
             "about/legend",
             f"Steps are movements; distances are in the unit of T.\n\n| tag | what it shows |\n|---|---|\n{rows}",
         )
-        has_goals = hasattr(parts.learner.autonomous, "goals")
-        metrics = [*METRICS, *[OF_GOALS] * has_goals, *[OF_REGIONS] * bool(parts.learner.regions)]
-        self._file.settings(settings, metrics, f"{parts.config.variant}, {settings['environment']}")
 
     def episode(self, episode: Episode, replayed: bool) -> None:
         """Count a movement; every 50th gives the curves a point. When a recorded one was made, nobody knows."""
@@ -85,7 +81,7 @@ class BoardListener:
         as 100 movements, so they are drawn when the number of movements has doubled, and at the end."""
         own = found["own"]
         others = {f"answers/{answer}": each.mean_error for answer, each in found.items() if answer != "own"}
-        self._scalars({**self._competent.evaluated(movements, own), **others})
+        self._scalars({**self._competent.curves(own), **others})
         if movements >= 2 * self._drawn_at or movements == self._parts.config.movements:
             self._drawn_at = movements
             self._draw(own)
@@ -111,5 +107,5 @@ class BoardListener:
 
     def _draw(self, found: Evaluation) -> None:
         parts, space, regions = self._parts, self._parts.environment.outcomes, self._parts.learner.regions
-        for tag, png in draw(regions, space, self._competent, parts.benchmark.goals, found.errors).items():
+        for tag, png in draw(regions, space, parts.benchmark.goals, found.errors).items():
             self._file.image(self._movements, tag, png)

@@ -1,6 +1,6 @@
-"""The pictures on the board: T from above, coloured by where goals are met, by error and by competence.
+"""The pictures on the board: T from above, coloured by error and by competence.
 
-pictures = draw(regions, space, competent, benchmark, errors); pictures["map/competence"] is a png, by its tag
+pictures = draw(regions, space, benchmark, errors); pictures["map/competence"] is a png, by its tag
 """
 
 from __future__ import annotations
@@ -15,8 +15,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from sgimd_torch.board.curves import DEPTH, Competent, branches
-from sgimd_torch.figures.axes import colour_bar, plane
+from sgimd_torch.board.curves import DEPTH, branches
 from sgimd_torch.figures.learning import competence_map, misses
 from sgimd_torch.figures.sections import Section, sections
 from sgimd_torch.goals.regions import Region
@@ -32,20 +31,15 @@ MARGIN = 0.9  # inches, above and below them together
 STYLE: Any = {"font.size": 8, "axes.titlesize": 8}
 
 
-def draw(
-    regions: Sequence[Region], space: Box, competent: Competent, benchmark: Array, errors: Array
-) -> dict[str, bytes]:
+def draw(regions: Sequence[Region], space: Box, benchmark: Array, errors: Array) -> dict[str, bytes]:
     """The pictures, as png, by tag.
 
     Args:
         regions: of the goal model; no picture of them if there are none.
         space: T; of more than two dimensions, a picture shows pairs next to each other.
-        competent: where it is, since when; shown in the plane only.
         benchmark, errors: ``(n, outcome_dim)`` its goals, and ``(n,)`` how far from each its answer landed.
     """
     pictures: dict[str, Callable[[Axes, Section], object]] = {}
-    if space.dim == 2:
-        pictures["competent/since"] = lambda ax, section: _since(ax, competent)
     pictures["map/error"] = lambda ax, section: _errors(ax, benchmark, errors, space, section)
     if regions:
         pictures["map/competence"] = lambda ax, section: _competence(ax, regions, section)
@@ -56,25 +50,6 @@ def _competence(ax: Axes, regions: Sequence[Region], section: Section) -> None:
     means = [region.competences.mean() if len(region.goals) else np.nan for region in regions]
     competence_map(ax, *_boxes(regions), np.array(means), section, worst=WORST)
     _name(ax, regions, section)
-
-
-def _since(ax: Axes, competent: Competent) -> None:
-    """Each cell coloured by the share of its goals that are met; where half of them are, since when is written."""
-    grid, shares, since = competent.grid, competent.shares, competent.since
-    n, box = grid.per_side, grid.box
-    values = np.array([shares.get(name, np.nan) for name in grid.names]).reshape(n, n).T  # (n_y, n_x)
-    x, y = (np.linspace(low, high, n + 1) for low, high in zip(box.low, box.high, strict=True))
-    mesh = ax.pcolormesh(x, y, np.ma.masked_invalid(values), cmap="viridis", vmin=0, vmax=1, edgecolors="white")
-    for k, name in enumerate(grid.names):
-        if name in shares:
-            column, row = divmod(k, n)
-            said = f"since\n{since[name]}" if name in since else f"{shares[name]:.0%}"
-            ink = "white" if shares[name] < 0.6 else "black"
-            middle = x[column : column + 2].mean(), y[row : row + 2].mean()
-            ax.text(*middle, said, ha="center", va="center", color=ink, weight="bold" if name in since else "normal")
-    colour_bar(ax, mesh, "share of the goals met now")
-    plane(ax, box)
-    ax.set_title("since when half of the goals are met, else the share")
 
 
 def _errors(ax: Axes, benchmark: Array, errors: Array, space: Box, section: Section) -> None:

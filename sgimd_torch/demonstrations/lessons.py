@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sgimd_torch.environments.protocol import Environment, HandLed
-from sgimd_torch.spaces import Array, Demonstration, read_only
+from sgimd_torch.spaces import Array, Box, Demonstration, read_only
 
 RATE: Final = 50.0  # Hz, of the shipped demonstrations and of motor primitives
 LAG: Final = 0.03  # m: warn when the arm lags the hand by more
@@ -65,8 +65,7 @@ class HandLesson:
     Args:
         demonstration: the trajectory, and the outcome of ``theta_d`` executed once.
         theta_d: ``(theta_dim,)`` in Pi, what the trajectory corresponds to.
-        misfit: rad, d of eq. (6): the root mean square over time and joints of what the robot plays minus what was led;
-            NaN if it cannot tell.
+        misfit: rad, see `misfit_of`.
         remarks: what could not be followed, a sentence each; none if all could.
     """
 
@@ -109,10 +108,8 @@ def lesson_by_hand(
     even, joints = resampled(times, recording.joints)
     theta_d = environment.policies.check("theta_d", correspondence(even, joints))
     shown = Demonstration(context, even, joints, environment.execute(context, theta_d.copy(), rng))
-    instead = played(environment, theta_d, shown)
-    misfit = np.nan if instead is None else float(np.sqrt(np.mean((instead - joints) ** 2)))
     remarks = (*_as_led(recording, times, led), *beyond_limits(environment, shown))
-    return HandLesson(shown, read_only(theta_d), misfit, remarks)
+    return HandLesson(shown, read_only(theta_d), misfit_of(environment, theta_d, shown), remarks)
 
 
 def resampled(times: Array, joints: Array) -> tuple[Array, Array]:
@@ -121,19 +118,30 @@ def resampled(times: Array, joints: Array) -> tuple[Array, Array]:
     return even, np.stack([np.interp(even, times, column) for column in joints.T], axis=1)
 
 
-def played(environment: Environment, theta: Array, shown: Demonstration) -> Array | None:
-    """``(n_times, n_joints)`` that the robot plays in the place of a recording; None for one that cannot tell."""
+def misfit_of(environment: Environment, theta: Array, shown: Demonstration) -> float:
+    """d of eq. (6): the root mean square (rad), over time and joints, of what the robot plays minus what was shown.
+
+    Args:
+        environment: has a ``primitive`` or a ``controller``; NaN for one that cannot tell what it plays.
+        theta: ``(theta_dim,)``, what the recording was translated to.
+        shown: the recording.
+    """
     player = _player_of(environment)
-    if player is None:
-        return None
-    found: Array = player.at(theta, np.asarray(shown.times - shown.times[0]))
-    return found if found.shape == shown.trajectory.shape else None
+    played = None if player is None else player.at(theta, shown.times - shown.times[0])
+    if played is None or played.shape != shown.trajectory.shape:
+        return float("nan")
+    return float(np.sqrt(np.mean((played - shown.trajectory) ** 2)))
+
+
+def ranges_of(environment: Environment) -> Box | None:
+    """The ranges of the joints or commands that recordings are of; None for a robot that does not tell."""
+    player = _player_of(environment)
+    return getattr(player, "joints", getattr(player, "commands", None))
 
 
 def beyond_limits(environment: Environment, shown: Demonstration) -> list[str]:
     """What of a recording lies outside the limits of the robot, as far as it tells them."""
-    remarks, player = [], _player_of(environment)
-    box = getattr(player, "joints", getattr(player, "commands", None))
+    remarks, box = [], ranges_of(environment)
     if box is not None and shown.trajectory.ndim == 2 and shown.trajectory.shape[1] == box.dim:
         outside = (shown.trajectory < box.low) | (shown.trajectory > box.high)
         for joint in np.flatnonzero(outside.any(axis=0)):

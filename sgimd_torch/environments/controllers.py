@@ -16,6 +16,7 @@ from sgimd_torch.environments.protocol import check_recording
 from sgimd_torch.spaces import Array, Box
 
 _GRID: Final = 200  # frequencies that are tried before the best one is refined
+STEER: Final = 0.5  # half ranges, the largest offset
 
 
 class Controller(Protocol):
@@ -35,29 +36,28 @@ class Sinusoids:
     """One sinusoid for each command: amplitude, phase and offset; all share one frequency.
 
     theta in [0, 1]^(3 n_commands + 1) holds amplitude, phase and offset command by command, then the frequency. An
-    amplitude of 1 is half of the command's range, an offset moves the middle by ``steer`` of that at most; what leaves
+    amplitude of 1 is half of the command's range, an offset moves the middle by half of that at most; what leaves
     the range is clipped. A phase of 1 is that of 0.
 
     Args:
         commands: ``(n_commands,)`` box of their ranges, such as the torques of motors.
         frequencies: lowest and highest (Hz).
-        steer: the largest offset, in half ranges.
 
     Raises:
-        ValueError: frequencies that are not 0 < lowest < highest, or ``steer`` outside (0, 1].
+        ValueError: frequencies that are not 0 < lowest < highest.
     """
 
-    def __init__(self, commands: Box, frequencies: tuple[float, float], *, steer: float = 0.5) -> None:
-        if not 0 < frequencies[0] < frequencies[1] < np.inf or not 0 < steer <= 1:
-            raise ValueError(f"needs 0 < lowest < highest frequency and 0 < steer <= 1, got {frequencies} and {steer}")
-        self.commands, self.frequencies, self.steer = commands, frequencies, steer
+    def __init__(self, commands: Box, frequencies: tuple[float, float]) -> None:
+        if not 0 < frequencies[0] < frequencies[1] < np.inf:
+            raise ValueError(f"frequencies must be 0 < lowest < highest in Hz, got {frequencies}")
+        self.commands, self.frequencies = commands, frequencies
         self.policies = Box.cube(0.0, 1.0, 3 * commands.dim + 1)
 
     def at(self, theta: Array, times: Array) -> Array:
         """``(n_times, n_commands)`` at ``times`` (s)."""
         amplitudes, phases, offsets = theta[:-1].reshape(-1, 3).T
         angles = 2 * np.pi * (self._frequency(theta[-1]) * times[:, None] + phases)
-        waves = amplitudes * np.sin(angles) + self.steer * (2 * offsets - 1)
+        waves = amplitudes * np.sin(angles) + STEER * (2 * offsets - 1)
         low, high = self.commands.low, self.commands.high
         return self.commands.clip((low + high) / 2 + (high - low) / 2 * waves)
 
@@ -92,7 +92,7 @@ class Sinusoids:
         pace = float(minimize_scalar(lambda pace: fit(pace)[0], bounds=around, method="bounded").x)
         sine, cosine, offset = fit(pace)[1]
         phases = np.arctan2(cosine, sine) / (2 * np.pi) % 1.0
-        each = np.stack([np.hypot(sine, cosine), phases, (offset / self.steer + 1) / 2], axis=1)
+        each = np.stack([np.hypot(sine, cosine), phases, (offset / STEER + 1) / 2], axis=1)
         return self.policies.clip(np.append(each.ravel(), pace))
 
     def _frequency(self, pace: float) -> float:

@@ -124,25 +124,14 @@ class FishingRod:
         context, theta = check_movement(self, context, theta)
         return self._execute(context[None], theta[None], [rng])[0]
 
-    def execute_many(self, contexts: ArrayLike, thetas: ArrayLike, rngs: Sequence[np.random.Generator]) -> Array:
-        """Run many movements side by side on threads; row i equals ``execute`` for row i bit for bit.
+    def execute_many(self, contexts: Array, thetas: Array, rngs: Sequence[np.random.Generator]) -> Array:
+        """``(n, 2)`` m, many movements side by side on threads; row i equals ``execute`` for row i bit for bit.
 
-        Args:
-            contexts: ``(n, context_dim)``.
-            thetas: ``(n, 25)``.
-            rngs: n streams.
-
-        Returns:
-            ``(n, 2)`` m.
+        The function `execute_many` checks what it is given: ``contexts`` ``(n, context_dim)``, ``thetas`` ``(n, 25)``.
 
         Raises:
-            ValueError, TypeError, SimulationError: as ``execute``.
+            TypeError, SimulationError: as ``execute``.
         """
-        thetas = self.policies.check("theta", thetas, "was a goal passed instead?")
-        contexts = self.contexts.check("context", contexts)
-        if not thetas.ndim == contexts.ndim == 2 or not 0 < len(thetas) == len(contexts) == len(rngs):
-            rows = f"{contexts.shape}, {thetas.shape} and {len(rngs)} rngs"
-            raise ValueError(f"needs n > 0 contexts, thetas and rngs, got {rows}; is it one movement, for execute()?")
         # A block takes as many steps as its longest movement, so movements of about the same length run together.
         order = thetas[:, -1].argsort(kind="stable")
         outcomes = np.empty((len(thetas), self.outcomes.dim))

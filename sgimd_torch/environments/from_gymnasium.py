@@ -18,10 +18,10 @@ from numpy.typing import ArrayLike
 
 from sgimd_torch.environments.controllers import Controller
 from sgimd_torch.environments.protocol import SimulationError, check_movement, check_rest
-from sgimd_torch.spaces import Array, Box, Demonstration, check_count, check_point, check_rng, check_vector, stream
+from sgimd_torch.spaces import Array, Box, check_count, check_point, check_rng, check_vector, stream
 
 try:
-    import gymnasium
+    import gymnasium as gymnasium
 except ImportError as error:
     raise ImportError(f"this environment needs gymnasium: pip install 'sgimd-torch[gym]' ({error})") from error
 
@@ -104,18 +104,6 @@ class FromGymnasium:
             )
         return self._play(actions, stream(0, "replay"), actions[-1])
 
-    def misfit(self, demonstration: Demonstration) -> float:
-        """How far a recording of actions is from what the controller can play, root mean square.
-
-        Raises:
-            ValueError: the recording cannot be translated, or the controller has no ``correspondence``.
-        """
-        times, actions = demonstration.times, demonstration.trajectory
-        if not hasattr(self, "correspondence"):
-            raise ValueError(f"{type(self.controller).__name__} cannot translate recorded actions")
-        played = self.controller.at(self.correspondence(times, actions), times - times[0])
-        return float(np.sqrt(np.mean(np.square(played - actions))))
-
     def _play(self, actions: Array, rng: np.random.Generator, theta: Array) -> Array:
         """The outcome of an episode of these ``actions``; ``theta`` is named if it fails."""
         check_rng(rng)
@@ -133,18 +121,6 @@ class FromGymnasium:
         if not np.isfinite(outcome).all():
             raise SimulationError("the outcome is not finite", theta)
         return check_point("outcome", outcome, self.outcomes.dim)
-
-
-def make_world(name: str, **options: Any) -> gymnasium.Env[Any, Any]:
-    """``gymnasium.make``, without its checks of every step.
-
-    Raises:
-        ValueError: gymnasium does not know the name, or misses a package.
-    """
-    try:
-        return gymnasium.make(name, disable_env_checker=True, **options)
-    except gymnasium.error.Error as error:
-        raise ValueError(f"{name} cannot be made: {error}") from error
 
 
 def measured_noise(environment: FromGymnasium, rng: np.random.Generator, *, movements: int = 20) -> float:

@@ -121,17 +121,6 @@ class GaussianPrimitive:
         pace = (np.clip(span, shortest, longest) - shortest) / (longest - shortest)
         return self.policies.clip(np.append(knots.T.ravel(), pace))
 
-    def residual(self, theta: ArrayLike, times: ArrayLike, trajectory: ArrayLike) -> float:
-        """How far theta is from reproducing a demonstration: d of eq. (6), as root mean square (rad).
-
-        Raises:
-            ValueError: as ``correspondence``.
-        """
-        theta = self.policies.check("theta", theta)
-        times, trajectory = check_recording(times, trajectory, self.joints.dim, samples=self.n_knots)
-        phases = (times - times[0]) / (times[-1] - times[0])
-        return float(np.sqrt(np.mean((self._weights(phases) @ self._knots(theta).T - trajectory) ** 2)))
-
     def _knots(self, theta: Array) -> Array:
         knots = theta[:-1].reshape(self.joints.dim, self.n_knots)
         return self.joints.low[:, None] + knots * self.joints.sides[:, None]

@@ -16,18 +16,16 @@ _STEPS = 26  # of it, from rest to its posture
 
 
 class PlanarArm:
-    """An arm of equal links in the plane; the outcome is the position of its end.
+    """An arm of equal links in the plane, 1 m long; the outcome is the position of its end.
 
     ``theta`` in [0, 1]^n_joints is scaled to joint angles, .5 to the angle 0: the first joint turns in [-pi, pi], the
-    others bend in [-max_angle, max_angle]. It can reach exactly the ring ``min_radius`` <= radius <= ``length``.
+    others bend by 2 pi / n_joints at most. So it can reach exactly the disc of radius 1 m.
 
     Args:
         n_joints: at least 2.
-        length: of the whole arm, m.
-        max_angle: rad, in (0, pi]; None means 2 pi / n_joints, the least that leaves no hole in the ring.
         noise: standard deviation of every joint angle, rad; its effect on the outcome depends on the movement.
         context: whether a context turns the whole arm, by an angle in [-pi/4, pi/4]; ``rest`` is in the context 0.
-        outcomes: T; None means the square around the ring.
+        outcomes: T; None means the square around the disc.
 
     Raises:
         ValueError: a number out of its range, or ``outcomes`` that do not contain ``rest``.
@@ -37,27 +35,20 @@ class PlanarArm:
         self,
         n_joints: int = 7,
         *,
-        length: float = 1.0,
-        max_angle: float | None = None,
         noise: float = 0.0,
         context: bool = False,
         outcomes: Box | None = None,
     ) -> None:
         n_joints = check_count("n_joints", n_joints, 2)
-        if max_angle is None:
-            max_angle = 2 * np.pi / n_joints
-        if not (0 < length < np.inf and 0 < max_angle <= np.pi and 0 <= noise < np.inf):
-            raise ValueError(f"needs length > 0, 0 < max_angle <= pi, noise >= 0, got {length}, {max_angle}, {noise}")
+        if not 0 <= noise < np.inf:
+            raise ValueError(f"noise must be finite and >= 0, got {noise}")
         self.contexts = Box.cube(-np.pi / 4, np.pi / 4, int(context), names=("turn",) * context, unit="rad")
         self.policies = Box.cube(0.0, 1.0, n_joints)
-        self.outcomes = Box.cube(-length, length, 2, names=("x", "y"), unit="m") if outcomes is None else outcomes
-        self.rest = self.outcomes.check("rest, where the straight arm ends,", [length, 0.0], "T has 2 dimensions")
+        self.outcomes = Box.cube(-1, 1, 2, names=("x", "y"), unit="m") if outcomes is None else outcomes
+        self.rest = self.outcomes.check("rest, where the straight arm ends,", [1.0, 0.0], "T has 2 dimensions")
         self.rest.flags.writeable = False
-        self.length, self.noise = length, noise
-        self._limits = np.array([np.pi] + [max_angle] * (n_joints - 1))
-        # Of bends up to max_angle, equal ones bring the end closest (Cauchy's arm lemma), until they close a circle.
-        self._max_bend = min(max_angle, 2 * np.pi / n_joints)
-        self.min_radius = max(0.0, self._radius(self._max_bend))
+        self.noise = noise
+        self._limits = np.array([np.pi] + [2 * np.pi / n_joints] * (n_joints - 1))  # the least that close a circle
         self.outcome_noise = self._mean_outcome_noise()
 
     def observe(self, rng: np.random.Generator) -> Array:
@@ -79,7 +70,7 @@ class PlanarArm:
         context, theta = check_movement(self, context, theta)
         angles, times = self._moved(theta, rng), np.linspace(0, 1, _STEPS)[:, None]
         directions = np.cumsum(times**2 * (3 - 2 * times) * angles, axis=1) + context.sum()
-        links = self.length / len(theta) * np.stack([np.cos(directions), np.sin(directions)], axis=2)
+        links = 1 / len(theta) * np.stack([np.cos(directions), np.sin(directions)], axis=2)
         joints = np.concatenate([np.zeros((_STEPS, 1, 2)), np.cumsum(links, axis=1)], axis=1)
         return Sketch(self._end(context, angles), _STEP, joints)
 
@@ -91,7 +82,7 @@ class PlanarArm:
         n = self.policies.dim
         names = tuple(JOINT.format(k) for k in range(n))
         ranges, fastest = Box(-self._limits, self._limits), (1.5 * self._limits, 6 * self._limits)  # of 3 t^2 - 2 t^3
-        return HandLed(planar_model([self.length / n] * n), names, "end", ranges, np.zeros(n), *fastest)
+        return HandLed(planar_model([1 / n] * n), names, "end", ranges, np.zeros(n), *fastest)
 
     def angles(self, theta: ArrayLike) -> Array:
         """``(..., n_joints)`` rad, the angle of each joint without noise; ``theta`` is ``(..., n_joints)``.
@@ -128,9 +119,7 @@ class PlanarArm:
 
     def reachable(self, points: ArrayLike) -> NDArray[np.bool_]:
         """``(...)`` whether some theta without noise reaches each of ``points`` ``(..., 2)``, to rounding."""
-        radius = np.linalg.norm(check_vector("points", points, 2), axis=-1)
-        rounding = 1e-12 * self.length
-        is_reachable: NDArray[np.bool_] = (self.min_radius - rounding <= radius) & (radius <= self.length + rounding)
+        is_reachable: NDArray[np.bool_] = np.linalg.norm(check_vector("points", points, 2), axis=-1) <= 1 + 1e-12
         return is_reachable
 
     def solve(self, context: ArrayLike, goal: ArrayLike) -> Array:
@@ -144,10 +133,10 @@ class PlanarArm:
         context, _ = check_movement(self, context, np.full(self.policies.dim, 0.5))
         goal = check_vector("goal", goal, 2, "was theta passed instead?")
         if goal.ndim != 1 or not self.reachable(goal):
-            raise ValueError(f"goal must be one point from {self.min_radius} to {self.length} m away, got {goal}")
-        n = self.policies.dim
-        radius = np.clip(np.linalg.norm(goal), self._radius(self._max_bend), self._radius(0.0))
-        bend = root_scalar(lambda bend: self._radius(bend) - radius, bracket=(0.0, self._max_bend), xtol=1e-15).root
+            raise ValueError(f"goal must be one point at most 1 m away, got {goal}")
+        n, circle = self.policies.dim, self._limits[1]
+        radius = np.clip(np.linalg.norm(goal), self._radius(circle), self._radius(0.0))
+        bend = root_scalar(lambda bend: self._radius(bend) - radius, bracket=(0.0, circle), xtol=1e-15).root
         first = np.arctan2(goal[1], goal[0]) - context.sum() - (n - 1) / 2 * bend  # the chord halves the total turn
         angles = np.array([np.angle(np.exp(1j * first))] + [bend] * (n - 1))
         return self.policies.clip((angles / self._limits + 1) / 2)
@@ -160,12 +149,12 @@ class PlanarArm:
 
     def _end(self, context: Array, angles: Array) -> Array:
         directions = np.cumsum(angles) + context.sum()  # an empty context sums to 0
-        return self.length / len(angles) * np.array([np.cos(directions).sum(), np.sin(directions).sum()])
+        return 1 / len(angles) * np.array([np.cos(directions).sum(), np.sin(directions).sum()])
 
     def _radius(self, bend: float) -> float:
-        """How far the end is when all joints but the first have this bend: from the length down to 0 at a full turn."""
+        """How far the end is when all joints but the first have this bend: from 1 down to 0 at a full turn."""
         n = self.policies.dim
-        return float(self.length / n * np.cos((np.arange(n) - (n - 1) / 2) * bend).sum())
+        return float(1 / n * np.cos((np.arange(n) - (n - 1) / 2) * bend).sum())
 
     def _mean_outcome_noise(self) -> float:
         """Root mean square, over uniform thetas, of an outcome's deviation per dimension, to first order in noise."""
@@ -174,4 +163,4 @@ class PlanarArm:
         alignment = straightness**apart  # (n, n) the mean cosine between two links
         # A joint moves the end by its angle times its distance to the end, the length of the links beyond it.
         levers = [alignment[joint:, joint:].sum() for joint in range(n)]
-        return float(self.noise * self.length / n * np.sqrt(np.sum(levers) / 2))
+        return float(self.noise / n * np.sqrt(np.sum(levers) / 2))

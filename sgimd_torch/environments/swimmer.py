@@ -13,7 +13,7 @@ from typing import Any, Final
 import numpy as np
 
 from sgimd_torch.environments.controllers import Sinusoids
-from sgimd_torch.environments.from_gymnasium import FromGymnasium, make_world
+from sgimd_torch.environments.from_gymnasium import FromGymnasium, gymnasium
 from sgimd_torch.spaces import Array, Box
 
 STEPS: Final = 150  # of .04 s
@@ -27,14 +27,16 @@ class Swimmer(FromGymnasium):
 
     Args:
         start: half the range from which its first positions and speeds are drawn; 0 always starts alike.
-
-    Raises:
-        ValueError: gymnasium cannot make Swimmer-v5.
     """
 
     def __init__(self, *, start: float = START) -> None:
         super().__init__(
-            make_world("Swimmer-v5", reset_noise_scale=start, exclude_current_positions_from_observation=False),
+            gymnasium.make(
+                "Swimmer-v5",
+                reset_noise_scale=start,
+                exclude_current_positions_from_observation=False,
+                disable_env_checker=True,  # of every step
+            ),
             Sinusoids(Box.cube(-1.0, 1.0, 2), FREQUENCIES),
             outcomes=Box.cube(-1.5, 1.5, 2, names=("x", "y"), unit="m"),
             rest=np.zeros(2),

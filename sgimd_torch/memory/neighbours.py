@@ -1,4 +1,4 @@
-"""Nearest rows of a growing table: exact ones by a tree, or by comparing with all; in a large policy space by an index.
+"""Nearest rows of a growing table: exact ones by a tree, or by comparing with all; of very many rows by cells.
 
 Memory asks it "which movements landed near there?" (section 4.4.2 of Nguyen & Oudeyer, 2014: H of eq. 8) and "which
 movements are like this one?" (K_h). scipy or faiss proposes, float64 decides; of equally near rows the older is nearer.
@@ -27,7 +27,9 @@ _LARGEST32: Final = float(np.finfo(np.float32).max)  # what faiss reports where 
 _ROUNDING: Final = 1e-9  # relative; far more than two ways to add up a float64 distance differ by
 
 faiss.omp_set_num_threads(1)  # queries last microseconds: to wake other threads costs more than they save
-faiss.cvar.distance_compute_blas_threshold = 2**20  # above it |a|^2 + |b|^2 - 2ab cancels, and _Flat's bound fails
+faiss.cvar.distance_compute_blas_threshold = (
+    2**20
+)  # above it |a|^2 + |b|^2 - 2ab cancels, and _surely_proposed is wrong
 
 
 class Table:
@@ -73,7 +75,7 @@ class TreeNeighbours:
     def __init__(self, keys: Table) -> None:
         self.keys = keys
         self._tree: cKDTree | None = None
-        self._newest = _Flat(keys, 0)
+        self._n_in_tree = 0
 
     def nearest(self, query: Array, k: int) -> Rows:
         """``(min(k, n),)`` rows, nearest to ``query`` ``(dim,)`` first.
@@ -82,41 +84,34 @@ class TreeNeighbours:
             ValueError: ``k`` is below 1.
         """
         _check_k(k)
-        n = len(self.keys)
-        if n - self._newest.first > max(self._NEWEST, self._newest.first // 32):
+        keys, n = self.keys.rows, len(self.keys)
+        if n - self._n_in_tree > max(self._NEWEST, self._n_in_tree // 32):
             # Neither option changes what is found; without them it is built twice as fast.
-            self._tree = cKDTree(self.keys.rows, balanced_tree=False, compact_nodes=False)
-            self._newest = _Flat(self.keys, n)
+            self._tree, self._n_in_tree = cKDTree(keys, balanced_tree=False, compact_nodes=False), n
+        newest = np.arange(self._n_in_tree, n)
         if self._tree is None:
-            return self._newest.nearest(query[None], k)[0]
-        return self._nearest(self._tree, query, k)
-
-    def _nearest(self, tree: cKDTree, query: Array, k: int) -> Rows:
-        n_proposed = min(k + _SPARE, tree.n)
-        distances, proposed = tree.query(query, n_proposed)
-        beyond = distances[-1] if n_proposed < tree.n else np.inf  # no row that the tree did not propose is nearer
-        newest, beyond_newest = self._newest.propose(query[None], k + _SPARE)
-        rows, squared = _nearest_of(self.keys.rows, query, np.sort(np.concatenate((proposed, newest[0]))), k)
-        reach = math.sqrt(squared[-1])
-        if reach * (1 + _ROUNDING) < beyond and _surely_proposed(query, reach, beyond_newest[0]):
+            return _nearest_of(keys, query, newest, k)[0]
+        n_proposed = min(k + _SPARE, self._tree.n)
+        distances, proposed = self._tree.query(query, n_proposed)
+        beyond = distances[-1] if n_proposed < self._tree.n else np.inf  # no row that it did not propose is nearer
+        rows, squared = _nearest_of(keys, query, np.concatenate((np.sort(proposed), newest)), k)
+        reach = math.sqrt(squared[-1]) * (1 + _ROUNDING)
+        if reach < beyond:
             return rows
-        ball = tree.query_ball_point(query, reach * (1 + _ROUNDING), return_sorted=True)
-        rows = np.concatenate((np.array(ball, dtype=np.int64), np.arange(tree.n, len(self.keys))))
-        return _nearest_of(self.keys.rows, query, rows, k)[0]
+        ball = self._tree.query_ball_point(query, reach, return_sorted=True)
+        return _nearest_of(keys, query, np.concatenate((np.array(ball, dtype=np.int64), newest)), k)[0]
 
 
 class PolicyNeighbours:
     """Neighbours in many dimensions: exact among up to ``EXACT_UP_TO`` rows; among more nearly all of them are found.
 
-    Above that, rows are kept in generations, each as large as all before it together. A generation is cut into cells
-    around rows of the one before (the first: around its own), and only the cells nearest to a query are searched. So no
-    row ever moves, and no addition takes long.
+    Above that, rows lie in cells around some of the first ones, and only the cells nearest to a query are searched.
     """
 
     def __init__(self, keys: Table) -> None:
         self.keys = keys
-        self._all: _Flat | None = _Flat(keys, 0)
-        self._generations: list[_Cells] = []
+        self._index: faiss.Index = faiss.IndexFlatL2(keys.dim)
+        self._exact = True
 
     def nearest(self, queries: Array, k: int, within: float = np.inf) -> list[Rows]:
         """For each of ``queries`` ``(m, dim)`` at most ``k`` rows not farther than ``within``, nearest first.
@@ -125,90 +120,35 @@ class PolicyNeighbours:
             ValueError: ``k`` is below 1.
         """
         _check_k(k)
-        if len(self.keys) <= EXACT_UP_TO:
-            assert self._all is not None
-            return self._all.nearest(queries, k, within)
-        self._all = None
-        self._catch_up()
-        keys, queries32 = self.keys.rows, _float32(queries)
-        proposed = np.hstack([cells.propose(queries32, k + _SPARE) for cells in self._generations])
-        return [
-            rows[: int((squared <= within * within).sum())]
-            if squared[-1] < np.inf  # too few are proposed where cells are nearly empty, or a query is beyond float32
-            else _rank(keys, query, k, within)
-            for query, rows, squared in zip(queries, *_decide(keys, queries, proposed, k), strict=True)
-        ]
-
-    def _catch_up(self) -> None:
-        keys = self.keys.rows
-        if not self._generations:
-            self._generations.append(_Cells(keys[:EXACT_UP_TO], 0, EXACT_UP_TO))
-        self._generations[-1].catch_up(keys)
-        while (stop := self._generations[-1].stop) < len(keys):
-            before = keys[self._generations[-1].first : stop]
-            self._generations.append(_Cells(before, stop, 2 * stop))
-            self._generations[-1].catch_up(keys)
-
-
-class _Flat:
-    """All rows from ``first`` on, compared in float32."""
-
-    def __init__(self, keys: Table, first: int) -> None:
-        self.keys, self.first = keys, first
-        self._index = faiss.IndexFlatL2(keys.dim)
-
-    def propose(self, queries: Array, n: int) -> tuple[Rows, Array]:
-        """For each of ``queries`` ``(m, dim)`` the ``n`` rows nearest in float32, ``(m, n)`` or fewer columns, and the
-        squared distance ``(m,)`` in float32 that no other row is below, infinite if there is none."""
-        keys = self.keys.rows[self.first :]
-        if self._index.ntotal < len(keys):
-            self._index.add(_float32(keys[self._index.ntotal :]))
-        if n >= len(keys):
-            rows = np.arange(self.first, self.first + len(keys))
-            return np.tile(rows, (len(queries), 1)), np.full(len(queries), np.inf)
-        squared32, proposed = self._index.search(_float32(queries), n)
-        return proposed + self.first, squared32[:, -1].astype(np.float64)
-
-    def nearest(self, queries: Array, k: int, within: float = np.inf) -> list[Rows]:
-        """The exact ones, if ``first`` is 0."""
         keys = self.keys.rows
         if len(keys) <= k + _SPARE:
             return [_rank(keys, query, k, within) for query in queries]
-        proposed, beyond = self.propose(queries, k + _SPARE)
-        found = _decide(keys, queries, proposed, k)
-        return [
-            rows[: int((squared <= within * within).sum())]
-            if _surely_proposed(query, min(math.sqrt(squared[-1]), within), last)
-            else _rank(keys, query, k, within)
-            for query, rows, squared, last in zip(queries, *found, beyond, strict=True)
-        ]
+        if self._exact and len(keys) > EXACT_UP_TO:
+            self._index, self._exact = _in_cells(_float32(keys[:EXACT_UP_TO])), False
+        if self._index.ntotal < len(keys):
+            self._index.add(_float32(keys[self._index.ntotal :]))
+        squared32, proposed = self._index.search(_float32(queries), k + _SPARE)
+        found: list[Rows] = []
+        for query, rows, squared, beyond in zip(
+            queries, *_decide(keys, queries, proposed, k), squared32[:, -1].astype(np.float64), strict=True
+        ):
+            if self._exact:
+                enough = _surely_proposed(query, min(math.sqrt(squared[-1]), within), beyond)
+            else:
+                enough = squared[-1] < np.inf  # not where cells are nearly empty, or the query is beyond float32
+            found.append(rows[squared <= within * within] if enough else _rank(keys, query, k, within))
+        return found
 
 
-class _Cells:
-    """One generation: the rows from ``first`` to ``stop``, each in the cell of the nearest of some ``rows``."""
-
-    _SEARCHED: Final = 16  # cells for each query
-
-    def __init__(self, rows: Array, first: int, stop: int) -> None:
-        self.first, self.stop = first, stop
-        n_cells = 4 * math.isqrt(stop - first)
-        centres = _float32(rows[:: len(rows) // n_cells][:n_cells])
-        self._centres = faiss.IndexFlatL2(centres.shape[1])
-        self._centres.add(centres)
-        self._index = faiss.IndexIVFFlat(self._centres, centres.shape[1], n_cells)
-        self._index.is_trained = True  # nothing is left to learn: the centres are given
-        self._index.nprobe = self._SEARCHED
-
-    def catch_up(self, keys: Array) -> None:
-        """Take in what is new in ``keys`` ``(n, dim)``, all rows of the table."""
-        new = keys[self.first + self._index.ntotal : self.stop]
-        if len(new):
-            self._index.add(_float32(new))
-
-    def propose(self, queries32: NDArray[np.float32], n: int) -> Rows:
-        """``(m, n)`` rows near each of ``(m, dim)`` queries; -1 stands for none."""
-        _, rows = self._index.search(queries32, n)
-        return np.where(rows < 0, -1, rows + self.first)
+def _in_cells(rows32: NDArray[np.float32]) -> faiss.IndexIVFFlat:
+    """An empty index that puts each row into the cell of the nearest of some of these ``(n, dim)``."""
+    n_cells = 4 * math.isqrt(len(rows32))
+    centres = faiss.IndexFlatL2(rows32.shape[1])
+    centres.add(rows32[:: len(rows32) // n_cells][:n_cells])
+    index = faiss.IndexIVFFlat(centres, rows32.shape[1], n_cells)
+    index.is_trained = True  # nothing is left to learn: the centres are given
+    index.nprobe = 16  # cells that are searched for a query
+    return index
 
 
 def _check_k(k: int) -> None:
@@ -234,7 +174,7 @@ def _surely_proposed(query: Array, reach: float, beyond: float) -> bool:
     ``reach + error``.
     """
     error = _EPSILON32 * (len(query) + 5) * (reach + math.sqrt((query * query).sum()))
-    return beyond == np.inf or ((reach + error) ** 2 < beyond < _LARGEST32)
+    return (reach + error) ** 2 < beyond < _LARGEST32
 
 
 def _decide(keys: Array, queries: Array, proposed: Rows, k: int) -> tuple[Rows, Array]:
@@ -255,6 +195,9 @@ def _rank(keys: Array, query: Array, k: int, within: float) -> Rows:
 def _nearest_of(keys: Array, query: Array, rows: Rows, k: int) -> tuple[Rows, Array]:
     """The ``k`` nearest of increasing ``rows``, and their squared distances."""
     squared = squared_distances(keys[rows], query)
+    if k < len(rows):
+        near = squared <= np.partition(squared, k - 1)[k - 1]  # with all that are as far, of which the older count
+        rows, squared = rows[near], squared[near]
     order = squared.argsort(kind="stable")[:k]
     return rows[order], squared[order]
 

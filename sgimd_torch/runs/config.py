@@ -11,7 +11,6 @@ from __future__ import annotations
 import importlib.util
 import inspect
 import json
-import math
 from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, fields
@@ -28,7 +27,7 @@ THREADS: Final = "environment.threads"
 PLACE: Final = ("seed", "out", "name", "board", THREADS)  # they do not change the learner
 EVALUATES: Final = ("evaluated_by", "repeats", "floor_at", "benchmark_crc32")  # all evaluations of a run share these
 MAY_CHANGE: Final = (
-    *("movements", "out", "name", "board", "patience", "failures", "evaluate_at"),
+    *("movements", "out", "name", "board", "failures", "evaluate_at"),
     *(*FILES, *EVALUATES, THREADS),
 )
 """When a run is resumed, as they only say how long it lasts, where it is or how it is shown. Files count by their
@@ -48,14 +47,13 @@ class Config:
         movements: number of movements, those at rest included.
         out: folder for runs; this one goes to OUT/NAME/seed-003.
         name: NAME in that path, to keep a variant apart; null is the algorithm's.
-        board: whether TensorBoard shows the run; sgimd watch OUT opens it.
+        board: whether curves and pictures for TensorBoard are written, into its folder.
         evaluate_at: movements after which to evaluate, besides the end; null is 250, 500 and every 1000; [] never.
         evaluated_by: which inverse models answer in evaluations: own is that of --inverse, others are its words.
         repeats: how often each movement of an evaluation is executed again to measure the noise; 0 does not.
         floor_at: which evaluations measure the noise, which takes four times as long; null is all.
         benchmark: file of the goals to evaluate on; null is the environment's own.
         demonstrations: file of recorded demonstrations; null is the environment's own.
-        patience: seconds to wait for a teacher who is asked; null is as long as it takes.
         failures: failed movements in a row that stop the run; null is ten.
         parts: by name, such as "goals" or "goals.window", what is chosen for it; what differs from its default is kept.
 
@@ -75,7 +73,6 @@ class Config:
     floor_at: tuple[int, ...] | None = None
     benchmark: Path | None = None
     demonstrations: Path | None = None
-    patience: float | None = None
     failures: int | None = None
     parts: Mapping[str, Any] | tuple[tuple[str, Any], ...] = ()
 
@@ -96,8 +93,6 @@ class Config:
         for name in ("evaluate_at", "floor_at"):
             if min(getattr(self, name) or (1,)) < 1:
                 raise ValueError(f"{name} must be numbers of movements, at least 1, got {getattr(self, name)}")
-        if self.patience is not None and not 0 < self.patience < math.inf:
-            raise ValueError(f"patience must be above 0 s and finite, got {self.patience}; null waits for ever")
         for name, words in (("evaluated_by", self.evaluated_by), ("teachers", self.values.get("teachers", ("",)))):
             if not words or len({*words}) < len(words):
                 raise ValueError(f"{name} must name at least one, and each once, got {','.join(words)}")

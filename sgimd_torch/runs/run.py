@@ -10,7 +10,7 @@ import time
 import traceback
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
-from typing import TYPE_CHECKING, Final, Self
+from typing import Final, Self
 
 from sgimd_torch.environments.protocol import FAILURES, SimulationError
 from sgimd_torch.record import Record, RunError
@@ -22,9 +22,6 @@ from sgimd_torch.runs.listeners import Listener, Seconds
 from sgimd_torch.runs.process import Failed, Progress, Stopped, Stopping, say
 from sgimd_torch.session import NoOutcomeError, ReplayError, live, reason_of, run
 from sgimd_torch.spaces import Episode
-
-if TYPE_CHECKING:
-    from sgimd_torch.teachers.answering import Demonstrator
 
 TOLD: Final = 3  # failed movements that are told one by one
 COMMIT_EVERY: Final = 1.0  # s; a killed run loses what came since
@@ -153,7 +150,7 @@ class Life:
             seed,
             movements=parts.config.movements,
             teacher=parts.teacher,
-            teachers={name: self._awaited(name, each) for name, each in parts.teachers.items()},
+            teachers=parts.teachers,
             execute=self.seconds.of("physics")(live(parts.environment, seed)),
             record=self.record,
             failures=parts.config.failures or FAILURES,
@@ -174,11 +171,6 @@ class Life:
     def _settle(self) -> None:
         self.record.settle(seconds=self.seconds.summary())
         self.record.commit()
-
-    def _awaited(self, name: str, teacher: Demonstrator) -> Demonstrator:
-        from sgimd_torch.teachers.awaited import Awaited  # most learners ask nobody
-
-        return Awaited(name, teacher, patience=self.parts.config.patience, say=say)
 
     def _after(self, episode: Episode) -> None:
         replayed = self.replaying

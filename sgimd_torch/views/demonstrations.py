@@ -30,7 +30,7 @@ import numpy as np
 
 from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
 from sgimd_torch.demonstrations.columns import Columns, read_csv
-from sgimd_torch.demonstrations.lessons import beyond_limits
+from sgimd_torch.demonstrations.lessons import beyond_limits, misfit_of
 from sgimd_torch.environments.protocol import SimulationError, execute_many
 from sgimd_torch.runs.build import task_of
 from sgimd_torch.runs.config import Config
@@ -46,7 +46,7 @@ class Checked:
     """One recording on a robot.
 
     ``lands`` ``(outcome_dim,)`` is None if it cannot be translated; ``refused`` says why. ``misfit`` is NaN where the
-    task cannot tell. ``remarks`` say what lies outside a limit.
+    robot cannot tell. ``remarks`` say what lies outside a limit.
     """
 
     shown: Demonstration
@@ -156,11 +156,10 @@ def check(task: Task, shown: Demonstration, row: int) -> Checked:
         context = robot.contexts.check("its context", shown.context)
         theta = correspondence_of(task)(shown.times, shown.trajectory)
         theta = robot.policies.check("theta_d of the correspondence", theta)
-        misfit = float("nan") if task.misfit is None else task.misfit(shown)
         lands = execute_many(robot, context[None], theta[None], [stream(row, "demonstrations check")])[0]
     except (ValueError, SimulationError) as error:
         return Checked(shown, None, float("nan"), remarks, str(error))
-    return Checked(shown, lands, misfit, remarks)
+    return Checked(shown, lands, misfit_of(robot, theta, shown), remarks)
 
 
 def _cells(row: int, found: Checked) -> tuple[str, ...]:

@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from tensorboard.plugins.hparams import metadata as hparams
 
 from boards import charts_of, curves_of, values_of
 from runs import arguments, content_of, end, stopped_at
@@ -105,13 +104,13 @@ def test_a_region_that_was_cut_goes_on_as_the_mean_over_the_goals_of_its_parts()
 
 def test_cells_of_the_grid_hold_each_point_once_the_border_included():
     grid = Grid(PLANE)
-    assert len(grid.names) == len(set(grid.names)) == 16
+    assert len(grid.names) == len(set(grid.names)) == 4
     means = grid.means(np.array([[-1, -1], [1, 1], [0, 0], [0.1, 0.4], [1.1, 0]]), np.array([1.0, 2, 3, 4, 5]))
-    assert means == {"x -1..-0.5, y -1..-0.5": 1, "x 0.5..1, y 0.5..1": 2, "x 0..0.5, y 0..0.5": 3.5}
+    assert means == {"x -1..0, y -1..0": 1, "x 0..1, y 0..1": 3}
 
 
-@pytest.mark.parametrize(("dim", "cells"), [(2, 16), (3, 8)])
-def test_a_grid_has_at_most_sixteen_cells_in_any_dimension(dim, cells):
+@pytest.mark.parametrize(("dim", "cells"), [(1, 8), (2, 4), (3, 8)])
+def test_a_grid_has_at_most_eight_cells_in_any_dimension(dim, cells):
     grid = Grid(Box.cube(0, 1, dim))
     assert len(grid.names) == cells
     assert all(name.count("..") == dim for name in grid.names)
@@ -133,35 +132,13 @@ def test_cells_lie_where_the_goals_of_the_benchmark_do_so_that_task_spaces_of_an
 def test_the_share_of_goals_met_is_counted_by_place_and_everywhere():
     goals = np.array([[-0.9, -0.9], [-0.8, -0.9], [0.5, 0.5], [0.9, 0.9]])
     competent = Competent(goals, 0.05, PLANE)
-    values = competent.evaluated(100, evaluation([0.01, 0.2, 0.05, 0.0]))
+    values = competent.curves(evaluation([0.01, 0.2, 0.05, 0.0]))
     assert values["met/everywhere"] == 0.75
     assert {tag: share for tag, share in values.items() if "x" in tag} == {
         "met/x -1..0, y -1..0": 0.5,
         "met/x 0..1, y 0..1": 1,
     }  # and of no place without goals
-    assert competent.shares["x -1..-0.5, y -1..-0.5"] == 0.5
     assert (values["error/mean"], values["error/noise_floor"]) == pytest.approx((0.065, 0.01))
-
-
-def test_a_cell_counts_as_competent_since_half_of_its_goals_are_met_without_interruption():
-    competent = Competent(np.array([[-1.0, -1.0], [-0.9, -0.9], [1.0, 1.0]]), 0.05, PLANE)
-    here, there = competent.grid.names[0], competent.grid.names[-1]
-    for movements, first in ((250, 0.01), (500, 0.4), (1000, 0.01), (2000, 0.02)):
-        competent.evaluated(movements, evaluation([first, 0.3, 0.3]))
-    assert competent.since == {here: 1000}
-    assert competent.shares == {here: 0.5, there: 0}
-
-
-def test_the_map_says_where_since_when_and_what_is_missing_elsewhere():
-    competent = Competent(np.array([[-1.0, -1.0], [1.0, 1.0]]), 0.05, PLANE)
-    names = competent.grid.names
-    competent.shares, competent.since = {names[0]: 0.75, names[7]: 0.25}, {names[0]: 1000}
-    ax = Figure().add_subplot()
-    pictures._since(ax, competent)
-    texts = {text.get_text(): text.get_position() for text in ax.texts}
-    assert texts == {"since\n1000": (-0.75, -0.75), "25%": (-0.25, 0.75)}  # as the names say
-    assert (names[0], names[7]) == ("x -1..-0.5, y -1..-0.5", "x -0.5..0, y 0.5..1")
-    assert ax.collections[0].get_array()[3, 1] == 0.25
 
 
 def test_the_names_of_regions_lie_where_they_are_and_are_those_of_the_curves():
@@ -228,36 +205,9 @@ def test_the_curves_of_a_run_are_those_of_its_record(watched):
 def test_every_tag_is_explained_once_in_the_file_and_in_the_legend(watched):
     explained = [value.tag for _, value in values_of(watched) if value.metadata.summary_description]
     curves = curves_of(watched)
-    assert sorted(explained) == sorted(tag for tag in curves if not tag.startswith(("_hparams_", "custom_scalars")))
+    assert sorted(explained) == sorted(tag for tag in curves if not tag.startswith("custom_scalars"))
     (legend,) = curves["about/legend"].values()
     assert all(f"**{tag}" in legend.decode() for tag in LEGEND)
-
-
-def test_runs_can_be_compared_by_settings_and_results(watched):
-    contents = {value.tag: value.metadata.plugin_data.content for _, value in values_of(watched)}
-    begun = hparams.parse_session_start_info_plugin_data(contents[hparams.SESSION_START_INFO_TAG])
-    assert begun.hparams["seed"].number_value == 3
-    assert begun.hparams["algorithm"].string_value == "sgim-d"
-    assert begun.hparams["board"].bool_value is True
-    compared = hparams.parse_experiment_plugin_data(contents[hparams.EXPERIMENT_TAG])
-    assert {info.name for info in compared.hparam_infos} >= begun.hparams.keys()
-    assert {info.name.tag for info in compared.metric_infos} <= curves_of(watched).keys()
-
-
-def test_options_of_parts_come_after_the_parts_and_one_that_is_not_set_is_left_out(tmp_path):
-    file = EventFile(tmp_path)
-    file.settings({"goals.window": 12, "goals": "interest-map", "floor_at": None}, ["error/mean"], "grid")
-    file.begin()
-    file.close()
-    contents = {value.tag: value.metadata.plugin_data.content for _, value in values_of(tmp_path)}
-    infos = hparams.parse_experiment_plugin_data(contents[hparams.EXPERIMENT_TAG]).hparam_infos
-    assert [(info.name, info.differs) for info in infos] == [
-        ("goals", True),
-        ("floor_at", True),
-        ("goals.window", False),
-    ]
-    begun = hparams.parse_session_start_info_plugin_data(contents[hparams.SESSION_START_INFO_TAG])
-    assert begun.hparams.keys() == {"goals", "goals.window"}
 
 
 def test_the_page_of_charts_begins_with_where_it_is_competent_by_places_with_goals(watched):
@@ -280,7 +230,7 @@ def test_no_chart_is_empty_whatever_the_learner(tmp_path, go, options):
 def assert_same_board(directory, whole):
     """By tag, step and value; but for seconds, which a replayed movement does not have."""
     found, wanted = (
-        {tag: curve for tag, curve in curves_of(each).items() if not tag.startswith(("time/", "_hparams_"))}
+        {tag: curve for tag, curve in curves_of(each).items() if not tag.startswith("time/")}
         for each in (directory, whole)
     )
     for found_settings in (found, wanted):
@@ -314,9 +264,7 @@ def live_as(robot, *options):
 def test_outcomes_of_any_dimension_have_curves_and_pictures(own, robot):
     curves = curves_of(live_as(robot))
     assert {"error/mean", "competence/R", "interest/R", "goals/missed_by"} < curves.keys()
-    pictures = {tag for tag in curves if tag.startswith(("map/", "competent/"))}
-    wanted = {"map/error", "map/competence"}
-    assert pictures == wanted | ({"competent/since"} if robot == "Shifted" else set())
+    assert {tag for tag in curves if tag.startswith("map/")} == {"map/error", "map/competence"}
 
 
 HALVES = '''

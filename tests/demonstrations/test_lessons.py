@@ -6,10 +6,10 @@ import pytest
 from sgimd_torch.algorithms import observation
 from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
 from sgimd_torch.demonstrations.leading import Leading
-from sgimd_torch.demonstrations.lessons import LedMovement, lesson_by_hand, resampled
+from sgimd_torch.demonstrations.lessons import LedMovement, lesson_by_hand, misfit_of, resampled
 from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.spaces import stream
+from sgimd_torch.spaces import Demonstration, stream
 
 
 @pytest.fixture(scope="module")
@@ -70,11 +70,12 @@ def test_what_the_robot_can_play_has_no_misfit_and_no_remark(rod):
     assert [remark for remark in lesson.remarks if "starts" not in remark] == []
 
 
-def test_the_misfit_is_that_of_eq_6(rod):
-    lesson = give(rod, swung(rod))
-    shown = lesson.demonstration
-    whole = rod.primitive.residual(lesson.theta_d, shown.times, shown.trajectory)
-    assert lesson.misfit == pytest.approx(whole, rel=1e-9)
+def test_the_misfit_is_the_root_mean_square_in_radians(rod):
+    theta = rod.policies.sample(stream(1, "theta"))
+    times, trajectory = rod.primitive.trajectory(theta)
+    off = trajectory + np.array([0.3, 0, 0, 0, 0, 0])  # one of six joints, throughout
+    shown = Demonstration(np.zeros(0), times + 7, off, np.zeros(2))
+    assert misfit_of(rod, theta, shown) == pytest.approx(0.3 / np.sqrt(6))
 
 
 def test_a_slow_hand_is_played_in_the_longest_movement_and_told(rod):

@@ -11,7 +11,7 @@ TIMES = 0.05 * np.arange(100)
 
 
 def test_a_sinusoid_has_the_amplitude_phase_offset_and_frequency_of_its_theta():
-    skill = Sinusoids(TORQUES, (0.5, 1.5), steer=0.5)
+    skill = Sinusoids(TORQUES, (0.5, 1.5))
     theta = np.array([0.5, 0.25, 0.5, 0.0, 0.0, 1.0, 0.5])  # half a range from its top; still, at .5 above the middle
     found = skill.at(theta, np.array([0.0, 0.25, 0.5, 1.0]))  # 1 Hz
     np.testing.assert_allclose(found[:, 0], [0.5, 0, -0.5, 0.5], atol=1e-15)
@@ -32,7 +32,6 @@ def test_a_recording_out_of_range_is_translated_to_the_nearest_in_pi():
     assert skill.policies.contains(theta)
 
 
-@pytest.mark.parametrize("options", [{"frequencies": (2.0, 1.0)}, {"frequencies": (0.1, 1.0), "steer": 0.0}])
-def test_numbers_out_of_range_are_refused(options):
-    with pytest.raises(ValueError, match="needs"):
-        Sinusoids(TORQUES, **options)
+def test_frequencies_in_no_order_are_refused():
+    with pytest.raises(ValueError, match="frequencies"):
+        Sinusoids(TORQUES, (2.0, 1.0))

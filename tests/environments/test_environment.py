@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike
-from scipy.optimize import minimize
 
 from sgimd_torch.environments.check import check_environment
 from sgimd_torch.environments.planar_arm import PlanarArm
@@ -55,7 +54,7 @@ environments = pytest.mark.parametrize(
     "environment",
     [
         PlanarArm(),
-        PlanarArm(2, length=3.0),
+        PlanarArm(2),
         PlanarArm(noise=0.02, context=True),
         PlanarArm(context=True, outcomes=Box.cube(-100, 100, 2)),
         Slope(),
@@ -129,13 +128,13 @@ def test_a_diverged_simulation_names_its_theta_even_from_another_process():
 
 
 def test_rest_is_the_end_of_the_straight_arm():
-    arm = PlanarArm(5, length=2.0)
-    np.testing.assert_allclose(end_of(arm, np.full(5, 0.5)), [2.0, 0.0], atol=1e-15)
-    assert arm.rest.tolist() == [2.0, 0.0]
+    arm = PlanarArm(5)
+    np.testing.assert_allclose(end_of(arm, np.full(5, 0.5)), [1.0, 0.0], atol=1e-15)
+    assert arm.rest.tolist() == [1.0, 0.0]
 
 
 def test_two_links_up_and_then_right_end_at_half_a_metre_each():
-    arm = PlanarArm(2, max_angle=np.pi)
+    arm = PlanarArm(2)
     np.testing.assert_allclose(end_of(arm, [0.75, 0.25]), [0.5, 0.5], atol=1e-15)  # pi/2, then -pi/2
 
 
@@ -151,14 +150,13 @@ def test_correspondence_finds_the_theta_whose_angles_a_trajectory_ends_with(n_jo
 
 
 def test_a_posture_at_its_limits_is_accepted_also_with_rounding():
-    arm = PlanarArm(2, max_angle=1.0)
-    assert arm.correspondence([0.0], [[np.pi * (1 + 1e-15), -1.0 - 1e-15]]).tolist() == [1.0, 0.0]
+    assert PlanarArm(4).correspondence([0.0], [[np.pi * (1 + 1e-15), -np.pi / 2 - 1e-15, 0, 0]])[:2].tolist() == [1, 0]
 
 
-@pytest.mark.parametrize("last", [[0, 1.1], [-3.2, 0]])
+@pytest.mark.parametrize("last", [[0, 1.6, 0, 0], [-3.2, 0, 0, 0]])
 def test_a_posture_that_the_joints_cannot_take_is_refused(last):
     with pytest.raises(ValueError, match="of the last posture entry"):
-        PlanarArm(2, max_angle=1.0).correspondence([0.0, 1.0], [[0, 0], last])
+        PlanarArm(4).correspondence([0.0, 1.0], [[0] * 4, last])
 
 
 @pytest.mark.parametrize(
@@ -187,15 +185,13 @@ def test_a_context_turns_the_whole_arm():
 
 @given(
     n_joints=st.integers(2, 12),
-    max_angle=st.one_of(st.none(), st.floats(0.1, np.pi)),
-    share=st.floats(0, 1),
+    radius=st.floats(0, 1),
     direction=st.floats(-np.pi, np.pi),
     turn=st.floats(-np.pi / 4, np.pi / 4),
 )
 @settings(max_examples=50, deadline=None, derandomize=True)
-def test_solve_reaches_every_goal_of_the_ring_in_every_context(n_joints, max_angle, share, direction, turn):
-    arm = PlanarArm(n_joints, length=3.0, max_angle=max_angle, context=True)
-    radius = arm.min_radius + share * (3.0 - arm.min_radius)
+def test_solve_reaches_every_goal_of_the_disc_in_every_context(n_joints, radius, direction, turn):
+    arm = PlanarArm(n_joints, context=True)
     goal = radius * np.array([np.cos(direction), np.sin(direction)])
     assert arm.reachable(goal)
     theta = arm.solve([turn], goal)
@@ -203,31 +199,16 @@ def test_solve_reaches_every_goal_of_the_ring_in_every_context(n_joints, max_ang
     np.testing.assert_allclose(end_of(arm, theta, [turn]), goal, atol=1e-12)
 
 
-def test_the_default_arm_reaches_its_whole_disc_and_nothing_beyond():
-    arm = PlanarArm(length=2.0)
-    points = [[0.0, 0.0], [0.0, -2.0], [1.4, 1.4], [1.42, 1.42], [2.01, 0.0]]  # radii 0, 2, 1.98, 2.008, 2.01
+def test_the_arm_reaches_its_whole_disc_and_nothing_beyond():
+    arm = PlanarArm(5)
+    points = [[0.0, 0.0], [0.0, -1.0], [0.7, 0.7], [0.71, 0.71], [1.01, 0.0]]  # radii 0, 1, .99, 1.004, 1.01
     assert arm.reachable(points).tolist() == [True, True, True, False, False]
-    arm = PlanarArm(5, length=2.0)
     straight = [end_of(arm, [turn, *[0.5] * 4]) for turn in np.linspace(0, 1, 50)]
     assert arm.reachable(straight).all()  # some are 4e-16 beyond the length
 
 
-def test_no_bends_bring_the_end_closer_than_the_inner_radius():
-    arm = PlanarArm(3, max_angle=1.0)
-    assert arm.min_radius == pytest.approx((1 + 2 * np.cos(1.0)) / 3)  # cos(-1) + cos(0) + cos(1) links of 1/3
-
-    def radius(bends: Array) -> float:
-        return float(np.linalg.norm(end_of(arm, [0.5, *np.clip(bends, 0, 1)])))
-
-    starts = stream(2, "starts").uniform(size=(10, 2))
-    closest = [minimize(radius, start, method="Nelder-Mead").fun for start in starts]
-    assert min(closest) == pytest.approx(arm.min_radius, abs=1e-6)
-    assert arm.reachable([arm.min_radius + 1e-9, 0])
-    assert not arm.reachable([arm.min_radius - 1e-9, 0])
-
-
 def test_outcome_noise_is_that_of_movements_executed_again():
-    arm, rng = PlanarArm(5, length=2.0, noise=0.01), stream(3, "environment")
+    arm, rng = PlanarArm(5, noise=0.01), stream(3, "environment")
     thetas = stream(3, "theta").uniform(size=(4000, 5))
     difference = [arm.execute(NO_CONTEXT, theta, rng) - arm.execute(NO_CONTEXT, theta, rng) for theta in thetas]
     measured = np.sqrt(np.mean(np.square(difference)) / 2)  # a difference has twice the variance
@@ -235,18 +216,16 @@ def test_outcome_noise_is_that_of_movements_executed_again():
     assert measured == pytest.approx(arm.outcome_noise, rel=0.05)
 
 
-@pytest.mark.parametrize("goal", [[1.01, 0.0], [0.1, 0.0, 0.0], [0.3, 0.0]])
+@pytest.mark.parametrize("goal", [[1.01, 0.0], [0.1, 0.0, 0.0]])
 def test_solve_refuses_goals_that_are_not_one_reachable_point(goal):
     with pytest.raises(ValueError, match="goal must"):
-        PlanarArm(3, max_angle=1.0).solve(NO_CONTEXT, goal)
+        PlanarArm(3).solve(NO_CONTEXT, goal)
 
 
 @pytest.mark.parametrize(
     "options",
     [
         {"n_joints": 1},
-        {"length": 0.0},
-        {"max_angle": 3.2},
         {"noise": -0.1},
         {"outcomes": Box.cube(-1, 1, 3)},
         {"outcomes": Box.cube(2, 3, 2)},

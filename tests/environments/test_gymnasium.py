@@ -7,7 +7,7 @@ from gymnasium.utils.env_checker import check_env
 
 from sgimd_torch.environments.check import check_environment
 from sgimd_torch.environments.controllers import Sinusoids
-from sgimd_torch.environments.from_gymnasium import FromGymnasium, make_world, measured_noise
+from sgimd_torch.environments.from_gymnasium import FromGymnasium, measured_noise
 from sgimd_torch.environments.motor_primitives import GaussianPrimitive
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.environments.protocol import SimulationError
@@ -92,7 +92,6 @@ def test_a_movement_is_an_episode_of_the_controllers_commands():
         ),
         (lambda: sled(world=gymnasium.make("MountainCarContinuous-v0")), "needs dt > 0, .* this world does not say it"),
         (lambda: sled(steps=0), "steps must be a whole number >= 1"),
-        (lambda: make_world("Swimmer-v55"), "Swimmer-v55 cannot be made"),
     ],
 )
 def test_what_cannot_be_a_task_is_refused(make, message):
@@ -197,9 +196,9 @@ def test_the_swimmer_is_a_task_with_goals_and_demonstrations():
     task = task_of(Config(parts={"environment": "swimmer"}))
     benchmark, _, _ = benchmark_of(task, None)
     assert len(benchmark.goals) > 100
-    shown, _, _ = demonstrations_of(task, None)
+    shown, notes, _ = demonstrations_of(task, None)
     assert len(shown) == 100
-    assert 0 < max(map(task.misfit, shown)) < 0.3  # the hand shook
+    assert "misses them by 0.0347 rad" in notes[0]  # the hand shook
     still = Swimmer(start=0.0)
     for each in shown[:3]:
         np.testing.assert_allclose(still.replay(each.trajectory), each.outcome, atol=1e-9)

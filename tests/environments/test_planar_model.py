@@ -9,7 +9,7 @@ from sgimd_torch.spaces import stream
 
 
 def test_its_end_is_where_the_arm_ends_for_any_theta():
-    arm, rng = PlanarArm(5, length=2.0), stream(0, "thetas")
+    arm, rng = PlanarArm(5), stream(0, "thetas")
     model = arm.hand_led.model
     data = mujoco.MjData(model)
     for _ in range(20):

@@ -138,7 +138,7 @@ CHANGED = [
     Config("sagg-riac", evaluate_at=(5, 6), parts={"goals": "grid", "goals.progress": "signed", "goals.window": 8}),
     Config("sgim-d", parts={"environment.task_space": 2.5, "global_range": (0.1, 0.2), "goals.modes": (1.0, 0.0, 0.0)}),
     Config("sgim-acts", name="x", parts={"teachers": ("low-half", "slow"), "base": "search", "base.budget": 3}),
-    Config("imitation", out=Path("here"), patience=2.5, parts={"teacher": "asked", "teacher.choose": "random"}),
+    Config("imitation", out=Path("here"), parts={"teacher": "asked", "teacher.choose": "random"}),
 ]
 
 

@@ -93,7 +93,7 @@ def test_rod_and_arm_have_one_task_space_so_that_their_tiles_begin_at_one_corner
     assert FishingRod().outcomes.high.tolist() == PlanarArm().outcomes.high.tolist() == [1, 1]
 
 
-@pytest.mark.parametrize("arm", [*map(PlanarArm, ARMS.values()), PlanarArm(3, length=2.0, max_angle=1.5)])
+@pytest.mark.parametrize("arm", list(map(PlanarArm, ARMS.values())))
 def test_demonstrations_for_an_arm_lead_from_rest_to_equal_bends_all_over_its_reach(arm):
     shown = arm_demonstrations(arm)
     assert len(shown) == 127
@@ -106,13 +106,13 @@ def test_demonstrations_for_an_arm_lead_from_rest_to_equal_bends_all_over_its_re
         end = arm.execute(NO_CONTEXT, theta, stream(0, "any"))
         np.testing.assert_allclose(end, demonstration.outcome, atol=1e-14)
     # A 127th of the area is a disc of this radius: neighbours are between one and two such radii apart.
-    radius = np.sqrt((arm.length**2 - arm.min_radius**2) / 127)
+    radius = np.sqrt(1 / 127)
     ends = np.array([demonstration.outcome for demonstration in shown])
     gaps = np.linalg.norm(ends[:, None] - ends, axis=2)[~np.eye(127, dtype=bool)].reshape(127, 126).min(axis=1)
     assert radius < gaps.min() <= gaps.max() < 2 * radius
     far = np.linalg.norm(ends, axis=1)
-    assert far.min() < arm.min_radius + radius
-    assert arm.length - radius / 4 < far.max() <= arm.length
+    assert far.min() < radius
+    assert 1 - radius / 4 < far.max() <= 1
 
 
 def test_own_demonstrations_and_goals_replace_those_of_the_arm(tmp_path, capsys):

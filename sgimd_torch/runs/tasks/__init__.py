@@ -21,6 +21,7 @@ from sgimd_torch.files import checksum
 from sgimd_torch.spaces import Demonstration
 
 MOST_GOALS: Final = 500  # of a task that has none
+TOO_FAR: Final = 0.25  # of a joint's range: a robot that misses a demonstration by more cannot make that movement
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,8 +33,6 @@ class Task:
         benchmark: goals of evaluation: a file, or a function that makes them; None for goals all over T.
         demonstrations: what a teacher has to show: a file, or a function that makes it; None for no teacher.
         correspondence: (times, trajectory) -> theta_d, eq. (6); None for the environment's own, if it has one.
-        misfit: demonstration -> how far (rad) it is from what the robot can play; raises ValueError if it cannot be
-            translated. None for the correspondence alone.
 
     Raises:
         ValueError: a class in the place of an environment.
@@ -43,7 +42,6 @@ class Task:
     benchmark: Path | Callable[[], Benchmark] | None = None
     demonstrations: Path | Callable[[], Sequence[Demonstration]] | None = None
     correspondence: Correspondence | None = None
-    misfit: Callable[[Demonstration], float] | None = None
 
     def __post_init__(self) -> None:
         check_instance(self.environment)
@@ -117,16 +115,19 @@ def demonstrations_of(task: Task, file: Path | None) -> tuple[Sequence[Demonstra
     crc32: str | None = None
     if isinstance(source, Path):
         from sgimd_torch.demonstrations import load_demonstrations  # most learners read none
+        from sgimd_torch.demonstrations.lessons import misfit_of, ranges_of
 
         crc32 = checksum(source)
         shown = load_demonstrations(source, outcome_dim=robot.outcomes.dim, context_dim=robot.contexts.dim)
-        translate = correspondence_of(task)
-        for row, demonstration in enumerate(shown):
+        translate, ranges = correspondence_of(task), ranges_of(robot)
+        for row, each in enumerate(shown):
             try:
-                if task.misfit is None:
-                    translate(demonstration.times, demonstration.trajectory)
-                else:
-                    task.misfit(demonstration)
+                misfit = misfit_of(robot, translate(each.times, each.trajectory), each)
+                if ranges is not None and misfit > TOO_FAR * ranges.sides.mean():
+                    raise ValueError(
+                        f"it is {misfit:.2f} (root mean square) away from anything that the robot can play; was it "
+                        "recorded in degrees, or with the joints in another order?"
+                    )
             except ValueError as error:
                 raise ValueError(f"{source}: recording {row} cannot be translated: {error}") from error
     else:

@@ -34,8 +34,7 @@ def swimmer() -> Task:
     """gymnasium's Swimmer-v5; its demonstrations are torques."""
     from sgimd_torch.environments.swimmer import Swimmer  # gymnasium is loaded only when it is needed
 
-    robot, goals, shown = Swimmer(), DATA / "swimmer_benchmark.npz", DATA / "swimmer_demonstrations.npz"
-    return Task(robot, goals, shown, misfit=robot.misfit)
+    return Task(Swimmer(), DATA / "swimmer_benchmark.npz", DATA / "swimmer_demonstrations.npz")
 
 
 def half_reached() -> Task:
@@ -88,9 +87,8 @@ def arm_benchmark(arm: PlanarArm) -> Benchmark:
 def arm_demonstrations(arm: PlanarArm) -> list[Demonstration]:
     """Movements from rest to postures with all bends equal; their end positions are spread evenly within reach."""
     shares = (np.arange(SHOWN) + 0.5) / SHOWN  # of the area within reach: a sunflower's spiral
-    radii = np.sqrt(arm.min_radius**2 + shares * (arm.length**2 - arm.min_radius**2))
     turns = np.pi * (3 - np.sqrt(5)) * np.arange(SHOWN)
-    ends = radii[:, None] * np.stack([np.cos(turns), np.sin(turns)], axis=1)
+    ends = np.sqrt(shares)[:, None] * np.stack([np.cos(turns), np.sin(turns)], axis=1)
     return [_led_to(arm, end) for end in ends]
 
 

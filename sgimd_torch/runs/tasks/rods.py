@@ -17,8 +17,6 @@ from sgimd_torch.runs.tasks import Task
 from sgimd_torch.spaces import Box, Demonstration
 
 LARGEST: Final = 1e6  # m, of T
-STRETCH: Final = 3.0  # a demonstration this many times slower or faster than the robot can move has wrong times
-MISFIT: Final = 0.5  # rad; a larger misfit means that this robot cannot make the movement
 
 
 @hands_on(FishingRod, "noise", "max_yaw", "max_wind", "line")
@@ -47,27 +45,9 @@ def fishing_rod(*, task_space: float = 1.0, threads: int = 1, **physics: Any) ->
         SHIPPED_BENCHMARK,
         partial(_in_context_zero, rod.contexts.dim) if rod.contexts.dim else SHIPPED_DEMONSTRATIONS,
         rod.primitive.correspondence,
-        partial(_misfit, rod),
     )
 
 
 def _in_context_zero(context_dim: int) -> list[Demonstration]:
     """The shipped demonstrations, for a rod with contexts."""
     return [replace(shown, context=np.zeros(context_dim)) for shown in load_demonstrations()]
-
-
-def _misfit(rod: FishingRod, demonstration: Demonstration) -> float:
-    times, trajectory = demonstration.times, demonstration.trajectory
-    duration, (shortest, longest) = times[-1] - times[0], rod.primitive.durations
-    if not shortest / STRETCH <= duration <= longest * STRETCH:
-        raise ValueError(
-            f"it lasts {duration:g} s, the robot's movements {shortest:g} to {longest:g} s; "
-            "was it recorded in milliseconds?"
-        )
-    residual = rod.primitive.residual(rod.primitive.correspondence(times, trajectory), times, trajectory)
-    if residual > MISFIT:
-        raise ValueError(
-            f"it is {residual:.2f} rad (root mean square) away from anything that the robot can play; "
-            "was it recorded in degrees, or with the joints in another order?"
-        )
-    return residual

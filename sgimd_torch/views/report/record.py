@@ -26,14 +26,11 @@ def doubts(variants: Sequence[Variant]) -> Iterator[str]:
         yield f"Fewer than {LEAST_SEEDS} seeds: {', '.join(few)}. They have points, but no intervals and no verdict."
     if len({run.files.get("benchmark_crc32") for run in every}) > 1:
         yield "The runs were evaluated on different benchmarks, so their errors cannot be compared."
-    for name, values in _versions(variants).items():
+    for name, values in versions(variants).items():
         if len(values) > 1 and name != "platform":
             yield f"The runs were made with different versions of {name}: {', '.join(values)}."
-    commits = [run.versions.get("commit") for run in every]
-    if dirty := sum(str(commit).endswith("-dirty") for commit in commits):
+    if dirty := sum(str(run.versions.get("commit")).endswith("-dirty") for run in every):
         yield f"{_count(dirty)} came from a checkout with uncommitted changes; the commit does not show them."
-    if nowhere := commits.count(None):
-        yield f"The commit of {_count(nowhere)} is not known: made outside a git checkout."
     for variant in variants:
         if own := differing([variant]):
             yield f"The seeds of {variant.label} have different settings: they differ in {', '.join(own)}."
@@ -46,13 +43,8 @@ def doubts(variants: Sequence[Variant]) -> Iterator[str]:
         yield f"{_count(len(cut))} not finished, stopped or still running: {'; '.join(named)}."
 
 
-def versions(variants: Sequence[Variant]) -> list[tuple[str, str]]:
-    """Of each library and of this one, the commit first; where runs differ, all of them."""
-    return [(name, " or ".join(values)) for name, values in _versions(variants).items() if values]
-
-
-def _versions(variants: Sequence[Variant]) -> dict[str, dict[str, None]]:
-    """The same, by name; also those with which a run was made before it was resumed."""
+def versions(variants: Sequence[Variant]) -> dict[str, dict[str, None]]:
+    """Of each library and of this one, the commit first; also those with which a run was made before it was resumed."""
     found: dict[str, dict[str, None]] = {"commit": {}}
     for run in [run for variant in variants for run in variant.runs]:
         for made_by in (run.versions, *run.versions.get("before", ())):
