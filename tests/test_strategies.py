@@ -46,17 +46,7 @@ def remembering(n: int) -> Memory:
     return executed(ARM, stream(0, "remembered").random((n, 5)))
 
 
-def babbling(
-    memory: Memory,
-    goals: Diary,
-    *,
-    search: Search | None = None,
-    budget: int = 12,
-    tolerance: float = 1e-9,
-    global_range: tuple[float, float] = (0.0, 0.0),
-    give_up: float = -1.0,
-    seed: int = 0,
-) -> GoalBabbling:
+def babbling(memory: Memory, goals: Diary, *, search: Search | None = None, seed: int = 0, **options) -> GoalBabbling:
     return GoalBabbling(
         ARM.policies,
         memory,
@@ -66,10 +56,7 @@ def babbling(
         Competence(memory, MEASURE),
         AttemptCompetence(MEASURE),
         stream(seed, "regime"),
-        budget=budget,
-        tolerance=tolerance,
-        global_range=global_range,
-        give_up=give_up,
+        **{"budget": 12, "tolerance": 1e-9, "global_range": (0.0, 0.0), "give_up": -1.0, **options},
     )
 
 
@@ -88,16 +75,6 @@ def live(attempt: Attempt, memory: Memory | None = None, n: int = 10_000) -> lis
                 memory.add(NO_CONTEXT, moves[-1].theta, outcome)
             moves.append(attempt.send(outcome))
     return moves
-
-
-def plan(*thetas: Array) -> Search:
-    """A search that executes these, whatever their outcomes are."""
-
-    def search(start: Estimate, goal: Array) -> Generator[Array, Array, None]:
-        for theta in thetas:  # noqa: UP028 - a tuple takes no outcomes
-            yield theta
-
-    return search
 
 
 LESSON = demonstrate(ARM, [-0.5, 0.5])
@@ -182,7 +159,13 @@ def test_goal_babbling_spends_exactly_its_budget_on_a_goal_it_does_not_reach(bud
 
 def test_goal_babbling_stops_with_the_movement_that_reaches_the_goal() -> None:
     goals = Diary(np.array([0.3, -0.4]))
-    third_time_lucky = plan(np.full(5, 0.5), np.full(5, 0.6), ARM.solve(NO_CONTEXT, goals.goal), np.full(5, 0.7))
+
+    def third_time_lucky(start: Estimate, goal: Array) -> Generator[Array, Array, None]:
+        yield np.full(5, 0.5)
+        yield np.full(5, 0.6)
+        yield ARM.solve(NO_CONTEXT, goal)
+        yield np.full(5, 0.7)
+
     moves = live(babbling(remembering(20), goals, search=third_time_lucky, tolerance=0.01).attempt(NO_CONTEXT))
     assert len(moves) == 3
     assert goals.entries[0][1] == pytest.approx(0.0, abs=1e-9)
