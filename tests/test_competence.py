@@ -6,23 +6,15 @@ import numpy as np
 import pytest
 
 from sgimd_torch.competence import AttemptCompetence, Competence, performance
-from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, stream
+from worlds import NO_CONTEXT, remember
 
-NO_CONTEXT = np.zeros(0)
 REST = np.array([0.0, 0.5])
 relative = partial(performance, rest=REST, d_min=0.01)
 
 
 def from_rest(x: float, y: float) -> Array:
     return REST + np.array([x, y])
-
-
-def memory_of(*outcomes: tuple[float, float]) -> Memory:
-    memory = Memory(0, 1, 2)
-    for outcome in outcomes:
-        memory.add(NO_CONTEXT, np.zeros(1), np.array(outcome))
-    return memory
 
 
 @pytest.mark.parametrize(
@@ -72,7 +64,7 @@ def test_a_scale_that_is_not_positive_is_refused(wrong: float) -> None:
 
 def test_competence_is_the_best_performance_over_all_of_memory() -> None:
     rng = stream(1, "test")
-    memory = memory_of(*rng.uniform(-1, 1, (60, 2)))
+    memory = remember(np.zeros((60, 1)), rng.uniform(-1, 1, (60, 2)))
     competence = Competence(memory, relative)
     for goal in rng.uniform(-2, 2, (30, 2)):
         assert competence(NO_CONTEXT, goal) == max(relative(goal, outcome) for outcome in memory.outcomes)
@@ -80,7 +72,7 @@ def test_competence_is_the_best_performance_over_all_of_memory() -> None:
 
 def test_competence_never_falls_while_the_attempt_reading_can() -> None:
     goal = np.array([1.0, 0.5])
-    memory = memory_of((0.9, 0.5))
+    memory = remember(np.zeros((1, 1)), np.array([[0.9, 0.5]]))
     remembered, attempted = Competence(memory, relative), AttemptCompetence(relative)
     good, bad = np.array([[0.2, 0.5], [0.9, 0.5]]), np.array([[0.2, 0.5], [0.4, 0.5]])
     assert remembered(NO_CONTEXT, goal, bad) == pytest.approx(-0.1)
@@ -89,9 +81,7 @@ def test_competence_never_falls_while_the_attempt_reading_can() -> None:
 
 
 def test_competence_belongs_to_a_context() -> None:
-    memory = Memory(1, 1, 2)
-    memory.add(np.array([0.0]), np.zeros(1), np.array([1.0, 0.5]))
-    memory.add(np.array([9.0]), np.zeros(1), np.array([0.0, 0.5]))
+    memory = remember(np.zeros((2, 1)), np.array([[1.0, 0.5], [0.0, 0.5]]), np.array([[0.0], [9.0]]))
     competence = Competence(memory, relative)
     goal = np.array([1.0, 0.5])
     assert competence(np.array([0.0]), goal) == 0

@@ -40,14 +40,6 @@ def test_practice_beats_uniform_goals_with_the_nearest_and_noise(make, side):
     assert (errors[0] < 0.75 * errors[1]).all()
 
 
-def test_each_part_of_practice_is_one_changed_word():
-    robot = two_elbows()
-    learner = practice(robot, 0, budget=3, inverse=NearestNeighbour)
-    goals = [episode.move.goal for episode in run(learner, robot, 0, movements=30)]
-    lengths = np.diff(np.flatnonzero(np.diff(goals, axis=0, prepend=np.nan).any(axis=1)))
-    assert lengths.max() == 3
-
-
 def test_taught_practice_does_once_what_it_is_shown_and_then_pursues_goals_of_its_own():
     robot = two_elbows()
     shown = [Demonstration(np.zeros(0), np.arange(2.0), np.stack((t, t)), np.zeros(2)) for t in np.eye(3)]

@@ -183,24 +183,6 @@ def test_all_pages_together_can_be_read():
     assert sum(len(path.read_text(encoding="utf-8").split()) for path in pages) <= 30_000
 
 
-@pytest.mark.parametrize("name", PAGES)
-def test_files_that_a_page_names_exist(name):
-    page = ROOT / name
-    text = page.read_text(encoding="utf-8")
-    links = [link for link in re.findall(r"\]\(([^)#]+)\)", text) if "://" not in link]
-    paths = re.findall(r"`((?:experiments|scripts|tests|sgimd_torch)/[\w./-]+)`", text)
-    missing = [link for link in links if not (page.parent / link).exists()]
-    missing += [path for path in paths if not (ROOT / path).exists()]
-    assert not missing
-
-
-def test_the_index_names_every_page_of_docs_once():
-    docs = ROOT / "docs"
-    listed = re.findall(r"^- \[.*?\]\((.*?)\): ", (docs / "README.md").read_text(encoding="utf-8"), re.MULTILINE)
-    there = {path.relative_to(docs).as_posix() for path in docs.rglob("*.md")} - {"README.md"}
-    assert sorted(link for link in listed if not link.startswith("../")) == sorted(there)
-
-
 def test_the_version_to_cite_is_that_of_the_package():
     cited = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
     assert f"\nversion: {sgimd_torch.__version__}\n" in cited

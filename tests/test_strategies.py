@@ -1,7 +1,8 @@
 """Strategies: movements inside Pi, one goal remembered for each attempt however it ends, and what it had gained."""
 
 import re
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Generator
+from contextlib import suppress
 from functools import partial
 
 import numpy as np
@@ -15,7 +16,7 @@ from sgimd_torch.searches.perturb import perturb
 from sgimd_torch.searches.simplex import nelder_mead
 from sgimd_torch.spaces import Array, Attempt, Box, Demonstration, Estimate, Move, Search, stream
 from sgimd_torch.strategies import Babble, Emulate, GoalBabbling, Imitate, Remember
-from worlds import NO_CONTEXT, demonstrate
+from worlds import NO_CONTEXT, demonstrate, executed
 
 ARM = PlanarArm(5)
 MEASURE = partial(performance, rest=ARM.rest, d_min=0.02)
@@ -42,24 +43,10 @@ class Diary:
 
 def remembering(n: int) -> Memory:
     """``n`` random movements of the arm."""
-    memory, rng = Memory(0, 5, 2), stream(0, "remembered")
-    for _ in range(n):
-        theta = ARM.policies.sample(rng)
-        memory.add(NO_CONTEXT, theta, ARM.execute(NO_CONTEXT, theta, rng))
-    return memory
+    return executed(ARM, stream(0, "remembered").random((n, 5)))
 
 
-def babbling(
-    memory: Memory,
-    goals: Diary,
-    *,
-    search: Search | None = None,
-    budget: int = 12,
-    tolerance: float = 1e-9,
-    global_range: tuple[float, float] = (0.0, 0.0),
-    give_up: float = -1.0,
-    seed: int = 0,
-) -> GoalBabbling:
+def babbling(memory: Memory, goals: Diary, *, search: Search | None = None, seed: int = 0, **options) -> GoalBabbling:
     return GoalBabbling(
         ARM.policies,
         memory,
@@ -69,10 +56,7 @@ def babbling(
         Competence(memory, MEASURE),
         AttemptCompetence(MEASURE),
         stream(seed, "regime"),
-        budget=budget,
-        tolerance=tolerance,
-        global_range=global_range,
-        give_up=give_up,
+        **{"budget": 12, "tolerance": 1e-9, "global_range": (0.0, 0.0), "give_up": -1.0, **options},
     )
 
 
@@ -80,31 +64,17 @@ def execute(move: Move) -> Array:
     return ARM.execute(NO_CONTEXT, move.theta, stream(0, "environment"))
 
 
-def live(attempt: Attempt, memory: Memory | None = None, n: int = 10_000) -> list[Move | None]:
-    """The first ``n`` movements, executed; with ``memory``, as a learner remembers them."""
-    moves: list[Move | None] = []
-    try:
-        move = next(attempt)
-        while True:
-            moves.append(move)
-            if len(moves) == n:
-                return moves
-            outcome = execute(move) if move is not None else np.zeros(2)
-            if memory is not None and move is not None:
-                memory.add(NO_CONTEXT, move.theta, outcome)
-            move = attempt.send(outcome)
-    except StopIteration:
-        return moves
-
-
-def plan(*thetas: Array) -> Search:
-    """A search that executes these, whatever their outcomes are."""
-
-    def search(start: Estimate, goal: Array) -> Generator[Array, Array, None]:
-        for theta in thetas:  # noqa: UP028 - a tuple takes no outcomes
-            yield theta
-
-    return search
+def live(attempt: Attempt, memory: Memory | None = None, n: int = 10_000) -> list[Move]:
+    """The first ``n`` movements, all but the n-th executed; with ``memory``, as a learner remembers them."""
+    moves: list[Move] = []
+    with suppress(StopIteration):
+        moves.append(next(attempt))
+        while len(moves) < n:
+            outcome = execute(moves[-1])
+            if memory is not None:
+                memory.add(NO_CONTEXT, moves[-1].theta, outcome)
+            moves.append(attempt.send(outcome))
+    return moves
 
 
 LESSON = demonstrate(ARM, [-0.5, 0.5])
@@ -122,59 +92,51 @@ def imitation(goals: Diary, repeats: int | None = 4, *, memory: Memory | None = 
     )
 
 
-def attempts(goals: Diary) -> Iterator[tuple[str, Callable[[], Attempt]]]:
-    """Every strategy that moves, ready to begin, as in a learner that has made 50 movements."""
-    memory = remembering(50)
-    simplex = nelder_mead(ARM.policies, stream(0, "search"), step=0.3)
-    yield "goal babbling", lambda: babbling(memory, goals, global_range=(0.5, 0.5)).attempt(NO_CONTEXT)
-    yield "simplex", lambda: babbling(memory, goals, search=simplex, budget=40).attempt(NO_CONTEXT)
-    yield "imitate", lambda: imitation(goals, epsilon=0.6).attempt(NO_CONTEXT, THETA_D, LESSON)
-    yield "emulate", lambda: Emulate(babbling(memory, goals), ARM.outcomes).attempt(NO_CONTEXT, THETA_D, LESSON)
+MEMORY = remembering(50)
+SIMPLEX = nelder_mead(ARM.policies, stream(0, "search"), step=0.3)
+ATTEMPTS = {  # every strategy that moves, in a learner that has made 50 movements; its goal, by whom, and the regimes
+    "goal babbling": (
+        lambda goals: babbling(MEMORY, goals, global_range=(0.5, 0.5)).attempt(NO_CONTEXT),
+        *(FAR, "autonomous", {"global", "local"}),
+    ),
+    "simplex": (
+        lambda goals: babbling(MEMORY, goals, search=SIMPLEX, budget=40).attempt(NO_CONTEXT),
+        *(FAR, "autonomous", {"local"}),
+    ),
+    "imitate": (
+        lambda goals: imitation(goals, epsilon=0.6).attempt(NO_CONTEXT, THETA_D, LESSON),
+        *(LESSON.outcome, "social", {"imitate"}),
+    ),
+    "emulate": (
+        lambda goals: Emulate(babbling(MEMORY, goals), ARM.outcomes).attempt(NO_CONTEXT, THETA_D, LESSON),
+        *(LESSON.outcome, "social", {"local"}),
+    ),
+}
 
 
-NAMES = [name for name, _ in attempts(Diary())]
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_movements_stay_inside_the_policy_space_and_say_what_they_are_for(name: str) -> None:
+@pytest.mark.parametrize("n", [10_000, 3, 1], ids=["to its end", "interrupted", "before it moved"])
+@pytest.mark.parametrize("name", ATTEMPTS)
+def test_an_attempt_moves_inside_pi_and_leaves_one_goal_judged_by_what_was_executed(name: str, n: int) -> None:
+    begin, goal, strategy, origins = ATTEMPTS[name]
     goals = Diary()
-    moves = live(dict(attempts(goals))[name]())
-    assert len(moves) >= 4
-    for move in moves:
-        assert ARM.policies.contains(move.theta)
-        assert np.array_equal(move.goal, goals.entries[0][0])
-        assert move.origin in {"global", "local", "imitate"}
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_an_attempt_that_ends_by_itself_leaves_one_goal(name: str) -> None:
-    goals = Diary()
-    moves = live(dict(attempts(goals))[name]())
-    assert len(goals.entries) == 1
-    best = max(float(MEASURE(goals.entries[0][0], execute(move))) for move in moves)
-    assert goals.entries[0][1] == pytest.approx(best)
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_an_interrupted_attempt_leaves_one_goal_judged_by_what_was_executed(name: str) -> None:
-    goals = Diary()
-    attempt = dict(attempts(goals))[name]()
-    moves = live(attempt, n=3)  # the third is proposed, not executed
-    assert goals.entries == []
-    attempt.close()
-    attempt.close()
-    assert len(goals.entries) == 1
-    best = max(float(MEASURE(goals.entries[0][0], execute(move))) for move in moves[:2])
-    assert goals.entries[0][1] == pytest.approx(best)
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_an_attempt_of_which_nothing_was_executed_leaves_no_goal(name: str) -> None:
-    goals = Diary()
-    attempt = dict(attempts(goals))[name]()
-    next(attempt)
-    attempt.close()
-    assert goals.entries == []
+    attempt = begin(goals)
+    moves = live(attempt, n=n)
+    assert ARM.policies.contains([move.theta for move in moves]).all()
+    assert all(np.array_equal(move.goal, goal) for move in moves)
+    assert {move.origin for move in moves} <= origins
+    if n <= 3:
+        assert goals.entries == []
+        attempt.close()
+        attempt.close()
+        moves.pop()  # proposed, not executed
+    assert len(moves) >= 4 or len(moves) == n - 1
+    if moves:
+        ((told, competence, by),) = goals.entries
+        assert np.array_equal(told, goal)
+        assert by == strategy
+        assert competence == pytest.approx(max(float(MEASURE(goal, execute(move))) for move in moves))
+    else:
+        assert goals.entries == []
 
 
 def test_babbling_is_one_uniform_movement_without_a_goal() -> None:
@@ -197,7 +159,13 @@ def test_goal_babbling_spends_exactly_its_budget_on_a_goal_it_does_not_reach(bud
 
 def test_goal_babbling_stops_with_the_movement_that_reaches_the_goal() -> None:
     goals = Diary(np.array([0.3, -0.4]))
-    third_time_lucky = plan(np.full(5, 0.5), np.full(5, 0.6), ARM.solve(NO_CONTEXT, goals.goal), np.full(5, 0.7))
+
+    def third_time_lucky(start: Estimate, goal: Array) -> Generator[Array, Array, None]:
+        yield np.full(5, 0.5)
+        yield np.full(5, 0.6)
+        yield ARM.solve(NO_CONTEXT, goal)
+        yield np.full(5, 0.7)
+
     moves = live(babbling(remembering(20), goals, search=third_time_lucky, tolerance=0.01).attempt(NO_CONTEXT))
     assert len(moves) == 3
     assert goals.entries[0][1] == pytest.approx(0.0, abs=1e-9)
@@ -239,12 +207,15 @@ def test_a_search_that_ends_before_the_budget_is_followed_by_one_that_knows_more
         *({"tolerance": tolerance} for tolerance in (np.nan, np.inf, -0.1)),
         *({"global_range": pair} for pair in ((0.9, 0.1), (-0.1, 0.5), (0.5, 1.1), (np.nan, 0.5), (0.5,))),
         *({"give_up": competence} for competence in (np.nan, 0.5)),
+        *({"epsilon": epsilon} for epsilon in (np.nan, -0.1)),
+        *({"repeats": repeats} for repeats in (0, 1.5)),
     ],
 )
-def test_numbers_that_goal_babbling_cannot_use_are_refused(options: dict[str, object]) -> None:
+def test_numbers_that_a_strategy_cannot_use_are_refused(options: dict[str, object]) -> None:
     ((name, value),) = options.items()
+    make = partial(Imitate, ARM.policies) if name in ("epsilon", "repeats") else partial(babbling, MEMORY)
     with pytest.raises(ValueError, match=f"{name} must .*got {re.escape(str(value))}"):
-        babbling(Memory(0, 5, 2), Diary(), **options)
+        make(Diary(), **options)
 
 
 def test_imitation_is_exact_first_and_then_varied_by_less_than_epsilon() -> None:
@@ -260,53 +231,19 @@ def test_imitation_is_exact_first_and_then_varied_by_less_than_epsilon() -> None
     assert (variations.max(axis=0) > 0.04).all()
 
 
-def test_a_demonstrated_outcome_becomes_a_goal_of_the_social_strategy_after_its_imitation() -> None:
+def test_a_demonstrated_outcome_outside_the_task_space_is_imitated_but_never_a_goal() -> None:
     goals = Diary()
-    live(imitation(goals, repeats=3).attempt(NO_CONTEXT, THETA_D, LESSON))
-    ((goal, competence, strategy),) = goals.entries
-    assert np.array_equal(goal, LESSON.outcome)
-    assert competence == pytest.approx(0, abs=1e-9)  # imitated exactly where nothing is random
-    assert strategy == "social"
-
-
-def outside(lesson: Demonstration) -> Demonstration:
-    return Demonstration(lesson.context, lesson.times, lesson.trajectory, np.array([1.5, 0.0]))
-
-
-def test_a_demonstrated_outcome_outside_the_task_space_is_imitated_but_is_no_goal() -> None:
-    goals = Diary()
-    assert len(live(imitation(goals, repeats=3).attempt(NO_CONTEXT, THETA_D, outside(LESSON)))) == 3
+    outside = Demonstration(LESSON.context, LESSON.times, LESSON.trajectory, np.array([1.5, 0.0]))
+    assert len(live(imitation(goals, repeats=3).attempt(NO_CONTEXT, THETA_D, outside))) == 3
+    emulate = Emulate(babbling(MEMORY, goals), ARM.outcomes)
+    assert live(emulate.attempt(NO_CONTEXT, THETA_D, outside)) == []
     assert goals.entries == []
-
-
-@pytest.mark.parametrize(("name", "value"), [("epsilon", np.nan), ("epsilon", -0.1), ("repeats", 0), ("repeats", 1.5)])
-def test_numbers_that_imitation_cannot_use_are_refused(name: str, value: float) -> None:
-    with pytest.raises(ValueError, match=f"{name} must .*got {value}"):
-        Imitate(ARM.policies, stream(0, "imitate"), **{name: value})
 
 
 def test_imitation_takes_babbling_and_task_space_together_or_neither() -> None:
-    with pytest.raises(ValueError, match="together"):
-        Imitate(ARM.policies, stream(0, "imitate"), babbling=babbling(Memory(0, 5, 2), Diary()))
-    with pytest.raises(ValueError, match="together"):
-        Imitate(ARM.policies, stream(0, "imitate"), outcomes=ARM.outcomes)
-
-
-def test_emulation_pursues_the_demonstrated_outcome_and_not_the_learners_own_goal() -> None:
-    goals = Diary(FAR)
-    moves = live(Emulate(babbling(remembering(20), goals), ARM.outcomes).attempt(NO_CONTEXT, THETA_D, LESSON))
-    assert all(np.array_equal(move.goal, LESSON.outcome) for move in moves)
-    assert not any(np.array_equal(move.theta, THETA_D) for move in moves)
-    ((goal, _, strategy),) = goals.entries
-    assert np.array_equal(goal, LESSON.outcome)
-    assert strategy == "social"
-
-
-def test_emulation_of_an_outcome_outside_the_task_space_does_nothing() -> None:
-    goals = Diary()
-    emulate = Emulate(babbling(remembering(20), goals), ARM.outcomes)
-    assert live(emulate.attempt(NO_CONTEXT, THETA_D, outside(LESSON))) == []
-    assert goals.entries == []
+    for options in ({"babbling": babbling(MEMORY, Diary())}, {"outcomes": ARM.outcomes}):
+        with pytest.raises(ValueError, match="together"):
+            Imitate(ARM.policies, stream(0, "imitate"), **options)
 
 
 def test_remembering_stores_the_demonstrated_pair_and_does_not_move() -> None:

@@ -9,13 +9,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Generator
-from typing import TypeVar
 
 import numpy as np
 
 from sgimd_torch.spaces import Array, Box, Estimate, Search
-
-Movement = TypeVar("Movement")
 
 
 def nelder_mead(
@@ -85,19 +82,6 @@ def nelder_mead(
         yield from _towards(goal, simplex_descent(*simplex, place=place, adaptive=adaptive, xatol=xatol, fatol=fatol))
 
     return search
-
-
-def limit(attempt: Generator[Movement, Array, None], n: int) -> Generator[Movement, Array, None]:
-    """The first ``n`` movements of ``attempt``, which is closed afterwards, or when this generator is closed.
-
-    ``attempt`` is sent all ``n`` outcomes; what it proposes after the last one is dropped.
-
-    Raises:
-        ValueError: ``n`` is negative.
-    """
-    if n < 0:
-        raise ValueError(f"n must be >= 0 movements, got {n}")
-    return _first(attempt, n)
 
 
 def simplex_descent(
@@ -245,16 +229,3 @@ def _towards(goal: Array, descent: Generator[Array, float, None]) -> Generator[A
             theta = descent.send(math.dist(goal, (yield theta)))
     except StopIteration:
         return
-
-
-def _first(attempt: Generator[Movement, Array, None], n: int) -> Generator[Movement, Array, None]:
-    try:
-        if n:
-            movement = next(attempt)
-            for _ in range(n - 1):
-                movement = attempt.send((yield movement))
-            attempt.send((yield movement))
-    except StopIteration:
-        return
-    finally:
-        attempt.close()

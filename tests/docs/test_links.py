@@ -44,6 +44,18 @@ def test_every_link_inside_the_repository_leads_to_a_file_and_a_heading(page):
     assert not lost
 
 
+@pytest.mark.parametrize("page", PAGES)
+def test_files_that_a_page_names_exist(page):
+    paths = re.findall(r"`((?:experiments|scripts|tests|sgimd_torch)/[\w./-]+)`", text_of(page))
+    assert not [path for path in paths if not (ROOT / path).exists()]
+
+
+def test_the_index_names_every_page_of_docs_once():
+    listed = re.findall(r"^- \[.*?\]\((.*?)\): ", text_of("docs/README.md"), re.MULTILINE)
+    there = {path.relative_to(ROOT / "docs").as_posix() for path in (ROOT / "docs").rglob("*.md")} - {"README.md"}
+    assert sorted(link for link in listed if not link.startswith("../")) == sorted(there)
+
+
 def test_the_navigation_has_every_page_once():
     def pages(entry):
         if isinstance(entry, str):

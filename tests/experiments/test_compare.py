@@ -57,31 +57,34 @@ def ended(process):
     return process.returncode, said, errors
 
 
-WHOLE = [(name, when, "process") for name in ("random", "sgim-d-large") for when in (20, 40)]
-
-
-def rows_of(path):
-    return [*read_table(path / "results")[["variant", "movements", "answer"]].itertuples(index=False, name=None)]
-
-
-def test_each_evaluation_is_a_row_the_failed_are_reported_and_a_second_start_does_nothing(compare, tmp_path):
-    code, _, errors = ended(compare("learners", "large-space", "broken"))
+def test_each_evaluation_is_a_row_for_each_experiment_the_failed_are_reported_and_a_second_start_does_nothing(
+    compare, tmp_path
+):
+    code, _, errors = ended(compare("learners", "forward-model", "large-space", "planar-arm-7", "broken"))
     assert code == 1
-    assert sorted(rows_of(tmp_path)) == WHOLE
     assert "untaught seed 0 failed: nowhere.npz cannot be read or written: No such file" in errors
-    assert "2 runs ended well, 1 failed" in errors
+    assert "3 runs ended well, 1 failed" in errors
     assert "Traceback" not in errors
     table = read_table(tmp_path / "results")
-    for variant, task in (("random", "fishing-rod"), ("sgim-d-large", "fishing-rod task_space=100")):
-        run, theirs = read_run(tmp_path / "runs" / variant / "seed-000"), table[table.variant == variant]
-        assert {*theirs.task} == {task}
+    tasks = {"learners": "fishing-rod", "large-space": "fishing-rod task_space=100", "planar-arm-7": "planar-arm-7"}
+    for experiment, task in tasks.items():
+        theirs = table[table.experiment == experiment]
+        (variant,) = {*theirs.variant}
+        assert [*zip(theirs.task, theirs.movements, theirs.answer, strict=True)] == [
+            (task, when, "process") for when in (20, 40)
+        ]
+        run = read_run(tmp_path / "runs" / variant / "seed-000")
         assert [*theirs.error] == run.answers["own"]["mean_error"].tolist()
         assert theirs.floor.isna().all()  # the noise floor is measured at 5000 only
-    random, large = read_table(tmp_path / "results", "explored.csv").to_dict("records")
-    assert (random["variant"], random["goals"]) == ("random", 0)
-    assert 0 < random["tiles"] <= 40
+    first, second = (
+        table[table.experiment == each].drop(columns="experiment") for each in ("learners", "forward-model")
+    )
+    assert first.to_csv(index=False) == second.to_csv(index=False)  # one run, of two experiments
+    explored = read_table(tmp_path / "results", "explored.csv").set_index("variant")
+    assert explored.goals["random"] == 0
+    assert 0 < explored.tiles["random"] <= 40
     n_goals = len(read_run(tmp_path / "runs/sgim-d-large/seed-000").chosen_goals())
-    assert (large["goals"], large["near"]) == (n_goals, 0)  # of 40000 m², 7 are near
+    assert (explored.goals["sgim-d-large"], explored.near["sgim-d-large"]) == (n_goals, 0)  # of 40000 m², 7 are near
 
     contents = [path.read_bytes() for path in tmp_path.glob("results/*.csv")]
     code, _, errors = ended(compare("learners", "large-space"))
@@ -89,19 +92,6 @@ def test_each_evaluation_is_a_row_the_failed_are_reported_and_a_second_start_doe
     assert "2 runs, 2 of them in" in errors
     assert "nothing is left to run: --verify 10 makes ten of these rows again" in errors
     assert [path.read_bytes() for path in tmp_path.glob("results/*.csv")] == contents
-
-
-def test_a_variant_of_two_experiments_is_one_run_with_rows_for_each(compare, tmp_path):
-    code, _, errors = ended(compare("learners", "forward-model", "planar-arm-7"))
-    assert code == 0, errors
-    table = read_table(tmp_path / "results")
-    assert {*table.experiment} == {"learners", "forward-model", "planar-arm-7"}
-    first, second = (
-        table[table.experiment == each].drop(columns="experiment") for each in ("learners", "forward-model")
-    )
-    assert first.to_csv(index=False) == second.to_csv(index=False)
-    arm = table[table.experiment == "planar-arm-7"]
-    assert {*arm.task} == {"planar-arm-7"}
 
 
 def test_shards_share_out_the_runs_and_one_of_two_experiments_stays_together(tmp_path, monkeypatch, capsys):
@@ -234,20 +224,27 @@ def test_a_run_is_evaluated_by_its_own_inverse_and_by_the_answers_that_pages_rea
     }
 
 
-def test_few_are_a_tenth_of_the_demonstrations_and_half_are_those_to_the_right(tmp_path):
-    make_subsets(tmp_path / "new")
-    everything = load_demonstrations()
-    few, half = (load_demonstrations(tmp_path / "new" / name) for name in ("few.npz", "half.npz"))
+@pytest.fixture(scope="module")
+def subsets(tmp_path_factory):
+    """All that is shipped, and the subsets of it by name."""
+    folder = tmp_path_factory.mktemp("subsets") / "new"
+    make_subsets(folder, by_hand=True)
+    parts = {path.stem: load_demonstrations(path, n_joints=6, outcome_dim=2) for path in folder.iterdir()}
+    return load_demonstrations(), parts
+
+
+def test_few_are_a_tenth_of_the_demonstrations_and_half_are_those_to_the_right(subsets):
+    everything, parts = subsets
+    few, half = parts["few"], parts["half"]
     assert len(few) == 13
     assert {tuple(shown.outcome) for shown in few + half} < {tuple(shown.outcome) for shown in everything}
     assert all(shown.outcome[0] > 0 for shown in half)
     assert len(half) == sum(shown.outcome[0] > 0 for shown in everything) > 40
 
 
-def test_a_corner_is_twenty_neighbours_and_shuffled_ones_only_say_something_else(tmp_path):
-    make_subsets(tmp_path / "new")
-    everything = load_demonstrations()
-    corner, shuffled = (load_demonstrations(tmp_path / "new" / name) for name in ("corner.npz", "shuffled.npz"))
+def test_a_corner_is_twenty_neighbours_and_shuffled_ones_only_say_something_else(subsets):
+    everything, parts = subsets
+    corner, shuffled = parts["corner"], parts["shuffled"]
     assert len(corner) == 20
     assert np.ptp([shown.outcome for shown in corner], axis=0).max() < 1
     assert [shown.trajectory.tobytes() for shown in shuffled] == [shown.trajectory.tobytes() for shown in everything]
@@ -257,11 +254,10 @@ def test_a_corner_is_twenty_neighbours_and_shuffled_ones_only_say_something_else
     assert same < 10
 
 
-def test_ten_lessons_by_hand_are_set_against_the_first_ten_that_are_shipped(tmp_path):
-    make_subsets(tmp_path, by_hand=True)
-    ten, hand = (load_demonstrations(tmp_path / name, n_joints=6, outcome_dim=2) for name in ("ten.npz", "hand.npz"))
-    assert len(ten) == len(hand) == 10
-    for shown, shipped_one in zip(ten, load_demonstrations(), strict=False):
+def test_ten_lessons_by_hand_are_set_against_the_first_ten_that_are_shipped(subsets):
+    everything, parts = subsets
+    assert len(parts["ten"]) == len(parts["hand"]) == 10
+    for shown, shipped_one in zip(parts["ten"], everything, strict=False):
         np.testing.assert_array_equal(shown.trajectory, shipped_one.trajectory)
 
 

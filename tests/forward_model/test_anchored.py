@@ -9,28 +9,16 @@ import torch
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.forward_model.anchored import Anchored, Trust
 from sgimd_torch.forward_model.model import ForwardModel
-from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Box, stream
+from worlds import NO_CONTEXT, executed, remember
 
-NO_CONTEXT = np.zeros(0)
 ARM = PlanarArm(7)
 EXACT = Trust(share=0.0)
 
 
 @pytest.fixture(scope="module")
 def memory():
-    memory, rng = Memory(0, 7, 2), stream(0, "exemplars")
-    for theta in rng.random((300, 7)):
-        memory.add(NO_CONTEXT, theta, ARM.execute(NO_CONTEXT, theta, rng))
-    return memory
-
-
-@pytest.fixture(scope="module")
-def model(memory):
-    """Good enough to be used, but still wrong by some cm."""
-    model = ForwardModel(0, 7, 2, rate=1.0)
-    model.refresh(memory)
-    return model
+    return executed(ARM, stream(0, "exemplars").random((300, 7)))
 
 
 def anchored(model, memory, rows, trust=EXACT, policies=ARM.policies):
@@ -97,29 +85,16 @@ def test_doubt_grows_from_nothing_at_an_anchor_and_counts_by_caution(model, memo
     assert doubt[0] < 0.001 * doubt[-1]
 
 
-def test_a_noisy_anchor_counts_by_the_ratio_of_doubt_to_doubt_and_noise(memory):
-    model = ForwardModel(0, 7, 2)  # untrained: it says 0 and is wrong by up to a metre
-    model.weights[-1].data[:] = 0.0
-    model.biases[-1].data[..., 2:] = 0.0  # by a noise of 1
-    model.missed.fill_(2.0)
-    near = anchored(model, memory, [0], Trust(share=1.0, caution=1.0))
-    landing, spread = predict(near, memory.thetas[:1])
-    np.testing.assert_allclose(landing, 0.8 * memory.outcomes[:1], rtol=1e-5)  # 2^2 / (2^2 + 1^2)
-    np.testing.assert_allclose(spread - 2 * 1.0, 2 * 0.8, rtol=1e-4)  # (1 - .8) 2^2 a dimension
-    near = anchored(model, memory, [0])
-    np.testing.assert_allclose(predict(near, memory.thetas[:1])[0], memory.outcomes[:1], rtol=1e-3)
-
-
-def test_a_share_of_the_spread_that_the_model_predicts_counts(memory):
+def test_a_share_of_the_spread_that_the_model_predicts_counts_and_a_noisy_anchor_by_doubt_over_doubt_and_noise(memory):
     model = ForwardModel(0, 7, 2)
     model.weights[-1].data[:] = 0.0  # untrained: it says 0
     model.biases[-1].data[..., 2:] = np.log(0.5)  # with a noise of .5 m^2
     model.missed.fill_(2.0)
-    for share in (0.0, 0.3, 1.0):
-        trust = Trust(share=share, caution=0.0)
+    for share, caution in ((0.0, 0.0), (0.3, 0.0), (1.0, 0.0), (1.0, 1.0)):
+        trust, counts = Trust(share=share, caution=caution), 4 / (4 + share * 0.5)
         landing, spread = predict(anchored(model, memory, [0], trust), memory.thetas[:1])
-        np.testing.assert_allclose(spread, share * 2 * 0.5, rtol=1e-5)
-        np.testing.assert_allclose(landing, memory.outcomes[:1] * 4 / (4 + share * 0.5), rtol=1e-5)
+        np.testing.assert_allclose(landing, memory.outcomes[:1] * counts, rtol=1e-5)
+        np.testing.assert_allclose(spread, 2 * (share * 0.5 + caution * (1 - counts) * 4), rtol=1e-4)
 
 
 def test_each_candidate_has_its_own_anchors(model, memory):
@@ -221,9 +196,7 @@ def test_a_step_is_a_share_of_each_side_whatever_the_unit(memory):
     """Parameters in other units, learnt in these: the descent is the same."""
     paths = []
     for scale in (np.ones(7), BOX.sides):
-        scaled, policies = Memory(0, 7, 2), Box(np.zeros(7), scale)
-        for theta, outcome in zip(memory.thetas[:60], memory.outcomes[:60], strict=True):
-            scaled.add(NO_CONTEXT, theta * scale, outcome)
+        scaled, policies = remember(memory.thetas[:60] * scale, memory.outcomes[:60]), Box(np.zeros(7), scale)
         model = ForwardModel(0, 7, 2)
         model.refresh(scaled)
         near = anchored(model, scaled, np.arange(5), Trust(), policies)

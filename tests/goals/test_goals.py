@@ -8,7 +8,8 @@ import pytest
 from sgimd_torch.goals.alp_gmm import AlpGmm
 from sgimd_torch.goals.interest_map import InterestMap
 from sgimd_torch.goals.progress_grid import ProgressGrid
-from sgimd_torch.goals.regions import absolute_progress, gained_progress, paired_progress
+from sgimd_torch.goals.regions import absolute_progress, paired_progress
+from sgimd_torch.goals.strategic import StrategicInterest
 from sgimd_torch.goals.uniform import UniformGoals
 from sgimd_torch.goals.within_reach import WithinReach
 from sgimd_torch.memory import Memory
@@ -38,25 +39,18 @@ ALL = pytest.mark.parametrize(
 
 
 @ALL
-def test_every_goal_model_can_be_used_in_the_same_way(make):
-    goals = make(LINE, SQUARE, stream(20, "goals"))
+def test_goals_lie_in_the_task_space_and_are_drawn_only_when_one_is_sampled(make):
+    rng = stream(23, "goals")
+    goals = make(LINE, SQUARE, rng)
     for _ in range(120):
+        state = rng.bit_generator.state
         goal = goals.sample([0.5])
         assert goal.shape == (2,)
         assert SQUARE.contains(goal)
-        goals.add([0.5], goal, -goal[0], "imitate", 0.1)
-
-
-@ALL
-def test_every_goal_model_draws_only_when_it_samples(make):
-    rng = stream(23, "goals")
-    goals = make(LINE, SQUARE, rng)
-    for index in range(110):
-        state = rng.bit_generator.state
-        goals.add([0.5], [index / 110, 0.5], -1)
-        assert rng.bit_generator.state == state
-        goals.sample([0.5])
         assert rng.bit_generator.state != state
+        state = rng.bit_generator.state
+        goals.add([0.5], goal, -goal[0], "imitate", 0.1)
+        assert rng.bit_generator.state == state
 
 
 @ALL
@@ -102,28 +96,6 @@ def test_uniform_goals_are_uniform_whatever_was_learnt():
     assert np.abs(counts - 500).max() < 5 * np.sqrt(5000 * 0.1 * 0.9)  # five standard deviations
 
 
-def planted(make, cells: int, **options) -> ProgressGrid:
-    """Cells on a line; each but the first met two failures, then two goals that went .2 better, .4 better ...
-
-    Gains rise the other way: none in the last cell, .1 in the one below ...
-    """
-    goals = make(NO_CONTEXTS, LINE, stream(30, "goals"), cells=cells, **options)
-    for index, region in enumerate(goals.regions):
-        for competence in (-1, -1, -1 + 0.2 * index, -1 + 0.2 * index):
-            goals.add(NO_CONTEXT, (region.low + region.high) / 2, competence, gain=0.1 * (cells - 1 - index))
-    return goals
-
-
-@pytest.mark.parametrize(("progress", "tenths"), [(absolute_progress, [0, 1, 2, 3]), (gained_progress, [3, 2, 1, 0])])
-def test_cells_of_the_grid_are_chosen_in_proportion_to_their_interest(progress, tenths):
-    goals = planted(ProgressGrid, 4, modes=(1, 0, 0), progress=progress)
-    assert [region.interest() for region in goals.regions] == pytest.approx(np.array(tenths) / 10)
-    samples = np.array([goals.sample(NO_CONTEXT) for _ in range(6000)])
-    counts = np.histogram(samples, 4, (0, 1))[0]
-    expected = 6000 * np.array(tenths) / 6
-    assert np.all(np.abs(counts - expected) <= 5 * np.sqrt(expected))
-
-
 def test_a_cell_forgets_what_lies_before_its_window_and_counts_it():
     goals = ProgressGrid(NO_CONTEXTS, LINE, stream(31, "goals"), cells=2, window=4, progress=absolute_progress)
     for competence in (-1, -0.9, -0.8, -0.7, -0.6, -0.5):
@@ -148,25 +120,27 @@ def test_cells_tile_the_space_about_a_hundred_of_them(dim, cells):
     assert regions[1].path == "R" + ".0" * (dim - 1) + ".1"
 
 
-def test_goals_come_from_cells_that_contain_the_context():
-    goals = ProgressGrid(LINE, LINE, stream(34, "goals"), cells=2, modes=(1, 0, 0), progress=absolute_progress)
-    for competence in (-1, -1, 0, 0):
-        goals.add([0.9], [0.2], competence)
-    assert max(goals.sample([0.6])[0] for _ in range(100)) < 0.5
-    assert max(goals.sample([0.4])[0] for _ in range(100)) > 0.5  # no progress here: uniform, odds of failure 2^-100
-
-
 @pytest.mark.parametrize(
-    ("options", "message"),
+    ("make", "options"),
     [
-        ({"window": 5}, "window must be even"),
-        ({"window": 2}, "window must be even and at least 4"),
-        ({"modes": (0.7, 0.2, 0.2)}, "modes must be three"),
-        ({"near": 0.0}, "near must lie in"),
-        ({"cells": 0}, "cells must be at least 1 for each dimension"),
-        ({"cells": 1000}, "100000 in all, got 1000 in 2 dimensions"),
+        *((InterestMap, {"window": window}) for window in (5, 2, 32)),  # the last is more than g_max
+        *((InterestMap, {"modes": modes}) for modes in ((0.7, 0.2, 0.2), (1.2, -0.2, 0.0))),
+        *((InterestMap, {name: 0.0}) for name in ("cuts", "near", "min_side")),
+        (InterestMap, {"min_side": 0.6}),
+        *((InterestMap, {"max_aspect": aspect}) for aspect in (0.5, np.nan)),
+        *((ProgressGrid, {"window": window}) for window in (5, 2)),
+        (ProgressGrid, {"modes": (0.7, 0.2, 0.2)}),
+        (ProgressGrid, {"near": 0.0}),
+        *((ProgressGrid, {"cells": cells}) for cells in (0, 1000)),  # a million in all
+        (AlpGmm, {"components": 1}),
+        *((AlpGmm, {"refit": refit}) for refit in (0, 9)),  # less than components
+        (AlpGmm, {"memory": 9}),
+        *((AlpGmm, {"uniform": uniform}) for uniform in (1.1, np.nan)),
+        *((StrategicInterest, {"anywhere": anywhere}) for anywhere in (1.1, -0.1)),
+        (StrategicInterest, {"greatest": 0}),
+        (StrategicInterest, {"temperature": 0.0}),
     ],
 )
-def test_a_grid_refuses_numbers_out_of_range(options, message):
-    with pytest.raises(ValueError, match=message):
-        ProgressGrid(NO_CONTEXTS, SQUARE, stream(0, "goals"), **options)
+def test_numbers_out_of_range_are_refused(make, options):
+    with pytest.raises(ValueError, match=f"{next(iter(options))}.*got"):
+        make(NO_CONTEXTS, SQUARE, stream(0, "goals"), **options)

@@ -3,23 +3,17 @@
 import numpy as np
 import pytest
 
-from sgimd_torch.algorithms import practice
-from sgimd_torch.environments.toys import Toy, toss, two_elbows
 from sgimd_torch.goals.uniform import UniformGoals
 from sgimd_torch.goals.within_reach import WithinReach
-from sgimd_torch.memory import Memory
-from sgimd_torch.session import run
 from sgimd_torch.spaces import Box, stream
+from worlds import remember
 
 NO_CONTEXTS, NO_CONTEXT = Box.cube(0, 1, 0), np.empty(0)
 
 
-def remembering(outcomes, context_dim=0, thetas=None) -> Memory:
+def remembering(outcomes, context_dim=0, thetas=None):
     """A memory of these outcomes, each of a movement of the same numbers unless ``thetas`` say otherwise."""
-    memory = Memory(context_dim, outcomes.shape[1], outcomes.shape[1])
-    for theta, outcome in zip(outcomes if thetas is None else thetas, outcomes, strict=True):
-        memory.add(np.zeros(context_dim), theta, outcome)
-    return memory
+    return remember(outcomes if thetas is None else thetas, outcomes, np.zeros((len(outcomes), context_dim)))
 
 
 def scattered(dim, n=300, seed=0):
@@ -96,35 +90,6 @@ def test_a_context_changes_nothing_but_what_is_checked():
 def test_outcomes_outside_t_lead_to_goals_at_its_border():
     found = drawn(remembering(scattered(2) + np.array([10, 0])), Box.cube(-1, 1, 2), n=20)
     assert np.abs(found).max() <= 1
-
-
-def wide(make, times: float, unit: float = 1.0) -> Toy:
-    """A toy whose T is so many times too wide, in another unit."""
-    toy = make()
-    middle, sides = (toy.outcomes.low + toy.outcomes.high) / 2, times * toy.outcomes.sides
-    space = Box(unit * (middle - sides / 2), unit * (middle + sides / 2))
-    return Toy(
-        toy.contexts,
-        toy.policies,
-        space,
-        lambda context, theta: unit * toy.effect(context, theta),
-        toy.still,
-        unit * toy.outcome_noise,
-    )
-
-
-def lived(robot: Toy, movements: int = 150):
-    learner = practice(robot, 1)
-    goals = [episode.move.goal for episode in run(learner, robot, 1, movements=movements)]
-    return np.array(goals), learner.memory.outcomes
-
-
-@pytest.mark.parametrize("make", [toss, two_elbows])
-def test_goals_of_practice_come_near_what_it_reaches_whatever_the_size_of_t(make):
-    goals, outcomes = lived(wide(make, 100))
-    reached = np.ptp(outcomes, axis=0)
-    assert (np.ptp(goals[-50:], axis=0) < 3 * reached).all()
-    assert (np.ptp(goals[-50:], axis=0) > 0.5 * reached).all()
 
 
 def test_in_a_unit_a_thousand_times_smaller_goals_are_a_thousand_times_as_large():

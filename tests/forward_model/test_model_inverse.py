@@ -19,20 +19,6 @@ from worlds import NO_CONTEXT, executed
 ARM = PlanarArm(7)
 
 
-@pytest.fixture(scope="module")
-def taught():
-    memory = executed(ARM, stream(0, "thetas").random((600, 7)))
-    model = ForwardModel(0, 7, 2, rate=2.0)
-    model.refresh(memory)
-    return memory, model
-
-
-@pytest.fixture(scope="module")
-def goals():
-    rng = stream(1, "goals")
-    return np.stack([ARM.execute(NO_CONTEXT, theta, rng) for theta in rng.random((30, 7))])
-
-
 def test_where_outcomes_are_noisy_it_lands_nearer_than_what_it_starts_from(goals):
     arm = PlanarArm(7, noise=0.1)
     memory, model = executed(arm, stream(0, "thetas").random((1500, 7))), ForwardModel(0, 7, 2)
@@ -48,8 +34,7 @@ def test_where_outcomes_are_noisy_it_lands_nearer_than_what_it_starts_from(goals
     assert found < 0.8 * mean_error([start(NO_CONTEXT, goal) for goal in goals])
 
 
-def test_without_steps_it_picks_among_what_is_known(taught, goals, monkeypatch):
-    memory, model = taught
+def test_without_steps_it_picks_among_what_is_known(memory, model, goals, monkeypatch):
     monkeypatch.setattr(through_model, "_STEPS", 0)
     inverse = ModelInverse(memory, model, ARM.policies)
     for goal in goals[:5]:
@@ -69,8 +54,7 @@ def test_of_two_ways_to_a_goal_the_reliable_one_wins():
     assert max(chosen) < 0.1 < np.mean([NearestNeighbour(memory)(NO_CONTEXT, goal).theta[1] for goal in goals])
 
 
-def test_the_greater_the_caution_the_nearer_it_stays_to_what_was_tried(taught, goals, monkeypatch):
-    memory, model = taught
+def test_the_greater_the_caution_the_nearer_it_stays_to_what_was_tried(memory, model, goals, monkeypatch):
     monkeypatch.setattr(through_model, "_STEP", 0.05)
 
     def distance(caution):
@@ -83,8 +67,8 @@ def test_the_greater_the_caution_the_nearer_it_stays_to_what_was_tried(taught, g
     assert default < 0.5 * careless
 
 
-def test_all_goals_together_find_what_each_finds_alone(taught, goals):
-    inverse = ModelInverse(*taught, ARM.policies)
+def test_all_goals_together_find_what_each_finds_alone(memory, model, goals):
+    inverse = ModelInverse(memory, model, ARM.policies)
     several = np.vstack([goals, goals + 0.05, goals - 0.05])  # more than one batch
     together = inverse.many(NO_CONTEXT, several)
     assert len(together) == len(several)
@@ -95,15 +79,14 @@ def test_all_goals_together_find_what_each_finds_alone(taught, goals):
         np.testing.assert_array_equal(estimate.outcomes, alone.outcomes)
 
 
-def test_it_stays_in_the_box_at_a_goal_out_of_reach(taught, monkeypatch):
+def test_it_stays_in_the_box_at_a_goal_out_of_reach(memory, model, monkeypatch):
     monkeypatch.setattr(through_model, "_STEP", 0.3)
-    theta = ModelInverse(*taught, ARM.policies)(NO_CONTEXT, np.array([9.0, 9.0])).theta
+    theta = ModelInverse(memory, model, ARM.policies)(NO_CONTEXT, np.array([9.0, 9.0])).theta
     assert ARM.policies.contains(theta)
     assert theta.min() == 0.0 or theta.max() == 1.0
 
 
-def test_asking_changes_nothing_and_gives_the_same_answer_again(taught, goals):
-    memory, model = taught
+def test_asking_changes_nothing_and_gives_the_same_answer_again(memory, model, goals):
     before, random = [values.clone() for values in model.state_dict().values()], torch.random.get_rng_state()
     inverse = ModelInverse(memory, model, ARM.policies)
     np.testing.assert_array_equal(inverse(NO_CONTEXT, goals[0]).theta, inverse(NO_CONTEXT, goals[0]).theta)
@@ -111,30 +94,23 @@ def test_asking_changes_nothing_and_gives_the_same_answer_again(taught, goals):
     assert torch.equal(torch.random.get_rng_state(), random)
 
 
-def test_before_the_model_has_learnt_it_answers_like_its_start():
-    memory = Memory(0, 2, 2)
-    memory.add(NO_CONTEXT, np.array([0.2, 0.4]), np.array([0.1, 0.3]))
-    inverse = ModelInverse(memory, ForwardModel(0, 2, 2), Box.cube(0.0, 1.0, 2))
-    assert not inverse.trusted
-    np.testing.assert_array_equal(inverse(NO_CONTEXT, np.zeros(2)).theta, [0.2, 0.4])
-    np.testing.assert_array_equal(inverse.many(NO_CONTEXT, np.zeros((2, 2)))[1].theta, [0.2, 0.4])
-
-
-def test_it_answers_like_its_start_only_until_the_model_is_good_enough(taught, goals):
-    memory, model = taught
-    asked, answered = (
-        ModelInverse(memory, model, ARM.policies, trust=Trust(error=share * model.relative_error))
-        for share in (1.01, 0.99)
-    )
+def test_it_answers_like_its_start_until_the_model_is_good_enough(memory, model, goals):
+    exact = Trust(error=1.01 * model.relative_error)
+    asked = ModelInverse(memory, model, ARM.policies, trust=exact)
     start = asked.start(NO_CONTEXT, goals[0]).theta
-    assert (asked.trusted, answered.trusted) == (True, False)
-    np.testing.assert_array_equal(answered(NO_CONTEXT, goals[0]).theta, start)
+    assert asked.trusted
     assert not np.array_equal(asked(NO_CONTEXT, goals[0]).theta, start)
+    untrained = ForwardModel(0, 7, 2)
+    for doubted, trust in ((model, Trust(error=0.99 * model.relative_error)), (untrained, Trust())):
+        inverse = ModelInverse(memory, doubted, ARM.policies, trust=trust)
+        assert not inverse.trusted
+        for estimate in (inverse(NO_CONTEXT, goals[0]), *inverse.many(NO_CONTEXT, goals[:1])):
+            np.testing.assert_array_equal(estimate.theta, start)
 
 
-def test_a_memory_may_have_fewer_exemplars_than_candidates_and_anchors(taught):
-    memory = executed(ARM, stream(3, "thetas").random((3, 7)))
-    assert ARM.policies.contains(ModelInverse(memory, taught[1], ARM.policies)(NO_CONTEXT, np.zeros(2)).theta)
+def test_a_memory_may_have_fewer_exemplars_than_candidates_and_anchors(model):
+    few = executed(ARM, stream(3, "thetas").random((3, 7)))
+    assert ARM.policies.contains(ModelInverse(few, model, ARM.policies)(NO_CONTEXT, np.zeros(2)).theta)
 
 
 def test_contexts_reach_the_model():
@@ -148,11 +124,10 @@ def test_contexts_reach_the_model():
         assert np.linalg.norm(landed - goal) < 0.02
 
 
-def test_a_model_of_another_robot_is_refused(taught):
-    with pytest.raises(ValueError, match="memory"):
-        ModelInverse(Memory(0, 3, 2), taught[1], ARM.policies)
-    with pytest.raises(ValueError, match="policies"):
-        ModelInverse(*taught, PlanarArm(3).policies)
+@pytest.mark.parametrize(("joints", "policies", "named"), [(3, 7, "memory"), (7, 3, "policies")])
+def test_a_model_of_another_robot_is_refused(model, joints, policies, named):
+    with pytest.raises(ValueError, match=named):
+        ModelInverse(Memory(0, joints, 2), model, PlanarArm(policies).policies)
 
 
 def lived(outcome_of, n, scale=1.0, **options):
@@ -177,6 +152,11 @@ def noisy(theta, rng):
     return np.sin(6 * theta[:2]) + 0.3 * theta[2] * rng.standard_normal(2)
 
 
+@pytest.fixture(scope="module")
+def proved():
+    return lived(noisy, 600)
+
+
 def same_answers(proved, expected, goals):
     found = proved.many(NO_CONTEXT, goals)
     return all(np.array_equal(one.theta, other.theta) for one, other in zip(found, expected, strict=True))
@@ -190,11 +170,10 @@ def test_a_model_that_predicts_worse_than_the_process_is_not_asked():
     assert same_answers(proved, [proved.process(NO_CONTEXT, goal) for goal in goals], goals)
 
 
-def test_a_model_that_predicts_better_answers_once_there_were_enough_tests():
-    few, many = lived(noisy, 150), lived(noisy, 600)
-    assert (few.trusted, many.trusted) == (False, True)
-    goals = many.process.memory.outcomes[:3] + 0.01
-    assert same_answers(many, many.through_model.many(NO_CONTEXT, goals), goals)
+def test_a_model_that_predicts_better_answers_once_there_were_enough_tests(proved):
+    assert (lived(noisy, 150).trusted, proved.trusted) == (False, True)
+    goals = proved.process.memory.outcomes[:3] + 0.01
+    assert same_answers(proved, proved.through_model.many(NO_CONTEXT, goals), goals)
 
 
 def test_it_is_the_same_whether_or_not_it_was_asked(goals):
@@ -211,11 +190,10 @@ def test_it_is_the_same_whether_or_not_it_was_asked(goals):
     assert same_answers(asked, silent.many(NO_CONTEXT, goals), goals)
 
 
-def test_in_thousandths_of_the_unit_it_trusts_and_answers_the_same():
-    one, thousand = lived(noisy, 600), lived(noisy, 600, scale=1000.0)
-    assert one.trusted
-    assert thousand.trusted
+def test_in_thousandths_of_the_unit_it_trusts_and_answers_the_same(proved):
+    thousand = lived(noisy, 600, scale=1000.0)
+    assert thousand.trusted == proved.trusted
     goals = stream(6, "goals").uniform(-0.9, 0.9, (20, 2))
-    answers = (each.many(NO_CONTEXT, scale * goals) for each, scale in ((one, 1.0), (thousand, 1000.0)))
+    answers = (each.many(NO_CONTEXT, scale * goals) for each, scale in ((proved, 1.0), (thousand, 1000.0)))
     for found, scaled in zip(*answers, strict=True):
         np.testing.assert_allclose(found.theta, scaled.theta, atol=5e-3)  # many steps in float32
