@@ -122,8 +122,9 @@ def test_a_life_that_asked_goes_on_as_if_it_had_never_stopped_without_asking_aga
 
 
 def test_a_request_that_waits_for_its_answer_is_saved_too(tmp_path):
-    robot = next(each for each in (acts(seed=seed) for seed in range(1000, 1100)) if each.request(NO_CONTEXT))
     seed = next(seed for seed in range(1000, 1100) if acts(seed=seed).request(NO_CONTEXT))
+    robot = acts(seed=seed)
+    assert robot.request(NO_CONTEXT)
     robot.save(tmp_path / "life.npz")
     again = acts(seed=seed)
     again.load(tmp_path / "life.npz")
@@ -215,16 +216,8 @@ def test_an_attempt_gets_its_lesson_with_the_policy_that_it_corresponds_to():
 
 
 def test_costs_make_it_ask_less():
-    arm = PlanarArm(7)
-    shown = arm_demonstrations(arm)
-    asked = {}
-    for cost in (1.0, 30.0):
-        asked[cost] = 0
-        for seed in (1000, 1001):
-            teachers = halves(seed, shown)
-            learner = sgim_acts(arm, seed, correspondence=arm.correspondence, teachers=teachers, cost=cost)
-            asked[cost] += sum(e.request is not None for e in live(learner, teachers, 800, arm, seed)[200:])
-    assert asked[30.0] < 0.7 * asked[1.0]
+    asked = [sum(e.request is not None for e in live(acts(cost=cost), halves())) for cost in (1.0, 1000.0)]
+    assert asked[1] < 0.3 * asked[0]
 
 
 def test_nobody_shows_the_same_twice():
@@ -237,28 +230,26 @@ def test_nobody_shows_the_same_twice():
     assert all(e.demonstration is None and e.move.origin != "imitate" for e in again)
 
 
-def test_somebody_who_mislabels_is_soon_left_alone():
-    arm = PlanarArm(7, noise=0.02)
+def late_requests(movements, after, noise=0.0, **more):
+    """Of two learners of two teachers, each for one half, and of ``more``."""
+    arm, found = PlanarArm(7, noise=noise), []
     shown = arm_demonstrations(arm)
-    late = []
     for seed in (1000, 1001):
         teachers = halves(seed, shown)
-        teachers["wrong"] = AnsweringTeacher(shown, stream(seed, "wrong"), knows=mislabelled)
+        teachers |= {name: AnsweringTeacher(shown, stream(seed, name), knows=knows) for name, knows in more.items()}
         learner = sgim_acts(arm, seed, correspondence=arm.correspondence, teachers=teachers)
-        late += [e.request.teacher for e in live(learner, teachers, 600, arm, seed)[200:] if e.request]
-    assert len(late) > 40
-    assert late.count("wrong") / len(late) < 0.15  # a third, if it made no difference
+        found += [e.request for e in live(learner, teachers, movements, arm, seed)[after:] if e.request]
+    assert len(found) > 40
+    return found
+
+
+def test_somebody_who_mislabels_is_soon_left_alone():
+    asked = [request.teacher for request in late_requests(600, 200, noise=0.02, wrong=mislabelled)]
+    assert asked.count("wrong") / len(asked) < 0.15  # a third, if it made no difference
 
 
 def test_of_two_teachers_each_is_asked_in_their_own_half():
-    arm = PlanarArm(7)
-    shown, own = arm_demonstrations(arm), []
-    for seed in (1000, 1001):
-        teachers = halves(seed, shown)
-        learner = sgim_acts(arm, seed, correspondence=arm.correspondence, teachers=teachers)
-        late = live(learner, teachers, 1500, arm, seed)[800:]
-        own += [(e.request.goal[0] < 0) == (e.request.teacher == "low") for e in late if e.request]
-    assert len(own) > 40
+    own = [(request.goal[0] < 0) == (request.teacher == "low") for request in late_requests(1500, 800)]
     assert np.mean(own) > 0.8
 
 

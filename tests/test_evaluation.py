@@ -18,10 +18,8 @@ from sgimd_torch.evaluation import (
     tile_goals,
 )
 from sgimd_torch.inverses.local import NearestNeighbour
-from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, Box, Estimate, stream
-
-NO_CONTEXT = np.zeros(0)
+from worlds import NO_CONTEXT, executed
 
 
 def perfect(arm: PlanarArm):
@@ -34,31 +32,16 @@ def perfect(arm: PlanarArm):
     return inverse
 
 
-def knowing(arm: PlanarArm, *thetas: list[float]) -> Memory:
-    memory = Memory(0, arm.policies.dim, 2)
-    for theta in thetas:
-        memory.add(NO_CONTEXT, theta, arm.execute(NO_CONTEXT, theta, stream(0, "remembered")))
-    return memory
-
-
 def test_errors_are_the_distances_between_goals_and_where_the_best_movements_end() -> None:
     # Two links of .5 m: straight ahead at (1, 0), a first joint at +pi/2 (theta .75) ends at (0, 1).
     arm = PlanarArm(2)
-    memory = knowing(arm, [0.5, 0.5], [0.75, 0.5])
+    memory = executed(arm, np.array([[0.5, 0.5], [0.75, 0.5]]))
     goals = np.array([[1.0, 0.0], [0.7, 0.4], [0.3, 1.4]])
     evaluation = evaluate(NearestNeighbour(memory), arm, goals, 0, 1000, repeats=0)
     assert evaluation.errors == pytest.approx([0.0, 0.5, 0.5])
     assert evaluation.mean_error == pytest.approx(1 / 3)
     assert evaluation.outcomes == pytest.approx(np.array([[1.0, 0.0], [1.0, 0.0], [0.0, 1.0]]))
     assert evaluation.thetas.tolist() == [[0.5, 0.5], [0.5, 0.5], [0.75, 0.5]]
-
-
-def test_a_perfect_inverse_makes_no_error_in_any_context() -> None:
-    arm = PlanarArm(5, context=True)
-    goals = stream(0, "goals").uniform(-0.6, 0.6, (20, 2))
-    for context in (None, np.array([0.0]), np.array([0.7])):
-        evaluation = evaluate(perfect(arm), arm, goals, 0, 0, context=context, repeats=0)
-        assert evaluation.errors == pytest.approx(np.zeros(20), abs=1e-9)
 
 
 def test_each_goal_has_a_context_of_its_own_the_same_in_every_evaluation_of_every_run() -> None:
@@ -82,12 +65,12 @@ def test_each_goal_has_a_context_of_its_own_the_same_in_every_evaluation_of_ever
     assert first.contexts.std() == pytest.approx(0.453, abs=0.06)
 
 
-def test_a_context_for_each_goal_may_be_given() -> None:
+def test_a_perfect_inverse_makes_no_error_in_any_context_given_for_all_goals_or_for_each() -> None:
     arm, goals = PlanarArm(5, context=True), stream(0, "goals").uniform(-0.6, 0.6, (4, 2))
-    given = np.array([[0.1], [-0.2], [0.3], [0.0]])
-    found = evaluate(perfect(arm), arm, goals, 0, 0, context=given, repeats=0)
-    assert np.array_equal(found.contexts, given)
-    assert found.errors == pytest.approx(np.zeros(4), abs=1e-9)
+    for context in (None, np.array([0.0]), np.array([0.7]), np.array([[0.1], [-0.2], [0.3], [0.0]])):
+        found = evaluate(perfect(arm), arm, goals, 0, 0, context=context, repeats=0)
+        assert found.errors == pytest.approx(np.zeros(4), abs=1e-9)
+        assert context is None or np.array_equal(found.contexts, np.broadcast_to(context, (4, 1)))
 
 
 def test_without_contexts_an_environment_is_not_asked_for_any() -> None:
@@ -127,11 +110,18 @@ def test_the_movement_that_is_judged_is_not_one_of_its_own_repeats() -> None:
     )  # from two points to their middle
 
 
-@pytest.mark.parametrize("counts", [{"repeats": -1}, {"repeats": 1}, {"repeats": 2.5}, {"step": -1}])
-def test_a_count_out_of_its_range_is_refused(counts: dict[str, int]) -> None:
-    arm = PlanarArm(5)
-    with pytest.raises(ValueError, match=f"{next(iter(counts))} must be"):
-        evaluate(perfect(arm), arm, np.array([[0.5, 0.5]]), **{"seed": 0, "step": 0} | counts)
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        *({"repeats": repeats} for repeats in (-1, 1, 2.5)),
+        {"step": -1},
+        *({"goals": goals} for goals in (np.zeros((3, 3)), np.full((3, 2), np.nan), np.zeros(2), np.zeros((0, 2)))),
+    ],
+)
+def test_counts_and_goals_that_are_none_are_refused(wrong: dict[str, object]) -> None:
+    arm, right = PlanarArm(5), {"goals": np.array([[0.5, 0.5]]), "seed": 0, "step": 0}
+    with pytest.raises(ValueError, match=f"{next(iter(wrong))} must"):
+        evaluate(perfect(arm), arm, **right | wrong)
 
 
 def test_the_same_streams_give_the_same_and_every_evaluation_of_a_run_has_its_own() -> None:
@@ -145,13 +135,6 @@ def test_the_same_streams_give_the_same_and_every_evaluation_of_a_run_has_its_ow
     assert np.array_equal(first.scatter, same.scatter)
     assert not np.isclose(first.outcomes, later.outcomes).any()
     assert not np.isclose(first.outcomes, other.outcomes).any()
-
-
-@pytest.mark.parametrize("goals", [np.zeros((3, 3)), np.full((3, 2), np.nan), np.zeros(2), np.zeros((0, 2))])
-def test_anything_but_goals_is_refused(goals: Array) -> None:
-    arm = PlanarArm(5)
-    with pytest.raises(ValueError, match="goals must"):
-        evaluate(perfect(arm), arm, goals, 0, 0)
 
 
 def test_one_goal_is_drawn_in_each_tile_that_was_reached_twice_and_none_outside_the_task_space() -> None:

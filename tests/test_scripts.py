@@ -19,6 +19,13 @@ from sgimd_torch.spaces import Box, stream
 from sgimd_torch.teachers import PeriodicTeacher
 
 
+def go(script, options):
+    """Run a script with these options."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "argv", ["script", *options.split()])
+        return script.main()
+
+
 @pytest.mark.parametrize(
     ("script", "options"),
     [
@@ -45,10 +52,9 @@ from sgimd_torch.teachers import PeriodicTeacher
 )
 def test_what_makes_no_sense_is_refused_and_nothing_is_written(tmp_path, monkeypatch, capsys, script, options):
     monkeypatch.chdir(tmp_path)
-    out = {bench: [], check_physics: [], make_teachers: ["--out", "."]}.get(script, ["--out", "out.npz"])
-    monkeypatch.setattr(sys, "argv", ["script", *out, *options.split()])
+    out = {bench: "", check_physics: "", make_teachers: "--out . "}.get(script, "--out out.npz ")
     with pytest.raises(SystemExit) as end:
-        script.main()
+        go(script, out + options)
     assert end.value.code == 2
     assert "error: " in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
@@ -67,11 +73,8 @@ def lived(algorithm, seed, movements):
     return learner.memory
 
 
-def test_the_benchmark_is_a_goal_in_each_tile_that_the_three_learners_reached(tmp_path, monkeypatch):
-    monkeypatch.setattr(
-        sys, "argv", f"make_benchmark.py --out {tmp_path}/b.npz --runs 1 --movements 40 --seed 2007 --tiles 20".split()
-    )
-    make_benchmark.main()
+def test_the_benchmark_is_a_goal_in_each_tile_that_the_three_learners_reached(tmp_path):
+    go(make_benchmark, f"--out {tmp_path}/b.npz --runs 1 --movements 40 --seed 2007 --tiles 20")
     outcomes = np.concatenate([lived(name, 2007, 40).outcomes for name in ("random", "sagg-riac", "sgim-d")])
     box = Box.cube(-1, 1, 2)
 
@@ -98,10 +101,7 @@ def pool():
 def teachers(tmp_path_factory):
     """Demonstrators 1 and 2, taught by those lives."""
     out = tmp_path_factory.mktemp("teachers")
-    with pytest.MonkeyPatch.context() as patch:
-        options = f"--out {out} --n 5 --runs 2 --movements 30 --processes 1"
-        patch.setattr(sys, "argv", ["make_teachers.py", *options.split()])
-        make_teachers.main()
+    go(make_teachers, f"--out {out} --n 5 --runs 2 --movements 30 --processes 1")
     assert sorted(path.name for path in out.iterdir()) == ["demonstrator_1.npz", "demonstrator_2.npz"]
     return {number: load_demonstrations(out / f"demonstrator_{number}.npz", n_joints=6) for number in (1, 2)}
 
@@ -154,10 +154,8 @@ def test_a_pool_on_too_few_tiles_is_refused(pool):
 
 
 def test_the_bench_compares_two_checkouts_side_by_side(capsys, monkeypatch):
-    options = ["--only", "movement", "life", "--rounds", "1", "--movements", "40", "--against", str(bench.HERE)]
-    monkeypatch.setattr(sys, "argv", ["bench", *options])
     monkeypatch.setitem(bench.PARTS, "movement", bench.PARTS["movement"][:2])  # two learners are enough here
-    assert bench.main() == 0
+    assert go(bench, f"--only movement life --rounds 1 --movements 40 --against {bench.HERE}") == 0
     head, *lines = capsys.readouterr().out.splitlines()
     assert head.split() == ["here", "there", "here/there"]
     assert len(lines) == 2 * 2 + 3
@@ -169,9 +167,8 @@ def test_the_bench_compares_two_checkouts_side_by_side(capsys, monkeypatch):
             assert ratio == pytest.approx(here / there, abs=0.01)
 
 
-def test_smaller_time_steps_of_the_rod_land_nearer_to_the_smallest(monkeypatch, capsys):
-    monkeypatch.setattr(sys, "argv", ["check_physics.py", "--time-steps", "--movements", "10"])
-    assert check_physics.main() == 0
+def test_smaller_time_steps_of_the_rod_land_nearer_to_the_smallest(capsys):
+    assert go(check_physics, "--time-steps --movements 10") == 0
     rows = [[float(cell) for cell in line.split()] for line in capsys.readouterr().out.splitlines()[1:]]
     found = np.array(rows)
     assert found[:, 0].tolist() == [10, 5, 2, 1]

@@ -93,13 +93,10 @@ def test_only_those_figures_are_left_out_that_need_a_variant(tmp_path, capsys, m
         assert FIGURES[name](Evidence.of(folder)).axes
 
 
-def test_a_damaged_table_and_a_file_in_the_way_end_with_one_line(folder, tmp_path, capsys):
-    (tmp_path / "results.csv").write_text((folder / "results.csv").read_text() + "junk\n")
-    assert draw("--results", tmp_path, "--out", tmp_path / "out") == 2
-    assert capsys.readouterr().err.splitlines()[-1].startswith(f"error: {tmp_path / 'results.csv'}")
+def test_a_file_in_the_way_ends_with_one_line(folder, tmp_path, capsys):
     (tmp_path / "out").write_text("thesis")
     assert draw("--results", folder, "--out", tmp_path / "out") == 2
-    assert f"{tmp_path / 'out'} is no folder" in capsys.readouterr().err
+    assert f"{tmp_path / 'out'} is no folder" in capsys.readouterr().err.splitlines()[-1]
 
 
 def test_the_help_names_every_figure(capsys):

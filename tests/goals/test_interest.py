@@ -138,23 +138,6 @@ def test_a_region_is_cut_when_it_holds_more_goals_than_allowed_and_not_before():
     assert [region.path for region in goals.regions] == ["R0", "R1"]
 
 
-def test_a_cut_conserves_goals_and_their_order():
-    goals, rng = InterestMap(LINE, SQUARE, stream(10, "goals")), stream(10, "planted")
-    points = rng.uniform(size=(200, 3))
-    competences = -np.arange(200) / 200  # tells when a goal was added
-    for point, competence in zip(points, competences, strict=True):
-        goals.add(point[:1], point[1:], competence, gain=-competence)
-    regions = goals.regions
-    assert len(regions) > 3
-    assert sorted(np.concatenate([region.competences for region in regions])) == sorted(competences)
-    for region in regions:
-        assert (np.diff(region.competences) < 0).all()
-        rows = np.rint(-200 * region.competences).astype(int)
-        np.testing.assert_array_equal(np.hstack((region.contexts, region.goals)), points[rows])
-        assert region.gains.tolist() == (-region.competences).tolist()
-        assert region.attempts == len(region.goals)
-
-
 def cut_of(points: Array, competences: Array, gains: Array | None = None, **options) -> tuple[int, float]:
     """(axis, position) of the first cut of the square, which is made at the 51st goal."""
     goals = InterestMap(NO_CONTEXTS, SQUARE, stream(11, "goals"), **{**BY_EQ_3, **options})
@@ -231,16 +214,16 @@ POINTS = st.lists(st.tuples(COORDINATE, COORDINATE, COORDINATE), min_size=30, ma
 
 @given(points=POINTS, seed=st.integers(0, 99), max_aspect=st.sampled_from([np.inf, 2.0]), cuts=st.sampled_from([3, 20]))
 @settings(max_examples=60, deadline=None, derandomize=True)
-def test_leaves_tile_the_box_and_keep_each_goal_once_whatever_is_added(points, seed, max_aspect, cuts):
-    box, rng = Box.cube(-1, 1, 3), stream(seed, "planted")
+def test_leaves_tile_the_box_and_keep_each_goal_once_in_order_whatever_is_added(points, seed, max_aspect, cuts):
+    box, points = Box.cube(-1, 1, 3), np.array(points)
     contexts, outcomes = Box.cube(-1, 1, 1), Box.cube(-1, 1, 2)
     options = {"max_aspect": max_aspect, "cuts": cuts}  # few cuts fall on goals, many between them
     goals = InterestMap(contexts, outcomes, stream(seed, "goals"), g_max=8, window=4, **options)
-    competences = -rng.permutation(len(points)) / len(points)  # each its own
+    competences = -np.arange(len(points)) / len(points)  # tells when a goal was added
     kept, after = 0, goals.regions
-    for point, competence in zip(np.array(points), competences, strict=True):
+    for point, competence in zip(points, competences, strict=True):
         before = {region.path: region for region in after}
-        goals.add(point[:1], point[1:], competence)
+        goals.add(point[:1], point[1:], competence, gain=-competence)
         after = goals.regions
         new = [region for region in after if region.path not in before]
         assert sum(competence in region.competences for region in after) == 1
@@ -253,10 +236,14 @@ def test_leaves_tile_the_box_and_keep_each_goal_once_whatever_is_added(points, s
         for region in after:
             assert len(region.goals) <= 8
             places = np.hstack((region.contexts, region.goals))
+            assert (np.diff(region.competences) < 0).all()
+            assert np.array_equal(places, points[np.rint(-len(points) * region.competences).astype(int)])
+            assert region.gains.tolist() == (-region.competences).tolist()
             is_below = (places < region.high) | ((places == region.high) & (region.high == box.high))
             assert ((region.low <= places) & is_below).all()
         for region in new:
             parent = before[region.path[:-1]]
+            assert region.attempts == len(region.goals)
             assert (region.high - region.low >= (parent.high - parent.low) / 15 * (1 - 1e-9)).all()  # rounding
     lows, highs = (np.array([getattr(region, name) for region in after]) for name in ("low", "high"))
     assert np.prod(highs - lows, axis=1).sum() == pytest.approx(8)

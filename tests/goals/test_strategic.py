@@ -77,21 +77,20 @@ def choices(goals, costs, n=2000):
 
 
 @pytest.mark.parametrize("anywhere", [0.0, 1.0])
-def test_strategies_are_drawn_in_proportion_to_their_interest(anywhere):
+@pytest.mark.parametrize(
+    ("alone", "imitate", "cost", "share"),
+    [
+        (0.3, 0.4, 1.0, 0.731),  # e^4 / (e^3 + e^4)
+        (0.3, 0.4, 2.0, 0.452),  # e^(3+1/2) / 2 / (e^3 + e^(3+1/2) / 2)
+        (-0.1, -0.2, 4.0, 0.084),  # e^-2 / 4 / (e^-1 + e^-2 / 4); were the loss divided by the cost, .29
+    ],
+)
+def test_strategies_are_drawn_in_proportion_to_their_interest_over_their_cost(alone, imitate, cost, share, anywhere):
     goals = interest(anywhere=anywhere, temperature=0.1)
-    told(goals, "autonomous", 0.3)
-    told(goals, "imitate", 0.4)
-    # e^4 / (e^3 + e^4) = .73, and e^(3+1/2) / 2 / (e^3 + e^(3+1/2) / 2) = .45. Standard errors .010 and .011.
-    assert choices(goals, {"autonomous": 1.0, "imitate": 1.0})["imitate"] / 2000 == pytest.approx(0.731, abs=0.045)
-    assert choices(goals, {"autonomous": 1.0, "imitate": 2.0})["imitate"] / 2000 == pytest.approx(0.452, abs=0.045)
-
-
-def test_a_cost_makes_no_loss_smaller():
-    goals = interest(temperature=0.1)
-    told(goals, "autonomous", -0.1)
-    told(goals, "imitate", -0.2)
-    # e^-2 / 4 / (e^-1 + e^-2 / 4) = .084; divided by the cost, the loss would be -.05 and the share .29.
-    assert choices(goals, {"autonomous": 1.0, "imitate": 4.0})["imitate"] / 2000 == pytest.approx(0.084, abs=0.03)
+    told(goals, "autonomous", alone)
+    told(goals, "imitate", imitate)
+    found = choices(goals, {"autonomous": 1.0, "imitate": cost})["imitate"] / 2000
+    assert found == pytest.approx(share, abs=4 * np.sqrt(share * (1 - share) / 2000))  # four standard errors
 
 
 def test_only_the_greatest_are_drawn_from():

@@ -198,9 +198,8 @@ def test_a_mean_of_movements_on_the_border_does_not_leave_the_policy_space_by_ro
 
 
 def test_the_neighbours_of_another_context_do_not_count() -> None:
-    memory = Memory(1, 1, 1)
-    for context, theta in ((0.0, 0.10), (0.0, 0.11), (5.0, 0.90), (5.0, 0.91)):
-        memory.add(np.array([context]), np.array([theta]), np.zeros(1))
+    thetas, contexts = np.array([[0.10], [0.11], [0.90], [0.91]]), np.array([[0.0], [0.0], [5.0], [5.0]])
+    memory = remember(thetas, np.zeros((4, 1)), contexts)
     assert LocalInverse(memory)(np.array([0.0]), np.zeros(1)).theta[0] == pytest.approx(0.105)
     assert LocalInverse(memory)(np.array([5.0]), np.zeros(1)).theta[0] == pytest.approx(0.905)
 

@@ -1,5 +1,7 @@
 """The local Gaussian process: its laws, and an answer that is given only where it should beat the nearest exemplar."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from threadpoolctl import threadpool_info
@@ -10,7 +12,7 @@ from sgimd_torch.inverses.local import NearestNeighbour
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.inverses.locally_linear import LocallyLinear
 from sgimd_torch.memory import Memory
-from sgimd_torch.spaces import Array, stream
+from sgimd_torch.spaces import Array, Estimate, stream
 from worlds import NO_CONTEXT, remember
 
 SMOOTH = Kernel(scale=1.0, finer=1.0, share=0.0, noise=1e-6)
@@ -87,18 +89,16 @@ def test_the_kernel_takes_about_as_much_for_noise_as_is_stated(noise: float) -> 
     assert choose_kernel([(inputs, outcomes)], 0.0).noise == 1e-6
 
 
-def errors(toy: Toy, memory: Memory, make: object, goals: Array, contexts: Array) -> Array:
-    inverse = make(memory)  # type: ignore[operator]
+def mean_error(toy: Toy, inverse: Callable[[Array, Array], Estimate], goals: Array, contexts: Array) -> float:
     thetas = np.stack([inverse(context, goal).theta for context, goal in zip(contexts, goals, strict=True)])
-    distances: Array = np.linalg.norm(toy.effect(contexts, thetas) - goals, axis=1)
-    return distances
+    return float(np.linalg.norm(toy.effect(contexts, thetas) - goals, axis=1).mean())
 
 
 def test_where_several_families_of_movements_lead_to_a_place_it_beats_the_nearest_and_the_linear() -> None:
     toy = two_elbows()
     memory, goals = played(toy, 300), played(toy, 40, seed=1).outcomes
     process, nearest, linear = (
-        errors(toy, memory, make, goals, np.zeros((40, 0))).mean()
+        mean_error(toy, make(memory), goals, np.zeros((40, 0)))
         for make in (LocalProcess, NearestNeighbour, LocallyLinear)
     )
     assert process < 0.6 * min(nearest, linear)
@@ -108,7 +108,7 @@ def test_in_a_context_that_never_came_it_beats_the_nearest() -> None:
     toy = toss()
     memory, asked = played(toy, 200), played(toy, 40, seed=1)
     process, nearest = (
-        errors(toy, memory, make, asked.outcomes, asked.contexts).mean() for make in (LocalProcess, NearestNeighbour)
+        mean_error(toy, make(memory), asked.outcomes, asked.contexts) for make in (LocalProcess, NearestNeighbour)
     )
     assert process < 0.4 * nearest
 
@@ -150,10 +150,7 @@ def in_wind(contexts: Array) -> float:
     """The mean error of a robot that does not feel the wind that it remembers."""
     toy = two_elbows()
     memory, goals = played(toy, 200), played(toy, 20, seed=1).outcomes
-    windy = Memory(contexts.shape[1], memory.theta_dim, 2)
-    for context, theta, outcome in zip(contexts[:200], memory.thetas, memory.outcomes, strict=True):
-        windy.add(context, theta, outcome)
-    inverse = LocalProcess(windy)
+    inverse = LocalProcess(remember(memory.thetas, memory.outcomes, contexts[:200]))
     thetas = np.stack([inverse(*asked).theta for asked in zip(contexts[200:], goals, strict=True)])
     return float(np.linalg.norm(toy.effect(np.zeros((20, 0)), thetas) - goals, axis=1).mean())
 

@@ -5,10 +5,9 @@ import pytest
 
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.goals.strategic import AUTONOMOUS
-from sgimd_torch.memory import Memory
 from sgimd_torch.rivals.entropy import EntropyGoals, doubt
 from sgimd_torch.spaces import Box, stream
-from worlds import NO_CONTEXT, demonstrations
+from worlds import NO_CONTEXT, demonstrations, remember
 
 ARM = PlanarArm(4, noise=0.02)
 SHOWN = demonstrations(PlanarArm(4))
@@ -52,9 +51,7 @@ def test_covariances_are_symmetric_and_no_variance_is_negative_or_above_one():
 
 def goals_with(outcomes):
     """A choice of a learner whose memory has these outcomes."""
-    memory = Memory(0, 1, 2)
-    for outcome in outcomes:
-        memory.add(NO_CONTEXT, np.zeros(1), outcome)
+    memory = remember(np.zeros((len(outcomes), 1)), np.reshape(outcomes, (-1, 2)))
     return EntropyGoals(Box.cube(0, 1, 0), SQUARE, stream(0, "goals"), memory=memory), memory
 
 

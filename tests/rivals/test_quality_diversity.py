@@ -37,7 +37,7 @@ def cells_reached(learner: Learner) -> int:
 @BOTH
 def test_the_same_seed_makes_the_same_movements_and_another_seed_others(make):
     numpy_state = str(np.random.get_state())  # noqa: NPY002 - nobody may touch it
-    first, same, other = (live(make(ARM, seed), 250) for seed in (1, 1, 2))
+    first, same, other = (live(make(ARM, seed), 150) for seed in (1, 1, 2))
     assert np.array_equal(first, same)
     assert not np.isclose(first, other).all(axis=1).any()
     assert str(np.random.get_state()) == numpy_state  # noqa: NPY002
@@ -115,12 +115,10 @@ def test_what_makes_no_sense_is_refused(make):
         make(Elsewhere(ARM.policies, Box.cube(2, 3, 2), ARM.contexts), 0)
     with pytest.raises(ValueError, match="must be a whole number"):
         make(ARM, 0, **({"first": 0} if make in ELITES else {"emitters": 0}))
-
-
-def test_a_learning_rate_is_a_share():
-    for rate in (0.0, 1.5, np.nan):
-        with pytest.raises(ValueError, match=r"learning_rate must lie in \(0, 1\]"):
-            cma_mae(ARM, 0, learning_rate=rate)
+    if make is cma_mae:
+        for rate in (0.0, 1.5, np.nan):
+            with pytest.raises(ValueError, match="learning_rate must"):
+                make(ARM, 0, learning_rate=rate)
 
 
 def test_movements_of_cma_mae_stay_compact():
