@@ -148,6 +148,9 @@ def learning(found: Evidence) -> list[Claim]:
               times_as_much(found, 1.15, "practice.rod-large", alone, *TIMES[1:])),
         Claim("... and where most movements do nothing, `puck`: ≤ 0.60 times random movements at 2000",
               times_as_much(found, 0.6, "practice.puck", f"{RANDOM}.puck", 2000)),
+        Claim("... there and on `fetch` less than SAGG-RIAC and the standard baseline: < 0 at 2000",
+              [part for task in SPARSE for name in ("sagg-riac", UNIFORM)
+               for part in less(found, f"practice.{task}", f"{name}.{task}", 2000, name=f"{name}, {task}")]),
         Claim("SGIM-D errs less than the standard baseline, both shown one every 30: < 0 at 5000",
               less(found, "sgim-d.rod", "uniform-nearest-taught.rod")),
         Claim("Suite: `practice` never errs more than random movements: ≤ 1.02 times, 250 to 2000",

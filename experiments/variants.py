@@ -52,7 +52,8 @@ INVERSE: Final[Variant] = {"inverse": "paper"}  # all that the letter changes in
 # paper's letter by eq. (9), a step of the ladder by what it learns with, a learner with a forward model by that model.
 ALIKE: Final = ("process",)
 ANSWERS: Final[dict[str, tuple[str, ...]]] = {
-    **dict.fromkeys(("letter", "letter-teachers", "large-space"), (*ALIKE, "paper")),
+    **dict.fromkeys(("letter", "large-space"), (*ALIKE, "paper")),
+    "letter-teachers": ("paper",),
     "ladder": (*ALIKE, "linear"),
     **dict.fromkeys(("forward-model", "planar-arm-7", "planar-arm-50", "swimmer"), (*ALIKE, "model-alone")),
     **dict.fromkeys(("settings", "practice"), (*ALIKE, "model")),

@@ -59,6 +59,7 @@ ERRORS = {  # name, as `Evidence` has it: its error (m) at 5000
     **{f"practice.{task}": 1.0 for task in (*SUITE, *SPARSE) if task != "rod"},
     "practice.rod-large": 0.022,
     **{f"{name}.{task}": ON_TASKS[name] for name in ("random-nearest", "uniform-nearest") for task in SPARSE},
+    **{f"sagg-riac.{task}": 1.5 for task in SPARSE},
     # With a forward model.
     "imitation.rod by model": 0.3,
     **{f"{name} by model-alone": 0.03 for name in ("model", "gradient")},

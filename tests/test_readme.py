@@ -72,12 +72,12 @@ class Block(NamedTuple):
     def __str__(self):
         return f"{self.page}:{self.line}"
 
-    def carry_out(self):
-        """In the working directory."""
+    def carry_out(self, names=None):
+        """In the working directory; ``names`` are known from blocks above."""
         if self.name:
             Path(self.name).write_text(self.text, encoding="utf-8")
         elif self.kind == "python":
-            exec(compile("\n" * (self.line - 1) + self.text, ROOT / self.page, "exec"), {"__name__": "__main__"})
+            exec(compile("\n" * (self.line - 1) + self.text, ROOT / self.page, "exec"), {} if names is None else names)
         elif self.kind == "sh":
             for line in self.lines():
                 program, *words = shlex.split(line, comments=True)
@@ -128,10 +128,11 @@ def test_a_page_works_from_top_to_bottom(page, folder):
 
 
 def work_through(page):
+    names = {"__name__": "__main__"}
     for block in blocks(page, "python", "sh"):
         for long, short in SMALLER.items():
             block = block._replace(text=block.text.replace(long, short))
-        block.carry_out()
+        block.carry_out(names)
 
 
 def test_all_that_is_made_smaller_is_on_a_page():

@@ -102,7 +102,7 @@ def lesson_by_hand(
     """
     middle = (environment.contexts.low + environment.contexts.high) / 2
     context = environment.contexts.check("context", middle if context is None else context)
-    _, longest = _durations(environment)
+    _, longest = durations_of(environment)
     slower = recording.duration > longest
     times = recording.times / recording.duration * longest if slower else recording.times  # ends exactly at longest
     even, joints = resampled(times, recording.joints)
@@ -148,7 +148,7 @@ def beyond_limits(environment: Environment, shown: Demonstration) -> list[str]:
             sample = int(outside[:, joint].argmax())
             found = f"joint {joint} is {shown.trajectory[sample, joint]:.3g} at sample {sample}"
             remarks.append(f"{found}, its range [{box.low[joint]:g}, {box.high[joint]:g}]")
-    shortest, longest = _durations(environment)
+    shortest, longest = durations_of(environment)
     lasts = float(shown.times[-1] - shown.times[0])
     if not shortest * (1 - 1e-9) <= lasts <= longest * (1 + 1e-9):
         remarks.append(f"too {'fast' if lasts < shortest else 'long'}: movements last {shortest:g} to {longest:g} s")
@@ -163,7 +163,7 @@ def _player_of(environment: Environment) -> Any:
     return player if hasattr(player, "at") else None
 
 
-def _durations(environment: Environment) -> tuple[float, float]:
+def durations_of(environment: Environment) -> tuple[float, float]:
     """s, how long the robot's movements last, at least and at most."""
     player = _player_of(environment)
     shortest, *_, longest = getattr(player, "durations", (0.0, getattr(player, "duration", np.inf)))

@@ -21,6 +21,7 @@ from sgimd_torch.files import checksum
 from sgimd_torch.spaces import Demonstration
 
 MOST_GOALS: Final = 500  # of a task that has none
+FASTER: Final = 3.0  # than the shortest movement, and more: such a recording has wrong times
 TOO_FAR: Final = 0.25  # of a joint's range: a robot that misses a demonstration by more cannot make that movement
 
 
@@ -115,13 +116,15 @@ def demonstrations_of(task: Task, file: Path | None) -> tuple[Sequence[Demonstra
     crc32: str | None = None
     if isinstance(source, Path):
         from sgimd_torch.demonstrations import load_demonstrations  # most learners read none
-        from sgimd_torch.demonstrations.lessons import misfit_of, ranges_of
+        from sgimd_torch.demonstrations.lessons import durations_of, misfit_of, ranges_of
 
         crc32 = checksum(source)
         shown = load_demonstrations(source, outcome_dim=robot.outcomes.dim, context_dim=robot.contexts.dim)
-        translate, ranges = correspondence_of(task), ranges_of(robot)
+        translate, ranges, shortest = correspondence_of(task), ranges_of(robot), durations_of(robot)[0]
         for row, each in enumerate(shown):
             try:
+                if (lasts := each.times[-1] - each.times[0]) < shortest / FASTER:
+                    raise ValueError(f"movements last {shortest:g} s at least, it {lasts:g} s; is it in milliseconds?")
                 misfit = misfit_of(robot, translate(each.times, each.trajectory), each)
                 if ranges is not None and misfit > TOO_FAR * ranges.sides.mean():
                     raise ValueError(
