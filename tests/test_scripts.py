@@ -1,5 +1,6 @@
 """The scripts that make the shipped data: what the robots that teach show, and what makes no sense is refused."""
 
+import shlex
 import sys
 
 import numpy as np
@@ -22,7 +23,7 @@ from sgimd_torch.teachers import PeriodicTeacher
 def go(script, options):
     """Run a script with these options."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sys, "argv", ["script", *options.split()])
+        patch.setattr(sys, "argv", ["script", *shlex.split(options)])
         return script.main()
 
 
@@ -155,7 +156,7 @@ def test_a_pool_on_too_few_tiles_is_refused(pool):
 
 def test_the_bench_compares_two_checkouts_side_by_side(capsys, monkeypatch):
     monkeypatch.setitem(bench.PARTS, "movement", bench.PARTS["movement"][:2])  # two learners are enough here
-    assert go(bench, f"--only movement life --rounds 1 --movements 40 --against {bench.HERE}") == 0
+    assert go(bench, f"--only movement life --rounds 1 --movements 40 --against '{bench.HERE}'") == 0
     head, *lines = capsys.readouterr().out.splitlines()
     assert head.split() == ["here", "there", "here/there"]
     assert len(lines) == 2 * 2 + 3
