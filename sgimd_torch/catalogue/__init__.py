@@ -293,7 +293,10 @@ def checked(kind: str, word: str, make: Callable[..., Any]) -> Callable[..., Any
             inspect.signature(make).bind(*arguments, **options)
         except TypeError as error:
             raise ValueError(f"{kind} {word} cannot be called as {wanted}: {error}") from error
-        part = make(*arguments, **options)
+        try:
+            part = make(*arguments, **options)
+        except SystemExit as end:  # it must not end the command, which would look like success
+            raise ValueError(f"{kind} {word} cannot be made: it calls exit({end})") from end
         robot = getattr(part, "environment", part) if kind == "environment" else part  # of a Task
         missing = [name for name in members if not hasattr(robot, name)]
         if missing:

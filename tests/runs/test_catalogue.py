@@ -162,6 +162,12 @@ def test_what_a_part_is_anyway_is_no_difference():
     assert own["movements"] == 5000
 
 
+def test_a_robot_that_ends_the_program_is_refused(tmp_path, module):
+    module("ends", "def make():\n    raise SystemExit(0)\n")
+    with pytest.raises(ValueError, match=r"environment ends:make cannot be made: it calls exit\(0\)"):
+        build(Config("practice", out=tmp_path, parts={"environment": "ends:make"}))
+
+
 def test_dashes_and_underscores_mean_the_same():
     assert parse(["--goals", "grid", "--goals.window=8", "--give-up", "-1"]) == parse(
         ["--goals=grid", "--goals.window", "8", "--give_up=-1"]
@@ -173,7 +179,7 @@ def test_help_is_one_screen_and_a_parts_options_are_shown_once_it_is_chosen(caps
         with pytest.raises(SystemExit) as stop:
             parse(argv, "What it does.")
         assert stop.value.code == 0
-    assert len(overview(command_line.__doc__, command_line.FLAGS).splitlines()) <= 60
+    assert len(overview(command_line.__doc__).splitlines()) <= 60
     said = capsys.readouterr().out
     assert said.count("--goals.window ") == 2  # of which one is an example
     assert "how many recent goals the interest looks at" in " ".join(said.split())
