@@ -24,6 +24,7 @@ from table import read_table
 from variants import ARMS, EXPERIMENTS, REFINING, ROBOTS, SPARSE, SUITE, TEACHERS, ladder
 
 SETTINGS: Final = (*ROBOTS, *TEACHERS)
+VARIANTS: Final = {name for variants in EXPERIMENTS.values() for name in variants}
 DEFAULT: Final = "default"  # setting of a rival
 # Rivals by schedule: no teacher; one demonstration every 30 movements, ten imitations each; all at the start, once.
 RIVALS: Final[Mapping[str, tuple[str, str, str]]] = {
@@ -146,8 +147,7 @@ class Tables:
     def suite(self, at: int = 1000) -> str:
         """Errors over those of random movements on each task, then their interquartile mean over tasks."""
         learners, every = ("practice", UNIFORM, "map-elites"), (*SUITE, *SPARSE)
-        run = {*EXPERIMENTS["learning"], *EXPERIMENTS["suite"], *EXPERIMENTS["practice"]}
-        known = {name: [task for task in every if f"{name}.{task}" in run] for name in learners}
+        known = {name: [task for task in every if f"{name}.{task}" in VARIANTS] for name in learners}
         rows = [
             [titled(task), *(self.cell(self.found.ratio, f"{name}.{task}", f"{RANDOM}.{task}", at, form=".2f")
                              if task in known[name] else "–" for name in learners)]
@@ -160,7 +160,7 @@ class Tables:
         """What each step from random movements to practice brings; then learners with the same teacher."""
         rows = [
             [step, *self.errors(f"{name}.rod", (1000,), between=True), *self.errors(f"{name}.rod", (LAST,)),
-             self._over_tasks(name, [*SUITE], 1000) if step in GAIN and name != "practice-interest" else ""]
+             self._over_tasks(name, [*SUITE], 1000) if all(f"{name}.{task}" in VARIANTS for task in SUITE) else ""]
             for step, name in {**GAIN, **TAUGHT}.items()
         ]  # fmt: skip
         return markdown(("step", "rod, 1000 (m)", "rod, 5000 (m)", "suite, 1000"), _run(rows))

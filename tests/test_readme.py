@@ -77,7 +77,10 @@ class Block(NamedTuple):
         if self.name:
             Path(self.name).write_text(self.text, encoding="utf-8")
         elif self.kind == "python":
-            exec(compile("\n" * (self.line - 1) + self.text, ROOT / self.page, "exec"), {} if names is None else names)
+            exec(
+                compile("\n" * (self.line - 1) + self.text, ROOT / self.page, "exec"),
+                {"__name__": "__main__"} if names is None else names,
+            )
         elif self.kind == "sh":
             for line in self.lines():
                 program, *words = shlex.split(line, comments=True)

@@ -27,9 +27,8 @@ _LARGEST32: Final = float(np.finfo(np.float32).max)  # what faiss reports where 
 _ROUNDING: Final = 1e-9  # relative; far more than two ways to add up a float64 distance differ by
 
 faiss.omp_set_num_threads(1)  # queries last microseconds: to wake other threads costs more than they save
-faiss.cvar.distance_compute_blas_threshold = (
-    2**20
-)  # above it |a|^2 + |b|^2 - 2ab cancels, and _surely_proposed is wrong
+# Above that, |a|^2 + |b|^2 - 2ab cancels, and `_surely_proposed` would be wrong.
+faiss.cvar.distance_compute_blas_threshold = 2**20
 
 
 class Table:

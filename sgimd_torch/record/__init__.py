@@ -44,6 +44,7 @@ from sgimd_torch.record.layout import (
     event_reader,
     event_row,
     layout,
+    lesson_of,
     movements_after,
     plain,
     read_demonstration,
@@ -229,7 +230,12 @@ class Record:
         with replacing(self.path) as partial:
             with Record.make(partial, self.dims, about) as new:
                 shown = new._take("demonstrations", self.rows("demonstrations"))
-                new._take("events", takewhile(lambda row: row[-4] is None or row[-4] < shown, self.rows("events")))
+
+                def has_lesson(row: Row) -> bool:
+                    lesson = lesson_of(row)
+                    return lesson is None or lesson < shown
+
+                new._take("events", takewhile(has_lesson, self.rows("events")))
                 new.commit()
             self.close()
         return Record(self.path, write=True)

@@ -101,6 +101,12 @@ def event_row(event: Event, movement: int, lesson: int | None, dims: Dims) -> Ro
     return movement, str(event.kind), event.origin, *vectors, lesson, event.who, event.strategy, event.reply
 
 
+def lesson_of(row: Row) -> int | None:
+    """The row of the demonstration of such an event."""
+    found: int | None = row[-4]
+    return found
+
+
 def event_reader(dims: Dims, shown: Sequence[Demonstration]) -> Callable[[Row], Event]:
     """What makes an event of such a row, ``shown`` being the demonstrations."""
     every = (*dims, dims[2])

@@ -55,7 +55,7 @@ def parse(argv: Sequence[str], description: str | None = None) -> tuple[Config, 
     try:
         given, asked = _read(argv)
         if "help" in asked and not given:
-            print(overview(description, FLAGS))
+            print(overview(description))
             raise SystemExit(0)
         if "algorithm" not in given:
             given["algorithm"] = _suited(given)
@@ -156,11 +156,11 @@ def _wanted(kind: Any) -> str:
     return f"{text}, with commas" if "tuple" in text else text
 
 
-def overview(description: str | None, flags: Mapping[str, str]) -> str:
+def overview(description: str | None) -> str:
     """What ``sgimd run --help`` prints: the options of every run, its flags, and the words for its parts."""
     about = help_of(Config)
     shown = {name: typed(getattr(Config, name)) for name in RUN}
-    run = {name: about[name] + f" ({text})" * (text != "null") for name, text in shown.items()} | {**flags}
+    run = {name: about[name] + f" ({text})" * (text != "null") for name, text in shown.items()} | FLAGS
     algorithms = {word: entry.about for word, entry in CATALOGUE["algorithm"].items() if "rivals" not in entry.about}
     rivals = [word for word in CATALOGUE["algorithm"] if word not in algorithms]
     kinds = {kind: ", ".join(words) for kind, words in CATALOGUE.items() if kind != "algorithm"}
