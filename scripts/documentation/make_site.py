@@ -37,7 +37,7 @@ LINK = re.compile(r"(!?\[[^\]]*\]\()([^)\s#]*)(#[^)\s]*)?(\))")
 INTERVAL = re.compile(r"(\[[+−-]?[\d.]+), ([+−-]?[\d.]+\])")  # stays on one line, also in a narrow column
 NOTEBOOKS = '["docs/notebooks/"]'  # in zensical.toml, in the place of all of them
 COLOUR = re.compile(r"\x1b\[[\d;]*m")
-SAVED_AS = re.compile(r"^```(\w+) ([\w./-]+)$", re.MULTILINE)  # as tests/test_readme.py reads the first line of a block
+SAVED_AS = re.compile(r"^```(\w+) ([\w./-]+)$", re.MULTILINE)  # as test_readme.py reads the first line of a block
 
 
 def sources() -> list[str]:

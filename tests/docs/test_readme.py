@@ -27,7 +27,7 @@ from sgimd_torch.runs.command_line import parse
 from sgimd_torch.runs.process import command
 from sgimd_torch.views.teach import options_of
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 ALONE = ("README.md", "CONTRIBUTING.md")  # each block by itself
 HOW_TO = tuple(
     f"docs/{name}.md"
