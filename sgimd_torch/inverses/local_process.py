@@ -79,18 +79,23 @@ class LocalProcess:
         clearly = errors[chosen_one] < _CLEARLY * exemplars[0]
         return estimate._replace(theta=candidates[chosen_one]) if clearly else estimate
 
-    @one_thread
     def predict(self, context: Array, theta: Array) -> Array | None:
         """``(outcome_dim,)`` what ``theta`` should lead to, judging by the movements most like it, or by the last
         one while all led to the same. None while there are too few."""
+        found = self.predict_variance(context, theta)
+        return None if found is None else found[0]
+
+    @one_thread
+    def predict_variance(self, context: Array, theta: Array) -> tuple[Array, float] | None:
+        """As `predict`, and the variance of each dimension, noise aside."""
         self._catch_up()
         if self._kernel is None:
-            return self.memory.outcomes[-1] if self._fitted else None
+            return (self.memory.outcomes[-1], 0.0) if self._fitted else None
         here = self._in_lengths(context, theta[None])
         rows = self._inputs.nearest(here, min(_LEARNT, len(self.memory)))[0]
         process = Process(self._inputs.keys.rows[rows], self.memory.outcomes[rows], self._kernel)
-        expected: Array = process.expect(here)[0]
-        return expected
+        (expected,), (variance,) = process.predict(here)
+        return expected, float(variance)
 
     def _learn_near(self, context: Array, goal: Array) -> tuple[Process, Rows, float] | None:
         """The process of the movements near the goal, the rows of the nearest outcomes, with which it begins, and how

@@ -93,9 +93,8 @@ def _reopened(
         record = _whole(record, accept_loss, notes)
         if record.movements > config.movements:
             raise RunError(f"{path} has {record.movements} movements already, {config.movements} were asked for")
-        made = list(dict.fromkeys(movements for movements, *_ in record.rows("evaluations")))
-        others = made != config.evaluations[: len(made)] or differ & {*EVALUATES}
-        for table in (*OF_MODEL, *EVALUATED * bool(others)):
+        _forget_evaluations(record, config, anew=bool(differ & {*EVALUATES}), notes=notes)
+        for table in OF_MODEL:
             record.replace_rows(table, ())
         about["versions"] = _with_earlier(record.about["versions"], about["versions"], notes)
         record.settle(**about)
@@ -103,6 +102,18 @@ def _reopened(
         record.close()
         raise
     return record
+
+
+def _forget_evaluations(record: Record, config: Config, *, anew: bool, notes: list[str]) -> None:
+    """Leave out those that are not wanted now, and what follows one that is missing; all to make them ``anew``."""
+    made = list(dict.fromkeys(movements for movements, *_ in record.rows("evaluations")))
+    kept = [] if anew else [movements for movements in made if movements in config.evaluations]
+    while kept != config.evaluations[: len(kept)]:
+        kept.pop()
+    if others := [str(movements) for movements in made if movements not in kept]:
+        notes.append(f"evaluations after {', '.join(others)} movements are left out, or made again if asked for")
+        for table in EVALUATED:
+            record.replace_rows(table, [row for row in record.rows(table) if row[0] in kept])
 
 
 def _refuse_other(record: Record, about: dict[str, Any], dims: Dims) -> set[str]:

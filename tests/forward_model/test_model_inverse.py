@@ -130,10 +130,10 @@ def test_a_model_of_another_robot_is_refused(model, joints, policies, named):
         ModelInverse(Memory(0, joints, 2), model, PlanarArm(policies).policies)
 
 
-def lived(outcome_of, n, scale=1.0, **options):
+def lived(outcome_of, n, scale=1.0, noise=0.1, **options):
     """``n`` random movements, of which a model and a `ProvedModel` were told after each 50."""
     memory, model = Memory(0, 3, 2), ForwardModel(0, 3, 2, **options)
-    proved, rng = ProvedModel(memory, model, CUBE), stream(0, "lived")
+    proved, rng = ProvedModel(memory, model, CUBE, outcome_noise=scale * noise), stream(0, "lived")
     for theta in rng.random((n, 3)):
         memory.add(NO_CONTEXT, theta, scale * outcome_of(theta, rng))
         model.refresh(memory)
@@ -174,6 +174,11 @@ def test_a_model_that_predicts_better_answers_once_there_were_enough_tests(prove
     assert (lived(noisy, 150).trusted, proved.trusted) == (False, True)
     goals = proved.process.memory.outcomes[:3] + 0.01
     assert same_answers(proved, proved.through_model.many(NO_CONTEXT, goals), goals)
+
+
+def test_told_that_nothing_is_noisy_it_wants_better_predictions(proved):
+    assert proved.trusted
+    assert not lived(noisy, 600, noise=0.0).trusted
 
 
 def test_it_is_the_same_whether_or_not_it_was_asked(goals):

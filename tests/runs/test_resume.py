@@ -106,6 +106,21 @@ def test_a_run_that_another_process_writes_is_left_alone(tmp_path, go, benchmark
     assert content_of(tmp_path / "sgim-d" / "seed-003") == reference
 
 
+def test_a_run_made_longer_executes_nothing_again_for_its_evaluations(tmp_path, go, reference, monkeypatch, capsys):
+    assert go(tmp_path, "--movements", 50) == 0  # evaluated after 30 and, at its end, 50
+    evaluated = set()
+
+    def evaluate_and_note(*arguments, **options):
+        evaluated.add(arguments[4])
+        return evaluate(*arguments, **options)
+
+    monkeypatch.setattr(evaluations, "evaluate", evaluate_and_note)
+    assert go(tmp_path, "--resume") == 0
+    assert evaluated == {60, 90}
+    assert "evaluations after 50 movements are left out" in capsys.readouterr().err
+    assert content_of(tmp_path / "sgim-d" / "seed-003") == reference
+
+
 @pytest.mark.parametrize("algorithm", ["sgim-d", "observation"])
 def test_a_finished_run_made_longer_equals_a_long_run(tmp_path, go, algorithm):
     options = ("--algorithm", algorithm)
