@@ -56,7 +56,7 @@ ANSWERS: Final[dict[str, tuple[str, ...]]] = {
     "letter-teachers": ("paper",),
     "ladder": (*ALIKE, "linear"),
     **dict.fromkeys(("forward-model", "planar-arm-7", "planar-arm-50", "swimmer"), (*ALIKE, "model-alone")),
-    **dict.fromkeys(("settings", "practice"), (*ALIKE, "model")),
+    **dict.fromkeys(("settings", "proved-model"), (*ALIKE, "model")),
     "learning": (*ALIKE, "linear", "nearest", "model"),
     "suite": (*ALIKE, "linear", "nearest"),
 }
@@ -335,11 +335,10 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
     "suite": _on_suite(SUITED),
     "practice": {
         "practice.rod": {**PRACTICE, **ON_ROD},
-        "sgim-d-model.rod": {**BY_PROOF, **ON_ROD},
         **_on_suite({"practice": PRACTICE}, TASKS),
         **_on_suite({**REFERENCES, "sagg-riac": SAGG_RIAC}, SPARSE),
-        **_on_suite({"sgim-d-model": BY_PROOF}, ARMS),
     },
+    "proved-model": {"sgim-d-model.rod": {**BY_PROOF, **ON_ROD}, **_on_suite({"sgim-d-model": BY_PROOF}, ARMS)},
     "gain": {
         **{f"{name}.rod": {**line, **ON_ROD} for name, line in {**STEPS_OF_GAIN, **SCHEDULES}.items()},
         **_on_suite(BEGUN),
@@ -355,6 +354,7 @@ SEEDS: Final[dict[str, range]] = {
     "settings": range(100, 105),
     **dict.fromkeys(("learning", "suite", "gain"), range(120, 140)),
     "practice": range(160, 180),
+    "proved-model": range(180, 200),
     "asking": range(140, 160),
     "by-hand": range(150, 160),
 }
