@@ -6,6 +6,7 @@ print(carry_out(build(Config(seed=3)), stopping, resume=False, accept_loss=False
 from __future__ import annotations
 
 import math
+import re
 import time
 import traceback
 from collections.abc import Callable, Iterator, Mapping
@@ -23,7 +24,7 @@ from sgimd_torch.runs.process import Failed, Progress, Stopped, Stopping, say
 from sgimd_torch.session import NoOutcomeError, ReplayError, live, reason_of, run
 from sgimd_torch.spaces import Episode
 
-TOLD: Final = 3  # failed movements that are told one by one
+TOLD: Final = 3  # failed movements that are told one by one; later ones, if they fail in another way
 COMMIT_EVERY: Final = 1.0  # s; a killed run loses what came since
 
 
@@ -86,6 +87,7 @@ class Life:
         self.evaluations = Evaluations(*judged, self.record)
         self.listeners = listeners_of(parts, self.record, self.seconds)
         self._wanted = set(parts.config.evaluations)
+        self._failures: list[str] = []  # kinds of those that were told
         self._committed = time.monotonic()
 
     def __enter__(self) -> Self:
@@ -177,9 +179,11 @@ class Life:
         self.movements = episode.index + 1
         if episode.failed:
             self.failed += 1
-            if not replayed and self.failed <= TOLD:
-                more = "; from now on they are only counted" if self.failed == TOLD else ""
+            kind = re.sub(r"\d", "", episode.failed)
+            if not replayed and (len(self._failures) < TOLD or kind not in self._failures):
+                more = "; from now on such failures are only counted" if len(self._failures) == TOLD - 1 else ""
                 say(f"movement {episode.index} failed: {episode.failed}{more}")
+                self._failures.append(kind)
         for each in self.listeners:
             each.episode(episode, replayed)
         if self.movements in self._wanted:

@@ -190,11 +190,21 @@ class Broken(Lossy):
         if Path("repaired").exists():
             return PlanarArm.execute(self, context, theta, rng)
         raise SystemExit(0)
+class Worse(PlanarArm):
+    n = 0
+    def execute(self, context, theta, rng):
+        self.n += 1
+        if self.n == 11:
+            raise TimeoutError("slow")
+        if self.n % 2 == 0:
+            raise ConnectionError(f"lost packet {self.n}")
+        return super().execute(context, theta, rng)
 def task(kind):
     goals = np.random.default_rng(0).uniform(-.5, .5, (20, 2))
     return Task(kind(5, noise=.01), lambda: Benchmark(kind.__name__, goals, .1))
 def lossy(): return task(Lossy)
 def broken(): return task(Broken)
+def worse(): return task(Worse)
 """
 
 
@@ -229,3 +239,12 @@ def test_a_run_whose_robot_is_broken_says_how_to_go_on_and_does(robots: Path, ca
     (robots / "repaired").touch()
     assert command(main, words("broken", "--resume")) == 0
     assert read_run(robots / "broken" / "practice" / "seed-003").summary["failed"] == 10
+
+
+def test_three_failures_are_told_and_later_each_of_another_kind(robots: Path, capsys) -> None:
+    assert command(main, words("worse", "--evaluate-at", "[]", "--movements", "20")) == 0
+    told = [line for line in capsys.readouterr().err.splitlines() if "movement " in line]
+    numbers = ("1 failed: ConnectionError: lost packet 2", "3", "5", "10 failed: TimeoutError: slow")
+    assert len(told) == 4
+    assert all(f"movement {each}" in line for line, each in zip(told, numbers, strict=True))
+    assert "from now on such failures are only counted" in told[2]
