@@ -39,6 +39,8 @@ RIVALS: Final[Mapping[str, tuple[str, str, str]]] = {
     "demonstrations and noise*": ("", "demonstrations-noise", ""),
     "CMA-ME, CMA-MAE, tuned*": ("cma-me-tuned", "cma-mae-demonstrations-tuned", ""),
     "MAP-Elites, tuned*": ("map-elites-tuned", "", ""),
+    "Random, from the middle": ("middle-random.rod", "", ""),
+    "MAP-Elites, from the middle": ("middle-map-elites.rod", "", ""),
 }
 # From random movements to practice, each step added to the one before; then the same teacher for all.
 GAIN: Final[Mapping[str, str]] = {

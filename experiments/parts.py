@@ -19,6 +19,8 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
+from ribs.archives import GridArchive
+from ribs.emitters import GaussianEmitter
 
 from sgimd_torch.algorithms import Correspondence
 from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
@@ -50,6 +52,19 @@ TREMBLE: Final = 0.004  # m, the same of the hand's trembling where it is fastes
 def map_elites(environment: Environment, seed: int, *, memory: Memory | None = None) -> Learner:
     """MAP-Elites with cells of twice the side."""
     return quality_diversity.map_elites(environment, seed, cells=10, memory=memory)
+
+
+def map_elites_middle(environment: Environment, seed: int, *, memory: Memory | None = None) -> Learner:
+    """The same, with first movements around the middle of Pi, and wider variations."""
+
+    def emitters(archive: GridArchive, rng: np.random.Generator) -> list[GaussianEmitter]:
+        dim = environment.policies.dim
+        bounds = {"lower_bounds": np.zeros(dim), "upper_bounds": np.ones(dim)}
+        first = rng.normal(0.5, 0.1, (100, dim)).clip(0, 1)
+        drawn = int(rng.integers(2**32))
+        return [GaussianEmitter(archive, sigma=0.1, initial_solutions=first, batch_size=10, seed=drawn, **bounds)]
+
+    return quality_diversity.quality_diversity(environment, seed, "map-elites", emitters, cells=10, memory=memory)
 
 
 def cma_me(environment: Environment, seed: int, *, memory: Memory | None = None) -> Learner:

@@ -129,6 +129,8 @@ MIDDLE: Final[Variant] = {**REFERENCES[UNIFORM], "explore": "widening", "global_
 BEGUN: Final[dict[str, Variant]] = {"middle": MIDDLE, "middle-process": {**MIDDLE, "inverse": "process"}}
 STEPS_OF_GAIN: Final[dict[str, Variant]] = {
     **BEGUN,
+    "middle-random": {**MIDDLE, "inverse": "process", "global_range": (1.0, 1.0)},
+    "middle-map-elites": {"algorithm": "experiments.parts:map_elites_middle"},
     "practice-interest": {**UNIFORM_PRACTICE, "goals": "interest-map"},
 }
 SCHEDULES: Final[dict[str, Variant]] = {
