@@ -192,7 +192,7 @@ class Box:
 
     def sample(self, rng: np.random.Generator) -> Array:
         """``(dim,)`` one uniform point."""
-        return rng.uniform(self.low, self.high)
+        return self.low + self.sides * rng.random(self.dim)  # as rng.uniform, several times faster
 
     def clip(self, points: ArrayLike) -> Array:
         """``(..., dim)`` the nearest points inside."""

@@ -153,7 +153,7 @@ class Life:
             movements=parts.config.movements,
             teacher=parts.teacher,
             teachers=parts.teachers,
-            execute=self.seconds.of("physics")(live(parts.environment, seed)),
+            execute=self.seconds.of_physics(live(parts.environment, seed)),
             record=self.record,
             failures=parts.config.failures or FAILURES,
         )
