@@ -44,8 +44,8 @@ class Benchmark:
         found = type(environment).__name__
         if found != self.environment or environment.outcomes.dim != self.goals.shape[1]:
             raise ValueError(
-                f"the benchmark was made for {self.environment} with {self.goals.shape[1]} outcome dimensions, got "
-                f"{found} with {environment.outcomes.dim}; make one with sgimd benchmark"
+                f"the benchmark was made for the class {self.environment} ({self.goals.shape[1]} outcome dimensions), "
+                f"got {found} ({environment.outcomes.dim}); make one with sgimd benchmark"
             )
         space = environment.outcomes
         if not space.contains(self.goals).all():

@@ -42,7 +42,7 @@ class Config:
     """One run.
 
     Args:
-        algorithm: which learner, see below.
+        algorithm: which learner, see below; practice for a robot without demonstrations.
         seed: of all random streams; the same seed gives the same run.
         movements: number of movements, those at rest included.
         out: folder for runs; this one goes to OUT/NAME/seed-003.

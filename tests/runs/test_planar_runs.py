@@ -137,7 +137,7 @@ def test_own_demonstrations_and_goals_replace_those_of_the_arm(tmp_path, capsys)
 @pytest.mark.parametrize(
     ("environment", "options", "message"),
     [
-        ("planar-arm-7", ["--benchmark", "{rod}"], "the benchmark was made for FishingRod .* got PlanarArm"),
+        ("planar-arm-7", ["--benchmark", "{rod}"], "the benchmark was made for the class FishingRod .* got PlanarArm"),
         ("planar-arm-50", ["--demonstrations", "{seven}"], r"seven.npz: recording 0 .*shape \(..., 50\), got \(5, 7\)"),
         ("planar-arm-7", ["--demonstrations", "{degrees}"], "recording 0 cannot be translated: .* is it in deg"),
         ("fishing-rod", ["--demonstrations", "{seven}"], r"seven.npz: recording 0 .*shape \(..., 6\), got \(5, 7\)"),
