@@ -100,7 +100,7 @@ class ProvedModel:
         self._proved = self._is_nearly_as_good(len(memory))
 
     def _is_nearly_as_good(self, n: int) -> bool:
-        """Whether the model missed the newer half of ``n`` movements by about as little as the process."""
+        """Whether it missed those of the newer half of ``n`` movements that the process was surest of by as little."""
         recent = np.array([test for row, *test in self._tests if row >= n / 2])
         if len(recent) < _FEWEST:
             return False
