@@ -164,7 +164,7 @@ def test_a_benchmark_is_loaded_as_it_was_saved(tmp_path: Path) -> None:
 
 def test_a_benchmark_of_another_environment_is_refused() -> None:
     BENCHMARK.check(PlanarArm(5))
-    with pytest.raises(ValueError, match=r"made for FishingRod .* got PlanarArm"):
+    with pytest.raises(ValueError, match=r"made for the class FishingRod .* got PlanarArm"):
         Benchmark("FishingRod", BENCHMARK.goals, 0.1).check(PlanarArm(5))
     with pytest.raises(ValueError, match="3 outcome dimensions"):
         Benchmark("PlanarArm", np.zeros((4, 3)), 0.1).check(PlanarArm(5))
