@@ -2,8 +2,8 @@
 
 Our addition. Where T is far wider than what can be reached, nearly all of its points are hopeless, and a learner that
 aims at them learns its most extreme movements. The box holds what can be reached again: for each movement, the mean
-outcome of those most like it counts, unless these scatter most; so a lucky landing hardly does. Goals lie a step beyond
-it, too, so the box grows. The step is wide at first, and narrow later, when only noisy movements get any farther.
+outcome of those most like it counts, so a lucky landing hardly does. Goals lie a step beyond it, too, at first a wide
+one: so the box grows.
     goals = WithinReach(contexts, outcomes, rng, reached=memory)
 """
 
@@ -21,10 +21,8 @@ from sgimd_torch.spaces import Array, Box
 _FIRST: Final = 21  # exemplars; before, goals are uniform in T
 _LOOKED_AT, _GROWTH = 1000, 1.05  # exemplars at about equal distances in time, whenever there are so many times more
 _ALIKE: Final = 5  # movements whose mean outcome counts, fewer while a memory is small
-_SURE: Final = 0.85  # of the movements count, those whose likes scatter least
 _TAIL: Final = 0.02  # of these means on each side of a dimension: rare ones do not make the box larger
-_NARROW, _WIDE = 0.1, 0.2  # of the box's longest side, the step beyond it on all sides; at first the whole side
-_WIDE_FOR: Final = 250  # exemplars; from there on the step is narrower in proportion
+_BEYOND: Final = 0.2  # of the box's longest side, the step beyond it on all sides; at first the whole side
 _ROUNDING: Final = 1e-9  # of a side of T: outcomes so near each other are all alike
 _MOST: Final = 0.7  # of a side of T, in the geometric mean: the box is then as good as T
 
@@ -93,12 +91,8 @@ class WithinReach(UniformGoals):
         n = self._looked = len(self.reached)
         rows = np.arange(0, n, 1 + n // _LOOKED_AT)
         alike = self.reached.neighbourhoods(rows, min(_ALIKE, n // _FIRST))
-        outcomes = [self.reached.outcomes[each] for each in alike]
-        scatter = np.array([each.var(axis=0).sum() for each in outcomes])
-        sure = scatter <= np.quantile(scatter, _SURE)
-        means = np.array([each.mean(axis=0) for each in outcomes])[sure]
+        means = [self.reached.outcomes[each].mean(axis=0) for each in alike]
         low, high = np.quantile(means, (_TAIL, 1 - _TAIL), axis=0)
-        step = max(_FIRST / n, np.clip(_WIDE * _WIDE_FOR / n, _NARROW, _WIDE))
-        beyond = step * float((high - low).max())
+        beyond = max(_BEYOND, _FIRST / n) * float((high - low).max())
         if beyond > _ROUNDING * self.outcomes.sides.max():
             self._low, self._high = self.outcomes.clip(low - beyond), self.outcomes.clip(high + beyond)
