@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from itertools import chain
 from pathlib import Path
 from typing import Final
 
@@ -187,12 +186,22 @@ class Tables:
 
     def models(self) -> str:
         """Learners with and without a forward model: errors (m) by their own answer, at the end by `process`, too."""
-        ends = {"": (1000, LAST), **{f"-{arm.removeprefix('planar-')}": (2000,) for arm in ARMS}}
         rows = []
         for name, line in REFINING.items():
             by = " by model-alone" if line.get("inverse") == "model-alone" else ""
-            found = [self.errors(f"{name}{ending}{by}", times, ".4f") for ending, times in ends.items()]
-            rows.append([f"`{name}`", *chain(*found), *self.errors(name, (LAST,), ".4f")])
+            on_arms = [
+                self.errors(f"{each}{by}", (2000,), ".4f")[0] if each in EXPERIMENTS[arm] else "–"
+                for arm in ARMS
+                for each in (f"{name}-{arm.removeprefix('planar-')}",)
+            ]
+            rows.append(
+                [
+                    f"`{name}`",
+                    *self.errors(f"{name}{by}", (1000, LAST), ".4f"),
+                    *on_arms,
+                    *self.errors(name, (LAST,), ".4f"),
+                ]
+            )
         head = ("learner", "rod, 1000", "rod, 5000", "arm of 7, 2000", "arm of 50, 2000", "rod, 5000, by `process`")
         return markdown(head, _run(rows))
 
@@ -233,12 +242,12 @@ class Tables:
         return markdown(("idea", *SETTINGS), _run(rows))
 
     def swimmer(self) -> str:
-        """Each learner on the swimmer, by `process`, and by its forward model at the end."""
-        rows = []
-        for name in EXPERIMENTS["swimmer"]:
-            model = self.cell(self.found.error, f"{name} by model-alone", 2000) if "practice" not in name else "–"
-            rows.append([f"`{name.removesuffix('-swimmer')}`", *self.errors(name, TIMES, between=True), model])
-        return markdown(("explored by", *map(str, TIMES), "2000, by `model`"), _run(rows))
+        """Each learner on the swimmer."""
+        rows = [
+            [f"`{name.removesuffix('-swimmer')}`", *self.errors(name, TIMES, between=True)]
+            for name in EXPERIMENTS["swimmer"]
+        ]
+        return markdown(("explored by", *map(str, TIMES)), _run(rows))
 
     def by_hand(self) -> str:
         """Each learner alone, with lessons by hand and with shipped demonstrations."""

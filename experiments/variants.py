@@ -55,7 +55,7 @@ ANSWERS: Final[dict[str, tuple[str, ...]]] = {
     **dict.fromkeys(("letter", "large-space"), (*ALIKE, "paper")),
     "letter-teachers": ("paper",),
     "ladder": (*ALIKE, "linear"),
-    **dict.fromkeys(("forward-model", "planar-arm-7", "planar-arm-50", "swimmer"), (*ALIKE, "model-alone")),
+    **dict.fromkeys(("forward-model", "planar-arm-7", "planar-arm-50"), (*ALIKE, "model-alone")),
     **dict.fromkeys(("settings", "proved-model"), (*ALIKE, "model")),
     "learning": (*ALIKE, "linear", "nearest", "model"),
     "suite": (*ALIKE, "linear", "nearest"),
@@ -67,28 +67,16 @@ SCHOOL: Final = ("map-elites", "isoline", "cma-me", "cma-mae")  # quality divers
 FEW, MANY, HALF, CORNER, SHUFFLED, TEN, HAND = MADE = tuple(
     Path(f"{name}.npz") for name in ("few", "many", "half", "corner", "shuffled", "ten", "hand")
 )
-# Ways to refine a movement for a goal, and to answer in evaluations. Each line is a variant on the rod and, with a
-# longer name, on every arm.
+# Ways to refine a movement for a goal, and to answer in evaluations. Each line of SGIM-D is a variant on the rod and,
+# with a longer name, on every arm.
 MODEL: Final[Variant] = {**SGIM_D, "inverse": "model-alone"}
-GRADIENT: Final[Variant] = {**MODEL, "search": "gradient"}
-ALONE: Final[Variant] = {**SAGG_RIAC, "inverse": "model-alone"}
 REFINING: Final[dict[str, Variant]] = {
     "sgim-d": SGIM_D,
     "sagg-riac": SAGG_RIAC,
     "model": MODEL,
-    "gradient": GRADIENT,
-    "gauss-newton": {**MODEL, "search": "gauss-newton"},
-    "sagg-riac-model": ALONE,
-    "sagg-riac-gradient": {**ALONE, "search": "gradient"},
-    "imitation": {"algorithm": "imitation"},
-    "imitation-model": {"algorithm": "imitation", "inverse": "model-alone"},
-    "model-unanchored": {**MODEL, "trust.anchors": False},
-    "gradient-no-residual": {**GRADIENT, "search.residual": False},
-    "model-one-noise": {**MODEL, "model.noise_heads": False},
-    "model-1": {**MODEL, "model.members": 1},
-    "model-5": {**MODEL, "model.members": 5},
+    "gradient": {**MODEL, "search": "gradient"},
 }
-# A robot that nobody here wrote. Evaluated by every answer, so that one run serves learners with and without a model.
+# A robot that nobody here wrote.
 SWIMMER: Final[Variant] = {
     "environment": "swimmer",
     "movements": 2000,
@@ -150,10 +138,6 @@ SHOWN: Final[dict[str, Variant]] = {"goals": {**SGIM_D, "teacher": "initial"}, "
 # Movements of an arm take no time, so training may take more.
 ON_ARMS: Final[Variant] = {"movements": 2000, "evaluate_at": (250, 500, 1000)}  # and at the end
 LONGER: Final[Variant] = {"model.rate": 2.0}
-BY_MODEL: Final = frozenset(
-    {"model", "model-alone", "gradient", "gauss-newton"}
-)  # words of what learns a forward model
-
 
 # Learners that ask. All are answered by ``process``, too, the answer of those that practise.
 IM: Final[Variant] = {"algorithm": "sgim-im"}
@@ -237,12 +221,13 @@ def _on_arm(arm: str) -> dict[str, Variant]:
     short = arm.removeprefix("planar-")
     return {
         f"{name}-{short}": {
-            **(LONGER if BY_MODEL.intersection(line.values()) else {}),
+            **(LONGER if "inverse" in line else {}),
             **line,
             "environment": arm,
             **ON_ARMS,
         }
         for name, line in REFINING.items()
+        if line["algorithm"] == "sgim-d"
     }
 
 
@@ -360,7 +345,7 @@ SEEDS: Final[dict[str, range]] = {
     "asking": range(140, 160),
     "by-hand": range(150, 160),
 }
-MAIN: Final = ("sgim-d", "sagg-riac", "model", "gradient")  # of the forward model, with as many seeds as learners
+MAIN: Final = ("sgim-d", "sagg-riac")  # of the forward model, with as many seeds as learners
 
 
 def seeds_of(experiment: str, variant: str) -> range:

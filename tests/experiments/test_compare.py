@@ -191,7 +191,7 @@ def test_without_seeds_each_experiment_has_those_that_its_shipped_rows_are_of(tm
     for name, config in runs_of(list(EXPERIMENTS), [], None, tmp_path):
         wanted.setdefault((name, config.variant), []).append(config.seed)
     assert wanted["learners", "sgim-d"] == wanted["forward-model", "sgim-d"] == [*range(100, 120)]
-    assert wanted["forward-model", "model-5"] == [*range(100, 110)]
+    assert wanted["forward-model", "gradient"] == [*range(100, 110)]
     table = read_table(ROOT / "results")
     assert {*table.experiment} <= {*EXPERIMENTS}
     runs = {*table[["experiment", "variant", "seed"]].itertuples(index=False, name=None)}
