@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
 from typing import Final
 
@@ -186,22 +187,12 @@ class Tables:
 
     def models(self) -> str:
         """Learners with and without a forward model: errors (m) by their own answer, at the end by `process`, too."""
+        ends = {"": (1000, LAST), **{f"-{arm.removeprefix('planar-')}": (2000,) for arm in ARMS}}
         rows = []
         for name, line in REFINING.items():
             by = " by model-alone" if line.get("inverse") == "model-alone" else ""
-            on_arms = [
-                self.errors(f"{each}{by}", (2000,), ".4f")[0] if each in EXPERIMENTS[arm] else "–"
-                for arm in ARMS
-                for each in (f"{name}-{arm.removeprefix('planar-')}",)
-            ]
-            rows.append(
-                [
-                    f"`{name}`",
-                    *self.errors(f"{name}{by}", (1000, LAST), ".4f"),
-                    *on_arms,
-                    *self.errors(name, (LAST,), ".4f"),
-                ]
-            )
+            found = [self.errors(f"{name}{ending}{by}", times, ".4f") for ending, times in ends.items()]
+            rows.append([f"`{name}`", *chain(*found), *self.errors(name, (LAST,), ".4f")])
         head = ("learner", "rod, 1000", "rod, 5000", "arm of 7, 2000", "arm of 50, 2000", "rod, 5000, by `process`")
         return markdown(head, _run(rows))
 

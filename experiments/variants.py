@@ -67,12 +67,11 @@ SCHOOL: Final = ("map-elites", "isoline", "cma-me", "cma-mae")  # quality divers
 FEW, MANY, HALF, CORNER, SHUFFLED, TEN, HAND = MADE = tuple(
     Path(f"{name}.npz") for name in ("few", "many", "half", "corner", "shuffled", "ten", "hand")
 )
-# Ways to refine a movement for a goal, and to answer in evaluations. Each line of SGIM-D is a variant on the rod and,
-# with a longer name, on every arm.
+# Ways to refine a movement for a goal, and to answer in evaluations. Each line is a variant on the rod and, with a
+# longer name, on every arm.
 MODEL: Final[Variant] = {**SGIM_D, "inverse": "model-alone"}
 REFINING: Final[dict[str, Variant]] = {
     "sgim-d": SGIM_D,
-    "sagg-riac": SAGG_RIAC,
     "model": MODEL,
     "gradient": {**MODEL, "search": "gradient"},
 }
@@ -227,7 +226,6 @@ def _on_arm(arm: str) -> dict[str, Variant]:
             **ON_ARMS,
         }
         for name, line in REFINING.items()
-        if line["algorithm"] == "sgim-d"
     }
 
 
@@ -304,7 +302,7 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
     "forward-model": REFINING,
     **{arm: _on_arm(arm) for arm in ARMS},
     "swimmer": {
-        **{f"{name}-swimmer": {"algorithm": name, "inverse": "model-alone", **SWIMMER} for name in SWIMMERS},
+        **{f"{name}-swimmer": {"algorithm": name, "inverse": "linear", **SWIMMER} for name in SWIMMERS},
         "practice-swimmer": {**UNIFORM_PRACTICE, **SWIMMER},
     },
     "by-hand": {
@@ -345,12 +343,11 @@ SEEDS: Final[dict[str, range]] = {
     "asking": range(140, 160),
     "by-hand": range(150, 160),
 }
-MAIN: Final = ("sgim-d", "sagg-riac")  # of the forward model, with as many seeds as learners
 
 
 def seeds_of(experiment: str, variant: str) -> range:
     """The seeds that the page of a variant stands on."""
-    return SEEDS["learners" if experiment == "forward-model" and variant in MAIN else experiment]
+    return SEEDS["learners" if (experiment, variant) == ("forward-model", "sgim-d") else experiment]
 
 
 def small_tables(experiment: str) -> list[str]:
