@@ -338,7 +338,7 @@ SEEDS: Final[dict[str, range]] = {
     **dict.fromkeys(("forward-model", *ARMS, "swimmer"), range(100, 110)),
     "settings": range(100, 105),
     **dict.fromkeys(("learning", "suite", "gain"), range(120, 140)),
-    "practice": range(160, 180),
+    "practice": range(220, 240),
     "proved-model": range(180, 200),
     "asking": range(140, 160),
     "by-hand": range(150, 160),

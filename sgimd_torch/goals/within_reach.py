@@ -3,7 +3,7 @@
 Our addition. Where T is far wider than what can be reached, nearly all of its points are hopeless, and a learner that
 aims at them learns its most extreme movements. The box holds what can be reached again: for each movement, the mean
 outcome of those most like it counts, so a lucky landing hardly does. Goals lie a step beyond it, too, at first a wide
-one: so the box grows.
+one: so the box grows. The step narrows where such goals are missed: what lies there was reached by noise alone.
     goals = WithinReach(contexts, outcomes, rng, reached=memory)
 """
 
@@ -22,7 +22,10 @@ _FIRST: Final = 21  # exemplars; before, goals are uniform in T
 _LOOKED_AT, _GROWTH = 1000, 1.05  # exemplars at about equal distances in time, whenever there are so many times more
 _ALIKE: Final = 5  # movements whose mean outcome counts, fewer while a memory is small
 _TAIL: Final = 0.02  # of these means on each side of a dimension: rare ones do not make the box larger
-_BEYOND: Final = 0.2  # of the box's longest side, the step beyond it on all sides; at first the whole side
+_NARROWEST, _WIDEST = 0.02, 0.2  # of the box's longest side, the step beyond it on all sides; at first the whole side
+_WIDE_FOR: Final = 250  # exemplars; before, the step is not narrowed
+_FACTOR: Final = 1.4  # from one step to the next after a goal beyond that was met; its cube root after one missed
+_MEDIAN: Final = 1.1  # the same of the median by which goals within the box are missed
 _ROUNDING: Final = 1e-9  # of a side of T: outcomes so near each other are all alike
 _MOST: Final = 0.7  # of a side of T, in the geometric mean: the box is then as good as T
 
@@ -46,7 +49,9 @@ class WithinReach(UniformGoals):
     """Uniform goals in a box around what was reached, which is T where that is nearly as large; see `Goals`.
 
     Each draw is one of `UniformGoals`, moved from T to the box. The step beyond is the same on all sides, in the unit
-    of T, so a dimension that nothing has moved yet is aimed at, too.
+    of T, so a dimension that nothing has moved yet is aimed at, too. It follows a success rule (Rechenberg 1973): of four
+    goals beyond the box one should be met, that is, missed by less than it lies beyond, or than half of the goals within
+    the box are.
 
     Args:
         contexts: C; the box is the same in all of them.
@@ -68,7 +73,9 @@ class WithinReach(UniformGoals):
     ) -> None:
         super().__init__(contexts, outcomes, rng)
         self.reached, self._effects = reached, effects
-        self._low, self._high, self._looked = outcomes.low, outcomes.high, 0  # the box; exemplars at the last look
+        self._reach: Array | None = None  # (2, outcome_dim), the box; None until anything had an effect
+        self._step, self._looked = _WIDEST, 0  # how far beyond; exemplars at the last look
+        self._missed = 0.0  # by how much half of the goals within the box are, about
 
     def sample(self, context: ArrayLike) -> Array:
         """``(outcome_dim,)`` uniform in the box, or in T.
@@ -80,19 +87,51 @@ class WithinReach(UniformGoals):
         n = len(self.reached)
         if n >= max(_FIRST, _GROWTH * self._looked):
             self._look()
-        sides = self._high - self._low
-        if np.prod(sides / space.sides) ** (1 / space.dim) >= _MOST or self._effects() is not None:
+        if self._reach is None or self._effects() is not None or self._fits(self._around(_WIDEST)):
             return goal
-        moved: Array = self._low + (goal - space.low) / space.sides * sides
+        low, high = self._around(self._step)
+        moved: Array = low + (goal - space.low) / space.sides * (high - low)
         return moved
 
+    def add(
+        self, context: ArrayLike, goal: ArrayLike, competence: float, strategy: str = "autonomous", gain: float = 0.0
+    ) -> None:
+        """After an attempt at a goal beyond the box the step is wider or narrower.
+
+        Raises:
+            ValueError: see `Goals.add`.
+        """
+        super().add(context, goal, competence, strategy, gain)
+        if self._reach is None:
+            return
+        beyond = np.linalg.norm(goal - np.clip(goal, *self._reach))
+        missed = float(np.linalg.norm(goal - self.reached.outcomes[-1]))
+        if beyond == 0:
+            median = self._missed or missed
+            self._missed = median * _MEDIAN if missed > median else median / _MEDIAN
+        elif len(self.reached) >= _WIDE_FOR:
+            met = missed < max(beyond, self._missed)
+            step = self._step * _FACTOR if met else self._step / _FACTOR ** (1 / 3)
+            self._step = float(np.clip(step, _NARROWEST, _WIDEST))
+
     def _look(self) -> None:
-        """Where the box is now; T until anything had an effect."""
+        """Where the box is now."""
         n = self._looked = len(self.reached)
         rows = np.arange(0, n, 1 + n // _LOOKED_AT)
         alike = self.reached.neighbourhoods(rows, min(_ALIKE, n // _FIRST))
         means = [self.reached.outcomes[each].mean(axis=0) for each in alike]
-        low, high = np.quantile(means, (_TAIL, 1 - _TAIL), axis=0)
-        beyond = max(_BEYOND, _FIRST / n) * float((high - low).max())
-        if beyond > _ROUNDING * self.outcomes.sides.max():
-            self._low, self._high = self.outcomes.clip(low - beyond), self.outcomes.clip(high + beyond)
+        reach = np.quantile(means, (_TAIL, 1 - _TAIL), axis=0)
+        if np.ptp(reach, axis=0).max() > _ROUNDING * self.outcomes.sides.max():
+            self._reach = reach
+
+    def _around(self, step: float) -> tuple[Array, Array]:
+        """Low and high ends of the box and a step beyond, within T."""
+        assert self._reach is not None
+        low, high = self._reach
+        beyond = max(step, _FIRST / self._looked) * float((high - low).max())
+        return self.outcomes.clip(low - beyond), self.outcomes.clip(high + beyond)
+
+    def _fits(self, ends: tuple[Array, Array]) -> bool:
+        """Whether T is hardly larger."""
+        low, high = ends
+        return bool(np.prod((high - low) / self.outcomes.sides) ** (1 / self.outcomes.dim) >= _MOST)
