@@ -49,9 +49,9 @@ class WithinReach(UniformGoals):
     """Uniform goals in a box around what was reached, which is T where that is nearly as large; see `Goals`.
 
     Each draw is one of `UniformGoals`, moved from T to the box. The step beyond is the same on all sides, in the unit
-    of T, so a dimension that nothing has moved yet is aimed at, too. It follows a success rule (Rechenberg 1973): of four
-    goals beyond the box one should be met, that is, missed by less than it lies beyond, or than half of the goals within
-    the box are.
+    of T, so a dimension that nothing has moved yet is aimed at, too. It follows a success rule (Rechenberg 1973): of
+    four goals beyond the box one should be met, that is, missed by less than it lies beyond, or by less than half of
+    the goals within the box are.
 
     Args:
         contexts: C; the box is the same in all of them.

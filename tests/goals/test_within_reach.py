@@ -57,6 +57,24 @@ def test_the_box_grows_as_long_as_goals_beyond_are_reached():
     assert np.abs(found[300:]).max() > 3 * np.abs(found[:10]).max()
 
 
+@pytest.mark.parametrize(
+    ("noise_within", "least", "most"), [(0.0, 0.0, 0.1), (0.5, 0.2, 0.5)], ids=["met", "missed by as much"]
+)
+def test_the_step_beyond_narrows_where_only_noise_leads_unless_goals_within_are_missed_as_much(
+    noise_within, least, most
+):
+    rng, memory = np.random.default_rng(1), remembering(scattered(2))
+    goals = WithinReach(NO_CONTEXTS, Box.cube(-100, 100, 2), stream(0, "goals"), reached=memory)
+    farthest = []
+    for _ in range(1000):
+        goal = goals.sample(NO_CONTEXT)
+        noise = noise_within if np.abs(goal).max() <= 1 else max(0.3, noise_within)
+        memory.add(NO_CONTEXT, goal, goal.clip(-1, 1) + noise * rng.normal(size=2))  # the goal itself as the movement
+        goals.add(NO_CONTEXT, goal, -0.5)
+        farthest.append(np.abs(goal).max())
+    assert least < (max(farthest[-200:]) - 1) / 2 < most  # in sides of what was reached
+
+
 def test_goals_are_uniform_until_anything_has_had_an_effect():
     space = Box.cube(-100, 100, 2)
     uniform = UniformGoals(NO_CONTEXTS, space, stream(0, "goals"))
