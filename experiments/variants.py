@@ -320,9 +320,9 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
     "suite": _on_suite(SUITED),
     "practice": {
         "practice.rod": {**PRACTICE, **ON_ROD},
-        **_on_suite({"practice": PRACTICE}, TASKS),
-        **_on_suite({**REFERENCES, "sagg-riac": SAGG_RIAC}, SPARSE),
+        **_on_suite({"practice": PRACTICE}),
     },
+    "sparse": _on_suite({"practice": PRACTICE, **REFERENCES, "sagg-riac": SAGG_RIAC}, SPARSE),
     "proved-model": {"sgim-d-model.rod": {**BY_PROOF, **ON_ROD}, **_on_suite({"sgim-d-model": BY_PROOF}, ARMS)},
     "gain": {
         **{f"{name}.rod": {**line, **ON_ROD} for name, line in {**STEPS_OF_GAIN, **SCHEDULES}.items()},
@@ -338,6 +338,7 @@ SEEDS: Final[dict[str, range]] = {
     **dict.fromkeys(("forward-model", *ARMS, "swimmer"), range(100, 110)),
     "settings": range(100, 105),
     **dict.fromkeys(("learning", "suite", "gain"), range(120, 140)),
+    "sparse": range(160, 180),
     "practice": range(220, 240),
     "proved-model": range(180, 200),
     "asking": range(140, 160),
