@@ -41,6 +41,7 @@ RIVALS: Final[Mapping[str, tuple[str, str, str]]] = {
     "MAP-Elites, tuned*": ("map-elites-tuned", "", ""),
     "Random, from the middle": ("middle-random.rod", "", ""),
     "MAP-Elites, from the middle": ("middle-map-elites.rod", "", ""),
+    "Goal babbling from home": ("home-babbling.rod", "", ""),
 }
 # From random movements to practice, each step added to the one before; then the same teacher for all.
 GAIN: Final[Mapping[str, str]] = {

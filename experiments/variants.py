@@ -118,6 +118,7 @@ STEPS_OF_GAIN: Final[dict[str, Variant]] = {
     **BEGUN,
     "middle-random": {**MIDDLE, "inverse": "process", "global_range": (1.0, 1.0)},
     "middle-map-elites": {"algorithm": "experiments.parts:map_elites_middle"},
+    "home-babbling": {"algorithm": "experiments.home_babbling:home_babbling"},
     "practice-interest": {**UNIFORM_PRACTICE, "goals": "interest-map"},
 }
 SCHEDULES: Final[dict[str, Variant]] = {

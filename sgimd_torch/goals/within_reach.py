@@ -104,7 +104,7 @@ class WithinReach(UniformGoals):
         super().add(context, goal, competence, strategy, gain)
         if self._reach is None:
             return
-        beyond = np.linalg.norm(goal - np.clip(goal, *self._reach))
+        beyond = float(np.linalg.norm(goal - np.clip(goal, *self._reach)))
         missed = float(np.linalg.norm(goal - self.reached.outcomes[-1]))
         if beyond == 0:
             median = self._missed or missed
