@@ -52,7 +52,7 @@ class HomeBabbling:
     def attempt(self, context: Array) -> Attempt:
         """Home, now and then, and a way from there or from the last goal to a new one."""
         if self._from is None or self.rng.random() < HOMEWARD:
-            self._from = yield Move(self.home, None, ORIGIN)
+            self._from = self.outcomes.clip((yield Move(self.home, None, ORIGIN)))
             self._weights.append(1.0)
         end = self.outcomes.sample(self.rng)
         goals = np.linspace(self._from, end, self.steps + 1)[1:]
