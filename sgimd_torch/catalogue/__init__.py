@@ -328,7 +328,8 @@ def load(place: str, what: str = "") -> Any:
         found: Any = importlib.import_module(module)
     except (Exception, SystemExit) as error:  # whatever that module does when it is imported
         if isinstance(error, ImportError) and module.startswith(_IN_THE_PACKAGE):
-            raise ValueError(str(error)) from error  # it names the extra that is missing
+            brings_torch = "; pip install 'sgimd-torch[forward]' brings it" if error.name == "torch" else ""
+            raise ValueError(f"{error}{brings_torch}") from error  # what needs another extra names it itself
         where = f"; is it installed, or in {here}?" if isinstance(error, ImportError) else ""
         raise ValueError(
             f"{what}: the module {module} cannot be imported: {type(error).__name__}: {error}{where}"
