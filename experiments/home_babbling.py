@@ -15,7 +15,7 @@ from typing import Final
 
 import numpy as np
 
-from sgimd_torch.algorithms import MakeInverse, answering, start_memory
+from sgimd_torch.algorithms import answering, start_memory
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Learner
@@ -71,7 +71,7 @@ class HomeBabbling:
     def _estimate(self, context: Array, goal: Array) -> Array:
         """``(theta_dim,)`` for a goal: an affine regression of theta on the outcomes nearest to it, drawn home."""
         rows = self.memory.near_outcomes(context, goal, NEAREST)
-        weights = np.array(self._weights)[rows]
+        weights = np.array([self._weights[row] for row in rows])
         off = (self.memory.outcomes[rows] - goal) / self.outcomes.sides
         inputs = np.concatenate((np.ones((len(rows), 1)), off), axis=1)
         weighted = weights[:, None] * inputs
@@ -88,20 +88,12 @@ def _weight(goal: Array, outcome: Array, theta: Array) -> float:
     return float((1 + straight) / 2 * length / max(size, TINY))
 
 
-def home_babbling(
-    environment: Environment,
-    seed: int,
-    *,
-    steps: int = 10,
-    sd: float = 0.1,
-    inverse: MakeInverse = LocalProcess,
-) -> Learner:
-    """Goal babbling from home; the learner answers by ``inverse``, as others do.
+def home_babbling(environment: Environment, seed: int, *, steps: int = 10, sd: float = 0.1) -> Learner:
+    """Goal babbling from home; the learner answers by `LocalProcess`, as others do.
 
     Args:
         environment, steps, sd: as in `HomeBabbling`.
         seed: of this learner's stream.
-        inverse: (memory) -> the inverse model by which it answers.
 
     Raises:
         ValueError: an environment with contexts, between which a way cannot go.
@@ -110,4 +102,4 @@ def home_babbling(
         raise ValueError(f"home babbling knows one context only, got contexts of dim {environment.contexts.dim}")
     memory = start_memory(environment, None)
     babbling = HomeBabbling(environment, memory, stream(seed, ORIGIN), steps=steps, sd=sd)
-    return Learner(memory, babbling, inverse=answering(environment, memory, inverse))
+    return Learner(memory, babbling, inverse=answering(environment, memory, LocalProcess))

@@ -76,6 +76,7 @@ class WithinReach(UniformGoals):
         self._reach: Array | None = None  # (2, outcome_dim), the box; None until anything had an effect
         self._step, self._looked = _WIDEST, 0  # how far beyond; exemplars at the last look
         self._missed = 0.0  # by how much half of the goals within the box are, about
+        self._all_of_t = False  # T is hardly larger than the box at its widest
 
     def sample(self, context: ArrayLike) -> Array:
         """``(outcome_dim,)`` uniform in the box, or in T.
@@ -87,9 +88,9 @@ class WithinReach(UniformGoals):
         n = len(self.reached)
         if n >= max(_FIRST, _GROWTH * self._looked):
             self._look()
-        if self._reach is None or self._effects() is not None or self._fits(self._around(_WIDEST)):
+        if self._reach is None or self._all_of_t or self._effects() is not None:
             return goal
-        low, high = self._around(self._step)
+        low, high = self._around(self._reach, self._step)
         moved: Array = low + (goal - space.low) / space.sides * (high - low)
         return moved
 
@@ -123,15 +124,13 @@ class WithinReach(UniformGoals):
         reach = np.quantile(means, (_TAIL, 1 - _TAIL), axis=0)
         if np.ptp(reach, axis=0).max() > _ROUNDING * self.outcomes.sides.max():
             self._reach = reach
+        if self._reach is not None:
+            low, high = self._around(self._reach, _WIDEST)
+            share = np.prod((high - low) / self.outcomes.sides) ** (1 / self.outcomes.dim)
+            self._all_of_t = bool(share >= _MOST)
 
-    def _around(self, step: float) -> tuple[Array, Array]:
+    def _around(self, reach: Array, step: float) -> tuple[Array, Array]:
         """Low and high ends of the box and a step beyond, within T."""
-        assert self._reach is not None
-        low, high = self._reach
+        low, high = reach
         beyond = max(step, _FIRST / self._looked) * float((high - low).max())
         return self.outcomes.clip(low - beyond), self.outcomes.clip(high + beyond)
-
-    def _fits(self, ends: tuple[Array, Array]) -> bool:
-        """Whether T is hardly larger."""
-        low, high = ends
-        return bool(np.prod((high - low) / self.outcomes.sides) ** (1 / self.outcomes.dim) >= _MOST)

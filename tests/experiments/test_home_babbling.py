@@ -13,13 +13,13 @@ from sgimd_torch.spaces import stream
 ARM = PlanarArm(7)
 
 
-def lived(make, movements=400, seed=0):
+def lived(make, movements, seed=0):
     learner = make(ARM, seed)
     return list(run(learner, ARM, seed, movements=movements)), learner
 
 
 def test_its_first_movement_is_home_and_ways_lead_from_what_came_of_it():
-    (first, second, *_), _ = lived(home_babbling, movements=3)
+    (first, second, *_), _ = lived(home_babbling, 3)
     assert np.array_equal(first.move.theta, np.full(7, 0.5))
     assert np.linalg.norm(second.move.goal - first.outcome) < 0.1 * np.linalg.norm(ARM.outcomes.sides)
 
