@@ -8,22 +8,16 @@ movements, demonstrates something from a tile chosen at random among those the l
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Final, Protocol
+from functools import partial
+from typing import Final
 
 import numpy as np
 
 from sgimd_torch.memory import Memory
+from sgimd_torch.parts import Teacher
 from sgimd_torch.spaces import Array, Demonstration, check_count, check_rng, check_vector
 
 _STALLED: Final = 0.01  # share by which distances fall at least while a learner progresses
-
-
-class Teacher(Protocol):
-    """Offers demonstrations to a learner, whose memory it can see: the paper's What, How and When in one call."""
-
-    def offer(self, index: int, memory: Memory) -> Demonstration | None:
-        """A demonstration before movement ``index`` (0, 1, ...), or None."""
-        ...
 
 
 Choose = Callable[[Sequence[Demonstration], Memory, np.random.Generator], Demonstration]
@@ -41,7 +35,10 @@ def least_explored(
     """A demonstration from a tile chosen at random among the tiles that have any and that the learner reached least.
 
     Args:
-        tiles: in each dimension of the box around the demonstrated outcomes.
+        demonstrations: demonstrations to choose from.
+        memory: exemplars of the learner.
+        rng: random stream of the choice.
+        tiles: number of tiles in each dimension of the box around the demonstrated outcomes.
 
     Raises:
         ValueError: outcomes of another dimension than those of the memory.
@@ -62,14 +59,14 @@ def least_explored(
     return demonstrations[int(rng.choice(np.flatnonzero(tile_of.ravel() == chosen)))]
 
 
-class PeriodicTeacher:
+class PeriodicTeacher(Teacher):
     """Demonstrates regularly, as in the paper: before the movements ``every``, 2 ``every``, ...
 
     Args:
-        demonstrations: that it has.
-        rng: draws what ``choose`` draws.
+        demonstrations: demonstrations to choose from.
+        rng: random stream of ``choose``.
         every: movements from one demonstration to the next.
-        choose: which demonstration comes.
+        choose: choice of the next demonstration.
     """
 
     def __init__(
@@ -87,18 +84,18 @@ class PeriodicTeacher:
         self.choose = choose
 
     def offer(self, index: int, memory: Memory) -> Demonstration | None:
-        """See ``Teacher``."""
+        """A demonstration, if one is due."""
         if index == 0 or index % self.every:
             return None
         return self.choose(self.demonstrations, memory, self.rng)
 
 
-class InitialTeacher:
+class InitialTeacher(Teacher):
     """Gives each demonstration once, at the start, in random order: one before the movements 0, ``every``, ...
 
     Args:
-        demonstrations: that it has.
-        rng: draws their order.
+        demonstrations: demonstrations to give.
+        rng: random stream of their order.
         every: movements from one demonstration to the next.
     """
 
@@ -109,24 +106,28 @@ class InitialTeacher:
         self._order = rng.permutation(len(demonstrations))
 
     def offer(self, index: int, memory: Memory) -> Demonstration | None:
-        """See ``Teacher``."""
+        """A demonstration, if one is due."""
         lesson, rest = divmod(index, self.every)
         if rest or lesson >= len(self._order):
             return None
         return self.demonstrations[self._order[lesson]]
 
 
-class AskedTeacher:
+at_once = partial(InitialTeacher, every=1)
+"""Gives each demonstration once, at the start, one before each movement."""
+
+
+class AskedTeacher(Teacher):
     """Demonstrates when the learner's competence stalls, as if the learner had asked.
 
     Every ``patience`` movements it looks how near the learner has come to each demonstrated outcome. It demonstrates if
     the mean distance fell by less than a hundredth since the last look.
 
     Args:
-        demonstrations: that it has.
-        rng: draws what ``choose`` draws.
+        demonstrations: demonstrations to choose from.
+        rng: random stream of ``choose``.
         patience: movements from one look at the learner to the next.
-        choose: which demonstration comes.
+        choose: choice of the next demonstration.
     """
 
     def __init__(
@@ -145,7 +146,7 @@ class AskedTeacher:
         self._distance = np.inf
 
     def offer(self, index: int, memory: Memory) -> Demonstration | None:
-        """See ``Teacher``."""
+        """A demonstration, if one is due."""
         if index == 0 or index % self.patience:
             return None
         before, self._distance = self._distance, self._distance_left(memory)

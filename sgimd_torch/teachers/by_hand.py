@@ -13,26 +13,33 @@ from typing import Final
 import numpy as np
 
 from sgimd_torch.memory import Memory
+from sgimd_torch.parts import Teacher
 from sgimd_torch.spaces import Demonstration
-from sgimd_torch.teachers import Teacher
 
 BY_HAND: Final = "by-hand"
 """Who has shown a lesson by hand, in the record; also the word of the command line."""
 
 
-class ByHand:
+class ByHand(Teacher):
     """Offers what a person gives; otherwise, what another teacher offers.
 
     That teacher is asked before each movement, also where a person shows something, so that its draws stay the same.
 
     Args:
-        teacher: another one, None if there is none.
-
-    Attributes:
-        who: showed what was offered last, as the record has it.
+        demonstrations: not needed.
+        rng: not needed, as nothing is drawn.
+        teacher: another teacher; None if there is none.
     """
 
-    def __init__(self, teacher: Teacher | None = None) -> None:
+    needs_demonstrations = False
+
+    def __init__(
+        self,
+        demonstrations: Sequence[Demonstration] = (),
+        rng: np.random.Generator | None = None,
+        *,
+        teacher: Teacher | None = None,
+    ) -> None:
         self.teacher, self.who = teacher, "teacher"
         self._given: Demonstration | None = None
 
@@ -46,8 +53,3 @@ class ByHand:
         given, self._given = self._given, None
         self.who = "teacher" if given is None else BY_HAND
         return offered if given is None else given
-
-
-def nobody(demonstrations: Sequence[Demonstration], rng: np.random.Generator) -> ByHand:
-    """A person who has nothing prepared; ``sgimd teach`` brings what they show."""
-    return ByHand()

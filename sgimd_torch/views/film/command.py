@@ -141,9 +141,9 @@ def remember(run: Run, parts: RunParts, start: int, stop: int) -> None:
             memory.add(shown.context, correspondence(shown.times, shown.trajectory), shown.outcome)
         if np.isfinite(run.outcomes[row]).all():
             memory.add(run.contexts[row], run.thetas[row], run.outcomes[row])
-        if parts.model is not None:
+        for model in parts.learner.problem.trained:
             goal = run.goals[row]
-            parts.model.refresh(memory, goal if np.isfinite(goal).all() else None)
+            model.refresh(memory, goal if np.isfinite(goal).all() else None)
 
 
 def _stages(run: Run, options: argparse.Namespace) -> list[int]:
