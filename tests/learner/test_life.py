@@ -145,23 +145,23 @@ def test_a_search_through_a_model_goes_on_when_the_model_is_refreshed_as_the_loo
 
     def build():
         learner = sagg_riac(ARM, 5, search=GradientSearch)
-        (model,) = learner.problem.trained
-        return model, learner
+        (shared,) = learner.problem.trained
+        return shared, learner
 
-    model, whole = build()
+    shared, whole = build()
     lines = []
     for episode in run(whole, ARM, 5, movements=140):
         lines.append(line(episode))
-        model.refresh(whole.memory, episode.move.goal)
+        shared.refresh(whole.memory, episode.move.goal)
         if episode.index == 99:
             save_life(whole, tmp_path / "life.sqlite")
-    assert model.trained
-    model, again = build()
-    load_life(again, tmp_path / "life.sqlite", after=lambda move: model.refresh(again.memory, move.goal))
+    assert shared.model.trained
+    shared, again = build()
+    load_life(again, tmp_path / "life.sqlite", after=lambda move: shared.refresh(again.memory, move.goal))
     rest = []
     for episode in run(again, ARM, 5, movements=140):
         rest.append(line(episode))
-        model.refresh(again.memory, episode.move.goal)
+        shared.refresh(again.memory, episode.move.goal)
     assert rest == lines[100:]
 
 
