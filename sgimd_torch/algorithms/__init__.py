@@ -18,7 +18,7 @@ from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Correspondence, Learner
 from sgimd_torch.memory import Memory
-from sgimd_torch.parts import Inverse, Problem, Social, made
+from sgimd_torch.parts import Inverse, Problem, Social
 from sgimd_torch.strategies import Babble, GoalBabbling, Imitate, Mimic, Remember, Rest
 
 MakeInverse = Callable[[Problem], Inverse]
@@ -116,4 +116,4 @@ def sgim_d(
     """
     problem = Problem(environment, seed, memory, inverse=inverse)
     problem.autonomous = GoalBabbling(problem, **parts)
-    return Learner(problem, problem.autonomous, social=made(Social, social, problem), correspondence=correspondence)
+    return Learner(problem, problem.autonomous, social=Social.of(social, problem), correspondence=correspondence)
