@@ -208,8 +208,10 @@ class Mimic(Social):
 
 
 class Imitate(Mimic):
-    """How SGIM-D answers a demonstration: a short imitation, then emulation of the goal (section 3.2.3): the goal model
-    is told the competence at the demonstrated outcome. An outcome outside T is imitated, but never a goal.
+    """A short imitation, then emulation of the goal, as in SGIM-D.
+
+    Section 3.2.3: afterwards the goal model is told the competence at the demonstrated outcome. An outcome outside T is
+    imitated, but never a goal.
 
     Args:
         problem: what has to be learnt, with its goal babbling.
@@ -236,7 +238,7 @@ class Imitate(Mimic):
 
 
 class Emulate(Social):
-    """Take over the teacher's goal but not the movement: pursue the demonstrated outcome by goal babbling.
+    """Pursues the demonstrated outcome, but not by the demonstrated movement.
 
     Args:
         problem: what has to be learnt.

@@ -55,7 +55,9 @@ def _recorded(number: int, demonstrations: Sequence[Demonstration], rng: np.rand
 
 
 class AnsweringTeacher(Demonstrator):
-    """Shows the demonstration nearest to the goal; of equally near ones the first.
+    """Shows the demonstration nearest to the goal, of all there are.
+
+    Of equally near ones it shows the first.
 
     Args:
         demonstrations: demonstrations to choose from.

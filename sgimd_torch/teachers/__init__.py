@@ -42,14 +42,16 @@ Choose = Callable[[Sequence[Demonstration], Memory, np.random.Generator], Demons
 
 
 def at_random(demonstrations: Sequence[Demonstration], memory: Memory, rng: np.random.Generator) -> Demonstration:
-    """Any of them, all equally likely."""
+    """Any demonstration, all equally likely."""
     return demonstrations[int(rng.integers(len(demonstrations)))]
 
 
 def least_explored(
     demonstrations: Sequence[Demonstration], memory: Memory, rng: np.random.Generator, *, tiles: int = 10
 ) -> Demonstration:
-    """A demonstration from a tile chosen at random among the tiles that have any and that the learner reached least.
+    """Demonstration from a tile that the learner has reached least.
+
+    The tile is chosen at random among those that have any and were reached least.
 
     Args:
         demonstrations: demonstrations to choose from.
@@ -77,7 +79,9 @@ def least_explored(
 
 
 class PeriodicTeacher(Teacher):
-    """Demonstrates regularly, as in the paper: before the movements ``every``, 2 ``every``, ...
+    """Demonstrates regularly, one every so many movements, as in the paper.
+
+    It demonstrates before the movements ``every``, 2 ``every``, ...
 
     Args:
         demonstrations: demonstrations to choose from.
@@ -108,7 +112,9 @@ class PeriodicTeacher(Teacher):
 
 
 class InitialTeacher(Teacher):
-    """Gives each demonstration once, at the start, in random order: one before the movements 0, ``every``, ...
+    """Demonstrates all at the start, one every so many movements, in random order.
+
+    One demonstration comes before the movements 0, ``every``, ...
 
     Args:
         demonstrations: demonstrations to give.
@@ -135,7 +141,9 @@ at_once = partial(InitialTeacher, every=1)
 
 
 class AskedTeacher(Teacher):
-    """Demonstrates when the learner's competence stalls, as if the learner had asked.
+    """Demonstrates when the learner's competence stalls.
+
+    It is as if the learner had asked.
 
     Every ``patience`` movements it looks how near the learner has come to each demonstrated outcome. It demonstrates if
     the mean distance fell by less than a hundredth since the last look.
