@@ -11,7 +11,7 @@ from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.learner import Learner
 from sgimd_torch.memory import Memory
-from sgimd_torch.parts import Inverse, Problem, made
+from sgimd_torch.parts import Inverse, Problem
 from sgimd_torch.spaces import Array, Box, Demonstration, stream
 
 NO_CONTEXT = np.zeros(0)
@@ -60,7 +60,7 @@ def problem(
     if memory is not None:
         found = found.over(memory)
     if inverse is not None:
-        found.inverse = made(Inverse, inverse, found)
+        found.inverse = Inverse.of(inverse, found)
     return found
 
 
