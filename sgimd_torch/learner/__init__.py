@@ -202,7 +202,8 @@ class Learner:
 
         Args:
             demonstration: demonstration that is shown.
-            who: name of the teacher of a `run` who offers it, see ``lesson_waits``; None outside of a run.
+            who: name of the teacher who offers it, if one is asked before each movement, as in a `run`; see
+                ``lesson_waits``. None for a lesson besides.
 
         Raises:
             RuntimeError: this learner has no social strategy, or the last movement's outcome was not told.
