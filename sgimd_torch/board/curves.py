@@ -18,7 +18,7 @@ from sgimd_torch.goals.regions import Region
 from sgimd_torch.spaces import Array, Box, Episode
 
 DEPTH: Final = 3  # levels of the tree of regions, below the root, that have curves: 15 curves at most
-PLACES: Final = 8  # places that have a curve, at most: 2 x 2 in the plane
+PLACES: Final = 4  # places that have a curve, at most: 2 x 2 in the plane
 _RECENT: Final = 50  # goals
 
 
@@ -107,9 +107,9 @@ def places_of(space: Box, goals: Array) -> dict[str, NDArray[np.bool_]]:
 
     Returns:
         ``(n,)`` which goals lie in a cell, by the name of the cell, such as "x -1..0 y 0..1"; cells without goals are
-        left out. A dimension without a name is "t0", "t1" and so on. No cells if T has four dimensions or more.
+        left out. A dimension without a name is "t0", "t1" and so on. No cells if T has three dimensions or more.
     """
-    per_side = int(PLACES ** (1 / space.dim) + 1e-9)
+    per_side = int(PLACES ** (1 / space.dim))
     if per_side == 1:
         return {}
     sides = np.ptp(goals, axis=0)

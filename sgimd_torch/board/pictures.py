@@ -69,7 +69,7 @@ def _competence(ax: Axes, regions: Sequence[Region], section: Section) -> None:
         x, y = (low + high) / 2
         text = ax.text(x, y, path, ha="center", va="center", fontweight="bold")
         text.set_rotation(90 if width < min(NARROW, height) else 0)
-        text.set_bbox({"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 1.2})
+        text.set_bbox({"facecolor": "white", "alpha": 0.9, "edgecolor": "none", "pad": 1.2})
 
 
 def _pixels(picture: Callable[[Axes, Section], object], shown: Sequence[Section]) -> NDArray[np.uint8]:
@@ -80,5 +80,6 @@ def _pixels(picture: Callable[[Axes, Section], object], shown: Sequence[Section]
         for ax, section in zip(figure.subplots(1, len(shown), squeeze=False).flat, shown, strict=True):
             picture(ax, section)
         canvas: Any = FigureCanvasAgg(figure)
+        figure.draw_without_rendering()  # the layout needs two passes, one cuts labels off
         canvas.draw()
         return np.asarray(canvas.buffer_rgba())
