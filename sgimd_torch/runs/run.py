@@ -84,7 +84,7 @@ class Life:
         self.seconds = Seconds(self.record.about.get("seconds", {}))
         judged = parts.config, parts.environment, parts.benchmark, parts.learner, parts.answers
         self.evaluations = Evaluations(*judged, self.record)
-        self.listeners = [each.listener(self) for each in parts.learner.problem.trained]
+        self.listeners: list[Listener] = [each.listener(self) for each in parts.learner.problem.trained]
         if parts.config.board:
             from sgimd_torch.board.listener import BoardListener  # most runs have no board
 
