@@ -5,39 +5,35 @@ from functools import partial
 import numpy as np
 import pytest
 
+from sgimd_torch.catalogue import WORDS
 from sgimd_torch.goals.interest_map import InterestMap
 from sgimd_torch.goals.progress_grid import ProgressGrid
 from sgimd_torch.goals.regions import absolute_progress, paired_progress
 from sgimd_torch.goals.uniform import UniformGoals
-from sgimd_torch.goals.within_reach import WithinReach
 from sgimd_torch.inverses.nearest import NearestNeighbour
-from sgimd_torch.rivals.alp_gmm import AlpGmm
 from sgimd_torch.spaces import Box, stream
-from worlds import NO_CONTEXT, problem
+from worlds import NO_CONTEXT, part, problem, remember
 
 LINE, SQUARE = Box.cube(0, 1, 1), Box.cube(0, 1, 2)
 
-ALL = pytest.mark.parametrize(
-    "make",
-    [
-        InterestMap,
-        partial(InterestMap, window=20, progress=paired_progress),
-        ProgressGrid,
-        partial(ProgressGrid, cells=3, progress=paired_progress),
-        AlpGmm,
-        UniformGoals,
-        WithinReach,
-    ],
-    ids=["map", "paired", "grid", "paired grid", "alp-gmm", "uniform", "within-reach"],
-)
+PAIRED = {
+    "paired": partial(InterestMap, window=20, progress=paired_progress),
+    "paired grid": partial(ProgressGrid, cells=3, progress=paired_progress),
+}
+
+
+@pytest.fixture(params=[*WORDS["goals"], *PAIRED])
+def make(request):
+    """Every goal model."""
+    return PAIRED.get(request.param) or part("goals", request.param)
 
 
 def in_a_context(seed):
-    """Goals in a square, for each context on a line."""
-    return problem(contexts=LINE, outcomes=SQUARE, inverse=NearestNeighbour, seed=seed)
+    """Goals in a square, for each context on a line; one movement was made."""
+    memory = remember(np.zeros((1, 1)), np.zeros((1, 2)), np.zeros((1, 1)))
+    return problem(outcomes=SQUARE, memory=memory, inverse=NearestNeighbour, seed=seed)
 
 
-@ALL
 def test_goals_lie_in_the_task_space_and_are_drawn_only_when_one_is_sampled(make):
     goals = make(in_a_context(23))
     rng = goals.problem.stream("goals")
@@ -52,7 +48,6 @@ def test_goals_lie_in_the_task_space_and_are_drawn_only_when_one_is_sampled(make
         assert rng.bit_generator.state == state
 
 
-@ALL
 def test_the_same_stream_gives_the_same_goals(make):
     def lived(seed):
         goals, planted = make(in_a_context(seed)), stream(24, "planted")
@@ -69,7 +64,6 @@ def test_the_same_stream_gives_the_same_goals(make):
     assert str(np.random.get_state()) == numpy_state  # noqa: NPY002
 
 
-@ALL
 @pytest.mark.parametrize(
     ("name", "value"),
     [
@@ -129,8 +123,6 @@ def test_cells_tile_the_space_about_a_hundred_of_them(dim, cells):
         *((ProgressGrid, {"window": window}) for window in (5, 2)),
         (ProgressGrid, {"near": 0.0}),
         *((ProgressGrid, {"cells": cells}) for cells in (0, 1000)),  # a million in all
-        (AlpGmm, {"memory": 9}),  # fewer than Gaussians
-        *((AlpGmm, {"uniform": uniform}) for uniform in (1.1, np.nan)),
     ],
 )
 def test_numbers_out_of_range_are_refused(make, options):

@@ -79,6 +79,12 @@ def test_in_a_context_goals_come_from_where_that_context_progresses():
         assert np.median(samples) == pytest.approx(context, abs=0.15)
 
 
+@pytest.mark.parametrize("options", [{"memory": 9}, *({"uniform": uniform} for uniform in (1.1, np.nan))])
+def test_numbers_out_of_range_are_refused(options):
+    with pytest.raises(ValueError, match=f"{next(iter(options))}.*got"):
+        on_a_line(0, **options)
+
+
 def test_goals_stay_in_a_task_space_of_any_size_even_when_progress_is_in_its_corner():
     box = Box(np.array([-100.0, -1e-3]), np.array([100.0, 0.0]))
     goals, rng = AlpGmm(problem(outcomes=box, seed=7)), stream(7, "planted")
