@@ -36,7 +36,9 @@ def performance(goal: Array, outcome: Array, rest: Array, d_min: float) -> Array
 
 
 class Competence(Judge):
-    """gamma of eq. (2), the `memory` reading: the best performance remembered. In one context it never falls.
+    """Competence by the best outcome ever remembered, as in the paper.
+
+    gamma of eq. (2), the `memory` reading. In one context it never falls.
 
     Deviation: the paper prints the minimum over memory, but J is negative, so the best is the maximum. J falls with
     distance, so the nearest outcome has the best. Deviation: eq. (2) asks for exactly the same context, which never
@@ -64,8 +66,10 @@ class Competence(Judge):
 
 
 class AttemptCompetence(Judge):
-    """The `attempt` reading, SAGG-RIAC's own: the best performance of this attempt alone. It can fall when a movement
-    stops working, and then the interest measure sees a change."""
+    """Competence by the best outcome of the attempt alone.
+
+    The `attempt` reading, SAGG-RIAC's own. It can fall when a movement stops working, and then interest sees a change.
+    """
 
     def __call__(self, context: Array, goal: Array, outcomes: Array) -> float:
         """In [-1, 0] from the ``outcomes`` ``(n, outcome_dim)`` of this attempt, -1 if nothing was executed."""

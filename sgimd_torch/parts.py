@@ -8,7 +8,6 @@ A part derives from the class of its kind and is built from one `Problem`. Its o
 
 from __future__ import annotations
 
-import inspect
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Generator, Sequence
 from copy import copy
@@ -16,8 +15,8 @@ from typing import Any, ClassVar, Final, TypeVar
 
 import numpy as np
 
-from sgimd_torch.catalogue import function_of, place_of
-from sgimd_torch.environments.protocol import Environment, check_rest
+from sgimd_torch.catalogue.built import Built
+from sgimd_torch.environments.protocol import Environment, check_robot
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, AskingAttempt, Attempt, Demonstration, Estimate, stream
 
@@ -60,19 +59,17 @@ class Problem:
         *,
         inverse: Callable[[Problem], Inverse] | None = None,
     ) -> None:
-        check_rest(environment)
-        if not 0 <= environment.outcome_noise < np.inf:
-            wanted = "a standard deviation, finite and >= 0"
-            raise ValueError(f"outcome_noise must be {wanted}, got {environment.outcome_noise}")
+        check_robot(environment)
         self.contexts, self.policies, self.outcomes = environment.contexts, environment.policies, environment.outcomes
         self.rest, self.outcome_noise, self.seed = environment.rest, environment.outcome_noise, seed
         self.tolerance = max(environment.outcome_noise, LEAST_TOLERANCE)
         self._streams: dict[str, np.random.Generator] = {}
         self._shared: dict[type, Any] = {}
-        self.memory = self._start(memory)
+        self.memory = Memory(*self.dims) if memory is None else memory.copy_for(self.dims)
+        self.policies.check("thetas of a memory to start from", self.memory.thetas, "of another robot?")
         self.remarks: list[str] = []
         if inverse is not None:
-            self.inverse = made(Inverse, inverse, self)
+            self.inverse = Inverse.of(inverse, self)
 
     @property
     def dims(self) -> tuple[int, int, int]:
@@ -103,20 +100,9 @@ class Problem:
         """Shared objects that have to be trained."""
         return [each for each in self._shared.values() if isinstance(each, Trained)]
 
-    def _start(self, start: Memory | None) -> Memory:
-        if start is None:
-            return Memory(*self.dims)
-        found = start.context_dim, start.theta_dim, start.outcome_dim
-        if found != self.dims:
-            raise ValueError(
-                f"a memory to start from must have dims {self.dims} of context, theta, outcome, got {found}"
-            )
-        self.policies.check("thetas of a memory to start from", start.thetas, "of another robot?")
-        return start.copy()
 
-
-class Part(ABC):  # noqa: B024
-    """Something that a learner is put together from."""
+class Part(Built):
+    """A part of a learner."""
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
@@ -254,62 +240,20 @@ class Social(Part):
         """Yield movements, or none, after ``demonstration``, which corresponds to ``theta_d`` ``(theta_dim,)``."""
 
 
-class FromDemonstrations(ABC):  # noqa: B024
-    """Somebody who shows what was recorded; built from ``(demonstrations, rng)`` and options.
+class Teacher(Built):
+    """Teacher who demonstrates of their own accord: the paper's What, How and When in one call (section 2.3).
+
+    Built from ``(demonstrations, rng)`` and options.
 
     Attributes:
+        who: name in the record of whoever has shown the last offer.
         needs_demonstrations: False for somebody who has nothing prepared.
     """
 
     needs_demonstrations: ClassVar[bool] = True
-
-
-class Teacher(FromDemonstrations):
-    """Teacher who demonstrates of their own accord: the paper's What, How and When in one call (section 2.3).
-
-    Attributes:
-        who: name in the record of whoever has shown the last offer.
-    """
 
     who: str = "teacher"
 
     @abstractmethod
     def offer(self, index: int, memory: Memory) -> Demonstration | None:
         """A demonstration before movement ``index`` (0, 1, ...) of the learner with this ``memory``, or None."""
-
-
-class Demonstrator(FromDemonstrations):
-    """Teacher who is asked for a demonstration of a goal.
-
-    Attributes:
-        takes: movements at which the learner rests until a reply has come.
-    """
-
-    takes: int = 0
-
-    @abstractmethod
-    def demonstrate(self, context: Array, goal: Array, memory: Memory) -> Demonstration | None:
-        """A demonstration of ``goal`` ``(outcome_dim,)`` in ``context`` ``(context_dim,)``, or None. A replay asks
-        again, so what is drawn may depend on the seed and on the arguments only."""
-
-
-def made(kind: type[Made], make: Callable[..., Made], *given: Any) -> Made:
-    """The part of this ``kind`` that a constructor builds from what it is ``given``.
-
-    Raises:
-        ValueError: no constructor, an abstract method is missing, or what was built is of another kind.
-    """
-    if isinstance(make, str):
-        module, _, name = place_of(kind.__name__.lower(), make).partition(":")
-        raise ValueError(f"a {kind.__name__} is given as its constructor, got {make!r}; from {module} import {name}")
-    if isinstance(make, kind) or not callable(make):
-        raise ValueError(f"a {kind.__name__} is given as its constructor, got a {type(make).__name__} made already")
-    built = function_of(make)
-    if inspect.isclass(built) and inspect.isabstract(built):
-        missing = ", ".join(sorted(built.__abstractmethods__))
-        raise ValueError(f"{built.__name__} has no {missing}, which {kind.__name__} demands; see sgimd_torch.parts")
-    part = make(*given)
-    if not isinstance(part, kind):
-        name = built.__name__ if inspect.isclass(built) else f"the {type(part).__name__} that was built"
-        raise ValueError(f"{name} must derive from {kind.__name__} of sgimd_torch.parts")
-    return part

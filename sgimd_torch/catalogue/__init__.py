@@ -187,7 +187,7 @@ def about(kind: str, word: str) -> str:
     path = _PACKAGE / module.replace(".", "/")
     tree = ast.parse((path / "__init__.py" if path.is_dir() else path.with_suffix(".py")).read_text(encoding="utf-8"))
     found = ast.get_docstring(tree) if not name else None
-    for node, after in pairwise(tree.body):
+    for node, after in pairwise((*tree.body, ast.Pass())):
         if isinstance(node, ast.FunctionDef | ast.ClassDef) and node.name == name:
             found = ast.get_docstring(node)
         elif isinstance(node, ast.Assign) and isinstance(after, ast.Expr) and ast.unparse(node.targets[0]) == name:

@@ -47,7 +47,7 @@ def help_of(make: Callable[..., Any]) -> dict[str, str]:
     found = help_of(_TARGETS[make]) if make in _TARGETS else {}
     text = inspect.getdoc(make) or ""
     for each in docstring_parser.parse(text, docstring_parser.DocstringStyle.GOOGLE).params:
-        about = " ".join((each.description or "").split())
+        about = " ".join((each.description or "").split()).partition(" Deviation:")[0]
         found |= dict.fromkeys(each.arg_name.split(", "), about)
     return found
 

@@ -34,7 +34,7 @@ class Width:
 
 
 class Widening(Explore):
-    """Gaussian noise around the middle of Pi; a good prediction of what came of it makes it wider, a bad one narrower.
+    """Gaussian movements around the middle of Pi, wider while outcomes are predicted well.
 
     Args:
         problem: memory and inverse model are read. Where the inverse model predicts nothing, the width stays.

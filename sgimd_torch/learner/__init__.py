@@ -190,9 +190,9 @@ class Learner:
         self._asked = False
         self.movements += 1
         row = len(self.memory) - 1
-        outcome = self.memory.outcomes[-1]
-        self._advance(outcome)
-        self._publish(Event(Kind.MOVED, context, move.theta, move.goal, outcome, move.origin), row=row)
+        reached = self.memory.outcomes[-1]
+        self._advance(reached)
+        self._publish(Event(Kind.MOVED, context, move.theta, move.goal, reached, move.origin), row=row)
 
     def watch(self, demonstration: Demonstration, *, who: str | None = None) -> None:
         """See a demonstration: the attempt under way ends, and the social strategy answers from the next ``ask`` on.
@@ -287,8 +287,8 @@ class Learner:
                 listener(event)
 
     def _request_event(self, request: Request, reply: str) -> Event:
-        asked = {"goal": request.goal, "who": request.teacher, "strategy": request.strategy, "reply": reply}
-        return Event(Kind.ASKED, self._context, **asked)
+        goal, who, strategy = request.goal, request.teacher, request.strategy
+        return Event(Kind.ASKED, self._context, goal=goal, who=who, strategy=strategy, reply=reply)
 
     def _begun_untold(self) -> list[Event]:
         """What a replay needs to know of an attempt that ends before its first movement: it was begun."""

@@ -21,7 +21,9 @@ BY_HAND: Final = "by-hand"
 
 
 class ByHand(Teacher):
-    """Offers what a person gives; otherwise, what another teacher offers.
+    """A person who shows what they like, when they like: sgimd teach.
+
+    What a person gives is offered; otherwise, what another teacher offers.
 
     That teacher is asked before each movement, also where a person shows something, so that its draws stay the same.
 

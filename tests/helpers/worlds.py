@@ -13,7 +13,7 @@ from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.learner import Learner
 from sgimd_torch.memory import Memory
-from sgimd_torch.parts import Inverse, Problem, Search, made
+from sgimd_torch.parts import Inverse, Problem, Search
 from sgimd_torch.spaces import Array, Box, Demonstration, Estimate, stream
 
 NO_CONTEXT = np.zeros(0)
@@ -62,7 +62,7 @@ def problem(
     if memory is not None:
         found = found.over(memory)
     if inverse is not None:
-        found.inverse = made(Inverse, inverse, found)
+        found.inverse = Inverse.of(inverse, found)
     return found
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from runs import content_of
-from sgimd_torch.catalogue import CATALOGUE
+from sgimd_torch.catalogue import WORDS
 from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.evaluation import contexts_of_goals
 from sgimd_torch.runs.build import task_of
@@ -17,7 +17,7 @@ from sgimd_torch.runs.tasks import demonstrations_of
 
 @pytest.mark.parametrize(("word", "reach"), [("rod-wind", 0.05), ("rod-yaw", 0.5)])
 def test_the_contexts_of_the_rod_are_tasks(word, reach):
-    assert word in CATALOGUE["environment"]
+    assert word in WORDS["environment"]
     config = Config("sgim-d", parts={"environment": word, "environment.noise": 0.01})
     robot = task_of(config).environment
     assert (robot.contexts.low.tolist(), robot.contexts.high.tolist()) == ([-reach], [reach])

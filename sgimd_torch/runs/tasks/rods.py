@@ -21,7 +21,7 @@ LARGEST: Final = 1e6  # m, of T
 
 @hands_on(FishingRod, "noise", "max_yaw", "max_wind", "line")
 def fishing_rod(*, task_space: float = 1.0, threads: int = 1, **physics: Any) -> Task:
-    """The paper's arm with a rod, in MuJoCo.
+    """Arm with a fishing rod, in MuJoCo: the paper's task.
 
     Goals come from a square of half side ``task_space`` m.
 

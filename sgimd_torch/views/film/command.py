@@ -23,9 +23,9 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
-from sgimd_torch.catalogue import colour, label
 from sgimd_torch.environments.protocol import Sketch
 from sgimd_torch.evaluation import evaluate
+from sgimd_torch.figures.names import colour, label
 from sgimd_torch.runs.build import RunParts, build
 from sgimd_torch.runs.read import Run, config_of, read_run
 from sgimd_torch.spaces import Array, stream

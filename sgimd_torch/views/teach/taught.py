@@ -54,7 +54,7 @@ class TaughtRun:
 
     def __init__(self, config: Config) -> None:
         self.config, parts = config, build(config)
-        self._hand = ByHand(parts.teacher)
+        self._hand = ByHand(teacher=parts.teacher)
         self.parts = replace(parts, teacher=self._hand)
         self._life = Life(self.parts, resume=holds_run(config.directory / FILE))
         self._episodes = self._life.episodes()
