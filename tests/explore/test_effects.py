@@ -3,21 +3,19 @@
 import numpy as np
 import pytest
 
-from sgimd_torch.algorithms import practice
+from sgimd_torch.algorithms.practice import practice
 from sgimd_torch.environments.objects import fetch, puck
 from sgimd_torch.environments.toys import crawler, toss, two_elbows
 from sgimd_torch.evaluation import evaluate
+from sgimd_torch.explore.effects import Effects
+from sgimd_torch.explore.returning import Returning
+from sgimd_torch.explore.widening import Widening
 from sgimd_torch.inverses.among_effects import AmongEffects
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.memory import Memory
-from sgimd_torch.memory.effects import Effects
 from sgimd_torch.runs.tasks.robots import toy_benchmark
-from sgimd_torch.searches.returning import Returning
-from sgimd_torch.searches.widening import Widening
 from sgimd_torch.session import run
-from sgimd_torch.spaces import Box
-
-PI = Box.cube(0, 1, 3)
+from worlds import NO_CONTEXT, problem
 
 
 def lived(robot, movements, seed=0):
@@ -34,6 +32,10 @@ def button(rng, *, noise=0.0, unit=1.0, pressed=0.25):
     context, theta = rng.uniform(-1, 1, size=1), rng.uniform(size=3)
     outcome = 1 - 3 * context + (theta[0] < pressed) * (0.1 + theta[1])
     return context, theta, unit * rng.normal(outcome, noise)
+
+
+def returning(memory):
+    return Returning(problem(memory=memory, inverse=AmongEffects))
 
 
 @pytest.mark.parametrize(("noise", "unit"), [(0.0, 1.0), (0.01, 1.0), (0.01, 1000.0), (0.0, 1e-4)])
@@ -79,7 +81,7 @@ def test_the_answer_is_learnt_from_movements_with_an_effect():
     rng, memory = np.random.default_rng(0), Memory(1, 3, 1)
     for _ in range(400):
         memory.add(*button(rng))
-    inverse, errors = AmongEffects(memory), []
+    inverse, errors = AmongEffects(problem(memory=memory)), []
     for goal in np.linspace(1.2, 2, 20):
         theta = inverse(np.zeros(1), np.array([goal])).theta
         assert theta[0] < 0.25
@@ -90,22 +92,20 @@ def test_the_answer_is_learnt_from_movements_with_an_effect():
 def test_without_a_plateau_the_answer_and_the_exploration_are_the_usual_ones():
     robot = two_elbows()
     memory = lived(robot, 200)
-    ours = AmongEffects(memory, outcome_noise=robot.outcome_noise)
-    theirs = LocalProcess(memory, outcome_noise=robot.outcome_noise)
+    ours, theirs = (problem(robot, memory=memory, inverse=make) for make in (AmongEffects, LocalProcess))
     goal = np.array([0.3, 0.4])
-    assert np.array_equal(ours(np.zeros(0), goal).theta, theirs(np.zeros(0), goal).theta)
-    look = Returning(robot.policies, memory, ours, np.random.default_rng(1))
-    usual = Widening(robot.policies, memory, theirs, np.random.default_rng(1))
+    assert np.array_equal(ours.inverse(NO_CONTEXT, goal).theta, theirs.inverse(NO_CONTEXT, goal).theta)
+    look, usual = Returning(ours), Widening(theirs)
     assert look.share is None
     for _ in range(20):
-        theta = look(np.zeros(0))
-        assert np.array_equal(theta, usual(np.zeros(0)))
-        memory.add(np.zeros(0), theta, robot.execute(np.zeros(0), theta, np.random.default_rng(2)))
+        theta = look(NO_CONTEXT)
+        assert np.array_equal(theta, usual(NO_CONTEXT))
+        memory.add(NO_CONTEXT, theta, robot.execute(NO_CONTEXT, theta, np.random.default_rng(2)))
 
 
 def test_it_looks_anywhere_until_something_had_an_effect_and_then_around_that():
     rng, memory = np.random.default_rng(0), Memory(1, 3, 1)
-    look = Returning(PI, memory, AmongEffects(memory), np.random.default_rng(1))
+    look = returning(memory)
     for _ in range(50):
         memory.add(*button(rng, pressed=0.0))
     assert look.share == 1.0
@@ -118,7 +118,7 @@ def test_it_looks_anywhere_until_something_had_an_effect_and_then_around_that():
 
 def test_it_explores_less_when_there_are_effects_to_learn_from():
     rng, memory = np.random.default_rng(0), Memory(1, 3, 1)
-    look = Returning(PI, memory, AmongEffects(memory), np.random.default_rng(1))
+    look = returning(memory)
     shares = []
     for _ in range(200):
         memory.add(*button(rng))
@@ -145,7 +145,7 @@ def test_it_returns_to_effects_in_similar_contexts():
     for side in (-1.0, 1.0):
         for row in range(20):
             memory.add([side], [0.1, (1 + side) / 2, row / 20], [1 - 3 * side + 0.1 + (1 + side) / 2])
-    look = Returning(PI, memory, AmongEffects(memory), np.random.default_rng(1))
+    look = returning(memory)
     for side in (-1.0, 1.0):
         found = np.array([look(np.array([side])) for _ in range(200)])[:, 1]
         assert 0.35 < (np.abs(found - (1 + side) / 2) < 0.15).mean() < 0.65  # half of them, and .15 of the others
@@ -155,10 +155,10 @@ def test_it_varies_more_the_more_often_the_effect_persists():
     rng, widths = np.random.default_rng(0), []
     for persists in (True, False):
         memory = Memory(0, 3, 1)
-        look = Returning(PI, memory, AmongEffects(memory), np.random.default_rng(1))
+        look = returning(memory)
         for row in range(40):
             memory.add([], rng.uniform(size=3), [0.0 if row else 1.0])
         for _ in range(30):
-            memory.add([], look(np.zeros(0)), [rng.uniform(1, 2) if persists else 0.0])
+            memory.add([], look(NO_CONTEXT), [rng.uniform(1, 2) if persists else 0.0])
         widths.append(look.width.sd)
     assert widths[0] > 5 * widths[1]

@@ -3,11 +3,15 @@
 import numpy as np
 import pytest
 
-from sgimd_torch.goals.alp_gmm import AlpGmm
+from sgimd_torch.rivals.alp_gmm import AlpGmm
 from sgimd_torch.spaces import Box, stream
+from worlds import NO_CONTEXT, problem
 
-NO_CONTEXTS, LINE = Box.cube(0, 1, 0), Box.cube(0, 1, 1)
-NO_CONTEXT = np.empty(0)
+LINE = Box.cube(0, 1, 1)
+
+
+def on_a_line(seed: int, **options) -> AlpGmm:
+    return AlpGmm(problem(outcomes=LINE, seed=seed), **options)
 
 
 def practise(goals: AlpGmm, n: int, low: float, high: float, seed: int = 0) -> None:
@@ -18,7 +22,7 @@ def practise(goals: AlpGmm, n: int, low: float, high: float, seed: int = 0) -> N
 
 
 def test_goals_follow_progress_and_the_uniform_ones_reach_the_rest():
-    goals = AlpGmm(NO_CONTEXTS, LINE, stream(1, "goals"))
+    goals = on_a_line(1)
     practise(goals, 250, 0.6, 0.8)
     samples = np.array([goals.sample(NO_CONTEXT)[0] for _ in range(2000)])
     inside = np.mean((samples > 0.55) & (samples < 0.85))  # Gaussians have no edges
@@ -28,26 +32,26 @@ def test_goals_follow_progress_and_the_uniform_ones_reach_the_rest():
 
 def test_goals_are_uniform_before_the_first_fit_and_where_nothing_progresses():
     for n in (49, 250):
-        goals = AlpGmm(NO_CONTEXTS, LINE, stream(2, "goals"))
+        goals = on_a_line(2)
         practise(goals, n, 2, 3) if n == 250 else practise(goals, n, 0.6, 0.8)
         counts = np.histogram([goals.sample(NO_CONTEXT) for _ in range(2000)], 10, (0, 1))[0]
         assert np.abs(counts - 200).max() < 5 * np.sqrt(2000 * 0.1 * 0.9)  # five standard deviations
 
 
 def test_goals_before_the_last_memory_ones_are_forgotten():
-    goals = AlpGmm(NO_CONTEXTS, LINE, stream(3, "goals"), memory=60, uniform=0.0)
+    goals = on_a_line(3, memory=60, uniform=0.0)
     practise(goals, 60, 0.0, 0.3)
     practise(goals, 400, 0.7, 1.0, seed=1)  # long enough that few goals are nearest to one of the first 60
     samples = np.array([goals.sample(NO_CONTEXT)[0] for _ in range(300)])
     assert np.mean(samples > 0.6) > 0.85
 
 
-def test_a_new_fit_comes_after_refit_goals_and_no_sooner():
-    one, other = (AlpGmm(NO_CONTEXTS, LINE, stream(4, "goals"), refit=60, uniform=0.0) for _ in range(2))
+def test_a_new_fit_comes_after_fifty_goals_and_no_sooner():
+    one, other = (on_a_line(4, uniform=0.0) for _ in range(2))
     for goals in (one, other):
-        practise(goals, 60, 0.0, 0.3)
+        practise(goals, 50, 0.0, 0.3)
         assert goals.sample(NO_CONTEXT)[0] < 0.6
-    practise(one, 59, 0.7, 1.0, seed=1)
+    practise(one, 49, 0.7, 1.0, seed=1)
     assert [one.sample(NO_CONTEXT) for _ in range(20)] == [other.sample(NO_CONTEXT) for _ in range(20)]
     one.add(NO_CONTEXT, [0.5], -1)
     assert one.sample(NO_CONTEXT) != other.sample(NO_CONTEXT)
@@ -55,7 +59,7 @@ def test_a_new_fit_comes_after_refit_goals_and_no_sooner():
 
 def test_progress_is_measured_against_the_nearest_earlier_goal():
     # Competence differs from place to place in both; only in the second does it change with time, and in one place.
-    still, moving = (AlpGmm(NO_CONTEXTS, LINE, stream(5, "goals"), memory=50, uniform=0.0) for _ in range(2))
+    still, moving = (on_a_line(5, memory=50, uniform=0.0) for _ in range(2))
     for index in range(100):
         place = (index % 10) / 10
         still.add(NO_CONTEXT, [place], -place)
@@ -66,7 +70,7 @@ def test_progress_is_measured_against_the_nearest_earlier_goal():
 
 
 def test_in_a_context_goals_come_from_where_that_context_progresses():
-    goals = AlpGmm(LINE, LINE, stream(6, "goals"), uniform=0.0)
+    goals = AlpGmm(problem(contexts=LINE, outcomes=LINE, seed=6), uniform=0.0)
     rng = stream(6, "planted")
     for context, goal in rng.uniform(size=(250, 2)):
         goals.add([context], [goal], -rng.uniform() if abs(context - goal) < 0.15 else -1)
@@ -75,9 +79,15 @@ def test_in_a_context_goals_come_from_where_that_context_progresses():
         assert np.median(samples) == pytest.approx(context, abs=0.15)
 
 
+@pytest.mark.parametrize("options", [{"memory": 9}, *({"uniform": uniform} for uniform in (1.1, np.nan))])
+def test_numbers_out_of_range_are_refused(options):
+    with pytest.raises(ValueError, match=f"{next(iter(options))}.*got"):
+        on_a_line(0, **options)
+
+
 def test_goals_stay_in_a_task_space_of_any_size_even_when_progress_is_in_its_corner():
     box = Box(np.array([-100.0, -1e-3]), np.array([100.0, 0.0]))
-    goals, rng = AlpGmm(NO_CONTEXTS, box, stream(7, "goals")), stream(7, "planted")
+    goals, rng = AlpGmm(problem(outcomes=box, seed=7)), stream(7, "planted")
     for goal in rng.uniform(box.low, box.high, (150, 2)):
         goals.add(NO_CONTEXT, goal, -rng.uniform() if goal[0] > 90 else -1)
     samples = np.array([goals.sample(NO_CONTEXT) for _ in range(500)])
