@@ -33,7 +33,7 @@ COMMANDS: Final = {
     "benchmark": Command("views.benchmark", "goals of evaluation from what runs have reached"),
     "table": Command("views.table", "results of runs, over their seeds"),
     "report": Command("views.report.command", "one page about one run, or about many side by side", "report"),
-    "teach": Command("views.teach", "teach a learner by hand, in a browser", "teach"),
+    "teach": Command("teach.command", "teach a learner by hand, in a browser", "teach"),
     "film": Command("views.film.command", "a film of what a run has learnt", "film"),
     "demo": Command("views.demo", "three learners side by side: one figure, one table", "plot"),
 }

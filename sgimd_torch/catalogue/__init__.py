@@ -192,7 +192,7 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
         "initial": _at("teachers:InitialTeacher", "all at the start, one every so many movements"),
         "at-once": _at("teachers:InitialTeacher", "all at the start, one for each movement", fixed={"every": 1}),
         "asked": _at("teachers:AskedTeacher", "when the learner stalls"),
-        "by-hand": _at("teachers.by_hand:nobody", "a person, whenever they like: sgimd teach"),
+        "by-hand": _at("teach.by_hand:nobody", "a person, whenever they like: sgimd teach"),
     },
     "choose": {
         "least-explored": _at("teachers:least_explored", "the one whose outcome the learner has reached least"),

@@ -30,7 +30,7 @@ import numpy as np
 
 from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
 from sgimd_torch.demonstrations.columns import Columns, read_csv
-from sgimd_torch.demonstrations.lessons import beyond_limits, misfit_of
+from sgimd_torch.demonstrations.fit import beyond_limits, misfit_of
 from sgimd_torch.environments.protocol import SimulationError, execute_many
 from sgimd_torch.runs.build import task_of
 from sgimd_torch.runs.config import Config

@@ -5,11 +5,13 @@ import pytest
 
 from sgimd_torch.algorithms import observation
 from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
-from sgimd_torch.demonstrations.leading import Leading
-from sgimd_torch.demonstrations.lessons import LedMovement, lesson_by_hand, misfit_of, resampled
+from sgimd_torch.demonstrations.fit import misfit_of
 from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.spaces import Demonstration, stream
+from sgimd_torch.teach.leading import Leading
+from sgimd_torch.teach.led import arm_led, rod_led
+from sgimd_torch.teach.lessons import LedMovement, lesson_by_hand, resampled
 
 
 @pytest.fixture(scope="module")
@@ -22,17 +24,20 @@ def led(times, joints, gap=0.0):
 
 
 def give(robot, recording, **options):
-    translate = robot.primitive.correspondence if hasattr(robot, "primitive") else robot.correspondence
-    return lesson_by_hand(recording, robot, translate, robot.hand_led, stream(3, "lessons", 0), **options)
+    is_rod = isinstance(robot, FishingRod)
+    translate, led = (
+        (robot.primitive.correspondence, rod_led(robot)) if is_rod else (robot.correspondence, arm_led(robot))
+    )
+    return lesson_by_hand(recording, robot, translate, led, stream(3, "lessons", 0), **options)
 
 
 def swung(rod, goal=(0.4, 0.3, 0.6), seconds=1.0):
-    leading = Leading(rod.hand_led)
+    leading = Leading(rod_led(rod))
     leading.grab()
-    leading.record()
+    leading.begin_recording()
     leading.drag(goal)
     leading.step(seconds)
-    return leading.stop()
+    return leading.end_recording()
 
 
 def played(rod, theta, rate=200.0):
@@ -105,12 +110,12 @@ def test_what_could_not_be_followed_is_told(rod):
 
 def test_a_planar_arm_is_taught_by_its_last_posture():
     arm = PlanarArm()
-    leading = Leading(arm.hand_led)
+    leading = Leading(arm_led(arm))
     leading.grab()
-    leading.record()
+    leading.begin_recording()
     leading.drag([-0.2, 0.7, 0.0])
     leading.step(3.0)
-    lesson = give(arm, leading.stop())
+    lesson = give(arm, leading.end_recording())
     np.testing.assert_allclose(lesson.demonstration.outcome, [-0.2, 0.7], atol=1e-3)
     assert np.isnan(lesson.misfit)  # its movements are not angles over time
 

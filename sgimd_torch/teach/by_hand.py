@@ -1,8 +1,8 @@
-"""A person who teaches by hand: what they give is shown at once.
+"""A person who teaches by hand: the learner is shown each lesson at once.
 
 Section 2.3 of Nguyen & Oudeyer (2014): kinesthetic demonstrations.
     teacher = ByHand(teacher); teacher.give(demonstration); teacher.offer(120, memory)
-Nothing is drawn here, and the record of a run keeps what was shown, so a replay needs no person.
+Nothing is drawn at random here. The record of a run keeps the lessons, so a replay needs no person.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ from sgimd_torch.spaces import Demonstration
 from sgimd_torch.teachers import Teacher
 
 BY_HAND: Final = "by-hand"
-"""Who has shown a lesson by hand, in the record; also the word of the command line."""
+"""Name of the person in a record, and on the command line."""
 
 
 class ByHand:
     """Offers what a person gives; otherwise, what another teacher offers.
 
-    That teacher is asked before each movement, also where a person shows something, so that its draws stay the same.
+    The other teacher is asked before each movement, even when a person gives a lesson, so that its draws do not change.
 
     Args:
-        teacher: another one, None if there is none.
+        teacher: the other teacher, None for a person alone.
 
     Attributes:
-        who: showed what was offered last, as the record has it.
+        who: name, in a record, of whoever made the last offer.
     """
 
     def __init__(self, teacher: Teacher | None = None) -> None:
@@ -37,7 +37,7 @@ class ByHand:
         self._given: Demonstration | None = None
 
     def give(self, demonstration: Demonstration) -> None:
-        """Have this offered before the next movement for which the learner takes an offer."""
+        """Offer this demonstration before the next movement for which the learner takes an offer."""
         self._given = demonstration
 
     def offer(self, index: int, memory: Memory) -> Demonstration | None:
@@ -49,5 +49,5 @@ class ByHand:
 
 
 def nobody(demonstrations: Sequence[Demonstration], rng: np.random.Generator) -> ByHand:
-    """A person who has nothing prepared; ``sgimd teach`` brings what they show."""
+    """A person without prepared demonstrations; `sgimd teach` brings the lessons."""
     return ByHand()
