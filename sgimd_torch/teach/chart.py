@@ -1,6 +1,6 @@
 """A map of T that shows how near a learner has come to each place.
 
-    chart = chart_of(robot, memory, benchmark, context); picture = by_error(chart, robot.outcomes)
+    chart = chart_of(robot, memory, benchmark); picture = by_error(chart, robot.outcomes)
 The predicted error at a goal is the distance from the goal to the nearest place where a movement landed. Nothing is
 executed, so a map takes milliseconds.
 """
@@ -42,18 +42,18 @@ class Chart:
     met: NDArray[np.bool_]
 
 
-def chart_of(robot: Environment, memory: Memory, benchmark: Benchmark, context: Array) -> Chart:
-    """The map of what a learner can do in one context.
+def chart_of(robot: Environment, memory: Memory, benchmark: Benchmark) -> Chart:
+    """The map of what a learner can do in the middle of C.
 
     Args:
         robot: environment; the map shows the first two dimensions of its T, and the middle of the others.
         memory: memory of the learner; only read.
         benchmark: goals of the mean, and the side of their tiles.
-        context: ``(context_dim,)`` of the map.
     """
     places = np.concatenate([_cells(robot.outcomes), benchmark.goals])
     if len(memory):
         near = KDTree(np.concatenate([memory.contexts, memory.outcomes], axis=1))
+        context = robot.contexts.low + robot.contexts.sides / 2
         rows = np.concatenate([np.tile(context, (len(places), 1)), places], axis=1)
         nearest = memory.outcomes[near.query(rows)[1]]
     else:

@@ -10,7 +10,6 @@ accelerations of the joints. A released arm stays where it is.
 
 from __future__ import annotations
 
-from collections import deque
 from typing import Final
 
 import numpy as np
@@ -23,7 +22,6 @@ from sgimd_torch.teach.lessons import LedMovement
 
 STEP: Final = 0.01  # s, from one posture of the arm to the next
 FOLLOW: Final = 15.0  # 1/s, rate at which a held point follows: nearly all of a jump within 5 / FOLLOW
-RECENT: Final = 0.4  # s, during which a past place of the hand still counts as its path
 SUPPLE: Final = 0.03  # s, in which a joint takes up a speed, so that the arm does not tremble with the hand
 DAMPING: Final = 0.1  # of the least squares, relative to the levers: joints stay slow near a stretched posture
 BRAKES: Final = 0.88  # share of the acceleration that stops a joint at its range: the last step may take 9/8 of it
@@ -39,19 +37,12 @@ class _Hand:
     def __init__(self, body: int, place: Array, target: Array) -> None:
         self.body, self.place, self.target = body, place, target
         self._wanted, self._pull = target, np.zeros(3)
-        self._path = deque([target], maxlen=round(RECENT / STEP))
 
     def follow(self, point: Array) -> Array:
         """``(3,)`` m/s, the velocity that the held ``point`` should have in the next step."""
         self._pull = self._pull + STEP * FOLLOW**2 * (self.target - self._wanted - 2 / FOLLOW * self._pull)
         self._wanted = self._wanted + STEP * self._pull
-        self._path.append(self.target)
-        velocity: Array = self._pull + FOLLOW * (self._wanted - point)
-        return velocity
-
-    def gap(self, point: Array) -> float:
-        """m, from the held ``point`` to the nearest recent target."""
-        return float(np.linalg.norm(np.stack(self._path) - point, axis=1).min())
+        return np.asarray(self._pull + FOLLOW * (self._wanted - point))
 
 
 class Leading:
@@ -71,7 +62,7 @@ class Leading:
         self.arm = Arm(led)
         self._hand = self.arm.place_of(led.hand)
         self._held: _Hand | None = None
-        self._rows: list[tuple[Array, float]] | None = None
+        self._postures: list[Array] | None = None
         self.home()
 
     @property
@@ -90,14 +81,6 @@ class Leading:
         return self.arm.where(*self._hand)
 
     @property
-    def gap(self) -> float:
-        """m, from the held point to the recent path of the hand; 0 if nothing is held.
-
-        A point that follows late has no gap. A hand beyond the arm's reach, or faster than its joints, leaves one.
-        """
-        return self._held.gap(self.point) if self._held else 0.0
-
-    @property
     def held(self) -> bool:
         """Whether a hand holds the arm."""
         return self._held is not None
@@ -105,7 +88,7 @@ class Leading:
     @property
     def recording(self) -> bool:
         """Whether postures are being recorded."""
-        return self._rows is not None
+        return self._postures is not None
 
     def home(self) -> None:
         """Release the arm, and put it at once where its movements start.
@@ -168,9 +151,9 @@ class Leading:
         Raises:
             RuntimeError: a recording is under way.
         """
-        if self._rows is not None:
+        if self._postures is not None:
             raise RuntimeError("a recording is under way; end_recording() comes first")
-        self._rows = [(self.q, self.gap)]
+        self._postures = [self.q]
 
     def end_recording(self) -> LedMovement:
         """End the recording and return it.
@@ -179,14 +162,12 @@ class Leading:
             RuntimeError: no recording is under way.
             ValueError: no time has passed since it began; the recording is lost.
         """
-        if self._rows is None:
+        if self._postures is None:
             raise RuntimeError("nothing is being recorded; begin_recording() comes first")
-        rows, self._rows = self._rows, None
-        if len(rows) < 2:
+        postures, self._postures = self._postures, None
+        if len(postures) < 2:
             raise ValueError("a recording needs 2 postures or more; was it too short?")
-        postures, gaps = zip(*rows, strict=True)
-        times = np.arange(len(rows), dtype=np.float64) * STEP
-        return LedMovement(times, np.stack(postures), np.array(gaps))
+        return LedMovement(np.arange(len(postures), dtype=np.float64) * STEP, np.stack(postures))
 
     def _advance(self) -> None:
         held = self._held
@@ -195,8 +176,8 @@ class Leading:
         q = self.arm.ranges.clip(self._q + speed * STEP)  # rounding
         self._speed, self._q = (q - self._q) / STEP, q
         self.arm.pose(self._q)
-        if self._rows is not None:
-            self._rows.append((self.q, self.gap))
+        if self._postures is not None:
+            self._postures.append(self.q)
 
     def _towards(self, velocity: Array, body: int) -> Array:
         """``(n_joints,)`` rad/s that move the held point with this ``velocity`` ``(3,)`` m/s, by damped least squares.

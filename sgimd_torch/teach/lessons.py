@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from sgimd_torch.demonstrations.fit import beyond_limits, misfit_of
 from sgimd_torch.environments.protocol import Environment, primitive_of
@@ -22,7 +21,6 @@ from sgimd_torch.spaces import Array, Demonstration, read_only
 from sgimd_torch.teach.led import HandLed
 
 RATE: Final = 50.0  # Hz, of the shipped demonstrations and of motor primitives
-LAG: Final = 0.03  # m: a larger gap between arm and hand is remarked
 FASTER: Final = 1.02  # times the speed of the robot's own movements: a faster joint is remarked
 MOVES: Final = 0.02  # rad/s: an arm that was never faster did not move
 STILL: Final = 0.05  # share of the largest speed: the arm pauses while all joints are slower
@@ -36,12 +34,10 @@ class LedMovement:
     Attributes:
         times: ``(n_times,)`` s, increasing from 0.
         joints: ``(n_times, n_joints)`` rad.
-        gaps: ``(n_times,)`` m from the led point to the path of the hand, 0 while nothing is held.
     """
 
     times: Array
     joints: Array
-    gaps: Array
 
     @property
     def duration(self) -> float:
@@ -59,7 +55,7 @@ class LedMovement:
             raise ValueError("you did not move the arm")
         moved = np.flatnonzero(speeds > STILL * speeds.max())
         kept = slice(moved[0], moved[-1] + 2)
-        return LedMovement(self.times[kept] - self.times[moved[0]], self.joints[kept], self.gaps[kept])
+        return LedMovement(self.times[kept] - self.times[moved[0]], self.joints[kept])
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,10 +81,8 @@ def lesson_by_hand(
     correspondence: Callable[[Array, Array], Array],
     led: HandLed,
     rng: np.random.Generator,
-    *,
-    context: ArrayLike | None = None,
 ) -> HandLesson:
-    """Make a lesson of a recording; the robot executes ``theta_d`` once.
+    """Make a lesson of a recording; the robot executes ``theta_d`` once, in the middle of C.
 
     A recording longer than the robot's longest movement is played faster, and a remark says so.
 
@@ -98,14 +92,12 @@ def lesson_by_hand(
         correspondence: (times, trajectory) -> theta_d.
         led: arm that the hand led.
         rng: noise of the one movement, such as ``stream(seed, "lessons", number)``.
-        context: ``(context_dim,)`` of the one movement; None for the middle of C.
 
     Raises:
         ValueError: the correspondence refuses the recording.
         SimulationError: theta_d has no outcome.
     """
-    middle = (environment.contexts.low + environment.contexts.high) / 2
-    context = environment.contexts.check("context", middle if context is None else context)
+    context = environment.contexts.low + environment.contexts.sides / 2
     longest = primitive_of(environment).durations[1]
     slower = recording.duration > longest
     times = recording.times / recording.duration * longest if slower else recording.times  # ends exactly at longest
@@ -128,9 +120,6 @@ def _unlike_led(recording: LedMovement, times: Array, led: HandLed) -> list[str]
     if recording.duration > times[-1]:
         faster = recording.duration / times[-1]
         remarks.append(f"it is played {faster:.3g} times faster: movements last {times[-1]:g} s at most")
-    if recording.gaps.max() > LAG:
-        far = f"up to {recording.gaps.max():.2g} m"
-        remarks.append(f"the arm stayed {far} behind the hand, which went too far or too fast for it")
     speeds = np.abs(np.diff(recording.joints, axis=0) / np.diff(times)[:, None]).max(axis=0)
     for name, speed, most in zip(led.joints, speeds, speeds if led.speeds is None else led.speeds, strict=True):
         if speed > most * FASTER:

@@ -75,27 +75,25 @@ class Panel:
         gui.add_markdown(SEEN.format(" and ".join(space.axis(k) for k in range(min(2, space.dim)))))
         with gui.add_folder("1 · Lead the arm"):
             gui.add_markdown(LEAD)
-            self._add_buttons("record", "home")
+            self._add_button("record")
+            self._add_button("home")
         with gui.add_folder("2 · Look at what you recorded"):
             self.lesson = gui.add_markdown(LOOK)
-            self._add_buttons("discard")
+            self._add_button("discard")
         with gui.add_folder("3 · Teach it"):
-            self._add_buttons("show")
+            self._add_button("show")
             self.effect = gui.add_markdown("The learner imitates it at once.")
         panel = gui.add_panel()
         with panel.add_tab("The learner"):
             self.status = gui.add_html("")
-            self._add_buttons("run")
+            self._add_button("run")
             gui.add_html(_LEGEND.format(",".join(f"rgb({r:.0f},{g:.0f},{b:.0f})" for r, g, b in SKILL)))
         panel.dock_left()
         panel.set_width(300)
         self.show_lesson(None)
 
-    def _add_buttons(self, *names: str) -> None:
-        for name in names:
-            self._add_button(name, *ACTIONS[name])
-
-    def _add_button(self, name: str, label: str, icon: Any, colour: Any) -> None:
+    def _add_button(self, name: str) -> None:
+        label, icon, colour = ACTIONS[name]
         self.buttons[name] = button = self._gui.add_button(label, icon=icon, color=colour)
 
         @button.on_click  # type: ignore[untyped-decorator]

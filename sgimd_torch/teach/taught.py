@@ -57,7 +57,6 @@ class TaughtRun:
 
     Attributes:
         parts: parts of the run; its teacher is `ByHand`.
-        context: ``(context_dim,)`` of maps and lessons, the middle of C.
         cannot_be_taught: reason why the learner takes no lessons, "" if it does.
 
     Raises:
@@ -69,8 +68,6 @@ class TaughtRun:
         self.config, parts = config, build(config)
         self._hand = ByHand(parts.teacher)
         self.parts = replace(parts, teacher=self._hand)
-        contexts = parts.environment.contexts
-        self.context = np.asarray((contexts.low + contexts.high) / 2)
         teachable = parts.learner.social is not None and not parts.teachers
         self.cannot_be_taught = "" if teachable else ALONE.format(config.algorithm)
         self._life = Life(self.parts, resume=holds_run(config.directory / FILE))
@@ -132,13 +129,13 @@ class TaughtRun:
         """
         task, robot = self.parts.task, self.parts.environment
         rng = stream(self.config.seed, "lessons", self._lessons)
-        return lesson_by_hand(recording, robot, correspondence_of(task), hand_led_of(task), rng, context=self.context)
+        return lesson_by_hand(recording, robot, correspondence_of(task), hand_led_of(task), rng)
 
     def status(self) -> Status:
         """The status of now."""
         robot, memory = self.parts.environment, self.parts.learner.memory
         landed = np.array(self._landed).reshape(-1, robot.outcomes.dim)
-        chart = chart_of(robot, memory, self.parts.benchmark, self.context)
+        chart = chart_of(robot, memory, self.parts.benchmark)
         return Status(self._life.movements, self._lessons, self._life.replaying, landed, chart)
 
     def close(self) -> None:
