@@ -17,12 +17,12 @@ from typing import Final
 import numpy as np
 
 from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
-from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.runs.process import command
+from sgimd_torch.runs.tasks.rods import fishing_rod
 from sgimd_torch.spaces import Array, Demonstration, stream
 from sgimd_torch.teach.leading import Leading
-from sgimd_torch.teach.led import rod_led
-from sgimd_torch.teach.lessons import HandLesson, LedMovement, lesson_by_hand, resampled
+from sgimd_torch.teach.led import hand_led_of
+from sgimd_torch.teach.lessons import HandLesson, lesson_by_hand, moving, resampled
 
 LESSONS: Final = 10
 SEED: Final = 2014  # of the hand, which is the same for every learner
@@ -49,7 +49,7 @@ def sweep(tip: Array, end: Array, rng: np.random.Generator) -> Array:
     return np.asarray(hand + bell * rng.normal(0, TREMBLE, hand.shape))
 
 
-def lead(leading: Leading, end: Array, rng: np.random.Generator) -> LedMovement:
+def lead(leading: Leading, end: Array, rng: np.random.Generator) -> tuple[Array, Array]:
     """Lead the arm by its hand from its start to ``end``, and release it."""
     leading.home()
     leading.grab()
@@ -59,23 +59,20 @@ def lead(leading: Leading, end: Array, rng: np.random.Generator) -> LedMovement:
         leading.step(HEARD)
     leading.release()
     leading.step(WAITS)
-    return leading.end_recording().moving()
+    return moving(*leading.end_recording())
 
 
 def lessons_of_a_script() -> list[HandLesson]:
     """Ten lessons on the rod; their sweeps end all around the base, nearer and farther."""
-    rod = FishingRod()
-    led = rod_led(rod)
-    leading, found = Leading(led), list[HandLesson]()
+    task = fishing_rod()
+    leading, found = Leading(hand_led_of(task)), list[HandLesson]()
     for number in range(LESSONS):
         rng = stream(SEED, "hand", number)
         turn = np.pi * (2 * (number * (3 - np.sqrt(5)) / 2 % 1) - 1)  # golden angle: never twice the same side
         near, far = REACHES
         reach, height = np.sqrt(rng.uniform(near**2, far**2)), rng.uniform(*HEIGHTS)
         end = np.array([reach * np.sin(turn), reach * np.cos(turn), height])
-        recording = lead(leading, end, rng)
-        noise = stream(SEED, "lessons", number)
-        found.append(lesson_by_hand(recording, rod, rod.primitive.correspondence, led, noise))
+        found.append(lesson_by_hand(*lead(leading, end, rng), task, stream(SEED, "lessons", number)))
     return found
 
 

@@ -27,7 +27,7 @@ COMMANDS: Final = {
     "sweep": Command("runs.sweep", "many runs: options crossed with each other and with seeds, in parallel"),
     "check": Command("views.check", "does an environment keep every promise? each slip by name"),
     "demonstrations": Command(
-        "views.demonstrations", "are they right for a robot? import from CSV and LeRobot", "plot"
+        "views.demonstrations", "check demonstrations on a robot, or import them from CSV and LeRobot", "plot"
     ),
     "suite": Command("views.suite", "one learner on many robots, against random movements", "plot"),
     "benchmark": Command("views.benchmark", "goals of evaluation from what runs have reached"),

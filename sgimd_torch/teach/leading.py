@@ -5,7 +5,7 @@ weight. The point at which it is held follows the hand by damped least squares, 
 accelerations of the joints. A released arm stays where it is.
     leading = Leading(hand_led_of(task)); leading.grab("hand"); leading.begin_recording()
     for point in path: leading.drag(point); leading.step(0.02)
-    leading.release(); recording = leading.end_recording()
+    leading.release(); times, joints = leading.end_recording()
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ from numpy.typing import ArrayLike
 from sgimd_torch.spaces import Array, check_point
 from sgimd_torch.teach.arm import Arm
 from sgimd_torch.teach.led import HandLed
-from sgimd_torch.teach.lessons import LedMovement
 
 STEP: Final = 0.01  # s, from one posture of the arm to the next
 FOLLOW: Final = 15.0  # 1/s, rate at which a held point follows: nearly all of a jump within 5 / FOLLOW
@@ -155,8 +154,8 @@ class Leading:
             raise RuntimeError("a recording is under way; end_recording() comes first")
         self._postures = [self.q]
 
-    def end_recording(self) -> LedMovement:
-        """End the recording and return it.
+    def end_recording(self) -> tuple[Array, Array]:
+        """End the recording and return it: ``(n_times,)`` s from 0, and postures ``(n_times, n_joints)`` rad.
 
         Raises:
             RuntimeError: no recording is under way.
@@ -167,7 +166,7 @@ class Leading:
         postures, self._postures = self._postures, None
         if len(postures) < 2:
             raise ValueError("a recording needs 2 postures or more; was it too short?")
-        return LedMovement(np.arange(len(postures), dtype=np.float64) * STEP, np.stack(postures))
+        return np.arange(len(postures), dtype=np.float64) * STEP, np.stack(postures)
 
     def _advance(self) -> None:
         held = self._held

@@ -20,7 +20,7 @@ import viser
 from sgimd_torch.spaces import Array
 from sgimd_torch.teach.leading import Leading
 from sgimd_torch.teach.led import hand_led_of
-from sgimd_torch.teach.lessons import HandLesson
+from sgimd_torch.teach.lessons import HandLesson, moving
 from sgimd_torch.teach.panel import Panel
 from sgimd_torch.teach.scene import Scene
 from sgimd_torch.teach.taught import Status, TaughtRun
@@ -173,11 +173,11 @@ class Page:
             self.leading.begin_recording()
             return
         try:
-            recording = self.leading.end_recording().moving()
+            recording = moving(*self.leading.end_recording())
         except ValueError as error:
             self._set_lesson(None, str(error))
             return
-        future = self._learner.submit(self.taught.lesson_of, recording)
+        future = self._learner.submit(self.taught.lesson_of, *recording)
         future.add_done_callback(lambda done: self._later(client, lambda: self._lesson_made(done)))
 
     def _lesson_made(self, done: Future[HandLesson]) -> None:

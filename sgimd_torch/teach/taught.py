@@ -17,12 +17,10 @@ from sgimd_torch.runs.build import build
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.directory import FILE, holds_run
 from sgimd_torch.runs.run import Life
-from sgimd_torch.runs.tasks import correspondence_of
 from sgimd_torch.spaces import Array, Demonstration, stream
 from sgimd_torch.teach.by_hand import BY_HAND, ByHand
 from sgimd_torch.teach.chart import Chart, chart_of
-from sgimd_torch.teach.led import hand_led_of
-from sgimd_torch.teach.lessons import HandLesson, LedMovement, lesson_by_hand
+from sgimd_torch.teach.lessons import HandLesson, lesson_by_hand
 
 LATEST: Final = 60  # landings that the page shows
 IMITATIONS: Final = 10  # movements that follow a lesson at once, at most
@@ -121,15 +119,9 @@ class TaughtRun:
         self.give(demonstration)
         return self.imitate()
 
-    def lesson_of(self, recording: LedMovement) -> HandLesson:
-        """The lesson that a recording gives.
-
-        Raises:
-            ValueError: the robot cannot make this movement.
-        """
-        task, robot = self.parts.task, self.parts.environment
-        rng = stream(self.config.seed, "lessons", self._lessons)
-        return lesson_by_hand(recording, robot, correspondence_of(task), hand_led_of(task), rng)
+    def lesson_of(self, times: Array, joints: Array) -> HandLesson:
+        """Make a lesson of a recording for this learner; see `lesson_by_hand`."""
+        return lesson_by_hand(times, joints, self.parts.task, stream(self.config.seed, "lessons", self._lessons))
 
     def status(self) -> Status:
         """The status of now."""

@@ -81,10 +81,10 @@ def test_a_hand_that_tears_cannot_exceed_ranges_speeds_and_accelerations(leading
             leading.step(0.05)
         leading.release()
         leading.step(0.5)
-        led = leading.end_recording()
-        speeds = np.diff(led.joints, axis=0) / STEP
+        _, joints = leading.end_recording()
+        speeds = np.diff(joints, axis=0) / STEP
         starts = np.diff(np.concatenate([np.zeros((1, 6)), speeds]), axis=0) / STEP
-        assert leading.arm.ranges.contains(led.joints).all()
+        assert leading.arm.ranges.contains(joints).all()
         assert (np.abs(speeds) <= leading.arm.speeds * (1 + ROUNDING)).all()
         assert (np.abs(starts) <= leading.arm.accelerations * (1 + ROUNDING)).all()
     assert np.abs(speeds / leading.arm.speeds).max() > 0.9  # it was torn hard enough for the limits to count
@@ -141,10 +141,10 @@ def test_a_recording_begins_where_the_arm_was_and_has_every_step(leading):
     leading.drag([0.2, 0.3, 0.6])
     leading.step(0.5)
     assert leading.recording
-    led = leading.end_recording()
-    np.testing.assert_allclose(led.times, np.arange(51) * STEP)
-    np.testing.assert_array_equal(led.joints[0], leading.arm.start)
-    np.testing.assert_array_equal(led.joints[-1], leading.q)
+    times, joints = leading.end_recording()
+    np.testing.assert_allclose(times, np.arange(51) * STEP)
+    np.testing.assert_array_equal(joints[0], leading.arm.start)
+    np.testing.assert_array_equal(joints[-1], leading.q)
     assert not leading.recording
 
 

@@ -8,10 +8,11 @@ from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
 from sgimd_torch.demonstrations.fit import misfit_of
 from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.environments.planar_arm import PlanarArm
+from sgimd_torch.runs.tasks import Task
 from sgimd_torch.spaces import Demonstration, stream
 from sgimd_torch.teach.leading import Leading
 from sgimd_torch.teach.led import arm_led, rod_led
-from sgimd_torch.teach.lessons import LedMovement, lesson_by_hand, resampled
+from sgimd_torch.teach.lessons import lesson_by_hand, moving, resampled
 
 
 @pytest.fixture(scope="module")
@@ -20,15 +21,12 @@ def rod():
 
 
 def led(times, joints):
-    return LedMovement(np.asarray(times), np.asarray(joints))
+    return np.asarray(times), np.asarray(joints)
 
 
 def give(robot, recording):
-    is_rod = isinstance(robot, FishingRod)
-    translate, led = (
-        (robot.primitive.correspondence, rod_led(robot)) if is_rod else (robot.correspondence, arm_led(robot))
-    )
-    return lesson_by_hand(recording, robot, translate, led, stream(3, "lessons", 0))
+    translate = robot.primitive.correspondence if isinstance(robot, FishingRod) else None
+    return lesson_by_hand(*recording, Task(robot, correspondence=translate), stream(3, "lessons", 0))
 
 
 def swung(rod, goal=(0.4, 0.3, 0.6), seconds=1.0):
@@ -84,7 +82,8 @@ def test_the_misfit_is_the_root_mean_square_in_radians(rod):
 
 
 def test_a_slow_hand_is_played_in_the_longest_movement_and_told(rod):
-    slow = led(swung(rod).times * 3.2, swung(rod).joints)  # 3.2 s
+    times, joints = swung(rod)
+    slow = times * 3.2, joints  # 3.2 s
     lesson = give(rod, slow)
     assert lesson.demonstration.times[-1] == 1.6
     assert lesson.theta_d[-1] == 1.0
@@ -133,14 +132,14 @@ def test_a_recording_of_another_robot_is_refused(rod):
 
 def test_stillness_before_and_after_a_movement_is_left_out():
     times, turn = np.arange(201) / 100, np.clip(np.arange(201) / 100 - 0.5, 0, 0.8)
-    part = LedMovement(times, np.stack([turn, -turn], axis=1)).moving()
-    np.testing.assert_allclose(part.times, np.arange(81) / 100, atol=1e-12)
-    np.testing.assert_allclose(part.joints[[0, -1], 0], [0.0, 0.8], atol=1e-12)
+    kept, joints = moving(times, np.stack([turn, -turn], axis=1))
+    np.testing.assert_allclose(kept, np.arange(81) / 100, atol=1e-12)
+    np.testing.assert_allclose(joints[[0, -1], 0], [0.0, 0.8], atol=1e-12)
 
 
 def test_an_arm_that_did_not_move_teaches_nothing():
     with pytest.raises(ValueError, match="you did not move the arm"):
-        led(np.arange(201) / 100, np.zeros((201, 2))).moving()
+        moving(np.arange(201) / 100, np.zeros((201, 2)))
 
 
 def test_resampling_has_equal_steps_and_both_ends():
