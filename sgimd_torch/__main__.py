@@ -6,44 +6,19 @@ import importlib
 import os
 import sys
 from collections.abc import Sequence
-from typing import Final, NamedTuple
+from typing import Final
 
 from sgimd_torch import __version__
-from sgimd_torch.catalogue import unknown
+from sgimd_torch.catalogue import EXTRAS, WORDS, about, unknown
 from sgimd_torch.runs.process import command, loading
 
-
-class Command(NamedTuple):
-    """A command: the ``module`` whose ``main(argv)`` it is, one line ``about`` it, and the ``extra`` with what it
-    imports, at once or later; if that is not installed, the extra is named."""
-
-    module: str
-    about: str
-    extra: str = ""
-
-
-COMMANDS: Final = {
-    "run": Command("runs.command_line", "run one learner, evaluate it, write everything to a directory"),
-    "sweep": Command("runs.sweep", "many runs: options crossed with each other and with seeds, in parallel"),
-    "check": Command("views.check", "does an environment keep every promise? each slip by name"),
-    "demonstrations": Command(
-        "views.demonstrations", "check demonstrations on a robot, or import them from CSV and LeRobot", "plot"
-    ),
-    "suite": Command("views.suite", "one learner on many robots, against random movements", "plot"),
-    "benchmark": Command("views.benchmark", "goals of evaluation from what runs have reached"),
-    "table": Command("views.table", "results of runs, over their seeds"),
-    "report": Command("views.report.command", "one page about one run, or about many side by side", "report"),
-    "teach": Command("teach.command", "teach a learner by hand, in a browser", "teach"),
-    "film": Command("views.film.command", "a film of what a run has learnt", "film"),
-    "demo": Command("views.demo", "three learners side by side: one figure, one table", "plot"),
-}
 HELP: Final = f"""usage: sgimd COMMAND [OPTIONS]
 
 A robot arm learns where its float can land, by its own curiosity and by imitating a teacher
 (SGIM-D; Nguyen & Oudeyer, 2014).
 
 commands:
-{"".join(f"  {name:16}{each.about}{chr(10)}" for name, each in COMMANDS.items())}
+{"".join(f"  {name:16}{about('command', name)}{chr(10)}" for name in WORDS["command"])}
 examples:
   sgimd demo                                         see it learn, in a minute or two
   sgimd run --algorithm sgim-d --seed 3              one run of 5000 movements, into runs/sgim-d/seed-003
@@ -74,17 +49,16 @@ def _call(words: Sequence[str]) -> int:
     if words == ["--version"]:
         print(f"sgimd_torch {__version__}")
         return 0
-    if name not in COMMANDS:
-        raise unknown("command", name, COMMANDS, "; sgimd --help explains them")
-    chosen = COMMANDS[name]
+    if name not in WORDS["command"]:
+        raise unknown("command", name, WORDS["command"], "; sgimd --help explains them")
     try:
         with loading():
-            module = importlib.import_module(f"sgimd_torch.{chosen.module}")
+            module = importlib.import_module(f"sgimd_torch.{WORDS['command'][name]}")
         return int(module.main(words[1:]))
     except ModuleNotFoundError as error:
-        if not chosen.extra:
+        if name not in EXTRAS:
             raise
-        hint = f"pip install 'sgimd-torch[{chosen.extra}]' installs it"
+        hint = f"pip install 'sgimd-torch[{EXTRAS[name]}]' installs it"
         raise ImportError(f"sgimd {name} needs {error.name}, which is not installed; {hint}") from error
 
 

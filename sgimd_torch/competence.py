@@ -1,21 +1,15 @@
 """Performance and competence: how well was a goal met, and how well can it be met by now?
 
 Section 4.3 and eqs. (2) and (7) of Nguyen & Oudeyer (2014).
-    measure = partial(performance, rest=environment.rest, d_min=0.02)
-    competence = Competence(memory, measure); competence(context, goal)   # -1 never came near ... 0 reached
+    competence = Competence(problem); competence(context, goal)   # -1 never came near ... 0 reached
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
-from sgimd_torch.memory import Memory
+from sgimd_torch.parts import Judge, Problem
 from sgimd_torch.spaces import Array
-
-Performance = Callable[[Array, Array], Array]
-"""J: (goal, outcome) ``(..., outcome_dim)`` -> ``(...)`` in [-1, 0]; for a given goal it falls with their distance."""
 
 
 def performance(goal: Array, outcome: Array, rest: Array, d_min: float) -> Array:
@@ -41,17 +35,18 @@ def performance(goal: Array, outcome: Array, rest: Array, d_min: float) -> Array
     return -np.minimum(1.0, _distance(goal, outcome) / np.maximum(_distance(goal, rest), d_min))
 
 
-class Competence:
-    """gamma of eq. (2), the `memory` reading: the best performance remembered. In one context it never falls.
+class Competence(Judge):
+    """Competence by the best outcome ever remembered, as in the paper.
+
+    gamma of eq. (2), the `memory` reading. In one context it never falls.
 
     Deviation: the paper prints the minimum over memory, but J is negative, so the best is the maximum. J falls with
     distance, so the nearest outcome has the best. Deviation: eq. (2) asks for exactly the same context, which never
     comes again where contexts vary; the nearest exemplar in (context, outcome) is used instead.
     """
 
-    def __init__(self, memory: Memory, performance: Performance) -> None:
-        self.memory = memory
-        self.performance = performance
+    def __init__(self, problem: Problem) -> None:
+        super().__init__(problem)
         self._asked: tuple[bytes, bytes] | None = None
         self._row: int | None = None
 
@@ -62,28 +57,27 @@ class Competence:
         """
         asked = np.asarray(context).tobytes(), np.asarray(goal).tobytes()
         if asked != self._asked:
-            self._nearest = self.memory.nearest(context, goal)
-            self._asked, self._row, self._best = asked, None, _best(self.performance, goal, self.memory.outcomes[:0])
+            self._nearest = self.problem.memory.nearest(context, goal)
+            self._asked, self._row, self._best = asked, None, -1.0
         if (row := self._nearest.row) != self._row:
             assert row is not None
-            self._row, self._best = row, _best(self.performance, goal, self.memory.outcomes[row : row + 1])
+            self._row, self._best = row, _best(self.problem, goal, self.problem.memory.outcomes[row : row + 1])
         return self._best
 
 
-class AttemptCompetence:
-    """The `attempt` reading, SAGG-RIAC's own: the best performance of this attempt alone. It can fall when a movement
-    stops working, and then the interest measure sees a change."""
+class AttemptCompetence(Judge):
+    """Competence by the best outcome of the attempt alone.
 
-    def __init__(self, performance: Performance) -> None:
-        self.performance = performance
+    The `attempt` reading, SAGG-RIAC's own. It can fall when a movement stops working, and then interest sees a change.
+    """
 
     def __call__(self, context: Array, goal: Array, outcomes: Array) -> float:
         """In [-1, 0] from the ``outcomes`` ``(n, outcome_dim)`` of this attempt, -1 if nothing was executed."""
-        return _best(self.performance, goal, outcomes)
+        return _best(self.problem, goal, outcomes)
 
 
-def _best(performance: Performance, goal: Array, outcomes: Array) -> float:
-    return float(np.max(performance(goal, outcomes), initial=-1.0))
+def _best(problem: Problem, goal: Array, outcomes: Array) -> float:
+    return float(np.max(performance(goal, outcomes, problem.rest, problem.tolerance), initial=-1.0))
 
 
 def _distance(a: Array, b: Array) -> Array:

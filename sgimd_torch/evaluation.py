@@ -8,7 +8,6 @@ remembering, with random streams of its own.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -19,7 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from sgimd_torch.environments.protocol import BatchEnvironment, Environment, execute_many
 from sgimd_torch.files import read_npz, write_npz
-from sgimd_torch.spaces import Array, Box, Estimate, check_count, check_vector, first_entry, stream
+from sgimd_torch.parts import Inverse
+from sgimd_torch.spaces import Array, Box, check_count, check_vector, first_entry, stream
 
 SHIPPED = Path(__file__).with_name("data") / "benchmark.npz"
 TILES: Final = 358  # of the paper's benchmark
@@ -104,7 +104,7 @@ def contexts_of_goals(environment: Environment, n: int) -> Array:
 
 
 def evaluate(
-    inverse: Callable[[Array, Array], Estimate],
+    inverse: Inverse,
     environment: Environment,
     goals: Array,
     seed: int,
@@ -145,12 +145,7 @@ def evaluate(
     else:
         given = environment.contexts.check("context", context)
         contexts = np.broadcast_to(given, (len(goals), environment.contexts.dim))
-    many = getattr(inverse, "many", None)  # a forward model is ten times as fast in batches
-    if many is not None and (contexts == contexts[0]).all():
-        estimates = many(contexts[0], goals)
-    else:
-        estimates = [inverse(*each) for each in zip(contexts, goals, strict=True)]
-    thetas = np.stack([estimate.theta for estimate in estimates])
+    thetas = np.stack([estimate.theta for estimate in inverse.answer_many(contexts, goals)])
     copies = np.tile(thetas, (1 + repeats, 1))  # all goals once, then again: the judged rows do not depend on repeats
     landed = _landed(environment, np.tile(contexts, (1 + repeats, 1)), copies, seed, f"evaluation {step}")
     landed = landed.reshape(1 + repeats, *goals.shape)

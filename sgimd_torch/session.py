@@ -11,6 +11,7 @@ from __future__ import annotations
 import traceback
 import warnings
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,21 +19,18 @@ from numpy.typing import ArrayLike
 
 from sgimd_torch.environments.protocol import FAILURES, Environment, SimulationError, check_instance
 from sgimd_torch.learner import Learner, ReplayError
-from sgimd_torch.learner.replay import TEACHER, BeforeMovement, replay
-from sgimd_torch.record import Event, Kind, Record
-from sgimd_torch.spaces import Array, Demonstration, Episode, Move, Request, check_count, check_point, read_only, stream
+from sgimd_torch.learner.replay import BeforeMovement, replay
+from sgimd_torch.parts import Teacher
+from sgimd_torch.spaces import Array, Demonstration, Episode, Request, check_count, check_point, read_only, stream
+from sgimd_torch.teachers import Demonstrator
 
 if TYPE_CHECKING:
-    from sgimd_torch.teachers import Teacher
-    from sgimd_torch.teachers.answering import Demonstrator
+    from sgimd_torch.record import Record
 
 __all__ = ["Execute", "NoOutcomeError", "ReplayError", "live", "run"]
 
 Execute = Callable[[int, Array, Array], Array]
 """(index, context, theta) -> outcome of movement ``index``."""
-
-Note = Callable[[Event], object]
-"""Writes down what happened."""
 
 
 class NoOutcomeError(RuntimeError):
@@ -85,8 +83,8 @@ def run(
     check_instance(environment)
     if not isinstance(learner, Learner):
         raise ValueError(f"learner must be a Learner, got a {type(learner).__name__}; sagg_riac(environment, seed)?")
-    if teacher is not None and not hasattr(teacher, "offer"):
-        raise ValueError(f"teacher must have offer(), got a {type(teacher).__name__}; PeriodicTeacher(shown, rng)?")
+    if teacher is not None and not isinstance(teacher, Teacher):
+        raise ValueError(f"teacher must be a Teacher, got a {type(teacher).__name__}; PeriodicTeacher(shown, rng)?")
     made = learner.movements
     if check_count("movements", movements, 1) <= made:
         raise ValueError(
@@ -94,46 +92,45 @@ def run(
         )
     execute = live(environment, seed) if execute is None else execute
     before = BeforeMovement()
-    note: Note = (lambda event: None) if record is None else record.add
-    if record is not None:
-        before = yield from replay(learner, record.events(), teacher=teacher)
-    in_a_row = 0
-    for index in range(learner.movements, movements):
-        before = _offered(learner, teacher, index, before, note)
-        context, move, outcome = None, None, None
-        try:
-            context = _observed(learner, environment, index, seed)
-            if teachers and before.request is None:
-                before = _asked(learner, environment, context, teachers, before, note)
-            move = learner.ask(context)
-            if move is not None:
-                outcome = _tried("outcome", environment.outcomes.dim, execute, index, context, move.theta)
-        except _NoOutcome as error:
-            failed, in_a_row, cause = str(error), in_a_row + 1, error.__cause__
-            learner.fail(failed)
-            note(_event(Kind.FAILED, context, move, reply=failed))
-            seen = np.full(environment.contexts.dim, np.nan) if context is None else context
-            yield Episode(index, seen, move, None, *before, failed)
-            if in_a_row == failures:
-                raise NoOutcomeError(f"{failures} movements in a row failed, the last one: {failed}") from cause
-        else:
-            if outcome is not None:
-                in_a_row = 0
-                learner.tell(outcome)
-            note(_event(Kind.RESTED if outcome is None else Kind.MOVED, context, move, outcome))
-            yield Episode(index, context, move, outcome, *before)
-        before = BeforeMovement()
+    with ExitStack() as until_the_end:
+        if record is not None:
+            before = yield from replay(learner, record.events(), teacher=teacher)
+            learner.listeners.append(record.add)
+            until_the_end.callback(learner.listeners.remove, record.add)
+        in_a_row = 0
+        for index in range(learner.movements, movements):
+            before = _offered(learner, teacher, index, before)
+            context, move, outcome = None, None, None
+            try:
+                context = _observed(learner, environment, index, seed)
+                if teachers and before.request is None:
+                    before = _asked(learner, environment, context, teachers, before)
+                move = learner.ask(context)
+                if move is not None:
+                    outcome = _tried("outcome", environment.outcomes.dim, execute, index, context, move.theta)
+            except _NoOutcome as error:
+                failed, in_a_row, cause = str(error), in_a_row + 1, error.__cause__
+                learner.fail(failed)
+                seen = np.full(environment.contexts.dim, np.nan) if context is None else context
+                yield Episode(index, seen, move, None, *before, failed)
+                if in_a_row == failures:
+                    raise NoOutcomeError(f"{failures} movements in a row failed, the last one: {failed}") from cause
+            else:
+                if outcome is not None:
+                    in_a_row = 0
+                    learner.tell(outcome)
+                yield Episode(index, context, move, outcome, *before)
+            before = BeforeMovement()
 
 
-def _offered(
-    learner: Learner, teacher: Teacher | None, index: int, before: BeforeMovement, note: Note
-) -> BeforeMovement:
+def _offered(learner: Learner, teacher: Teacher | None, index: int, before: BeforeMovement) -> BeforeMovement:
     """Let the teacher offer a demonstration, unless one waits for an answer."""
-    offered = None if teacher is None or learner.lesson_waits else teacher.offer(index, learner.memory)
+    if teacher is None or learner.lesson_waits:
+        return before
+    offered = teacher.offer(index, learner.memory)
     if offered is None:
         return before
-    learner.watch(offered, offered=True)
-    note(Event(Kind.SHOWN, lesson=offered, who=getattr(teacher, "who", TEACHER)))
+    learner.watch(offered, who=teacher.who)
     return before._replace(demonstration=offered)
 
 
@@ -150,27 +147,17 @@ def _asked(
     context: Array,
     teachers: Mapping[str, Demonstrator],
     before: BeforeMovement,
-    note: Note,
 ) -> BeforeMovement:
     """Let the learner ask one of the ``teachers`` for a demonstration, and show it the answer."""
     request = learner.request(context)
     if request is None:
         return before
     answer, reply = _answer(learner, environment, context, request, teachers)
-    note(Event(Kind.ASKED, context, goal=request.goal, who=request.teacher, strategy=request.strategy, reply=reply))
     if answer is None:
+        learner.go_on_alone(reply)
         return before._replace(request=request, reply=reply)
     learner.watch(answer)
-    note(Event(Kind.SHOWN, lesson=answer, who=request.teacher))
     return BeforeMovement(answer, request, reply)
-
-
-def _event(
-    kind: Kind, context: Array | None, move: Move | None, outcome: Array | None = None, reply: str | None = None
-) -> Event:
-    if move is None:
-        return Event(kind, context, reply=reply)
-    return Event(kind, context, move.theta, move.goal, outcome, move.origin, reply=reply)
 
 
 class _NoOutcome(Exception):

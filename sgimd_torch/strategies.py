@@ -2,61 +2,34 @@
 
 Sections 3.1, 4.2 and 4.4 of Nguyen & Oudeyer (2014). An attempt is a generator: it yields a movement and is sent the
 outcome. So it reads like the paper's pseudo-code, and a demonstration can interrupt it at any movement.
-    autonomous: Babble, Rest, GoalBabbling          social: Imitate, Emulate, Remember
+    autonomous: Babble, Rest, GoalBabbling          social: Mimic, Imitate, Emulate, Remember
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
-from typing import Protocol
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from sgimd_torch.competence import Competence
-from sgimd_torch.goals.protocol import Goals
-from sgimd_torch.memory import Memory
-from sgimd_torch.spaces import Array, AskingAttempt, Attempt, Box, Demonstration, Estimate, Move, Search, check_count
-
-Judge = Callable[[Array, Array, Array], float]
-"""(context, goal, outcomes of the attempt) -> the competence at the goal when the attempt has ended, in [-1, 0]."""
-
-
-Explore = Callable[[Array], Array]
-"""context -> the next theta of global exploration. If it has an attribute ``share`` that is not None, this is the
-probability of the global regime, whatever the competence."""
+from sgimd_torch.explore.anywhere import Anywhere
+from sgimd_torch.goals.interest_map import InterestMap
+from sgimd_torch.goals.regions import Region
+from sgimd_torch.parts import Explore, Goals, Judge, Problem, Search, Social, Strategy
+from sgimd_torch.searches.simplex import NelderMead
+from sgimd_torch.spaces import Array, Attempt, Demonstration, Move, check_count
 
 
-class Strategy(Protocol):
-    """What a learner does on its own. An attempt stays in one context, and has to yield at least one movement or rest,
-    also if its requests are not answered."""
-
-    def attempt(self, context: Array) -> AskingAttempt:
-        """Movements for one goal, or one movement without a goal."""
-        ...
-
-
-class SocialStrategy(Protocol):
-    """How a learner answers a demonstration. It may yield nothing."""
-
-    def attempt(self, context: Array, theta_d: Array, demonstration: Demonstration) -> Attempt:
-        """Movements after ``demonstration``, which corresponds to the policy ``theta_d``."""
-        ...
-
-
-class Babble:
+class Babble(Strategy):
     """Random exploration of the policy space: one uniform theta."""
-
-    def __init__(self, policies: Box, rng: np.random.Generator) -> None:
-        self.policies = policies
-        self.rng = rng
 
     def attempt(self, context: Array) -> Attempt:
         """One movement."""
-        yield Move(self.policies.sample(self.rng), None, "babble")
+        yield Move(self.problem.policies.sample(self.problem.stream("babble")), None, "babble")
 
 
-class Rest:
+class Rest(Strategy):
     """Stay still for one movement: the observation learner, or the imitation learner before the first demonstration."""
 
     def attempt(self, context: Array) -> Attempt:
@@ -64,66 +37,65 @@ class Rest:
         yield None
 
 
-class GoalBabbling:
+class GoalBabbling(Strategy):
     """Goal-directed policy optimisation, section 4.4: choose a goal, then search for a movement that reaches it.
 
+    The inverse model is that of the problem. Competence, by all movements remembered, decides between the regimes.
+
     Args:
-        policies: Pi.
-        memory: what has been reached so far; only read.
-        goals: gives goals, and is told the competence at them.
-        inverse: the inverse model, (context, goal) -> estimate.
-        search: refines the estimate movement by movement.
-        competence: gamma, from memory; decides between the regimes.
-        judge: the competence that ``goals`` is told at the end of an attempt.
-        rng: draws the regimes.
-        budget: the most movements for one goal.
-        tolerance: distance (m) at which a goal counts as reached.
-        explore: draws the movements of the global regime; None: uniformly from Pi, by ``rng``.
+        problem: what has to be learnt, with its inverse model.
+        goals: goal model.
+        search: search, which refines the estimate of the inverse model.
+        explore: explorer, for the movements of the global regime.
+        judge: judge of the competence that the goal model is told at the end of an attempt.
+        budget: largest number of movements for one goal. Deviation: the paper has no such number; with a complete
+            simplex of 26 movements a goal would take 60 or so, and a learner with the rod would come to a hundred goals
+            in its life.
+        tolerance: distance in the unit of T at which a goal counts as reached; None for the outcome noise, but at least
+            .02.
         global_range: least and greatest probability of the global exploration regime.
-        give_up: a goal with competence below this is given up at the first movement that does not raise it; -1 never
-            gives up. Deviation: the paper spends the whole budget on every goal. But in a task space far larger than
-            what can be reached nearly all goals are hopeless, and movements spent on them are lost.
+        give_up: competence below which a goal is given up at the first movement that does not raise it; -1 never gives
+            up. Deviation: the paper spends the whole budget on every goal. But in a task space far larger than what can
+            be reached nearly all goals are hopeless, and movements spent on them are lost.
 
     Raises:
-        ValueError: a number out of its range.
+        ValueError: a number out of its range, or a part of another kind.
     """
 
     def __init__(
         self,
-        policies: Box,
-        memory: Memory,
-        goals: Goals,
-        inverse: Callable[[Array, Array], Estimate],
-        search: Search,
-        competence: Competence,
-        judge: Judge,
-        rng: np.random.Generator,
+        problem: Problem,
         *,
+        goals: Callable[[Problem], Goals] = InterestMap,
+        search: Callable[[Problem], Search] = NelderMead,
+        explore: Callable[[Problem], Explore] = Anywhere,
+        judge: Callable[[Problem], Judge] = Competence,
         budget: int = 15,
-        tolerance: float = 0.02,
-        explore: Explore | None = None,
+        tolerance: float | None = None,
         global_range: tuple[float, float] = (0.05, 0.95),
         give_up: float = -0.5,
     ) -> None:
+        super().__init__(problem)
+        tolerance = problem.tolerance if tolerance is None else tolerance
         if not 0 <= tolerance < np.inf:
-            raise ValueError(f"tolerance must be a distance (m), finite and >= 0, got {tolerance}")
+            raise ValueError(f"tolerance must be a distance, finite and >= 0, got {tolerance}")
         if len(global_range) != 2 or not 0 <= global_range[0] <= global_range[1] <= 1:
             raise ValueError(f"global_range must be two probabilities, the least first, got {global_range}")
         if not give_up <= 0:
             raise ValueError(f"give_up must be a competence, 0 at most, got {give_up}")
-        self.policies = policies
-        self.memory = memory
-        self.goals = goals
-        self.inverse = inverse
-        self.search = search
-        self.competence = competence
-        self.judge = judge
-        self.rng = rng
+        self.memory, self.inverse, self.rng = problem.memory, problem.inverse, problem.stream("regime")
+        self.competence = Competence(problem)
+        self.explore = Explore.of(explore, problem)
+        self.goals = Goals.of(goals, problem)
+        self.search = Search.of(search, problem)
+        self.judge = Judge.of(judge, problem)
         self.budget = check_count("budget", budget, 1)
-        self.tolerance = tolerance
-        self.explore: Explore = explore if explore is not None else lambda context: policies.sample(rng)
-        self.global_range = global_range
-        self.give_up = give_up
+        self.tolerance, self.global_range, self.give_up = tolerance, global_range, give_up
+
+    @property
+    def regions(self) -> Sequence[Region]:
+        """Regions of its goal model."""
+        return self.goals.regions
 
     def attempt(self, context: Array) -> Attempt:
         """Choose a goal and pursue it."""
@@ -176,9 +148,8 @@ class GoalBabbling:
         """Global exploration is the more likely, the farther the goal is from all that was reached."""
         if len(self.memory) == 0:
             return 1.0
-        share: float | None = getattr(self.explore, "share", None)
-        if share is not None:
-            return share
+        if self.explore.share is not None:
+            return self.explore.share
         # Deviation: the paper's probability is -J itself. It is kept off 0 and 1, so that both regimes stay possible.
         return float(np.clip(-self.competence(context, goal), *self.global_range))
 
@@ -194,62 +165,38 @@ class GoalBabbling:
                 return
 
 
-class Imitate:
+class Mimic(Social):
     """Imitate a policy, section 4.2: repeat theta_d with small variations, the first time exactly.
 
     Args:
-        policies: Pi.
-        rng: draws the variations.
+        problem: what has to be learnt.
         repeats: movements for one demonstration; None goes on until the next demonstration.
         epsilon: bound of the variation in each parameter, |theta_rand| < epsilon.
-        babbling: its interest map is told the competence at the demonstrated outcome afterwards (emulate a goal,
-            section 3.2.3); None to imitate only. A demonstrated outcome outside T is imitated, but never a goal.
-        outcomes: T; needed with ``babbling``.
-        strategy: by what name the interest map is told of it.
+        draws_from: name of the random stream of the variations.
 
     Raises:
-        ValueError: a number out of its range, or ``babbling`` without ``outcomes``.
+        ValueError: a number out of its range.
     """
 
     def __init__(
         self,
-        policies: Box,
-        rng: np.random.Generator,
+        problem: Problem,
         *,
         repeats: int | None = 10,
         epsilon: float = 0.05,
-        babbling: GoalBabbling | None = None,
-        outcomes: Box | None = None,
-        strategy: str = "social",
+        draws_from: str = "imitate",
     ) -> None:
-        if (babbling is None) != (outcomes is None):
-            raise ValueError("Imitate needs babbling and outcomes together, or neither of them")
-        if repeats is not None:
-            check_count("repeats", repeats, 1)
+        super().__init__(problem)
         if not 0 <= epsilon < np.inf:
             raise ValueError(f"epsilon must be a bound of variations, finite and >= 0, got {epsilon}")
-        self.policies = policies
-        self.rng = rng
-        self.repeats = repeats
-        self.epsilon = epsilon
-        self.babbling = babbling
-        self.outcomes = outcomes
-        self.strategy = strategy
+        self.repeats = repeats if repeats is None else check_count("repeats", repeats, 1)
+        self.epsilon, self.rng = epsilon, problem.stream(draws_from)
 
     def attempt(self, context: Array, theta_d: Array, demonstration: Demonstration) -> Attempt:
         """theta_d, then its variations."""
-        goal = demonstration.outcome
-        if self.babbling is None or self.outcomes is None or not self.outcomes.contains(goal):
-            yield from self._repeat(theta_d, goal, [])
-            return
-        outcomes: list[Array] = []
-        before = self.babbling.competence(context, goal)
-        try:
-            yield from self._repeat(theta_d, goal, outcomes)
-        finally:  # also when the next demonstration interrupts
-            self.babbling.conclude(context, goal, outcomes, before, self.strategy)
+        yield from self.repeat(theta_d, demonstration.outcome, [])
 
-    def _repeat(self, theta_d: Array, goal: Array, outcomes: list[Array]) -> Attempt:
+    def repeat(self, theta_d: Array, goal: Array, outcomes: list[Array]) -> Attempt:
         """Movements; their outcomes are appended to ``outcomes``."""
         for repeat in range(self.repeats) if self.repeats is not None else itertools.count():
             # Deviation: the paper varies all repeats; the exact one shows what theta_d itself leads to.
@@ -257,28 +204,68 @@ class Imitate:
             outcomes.append((yield Move(theta, goal, "imitate")))
 
     def _vary(self, theta_d: Array) -> Array:
-        return self.policies.clip(theta_d + self.rng.uniform(-self.epsilon, self.epsilon, theta_d.shape))
+        return self.problem.policies.clip(theta_d + self.rng.uniform(-self.epsilon, self.epsilon, theta_d.shape))
 
 
-class Emulate:
-    """Take over the teacher's goal but not the movement: pursue the demonstrated outcome by goal babbling."""
+class Imitate(Mimic):
+    """A short imitation, then emulation of the goal, as in SGIM-D.
 
-    def __init__(self, babbling: GoalBabbling, outcomes: Box, *, strategy: str = "social") -> None:
-        self.babbling, self.outcomes, self.strategy = babbling, outcomes, strategy
+    Section 3.2.3: afterwards the goal model is told the competence at the demonstrated outcome. An outcome outside T is
+    imitated, but never a goal.
+
+    Args:
+        problem: what has to be learnt, with its goal babbling.
+        repeats: movements for one demonstration; None goes on until the next demonstration.
+        epsilon: bound of the variation in each parameter, |theta_rand| < epsilon.
+    """
+
+    def __init__(self, problem: Problem, *, repeats: int | None = 10, epsilon: float = 0.05) -> None:
+        super().__init__(problem, repeats=repeats, epsilon=epsilon)
+        self.babbling = _babbling(problem)
+
+    def attempt(self, context: Array, theta_d: Array, demonstration: Demonstration) -> Attempt:
+        """theta_d, then its variations."""
+        goal = demonstration.outcome
+        if not self.problem.outcomes.contains(goal):
+            yield from super().attempt(context, theta_d, demonstration)
+            return
+        outcomes: list[Array] = []
+        before = self.babbling.competence(context, goal)
+        try:
+            yield from self.repeat(theta_d, goal, outcomes)
+        finally:  # also when the next demonstration interrupts
+            self.babbling.conclude(context, goal, outcomes, before, "social")
+
+
+class Emulate(Social):
+    """Pursues the demonstrated outcome, but not by the demonstrated movement.
+
+    Args:
+        problem: what has to be learnt.
+        strategy: name of the strategy that the goal model is told.
+    """
+
+    def __init__(self, problem: Problem, *, strategy: str = "social") -> None:
+        super().__init__(problem)
+        self.babbling, self.strategy = _babbling(problem), strategy
 
     def attempt(self, context: Array, theta_d: Array, demonstration: Demonstration) -> Attempt:
         """Movements towards the demonstrated outcome; none if it lies outside T."""
-        if self.outcomes.contains(demonstration.outcome):
+        if self.problem.outcomes.contains(demonstration.outcome):
             yield from self.babbling.pursue(context, demonstration.outcome, self.strategy)
 
 
-class Remember:
+class Remember(Social):
     """Learn by observation: remember (theta_d, tau_d) as if it had been executed, and do not move."""
-
-    def __init__(self, memory: Memory) -> None:
-        self.memory = memory
 
     def attempt(self, context: Array, theta_d: Array, demonstration: Demonstration) -> Attempt:
         """No movement."""
-        self.memory.add(context, theta_d, demonstration.outcome)
+        self.problem.memory.add(context, theta_d, demonstration.outcome)
         yield from ()  # makes this a generator
+
+
+def _babbling(problem: Problem) -> GoalBabbling:
+    """The goal babbling of a learner, whose goals a demonstration adds to."""
+    if not isinstance(problem.autonomous, GoalBabbling):
+        raise ValueError(f"a demonstrated goal needs goal babbling, got a {type(problem.autonomous).__name__}")
+    return problem.autonomous

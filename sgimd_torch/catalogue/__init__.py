@@ -1,312 +1,226 @@
-"""A list of words: everything that the command line can name, one record each, and where it is.
+"""The table of words: all that the command line can name, and where it is.
 
-    find("goals", "grid").load()                    # ProgressGrid; imported now
-    find("goals", "mypackage.goals:Curious")        # of your own
-What can be set of a thing is told by its own signature, see `sgimd_torch.catalogue.options`; nothing here repeats it.
+    load_word("goals", "grid")                    # ProgressGrid; imported now
+    load_word("goals", "mypackage.goals:Curious") # of your own
+Whoever leaves a feature out deletes its folder and its lines of this table. A description is the first line of the
+docstring at the place, options are its signature (`sgimd_torch.catalogue.options`); nothing here repeats them.
 """
 
 from __future__ import annotations
 
+import ast
 import importlib
 import inspect
 import os
 import sys
-from collections.abc import Callable, Collection, Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Iterable
 from difflib import get_close_matches
-from functools import partial, wraps
+from functools import cache, partial
+from itertools import pairwise
+from pathlib import Path
 from typing import Any, Final
 
-
-@dataclass(frozen=True)
-class Entry:
-    """One thing with a name.
-
-    Args:
-        at: where it is, ``package.module:attribute``.
-        about: what it is, for ``--help``.
-        label, colour: what figures call an algorithm, and how they draw it.
-        fixed: its parameter -> value, where the word is a preset of something more general; a text with a colon is an
-            attribute, loaded like ``at``.
-        teacher: of an algorithm that is shown something: when, unless a run says otherwise.
-    """
-
-    at: str
-    about: str
-    label: str = ""
-    colour: str = "black"
-    fixed: Mapping[str, object] = field(default_factory=dict)
-    teacher: str = "periodic"
-
-    def load(self) -> Any:
-        """The thing itself, with what is fixed.
-
-        Raises:
-            ValueError: a package that it needs is not installed, or broken.
-        """
-        fixed = {
-            name: load(value) if isinstance(value, str) and ":" in value else value
-            for name, value in self.fixed.items()
-        }
-        return partial(load(self.at), **fixed) if fixed else load(self.at)
-
-
-_IN_THE_PACKAGE: Final = "sgimd_torch"
-_ALONE: Final = {"correspondence": None, "imitations": 0, "epsilon": 0.0}  # a learner without a teacher
-_SCHOOL: Final = (  # of quality diversity
-    ("map-elites", "fills an archive of outcomes", "MAP-Elites", ("#56b4e9", "#1f78a8")),
-    ("isoline", "the same along lines between elites", "Isoline", ("#999933", "#5c5c1f")),
-    ("cma-me", "the same with evolution strategies", "CMA-ME", ("#e69f00", "#8f6300")),
-    ("cma-mae", "the same with thresholds that rise slowly", "CMA-MAE", ("#882255", "#4d1330")),
-)
-
-
-def _at(place: str, about: str, label: str = "", colour: str = "black", **more: Any) -> Entry:
-    return Entry(f"{_IN_THE_PACKAGE}.{place}", about, label, colour, **more)
-
-
-def _rod(about: str, **fixed: object) -> Entry:
-    return _at("runs.tasks.rods:fishing_rod", about, fixed=fixed)
-
-
-def _toy(name: str, side: float, about: str, *, module: str = "toys", **more: object) -> Entry:
-    make = f"{_IN_THE_PACKAGE}.environments.{module}:{name}"
-    return _at("runs.tasks.robots:toy", about, fixed={"make": make, "side": side, "taught": False, **more})
-
-
-def _answering(about: str, knows: str = "", **fixed: object) -> Entry:
-    known = {"knows": f"{_IN_THE_PACKAGE}.teachers.answering:{knows}"} if knows else {}
-    return _at("teachers.answering:AnsweringTeacher", about, fixed={**known, **fixed})
-
-
 ROD: Final = "fishing-rod"
-# Colours after Okabe & Ito: distinct with any colour vision, and in grey.
-CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
+WORDS: Final[dict[str, dict[str, str]]] = {
     "algorithm": {
-        "random": _at("algorithms:random_exploration", "uniform movements", "Random", "#7f7f7f"),
-        "sagg-riac": _at("algorithms:sagg_riac", "goal babbling", "SAGG-RIAC", "#0072b2"),
-        "practice": _at("algorithms:practice", "one movement a goal, by a local process", "Practice", "#332288"),
-        "practice-taught": _at(
-            "algorithms:practice_taught",
-            "the same, and does once what it is shown",
-            "Practice, taught",
-            "#aa4499",
-            teacher="at-once",
-        ),
-        "observation": _at("algorithms:observation", "watches and remembers, never moves", "Observation", "#cc79a7"),
-        "imitation": _at("algorithms:imitation", "varies the last demonstration", "Imitation", "#009e73"),
-        "sgim-d": _at("algorithms:sgim_d", "goal babbling and short imitations", "SGIM-D", "#d55e00"),
-        "sgim-im": _at("algorithms.asking:sgim_im", "decides when to ask the one of --teachers", "SGIM-IM", "#661100"),
-        "sgim-acts": _at("algorithms.asking:sgim_acts", "and which of them for what, and how", "SGIM-ACTS", "#cc6677"),
-        "sgim-eer": _at("rivals.entropy:sgim_eer", "asks when that takes away more doubt", "By entropy", "#117733"),
-        **{
-            f"{name}{ending}": _at(
-                f"rivals.quality_diversity:{name.replace('-', '_')}",
-                f"{about}{shown} (extra rivals)",
-                f"{label}, taught" if shown else label,
-                colours[bool(shown)],
-                fixed={} if shown else _ALONE,
-            )
-            for ending, shown in (("", ""), ("-taught", ", and imitates what it is shown"))
-            for name, about, label, colours in _SCHOOL
-        },
+        "random": "algorithms:random_exploration",
+        "sagg-riac": "algorithms:sagg_riac",
+        "practice": "algorithms.practice:practice",
+        "practice-taught": "algorithms.practice:practice_taught",
+        "observation": "algorithms:observation",
+        "imitation": "algorithms:imitation",
+        "sgim-d": "algorithms:sgim_d",
+        "sgim-im": "asking.algorithms:sgim_im",
+        "sgim-im-search": "asking.algorithms:sgim_im_search",
+        "sgim-acts": "asking.algorithms:sgim_acts",
+        "sgim-acts-search": "asking.algorithms:sgim_acts_search",
+        "sgim-eer": "asking.algorithms:sgim_eer",
+        "map-elites": "rivals.quality_diversity:map_elites_alone",
+        "map-elites-taught": "rivals.quality_diversity:map_elites",
+        "isoline": "rivals.quality_diversity:isoline_alone",
+        "isoline-taught": "rivals.quality_diversity:isoline",
+        "cma-me": "rivals.quality_diversity:cma_me_alone",
+        "cma-me-taught": "rivals.quality_diversity:cma_me",
+        "cma-mae": "rivals.quality_diversity:cma_mae_alone",
+        "cma-mae-taught": "rivals.quality_diversity:cma_mae",
     },
     "environment": {
-        ROD: _rod("the paper's arm with a rod, in MuJoCo"),
-        "rod-wind": _rod("the same in a side wind, up to a quarter of the float's weight: a context", max_wind=0.05),
-        "rod-yaw": _rod("the same with its base turned by up to half a radian: a context", max_yaw=0.5),
-        "rod-long": _rod("the same with a line half as long again, taught with the shorter one", line=1.5),
-        "planar-arm-7": _at("runs.tasks.robots:planar_arm", "7 joints, no noise", fixed={"n_joints": 7}),
-        "planar-arm-50": _at("runs.tasks.robots:planar_arm", "50 joints, no noise", fixed={"n_joints": 50}),
-        "swimmer": _at("runs.tasks.robots:swimmer", "gymnasium's Swimmer-v5: three links, two motors (extra gym)"),
-        "half-reached": _at("runs.tasks.robots:half_reached", "7 joints, less than half of T can be reached"),
-        "toss": _toy("toss", 0.4, "a ball in the wind, which is the context", taught=True),
-        "crawler": _toy("crawler", 0.1, "four legs, whose phases are periodic parameters"),
-        "two-elbows": _toy("two_elbows", 0.1, "an arm with two separate families of postures"),
-        "spatial-arm": _toy("spatial_arm", 25.0, "six joints, three outcomes, in cm"),
-        "puck": _toy("puck", 0.1, "a puck that has to be hit; where it lies is the context", module="objects"),
-        "fetch": _toy("fetch", 0.1, "a ball that has to be grasped", module="objects"),
+        ROD: "runs.tasks.rods:fishing_rod",
+        "rod-wind": "runs.tasks.rods:rod_wind",
+        "rod-yaw": "runs.tasks.rods:rod_yaw",
+        "rod-long": "runs.tasks.rods:rod_long",
+        "planar-arm-7": "runs.tasks.robots:planar_arm_7",
+        "planar-arm-50": "runs.tasks.robots:planar_arm_50",
+        "swimmer": "runs.tasks.robots:swimmer",
+        "half-reached": "runs.tasks.robots:half_reached",
+        "toss": "runs.tasks.robots:toss",
+        "crawler": "runs.tasks.robots:crawler",
+        "two-elbows": "runs.tasks.robots:two_elbows",
+        "spatial-arm": "runs.tasks.robots:spatial_arm",
+        "puck": "runs.tasks.robots:puck",
+        "fetch": "runs.tasks.robots:fetch",
     },
     "goals": {
-        "interest-map": _at("goals.interest_map:InterestMap", "where competence changes, in regions"),
-        "grid": _at("goals.progress_grid:ProgressGrid", "the same in cells that never split"),
-        "alp-gmm": _at("goals.alp_gmm:AlpGmm", "Gaussians of high progress (extra rivals)"),
-        "uniform": _at("goals.uniform:UniformGoals", "anywhere in T, all equally likely"),
-        "within-reach": _at("goals.within_reach:WithinReach", "the same where T is within reach, else around what is"),
+        "interest-map": "goals.interest_map:InterestMap",
+        "grid": "goals.progress_grid:ProgressGrid",
+        "alp-gmm": "rivals.alp_gmm:AlpGmm",
+        "uniform": "goals.uniform:UniformGoals",
+        "within-reach": "goals.within_reach:WithinReach",
+        "strategic": "asking.interest:StrategicInterest",
+        "entropy": "asking.entropy:EntropyGoals",
     },
     "progress": {
-        "gained": _at("goals.regions:gained_progress", "how much attempts raise the competence at their own goals"),
-        "absolute": _at("goals.regions:absolute_progress", "newer competences against older ones, the paper's eq. (3)"),
-        "signed": _at("goals.regions:signed_progress", "the same, but falling competence does not count"),
-        "paired": _at("goals.regions:paired_progress", "difference from the competence at the nearest earlier goal"),
+        "gained": "goals.regions:gained_progress",
+        "absolute": "goals.regions:absolute_progress",
+        "paired": "goals.regions:paired_progress",
     },
     "search": {
-        "nelder-mead": _at("searches.simplex:nelder_mead", "a simplex of neighbours, a little noise on every movement"),
-        "nelder-mead-exact": _at("searches.simplex:nelder_mead", "without the noise", fixed={"noise": 0.0}),
-        "nelder-mead-complete": _at(
-            "searches.simplex:nelder_mead",
-            "without the noise, from the paper's complete simplex of 26, ended by the budget alone",
-            fixed={"noise": 0.0, "complete": True, "xatol": 1e-4, "fatol": 1e-4},
-        ),
-        "perturb": _at("searches.perturb:perturb", "the best so far plus noise"),
-        "practice": _at("searches.perturb:practise", "what the inverse model infers plus a little noise"),
-        "cma-es": _at("searches.cma_es:cma_es", "an evolution strategy (extra rivals)"),
-        "gradient": _at("searches.through_model:gradient_search", "by the gradient of a forward model (extra forward)"),
-        "gauss-newton": _at(
-            "searches.through_model:gradient_search",
-            "a new plan through it for each movement (extra forward)",
-            fixed={"propose": "sgimd_torch.searches.through_model:gauss_newton"},
-        ),
+        "nelder-mead": "searches.simplex:NelderMead",
+        "nelder-mead-exact": "searches.simplex:exact",
+        "nelder-mead-complete": "searches.simplex:complete",
+        "perturb": "searches.perturb:Perturb",
+        "vary": "searches.perturb:Vary",
+        "cma-es": "rivals.cma_es:CmaEs",
+        "gradient": "forward_model.search:GradientSearch",
     },
     "explore": {
-        "anywhere": _at("algorithms:anywhere", "uniformly from Pi"),
-        "widening": _at("searches.widening:Widening", "around the middle of Pi, as wide as can be predicted"),
-        "returning": _at("searches.returning:Returning", "the same; if effects are rare, around what had one"),
+        "anywhere": "explore.anywhere:Anywhere",
+        "widening": "explore.widening:Widening",
+        "returning": "explore.returning:Returning",
     },
     "inverse": {
-        "linear": _at("inverses.locally_linear:LocallyLinear", "eq. (9) corrected to first order"),
-        "paper": _at("inverses.local:LocalInverse", "the weighted mean of eq. (9)"),
-        "nearest": _at("inverses.local:NearestNeighbour", "the movement that came nearest"),
-        "process": _at("inverses.local_process:LocalProcess", "a local Gaussian process, where it beats the nearest"),
-        "among-effects": _at("inverses.among_effects:AmongEffects", "the same; if effects are rare, from them alone"),
-        "model": _at("inverses.proved:ProvedModel", "process, then a forward model that beats it (extra forward)"),
-        "model-alone": _at(
-            "inverses.through_model:ModelInverse",
-            "linear when learning, a forward model in evaluations, proved or not (extra forward)",
-        ),
+        "linear": "inverses.locally_linear:LocallyLinear",
+        "paper": "inverses.local:LocalInverse",
+        "nearest": "inverses.nearest:NearestNeighbour",
+        "process": "inverses.local_process:LocalProcess",
+        "among-effects": "inverses.among_effects:AmongEffects",
+        "model": "forward_model.proved:ProvedModel",
+        "model-alone": "forward_model.inverse:ModelAlone",
     },
     "judge": {
-        "memory": _at("algorithms:remembered", "competence by all movements ever made, as in the paper"),
-        "attempt": _at("algorithms:attempted", "by those made for this goal"),
+        "memory": "competence:Competence",
+        "attempt": "competence:AttemptCompetence",
     },
     "social": {
-        "imitate": _at("algorithms:imitating", "repeat a demonstration a few times"),
-        "emulate": _at("algorithms:emulating", "pursue its outcome in the learner's own way"),
-    },
-    "base": {
-        "practice": _at("algorithms.asking:practised", "one movement a goal, and once what is shown"),
-        "search": _at("algorithms.asking:searched", "a search at each goal and short imitations, as in the papers"),
+        "imitate": "strategies:Imitate",
+        "emulate": "strategies:Emulate",
     },
     "teacher": {
-        "periodic": _at("teachers:PeriodicTeacher", "one every so many movements"),
-        "initial": _at("teachers:InitialTeacher", "all at the start, one every so many movements"),
-        "at-once": _at("teachers:InitialTeacher", "all at the start, one for each movement", fixed={"every": 1}),
-        "asked": _at("teachers:AskedTeacher", "when the learner stalls"),
-        "by-hand": _at("teach.by_hand:nobody", "a person, whenever they like: sgimd teach"),
+        "periodic": "teachers:PeriodicTeacher",
+        "initial": "teachers:InitialTeacher",
+        "at-once": "teachers:at_once",
+        "asked": "teachers:AskedTeacher",
+        "by-hand": "teach.by_hand:ByHand",
     },
     "choose": {
-        "least-explored": _at("teachers:least_explored", "the one whose outcome the learner has reached least"),
-        "random": _at("teachers:at_random", "any"),
+        "least-explored": "teachers:least_explored",
+        "random": "teachers:at_random",
     },
     "teachers": {
-        "all": _answering("shows the nearest of all demonstrations"),
-        **{
-            f"demonstrator-{number}": _answering(
-                f"has the recordings of the rod's demonstrator {number}", f"demonstrator_{number}"
-            )
-            for number in (1, 2, 3)
-        },
-        "low-half": _answering("has those of the lower half of the first outcome", "low_half"),
-        "high-half": _answering("has those of the upper half", "high_half"),
-        "mislabelling": _answering("shows something else than is said", "mislabelled"),
-        "slow": _answering("the nearest of all, for which the learner rests 10 movements", takes=10),
+        "all": "asking.teachers:AnsweringTeacher",
+        "demonstrator-1": "asking.teachers:demonstrator_1",
+        "demonstrator-2": "asking.teachers:demonstrator_2",
+        "demonstrator-3": "asking.teachers:demonstrator_3",
+        "low-half": "asking.teachers:low_half_teacher",
+        "high-half": "asking.teachers:high_half_teacher",
+        "mislabelling": "asking.teachers:mislabelling",
+        "slow": "asking.teachers:slow",
+    },
+    "command": {
+        "run": "runs.command_line",
+        "sweep": "runs.sweep",
+        "check": "views.check",
+        "demonstrations": "views.demonstrations",
+        "suite": "views.suite",
+        "benchmark": "views.benchmark",
+        "table": "views.table",
+        "report": "views.report.command",
+        "teach": "teach.command",
+        "film": "views.film.command",
+        "demo": "views.demo",
     },
 }
-# Parts that several others share: made once for a run, and only if something takes a parameter of this name.
-SHARED: Final = {
-    "model": _at("forward_model.model:ForwardModel", "the forward model (extra forward)"),
-    "trust": _at("forward_model.anchored:Trust", "how far to trust the forward model"),
+# Who shows an algorithm something, unless a run says otherwise; "teachers" are asked. Others learn alone.
+TAUGHT_BY: Final = {
+    **dict.fromkeys(("observation", "imitation", "sgim-d"), "periodic"),
+    **dict.fromkeys((word for word in WORDS["algorithm"] if word.endswith("-taught")), "periodic"),
+    "practice-taught": "at-once",
+    **dict.fromkeys((word for word, at in WORDS["algorithm"].items() if at.startswith("asking.")), "teachers"),
 }
-# What a thing of your own must have: how it is called, and the members of what it returns.
-_WANTED: Final[dict[str, tuple[str, tuple[str, ...]]]] = {
-    "algorithm": ("(environment, seed, ...) -> a Learner", ("ask", "tell", "watch", "memory", "inverse")),
-    "environment": (
-        "() -> an environment or a Task",
-        ("contexts", "policies", "outcomes", "rest", "outcome_noise", "observe", "execute"),
-    ),
-    "goals": ("(contexts, outcomes, rng) -> a goal model", ("sample", "add")),
-    "progress": ("(goals, competences, gains) of a region -> its interest", ()),
-    "judge": ("(memory, measure) -> a judge of competence", ("__call__",)),
-    "search": ("(policies, rng) -> a search", ("__call__",)),
-    "explore": ("(policies, memory, inverse, rng) -> an explorer", ("__call__",)),
-    "inverse": ("(memory) -> an inverse model", ("__call__",)),
-    "base": ("(environment) -> what a learner that asks does on its own, and how it answers", ("parts", "ways")),
-    "social": ("(goal babbling, outcomes, rng) -> a social strategy", ("attempt",)),
-    "teacher": ("(demonstrations, rng) -> a teacher", ("offer",)),
-    "teachers": ("(demonstrations, rng) -> a teacher who answers", ("demonstrate",)),
-    "choose": ("(demonstrations, memory, rng) -> a demonstration", ()),
+# Extras that bring what a command imports.
+EXTRAS: Final = {
+    **dict.fromkeys(("demonstrations", "suite", "demo"), "plot"),
+    **{name: name for name in ("report", "teach", "film")},
 }
+_PACKAGE: Final = Path(__file__).parents[1]
 
 
-def find(kind: str, word: str) -> Entry:
-    """The record of what ``word`` names.
+def place_of(kind: str, word: str) -> str:
+    """Place of what ``word`` names, ``package.module:attribute``.
 
     Raises:
-        ValueError: it is neither in the catalogue nor an attribute that can be loaded and called.
+        ValueError: it is neither in the table nor such a place.
     """
-    known = CATALOGUE[kind]
-    if word in known:
-        return known[word]
+    if word in WORDS[kind]:
+        return f"{_PACKAGE.name}.{WORDS[kind][word]}"
     if ":" not in word:
-        module, dot, name = word.rpartition(".")
-        meant = f"; is it {module}:{name}?" if dot else ", and package.module:attribute for one of your own"
-        raise unknown(kind, word, known, meant)
-    made = load(word, f"{kind} {word}")
-    if not callable(made):
-        raise ValueError(f"{kind} {word} must be called as {_WANTED[kind][0]}, but it is a {type(made).__name__}")
-    return Entry(word, "of your own")
+        raise unknown(kind, word, WORDS[kind], _meant(word))
+    return word
 
 
-def check_constructors(**parts: object) -> None:
-    """Refuse a word of the command line, or a part that is made already, where a learner wants a constructor.
+def load_word(kind: str, word: str) -> Callable[..., Any]:
+    """The thing that ``word`` names.
 
     Raises:
-        ValueError: with the import or the call that was meant.
+        ValueError: it is not in the table, cannot be loaded or cannot be called.
     """
-    for kind, part in parts.items():
-        if isinstance(part, str):
-            module, _, name = find(kind, part).at.partition(":")
-            raise ValueError(f"{kind} must be a constructor, got the word {part!r}; from {module} import {name}")
-        if not callable(part):
-            raise ValueError(f"{kind} must be a constructor, {_WANTED[kind][0]}, got a {type(part).__name__}")
-
-
-def word_of(kind: str, made: Callable[..., Any]) -> str:
-    """What a default is called: a word of the catalogue, or package.module:attribute; "" if it has no such name."""
-    made = made.func if isinstance(made, partial) else made
-    place = f"{made.__module__}:{made.__qualname__}"
-    words = (word for word, entry in CATALOGUE[kind].items() if entry.at == place and not entry.fixed)
-    return next(words, "" if "<" in place else place)
-
-
-def checked(kind: str, word: str, make: Callable[..., Any]) -> Callable[..., Any]:
-    """``make``, with a check of how it is called and of what it gives: one of your own may differ from its kind.
-
-    Raises (when called):
-        ValueError: with the call that was wanted, or the names of the members that are missing.
-    """
-    wanted, members = _WANTED[kind]
-
-    @wraps(make)
-    def made(*arguments: Any, **options: Any) -> Any:
-        try:
-            inspect.signature(make).bind(*arguments, **options)
-        except TypeError as error:
-            raise ValueError(f"{kind} {word} cannot be called as {wanted}: {error}") from error
-        try:
-            part = make(*arguments, **options)
-        except SystemExit as end:  # it must not end the command, which would look like success
-            raise ValueError(f"{kind} {word} cannot be made: it calls exit({end})") from end
-        robot = getattr(part, "environment", part) if kind == "environment" else part  # of a Task
-        missing = [name for name in members if not hasattr(robot, name)]
-        if missing:
-            raise ValueError(
-                f"{kind} {word} gave a {type(robot).__name__} without {', '.join(missing)}; wanted {wanted}, "
-                f"which has {', '.join(members)}"
-            )
-        return part
-
+    made: Callable[..., Any] = load(place_of(kind, word), f"{kind} {word}" if ":" in word else "")
+    if not callable(made):
+        raise ValueError(f"{kind} {word} must be something to call, but it is a {type(made).__name__}")
     return made
+
+
+@cache
+def about(kind: str, word: str) -> str:
+    """First line of the docstring of what ``word`` of the table names, which is not imported for that."""
+    module, _, name = WORDS[kind][word].partition(":")
+    path = _PACKAGE / module.replace(".", "/")
+    tree = ast.parse((path / "__init__.py" if path.is_dir() else path.with_suffix(".py")).read_text(encoding="utf-8"))
+    found = ast.get_docstring(tree) if not name else None
+    for node, after in pairwise((*tree.body, ast.Pass())):
+        if isinstance(node, ast.FunctionDef | ast.ClassDef) and node.name == name:
+            found = ast.get_docstring(node)
+        elif isinstance(node, ast.Assign) and isinstance(after, ast.Expr) and ast.unparse(node.targets[0]) == name:
+            found = ast.literal_eval(after.value)
+    return (found or "").partition("\n")[0].rstrip(".")
+
+
+def named(made: Callable[..., Any]) -> tuple[str, str] | None:
+    """Kind and word of what the table names; None for anything else."""
+    place = f"{function_of(made).__module__}:{function_of(made).__qualname__}"
+    places = ((kind, word, f"{_PACKAGE.name}.{at}") for kind, words in WORDS.items() for word, at in words.items())
+    return next(((kind, word) for kind, word, at in places if at == place), None)
+
+
+def function_of(made: Callable[..., Any]) -> Callable[..., Any]:
+    """The function or class itself, without what is fixed."""
+    return function_of(made.func) if isinstance(made, partial) else made
+
+
+def called(what: str, make: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
+    """Result of a call of ``make``; a thing of a user's own may not be callable as others of its kind are.
+
+    Raises:
+        ValueError: it takes other arguments, or would end the program.
+    """
+    try:
+        inspect.signature(make).bind(*arguments, **options)
+    except TypeError as error:
+        raise ValueError(f"{what} cannot be called as others of its kind are: {error}") from error
+    try:
+        return make(*arguments, **options)
+    except SystemExit as end:  # it must not end the command, which would look like success
+        raise ValueError(f"{what} cannot be made: it calls exit({end})") from end
 
 
 def load(place: str, what: str = "") -> Any:
@@ -327,7 +241,7 @@ def load(place: str, what: str = "") -> Any:
     try:
         found: Any = importlib.import_module(module)
     except (Exception, SystemExit) as error:  # whatever that module does when it is imported
-        if isinstance(error, ImportError) and module.startswith(_IN_THE_PACKAGE):
+        if isinstance(error, ImportError) and module.startswith(_PACKAGE.name):
             brings_torch = "; pip install 'sgimd-torch[forward]' brings it" if error.name == "torch" else ""
             raise ValueError(f"{error}{brings_torch}") from error  # what needs another extra names it itself
         where = f"; is it installed, or in {here}?" if isinstance(error, ImportError) else ""
@@ -342,18 +256,6 @@ def load(place: str, what: str = "") -> Any:
     return found
 
 
-def label(algorithm: str) -> str:
-    """What figures call an algorithm; the word itself where they have no other name."""
-    entry = CATALOGUE["algorithm"].get(algorithm)
-    return entry.label if entry and entry.label else algorithm
-
-
-def colour(algorithm: str) -> str:
-    """How figures draw an algorithm."""
-    entry = CATALOGUE["algorithm"].get(algorithm)
-    return entry.colour if entry else "black"
-
-
 def unknown(what: str, word: str, known: Collection[str], also: str = "") -> ValueError:
     """The error for a ``word`` that is none of those ``known``: the nearest first, then all, then ``also``."""
     near = did_you_mean(word, known)
@@ -365,3 +267,15 @@ def did_you_mean(name: str, known: Iterable[str], most: int = 1) -> str:
     spelt = {each.lower().replace("_", "-"): each for each in known}
     near = get_close_matches(name.lower().replace("_", "-"), spelt, most, 0.5)
     return f"; did you mean {' or '.join(spelt[each] for each in near)}?" if near else ""
+
+
+def _meant(word: str) -> str:
+    """What an unknown ``word`` was probably meant to be."""
+    module, dot, name = word.rpartition(".")
+    if name in ("xml", "urdf"):
+        return (
+            f"; {word} is a model file: write a class around it (docs/own-robot.md), and name it package.module:Class"
+        )
+    if os.path.isfile(f"{word.replace('.', '/')}.py"):
+        return f"; {word} is a module here: name what is in it, {word}:NAME"
+    return f"; is it {module}:{name}?" if dot else ", and package.module:attribute for one of your own"

@@ -1,7 +1,7 @@
-"""What can be set of a part: the keywords of simple types that a class or a function takes.
+"""Options of a part: the keywords of simple types that a class or a function takes.
 
     options_of(InterestMap)["window"]                   # Option(kind=int, default=24)
-    help_of(InterestMap)["window"]                      # from the docstring, "the paper's zeta, how many ..."
+    help_of(InterestMap)["window"]                      # from the docstring, "number of recent competences ..."
 The signature has name, type and default, the docstring the help, the body the bounds: nothing repeats them.
 """
 
@@ -16,6 +16,7 @@ from typing import Any, Final, NamedTuple, TypeVar, cast
 
 F = TypeVar("F", bound=Callable[..., Any])
 _SIMPLE: Final = (int, float, bool, str, type(None), ...)
+_TARGETS: Final[dict[Callable[..., Any], Callable[..., Any]]] = {}  # of what `hands_on` has decorated
 _NAMED: Final = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
 
 
@@ -43,22 +44,21 @@ def help_of(make: Callable[..., Any]) -> dict[str, str]:
 
     while isinstance(make, partial):
         make = make.func
-    target = getattr(make, "hands_on", None)
-    found = {} if target is None else help_of(target)
+    found = help_of(_TARGETS[make]) if make in _TARGETS else {}
     text = inspect.getdoc(make) or ""
     for each in docstring_parser.parse(text, docstring_parser.DocstringStyle.GOOGLE).params:
-        about = " ".join((each.description or "").split())
+        about = " ".join((each.description or "").split()).partition(" Deviation:")[0]
         found |= dict.fromkeys(each.arg_name.split(", "), about)
     return found
 
 
 def hands_on(target: Callable[..., Any], *names: str, **changed: Any) -> Callable[[F], F]:
-    """Of a function that hands its ``**keywords`` on to ``target``: its signature has those keywords, too.
+    """Give a function that hands its ``**keywords`` on to ``target`` a signature with those keywords.
 
     Args:
-        target: whose defaults they have.
-        names: which keywords; none for all.
-        changed: keywords with other defaults than the target's.
+        target: function or class that has the keywords and their defaults.
+        names: keywords to hand on; none for all.
+        changed: other defaults, by keyword.
     """
 
     def decorate(function: F) -> F:
@@ -73,17 +73,11 @@ def hands_on(target: Callable[..., Any], *names: str, **changed: Any) -> Callabl
         def made(*arguments: Any, **keywords: Any) -> Any:
             return function(*arguments, **{**changed, **keywords})
 
-        vars(made).update(__signature__=inspect.Signature(every), hands_on=target)
+        vars(made).update(__signature__=inspect.Signature(every))
+        _TARGETS[made] = target
         return cast(F, made)
 
     return decorate
-
-
-def given(make: Callable[..., Any], **shared: Any) -> Callable[..., Any]:
-    """``make`` with those of the ``shared`` things that it names as parameters and does not have yet."""
-    has = make.keywords if isinstance(make, partial) else {}
-    taken = {name: value for name, value in shared.items() if name in parameters_of(make) and name not in has}
-    return partial(make, **taken) if taken else make
 
 
 _EMPTY: Final = inspect.Parameter.empty

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from sgimd_torch.environments.protocol import BatchEnvironment, Environment, check_instance, check_rest
+from sgimd_torch.environments.protocol import BatchEnvironment, Environment, check_instance, check_robot
 from sgimd_torch.spaces import Array, Box, check_count, stream
 
 _FACTOR: Final = 10.0  # between the noise announced and that of a few movements; a wrong unit is farther off
@@ -77,7 +77,7 @@ def _spaces(environment: Environment, _: Movements) -> Iterator[str]:
         yield f"rest must be an array, the outcome of not moving, got {type(rest).__name__}; np.zeros(2), for example"
     elif isinstance(getattr(environment, "outcomes", None), Box):
         try:
-            check_rest(environment)
+            check_robot(environment)
         except ValueError as error:
             yield f"{error}; rest is the outcome of not moving, one point of T (outcomes)"
 

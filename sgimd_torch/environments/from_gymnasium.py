@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sgimd_torch.environments.controllers import Controller
-from sgimd_torch.environments.protocol import Primitive, SimulationError, check_movement, check_rest
+from sgimd_torch.environments.protocol import Primitive, SimulationError, check_movement, check_robot
 from sgimd_torch.spaces import Array, Box, check_count, check_point, check_rng, check_vector, stream
 
 try:
@@ -69,8 +69,8 @@ class FromGymnasium:
         self.contexts = Box.cube(0.0, 1.0, 0)
         self.rest = check_point("rest", rest, outcomes.dim).copy()
         self.rest.flags.writeable = False
-        check_rest(self)
         self.outcome_noise, self.steps, self.dt = float(outcome_noise), check_count("steps", steps, 1), float(dt)
+        check_robot(self)
         if hasattr(controller, "correspondence"):
             self.correspondence = controller.correspondence
         self._outcome = outcome

@@ -297,12 +297,15 @@ def check_instance(environment: object) -> None:
         )
 
 
-def check_rest(environment: Environment) -> None:
-    """Refuse an environment whose ``rest`` is not one point of T, before a learner is built for it.
+def check_robot(environment: Environment) -> None:
+    """Refuse an environment whose rest or noise makes no sense, before a learner is built for it.
 
     Raises:
-        ValueError: a class, another shape, NaN or infinity, or a point outside T.
+        ValueError: a class, a rest that is not one point of T, or a noise that is negative or not finite.
     """
     check_instance(environment)
     if environment.outcomes.check("rest of the environment", environment.rest, "is it a theta?").ndim != 1:
         raise ValueError(f"rest of the environment must be one outcome, got shape {np.shape(environment.rest)}")
+    if not 0 <= environment.outcome_noise < np.inf:
+        wanted = "a standard deviation, finite and >= 0"
+        raise ValueError(f"outcome_noise of the environment must be {wanted}, got {environment.outcome_noise}")

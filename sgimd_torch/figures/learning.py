@@ -16,13 +16,12 @@ from matplotlib.colors import ListedColormap, LogNorm
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import LogLocator, NullLocator
 
-from sgimd_torch.catalogue import CATALOGUE
 from sgimd_torch.figures.axes import alike, colour_bar, note
+from sgimd_torch.figures.names import COLOURS, NAMES
 from sgimd_torch.figures.sections import Section
 from sgimd_torch.spaces import Array, Box
 
-COLOURS = {word: entry.colour for word, entry in CATALOGUE["algorithm"].items()}
-NAMES = {word: entry.label for word, entry in CATALOGUE["algorithm"].items()}
+__all__ = ["COLOURS", "NAMES"]
 
 
 def landing_points(

@@ -2,42 +2,42 @@
 
 Section 3.2.1 of Nguyen & Oudeyer (2014). Regions of C x T split as goals accumulate, so that each ends up with its own
 competence progress, eq. (3). Goals are drawn where progress is high, see `Tiling`.
-    goals = InterestMap(contexts, outcomes, rng); goal = goals.sample(context); goals.add(context, goal, competence)
+    goals = InterestMap(problem); goal = goals.sample(context); goals.add(context, goal, competence)
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sgimd_torch.goals.regions import Progress, Region, between_interests, gained_progress, interest_of
 from sgimd_torch.goals.tiling import Tiling
-from sgimd_torch.spaces import Array, Box
+from sgimd_torch.parts import Goals, Problem
+from sgimd_torch.spaces import Array
+
+# The least side of a new region as a part of its *parent's*. An absolute bound would stop the zoom into a task space
+# 100 times larger than what can be reached.
+_MIN_SIDE: Final = 1 / 15
 
 
-class InterestMap:
-    """The interest map over C x T, a tree of regions, and the choice of goals from it.
+class InterestMap(Goals):
+    """Goals where competence changes fastest, from regions that split.
 
     Args:
-        contexts: C; ``dim`` 0 when there is only one context.
-        outcomes: T.
-        rng: the only source of draws; reading ``regions`` draws nothing.
-        g_max: a region with more goals than this is cut in two.
-        window: the paper's zeta, how many recent competences eq. (3) looks at; even, at least 4, at most ``g_max``.
-        modes: probabilities of a goal (1) in a region of high interest, (2) anywhere, (3) near a region's worst goal.
+        problem: C and T; reading ``regions`` draws nothing.
+        g_max: most goals of a region; with one more it is cut in two.
+        window: number of recent competences in eq. (3), the paper's zeta; even, at least 4, at most ``g_max``.
         cuts: candidate cuts for each dimension, at equal counts of goals.
-        near: how far from the worst goal mode 3 goes, as a part of the region's sides.
-        min_side: the least side of a new region as a part of its *parent's*. An absolute bound would stop the zoom into
-            a task space 100 times larger than what can be reached.
-        max_aspect: a side is not cut when it is this many times shorter than another that can be cut, both as parts of
-            C x T. Deviation: the paper has no such rule (inf), and ends in slivers when goals crowd in a small part of
-            a large space.
-        progress: what counts as progress: `gained_progress`; `absolute_progress`, which is eq. (3); `signed_progress`;
-            `paired_progress`; or a function of your own.
-        contrast: (region, which of its goals are below a cut) -> how much the cut tells apart.
+        near: distance from a region's worst goal, for goals near it, as a part of the region's sides.
+        max_aspect: ratio of two sides, as parts of C x T, beyond which the shorter one is not cut. Deviation: the paper
+            has no such rule (inf), and ends in slivers when goals crowd in a small part of a large space.
+        progress: measure of progress: `gained_progress`; `absolute_progress`, which is eq. (3); `paired_progress`; or a
+            function of your own.
+        contrast: function of a region and of which goals lie below a cut: difference between the two sides.
 
     Raises:
         ValueError: a number out of its range.
@@ -45,29 +45,23 @@ class InterestMap:
 
     def __init__(
         self,
-        contexts: Box,
-        outcomes: Box,
-        rng: np.random.Generator,
+        problem: Problem,
         *,
         g_max: int = 30,
         window: int = 24,
-        modes: tuple[float, float, float] = (0.7, 0.2, 0.1),
         cuts: int = 20,
         near: float = 0.05,
-        min_side: float = 1 / 15,
         max_aspect: float = 5.0,
         progress: Progress = gained_progress,
         contrast: Callable[[Region, NDArray[np.bool_]], float] = between_interests,
     ) -> None:
+        super().__init__(problem)
         if window % 2 or not 4 <= window <= g_max:
             raise ValueError(f"window must be even, from 4 to g_max={g_max}, got {window}")
-        if cuts < 1 or not 0 < min_side <= 0.5 or not max_aspect >= 1:
-            wanted = "cuts >= 1, min_side in (0, .5], max_aspect >= 1"
-            raise ValueError(f"needs {wanted}, got {cuts}, {min_side}, {max_aspect}")
-        self.g_max, self.cuts, self.min_side, self.max_aspect = g_max, cuts, min_side, max_aspect
-        self.contrast = contrast
-        measure = partial(interest_of, window=window, progress=progress)
-        self._tiling = Tiling(contexts, outcomes, rng, measure, modes=modes, near=near)
+        if cuts < 1 or not max_aspect >= 1:
+            raise ValueError(f"needs cuts >= 1 and max_aspect >= 1, got {cuts} and {max_aspect}")
+        self.g_max, self.cuts, self.max_aspect, self.contrast = g_max, cuts, max_aspect, contrast
+        self._tiling = Tiling(problem, partial(interest_of, window=window, progress=progress), near=near)
 
     @property
     def regions(self) -> list[Region]:
@@ -123,7 +117,7 @@ class InterestMap:
         is_below = region.points[:, None] < cuts  # (n, cuts, dim)
         n_below = is_below.sum(axis=0)
         few = np.minimum(n_below, n - n_below) < self.g_max / 20
-        thin = np.minimum(cuts - region.low, region.high - cuts) < self.min_side * side
+        thin = np.minimum(cuts - region.low, region.high - cuts) < _MIN_SIDE * side
         valid, shares = ~few & ~thin, side / self._tiling.box.sides
         valid &= shares * self.max_aspect >= shares.max(where=valid.any(axis=0), initial=0.0)
 

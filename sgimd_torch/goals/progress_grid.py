@@ -2,7 +2,7 @@
 
 It differs from section 3.2.1 of Nguyen & Oudeyer (2014) only in that cells never split. A grid may do as well in few
 dimensions, when the task space is as large as what can be reached.
-    goals = ProgressGrid(contexts, outcomes, rng)
+    goals = ProgressGrid(problem)
 """
 
 from __future__ import annotations
@@ -15,23 +15,22 @@ from numpy.typing import ArrayLike
 
 from sgimd_torch.goals.regions import Progress, Region, gained_progress, interest_of
 from sgimd_torch.goals.tiling import Tiling
-from sgimd_torch.spaces import Array, Box
+from sgimd_torch.parts import Goals, Problem
+from sgimd_torch.spaces import Array
 
 _DEFAULT_CELLS = 100  # a cell needs four goals before its progress is known, and a run has about 500 goals
 _MAX_CELLS = 100_000  # more than any run has goals
 
 
-class ProgressGrid:
-    """Equal cells over C x T, and the choice of goals from them by eqs. (3) and (4).
+class ProgressGrid(Goals):
+    """Goals where competence changes fastest, from equal cells.
 
     Args:
-        contexts, outcomes, rng: as in `InterestMap`. Goals come from the cells that contain the context.
-        cells: for each dimension of C x T. None gives about 100 in all, and at least 2 for each dimension: 10 x 10 in
-            two dimensions.
-        window: how many recent goals the interest looks at; even, at least 4. A cell remembers no more.
-        modes: probabilities of a goal (1) in a cell of high interest, (2) anywhere, (3) near a cell's worst goal.
-        near: how far from the worst goal mode 3 goes, as a part of the cell's sides.
-        progress: as in `InterestMap`.
+        problem: C and T. Goals come from the cells that contain the context.
+        cells: number of cells in each dimension of C x T; None for about 100 in all, but at least 2 in each dimension.
+        window: number of recent goals in a cell's interest; even, at least 4. A cell remembers no more.
+        near: distance from a cell's worst goal, for goals near it, as a part of the cell's sides.
+        progress: measure of progress, as in `InterestMap`.
 
     Raises:
         ValueError: a number out of its range, or so many cells that none would ever get four goals.
@@ -39,19 +38,17 @@ class ProgressGrid:
 
     def __init__(
         self,
-        contexts: Box,
-        outcomes: Box,
-        rng: np.random.Generator,
+        problem: Problem,
         *,
         cells: int | None = None,
         window: int = 24,
-        modes: tuple[float, float, float] = (0.7, 0.2, 0.1),
         near: float = 0.05,
         progress: Progress = gained_progress,
     ) -> None:
+        super().__init__(problem)
         if window % 2 or window < 4:
             raise ValueError(f"window must be even and at least 4, got {window}")
-        dim = contexts.dim + outcomes.dim
+        dim = problem.contexts.dim + problem.outcomes.dim
         if cells is None:
             cells = max(2, round(_DEFAULT_CELLS ** (1 / dim)))
         if cells < 1 or cells**dim > _MAX_CELLS:
@@ -60,8 +57,7 @@ class ProgressGrid:
                 f"got {cells} in {dim} dimensions"
             )
         self.window = window
-        measure = partial(interest_of, window=window, progress=progress)
-        self._tiling = Tiling(contexts, outcomes, rng, measure, modes=modes, near=near)
+        self._tiling = Tiling(problem, partial(interest_of, window=window, progress=progress), near=near)
         edges = np.linspace(self._tiling.box.low, self._tiling.box.high, cells + 1)  # (cells + 1, dim)
         axes = np.arange(dim)
 

@@ -22,7 +22,7 @@ each attempt raised the competence at its own goal; below 0, how far it stayed b
 
 
 def gained_progress(points: Array, competences: Array, gains: Array) -> float:
-    """Mean gain: how much an attempt here raises the competence at its goal.
+    """Rise of the competence at the goals themselves, in the mean.
 
     Deviation: eq. (3) compares the competences of older and newer goals, which also differ because the goals differ. In
     most regions of a large task space some goals can be reached and others cannot, and eq. (3) sees little else.
@@ -31,17 +31,17 @@ def gained_progress(points: Array, competences: Array, gains: Array) -> float:
 
 
 def absolute_progress(points: Array, competences: Array, gains: Array) -> float:
-    """Eq. (3): |newer half - older half| over the number of values; an odd window loses its oldest."""
-    return abs(_rise(competences))
+    """Difference of newer and older competences, the paper's eq. (3).
 
-
-def signed_progress(points: Array, competences: Array, gains: Array) -> float:
-    """Eq. (3) without its absolute value: falling competence is not interesting."""
-    return max(0.0, _rise(competences))
+    |newer half - older half| over the number of values; an odd window loses its oldest."""
+    # Deviation: the paper's two sums share their middle term; these halves are disjoint and of equal length.
+    half = len(competences) // 2
+    newer, older = competences[-half:], competences[-2 * half : -half]
+    return abs(float(newer.sum() - older.sum()) / (2 * half))
 
 
 def paired_progress(points: Array, competences: Array, gains: Array) -> float:
-    """Mean |competence - competence at the nearest earlier goal of the window|, over all goals but the first.
+    """Difference from the competence at the nearest earlier goal, in the mean over all goals but the first.
 
     Forestier et al. (2017) and Portelas et al. (2019) measure progress in this way. It tells competence that changes in
     time from competence that only differs between places, but it never averages out the noise of single goals. Of
@@ -52,13 +52,6 @@ def paired_progress(points: Array, competences: Array, gains: Array) -> float:
     apart[np.triu_indices(n)] = np.inf  # the goal itself, and later ones
     nearest = n - 1 - apart[1:, ::-1].argmin(axis=1)
     return float(np.abs(competences[1:] - competences[nearest]).mean())
-
-
-def _rise(competences: Array) -> float:
-    # Deviation: the paper's two sums share their middle term; these halves are disjoint and of equal length.
-    half = len(competences) // 2
-    newer, older = competences[-half:], competences[-2 * half : -half]
-    return float(newer.sum() - older.sum()) / (2 * half)
 
 
 def interest_of(points: Array, competences: Array, gains: Array, *, window: int, progress: Progress) -> float:
@@ -95,7 +88,7 @@ class Region:
     gains: Array
     strategies: NDArray[np.str_]
     attempts: int
-    measure: Callable[[Array, Array, Array], float]
+    progress: Progress
 
     def __post_init__(self) -> None:
         for name in ("low", "high", "points", "competences", "gains", "strategies"):
@@ -119,7 +112,7 @@ class Region:
 
     def interest_among(self, rows: NDArray[np.bool_] | slice) -> float:
         """The interest that it would have with these goals alone."""
-        return self.measure(self.points[rows], self.competences[rows], self.gains[rows])
+        return self.progress(self.points[rows], self.competences[rows], self.gains[rows])
 
     @cached_property
     def _interest(self) -> float:

@@ -6,50 +6,43 @@ Section 3.2.2 and eq. (4) of Nguyen & Oudeyer (2014). A map cuts C x T into regi
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sgimd_torch.goals.protocol import check_attempt, check_in
-from sgimd_torch.goals.regions import Region
+from sgimd_torch.goals.checks import check_attempt, check_in
+from sgimd_torch.goals.regions import Progress, Region
+from sgimd_torch.parts import Problem
 from sgimd_torch.spaces import Array, Box
+
+_MODES: Final = (0.7, 0.2, 0.1)  # probabilities of a goal where interest is high, anywhere, near a region's worst goal
 
 
 class Tiling:
     """Regions that tile C x T; at first one region, all of it.
 
     Args:
-        contexts, outcomes, rng, modes, near: as in `InterestMap`.
-        measure: (points, competences, gains) -> the interest of a region.
+        problem: C and T, and the random stream ``goals``.
+        progress: interest of a region, by its points, competences and gains.
+        near: distance from the worst goal that mode 3 goes, as a part of the region's sides.
 
     Raises:
         ValueError: a number out of its range.
     """
 
-    def __init__(
-        self,
-        contexts: Box,
-        outcomes: Box,
-        rng: np.random.Generator,
-        measure: Callable[[Array, Array, Array], float],
-        *,
-        modes: tuple[float, float, float],
-        near: float,
-    ) -> None:
-        if min(modes) < 0 or not np.isclose(sum(modes), 1):
-            raise ValueError(f"modes must be three probabilities that sum to 1, got {modes}")
+    def __init__(self, problem: Problem, progress: Progress, *, near: float) -> None:
         if not 0 < near <= 1:
             raise ValueError(f"near must lie in (0, 1], got {near}; it is a part of a region's sides")
-        self.contexts, self.outcomes = contexts, outcomes
+        self.problem, self._near, self._progress, self._rng = problem, near, progress, problem.stream("goals")
+        contexts, outcomes = problem.contexts, problem.outcomes
         self.box = Box(np.concatenate((contexts.low, outcomes.low)), np.concatenate((contexts.high, outcomes.high)))
-        self._modes, self._near, self._rng, self._measure = modes, near, rng, measure
         self.plant([self.region("R", self.box.low, self.box.high)])
 
     def region(self, path: str, low: Array, high: Array) -> Region:
         """A region without goals."""
         nothing = np.empty((0, self.box.dim)), np.empty(0), np.empty(0), np.empty(0, dtype=np.str_)
-        return Region(path, low, high, self.contexts.dim, *nothing, 0, self._measure)
+        return Region(path, low, high, self.problem.contexts.dim, *nothing, 0, self._progress)
 
     def plant(self, regions: list[Region]) -> None:
         """Use these regions from now on; they must tile C x T."""
@@ -61,19 +54,20 @@ class Tiling:
 
     def add(self, context: ArrayLike, goal: ArrayLike, competence: float, strategy: str, gain: float) -> int:
         """Give a goal to the region in which it lies, and return the index of that region."""
-        point = check_attempt(self.contexts, self.outcomes, context, goal, competence, gain)
+        point = check_attempt(self.problem, context, goal, competence, gain)
         index = int(self.containing(point).argmax())
         self.regions[index] = self.regions[index].extend(point, competence, gain, strategy)
         return index
 
     def sample(self, context: ArrayLike) -> Array:
         """Decide a goal, section 3.2.2: a mode, a region that contains the context, a goal in it."""
-        context = check_in(self.contexts, "context", context)
-        mode = 1 + self._rng.choice(3, p=self._modes)
+        context = check_in(self.problem.contexts, "context", context)
+        mode = 1 + self._rng.choice(3, p=_MODES)
         if mode == 2:
-            return self.outcomes.sample(self._rng)
+            return self.problem.outcomes.sample(self._rng)
         region = self._choose(context)
-        low, high = region.low[self.contexts.dim :], region.high[self.contexts.dim :]
+        dim = self.problem.contexts.dim
+        low, high = region.low[dim:], region.high[dim:]
         if mode == 1 or len(region.goals) == 0:
             return self._rng.uniform(low, high)
         # Ties are common, as competence is -1 wherever nothing came near. The first would be tried again and again.
@@ -95,6 +89,6 @@ class Tiling:
         weights = interests - interests.min()  # eq. (4)
         # Deviation: eq. (4) is 0/0 where no region stands out. Their shares of T then make goals uniform.
         if not weights.any():
-            sides = (self._highs - self._lows)[here, self.contexts.dim :]
-            weights = (sides / self.outcomes.sides).prod(axis=1)
+            sides = (self._highs - self._lows)[here, self.problem.contexts.dim :]
+            weights = (sides / self.problem.outcomes.sides).prod(axis=1)
         return self.regions[int(self._rng.choice(here, p=weights / weights.sum()))]

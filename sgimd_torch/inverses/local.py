@@ -2,29 +2,33 @@
 
 Section 4.4.2 and eqs. (8) and (9) of Nguyen & Oudeyer (2014). Different movements can reach the same place, but their
 mean may land elsewhere. So it averages in one region of policy space only, which is near the goal *and* reliable.
-    inverse = LocalInverse(memory); estimate = inverse(context, goal); estimate.theta
+    inverse = LocalInverse(problem); estimate = inverse(context, goal); estimate.theta
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from sgimd_torch.memory import Memory, Rows
+from sgimd_torch.inverses.nearest import distances_to, near_goal
+from sgimd_torch.memory import Rows
+from sgimd_torch.parts import Inverse, Problem
 from sgimd_torch.spaces import Array, Estimate
 
 
-class LocalInverse:
-    """Mean theta of the most reliable neighbourhood, weighted towards the goal. It only reads, and draws nothing.
+class LocalInverse(Inverse):
+    """Mean of the most reliable neighbourhood, weighted towards the goal, eq. (9).
+
+    It only reads, and draws nothing.
 
     Args:
-        memory: of the learner.
-        h_max: how many of the nearest outcomes are compared, eq. (8).
-        k_max: the most exemplars in a neighbourhood K_h.
-        dist_n: the paper's distN, radius of a neighbourhood in policy space. None: 0.6 in 25 dimensions, otherwise
+        problem: the memory is read.
+        h_max: number of nearest outcomes that are compared, eq. (8).
+        k_max: largest number of exemplars in a neighbourhood K_h.
+        dist_n: radius of a neighbourhood in policy space, the paper's distN; None for 0.6 in 25 dimensions, otherwise
             proportional to the square root of their number, like distances in a unit cube.
-        alpha: how much distance to the goal a spread of 1 counts for.
-        width: of the Gaussian of eq. (9), in mean distances between the neighbourhood's outcomes and the goal. A wide
-            one averages the neighbourhood, a narrow one follows the exemplar nearest to the goal.
+        alpha: distance to the goal that counts as much as a spread of 1.
+        width: width of the Gaussian of eq. (9), in mean distances between the neighbourhood's outcomes and the goal. A
+            wide one averages the neighbourhood, a narrow one follows the exemplar nearest to the goal.
 
     Raises:
         ValueError: ``width`` is not positive.
@@ -32,7 +36,7 @@ class LocalInverse:
 
     def __init__(
         self,
-        memory: Memory,
+        problem: Problem,
         *,
         h_max: int = 10,
         k_max: int = 10,
@@ -42,12 +46,10 @@ class LocalInverse:
     ) -> None:
         if not width > 0:
             raise ValueError(f"width must be positive, got {width}; it is in mean distances to the goal")
-        self.memory = memory
-        self.h_max = h_max
-        self.k_max = k_max
-        self.dist_n = 0.6 * np.sqrt(memory.theta_dim / 25) if dist_n is None else dist_n
-        self.alpha = alpha
-        self.width = width
+        super().__init__(problem)
+        self.memory = problem.memory
+        self.h_max, self.k_max, self.alpha, self.width = h_max, k_max, alpha, width
+        self.dist_n = 0.6 * np.sqrt(problem.policies.dim / 25) if dist_n is None else dist_n
 
     def __call__(self, context: Array, goal: Array) -> Estimate:
         """theta_g, and K_best in the order of distance from its centre theta_h, nearest first.
@@ -62,29 +64,11 @@ class LocalInverse:
         return Estimate(np.clip(theta, thetas.min(axis=0), thetas.max(axis=0)), thetas, outcomes, context)
 
     def _most_reliable(self, context: Array, goal: Array) -> Rows:
-        near = _near_goal(self.memory, context, goal, self.h_max)  # H of eq. (8)
+        near = near_goal(self.memory, context, goal, self.h_max)  # H of eq. (8)
         neighbourhoods = self.memory.neighbourhoods(near, self.k_max, self.dist_n)  # K_h of eq. (8)
         spreads = _spreads(self.memory.outcomes, neighbourhoods)
-        unreliability = _distances(self.memory.outcomes[near], goal) + self.alpha * spreads
+        unreliability = distances_to(self.memory.outcomes[near], goal) + self.alpha * spreads
         return neighbourhoods[int(unreliability.argmin())]
-
-
-class NearestNeighbour:
-    """The remembered movement whose outcome is nearest to the goal: the field's simplest inverse model."""
-
-    def __init__(self, memory: Memory, k: int = 10) -> None:
-        self.memory = memory
-        self.k = k
-
-    def __call__(self, context: Array, goal: Array) -> Estimate:
-        """theta of the nearest outcome, and the ``k`` exemplars of the nearest outcomes, nearest first.
-
-        Raises:
-            RuntimeError: the memory is empty.
-        """
-        rows = _near_goal(self.memory, context, goal, self.k)
-        thetas = self.memory.thetas[rows]
-        return Estimate(thetas[0], thetas, self.memory.outcomes[rows], context)
 
 
 def gaussian_weights(goal: Array, outcomes: Array, width: float) -> Array:
@@ -92,17 +76,10 @@ def gaussian_weights(goal: Array, outcomes: Array, width: float) -> Array:
 
     The paper does not give its width: here it is ``width`` mean distances.
     """
-    distances = _distances(outcomes, goal)
+    distances = distances_to(outcomes, goal)
     scaled = distances / max(np.finfo(float).tiny, width * distances.mean())
     weights = np.exp(0.5 * (scaled.min() ** 2 - scaled**2))  # the nearest has 1, so the sum cannot be 0
     return weights / weights.sum()
-
-
-def _near_goal(memory: Memory, context: Array, goal: Array, k: int) -> Rows:
-    rows = memory.near_outcomes(context, goal, k)
-    if not len(rows):
-        raise RuntimeError("the inverse model needs a memory of at least one exemplar, but it is empty; explore first")
-    return rows
 
 
 def _spreads(outcomes: Array, neighbourhoods: list[Rows]) -> Array:
@@ -123,8 +100,3 @@ def _standard_deviation(outcomes: Array) -> float:
         return np.nan
     deviations = outcomes - outcomes.sum(axis=0) / n
     return float(np.sqrt((deviations * deviations).sum() / (n - 1)))  # by n, small neighbourhoods look reliable
-
-
-def _distances(outcomes: Array, goal: Array) -> Array:
-    difference = outcomes - goal
-    return np.sqrt((difference * difference).sum(axis=-1))

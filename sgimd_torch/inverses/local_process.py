@@ -1,10 +1,10 @@
-"""An answer that has to prove itself: what a local Gaussian process proposes, if it should beat the nearest exemplar.
+"""Local Gaussian process as inverse model; the nearest exemplar answers unless the process is clearly better.
 
 Our addition, not in the paper. The process learns from the movements near the goal and those most like them. Candidates
 are found by Gauss-Newton steps through it, from the nearest exemplars, and there is the answer of `LocallyLinear`. Each
 is judged by the squared error that the process expects of it, its own uncertainty included; where it was surprised by
 exemplars near the goal, it counts as less sure. If no candidate is clearly better, the nearest exemplar answers.
-    inverse = LocalProcess(memory, outcome_noise=environment.outcome_noise); estimate = inverse(context, goal)
+    inverse = LocalProcess(problem); estimate = inverse(context, goal)
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from typing import Final
 import numpy as np
 
 from sgimd_torch.inverses.gaussian_process import Kernel, Process, choose_kernel, fit_lengths, one_thread
-from sgimd_torch.inverses.local import NearestNeighbour
 from sgimd_torch.inverses.locally_linear import LocallyLinear
-from sgimd_torch.memory import Memory
+from sgimd_torch.inverses.nearest import NearestNeighbour
 from sgimd_torch.memory.neighbours import PolicyNeighbours, Rows, Table
+from sgimd_torch.parts import Inverse, Problem
 from sgimd_torch.spaces import Array, Estimate, stream
 
 _FIRST, _GROWTH = 16, 1.5  # exemplars at the first fit, and how many times more at each later one
@@ -31,35 +31,28 @@ _FAR: Final = 1e3  # spreads from 0: squares of inputs farther out would hide th
 _CLEARLY: Final = 0.8  # of the squared error expected of the nearest exemplar: what a candidate has to be below
 
 
-class LocalProcess:
-    """The inverse model; it only reads, draws nothing, and depends on the memory alone.
+class LocalProcess(Inverse):
+    """Local Gaussian process; the nearest exemplar, unless the process is clearly better.
+
+    It only reads, draws nothing, and depends on the memory alone.
 
     Lengths and kernel are refitted when the memory has 1.5 times its size at the last fit; other calls use neighbours
     only. Units do not matter. The answer is clipped to the box around all that was ever executed.
 
     Args:
-        memory: of the learner.
-        outcome_noise: standard deviation of each outcome dimension, ``outcome_noise`` of the environment.
-
-    Raises:
-        ValueError: ``outcome_noise`` is negative or not finite.
+        problem: memory and noise are read.
     """
 
-    def __init__(self, memory: Memory, *, outcome_noise: float = 0.0) -> None:
-        if not 0 <= outcome_noise < np.inf:
-            raise ValueError(f"outcome_noise must be a standard deviation, finite and >= 0, got {outcome_noise}")
-        self.memory, self.noise = memory, outcome_noise
-        self._nearest, self._linear = NearestNeighbour(memory, _NEAR), LocallyLinear(memory)
+    def __init__(self, problem: Problem) -> None:
+        super().__init__(problem)
+        self.memory, self.noise = problem.memory, problem.outcome_noise
+        self._nearest, self._linear = NearestNeighbour(problem, k=_NEAR), LocallyLinear(problem)
         self._fitted = 0  # exemplars at the last fit
         self._kernel: Kernel | None = None  # None: outcomes are all the same
 
     @one_thread
     def __call__(self, context: Array, goal: Array) -> Estimate:
-        """The answer, and the exemplars of the nearest outcomes, nearest first.
-
-        Raises:
-            RuntimeError: the memory is empty.
-        """
+        """The answer, and the exemplars of the nearest outcomes, nearest first."""
         estimate, learnt = self._nearest(context, goal), self._learn_near(context, goal)
         if learnt is None:
             return estimate
@@ -98,8 +91,8 @@ class LocalProcess:
         return expected, float(variance)
 
     def _learn_near(self, context: Array, goal: Array) -> tuple[Process, Rows, float] | None:
-        """The process of the movements near the goal, the rows of the nearest outcomes, with which it begins, and how
-        many times over its variance counts. None before the first fit."""
+        """The process of the movements near the goal; the rows of the nearest outcomes, its first ones; and the
+        variance inflation factor. None before the first fit."""
         self._catch_up()
         if self._kernel is None:
             return None

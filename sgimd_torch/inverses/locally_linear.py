@@ -1,7 +1,7 @@
 """Local inverse model, corrected to first order by a weighted regression of theta on outcome near the goal.
 
 Deviation: the paper stops at the weighted mean of eq. (9); this goes on from there.
-    inverse = LocallyLinear(memory); estimate = inverse(context, goal); estimate.theta
+    inverse = LocallyLinear(problem); estimate = inverse(context, goal); estimate.theta
 """
 
 from __future__ import annotations
@@ -9,35 +9,32 @@ from __future__ import annotations
 import numpy as np
 
 from sgimd_torch.inverses.local import LocalInverse, gaussian_weights
-from sgimd_torch.memory import Memory
+from sgimd_torch.parts import Inverse, Problem
 from sgimd_torch.spaces import Array, Estimate
 
 # More exemplars in a neighbourhood, and a wider Gaussian, than `LocalInverse` averages: a slope needs them.
 _K_MAX, _WIDTH = 20, 1.0
+# Relative to the variance of the outcomes; the larger, the closer to `LocalInverse`. It also makes the regression
+# unique when outcomes lie on a line, or are fewer than its slopes.
+_RIDGE = 1e-3
 _COINCIDENT = 1e-12  # outcomes that spread less, relative to their size, count as one outcome, which has no slope
 
 
-class LocallyLinear:
-    """:class:`LocalInverse`, corrected to first order. Its mean theta, eq. (9), should land on the weighted mean of the
-    outcomes; a weighted ridge regression of theta on outcome corrects it from there to the goal.
+class LocallyLinear(Inverse):
+    """Mean of the most reliable neighbourhood, eq. (9), corrected to first order.
+
+    The mean theta should land on the weighted mean of the outcomes; a weighted ridge regression of theta on outcome
+    corrects it from there to the goal.
 
     The answer is clipped to the box around all that was ever executed, because far goals extrapolate far.
 
     Args:
-        memory: of the learner.
-        ridge: relative to the variance of the outcomes, > 0; the larger, the closer to :class:`LocalInverse`. It also
-            makes the regression unique when outcomes lie on a line, or are fewer than its slopes.
-
-    Raises:
-        ValueError: ``ridge`` is not positive.
+        problem: the memory is read.
     """
 
-    def __init__(self, memory: Memory, *, ridge: float = 1e-3) -> None:
-        if not ridge > 0:
-            raise ValueError(f"ridge must be positive, got {ridge}; outcomes on a line have no slope across it")
-        self.memory = memory
-        self.ridge = ridge
-        self._local = LocalInverse(memory, k_max=_K_MAX, width=_WIDTH)
+    def __init__(self, problem: Problem) -> None:
+        super().__init__(problem)
+        self._local = LocalInverse(problem, k_max=_K_MAX, width=_WIDTH)
 
     def __call__(self, context: Array, goal: Array) -> Estimate:
         """The corrected theta_g, with K_best as :class:`LocalInverse` gives it.
@@ -55,6 +52,6 @@ class LocallyLinear:
         if variance <= (_COINCIDENT * np.abs(outcomes).max()) ** 2:
             return estimate
         cross = (weights * deviations.T) @ (thetas - mean_theta)
-        slope = np.linalg.solve(covariance + self.ridge * variance * np.eye(len(goal)), cross)
+        slope = np.linalg.solve(covariance + _RIDGE * variance * np.eye(len(goal)), cross)
         theta = mean_theta + (goal - mean_outcome) @ slope
-        return estimate._replace(theta=np.clip(theta, *self.memory.theta_range))
+        return estimate._replace(theta=np.clip(theta, *self.problem.memory.theta_range))

@@ -4,55 +4,43 @@ Algorithm 1 of Nguyen & Oudeyer (2014), rebuilt. All five learners of the paper 
 autonomous and a social strategy. The caller owns the loop: ``move = learner.ask(context)``, execute it,
 ``learner.tell(outcome)``; ``learner.watch(demonstration)`` whenever the teacher shows something. Some learners want to
 be shown a goal: ``learner.request(context)``, before ``ask``, says by whom. Which movement reaches a goal?
-``learner.inverse(context, goal).theta``. ``learner.save(path)`` and ``learner.load(path)`` keep its life.
+``learner.inverse(context, goal).theta``. Whoever listens is told what happens: ``learner.listeners.append(print)``.
 """
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sgimd_torch.files import replacing
-from sgimd_torch.inverses.locally_linear import LocallyLinear
-from sgimd_torch.learner.replay import TEACHER, ReplayError, replay
-from sgimd_torch.memory import Memory
-from sgimd_torch.record import Event, Kind, Record, RunError
-from sgimd_torch.spaces import (
-    Array,
-    AskingAttempt,
-    Box,
-    Demonstration,
-    Estimate,
-    Lesson,
-    Move,
-    Request,
-    check_point,
-    read_only,
-)
-from sgimd_torch.strategies import SocialStrategy, Strategy
+from sgimd_torch.learner.events import Event, Kind
+from sgimd_torch.learner.replay import ReplayError
+from sgimd_torch.parts import Inverse, Problem, Social, Strategy
+from sgimd_torch.spaces import Array, AskingAttempt, Demonstration, Lesson, Move, Request, check_point, read_only
 
-if TYPE_CHECKING:
-    from sgimd_torch.goals.regions import Region
-    from sgimd_torch.teachers import Teacher
+__all__ = ["Correspondence", "Learner", "ReplayError"]
 
-__all__ = ["Learner", "ReplayError"]
+Correspondence = Callable[[Array, Array], Array]
+"""Function from times ``(n_times,)`` and trajectory ``(n_times, n_joints)`` to theta_d ``(theta_dim,)``, eq. (6)."""
 
 
 class Learner:
     """Alternates between its own exploration and answers to demonstrations.
 
     Args:
-        memory: keeps the exemplar of every outcome that is told.
-        autonomous: what it does on its own.
+        problem: what has to be learnt; its memory keeps the exemplar of every outcome that is told.
+        autonomous: strategy of its own.
         social: how it answers a demonstration; None for a learner that cannot be taught.
-        correspondence: (times, trajectory) -> theta_d, eq. (6); needed with ``social``.
-        inverse: (context, goal) -> estimate, by which it answers; None for `LocallyLinear`. The attribute may be
-            replaced, by a `ModelInverse` of the same memory, for example.
-        policies: Pi, which a demonstration must not leave; None does not check that.
+        correspondence: function from times and trajectory to theta_d, eq. (6); needed with ``social``.
+
+    Attributes:
+        memory: exemplars, those of the problem.
+        inverse: inverse model by which it answers; it may be replaced by another one of the same problem.
+        listeners: functions that are called with each `Event`, after it has happened.
+        begun: number of exemplars that it began with.
+        movements: number of its movements, those at rest and those that failed included.
 
     Raises:
         ValueError: ``social`` without ``correspondence``.
@@ -60,36 +48,27 @@ class Learner:
 
     def __init__(
         self,
-        memory: Memory,
+        problem: Problem,
         autonomous: Strategy,
         *,
-        social: SocialStrategy | None = None,
-        correspondence: Callable[[Array, Array], Array] | None = None,
-        inverse: Callable[[Array, Array], Estimate] | None = None,
-        policies: Box | None = None,
+        social: Social | None = None,
+        correspondence: Correspondence | None = None,
     ) -> None:
         if social is not None and correspondence is None:
             raise ValueError("a social strategy needs a correspondence, which translates trajectories into theta")
-        self.memory = memory
-        self.autonomous = autonomous
-        self.social = social
-        self.correspondence = correspondence
-        self.inverse: Callable[[Array, Array], Estimate] = LocallyLinear(memory) if inverse is None else inverse
-        self.policies = policies
+        self.problem, self.autonomous, self.social, self.correspondence = problem, autonomous, social, correspondence
+        self.memory = problem.memory
+        self.inverse: Inverse = problem.inverse
+        self.listeners: list[Callable[[Event], object]] = []
+        self.begun, self.movements = len(self.memory), 0
+        self._life: list[int | Event] = []  # a movement is the row of memory that keeps it
         self._attempt: AskingAttempt | None = None
         self._context: Array = np.zeros(0)
         self._next: Move | Request | None = None  # of the attempt, not yet told or answered
         self._asked = False
-        self._events: list[int | Event] = []  # a movement is the row of memory that keeps it
-        self._begun = len(memory)
-        self._movements = 0
+        self._untold = False  # an attempt was begun by `request`, and no event says so yet
         self._lessons: set[tuple[bytes, bytes]] = set()
-        self._offered_at = -1  # how many it had made when a teacher offered the lesson under way
-
-    @property
-    def movements(self) -> int:
-        """How many it has made, those at rest and those that failed included."""
-        return self._movements
+        self._offered_at = -1  # how many movements it had made when a teacher offered the lesson under way
 
     @property
     def idle(self) -> bool:
@@ -98,13 +77,13 @@ class Learner:
 
     @property
     def lesson_waits(self) -> bool:
-        """Whether no movement has answered yet what a teacher offered: a `run` that goes on here asks for no other."""
-        return self._offered_at == self._movements
+        """Whether an offered demonstration is still unanswered: a `run` that goes on here asks for no other."""
+        return self._offered_at == self.movements
 
     @property
-    def regions(self) -> Sequence[Region]:
-        """Of its goal model as they are now; none if that has no regions."""
-        return list(getattr(getattr(self.autonomous, "goals", None), "regions", ()))
+    def regions(self) -> Sequence[Any]:
+        """Regions of its goal model as they are now; none if that has no regions."""
+        return self.autonomous.regions
 
     @property
     def waits_for_answer(self) -> bool:
@@ -122,6 +101,14 @@ class Learner:
             raise RuntimeError("no attempt is under way, so the context may be any; see idle")
         return self._context
 
+    def events(self) -> Iterator[Event]:
+        """What has happened to it, in order; of a movement without goal and origin."""
+        memory = self.memory
+        for each in self._life:
+            if isinstance(each, int):
+                each = Event(Kind.MOVED, memory.contexts[each], memory.thetas[each], outcome=memory.outcomes[each])
+            yield each
+
     def ask(self, context: ArrayLike) -> Move | None:
         """The next movement, or None to stay still this time, when there is no outcome to tell.
 
@@ -138,39 +125,52 @@ class Learner:
             raise RuntimeError(
                 "ask() again needs the outcome of the last movement; was tell() forgotten? Without one, interrupt()"
             )
-        self._go_unanswered()
+        self._go_on_alone()
         if self._attempt is None:
-            context = read_only(context)
-            self._begin(self.autonomous.attempt(context), context)
-            self._go_unanswered()
+            self._begin(self.autonomous.attempt(context := read_only(context)), context)
+            self._go_on_alone()
             if self._attempt is None:
                 raise RuntimeError(f"{type(self.autonomous).__name__}.attempt() has to yield at least once")
         elif context is not self._context and not np.array_equal(context, self._context):
             raise RuntimeError(f"the attempt under way began in context {self._context}, got {context}; see idle")
         if not isinstance(self._next, Move):
-            self._events.append(Event(Kind.RESTED, self._context))
-            self._movements += 1
+            self.movements += 1
             self._advance(None)
+            self._publish(Event(Kind.RESTED, self._context))
             return None
         self._asked = True
         return self._next
 
     def request(self, context: ArrayLike) -> Request | None:
-        """What it asks a teacher for before its next movement; None if nothing. `watch` answers, `ask` without an
-        answer goes on alone.
+        """Its request to a teacher before its next movement; None if there is none. `watch` answers; `go_on_alone`, or
+        `ask` at once, leaves it without an answer.
 
         Args:
-            context: as for `ask`; an attempt begins in it if none is under way.
+            context: ``(context_dim,)``; an attempt begins in it if none is under way.
 
         Raises:
             ValueError: a context of another shape, or not finite.
         """
         context = check_point("context", context, self.memory.context_dim)
         if self._attempt is None:
-            context = read_only(context)
-            self._begin(self.autonomous.attempt(context), context)
-            self._events.append(Event(Kind.ASKED, self._context))
+            self._begin(self.autonomous.attempt(context := read_only(context)), context)
+            self._untold = True
         return self._next if isinstance(self._next, Request) else None
+
+    def go_on_alone(self, reply: str) -> None:
+        """Say that its request has no answer.
+
+        Args:
+            reply: reason, for the record.
+
+        Raises:
+            RuntimeError: it has asked for nothing.
+        """
+        if not isinstance(self._next, Request):
+            raise RuntimeError("go_on_alone() needs a request, but request() has given none")
+        asked = self._request_event(self._next, reply)
+        self._advance(None)
+        self._publish(asked)
 
     def tell(self, outcome: ArrayLike) -> None:
         """Tell the outcome of the movement that was asked for; it enters memory.
@@ -185,41 +185,46 @@ class Learner:
         """
         if not self._asked or not isinstance(self._next, Move):
             raise RuntimeError("tell() needs the outcome of a movement, but ask() has not proposed one")
-        self.memory.add(self._context, self._next.theta, outcome)
+        move, context = self._next, self._context
+        self.memory.add(context, move.theta, outcome)
         self._asked = False
-        self._events.append(len(self.memory) - 1)
-        self._movements += 1
-        self._advance(self.memory.outcomes[-1])
+        self.movements += 1
+        row = len(self.memory) - 1
+        reached = self.memory.outcomes[-1]
+        self._advance(reached)
+        self._publish(Event(Kind.MOVED, context, move.theta, move.goal, reached, move.origin), row=row)
 
-    def watch(self, demonstration: Demonstration, *, offered: bool = False) -> None:
+    def watch(self, demonstration: Demonstration, *, who: str | None = None) -> None:
         """See a demonstration: the attempt under way ends, and the social strategy answers from the next ``ask`` on.
         One that was requested goes to the attempt that had requested it.
 
         Args:
-            demonstration: what is shown.
-            offered: by the teacher of a `run`, see ``lesson_waits``.
+            demonstration: demonstration that is shown.
+            who: name of the teacher of a `run` who offers it, see ``lesson_waits``; None outside of a run.
 
         Raises:
             RuntimeError: this learner has no social strategy, or the last movement's outcome was not told.
             ValueError: a demonstration that does not fit the spaces or the correspondence, or whose theta_d leaves Pi;
                 nothing has happened then.
         """
-        requested = self.waits_for_answer
-        if self.social is None and not requested:
+        request = self._next if isinstance(self._next, Request) else None
+        if self.social is None and request is None:
             raise RuntimeError("this learner has no social strategy, so it cannot be taught; use no teacher")
         if self._asked:
             raise RuntimeError("watch() needs the outcome of the last movement first; was tell() forgotten?")
         theta_d = self.translate(demonstration)
-        if not requested:
-            self._end()
-            self._offered_at = self._movements if offered else -1
-        self._events.append(Event(Kind.SHOWN, lesson=demonstration, who=TEACHER if offered else None))
         self._lessons.add(_lesson(demonstration, theta_d))
-        if requested:
+        if request is not None:
+            asked, who = self._request_event(request, "shown"), request.teacher
             self._advance(Lesson(theta_d, demonstration))
+            self._publish(asked, Event(Kind.SHOWN, lesson=demonstration, who=who))
         elif self.social is not None:
+            before = self._begun_untold()
+            self._end()
+            self._offered_at = -1 if who is None else self.movements
             context = np.asarray(demonstration.context, dtype=np.float64)
             self._begin(self.social.attempt(context, theta_d, demonstration), context)
+            self._publish(*before, Event(Kind.SHOWN, lesson=demonstration, who=who))
 
     def translate(self, demonstration: Demonstration) -> Array:
         """theta_d, eq. (6): the policy to which a demonstration corresponds.
@@ -234,15 +239,14 @@ class Learner:
         check_point("outcome of the demonstration", demonstration.outcome, self.memory.outcome_dim)
         theta_d = self.correspondence(demonstration.times, demonstration.trajectory)
         theta_d = check_point("theta_d of the correspondence", theta_d, self.memory.theta_dim)
-        if self.policies is not None:
-            self.policies.check("theta_d of the correspondence", theta_d)
-        return theta_d
+        return self.problem.policies.check("theta_d of the correspondence", theta_d)
 
     def was_shown(self, demonstration: Demonstration) -> bool:
         """Whether it was shown the same movement in the same context before.
 
         Raises:
-            RuntimeError, ValueError: as `translate`.
+            RuntimeError: this learner has no correspondence.
+            ValueError: see `watch`.
         """
         return _lesson(demonstration, self.translate(demonstration)) in self._lessons
 
@@ -251,88 +255,50 @@ class Learner:
         remembered, and its attempt ends as by `interrupt`.
 
         Args:
-            reason: why, for the record.
+            reason: why it failed, for the record.
         """
-        theta = self._next.theta if self._asked and isinstance(self._next, Move) else None
-        context = self._context if theta is not None else None
-        self._events.append(Event(Kind.FAILED, context, theta, reply=reason))
-        self._movements += 1
-        self._end()
+        self.movements += 1
+        self._stop(Kind.FAILED, reason)
 
     def interrupt(self) -> None:
         """End the attempt under way; what it learnt so far counts. An outcome not yet told is no longer expected."""
-        if self._asked and isinstance(self._next, Move):
-            self._events.append(Event(Kind.INTERRUPTED, self._context, self._next.theta))
-        elif self._attempt is not None:
-            self._events.append(Event(Kind.INTERRUPTED))
+        if self._attempt is not None:
+            self._stop(Kind.INTERRUPTED, None)
         self._end()
 
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write its life to a record: contexts, movements, rests, outcomes and lessons, in SQLite.
+    def _go_on_alone(self) -> None:
+        while self.waits_for_answer:
+            self.go_on_alone("nothing")
 
-        A movement that was asked for and not told yet is left out: after `load`, ask for it again.
+    def _stop(self, kind: Kind, reply: str | None) -> None:
+        if self._asked and isinstance(self._next, Move):
+            move = self._next
+            events = [Event(kind, self._context, move.theta, move.goal, None, move.origin, reply=reply)]
+        else:
+            events = [*self._begun_untold(), Event(kind, reply=reply)]
+        self._end()
+        self._publish(*events)
 
-        Raises:
-            OSError: ``path`` is a directory, or cannot be written.
-        """
-        memory = self.memory
-        dims = memory.context_dim, memory.theta_dim, memory.outcome_dim
-        with (
-            replacing(path) as partial,
-            Record.make(partial, dims, {"begun": self._begun, "exemplars": len(memory)}) as record,
-        ):
-            for event in self._events:
-                record.add(self._moved(event) if isinstance(event, int) else event)
-            record.commit()
+    def _publish(self, *events: Event, row: int | None = None) -> None:
+        self._untold = False
+        for event in events:
+            self._life.append(event if row is None else row)
+            for listener in self.listeners:
+                listener(event)
 
-    def load(
-        self,
-        path: str | os.PathLike[str],
-        *,
-        teacher: Teacher | None = None,
-        after: Callable[[Move | None], object] | None = None,
-    ) -> None:
-        """Live through a saved life again, or through the life of a run; then go on as if it had never stopped.
+    def _request_event(self, request: Request, reply: str) -> Event:
+        goal, who, strategy = request.goal, request.teacher, request.strategy
+        return Event(Kind.ASKED, self._context, goal=goal, who=who, strategy=strategy, reply=reply)
 
-        Args:
-            path: what `save` wrote, or the ``run.sqlite`` of a run.
-            teacher: freshly built, too, if one draws lessons at random: it is asked before each movement, as in `run`,
-                so that it goes on in the same way. None for the lessons of the file alone.
-            after: called after each movement, told or at rest (then with None), as your loop does to refresh a forward
-                model.
-
-        Raises:
-            ReplayError: this learner would have moved otherwise, or its memory comes out otherwise. It has then lived a
-                part of that life; build another one.
-            RuntimeError: it has lived already.
-            RunError: no record, damaged, or of another robot.
-        """
-        if self._events or self._attempt is not None:
-            raise RuntimeError("load() needs a learner freshly built; this one has lived already")
-        dims = self.memory.context_dim, self.memory.theta_dim, self.memory.outcome_dim
-        with Record(path) as record:
-            for damage in record.check().values():
-                raise RunError(damage)
-            if record.dims != dims:
-                raise RunError(f"{path} has dims {record.dims} of context, theta, outcome, got {dims}; another robot?")
-            begun, exemplars = record.about.get("begun", 0), record.about.get("exemplars")
-            if begun != self._begun:
-                raise ReplayError(f"{path} began with {begun} exemplars in memory, this learner with {self._begun}")
-            for episode in replay(self, record.events(), teacher=teacher):
-                if after is not None:
-                    after(episode.move)
-        if exemplars not in (None, len(self.memory)):
-            raise ReplayError(f"{path} ended with another memory; were exemplars added to one of them by hand?")
-
-    def _moved(self, row: int) -> Event:
-        memory = self.memory
-        return Event(Kind.MOVED, memory.contexts[row], memory.thetas[row], outcome=memory.outcomes[row])
+    def _begun_untold(self) -> list[Event]:
+        """What a replay needs to know of an attempt that ends before its first movement: it was begun."""
+        return [Event(Kind.ASKED, self._context)] if self._untold else []
 
     def _end(self) -> None:
         if self._attempt is not None:
             self._attempt.close()
         self._attempt = self._next = None
-        self._asked, self._offered_at = False, -1
+        self._asked, self._untold, self._offered_at = False, False, -1
 
     def _begin(self, attempt: AskingAttempt, context: Array) -> None:
         self._context, self._attempt = context, attempt
@@ -347,10 +313,6 @@ class Learner:
         except StopIteration:
             return
         self._attempt = attempt
-
-    def _go_unanswered(self) -> None:
-        while isinstance(self._next, Request):
-            self._advance(None)
 
 
 def _lesson(demonstration: Demonstration, theta_d: Array) -> tuple[bytes, bytes]:

@@ -1,25 +1,21 @@
 """Replaying a life: a learner of the same parts that lives through the same events becomes the same learner.
 
 It draws the same numbers again, so its goals, its searches and its memory come out the same, in the middle of an
-attempt, too. So nothing but events has to be kept; ``record.py`` keeps them.
+attempt, too. So nothing but events has to be kept, as `sgimd_torch.record` does.
     for episode in replay(learner, record.events(), teacher=teacher): ...
 """
 
 from __future__ import annotations
 
 from collections.abc import Generator, Iterable
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from sgimd_torch.record import Event, Kind
+from sgimd_torch.learner.events import TEACHER, Event, Kind
+from sgimd_torch.parts import Teacher
 from sgimd_torch.spaces import Array, Demonstration, Episode, Request
 
-if TYPE_CHECKING:
-    from sgimd_torch.teachers import Teacher
-
-TEACHER: Final = "teacher"
-"""Who has shown what the teacher of a run offered."""
 _HINT: Final = "was it recorded by another version, on another processor or with another configuration?"
 
 
@@ -41,10 +37,10 @@ def replay(
     """Let ``learner`` live through ``events``. Nothing is executed and nobody is asked for a demonstration.
 
     Args:
-        learner: a `Learner` freshly built; its file imports this one.
-        events: of the record.
-        teacher: freshly built, too: it is asked before each movement what it offers, so that its draws go on as they
-            would have. None for what was recorded alone.
+        learner: `Learner` freshly built; its file imports this one.
+        events: events of the record.
+        teacher: teacher freshly built, too: it is asked before each movement what it offers, so that its draws go on as
+            they would have. None for what was recorded alone.
 
     Yields:
         The episodes, as `run` has yielded them.
@@ -70,7 +66,7 @@ def replay(
                 if learner.social is None and not learner.waits_for_answer:
                     found = f"before movement {index} it asked for a demonstration, the learner now does not"
                     raise ReplayError(f"{found}; is it built in the same way, with the same seed?")
-                learner.watch(event.lesson, offered=event.who is not None)
+                learner.watch(event.lesson, who=event.who)
                 offered, before = None, before._replace(demonstration=event.lesson)
             case Kind.ASKED:
                 assert event.context is not None
@@ -78,6 +74,8 @@ def replay(
                 if event.who is not None and event.goal is not None:
                     request = Request(event.who, event.goal, event.strategy or "")
                     before = before._replace(request=request, reply=event.reply or "")
+                    if event.reply != "shown":
+                        learner.go_on_alone(event.reply or "")
             case Kind.INTERRUPTED if between:
                 learner.interrupt()
             case Kind.FAILED if event.theta is None:

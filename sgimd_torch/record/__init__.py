@@ -28,14 +28,13 @@ from pathlib import Path
 from typing import Any, Final, Self
 
 from sgimd_torch.files import replacing
+from sgimd_torch.learner.events import Event
 from sgimd_torch.record.layout import (
     DERIVED,
     HINT,
     SEALS,
     Dims,
-    Event,
     InUseError,
-    Kind,
     Row,
     RunError,
     about_rows,
@@ -54,7 +53,7 @@ from sgimd_torch.record.layout import (
 )
 from sgimd_torch.spaces import Demonstration
 
-__all__ = ["DERIVED", "Dims", "Event", "InUseError", "Kind", "Record", "RunError", "layout"]
+__all__ = ["DERIVED", "Dims", "InUseError", "Record", "RunError", "layout"]
 
 _PATIENCE: Final = 60.0  # s, that a commit waits for readers
 _AT_ONCE: Final = 4096  # rows that are read together

@@ -1,4 +1,4 @@
-"""How a record is laid out: what an event is, the columns of every table, cells of vectors, and seals of rows."""
+"""How a record is laid out: the columns of every table, cells of vectors, and seals of rows."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ import json
 import marshal
 import zlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from enum import StrEnum
 from itertools import accumulate, pairwise
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 
+from sgimd_torch.learner.events import Event, Kind
 from sgimd_torch.spaces import Array, Demonstration
 
 DERIVED: Final = ("goals", "evaluations", "errors", "regions", "predictions", "refreshes")  # a replay makes them again
@@ -30,32 +30,6 @@ class RunError(ValueError):
 
 class InUseError(RunError):
     """Another process writes it."""
-
-
-class Kind(StrEnum):
-    """What happened."""
-
-    MOVED = "moved"
-    RESTED = "rested"
-    SHOWN = "shown"
-    ASKED = "asked"  # an attempt began that may ask for a demonstration; what is shown next by that teacher answers it
-    FAILED = "failed"  # a movement got no outcome: ``reply`` says why; without theta, no context could be observed
-    INTERRUPTED = "interrupted"  # by the caller; with theta, before the outcome of that movement was told
-
-
-class Event(NamedTuple):
-    """Something that happened to a learner, with what belongs to its kind; ``who`` has shown something or was asked."""
-
-    kind: Kind
-    context: Array | None = None
-    theta: Array | None = None
-    goal: Array | None = None
-    outcome: Array | None = None
-    origin: str | None = None
-    lesson: Demonstration | None = None
-    who: str | None = None
-    strategy: str | None = None
-    reply: str | None = None
 
 
 _COUNTED: Final = (Kind.MOVED, Kind.RESTED, Kind.FAILED)

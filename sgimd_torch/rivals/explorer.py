@@ -1,6 +1,6 @@
 """How quality diversity explores: a scheduler's movements, batch after batch, and what is demonstrated beside them.
 
-explorer = QualityDiversity(policies, Scheduler(archive, emitters), "map-elites"); Learner(memory, explorer)
+explorer = QualityDiversity(problem, Scheduler(archive, emitters), "map-elites"); Learner(problem, explorer)
 """
 
 from __future__ import annotations
@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sgimd_torch.memory import Memory
-from sgimd_torch.spaces import Array, Attempt, Box, Demonstration, Move
-from sgimd_torch.strategies import Imitate
+from sgimd_torch.parts import Problem, Social, Strategy
+from sgimd_torch.spaces import Array, Attempt, Demonstration, Move
+from sgimd_torch.strategies import Mimic
 
 if TYPE_CHECKING:
     from ribs.schedulers import Scheduler
 
 
-class QualityDiversity:
+class QualityDiversity(Strategy):
     """The movements of a scheduler, batch after batch; it is told of a batch when all of it was executed.
 
     The objective, which decides between elites of one cell, is little effort: minus the mean square of a movement's
@@ -27,21 +27,21 @@ class QualityDiversity:
     Each attempt is one movement; if it is interrupted before its outcome is told, it is proposed again.
 
     Args:
-        policies: Pi.
-        scheduler: with its archive over T, of movements in sides of Pi. Deviation: what lies outside Pi is executed
-            clipped, but told as it was proposed, and its effort counts. CMA-ES itself would draw again, and never end
-            once its mean lies in a corner of many dimensions.
-        origin: of the movements, for the log.
-        start: its exemplars are in the archive from the start; None for an empty one.
+        problem: Pi; exemplars of its memory are in the archive from the start.
+        scheduler: scheduler of ribs, with its archive over T, of movements in sides of Pi. Deviation: what lies outside
+            Pi is executed clipped, but told as it was proposed, and its effort counts. CMA-ES itself would draw again,
+            and never end once its mean lies in a corner of many dimensions.
+        origin: origin of the movements, for the record.
     """
 
-    def __init__(self, policies: Box, scheduler: Scheduler, origin: str, start: Memory | None = None) -> None:
-        self.policies = policies
+    def __init__(self, problem: Problem, scheduler: Scheduler, origin: str) -> None:
+        super().__init__(problem)
+        self.policies = problem.policies
         self.archive = scheduler.archive
         self._scheduler = scheduler
         self._origin = origin
-        if start is not None and len(start):
-            self.add(start.thetas, start.outcomes)
+        if len(problem.memory):
+            self.add(problem.memory.thetas, problem.memory.outcomes)
         self._ask()
 
     def attempt(self, context: Array) -> Attempt:
@@ -66,17 +66,18 @@ class QualityDiversity:
         self._scheduler.tell(objectives_of(self._batch), np.stack(self._outcomes))
 
 
-class Shown:
+class Shown(Social):
     """Imitate what is demonstrated, as SGIM-D does; what was executed enters the archive, where it is varied."""
 
-    def __init__(self, explorer: QualityDiversity, imitate: Imitate) -> None:
-        self.explorer, self.imitate = explorer, imitate
+    def __init__(self, problem: Problem, explorer: QualityDiversity, mimic: Mimic) -> None:
+        super().__init__(problem)
+        self.explorer, self.mimic = explorer, mimic
 
     def attempt(self, context: Array, theta_d: Array, demonstration: Demonstration) -> Attempt:
         """The movements of the imitation."""
         thetas: list[Array] = []
         outcomes: list[Array] = []
-        moves = self.imitate.attempt(context, theta_d, demonstration)
+        moves = self.mimic.attempt(context, theta_d, demonstration)
         move = next(moves, None)
         try:
             while move is not None:

@@ -9,19 +9,21 @@ they found, but without goals: they vary movements that led somewhere new.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from functools import partial
+from typing import Any, Final
 
 import numpy as np
 
-from sgimd_torch.algorithms import Correspondence, MakeInverse, answering, start_memory
+from sgimd_torch.algorithms import MakeInverse
 from sgimd_torch.catalogue.options import hands_on
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.inverses.local_process import LocalProcess
-from sgimd_torch.learner import Learner
+from sgimd_torch.learner import Correspondence, Learner
 from sgimd_torch.memory import Memory
+from sgimd_torch.parts import Problem
 from sgimd_torch.rivals.explorer import QualityDiversity, Shown
-from sgimd_torch.spaces import check_count, stream
-from sgimd_torch.strategies import Imitate
+from sgimd_torch.spaces import check_count
+from sgimd_torch.strategies import Mimic
 
 try:
     from ribs.archives import GridArchive
@@ -72,8 +74,8 @@ def quality_diversity(
     """
     if environment.contexts.dim:
         raise ValueError(f"quality diversity knows one context only, got contexts of dim {environment.contexts.dim}")
-    memory = start_memory(environment, memory)
-    outcomes, rng = environment.outcomes, stream(seed, origin)
+    problem = Problem(environment, seed, memory, inverse=inverse)
+    outcomes, rng = environment.outcomes, problem.stream(origin)
     cells = max(2, round(_DEFAULT_CELLS ** (1 / outcomes.dim))) if cells is None else check_count("cells", cells, 1)
     if cells**outcomes.dim > _MAX_CELLS:
         raise ValueError(f"cells must be {_MAX_CELLS} in all at most, got {cells} in {outcomes.dim} dimensions")
@@ -85,19 +87,11 @@ def quality_diversity(
         **(annealed or {}),
     )
     scheduler = Scheduler(archive, emitters(archive, rng))
-    explorer = QualityDiversity(environment.policies, scheduler, origin, start=memory)
-    answer = answering(environment, memory, inverse)
+    explorer = QualityDiversity(problem, scheduler, origin)
     if correspondence is None:
-        return Learner(memory, explorer, inverse=answer)
-    imitate = Imitate(environment.policies, stream(seed, "imitate"), repeats=imitations, epsilon=epsilon)
-    return Learner(
-        memory,
-        explorer,
-        social=Shown(explorer, imitate),
-        correspondence=correspondence,
-        inverse=answer,
-        policies=environment.policies,
-    )
+        return Learner(problem, explorer)
+    shown = Shown(problem, explorer, Mimic(problem, repeats=imitations, epsilon=epsilon))
+    return Learner(problem, explorer, social=shown, correspondence=correspondence)
 
 
 @hands_on(quality_diversity, *_SHARED)
@@ -215,6 +209,17 @@ def cma_mae(
     team = _team(environment, emitters, sd, batch, ranker="imp", selection_rule="mu", restart_rule="basic")
     annealed = {"learning_rate": learning_rate, "threshold_min": _LEAST_OBJECTIVE}
     return quality_diversity(environment, seed, "cma-mae", team, annealed, **options)
+
+
+_ALONE: Final[dict[str, Any]] = {"correspondence": None, "imitations": 0, "epsilon": 0.0}
+map_elites_alone = partial(map_elites, **_ALONE)
+"""MAP-Elites: fills an archive of outcomes by variations of its elites."""
+isoline_alone = partial(isoline, **_ALONE)
+"""MAP-Elites along lines between elites."""
+cma_me_alone = partial(cma_me, **_ALONE)
+"""CMA-ME: fills an archive by evolution strategies."""
+cma_mae_alone = partial(cma_mae, **_ALONE)
+"""CMA-MAE: CMA-ME with thresholds that rise slowly."""
 
 
 def _check_sd(sd: float) -> None:

@@ -19,12 +19,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, get_type_hints
 
-from sgimd_torch.catalogue import CATALOGUE
+from sgimd_torch.catalogue import WORDS, about
 from sgimd_torch.catalogue.options import help_of
 from sgimd_torch.runs.config import FLAGS, RUN, Config, Part, chosen, dashed, typed
 from sgimd_torch.runs.process import Stopping, loading
 
 ALONE: Final = "practice"  # the default learner of a robot without demonstrations
+_PARTS: Final = [kind for kind in WORDS if kind not in ("algorithm", "command")]
 _PLACES: Final = {"progress": "goals.progress", "choose": "teacher.choose"}  # of kinds that another part chooses
 _WIDTH: Final = 120
 
@@ -59,7 +60,7 @@ def parse(argv: Sequence[str], description: str | None = None) -> tuple[Config, 
             raise SystemExit(0)
         if "algorithm" not in given:
             given["algorithm"] = _suited(given)
-        parts = chosen(given["algorithm"], {name: text for name, text in given.items() if name != "teachers"})
+        parts = chosen(given["algorithm"], given, asks="teachers" in given)
         if "help" in asked:
             print(help_on(parts))
             raise SystemExit(0)
@@ -157,13 +158,11 @@ def _wanted(kind: Any) -> str:
 
 
 def overview(description: str | None) -> str:
-    """What ``sgimd run --help`` prints: the options of every run, its flags, and the words for its parts."""
-    about = help_of(Config)
+    """Text of ``sgimd run --help``: the options of every run, its flags, and the words for its parts."""
+    about_run = help_of(Config)
     shown = {name: typed(getattr(Config, name)) for name in RUN}
-    run = {name: about[name] + f" ({text})" * (text != "null") for name, text in shown.items()} | FLAGS
-    algorithms = {word: entry.about for word, entry in CATALOGUE["algorithm"].items() if "rivals" not in entry.about}
-    rivals = [word for word in CATALOGUE["algorithm"] if word not in algorithms]
-    kinds = {kind: ", ".join(words) for kind, words in CATALOGUE.items() if kind != "algorithm"}
+    run = {name: about_run[name] + f" ({text})" * (text != "null") for name, text in shown.items()} | FLAGS
+    rivals = [word for word, at in WORDS["algorithm"].items() if at.startswith("rivals.")]
     lines = [
         "usage: sgimd run [--OPTION VALUE ...] [--resume]",
         "",
@@ -171,10 +170,10 @@ def overview(description: str | None) -> str:
         "the run, with defaults (null, for no value, where there is none):",
         *(_line(f"--{dashed(name)}", text) for name, text in run.items()),
         "algorithms (--algorithm):",
-        *(_line(word, text) for word, text in algorithms.items()),
+        *(_line(word, about("algorithm", word)) for word in WORDS["algorithm"] if word not in rivals),
         _line("extra rivals", ", ".join(rivals)),
         "parts, each a word of these or package.module:attribute, one of your own:",
-        *(_line(f"--{_PLACES.get(kind, kind)}", words) for kind, words in kinds.items()),
+        *(_line(f"--{_PLACES.get(kind, kind)}", ", ".join(words)) for kind, words in WORDS.items() if kind in _PARTS),
         "",
         "Parts have options of their own: sgimd run --goals interest-map --help shows those of the parts that are",
         "chosen, such as --goals.window 12.",
@@ -183,17 +182,17 @@ def overview(description: str | None) -> str:
 
 
 def help_on(parts: Mapping[str, Part]) -> str:
-    """What ``sgimd run --goals grid --help`` prints: the options of the parts that are chosen."""
+    """Text of ``sgimd run --goals grid --help``: the options of the parts that are chosen."""
     lines = ["usage: sgimd run [--OPTION VALUE ...] [--resume]; sgimd run --help shows the options of every run"]
     for part in parts.values():
-        words, about = CATALOGUE.get(part.kind, {}), help_of(part.make)
-        what = [words[part.word].about] if part.word in words else []
+        described = help_of(part.make)
+        what = [about(part.kind, part.word)] if part.word in WORDS[part.kind] else []
         leads_to = [f"--{part.full(each)}={parts[part.full(each)].word}" for each in part.choices]
         what += [f"its parts: {' '.join(leads_to)}"] if leads_to else []
         lines += ["", textwrap.fill(f"--{part.name or part.kind} {part.word}: {'; '.join(what)}", _WIDTH)]
         for name, option in part.options.items():
             meant = f"{_wanted(option.kind)}; default: {typed(option.default)}"
-            lines.append(_line(f"--{dashed(part.full(name))}", f"{about.get(name, '')} ({meant})"))
+            lines.append(_line(f"--{dashed(part.full(name))}", f"{described.get(name, '')} ({meant})"))
     return "\n".join(lines)
 
 

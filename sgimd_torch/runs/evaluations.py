@@ -6,7 +6,7 @@ evaluations.after(500)["own"].mean_error
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,9 +16,9 @@ from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.evaluation import Benchmark, Evaluation, evaluate
 from sgimd_torch.goals.regions import Region
 from sgimd_torch.learner import Learner
+from sgimd_torch.parts import Inverse
 from sgimd_torch.record import Record
 from sgimd_torch.runs.config import OWN, Config
-from sgimd_torch.spaces import Array, Estimate
 
 Answers = Mapping[str, Evaluation]
 """An evaluation by each answer, the run's own first."""
@@ -38,7 +38,7 @@ class Evaluations:
     environment: Environment
     benchmark: Benchmark
     learner: Learner
-    inverses: Mapping[str, Callable[[Array, Array], Estimate]]
+    inverses: Mapping[str, Inverse]
     record: Record
 
     def __post_init__(self) -> None:

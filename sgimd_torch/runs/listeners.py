@@ -5,16 +5,16 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any, Protocol
+from typing import Any
 
 from sgimd_torch.evaluation import Evaluation
 from sgimd_torch.spaces import Episode
 
 
-class Listener(Protocol):
-    """Is told what happens in a run. A resumed run tells it everything again, from its record.
+class Listener:
+    """Listener of a run: is told what happens. A resumed run tells it everything again, from its record.
 
-    Whoever derives from it need only say what concerns them.
+    A listener overrides what concerns it.
     """
 
     def episode(self, episode: Episode, replayed: bool) -> None:
@@ -28,6 +28,10 @@ class Listener(Protocol):
     def begin(self) -> None:
         """The replay is over: from now on files may change."""
         return
+
+    def curves(self) -> Mapping[str, float]:
+        """Numbers for the board since the last call, by tag."""
+        return {}
 
     def flush(self) -> None:
         """What was told so far is to be on the disk."""

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sgimd_torch.files import checksum
-from sgimd_torch.record import DERIVED, Kind, Record, RunError, layout
+from sgimd_torch.learner.events import Kind
+from sgimd_torch.record import DERIVED, Record, RunError, layout
 from sgimd_torch.runs.config import FILES, OWN, PLACE, Config, code_of
 from sgimd_torch.runs.directory import FILE
 from sgimd_torch.spaces import Array, Box, Demonstration

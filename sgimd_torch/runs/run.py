@@ -9,17 +9,16 @@ import math
 import re
 import time
 import traceback
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import suppress
 from typing import Final, Self
 
 from sgimd_torch.environments.protocol import FAILURES, SimulationError
-from sgimd_torch.record import Record, RunError
+from sgimd_torch.record import RunError
 from sgimd_torch.runs.build import RunParts
-from sgimd_torch.runs.config import OWN
 from sgimd_torch.runs.directory import open_run
 from sgimd_torch.runs.evaluations import Evaluations
-from sgimd_torch.runs.listeners import Listener, Seconds
+from sgimd_torch.runs.listeners import Seconds
 from sgimd_torch.runs.process import Failed, Progress, Stopped, Stopping, say
 from sgimd_torch.session import NoOutcomeError, ReplayError, live, reason_of, run
 from sgimd_torch.spaces import Episode
@@ -85,7 +84,12 @@ class Life:
         self.seconds = Seconds(self.record.about.get("seconds", {}))
         judged = parts.config, parts.environment, parts.benchmark, parts.learner, parts.answers
         self.evaluations = Evaluations(*judged, self.record)
-        self.listeners = listeners_of(parts, self.record, self.seconds)
+        self.listeners = [each.listener(self) for each in parts.learner.problem.trained]
+        if parts.config.board:
+            from sgimd_torch.board.listener import BoardListener  # most runs have no board
+
+            board = BoardListener(parts.config.directory, parts, self.seconds.summary, self._curves)
+            self.listeners.append(board)
         self._wanted = set(parts.config.evaluations)
         self._failures: list[str] = []  # kinds of those that were told
         self._committed = time.monotonic()
@@ -170,6 +174,10 @@ class Life:
             each.flush()
         self._committed = time.monotonic()
 
+    def _curves(self) -> dict[str, float]:
+        """Numbers that listeners have for the board since it asked last, by tag."""
+        return {tag: value for each in self.listeners for tag, value in each.curves().items()}
+
     def _settle(self) -> None:
         self.record.settle(seconds=self.seconds.summary())
         self.record.commit()
@@ -208,20 +216,3 @@ class Life:
         for each in self.listeners:
             each.begin()
         self.commit()
-
-
-def listeners_of(parts: RunParts, record: Record, seconds: Seconds) -> list[Listener]:
-    """Who listens to a run, in the order in which they are told."""
-    found: list[Listener] = []
-    curves: Callable[[], Mapping[str, float]] = dict
-    if parts.model is not None and parts.trust is not None:
-        from sgimd_torch.runs.model_listener import ModelListener
-
-        model = ModelListener(record, parts.model, parts.trust.error, parts.answers[OWN], parts.learner.memory, seconds)
-        found.append(model)
-        curves = model.new_curves
-    if parts.config.board:
-        from sgimd_torch.board.listener import BoardListener
-
-        found.append(BoardListener(parts.config.directory, parts, seconds.summary, curves))
-    return found

@@ -1,72 +1,85 @@
 """The simplest searches: the best movement so far, plus noise; or again and again what was inferred, plus less noise.
 
-search = perturb(policies, rng)(estimate, goal); theta = next(search); theta = search.send(outcome) ...
+search = Perturb(problem)(estimate, goal); theta = next(search); theta = search.send(outcome) ...
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 
 import numpy as np
 
-from sgimd_torch.searches.widening import Width
-from sgimd_torch.spaces import Array, Box, Estimate, Search
+from sgimd_torch.explore.widening import Width
+from sgimd_torch.parts import Problem, Search
+from sgimd_torch.spaces import Array, Estimate
 
 
-def perturb(policies: Box, rng: np.random.Generator, *, sd: float = 0.05) -> Search:
-    """Gaussian noise around the best theta so far, remembered or executed here, clipped to ``policies``; never ends.
+class Perturb(Search):
+    """Best movement so far plus Gaussian noise.
 
-    It executes theta_g first, unless it is a copy of a remembered theta, whose outcome is known.
+    The noise is around the best theta so far, remembered or executed here, and clipped to Pi; it never ends.
+
+    It executes theta_g first, unless that is a copy of a remembered theta, whose outcome is known.
 
     Args:
-        policies: Pi; nothing outside is proposed.
-        rng: draws the noise.
-        sd: standard deviation of the noise, in sides of ``policies``.
+        problem: Pi is read; nothing outside is proposed.
+        sd: standard deviation of the noise, in sides of Pi.
 
     Raises:
         ValueError: ``sd`` is not positive.
     """
-    vary = _variation(policies, rng, sd)
 
-    def search(start: Estimate, goal: Array) -> Generator[Array, Array, None]:
+    def __init__(self, problem: Problem, *, sd: float = 0.05) -> None:
+        super().__init__(problem)
+        self.sd = _positive(sd)
+
+    def __call__(self, start: Estimate, goal: Array) -> Generator[Array, Array, None]:
+        """Movements around ``start``."""
         distances = np.linalg.norm(start.outcomes - goal, axis=1)
         best, shortest = start.thetas[distances.argmin()], float(distances.min())
-        theta = vary(best) if _remembered(start) else policies.check("theta of the estimate", start.theta)
+        policies = self.problem.policies
+        theta = self._vary(best) if _remembered(start) else policies.check("theta of the estimate", start.theta)
         while True:
             distance = math.dist(goal, (yield theta))
             if distance < shortest:
                 best, shortest = theta, distance
-            theta = vary(best)
+            theta = self._vary(best)
 
-    return search
+    def _vary(self, theta: Array) -> Array:
+        policies = self.problem.policies
+        return policies.clip(self.rng.normal(theta, self.sd * policies.sides))
 
 
-def practise(policies: Box, rng: np.random.Generator, *, sd: float = 0.02, width: Width | None = None) -> Search:
-    """Gaussian noise around theta_g, whatever came of it, clipped to ``policies``; never ends.
+class Vary(Search):
+    """Answer of the inverse model plus a little Gaussian noise.
+
+    The noise is around theta_g, whatever came of it, and clipped to Pi; it never ends.
 
     So the inverse model is corrected where it errs, and sees in which directions the outcome changes. It is meant for
     an inverse model that is nearly right, and for one movement or two at each goal. Where theta_g is the copy of a
-    remembered theta, the inverse model knows nothing better, and more noise looks farther around it.
+    remembered theta, the inverse model knows nothing better, and more noise looks farther around it: half of the
+    `Width` of exploration.
 
     Args:
-        policies, rng: as in `perturb`.
-        sd: standard deviation of the noise, in sides of ``policies``.
-        width: of a search for what is far from the goal; around a copy the noise is half as wide. None: one that stays
-            as it begins.
+        problem: Pi is read; nothing outside is proposed.
+        sd: standard deviation of the noise, in sides of Pi.
 
     Raises:
         ValueError: ``sd`` is not positive.
     """
-    vary = _variation(policies, rng, sd)
-    width = width if width is not None else Width()
 
-    def search(start: Estimate, goal: Array) -> Generator[Array, Array, None]:
+    def __init__(self, problem: Problem, *, sd: float = 0.02) -> None:
+        super().__init__(problem)
+        self.sd, self.width = _positive(sd), problem.shared(Width)
+
+    def __call__(self, start: Estimate, goal: Array) -> Generator[Array, Array, None]:
+        """Movements around theta_g of ``start``."""
+        policies = self.problem.policies
         theta = policies.check("theta of the estimate", start.theta)
         while True:
-            yield (_variation(policies, rng, width.sd / 2) if _remembered(start) else vary)(theta)
-
-    return search
+            sd = self.width.sd / 2 if _remembered(start) else self.sd
+            yield policies.clip(self.rng.normal(theta, sd * policies.sides))
 
 
 def _remembered(start: Estimate) -> bool:
@@ -74,7 +87,7 @@ def _remembered(start: Estimate) -> bool:
     return bool((start.thetas == start.theta).all(axis=1).any())
 
 
-def _variation(policies: Box, rng: np.random.Generator, sd: float) -> Callable[[Array], Array]:
+def _positive(sd: float) -> float:
     if not sd > 0:
         raise ValueError(f"sd must be positive, got {sd}; without noise nothing new is tried")
-    return lambda theta: policies.clip(rng.normal(theta, sd * policies.sides))
+    return sd

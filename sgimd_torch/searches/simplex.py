@@ -2,86 +2,100 @@
 
 Section 4.4.2 of Nguyen & Oudeyer (2014), local optimisation (Lagarias et al. 1998). A search is a generator, so it can
 be paused, counted and interrupted at any movement:
-    search = nelder_mead(policies)(estimate, goal); theta = next(search); theta = search.send(outcome) ...
+    search = NelderMead(problem)(estimate, goal); theta = next(search); theta = search.send(outcome) ...
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Generator
+from functools import partial
 
 import numpy as np
 
-from sgimd_torch.spaces import Array, Box, Estimate, Search
+from sgimd_torch.parts import Problem, Search
+from sgimd_torch.spaces import Array, Box, Estimate
 
 
-def nelder_mead(
-    policies: Box,
-    rng: np.random.Generator,
-    *,
-    noise: float = 0.05,
-    step: float = 0.1,
-    complete: bool = False,
-    adaptive: bool = False,
-    xatol: float = 0.1,
-    fatol: float = 0.05,
-) -> Search:
-    """Downhill simplex on the distance to the goal, around theta_g and its neighbours.
+class NelderMead(Search):
+    """Simplex of neighbours, a little noise on every movement.
+
+    Downhill on the distance to the goal, around theta_g and its neighbours.
 
     The first movement is theta_g, with noise. Neighbours become vertices with their remembered outcomes, which costs no
     movement (but takes outcomes in nearby contexts for outcomes in this one). A neighbour on a line, plane ... through
     better vertices is left out, as a flat simplex cannot turn.
 
     Args:
-        policies: Pi; nothing outside is proposed.
-        rng: draws the noise, and the directions of the steps that replace missing neighbours.
-        noise: standard deviation of the noise on each parameter of every movement, in sides of ``policies``; the vertex
-            is the noisy movement. Deviation: the paper adds none. But a simplex searches the flat through its vertices,
+        problem: Pi is read; nothing outside is proposed.
+        noise: standard deviation of the noise on each parameter of every movement, in sides of Pi; the vertex is the
+            noisy movement. Deviation: the paper adds none. But a simplex searches the flat through its vertices,
             and neighbours from memory span the same flat again and again. Without new directions the learner soon
             repeats itself, and its inverse model cannot tell noise from the effect of theta.
-        step: size of those steps, root mean square over the parameters, in sides of ``policies``. Deviation: the usual
-            first simplex steps along one coordinate at a time, but one knot of one joint often hardly moves the float.
-            These steps go in random directions, and no noise is added to them.
-        complete: fill the simplex up to theta_dim + 1 vertices, the paper's 26, at one movement each. False: only up to
-            outcome_dim + 1, so that with some neighbours the first reflection is the second movement. The search then
-            stays in the flat through its vertices, which usually contains a solution, because theta is redundant.
-            Deviation: False is the default, as 25 steps would be the whole budget of a goal.
-        adaptive: Gao & Han's coefficients (2012), gentler in high dimensions.
-        xatol, fatol: it ends when all vertices are this near to the best, in theta and in metres from the goal. Below
-            the noise of the outcomes a simplex cannot tell better from worse, so by default it ends early, and the next
-            search begins with more in memory. Deviation: the paper names no such end.
+        step: size of the steps that replace missing neighbours, root mean square over the parameters, in sides of Pi.
+            Deviation: the usual first simplex steps along one coordinate at a time, but one knot of one joint often
+            hardly moves the float. These steps go in random directions, and no noise is added to them.
+        complete: true fills the simplex up to theta_dim + 1 vertices, the paper's 26, at one movement each; false fills
+            it up to outcome_dim + 1, so that with some neighbours the first reflection is the second movement. The
+            search then stays in the flat through its vertices, which usually contains a solution, because theta is
+            redundant. Deviation: False is the default, as 25 steps would be the whole budget of a goal.
+        xatol: distance in theta within which all vertices end the search. Below the noise of the outcomes a simplex
+            cannot tell better from worse, so by default the search ends early, and the next one begins with more in
+            memory. Deviation: the paper names no such end.
+        fatol: difference of distances from the goal, in the unit of T, within which all vertices end the search.
 
     Raises:
         ValueError: ``step`` is not in (0, 0.5], or ``noise`` not in [0, 0.5].
     """
-    if not 0 < step <= 0.5:
-        raise ValueError(f"step must lie in (0, 0.5], got {step}; it is a fraction of the sides of Pi")
-    if not 0 <= noise <= 0.5:
-        raise ValueError(f"noise must lie in [0, 0.5], got {noise}; it is a fraction of the sides of Pi")
 
-    def place(theta: Array) -> Array:
-        return policies.clip(rng.normal(theta, noise * policies.sides) if noise else theta)
+    def __init__(
+        self,
+        problem: Problem,
+        *,
+        noise: float = 0.05,
+        step: float = 0.1,
+        complete: bool = False,
+        xatol: float = 0.1,
+        fatol: float = 0.05,
+    ) -> None:
+        super().__init__(problem)
+        if not 0 < step <= 0.5:
+            raise ValueError(f"step must lie in (0, 0.5], got {step}; it is a fraction of the sides of Pi")
+        if not 0 <= noise <= 0.5:
+            raise ValueError(f"noise must lie in [0, 0.5], got {noise}; it is a fraction of the sides of Pi")
+        self.noise, self.step, self.complete, self.xatol, self.fatol = noise, step, complete, xatol, fatol
 
-    def search(start: Estimate, goal: Array) -> Generator[Array, Array, None]:
-        theta = place(policies.check("theta of the estimate", start.theta))
+    def __call__(self, start: Estimate, goal: Array) -> Generator[Array, Array, None]:
+        """Movements around ``start``, its theta_g first; it ends when the simplex has shrunk."""
+        policies = self.problem.policies
+        theta = self._place(policies.check("theta of the estimate", start.theta))
         vertices = [theta]
         values = [math.dist(goal, (yield theta))]
-        flat = _Flat(theta, xatol)
+        flat = _Flat(theta, self.xatol)
         distances = np.linalg.norm(start.outcomes - goal, axis=1)
         for k in distances.argsort(kind="stable"):
             if flat.widen_if_lacking(start.thetas[k]):
                 vertices.append(policies.check("a theta of the estimate", start.thetas[k]))
                 values.append(float(distances[k]))
-        n_vertices = 1 + (policies.dim if complete else min(policies.dim, len(goal)))
+        n_vertices = 1 + (policies.dim if self.complete else min(policies.dim, len(goal)))
         while len(vertices) < n_vertices:
-            vertex = _step_out(policies, theta, flat, rng, step)
+            vertex = _step_out(policies, theta, flat, self.rng, self.step)
             flat.widen(vertex)
             vertices.append(vertex)
             values.append(math.dist(goal, (yield vertex)))
         simplex = np.array(vertices), np.array(values)
-        yield from _towards(goal, simplex_descent(*simplex, place=place, adaptive=adaptive, xatol=xatol, fatol=fatol))
+        yield from _towards(goal, simplex_descent(*simplex, place=self._place, xatol=self.xatol, fatol=self.fatol))
 
-    return search
+    def _place(self, theta: Array) -> Array:
+        policies, noise = self.problem.policies, self.noise
+        return policies.clip(self.rng.normal(theta, noise * policies.sides) if noise else theta)
+
+
+exact = partial(NelderMead, noise=0.0)
+"""Simplex of neighbours, without noise."""
+
+complete = partial(NelderMead, noise=0.0, complete=True, xatol=1e-4, fatol=1e-4)
+"""Simplex without noise, complete as in the paper (26), ended by the budget alone."""
 
 
 def simplex_descent(
@@ -89,7 +103,6 @@ def simplex_descent(
     values: Array,
     *,
     place: Callable[[Array], Array] | None = None,
-    adaptive: bool = False,
     xatol: float = 1e-4,
     fatol: float = 1e-4,
 ) -> Generator[Array, float, None]:
@@ -102,10 +115,10 @@ def simplex_descent(
         vertices: ``(n + 1, dim)``. With n < dim the search stays in the n-dimensional flat through them, unless
             ``place`` leads out.
         values: ``(n + 1,)``.
-        place: moves a point to where it may be tried, for example clips it into a box; None leaves it where it is. (By
-            clipping alone, a simplex with all vertices on one face of the box cannot leave this face.)
-        adaptive: coefficients that depend on n.
-        xatol, fatol: it ends when all vertices are this near to the best, in every coordinate and in value.
+        place: function from a point to where it may be tried, into a box say; None leaves it where it is. (By clipping
+            alone, a simplex with all vertices on one face of the box cannot leave this face.)
+        xatol: distance in every coordinate within which all vertices end the descent.
+        fatol: difference of values within which all vertices end the descent.
 
     Raises:
         ValueError: fewer than two vertices, or not one value for each.
@@ -117,7 +130,6 @@ def simplex_descent(
     order = values.argsort(kind="stable")
     vertices, values = vertices[order], values[order]
     n = len(vertices) - 1
-    expansion, contraction, shrinkage = (1 + 2 / n, 0.75 - 1 / (2 * n), 1 - 1 / n) if adaptive else (2.0, 0.5, 0.5)
 
     def beyond(centre: Array, distance: float) -> Array:
         """A point on the line from the worst vertex (-1) through the ``centre`` of the others (0)."""
@@ -130,14 +142,14 @@ def simplex_descent(
         value = yield reflected
         better: tuple[Array, float] | None = None
         if value < values[0]:
-            expanded = beyond(centre, expansion)
+            expanded = beyond(centre, 2.0)
             value_expanded = yield expanded
             better = (expanded, value_expanded) if value_expanded < value else (reflected, value)
         elif value < values[-2]:
             better = reflected, value
         else:
             outside = value < values[-1]
-            contracted = beyond(centre, contraction if outside else -contraction)
+            contracted = beyond(centre, 0.5 if outside else -0.5)
             value_contracted = yield contracted
             if value_contracted <= value if outside else value_contracted < values[-1]:
                 better = contracted, value_contracted
@@ -145,7 +157,7 @@ def simplex_descent(
             vertices[-1], values[-1] = better
         else:
             for j in range(1, n + 1):
-                shrunk = vertices[0] + shrinkage * (vertices[j] - vertices[0])
+                shrunk = vertices[0] + 0.5 * (vertices[j] - vertices[0])
                 vertices[j] = shrunk if place is None else place(shrunk)
                 values[j] = yield vertices[j]
         order = values.argsort(kind="stable")

@@ -1,4 +1,6 @@
-"""Teach a learner by hand in a browser: lead the arm, show the movement, see the effect. Only this machine has access.
+"""Teach a learner by hand, in a browser.
+
+Lead the arm, show your movement to the learner, and see what it can do now. Only this machine has access to the page.
 
 Examples:
   sgimd teach                                           a new learner on the fishing rod, into runs/taught/seed-000

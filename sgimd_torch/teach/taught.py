@@ -64,7 +64,7 @@ class TaughtRun:
 
     def __init__(self, config: Config) -> None:
         self.config, parts = config, build(config)
-        self._hand = ByHand(parts.teacher)
+        self._hand = ByHand(teacher=parts.teacher)
         self.parts = replace(parts, teacher=self._hand)
         teachable = parts.learner.social is not None and not parts.teachers
         self.cannot_be_taught = "" if teachable else ALONE.format(config.algorithm)

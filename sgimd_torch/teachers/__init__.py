@@ -7,23 +7,34 @@ movements, demonstrates something from a tile chosen at random among those the l
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable, Sequence
-from typing import Final, Protocol
+from functools import partial
+from typing import Final
 
 import numpy as np
 
+from sgimd_torch.catalogue.built import Built
 from sgimd_torch.memory import Memory
+from sgimd_torch.parts import Teacher
 from sgimd_torch.spaces import Array, Demonstration, check_count, check_rng, check_vector
 
 _STALLED: Final = 0.01  # share by which distances fall at least while a learner progresses
 
 
-class Teacher(Protocol):
-    """Offers demonstrations to a learner, whose memory it can see: the paper's What, How and When in one call."""
+class Demonstrator(Built):
+    """Teacher who is asked for a demonstration of a goal. Built from ``(demonstrations, rng)`` and options.
 
-    def offer(self, index: int, memory: Memory) -> Demonstration | None:
-        """A demonstration before movement ``index`` (0, 1, ...), or None."""
-        ...
+    Attributes:
+        takes: movements at which the learner rests until a reply has come.
+    """
+
+    takes: int = 0
+
+    @abstractmethod
+    def demonstrate(self, context: Array, goal: Array, memory: Memory) -> Demonstration | None:
+        """A demonstration of ``goal`` ``(outcome_dim,)`` in ``context`` ``(context_dim,)``, or None. A replay asks
+        again, so what is drawn may depend on the seed and on the arguments only."""
 
 
 Choose = Callable[[Sequence[Demonstration], Memory, np.random.Generator], Demonstration]
@@ -31,17 +42,22 @@ Choose = Callable[[Sequence[Demonstration], Memory, np.random.Generator], Demons
 
 
 def at_random(demonstrations: Sequence[Demonstration], memory: Memory, rng: np.random.Generator) -> Demonstration:
-    """Any of them, all equally likely."""
+    """Any demonstration, all equally likely."""
     return demonstrations[int(rng.integers(len(demonstrations)))]
 
 
 def least_explored(
     demonstrations: Sequence[Demonstration], memory: Memory, rng: np.random.Generator, *, tiles: int = 10
 ) -> Demonstration:
-    """A demonstration from a tile chosen at random among the tiles that have any and that the learner reached least.
+    """Demonstration from a tile that the learner has reached least.
+
+    The tile is chosen at random among those that have any and were reached least.
 
     Args:
-        tiles: in each dimension of the box around the demonstrated outcomes.
+        demonstrations: demonstrations to choose from.
+        memory: exemplars of the learner.
+        rng: random stream of the choice.
+        tiles: number of tiles in each dimension of the box around the demonstrated outcomes.
 
     Raises:
         ValueError: outcomes of another dimension than those of the memory.
@@ -62,14 +78,16 @@ def least_explored(
     return demonstrations[int(rng.choice(np.flatnonzero(tile_of.ravel() == chosen)))]
 
 
-class PeriodicTeacher:
-    """Demonstrates regularly, as in the paper: before the movements ``every``, 2 ``every``, ...
+class PeriodicTeacher(Teacher):
+    """Demonstrates regularly, one every so many movements, as in the paper.
+
+    It demonstrates before the movements ``every``, 2 ``every``, ...
 
     Args:
-        demonstrations: that it has.
-        rng: draws what ``choose`` draws.
+        demonstrations: demonstrations to choose from.
+        rng: random stream of ``choose``.
         every: movements from one demonstration to the next.
-        choose: which demonstration comes.
+        choose: choice of the next demonstration.
     """
 
     def __init__(
@@ -87,18 +105,20 @@ class PeriodicTeacher:
         self.choose = choose
 
     def offer(self, index: int, memory: Memory) -> Demonstration | None:
-        """See ``Teacher``."""
+        """A demonstration, if one is due."""
         if index == 0 or index % self.every:
             return None
         return self.choose(self.demonstrations, memory, self.rng)
 
 
-class InitialTeacher:
-    """Gives each demonstration once, at the start, in random order: one before the movements 0, ``every``, ...
+class InitialTeacher(Teacher):
+    """Demonstrates all at the start, one every so many movements, in random order.
+
+    One demonstration comes before the movements 0, ``every``, ...
 
     Args:
-        demonstrations: that it has.
-        rng: draws their order.
+        demonstrations: demonstrations to give.
+        rng: random stream of their order.
         every: movements from one demonstration to the next.
     """
 
@@ -109,24 +129,30 @@ class InitialTeacher:
         self._order = rng.permutation(len(demonstrations))
 
     def offer(self, index: int, memory: Memory) -> Demonstration | None:
-        """See ``Teacher``."""
+        """A demonstration, if one is due."""
         lesson, rest = divmod(index, self.every)
         if rest or lesson >= len(self._order):
             return None
         return self.demonstrations[self._order[lesson]]
 
 
-class AskedTeacher:
-    """Demonstrates when the learner's competence stalls, as if the learner had asked.
+at_once = partial(InitialTeacher, every=1)
+"""Gives each demonstration once, at the start, one before each movement."""
+
+
+class AskedTeacher(Teacher):
+    """Demonstrates when the learner's competence stalls.
+
+    It is as if the learner had asked.
 
     Every ``patience`` movements it looks how near the learner has come to each demonstrated outcome. It demonstrates if
     the mean distance fell by less than a hundredth since the last look.
 
     Args:
-        demonstrations: that it has.
-        rng: draws what ``choose`` draws.
+        demonstrations: demonstrations to choose from.
+        rng: random stream of ``choose``.
         patience: movements from one look at the learner to the next.
-        choose: which demonstration comes.
+        choose: choice of the next demonstration.
     """
 
     def __init__(
@@ -145,7 +171,7 @@ class AskedTeacher:
         self._distance = np.inf
 
     def offer(self, index: int, memory: Memory) -> Demonstration | None:
-        """See ``Teacher``."""
+        """A demonstration, if one is due."""
         if index == 0 or index % self.patience:
             return None
         before, self._distance = self._distance, self._distance_left(memory)

@@ -27,7 +27,8 @@ from dataclasses import replace
 from functools import partial
 from typing import Final
 
-from sgimd_torch.catalogue import ROD, label
+from sgimd_torch.catalogue import ROD
+from sgimd_torch.figures.names import label
 from sgimd_torch.runs.command_line import parse
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.engines.loop import local, sweep

@@ -1,17 +1,67 @@
-"""What the tests of the learning side share: a planar arm, demonstrations on it, and the five learners of the paper."""
+"""What the tests of the learning side share: problems, a planar arm, demonstrations on it, and the paper's learners."""
 
 from collections.abc import Callable, Generator, Sequence
+from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
 
 from sgimd_torch.algorithms import imitation, observation, random_exploration, sagg_riac, sgim_d
 from sgimd_torch.environments.planar_arm import PlanarArm
+from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.learner import Learner
 from sgimd_torch.memory import Memory
-from sgimd_torch.spaces import Array, Demonstration, stream
+from sgimd_torch.parts import Inverse, Problem, made
+from sgimd_torch.spaces import Array, Box, Demonstration, stream
 
 NO_CONTEXT = np.zeros(0)
+
+
+@dataclass
+class Boxes:
+    """The smallest environment: an outcome is the movement itself, cut or repeated to the dimensions of T."""
+
+    contexts: Box
+    policies: Box
+    outcomes: Box
+    rest: Array
+    outcome_noise: float = 0.0
+
+    def observe(self, rng: np.random.Generator) -> Array:
+        return self.contexts.sample(rng)
+
+    def execute(self, context: Array, theta: Array, rng: np.random.Generator) -> Array:
+        return np.resize(theta, self.outcomes.dim) + rng.normal(0, self.outcome_noise, self.outcomes.dim)
+
+
+def problem(
+    environment: Environment | None = None,
+    *,
+    contexts: Box | None = None,
+    policies: Box | None = None,
+    outcomes: Box | None = None,
+    rest: Sequence[float] | Array | None = None,
+    noise: float = 0.0,
+    memory: Memory | None = None,
+    inverse: Callable[[Problem], Inverse] | None = None,
+    seed: int = 0,
+) -> Problem:
+    """The problem of an environment; without one, of these boxes.
+
+    Boxes that are not given have the dimensions of ``memory``: none for C, [0, 1] for Pi, [-1, 1]^2 for T. ``rest`` is
+    0, or the point of T nearest to it. The problem keeps ``memory`` itself, so that a test can add to it.
+    """
+    if environment is None:
+        c, p, t = (0, 1, 2) if memory is None else (memory.context_dim, memory.theta_dim, memory.outcome_dim)
+        outcomes = outcomes or Box.cube(-1, 1, t)
+        at_rest = outcomes.clip(np.zeros(outcomes.dim)) if rest is None else np.array(rest, dtype=float)
+        environment = Boxes(contexts or Box.cube(0, 1, c), policies or Box.cube(0, 1, p), outcomes, at_rest, noise)
+    found = Problem(environment, seed)
+    if memory is not None:
+        found = found.over(memory)
+    if inverse is not None:
+        found.inverse = made(Inverse, inverse, found)
+    return found
 
 
 def last_posture(times: Array, trajectory: Array) -> Array:

@@ -23,7 +23,7 @@ VARIANTS = {
     "sagg-riac": {"algorithm": "sagg-riac", **ARM},
     "imitation": {"algorithm": "imitation"},
     "model": {"algorithm": "sgim-d", **ARM, "inverse": "model-alone", "search": "gradient"},
-    "sgim-acts": {"algorithm": "sgim-acts", "teachers": ("low-half", "high-half"), "base": "search", **ARM},
+    "sgim-acts": {"algorithm": "sgim-acts-search", "teachers": ("low-half", "high-half"), **ARM},
     "random": {"algorithm": "random"},
     "observation": {"algorithm": "observation", **ARM},
 }

@@ -65,7 +65,7 @@ def test_a_teacher_of_the_run_shows_the_same_whether_or_not_a_person_does():
         def offer(self, index, memory):
             return SHOWN[index]
 
-    hand, offered = ByHand(Counting()), []
+    hand, offered = ByHand(teacher=Counting()), []
     for index in range(4):
         if index == 2:
             hand.give(SHOWN[50])

@@ -14,10 +14,10 @@ from typing import Final
 
 import numpy as np
 
-from sgimd_torch.algorithms import Correspondence
 from sgimd_torch.environments.protocol import Environment, Record, check_instance, primitive_of, recorded
 from sgimd_torch.evaluation import Benchmark, load_benchmark
 from sgimd_torch.files import checksum
+from sgimd_torch.learner import Correspondence
 from sgimd_torch.spaces import Demonstration
 
 MOST_GOALS: Final = 500  # of a task that has none

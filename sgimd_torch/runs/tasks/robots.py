@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
+from sgimd_torch.environments import objects, toys
 from sgimd_torch.environments.planar_arm import PlanarArm
+from sgimd_torch.environments.toys import Toy
 from sgimd_torch.evaluation import SHIPPED as SHIPPED_BENCHMARK
 from sgimd_torch.evaluation import Benchmark, tile_goals
 from sgimd_torch.runs.tasks import Task
 from sgimd_torch.spaces import Array, Box, Demonstration, stream
-
-if TYPE_CHECKING:
-    from sgimd_torch.environments.toys import Toy
 
 DATA: Final = SHIPPED_BENCHMARK.parent
 SIDE: Final = 0.1  # m, of a benchmark tile; it leaves 311 goals in the disc of radius 1 m that these arms reach
@@ -30,24 +28,59 @@ def planar_arm(*, n_joints: int) -> Task:
     return Task(arm, partial(arm_benchmark, arm), partial(arm_demonstrations, arm))
 
 
+planar_arm_7 = partial(planar_arm, n_joints=7)
+"""Planar arm with 7 joints, no noise."""
+planar_arm_50 = partial(planar_arm, n_joints=50)
+"""Planar arm with 50 joints, no noise."""
+
+
 def swimmer() -> Task:
-    """gymnasium's Swimmer-v5; its demonstrations are torques."""
+    """gymnasium's Swimmer-v5: three links, two motors, which demonstrations give torques."""
     from sgimd_torch.environments.swimmer import Swimmer  # gymnasium is loaded only when it is needed
 
     return Task(Swimmer(), DATA / "swimmer_benchmark.npz", DATA / "swimmer_demonstrations.npz")
 
 
 def half_reached() -> Task:
-    """The arm of 7 joints, with a little noise and a T of which it cannot reach a half and a bit."""
+    """Planar arm with 7 joints that reaches less than half of T."""
     arm = PlanarArm(7, noise=0.02, outcomes=Box(np.array([-1.0, -1.0]), np.array([3.0, 1.0]), ("x", "y"), "m"))
     return Task(arm, partial(arm_benchmark, arm))
 
 
-def toy(*, make: Callable[[], Toy], side: float, taught: bool = False) -> Task:
+def toy(robot: Toy, side: float, *, taught: bool = False) -> Task:
     """A toy robot; its goals lie on tiles of ``side``, in the unit of T. ``taught``: it has a teacher, too."""
-    robot = make()
     shown = partial(toy_demonstrations, robot) if taught else None
     return Task(robot, partial(toy_benchmark, robot, side), shown, last_row if taught else None)
+
+
+def toss() -> Task:
+    """A ball thrown in the wind, which is the context."""
+    return toy(toys.toss(), 0.4, taught=True)
+
+
+def crawler() -> Task:
+    """Four legs, whose phases are periodic parameters."""
+    return toy(toys.crawler(), 0.1)
+
+
+def two_elbows() -> Task:
+    """An arm with two separate families of postures."""
+    return toy(toys.two_elbows(), 0.1)
+
+
+def spatial_arm() -> Task:
+    """An arm with six joints and three outcomes, in cm."""
+    return toy(toys.spatial_arm(), 25.0)
+
+
+def puck() -> Task:
+    """A puck that has to be hit; where it lies is the context."""
+    return toy(objects.puck(), 0.1)
+
+
+def fetch() -> Task:
+    """A ball that has to be grasped."""
+    return toy(objects.fetch(), 0.1)
 
 
 def toy_benchmark(robot: Toy, side: float) -> Benchmark:

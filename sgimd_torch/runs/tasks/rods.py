@@ -21,7 +21,9 @@ LARGEST: Final = 1e6  # m, of T
 
 @hands_on(FishingRod, "noise", "max_yaw", "max_wind", "line")
 def fishing_rod(*, task_space: float = 1.0, threads: int = 1, **physics: Any) -> Task:
-    """The paper's task; goals come from a square of half side ``task_space`` m.
+    """Arm with a fishing rod, in MuJoCo: the paper's task.
+
+    Goals come from a square of half side ``task_space`` m.
 
     With a context, ``max_yaw`` or ``max_wind`` above 0, what was demonstrated was demonstrated in the context
     0, and the goals are those that can be reached in it. So, too, with another ``line``: both are those of the
@@ -46,6 +48,14 @@ def fishing_rod(*, task_space: float = 1.0, threads: int = 1, **physics: Any) ->
         partial(_in_context_zero, rod.contexts.dim) if rod.contexts.dim else SHIPPED_DEMONSTRATIONS,
         rod.primitive.correspondence,
     )
+
+
+rod_wind = partial(fishing_rod, max_wind=0.05)
+"""Rod in a side wind, up to a quarter of the float's weight: a context."""
+rod_yaw = partial(fishing_rod, max_yaw=0.5)
+"""Rod with its base turned by up to half a radian: a context."""
+rod_long = partial(fishing_rod, line=1.5)
+"""Rod with a line half as long again, taught with the shorter one."""
 
 
 def _in_context_zero(context_dim: int) -> list[Demonstration]:

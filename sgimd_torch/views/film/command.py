@@ -23,9 +23,9 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
-from sgimd_torch.catalogue import colour, label
 from sgimd_torch.environments.protocol import Sketch
 from sgimd_torch.evaluation import evaluate
+from sgimd_torch.figures.names import colour, label
 from sgimd_torch.runs.build import RunParts, build
 from sgimd_torch.runs.read import Run, config_of, read_run
 from sgimd_torch.spaces import Array, stream
@@ -141,9 +141,9 @@ def remember(run: Run, parts: RunParts, start: int, stop: int) -> None:
             memory.add(shown.context, correspondence(shown.times, shown.trajectory), shown.outcome)
         if np.isfinite(run.outcomes[row]).all():
             memory.add(run.contexts[row], run.thetas[row], run.outcomes[row])
-        if parts.model is not None:
+        for model in parts.learner.problem.trained:
             goal = run.goals[row]
-            parts.model.refresh(memory, goal if np.isfinite(goal).all() else None)
+            model.refresh(memory, goal if np.isfinite(goal).all() else None)
 
 
 def _stages(run: Run, options: argparse.Namespace) -> list[int]:

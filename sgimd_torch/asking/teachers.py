@@ -1,7 +1,7 @@
 """Teachers who are asked for a demonstration of a goal, and answer with what they have nearest, or with nothing.
 
 Nguyen & Oudeyer (2012), "Active choice of teachers, learning strategies and goals for a socially guided intrinsic
-motivation learner". The learner asks, see `sgimd_torch.learner.asking`; `run` hands its requests to the teachers.
+motivation learner". The learner asks, see `sgimd_torch.asking`; `run` hands its requests to the teachers.
     teachers = {"left": AnsweringTeacher(shown, stream(seed, "left"), knows=low_half)}
     teachers["left"].demonstrate(context, goal, memory)
 """
@@ -11,24 +11,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Protocol
 
 import numpy as np
 
 from sgimd_torch.demonstrations import SHIPPED, load_demonstrations
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, Demonstration, check_count, check_point
-from sgimd_torch.teachers import check_demonstrations
-
-
-class Demonstrator(Protocol):
-    """Answers requests. A member ``takes``, if there is one, is the number of movements that an answer counts as."""
-
-    def demonstrate(self, context: Array, goal: Array, memory: Memory) -> Demonstration | None:
-        """What it can show of ``goal`` ``(outcome_dim,)`` in ``context`` ``(context_dim,)``, or None. It must answer
-        the same in a replay, so what it draws may depend on its seed and on its arguments only."""
-        ...
-
+from sgimd_torch.teachers import Demonstrator, check_demonstrations
 
 Knows = Callable[[Sequence[Demonstration], np.random.Generator], Sequence[Demonstration]]
 """(demonstrations, rng) -> those that a teacher has, as they take them to be."""
@@ -65,19 +54,18 @@ def _recorded(number: int, demonstrations: Sequence[Demonstration], rng: np.rand
     return [replace(shown, context=np.zeros_like(here.context)) for shown in theirs]
 
 
-# The recordings of a demonstrator of section 5.3, whatever demonstrations there are.
-demonstrator_1, demonstrator_2, demonstrator_3 = (partial(_recorded, number) for number in (1, 2, 3))
+class AnsweringTeacher(Demonstrator):
+    """Shows the demonstration nearest to the goal, of all there are.
 
-
-class AnsweringTeacher:
-    """Shows the demonstration nearest to the goal; of equally near ones the first.
+    Of equally near ones it shows the first.
 
     Args:
-        demonstrations: that are there.
-        rng: draws what ``knows`` draws, and nothing later.
-        knows: which of them this teacher has: `everything`, `low_half`, `high_half`, `mislabelled` or your own.
-        within: distance in C x T beyond which they have no answer.
-        takes: movements that an answer counts as, at which the learner rests: a slow teacher.
+        demonstrations: demonstrations to choose from.
+        rng: random stream of ``knows``; nothing is drawn later.
+        knows: choice of the demonstrations that this teacher has: `everything`, `low_half`, `high_half`, `mislabelled`
+            or your own.
+        within: distance in C x T beyond which there is no reply.
+        takes: movements at which the learner rests until the reply has come.
 
     Raises:
         ValueError: no demonstration, or a number out of its range.
@@ -104,6 +92,22 @@ class AnsweringTeacher:
         distances = np.linalg.norm(self._points - point, axis=1)
         nearest = int(distances.argmin())
         return self.demonstrations[nearest] if distances[nearest] <= self.within else None
+
+
+low_half_teacher = partial(AnsweringTeacher, knows=low_half)
+"""Has the lower half of the demonstrations, by the first outcome coordinate."""
+high_half_teacher = partial(AnsweringTeacher, knows=high_half)
+"""Has the upper half of the demonstrations, by the first outcome coordinate."""
+mislabelling = partial(AnsweringTeacher, knows=mislabelled)
+"""Shows another outcome than is said."""
+slow = partial(AnsweringTeacher, takes=10)
+"""Has all demonstrations; the learner rests 10 movements for each."""
+demonstrator_1 = partial(AnsweringTeacher, knows=partial(_recorded, 1))
+"""Has the recordings of the rod's demonstrator 1."""
+demonstrator_2 = partial(AnsweringTeacher, knows=partial(_recorded, 2))
+"""Has the recordings of the rod's demonstrator 2."""
+demonstrator_3 = partial(AnsweringTeacher, knows=partial(_recorded, 3))
+"""Has the recordings of the rod's demonstrator 3."""
 
 
 def middle(demonstrations: Sequence[Demonstration]) -> float:

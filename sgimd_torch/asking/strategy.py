@@ -4,19 +4,21 @@ SGIM-IM and SGIM-ACTS, Nguyen & Oudeyer (2012): "Interactive learning gives the 
 robot learner", and "Active choice of teachers, learning strategies and goals for a socially guided intrinsic motivation
 learner". An attempt chooses a strategy and a goal together, asks for a demonstration of the goal if the strategy needs
 one, and tells the goal model what the strategy came to, at the goal and at what was shown.
-    StrategicBabbling(babbling, outcomes, {"imitate left": Asking("left", Imitate(...), cost=2.0)})
+    StrategicBabbling(problem, babbling, {"imitate left": Asking("left", Mimic(problem), cost=2.0)})
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from sgimd_torch.goals.strategic import AUTONOMOUS, StrategicGoals
-from sgimd_torch.spaces import Array, AskingAttempt, Box, Request
-from sgimd_torch.strategies import GoalBabbling, SocialStrategy
+from sgimd_torch.asking.interest import AUTONOMOUS, StrategicGoals
+from sgimd_torch.goals.regions import Region
+from sgimd_torch.parts import Problem, Social, Strategy
+from sgimd_torch.spaces import Array, AskingAttempt, Request
+from sgimd_torch.strategies import GoalBabbling
 
 
 class Asking(NamedTuple):
@@ -24,31 +26,39 @@ class Asking(NamedTuple):
     movements the learner rests until it comes."""
 
     teacher: str
-    answer: SocialStrategy
+    answer: Social
     cost: float = 1.0
     takes: int = 0
 
 
-class StrategicBabbling:
+class StrategicBabbling(Strategy):
     """Goal babbling, or asking a teacher: whatever brings most progress for its cost.
 
     Args:
-        babbling: the autonomous strategy; its goal model chooses among the strategies.
-        outcomes: T.
-        asking: by name, the strategies with a teacher.
+        problem: what has to be learnt.
+        babbling: autonomous strategy, whose goal model chooses among all strategies.
+        asking: strategies with a teacher, by name.
 
     Raises:
         ValueError: a cost is not positive, or the goal model does not choose strategies.
     """
 
-    def __init__(self, babbling: GoalBabbling, outcomes: Box, asking: Mapping[str, Asking]) -> None:
+    def __init__(self, problem: Problem, babbling: GoalBabbling, asking: Mapping[str, Asking]) -> None:
+        super().__init__(problem)
         if not isinstance(babbling.goals, StrategicGoals):
-            raise ValueError(f"goals must have choose(context, costs), got a {type(babbling.goals).__name__}")
+            raise ValueError(
+                f"goals must be StrategicGoals, which choose strategies, too, got a {type(babbling.goals).__name__}"
+            )
         self.costs = {AUTONOMOUS: 1.0, **{name: each.cost for name, each in asking.items()}}
         if not all(0 < cost < np.inf for cost in self.costs.values()):
             raise ValueError(f"costs must be positive and finite, got {self.costs}")
-        self.babbling, self.outcomes, self.asking = babbling, outcomes, asking
+        self.babbling, self.asking = babbling, asking
         self.goals: StrategicGoals = babbling.goals
+
+    @property
+    def regions(self) -> Sequence[Region]:
+        """Regions of its goal model."""
+        return self.goals.regions
 
     def attempt(self, context: Array) -> AskingAttempt:
         """Movements by one strategy for one goal; alone if the teacher has no answer.
@@ -77,5 +87,5 @@ class StrategicBabbling:
         finally:  # also when another demonstration interrupts
             outcomes = list(memory.outcomes[first:])
             self.babbling.conclude(context, goal, outcomes, before, strategy)
-            if self.outcomes.contains(shown):
+            if self.problem.outcomes.contains(shown):
                 self.babbling.conclude(context, shown, outcomes, there, strategy)

@@ -4,26 +4,32 @@ SGIM-ACTS: Nguyen & Oudeyer (2012), "Active choice of teachers, learning strateg
 intrinsic motivation learner". The measure of progress follows later work of that line: Duminy, Nguyen & Duhaut (2019),
 "Learning a set of interrelated tasks by using a succession of motor policies for a socially guided intrinsically
 motivated learner".
-    goals = StrategicInterest(contexts, outcomes, rng)
+    goals = StrategicInterest(problem)
     strategy, goal = goals.choose(context, {"autonomous": 1.0, "imitate left": 2.0})      # name: cost
 """
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Final, NamedTuple, Protocol, runtime_checkable
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sgimd_torch.goals.checks import check_in
 from sgimd_torch.goals.interest_map import InterestMap
-from sgimd_torch.goals.protocol import Goals, check_in
 from sgimd_torch.goals.regions import Region
-from sgimd_torch.spaces import Array, Box
+from sgimd_torch.parts import Goals, Problem
+from sgimd_torch.spaces import Array
 
 AUTONOMOUS: Final = "autonomous"
 _FEWEST, _LAST = 4, 10  # attempts that say something, and that progress is measured over
+# Share of the choices whose goal is drawn from all of T, and whose strategy by its interest there.
+_ANYWHERE: Final = 0.5
+_GREATEST: Final = 10  # pairs (region, strategy) of the greatest interest, from which the others are drawn
+_TEMPERATURE: Final = 0.03  # difference of progress that makes interest e times as large
 _UNTRIED: Final = 1.0  # progress that is hoped for: the most that there can be
 
 
@@ -51,17 +57,22 @@ def between_means(region: Region, below: NDArray[np.bool_]) -> float:
 BY_STRATEGY: Final = partial(InterestMap, g_max=50, window=_LAST, progress=strategic_progress, contrast=between_means)
 
 
-@runtime_checkable
-class StrategicGoals(Goals, Protocol):
+class StrategicGoals(Goals):
     """A goal model that also chooses the strategy by which the goal is pursued."""
 
+    @abstractmethod
     def choose(self, context: ArrayLike, costs: Mapping[str, float]) -> tuple[str, Array]:
         """A strategy of those that have ``costs``, and a goal ``(outcome_dim,)`` for it in this context."""
-        ...
+
+    def sample(self, context: ArrayLike) -> Array:
+        """A goal for a learner that has no other strategy than the autonomous one."""
+        return self.choose(context, {AUTONOMOUS: 1.0})[1]
 
 
-class StrategicInterest:
-    """Interest of each (region, strategy): e^(progress / temperature), over the cost of the strategy. Of its progress,
+class StrategicInterest(StrategicGoals):
+    """Goals and strategies of most progress for their cost, to ask teachers.
+
+    Interest of each (region, strategy): e^(progress / temperature), over the cost of the strategy. Of its progress,
     what exceeds that of the cheapest strategy there is divided by the cost, too. See `StrategicGoals`.
 
     The papers draw in proportion to progress, and try strategies by chance where they were not tried. Ours: progress
@@ -69,35 +80,13 @@ class StrategicInterest:
     So no choice has to be spent on a strategy drawn at random.
 
     Args:
-        contexts, outcomes, rng: as in `InterestMap`.
-        anywhere: share of the choices whose goal is drawn from all of T, and whose strategy by its interest there.
-        greatest: number of pairs (region, strategy) of the greatest interest that the others are drawn from, in
-            proportion to it.
-        temperature: the difference of progress that makes interest e times as large.
-        make: (contexts, outcomes, rng) -> the map of regions; interest is its progress.
-
-    Raises:
-        ValueError: a number out of its range.
+        problem: C and T.
+        make: constructor of the map of regions; interest is its progress.
     """
 
-    def __init__(
-        self,
-        contexts: Box,
-        outcomes: Box,
-        rng: np.random.Generator,
-        *,
-        anywhere: float = 0.5,
-        greatest: int = 10,
-        temperature: float = 0.03,
-        make: Callable[[Box, Box, np.random.Generator], InterestMap] = BY_STRATEGY,
-    ) -> None:
-        if not (0 <= anywhere <= 1 and greatest >= 1 and 0 < temperature < np.inf):
-            wanted = "anywhere must lie in [0, 1], greatest be at least 1 and temperature above 0"
-            raise ValueError(f"{wanted}, got {anywhere}, {greatest} and {temperature}")
-        self.contexts, self.outcomes = contexts, outcomes
-        self.anywhere, self.greatest, self.temperature = anywhere, greatest, temperature
-        self._rng = rng
-        self._map = make(contexts, outcomes, rng)
+    def __init__(self, problem: Problem, *, make: Callable[[Problem], InterestMap] = BY_STRATEGY) -> None:
+        super().__init__(problem)
+        self._map = make(problem)
         self._tried: dict[str, _Tried] = {}
 
     @property
@@ -129,8 +118,8 @@ class StrategicInterest:
         Raises:
             ValueError: ``context`` is not one point of C.
         """
-        context, goal = check_in(self.contexts, "context", context), self.outcomes.sample(self._rng)
-        given = self._rng.random() < self.anywhere
+        context, goal = check_in(self.problem.contexts, "context", context), self.problem.outcomes.sample(self.rng)
+        given = self.rng.random() < _ANYWHERE
         regions = self._map.regions_at(np.concatenate((context, goal)) if given else context)
         pairs = [(region, name) for region in regions for name in costs]
         progress = np.array([[self.progress(region, name) for name in costs] for region in regions])
@@ -138,16 +127,12 @@ class StrategicInterest:
         cheapest = progress[:, [int(cost.argmin())]]
         more = progress - cheapest
         worth = cheapest + np.minimum(more, more / cost)
-        logarithms = (worth / self.temperature - np.log(cost)).ravel()
-        best = np.argsort(-logarithms, kind="stable")[: self.greatest]
+        logarithms = (worth / _TEMPERATURE - np.log(cost)).ravel()
+        best = np.argsort(-logarithms, kind="stable")[:_GREATEST]
         interests = np.exp(logarithms[best] - logarithms[best[0]])
-        region, name = pairs[int(self._rng.choice(best, p=interests / interests.sum()))]
+        region, name = pairs[int(self.rng.choice(best, p=interests / interests.sum()))]
         dim = len(context)
-        return name, goal if given else self._rng.uniform(region.low[dim:], region.high[dim:])
-
-    def sample(self, context: ArrayLike) -> Array:
-        """A goal for a learner that has no other strategy than the autonomous one."""
-        return self.choose(context, {AUTONOMOUS: 1.0})[1]
+        return name, goal if given else self.rng.uniform(region.low[dim:], region.high[dim:])
 
     def add(
         self, context: ArrayLike, goal: ArrayLike, competence: float, strategy: str = AUTONOMOUS, gain: float = 0.0

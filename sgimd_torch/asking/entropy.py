@@ -1,9 +1,9 @@
-"""The rival by information: ask when a demonstration should take away more doubt than a movement of one's own.
+"""A rival by information: ask when a demonstration should reduce entropy more than a movement of one's own.
 
 After Kulak & Calinon (2023), "Combining social and intrinsically-motivated learning for multi-task robot skill
 acquisition": the expected epistemic entropy over goals, and how much each mode should reduce it; a demonstration is
 asked for where the epistemic entropy is greatest.
-    learner = sgim_eer(environment, seed, correspondence=..., teachers={"ann": ann})
+    learner = sgim_im(environment, seed, correspondence=..., teachers={"ann": ann}, goals=EntropyGoals)
 Ours: what is known of the policy for a goal is linear in features of the goal, so that reductions have a closed form;
 and where a movement of one's own would land is told by the earlier attempt that was nearest.
 """
@@ -11,23 +11,16 @@ and where a movement of one's own would land is told by the earlier attempt that
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sgimd_torch.algorithms import Correspondence, MakeInverse, start_memory
-from sgimd_torch.algorithms.asking import MakeBase, imitating_only, practised, strategic
-from sgimd_torch.environments.protocol import Environment
-from sgimd_torch.goals.protocol import check_attempt, check_in
-from sgimd_torch.goals.strategic import AUTONOMOUS
+from sgimd_torch.asking.interest import AUTONOMOUS, StrategicGoals
+from sgimd_torch.goals.checks import check_attempt, check_in
 from sgimd_torch.inverses.gaussian_process import Kernel, one_thread, squared_distances
-from sgimd_torch.inverses.local_process import LocalProcess
-from sgimd_torch.learner import Learner
-from sgimd_torch.memory import Memory
+from sgimd_torch.parts import Problem
 from sgimd_torch.spaces import Array, Box
-from sgimd_torch.teachers.answering import Demonstrator
 
 _GOALS: Final = 30  # over which the expected entropy is measured
 _KNOWN: Final = 400  # exemplars that a doubt is made from, spread over the memory
@@ -56,16 +49,18 @@ def doubt(known: Array, points: Array) -> Array:
     return found
 
 
-class EntropyGoals:
-    """Chooses mode and goal by the expected reduction of the epistemic entropy; see `StrategicGoals`.
+class EntropyGoals(StrategicGoals):
+    """Goals and strategies by the expected reduction of entropy, to ask teachers.
+
+    See `StrategicGoals`.
 
     Args:
-        contexts, outcomes, rng: as in `InterestMap`.
-        memory: of the learner; only read.
+        problem: C, T and the memory are read.
     """
 
-    def __init__(self, contexts: Box, outcomes: Box, rng: np.random.Generator, *, memory: Memory) -> None:
-        self.contexts, self.outcomes, self.memory, self._rng = contexts, outcomes, memory, rng
+    def __init__(self, problem: Problem) -> None:
+        super().__init__(problem)
+        self.memory, contexts, outcomes = problem.memory, problem.contexts, problem.outcomes
         self._box = Box(np.concatenate((contexts.low, outcomes.low)), np.concatenate((contexts.high, outcomes.high)))
         self._tried: dict[str, list[tuple[Array, Array]]] = {}  # goals, and by how much they were missed, in sides
 
@@ -75,8 +70,8 @@ class EntropyGoals:
         Raises:
             ValueError: ``context`` is not one point of C.
         """
-        context = check_in(self.contexts, "context", context)
-        goals = np.stack([self.outcomes.sample(self._rng) for _ in range(_GOALS)])
+        context = check_in(self.problem.contexts, "context", context)
+        goals = np.stack([self.problem.outcomes.sample(self.rng) for _ in range(_GOALS)])
         points = self._scaled(np.tile(context, (_GOALS, 1)), goals)
         places = [points, *(self._landing(points, name) for name in costs)]
         known = self._scaled(self.memory.contexts, self.memory.outcomes)
@@ -91,10 +86,6 @@ class EntropyGoals:
         name = max(found, key=lambda each: found[each])
         return name, goals[0 if name == AUTONOMOUS else doubtful]
 
-    def sample(self, context: ArrayLike) -> Array:
-        """A goal for a learner that has no other mode than the autonomous one."""
-        return self.choose(context, {AUTONOMOUS: 1.0})[1]
-
     def add(
         self, context: ArrayLike, goal: ArrayLike, competence: float, strategy: str = AUTONOMOUS, gain: float = 0.0
     ) -> None:
@@ -103,7 +94,7 @@ class EntropyGoals:
         Raises:
             ValueError: see `Goals.add`.
         """
-        point = check_attempt(self.contexts, self.outcomes, context, goal, competence, gain)
+        point = check_attempt(self.problem, context, goal, competence, gain)
         goals, last = (
             (point - self._box.low) / self._box.sides,
             self._scaled(self.memory.contexts, self.memory.outcomes),
@@ -126,29 +117,6 @@ class EntropyGoals:
     def _scaled(self, contexts: Array, outcomes: Array) -> Array:
         scaled: Array = (np.concatenate((contexts, outcomes), axis=1) - self._box.low) / self._box.sides
         return scaled
-
-
-def sgim_eer(
-    environment: Environment,
-    seed: int,
-    *,
-    correspondence: Correspondence,
-    teachers: Mapping[str, Demonstrator],
-    cost: float = 1.0,
-    base: MakeBase = practised,
-    inverse: MakeInverse = LocalProcess,
-    memory: Memory | None = None,
-    **parts: Any,
-) -> Learner:
-    """SGIM-IM with the choice of Kulak & Calinon.
-
-    Args:
-        environment, seed, correspondence, teachers, cost, base, inverse, parts: as in `sgim_acts`.
-        memory: to start from; None for an empty one.
-    """
-    memory, base = start_memory(environment, memory), partial(imitating_only, base)
-    chosen = {"goals": partial(EntropyGoals, memory=memory), "inverse": inverse, **parts}
-    return strategic(environment, seed, memory, correspondence, teachers, cost, base, **chosen)
 
 
 def _thinned(known: Array) -> Array:

@@ -3,7 +3,7 @@
 Portelas, Colas, Hofmann & Oudeyer, Teacher algorithms for curriculum learning of deep RL in continuously parameterized
 environments (CoRL 2019). Progress at a goal is |competence - competence at the nearest earlier goal|. A mixture of
 Gaussians over (context, goal, progress) is fitted from time to time, and shows where progress is high. Needs
-scikit-learn.    goals = AlpGmm(contexts, outcomes, rng)
+scikit-learn.    goals = AlpGmm(problem)
 """
 
 from __future__ import annotations
@@ -13,8 +13,9 @@ import warnings
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sgimd_torch.goals.protocol import check_attempt, check_in
-from sgimd_torch.spaces import Array, Box, check_count
+from sgimd_torch.goals.checks import check_attempt, check_in
+from sgimd_torch.parts import Goals, Problem
+from sgimd_torch.spaces import Array, check_count
 
 try:
     from sklearn.exceptions import ConvergenceWarning
@@ -23,23 +24,24 @@ except ImportError as error:
     raise ImportError(f"ALP-GMM needs scikit-learn: pip install 'sgimd-torch[rivals]' ({error})") from error
 
 _DRAWS = 20  # from a Gaussian; the first that lies in T is the goal
+# Goals between two fits; before the first fit, goals are uniform. Deviation: the publication waits for 250 goals, half
+# of what a run on the rod has.
+_REFIT = 50
+_COMPONENTS = 10  # largest number of Gaussians; Akaike's criterion chooses one from 2 to this
 
 
-class AlpGmm:
-    """Goals from a mixture of Gaussians over (context, goal, absolute learning progress).
+class AlpGmm(Goals):
+    """Goals from Gaussians of high absolute learning progress.
+
+    A mixture of Gaussians over (context, goal, absolute learning progress) is fitted.
 
     Without contexts a Gaussian is chosen in proportion to its mean progress, and a goal is drawn from it. In a context
     it is chosen in proportion to its mean progress times its density there, and the goal is drawn from the Gaussian
     given this context. Distances are measured in sides of C x T.
 
     Args:
-        contexts: C; ``dim`` 0 when there is only one context.
-        outcomes: T. A goal drawn outside is drawn again, and clipped if 20 draws lie outside.
-        rng: the only source of draws; ``add`` draws nothing.
-        refit: goals between two fits; before the first fit, goals are uniform. Deviation: the publication waits for 250
-            goals, half of what a run on the rod has.
-        memory: how many of the last goals are fitted. The nearest earlier goal is looked for among all goals.
-        components: the largest number of Gaussians. Akaike's criterion chooses a number from 2 to this.
+        problem: C and T; ``add`` draws nothing. A goal drawn outside T is drawn again, and clipped after 20 draws.
+        memory: number of last goals that are fitted. The nearest earlier goal is looked for among all goals.
         uniform: probability of a goal anywhere in T.
 
     Raises:
@@ -48,24 +50,17 @@ class AlpGmm:
 
     def __init__(
         self,
-        contexts: Box,
-        outcomes: Box,
-        rng: np.random.Generator,
+        problem: Problem,
         *,
-        refit: int = 50,
         memory: int = 250,
-        components: int = 10,
         uniform: float = 0.2,
     ) -> None:
-        self.components = check_count("components", components, 2)
-        self.refit = check_count("refit", refit, 1)
-        self.memory = check_count("memory", memory, 2)
-        if min(refit, memory) < components:
-            raise ValueError(f"refit and memory must be at least components={components}, got {refit} and {memory}")
+        super().__init__(problem)
+        self.memory = check_count("memory", memory, _COMPONENTS)
         if not 0 <= uniform <= 1:
             raise ValueError(f"uniform must be a probability, got {uniform}")
-        self.contexts, self.outcomes, self.uniform = contexts, outcomes, uniform
-        self._rng = rng
+        self.uniform = uniform
+        self.contexts, self.outcomes = contexts, outcomes = problem.contexts, problem.outcomes
         self._low = np.concatenate((contexts.low, outcomes.low))
         self._sides = np.concatenate((contexts.sides, outcomes.sides))
         self._points = np.empty((0, len(self._low)))  # in sides of C x T
@@ -81,10 +76,10 @@ class AlpGmm:
             ValueError: ``context`` is not one point of C.
         """
         context = check_in(self.contexts, "context", context)
-        if len(self._points) >= self._fitted + self.refit:
+        if len(self._points) >= self._fitted + _REFIT:
             self._mixture, self._fitted = self._fit(), len(self._points)
-        if self._mixture is None or self._rng.random() < self.uniform:
-            return self.outcomes.sample(self._rng)
+        if self._mixture is None or self.rng.random() < self.uniform:
+            return self.outcomes.sample(self.rng)
         return self._draw(self._mixture, (context - self.contexts.low) / self.contexts.sides)
 
     def add(
@@ -95,7 +90,7 @@ class AlpGmm:
         Raises:
             ValueError: see `Goals.add`.
         """
-        point = (check_attempt(self.contexts, self.outcomes, context, goal, competence, gain) - self._low) / self._sides
+        point = (check_attempt(self.problem, context, goal, competence, gain) - self._low) / self._sides
         progress = 0.0
         if len(self._points):
             apart = np.square(self._points - point).sum(axis=1)
@@ -107,11 +102,11 @@ class AlpGmm:
     def _fit(self) -> GaussianMixture:
         """The best mixture of 2, 3 ... Gaussians over the last goals, by Akaike's criterion."""
         rows = np.column_stack((self._points, self._progress))[-self.memory :]
-        seed = int(self._rng.integers(2**32))
+        seed = int(self.rng.integers(2**32))
         with warnings.catch_warnings():
             # Akaike's criterion may also judge a mixture of goals that coincide, or one that has not quite converged.
             warnings.simplefilter("ignore", ConvergenceWarning)
-            numbers = range(2, self.components + 1)
+            numbers = range(2, _COMPONENTS + 1)
             mixtures = [GaussianMixture(number, random_state=seed).fit(rows) for number in numbers]
         return min(mixtures, key=lambda mixture: mixture.aic(rows))
 
@@ -124,11 +119,11 @@ class AlpGmm:
         densities = -0.5 * ((away * scaled).sum(axis=1) + np.linalg.slogdet(covariances[:, c, c])[1])  # logarithms
         weights = np.maximum(means[:, -1], 0.0) * np.exp(densities - densities.max())
         if not weights.any():  # no progress anywhere
-            return self.outcomes.sample(self._rng)
-        k = self._rng.choice(len(weights), p=weights / weights.sum())
+            return self.outcomes.sample(self.rng)
+        k = self.rng.choice(len(weights), p=weights / weights.sum())
         gain = np.linalg.solve(covariances[k, c, c], covariances[k, c, g]).T  # (outcome_dim, context_dim)
         mean = means[k, g] + gain @ away[k]
         spread = np.linalg.cholesky(covariances[k, g, g] - gain @ covariances[k, c, g])
-        draws = mean + self._rng.standard_normal((_DRAWS, self.outcomes.dim)) @ spread.T
+        draws = mean + self.rng.standard_normal((_DRAWS, self.outcomes.dim)) @ spread.T
         goals = self.outcomes.low + self.outcomes.sides * draws
         return self.outcomes.clip(goals[self.outcomes.contains(goals).argmax()])

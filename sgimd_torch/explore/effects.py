@@ -3,7 +3,7 @@
 Our addition. A movement that misses an object leaves it where it lies. So the outcomes of all movements without an
 effect lie on one plateau: they depend on the context alone. It is looked for as RANSAC does (Fischler & Bolles 1981):
 an affine map of the context through few exemplars that fits as many others as possible, as closely as noise allows.
-    effects = Effects(memory, outcome_noise); acted = effects()
+    effects = Effects(memory, problem.outcome_noise); acted = effects()
 """
 
 from __future__ import annotations
@@ -22,15 +22,17 @@ _REFINED: Final = 5  # times, by least squares
 _NEAR, _WITHIN = 2.0, 4.0  # standard deviations of the noise: most of a plateau lies near it, nothing of it farther out
 _ROUNDING: Final = 1e-9  # of the spread of outcomes: noise of an environment that has none
 _LEAST, _SHARE = 16, 0.1  # exemplars on a plateau, and their share of all
-_DENSE: Final = 0.9  # of those within, so many are near; of outcomes that go on beyond, half or fewer would be
+_DENSE: Final = (
+    0.9  # share of points within 4 sd of the plateau that lie within 2 sd; half or fewer where outcomes go on
+)
 
 
 class Effects:
     """The exemplars with an effect. It only reads, draws nothing, and depends on the memory alone.
 
     Args:
-        memory: of the learner.
-        outcome_noise: standard deviation of each outcome dimension, ``outcome_noise`` of the environment.
+        memory: exemplars of the learner.
+        outcome_noise: standard deviation of each outcome dimension, in its unit.
     """
 
     def __init__(self, memory: Memory, outcome_noise: float) -> None:

@@ -1,0 +1,43 @@
+"""Names and colours of algorithms in figures and tables.
+
+Colours after Okabe & Ito: distinct with any colour vision, and in grey.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+_DRAWN: Final = {
+    "random": ("Random", "#7f7f7f"),
+    "sagg-riac": ("SAGG-RIAC", "#0072b2"),
+    "practice": ("Practice", "#332288"),
+    "practice-taught": ("Practice, taught", "#aa4499"),
+    "observation": ("Observation", "#cc79a7"),
+    "imitation": ("Imitation", "#009e73"),
+    "sgim-d": ("SGIM-D", "#d55e00"),
+    "sgim-im": ("SGIM-IM", "#661100"),
+    "sgim-im-search": ("SGIM-IM, search", "#661100"),
+    "sgim-acts": ("SGIM-ACTS", "#cc6677"),
+    "sgim-acts-search": ("SGIM-ACTS, search", "#cc6677"),
+    "sgim-eer": ("By entropy", "#117733"),
+    "map-elites": ("MAP-Elites", "#56b4e9"),
+    "map-elites-taught": ("MAP-Elites, taught", "#1f78a8"),
+    "isoline": ("Isoline", "#999933"),
+    "isoline-taught": ("Isoline, taught", "#5c5c1f"),
+    "cma-me": ("CMA-ME", "#e69f00"),
+    "cma-me-taught": ("CMA-ME, taught", "#8f6300"),
+    "cma-mae": ("CMA-MAE", "#882255"),
+    "cma-mae-taught": ("CMA-MAE, taught", "#4d1330"),
+}
+NAMES: Final = {word: name for word, (name, _) in _DRAWN.items()}
+COLOURS: Final = {word: colour for word, (_, colour) in _DRAWN.items()}
+
+
+def label(algorithm: str) -> str:
+    """Name of an algorithm in figures; the word itself where it has no other name."""
+    return NAMES.get(algorithm, algorithm)
+
+
+def colour(algorithm: str) -> str:
+    """Colour of an algorithm in figures."""
+    return COLOURS.get(algorithm, "black")

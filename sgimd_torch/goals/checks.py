@@ -1,0 +1,42 @@
+"""What goal models check first: is it a point of C, a goal in T, a competence?
+
+point = check_attempt(problem, context, goal, competence, gain)
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sgimd_torch.parts import Problem
+from sgimd_torch.spaces import Array, Box, check_vector
+
+
+def check_in(box: Box, name: str, value: ArrayLike, hint: str = "was a goal passed instead?") -> Array:
+    """``value`` as one point ``(dim,)`` of ``box``.
+
+    Raises:
+        ValueError: another shape, not finite, or outside.
+    """
+    point = check_vector(name, value, box.dim, hint)
+    if point.ndim != 1 or not box.contains(point):
+        raise ValueError(f"{name} must be one point of [{box.low}, {box.high}], got {point}; {hint}")
+    return point
+
+
+def check_attempt(problem: Problem, context: ArrayLike, goal: ArrayLike, competence: float, gain: float) -> Array:
+    """The point (context, goal) of C x T, ``(context_dim + outcome_dim,)``.
+
+    Raises:
+        ValueError: ``context`` is not one point of C, ``competence`` not in [-1, 0], ``gain`` not in [-1, 1], or
+            ``goal`` not one point of T. A demonstrated outcome may lie outside, so ask ``outcomes.contains`` first.
+    """
+    point = check_in(problem.contexts, "context", context)
+    goal = check_in(
+        problem.outcomes, "goal", goal, "ask outcomes.contains before a demonstrated outcome becomes a goal"
+    )
+    if not -1 <= competence <= 0:  # NaN too
+        raise ValueError(f"competence must lie in [-1, 0], got {competence}; was a distance passed instead?")
+    if not -1 <= gain <= 1:
+        raise ValueError(f"gain must lie in [-1, 1], got {gain}; it is a difference of two competences")
+    return np.concatenate((point, goal))

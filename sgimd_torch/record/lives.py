@@ -1,0 +1,69 @@
+"""Save the life of a learner, and live through it again: ``save_life(learner, path)``, ``load_life(learner, path)``."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+
+from sgimd_torch.files import replacing
+from sgimd_torch.learner import Learner, ReplayError
+from sgimd_torch.learner.replay import replay
+from sgimd_torch.parts import Teacher
+from sgimd_torch.record import Record, RunError
+from sgimd_torch.spaces import Move
+
+
+def save_life(learner: Learner, path: str | os.PathLike[str]) -> None:
+    """Write the life of a learner to a record: contexts, movements, rests, outcomes and lessons, in SQLite.
+
+    A movement that was asked for and not told yet is left out: after `load_life`, ask for it again.
+
+    Raises:
+        OSError: ``path`` is a directory, or cannot be written.
+    """
+    about = {"begun": learner.begun, "exemplars": len(learner.memory)}
+    with replacing(path) as partial, Record.make(partial, learner.problem.dims, about) as record:
+        for event in learner.events():
+            record.add(event)
+        record.commit()
+
+
+def load_life(
+    learner: Learner,
+    path: str | os.PathLike[str],
+    *,
+    teacher: Teacher | None = None,
+    after: Callable[[Move | None], object] | None = None,
+) -> None:
+    """Live through a saved life again, or through the life of a run; then go on as if it had never stopped.
+
+    Args:
+        learner: learner freshly built, of the same parts.
+        path: file that `save_life` wrote, or the ``run.sqlite`` of a run.
+        teacher: teacher freshly built, too, if one draws lessons at random: it is asked before each movement, as in
+            `run`, so that it goes on in the same way. None for the lessons of the file alone.
+        after: function called after each movement, with None after a rest, as your loop does to refresh a forward
+            model.
+
+    Raises:
+        ReplayError: this learner would have moved otherwise, or its memory comes out otherwise. It has then lived a
+            part of that life; build another one.
+        RuntimeError: it has lived already.
+        RunError: no record, damaged, or of another robot.
+    """
+    if any(learner.events()) or not learner.idle:
+        raise RuntimeError("load_life() needs a learner freshly built; this one has lived already")
+    dims = learner.problem.dims
+    with Record(path) as record:
+        for damage in record.check().values():
+            raise RunError(damage)
+        if record.dims != dims:
+            raise RunError(f"{path} has dims {record.dims} of context, theta, outcome, got {dims}; another robot?")
+        begun, exemplars = record.about.get("begun", 0), record.about.get("exemplars")
+        if begun != learner.begun:
+            raise ReplayError(f"{path} began with {begun} exemplars in memory, this learner with {learner.begun}")
+        for episode in replay(learner, record.events(), teacher=teacher):
+            if after is not None:
+                after(episode.move)
+    if exemplars not in (None, len(learner.memory)):
+        raise ReplayError(f"{path} ended with another memory; were exemplars added to one of them by hand?")
