@@ -379,6 +379,6 @@ def make_subsets(folder: Path, *, by_hand: bool = False) -> None:
     for name, chosen in (*first, (HALF, right), (CORNER, corner), (SHUFFLED, shuffled)):
         save_demonstrations(folder / name, chosen)
     if by_hand:
-        from parts import lessons_of_a_script  # MuJoCo is loaded only when it is needed
+        from hand import lessons_of_a_script  # MuJoCo is loaded only when it is needed
 
         save_demonstrations(folder / HAND, [lesson.demonstration for lesson in lessons_of_a_script()])

@@ -110,7 +110,7 @@ WORDS: Final[dict[str, dict[str, str]]] = {
         "initial": "teachers:InitialTeacher",
         "at-once": "teachers:at_once",
         "asked": "teachers:AskedTeacher",
-        "by-hand": "teachers.by_hand:ByHand",
+        "by-hand": "teach.by_hand:ByHand",
     },
     "choose": {
         "least-explored": "teachers:least_explored",
@@ -135,7 +135,7 @@ WORDS: Final[dict[str, dict[str, str]]] = {
         "benchmark": "views.benchmark",
         "table": "views.table",
         "report": "views.report.command",
-        "teach": "views.teach",
+        "teach": "teach.command",
         "film": "views.film.command",
         "demo": "views.demo",
     },

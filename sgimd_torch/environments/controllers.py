@@ -12,7 +12,7 @@ from typing import Final, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sgimd_torch.environments.protocol import check_recording
+from sgimd_torch.environments.protocol import Primitive, check_recording
 from sgimd_torch.spaces import Array, Box
 
 _GRID: Final = 200  # frequencies that are tried before the best one is refined
@@ -32,7 +32,7 @@ class Controller(Protocol):
         ...
 
 
-class Sinusoids:
+class Sinusoids(Primitive):
     """One sinusoid for each command: amplitude, phase and offset; all share one frequency.
 
     theta in [0, 1]^(3 n_commands + 1) holds amplitude, phase and offset command by command, then the frequency. An
@@ -50,7 +50,8 @@ class Sinusoids:
     def __init__(self, commands: Box, frequencies: tuple[float, float]) -> None:
         if not 0 < frequencies[0] < frequencies[1] < np.inf:
             raise ValueError(f"frequencies must be 0 < lowest < highest in Hz, got {frequencies}")
-        self.commands, self.frequencies = commands, frequencies
+        self.commands = self.ranges = commands
+        self.frequencies = frequencies
         self.policies = Box.cube(0.0, 1.0, 3 * commands.dim + 1)
 
     def at(self, theta: Array, times: Array) -> Array:

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sgimd_torch.environments.motor_primitives import GaussianPrimitive
-from sgimd_torch.environments.protocol import HandLed, SimulationError, check_movement, check_recording
+from sgimd_torch.environments.protocol import SimulationError, check_movement, check_recording
 from sgimd_torch.spaces import Array, Box, check_count, check_rng
 
 if TYPE_CHECKING:
@@ -94,12 +94,6 @@ class FishingRod:
     def steps(self) -> int:
         """Physics steps simulated so far, of all movements together."""
         return self._caster.steps
-
-    @property
-    def hand_led(self) -> HandLed:
-        """The arm, led by the tip of its rod, no faster than its motor primitive moves it."""
-        middle = (JOINT_RANGES.low + JOINT_RANGES.high) / 2
-        return HandLed(self.model, JOINTS, "tip", JOINT_RANGES, middle, *self.primitive.fastest())
 
     def observe(self, rng: np.random.Generator) -> Array:
         """``(context_dim,)`` the context of the next movement, uniform over ``contexts``; empty in the fishing task."""

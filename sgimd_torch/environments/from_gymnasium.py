@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sgimd_torch.environments.controllers import Controller
-from sgimd_torch.environments.protocol import SimulationError, check_movement, check_robot
+from sgimd_torch.environments.protocol import Primitive, SimulationError, check_movement, check_robot
 from sgimd_torch.spaces import Array, Box, check_count, check_point, check_rng, check_vector, stream
 
 try:
@@ -64,12 +64,13 @@ class FromGymnasium:
         if dt is None or not 0 < dt < np.inf:
             raise ValueError(f"needs dt > 0, seconds from one action to the next, got {dt}; this world does not say it")
         self.world, self.controller, self._actions = world, controller, world.action_space
+        self.primitive = controller if isinstance(controller, Primitive) else Primitive()
         self.policies, self.outcomes = controller.policies, outcomes
         self.contexts = Box.cube(0.0, 1.0, 0)
         self.rest = check_point("rest", rest, outcomes.dim).copy()
         self.rest.flags.writeable = False
-        check_robot(self)
         self.outcome_noise, self.steps, self.dt = float(outcome_noise), check_count("steps", steps, 1), float(dt)
+        check_robot(self)
         if hasattr(controller, "correspondence"):
             self.correspondence = controller.correspondence
         self._outcome = outcome

@@ -11,11 +11,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sgimd_torch.environments.protocol import check_recording
+from sgimd_torch.environments.protocol import Primitive, check_recording
 from sgimd_torch.spaces import Array, Box
 
 
-class GaussianPrimitive:
+class GaussianPrimitive(Primitive):
     """Joint trajectories by Gaussian distance weighting of knots, eq. (5).
 
     theta in [0, 1]^(n_joints * n_knots + 1) holds the knots joint by joint, scaled to the joint ranges, then the
@@ -38,7 +38,7 @@ class GaussianPrimitive:
             raise ValueError(f"durations must be 0 < shortest < longest in seconds, got {durations}")
         if n_knots < 2 or not sharpness > 0:
             raise ValueError(f"need n_knots >= 2 and sharpness > 0, got {n_knots} and {sharpness}")
-        self.joints = joints
+        self.joints = self.ranges = joints
         self.durations = durations
         self.n_knots = n_knots
         self.sharpness = sharpness

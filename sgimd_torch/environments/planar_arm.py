@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sgimd_torch.environments.protocol import HandLed, Sketch, check_movement, check_recording
+from sgimd_torch.environments.protocol import Sketch, check_movement, check_recording
 from sgimd_torch.spaces import Array, Box, check_count, check_rng, check_vector, first_entry
 
 _STEP = 0.04  # s, of a recorded movement
@@ -73,16 +73,6 @@ class PlanarArm:
         links = 1 / len(theta) * np.stack([np.cos(directions), np.sin(directions)], axis=2)
         joints = np.concatenate([np.zeros((_STEPS, 1, 2)), np.cumsum(links, axis=1)], axis=1)
         return Sketch(self._end(context, angles), _STEP, joints)
-
-    @property
-    def hand_led(self) -> HandLed:
-        """The arm in the context 0, led no faster than ``record`` moves it: smoothly, in 1 s."""
-        from sgimd_torch.environments.planar_model import JOINT, planar_model  # MuJoCo is loaded only when it is needed
-
-        n = self.policies.dim
-        names = tuple(JOINT.format(k) for k in range(n))
-        ranges, fastest = Box(-self._limits, self._limits), (1.5 * self._limits, 6 * self._limits)  # of 3 t^2 - 2 t^3
-        return HandLed(planar_model([1 / n] * n), names, "end", ranges, np.zeros(n), *fastest)
 
     def angles(self, theta: ArrayLike) -> Array:
         """``(..., n_joints)`` rad, the angle of each joint without noise; ``theta`` is ``(..., n_joints)``.

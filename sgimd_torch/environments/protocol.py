@@ -68,6 +68,41 @@ class BatchEnvironment(Environment, Protocol):
         ...
 
 
+class Primitive:
+    """How theta becomes joint angles (rad) or commands over time.
+
+    A robot that knows this offers it as its attribute ``primitive``, so that recordings can be compared with what the
+    robot plays. The defaults stand for what is unknown.
+
+    Attributes:
+        ranges: ``(n_joints,)`` box of the angles or commands.
+        durations: shortest and longest movement (s).
+    """
+
+    ranges: Box | None = None
+    durations: tuple[float, float] = (0.0, np.inf)
+
+    def at(self, theta: Array, times: Array) -> Array | None:
+        """``(n_times, n_joints)`` angles or commands at ``times`` ``(n_times,)`` s after the start."""
+        return None
+
+
+@runtime_checkable
+class HasPrimitive(Protocol):
+    """A robot that says how it plays a theta."""
+
+    @property
+    def primitive(self) -> Primitive:
+        """Plays the movements of this robot."""
+        ...
+
+
+def primitive_of(environment: Environment) -> Primitive:
+    """The primitive of an environment; one that knows nothing if it has none."""
+    found = environment.primitive if isinstance(environment, HasPrimitive) else None
+    return found if isinstance(found, Primitive) else Primitive()
+
+
 class Recorded(Protocol):
     """A movement that can be filmed: its ``outcome`` ``(outcome_dim,)``, and ``landed``, how long (s) it takes."""
 
@@ -116,31 +151,6 @@ class Sketch:
     def landed(self) -> float:
         """How long (s) the movement takes."""
         return self.step * (len(self.chains) - 1)
-
-
-@dataclass(frozen=True, eq=False)
-class HandLed:
-    """A robot that a person can lead by the hand: the optional attribute ``hand_led`` of an environment.
-
-    ``Leading`` in demonstrations/leading.py moves it and checks what is said here.
-
-    Args:
-        model: a ``mujoco.MjModel``, where the robot stands at its start, or can be put there by its joints.
-        joints: names of its joints that a policy moves, in the order of a recording's columns.
-        hand: name of the body or site by which it is led if nothing else is grabbed.
-        ranges: ``(n_joints,)`` rad, or m of a slide joint; None for those of the model.
-        start: ``(n_joints,)`` where every movement starts, in the context 0; None for the model's own posture.
-        speeds, accelerations: ``(n_joints,)`` rad/s and rad/s^2, the largest that the robot's own movements have, so
-            that it can do again what it was led through; None for an arm that crosses its ranges in about a second.
-    """
-
-    model: Any
-    joints: tuple[str, ...]
-    hand: str
-    ranges: Box | None = None
-    start: Array | None = None
-    speeds: Array | None = None
-    accelerations: Array | None = None
 
 
 Record = Callable[[Array, Array, np.random.Generator], Recorded]

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-from sgimd_torch.demonstrations.lessons import misfit_of
+from sgimd_torch.demonstrations.fit import misfit_of
 from sgimd_torch.environments.check import check_environment
 from sgimd_torch.environments.controllers import Sinusoids
 from sgimd_torch.environments.from_gymnasium import FromGymnasium, measured_noise
