@@ -113,9 +113,8 @@ CATALOGUE: Final[dict[str, dict[str, Entry]]] = {
     },
     "environment": {
         ROD: _rod("the paper's arm with a rod, in MuJoCo"),
-        "rod-wind": _rod("the same in a side wind, up to a quarter of the float's weight: a context", max_wind=0.05),
-        "rod-yaw": _rod("the same with its base turned by up to half a radian: a context", max_yaw=0.5),
-        "rod-long": _rod("the same with a line half as long again, taught with the shorter one", line=1.5),
+        "rod-wind": _rod("the rod in a side wind, up to a quarter of the float's weight: a context", max_wind=0.05),
+        "rod-long": _rod("the rod with a line 1.5 times as long, taught with the shorter one", line=1.5),
         "planar-arm-7": _at("runs.tasks.robots:planar_arm", "7 joints, no noise", fixed={"n_joints": 7}),
         "planar-arm-50": _at("runs.tasks.robots:planar_arm", "50 joints, no noise", fixed={"n_joints": 50}),
         "swimmer": _at("runs.tasks.robots:swimmer", "gymnasium's Swimmer-v5: three links, two motors (extra gym)"),

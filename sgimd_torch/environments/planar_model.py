@@ -1,6 +1,6 @@
-"""A planar arm as a MuJoCo model, so that it can be led by the hand and seen as other robots are.
+"""A planar arm as a MuJoCo model, so that a person can lead it by the hand and view it like other robots.
 
-It lies in the plane z = 0; at zero angles all links point along +x. Physics are off: only its geometry counts.
+The arm lies in the plane z = 0; at zero angles all links point along +x. The model has geometry but no physics.
     model = planar_model([0.5, 0.3, 0.2]); model.joint("joint_1"); model.site("end")
 """
 
@@ -16,7 +16,7 @@ LINK: Final = "link_{}"
 
 
 def planar_model(lengths: Sequence[float]) -> mujoco.MjModel:
-    """An arm with a link of each of ``lengths`` (m) behind a hinge; its end is the site "end"."""
+    """An arm of hinges, each followed by a link of the next of ``lengths`` (m); its end is the site "end"."""
     spec = mujoco.MjSpec()
     body, at, thickness = spec.worldbody, 0.0, 0.02 * sum(lengths)
     for number, length in enumerate(lengths):

@@ -21,7 +21,7 @@ WAITING = """
     runs runs/engines runs/tasks record experiments scripts scripts/documentation
     board figures views views/film views/report
     demonstrations views/teach
-    environments competence evaluation files spaces
+    competence evaluation files spaces
 """
 # First words that continue an earlier text, such as the name of the parameter; _ stands for a space.
 CONTINUING = """
@@ -34,7 +34,7 @@ CONTINUING = """
 VERBS = """
     is are was were has have had does did may can must called drawn made given shown told asked used executed freshly
     draws gives decides refines keeps makes moves_a predicts replaces shows showed says serves asks tells wants goes
-    name_the go send fill keep show only any another s rad m metre metres Hz degrees lowest_and
+    name_the go send fill keep show only any another s rad m metre metres Hz degrees
 """
 VERB_AND_OBJECT = "(?!(?:half|twice|whether|all|double) )[a-z]+ (?:the|a|an|its|it|them|their|how|nothing) "
 RELATIVE = "which|that|who|whose|where|when|what|how|if|as|whether"

@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 
 from sgimd_torch.algorithms import Correspondence
-from sgimd_torch.environments.protocol import Environment, HandLed, Record, check_instance, recorded
+from sgimd_torch.environments.protocol import Environment, HandLed, Tracer, check_instance, traced
 from sgimd_torch.evaluation import Benchmark, load_benchmark
 from sgimd_torch.files import checksum
 from sgimd_torch.spaces import Demonstration
@@ -48,10 +48,10 @@ class Task:
         check_instance(self.environment)
 
     @property
-    def picture(self) -> Record | None:
-        """The environment's ``record``, which gives a movement to be filmed, checked; None if it has none."""
-        found = getattr(self.environment, "record", None)
-        return partial(recorded, self.environment, found) if callable(found) else None
+    def picture(self) -> Tracer | None:
+        """The environment's ``trace``, which gives a movement to film, checked; None if it has none."""
+        found = getattr(self.environment, "trace", None)
+        return partial(traced, self.environment, found) if callable(found) else None
 
 
 def goals_all_over(environment: Environment) -> Benchmark:
