@@ -21,7 +21,6 @@ WAITING = """
     runs runs/engines runs/tasks record experiments scripts scripts/documentation
     board figures views views/film views/report
     demonstrations views/teach
-    competence evaluation files spaces
 """
 # First words that continue an earlier text, such as the name of the parameter; _ stands for a space.
 CONTINUING = """
