@@ -7,6 +7,7 @@ says how far the float lands, without noise, from where it lands at steps of hal
 from __future__ import annotations
 
 import argparse
+import math
 import time
 
 import mujoco
@@ -14,7 +15,7 @@ import numpy as np
 from jsonargparse.typing import PositiveInt
 from tqdm import tqdm
 
-from sgimd_torch.environments.fishing_rod import JOINT_RANGES, FishingRod
+from sgimd_torch.environments.fishing_rod import HOLD, JOINT_RANGES, FishingRod
 from sgimd_torch.environments.protocol import SimulationError
 from sgimd_torch.evaluation import load_benchmark
 from sgimd_torch.spaces import Array, stream
@@ -54,13 +55,13 @@ def cost(rod: FishingRod, movements: int = 300) -> tuple[float, float]:
     """
     data, postures, times, ratios = mujoco.MjData(rod.model), stream(SEED, "postures"), [], []
     for row, theta in enumerate(stream(SEED, "cost").random((movements, 25))):
-        rng, before = stream(SEED, "noise", row), rod.steps
+        rng, lasts = stream(SEED, "noise", row), rod.primitive.duration(theta) + HOLD
         begin = time.perf_counter()
         rod.execute(np.zeros(0), theta, rng)
         took = time.perf_counter() - begin
         data.ctrl[:6] = JOINT_RANGES.sample(postures)
         begin = time.perf_counter()
-        mujoco.mj_step(rod.model, data, nstep=rod.steps - before)
+        mujoco.mj_step(rod.model, data, nstep=math.ceil(lasts / rod.model.opt.timestep) + 1)
         times.append(took)
         ratios.append(took / (time.perf_counter() - begin))
     return 1e3 * float(np.median(times)), float(np.median(ratios))

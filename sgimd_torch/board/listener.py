@@ -80,6 +80,10 @@ class BoardListener(EventFile):
             for tag, picture in draw(self._learner.regions, self._space, goals, own.errors).items():
                 self._show(tag, summary.image(tag, picture, dataformats="HWC"), "images")
 
+    def curves(self) -> Mapping[str, float]:
+        """Nothing: the board draws what others tell."""
+        return {}
+
     def _scalars(self, values: Mapping[str, float]) -> None:
         """A point for each curve, by tag; values that are not finite are left out."""
         for tag, value in values.items():

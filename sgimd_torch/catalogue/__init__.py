@@ -47,7 +47,6 @@ WORDS: Final[dict[str, dict[str, str]]] = {
     "environment": {
         ROD: "runs.tasks.rods:fishing_rod",
         "rod-wind": "runs.tasks.rods:rod_wind",
-        "rod-yaw": "runs.tasks.rods:rod_yaw",
         "rod-long": "runs.tasks.rods:rod_long",
         "planar-arm-7": "runs.tasks.robots:planar_arm_7",
         "planar-arm-50": "runs.tasks.robots:planar_arm_50",

@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+from sgimd_torch.runs.model_listener import ModelListener
 
 from boards import curves_of
 from runs import LIVE, RUN, content_of, end, start, stopped_at
@@ -18,7 +19,6 @@ from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.directory import FILE
 from sgimd_torch.runs.listeners import Seconds
-from sgimd_torch.runs.model_listener import ModelListener
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.spaces import Episode, Move, stream

@@ -14,7 +14,7 @@ from typing import Final
 
 import numpy as np
 
-from sgimd_torch.environments.protocol import Environment, Record, check_instance, primitive_of, recorded
+from sgimd_torch.environments.protocol import Environment, Tracer, check_instance, primitive_of, traced
 from sgimd_torch.evaluation import Benchmark, load_benchmark
 from sgimd_torch.files import checksum
 from sgimd_torch.learner import Correspondence
@@ -48,10 +48,10 @@ class Task:
         check_instance(self.environment)
 
     @property
-    def picture(self) -> Record | None:
-        """The environment's ``record``, which gives a movement to be filmed, checked; None if it has none."""
-        found = getattr(self.environment, "record", None)
-        return partial(recorded, self.environment, found) if callable(found) else None
+    def picture(self) -> Tracer | None:
+        """The environment's ``trace``, which gives a movement to film, checked; None if it has none."""
+        found = getattr(self.environment, "trace", None)
+        return partial(traced, self.environment, found) if callable(found) else None
 
 
 def goals_all_over(environment: Environment) -> Benchmark:
