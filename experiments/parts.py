@@ -13,10 +13,9 @@ from numpy.typing import ArrayLike
 from ribs.archives import GridArchive
 from ribs.emitters import GaussianEmitter
 
-from sgimd_torch.algorithms import Correspondence
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.environments.toys import toss
-from sgimd_torch.learner import Learner
+from sgimd_torch.learner import Correspondence, Learner
 from sgimd_torch.memory import Memory
 from sgimd_torch.rivals import quality_diversity
 from sgimd_torch.runs.tasks import Task
