@@ -1,7 +1,7 @@
 """Spaces, records and random streams: the words that all other modules use.
 
 Section 2.1 of Nguyen & Oudeyer (2014): contexts c in C, policies theta in Pi, outcomes tau in T, and a
-learning episode [context][policy][outcome]. Numpy only; nothing here knows about learning or physics.
+learning episode (context, policy, outcome). Numpy only; nothing here knows about learning or physics.
 """
 
 from __future__ import annotations
@@ -296,7 +296,7 @@ class Lesson(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Episode:
-    """[context][policy][outcome] and why it happened. ``move`` and ``outcome`` are None when the learner rested;
+    """(context, policy, outcome) and why it happened. ``move`` and ``outcome`` are None when the learner rested;
     ``outcome`` is None, too, of a movement that ``failed``, which says why ("" if it did not);
     ``demonstration`` is what a teacher showed just before, if anything, and ``request`` what the learner had asked for,
     answered or not; then ``reply`` says "shown", or why not: "nothing", "again" (it was shown this before), "failed" or
