@@ -118,8 +118,7 @@ def evaluate(
     Two inverses that are evaluated with the same ``seed`` and ``step`` get the same noise, goal by goal.
 
     Args:
-        inverse: (context, goal) -> estimate; its memory must not be empty. If it has a method ``many``, (context,
-            goals) -> estimates, that is used instead.
+        inverse: inverse model, whose ``answer_many`` is called; its memory must not be empty.
         environment: executed, all goals side by side if it can do that.
         goals: ``(n, outcome_dim)`` m.
         seed, step: name the random streams: each evaluation of a run has a step of its own, such as the number of
