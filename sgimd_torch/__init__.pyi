@@ -5,9 +5,6 @@ from .algorithms import sagg_riac as sagg_riac
 from .algorithms import sgim_d as sgim_d
 from .algorithms.practice import practice as practice
 from .algorithms.practice import practice_taught as practice_taught
-from .asking.algorithms import sgim_acts as sgim_acts
-from .asking.algorithms import sgim_im as sgim_im
-from .asking.teachers import AnsweringTeacher as AnsweringTeacher
 from .competence import performance as performance
 from .demonstrations import load_demonstrations as load_demonstrations
 from .demonstrations import save_demonstrations as save_demonstrations

@@ -44,7 +44,8 @@ def help_of(make: Callable[..., Any]) -> dict[str, str]:
 
     while isinstance(make, partial):
         make = make.func
-    found = help_of(_TARGETS[make]) if make in _TARGETS else {}
+    decorated = make.__init__ if inspect.isclass(make) else make
+    found = help_of(_TARGETS[decorated]) if decorated in _TARGETS else {}
     text = inspect.getdoc(make) or ""
     for each in docstring_parser.parse(text, docstring_parser.DocstringStyle.GOOGLE).params:
         about = " ".join((each.description or "").split()).partition(" Deviation:")[0]

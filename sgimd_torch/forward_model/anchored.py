@@ -8,93 +8,51 @@ executed, and a search through it finds just those places.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Final
 
 import torch
 
-from sgimd_torch.forward_model.diagnostics import TRUSTED_UP_TO
 from sgimd_torch.forward_model.model import ForwardModel
 from sgimd_torch.spaces import Array, Box
 
-_REACH: Final = 0.08  # of an anchor, in sides of Pi, times the square root of the number of parameters
+# All numbers are without a unit: lengths come from the data, so metres, millimetres or newtons make no difference.
+_REACH: Final = 0.08  # length scale of a correction, in sides of Pi, times the square root of the number of parameters
+# Part of the model's predicted variances that counts, of noise and of disagreement. A network that has not learnt
+# enough takes its own errors for noise (twice the true deviation late in a run on the fishing rod, and more early), so
+# that the anchors would not correct it.
+_SHARE: Final = 0.1
+# Weight of the anchored prediction's variance against the squared distance. 1 would be the expectation, but the minimum
+# over many candidates selects those whose error makes them look good.
+_CAUTION: Final = 10.0
 _LEAST_NOISE: Final = 0.003  # in spreads of the outcomes; less makes the covariance of coincident anchors singular
 
 
-@dataclass(frozen=True)
-class Trust:
-    """How far to trust the model.
-
-    All are numbers without a unit: lengths come from the data, so metres, millimetres or newtons make no difference.
-
-    Args:
-        reach: length scale in policy space of what an anchor tells, in sides of Pi; None for .08 sqrt(theta_dim).
-        share: how much of the model's predicted variances counts, of noise and of disagreement. A network that has not
-            learnt enough takes its own errors for noise (twice the true deviation late in a run on the fishing rod, and
-            more early), so that the anchors would not correct it. 1 is for outcomes that are as noisy as it says.
-        caution: weight of the anchored prediction's variance against the squared distance. 1 would be the expectation,
-            but the minimum over many candidates selects those whose error makes them look good.
-        error: ``ForwardModel.relative_error`` above which the model is not used.
-        anchors: False predicts by the network alone, for comparison.
-
-    Raises:
-        ValueError: a number out of its range.
-    """
-
-    reach: float | None = None
-    share: float = 0.1
-    caution: float = 10.0
-    error: float = TRUSTED_UP_TO
-    anchors: bool = True
-
-    def __post_init__(self) -> None:
-        for name in ("reach", "error"):
-            value = getattr(self, name)
-            if value is not None and not 0 < value < float("inf"):
-                raise ValueError(f"{name} must be positive and finite, got {value}")
-        if not 0 <= self.share <= 1:
-            raise ValueError(f"share must lie in [0, 1], got {self.share}")
-        if not 0 <= self.caution < float("inf"):
-            raise ValueError(f"caution must be finite and at least 0, got {self.caution}")
-
-
-TRUST: Final = Trust()
-
-
 class Anchored:
-    """For n candidates: the expected squared distance of each to a goal, and its descent.
+    """Expected squared distance of each of n candidates to a goal, and its descent.
 
     Args:
-        model: predicts.
+        model: forward model, trained.
         policies: Pi, whose sides measure distances between movements.
         context: ``(context_dim,)`` in which the candidates will be executed, or ``(n, context_dim)``, each in its own.
         contexts: ``(n, m, context_dim)`` in which the anchors were executed.
-        thetas: ``(n, m, theta_dim)`` of the m anchors of each candidate; n may be 1, the same for all.
-        outcomes: ``(n, m, outcome_dim)`` where the anchors landed.
-        trust: how far to trust the model.
+        thetas: ``(n, m, theta_dim)`` of the m anchors of each candidate; with n = 1, all candidates share them.
+        outcomes: ``(n, m, outcome_dim)`` of the anchors.
     """
 
     def __init__(
-        self,
-        model: ForwardModel,
-        policies: Box,
-        context: Array,
-        contexts: Array,
-        thetas: Array,
-        outcomes: Array,
-        trust: Trust,
+        self, model: ForwardModel, policies: Box, context: Array, contexts: Array, thetas: Array, outcomes: Array
     ) -> None:
-        self.model, self.trust = model, trust
+        self.model = model
         self.low, self.high, self.sides = map(self.tensor, (policies.low, policies.high, policies.sides))
         self.context, thetas_there = self.tensor(context), self.tensor(thetas)
         self._placed = thetas_there / self.sides
         self._squares = (self._placed**2).sum(dim=-1)
-        self.reach = _REACH * policies.dim**0.5 if trust.reach is None else trust.reach
+        self._reach = _REACH * policies.dim**0.5
         spread = model.outcome_scale.square().mean().sqrt()
         with torch.no_grad():
             means, variances = model.landing(self.tensor(contexts), thetas_there)
-            missed, noise = self.tensor(outcomes) - means.mean(dim=0), trust.share * variances.mean(dim=(0, -1))
-            # Where no anchor is near it errs as it does on what it was never trained on, or more.
+            missed, noise = self.tensor(outcomes) - means.mean(dim=0), _SHARE * variances.mean(dim=(0, -1))
+            # Far from all anchors at least the held-out error is assumed.
             doubt = (missed**2).mean(dim=(1, 2), keepdim=True).sqrt().clamp(min=model.missed * spread)
             covariance = doubt**2 * self._kernel(torch.cdist(self._placed, self._placed) ** 2)
             noise = noise + (_LEAST_NOISE * spread) ** 2
@@ -102,24 +60,22 @@ class Anchored:
             self._doubt, self._weights = doubt[:, 0] ** 2, self._inverse @ missed
 
     def tensor(self, values: Array) -> torch.Tensor:
-        """``values`` in the precision of the model, and where it is."""
+        """``values`` in the precision and on the device of the model."""
         return torch.tensor(values, dtype=torch.float32, device=self.model.input_mean.device)
 
     def predict(self, theta: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """Where ``theta`` ``(n, theta_dim)`` should land, ``(n, outcome_dim)``, and the variance ``(n,)`` about it:
-        noise, disagreement of the members, and doubt weighted with ``caution``."""
+        """Outcomes ``(n, outcome_dim)`` expected of ``theta`` ``(n, theta_dim)``, and the variance ``(n,)`` about them:
+        noise, disagreement of the members, and the weighted variance of the correction."""
         means, variances = self.model.landing(self.context, theta)
         landing = means.mean(dim=0)
-        spread = self.trust.share * (variances.mean(dim=0) + means.var(dim=0, correction=0)).sum(dim=-1)
-        if not self.trust.anchors:
-            return landing, spread
+        spread = _SHARE * (variances.mean(dim=0) + means.var(dim=0, correction=0)).sum(dim=-1)
         placed = theta / self.sides
         squares = (placed**2).sum(dim=-1, keepdim=True) + self._squares - 2 * (self._placed @ placed[..., None])[..., 0]
         kernel = self._doubt * self._kernel(squares)  # (n, m)
         correction = (kernel[:, None] @ self._weights)[:, 0]
         explained = ((kernel[:, None] @ self._inverse)[:, 0] * kernel).sum(dim=-1)
         doubt = (self._doubt[:, 0] - explained).clamp(min=0)
-        return landing + correction, spread + landing.shape[-1] * self.trust.caution * doubt
+        return landing + correction, spread + landing.shape[-1] * _CAUTION * doubt
 
     def expected(self, theta: torch.Tensor, goals: torch.Tensor) -> torch.Tensor:
         """``(n,)`` squared distance to ``goals`` plus the spread, so that reliable movements win."""
@@ -138,7 +94,11 @@ class Anchored:
         """``(n, theta_dim)``: ``theta`` after ``steps`` of Adam, each of about ``step`` sides of Pi.
 
         Args:
-            radius: the farthest that it goes from ``theta``, root mean square over the parameters, in sides.
+            theta: ``(n, theta_dim)`` candidates.
+            goals: ``(n, outcome_dim)``, or one for all.
+            steps: number of steps.
+            step: length of a step in each parameter, in sides of Pi.
+            radius: largest distance from ``theta``, root mean square over the parameters, in sides; None for any.
         """
         start = theta
         mean, square = torch.zeros_like(theta), torch.zeros_like(theta)
@@ -150,15 +110,15 @@ class Anchored:
             change = (mean / (1 - 0.9**i)) / ((square / (1 - 0.999**i)).sqrt() + torch.finfo().tiny)
             theta = theta.detach() - step * self.sides * change
             if radius is not None:
-                theta = self.within(start, theta, self.sides, radius)
+                theta = within(start, theta, self.sides, radius)
             theta = theta.clamp(self.low, self.high)
         return theta.detach()
 
-    @staticmethod
-    def within(start: torch.Tensor, theta: torch.Tensor, sides: torch.Tensor, radius: float) -> torch.Tensor:
-        """The points nearest to ``theta`` in the trust region of ``start``: ``radius`` sides, root mean square."""
-        change, longest = (theta - start) / sides, radius * theta.shape[-1] ** 0.5
-        return start + sides * change * (longest / change.norm(dim=-1, keepdim=True).clamp(min=longest))
-
     def _kernel(self, squared_distances: torch.Tensor) -> torch.Tensor:
-        return (-squared_distances / (2 * self.reach**2)).exp()
+        return (-squared_distances / (2 * self._reach**2)).exp()
+
+
+def within(start: torch.Tensor, theta: torch.Tensor, sides: torch.Tensor, radius: float) -> torch.Tensor:
+    """Points nearest to ``theta`` in the trust region of ``start``: ``radius`` sides of Pi, root mean square."""
+    change, longest = (theta - start) / sides, radius * theta.shape[-1] ** 0.5
+    return start + sides * change * (longest / change.norm(dim=-1, keepdim=True).clamp(min=longest))

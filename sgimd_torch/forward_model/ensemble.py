@@ -1,37 +1,35 @@
-"""An ensemble of networks; each predicts a value and its noise. One batched product per layer computes all of them.
+"""An ensemble of networks; each predicts a value and its noise. One batched product per layer computes all networks.
 
 Deep ensembles (Lakshminarayanan, Pritzel & Blundell, NeurIPS 2017). A plain LightningModule, which any of Lightning's
 loops can train; ``model.py`` trains it online.
-    means, log_variances = Ensemble(25, 2, torch.Generator())(inputs)
+    means, log_variances = Ensemble(25, 2, torch.Generator(), members=3)(inputs)
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
 from typing import Final
 
-try:
-    import torch
-    from lightning import LightningModule
-except ImportError as error:
-    raise ImportError(f"the forward model needs torch: pip install 'sgimd-torch[forward]' ({error})") from error
+import torch
+from lightning import LightningModule
 
+_HIDDEN: Final = (64, 64)  # units of each hidden layer
 _LOG_VARIANCES: Final = (-9.0, 3.0)  # of standardised outcomes: a noise of 1 % to 450 % of their spread
 
 
 class Ensemble(LightningModule):
-    """The caller standardises inputs and outputs.
+    """Networks that predict outputs and their noise. The caller standardises inputs and outputs.
 
     Args:
-        n_inputs, n_outputs: their dimensions.
-        generator: draws the weights.
+        n_inputs: dimension of the inputs.
+        n_outputs: dimension of the outputs.
+        generator: random stream of the weights.
         members: number of networks; each starts from other weights.
-        hidden: units of each hidden layer.
-        noise_heads: whether the predicted noise depends on the input; if not, it is one number for each output.
+        noise_heads: true for a predicted noise that depends on the input, false for one number for each output.
         lr: learning rate of Adam.
-        beta: 0 is the likelihood itself; with .5 noisy inputs are learnt, too (Seitzer et al., ICLR 2022).
+        beta: weight of the noise in the loss: 0 is the likelihood itself; with .5 outputs of noisy inputs are learnt,
+            too (Seitzer et al., ICLR 2022).
     """
 
     def __init__(
@@ -39,8 +37,7 @@ class Ensemble(LightningModule):
         n_inputs: int,
         n_outputs: int,
         generator: torch.Generator,
-        members: int = 3,
-        hidden: Sequence[int] = (64, 64),
+        members: int,
         noise_heads: bool = True,
         *,
         lr: float = 1e-2,
@@ -49,7 +46,7 @@ class Ensemble(LightningModule):
         super().__init__()
         self.members, self.noise_heads, self.lr, self.beta = members, noise_heads, lr, beta
         self.weights, self.biases = torch.nn.ParameterList(), torch.nn.ParameterList()
-        for n_in, n_out in itertools.pairwise([n_inputs, *hidden, 2 * n_outputs]):
+        for n_in, n_out in itertools.pairwise([n_inputs, *_HIDDEN, 2 * n_outputs]):
             self.weights.append(torch.randn(members, n_in, n_out, generator=generator) / math.sqrt(n_in))
             self.biases.append(torch.zeros(members, 1, n_out))
 

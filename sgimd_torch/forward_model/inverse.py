@@ -2,118 +2,109 @@
 
 Not in Nguyen & Oudeyer (2014), whose inverse model, eqs. (8) and (9), only knows outcomes. Here candidates descend the
 expected squared distance to the goal, predicted noise included: of several movements to a goal a reliable one wins.
-    inverse = ModelInverse(memory, model, environment.policies); inverse(context, goal).theta
+    inverse = ModelInverse(problem); inverse(context, goal).theta
 """
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import torch
 
-from sgimd_torch.forward_model.anchored import TRUST, Anchored, Trust
-from sgimd_torch.forward_model.model import ForwardModel
+from sgimd_torch.catalogue.options import hands_on
+from sgimd_torch.forward_model.anchored import Anchored
+from sgimd_torch.forward_model.shared import ThroughModel
 from sgimd_torch.inverses.locally_linear import LocallyLinear
-from sgimd_torch.memory import Memory
-from sgimd_torch.spaces import Array, Box, Estimate
+from sgimd_torch.parts import Problem
+from sgimd_torch.spaces import Array, Estimate
 
 _NEAREST: Final = 10  # remembered movements that landed nearest to the goal: candidates beside the first estimate
 _ANCHORS: Final = 40  # neighbours in policy space that correct the predictions for a candidate
-# Of the descent; a step in sides of Pi. Many small steps end nearer to the start than few large ones.
+# Number and size of the steps of the descent, in sides of Pi. Many small steps end nearer to the start than few large
+# ones.
 _STEPS, _STEP = 40, 0.005
 _GOALS_PER_BATCH: Final = 64  # about 50 MB
 
 
-class ModelInverse:
-    """Descends from the estimate of `LocallyLinear` and from the nearest remembered movements to what ``model`` expects
+class ModelInverse(ThroughModel):
+    """Descends from the estimate of `LocallyLinear` and from the nearest remembered movements to what the model expects
     to be best.
 
     It never trains the model, so that an evaluation changes nothing: call ``model.refresh(memory)`` in the loop that
-    adds to the memory. Until the model is good enough for ``trust`` it answers like `LocallyLinear`.
+    adds to the memory. Until the model is trusted it answers like `LocallyLinear`.
 
     Args:
-        memory: gives candidates and anchors; only read.
-        model: predicts.
-        policies: Pi; nothing outside is proposed.
-        trust: how far to trust the model.
-
-    Raises:
-        ValueError: a model of other dimensions.
+        problem: Pi and the memory are read.
     """
 
-    learns_with = LocallyLinear  # the inverse of a learner whose evaluations are answered by this one
-
-    def __init__(self, memory: Memory, model: ForwardModel, policies: Box, *, trust: Trust = TRUST) -> None:
-        model.check_fits("memory", **{name: getattr(memory, name) for name in model.sizes})
-        model.check_fits("policies", theta_dim=policies.dim)
-        self.memory, self.model, self.policies, self.trust = memory, model, policies, trust
-        self.start = LocallyLinear(memory)
-
-    @property
-    def trusted(self) -> bool:
-        """Whether the model is good enough to be used."""
-        return self.model.relative_error <= self.trust.error
+    @hands_on(ThroughModel)
+    def __init__(self, problem: Problem, **options: Any) -> None:
+        super().__init__(problem, **options)
+        self.start = LocallyLinear(problem)
 
     def __call__(self, context: Array, goal: Array) -> Estimate:
-        """The candidate that should be best, with the neighbours that ``start`` gives.
+        """The candidate that should be best, with the neighbours that ``start`` gives."""
+        return self.answer_many(context[None], goal[None])[0]
 
-        Raises:
-            RuntimeError: the memory is empty.
-        """
-        return self.many(context, goal[None])[0]
-
-    def many(self, context: Array, goals: Array) -> list[Estimate]:
-        """An estimate for each of ``(n, outcome_dim)`` goals, several times faster than one by one.
-
-        Raises:
-            RuntimeError: the memory is empty.
-        """
-        estimates = [self.start(context, goal) for goal in goals]
+    def answer_many(self, contexts: Array, goals: Array) -> list[Estimate]:
+        """Estimates for ``goals`` ``(n, outcome_dim)``; in one context, several times faster than one by one."""
+        estimates = [self.start(*each) for each in zip(contexts, goals, strict=True)]
         if not self.trusted:
             return estimates
         found: list[Estimate] = []
-        for first in range(0, len(goals), _GOALS_PER_BATCH):
-            some = slice(first, first + _GOALS_PER_BATCH)
-            found += self._descended(context, goals[some], estimates[some])
+        size = _GOALS_PER_BATCH if (contexts == contexts[0]).all() else 1
+        for first in range(0, len(goals), size):
+            some = slice(first, first + size)
+            found += self._descended(contexts[first], goals[some], estimates[some])
         return found
 
-    def predict(self, contexts: Array, thetas: Array) -> Array:
-        """``(n, outcome_dim)`` what movements should lead to, judging by the model and by those most like each.
+    def predict_many(self, contexts: Array, thetas: Array) -> Array:
+        """``(n, outcome_dim)`` outcomes expected by the model, corrected at the movements most like each.
 
         Args:
             contexts: ``(n, context_dim)``.
             thetas: ``(n, theta_dim)``.
 
         Raises:
-            RuntimeError: the memory is empty, or the model is not trained.
+            RuntimeError: the memory is empty.
         """
         anchored = self._anchored(contexts, thetas)
         with torch.no_grad():
             return anchored.predict(anchored.tensor(thetas))[0].cpu().double().numpy()
 
     def _descended(self, context: Array, goals: Array, estimates: list[Estimate]) -> list[Estimate]:
-        memory = self.memory
+        memory, policies = self.problem.memory, self.problem.policies
         starts = [
             np.vstack([estimate.theta, memory.thetas[memory.near_outcomes(context, goal, _NEAREST)]])
             for goal, estimate in zip(goals, estimates, strict=True)
         ]
         n_each = min(map(len, starts))
-        candidates = self.policies.clip(np.vstack([thetas[:n_each] for thetas in starts]))
+        candidates = policies.clip(np.vstack([thetas[:n_each] for thetas in starts]))
         anchored = self._anchored(np.broadcast_to(context, (len(candidates), len(context))), candidates)
         aims = anchored.tensor(goals.repeat(n_each, axis=0))
         theta = anchored.descend(anchored.tensor(candidates), aims, steps=_STEPS, step=_STEP)
         with torch.no_grad():
             best = anchored.expected(theta, aims).reshape(len(goals), n_each).argmin(dim=1)
         chosen = theta.reshape(len(goals), n_each, -1)[torch.arange(len(goals)), best].cpu().double().numpy()
-        return [
-            estimate._replace(theta=self.policies.clip(row)) for estimate, row in zip(estimates, chosen, strict=True)
-        ]
+        return [estimate._replace(theta=policies.clip(row)) for estimate, row in zip(estimates, chosen, strict=True)]
 
     def _anchored(self, contexts: Array, thetas: Array) -> Anchored:
         """Predictions for ``(n, theta_dim)`` in ``(n, context_dim)``, each with anchors of its own."""
-        memory = self.memory
+        memory = self.problem.memory
         rows = [memory.near_policies(*each, _ANCHORS) for each in zip(contexts, thetas, strict=True)]
         near = np.stack([row[: min(map(len, rows))] for row in rows])
         there = memory.contexts[near], memory.thetas[near], memory.outcomes[near]
-        return Anchored(self.model, self.policies, contexts, *there, self.trust)
+        return Anchored(self.model, self.problem.policies, contexts, *there)
+
+
+class ModelAlone(ModelInverse):
+    """Locally linear while learning, a forward model in evaluations, proved or not (extra forward).
+
+    Args:
+        problem: Pi and the memory are read.
+    """
+
+    def __call__(self, context: Array, goal: Array) -> Estimate:
+        """The estimate of `LocallyLinear`."""
+        return self.start(context, goal)

@@ -1,26 +1,25 @@
-"""The forward model of a run: it is trained, its predictions are recorded, and a message says when it is not asked.
+"""The forward model in a run: it is trained, its predictions are recorded, and a message says when it is not asked.
 
 A replay makes its tables again, so a resumed run has them as if it had never stopped.
-    model = ModelListener(record, parts.model, trust, inverse, memory, seconds); model.episode(episode, replayed=False)
+    listener = ModelListener(record, model, asked, learner.memory, seconds); listener.episode(episode, replayed=False)
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from collections.abc import Callable
+from typing import Final
 
 import numpy as np
 
 from sgimd_torch.forward_model.diagnostics import coverage
+from sgimd_torch.forward_model.model import ForwardModel, Prediction
 from sgimd_torch.memory import Memory
 from sgimd_torch.record import Record
 from sgimd_torch.runs.listeners import Listener, Seconds
 from sgimd_torch.runs.process import say
 from sgimd_torch.spaces import Array, Episode
 
-if TYPE_CHECKING:
-    from sgimd_torch.forward_model.model import ForwardModel, Prediction
-
-LEVEL: Final = 0.8  # of the regions whose coverage the board shows
+LEVEL: Final = 0.8  # share of outcomes that the regions whose coverage the board shows should contain
 NOT_ASKED: Final = "the forward model is not asked, the learner goes on without it"
 
 
@@ -28,27 +27,25 @@ class ModelListener(Listener):
     """Refreshes the model after every movement and records what it predicts.
 
     Args:
-        record: of the run.
-        model: of the run.
-        trust: relative error above which the model is not asked.
-        inverse: of the run; if it knows whether the model can be ``trusted``, it decides whether the model is asked.
-        memory: of the learner.
-        seconds: of the run; those spent here are counted since movement 0, because a replay spends them again.
+        record: record of the run.
+        model: forward model of the run.
+        asked: function that says whether the learner asks the model now.
+        memory: memory of the learner.
+        seconds: clock of the run; training is counted since movement 0, because a replay trains again.
     """
 
     def __init__(
-        self, record: Record, model: ForwardModel, trust: float, inverse: object, memory: Memory, seconds: Seconds
+        self, record: Record, model: ForwardModel, asked: Callable[[], bool], memory: Memory, seconds: Seconds
     ) -> None:
-        self._model, self._trust, self._memory, self._seconds = model, trust, memory, seconds
-        self._record, self._inverse = record, inverse
-        self._asked = False
+        self._record, self._model, self._memory, self._seconds = record, model, memory, seconds
+        self._is_asked, self._asked = asked, False
         self._curves: dict[str, float] = {}
 
     def episode(self, episode: Episode, replayed: bool) -> None:
         """Refresh after a movement; say what is new."""
-        memory, movements, move = self._memory, episode.index + 1, episode.move
+        memory, movements = self._memory, episode.index + 1
         with self._seconds.of("model"):
-            refresh = self._model.refresh(memory, None if move is None else move.goal)
+            refresh = self._model.refresh(memory)
         if refresh is None:
             return
         error = self._model.relative_error
@@ -58,7 +55,7 @@ class ModelListener(Listener):
         if refresh.predicted is not None:
             self._predicted(refresh.first, memory.outcomes[refresh.first :], refresh.predicted)
         news = ["training diverged; the forward model keeps its last good weights"] if refresh.diverged else []
-        asked = getattr(self._inverse, "trusted", error <= self._trust)
+        asked = self._is_asked()
         if asked != self._asked:
             self._asked = asked
             who = "the forward model is asked from here on" if asked else NOT_ASKED
@@ -73,8 +70,8 @@ class ModelListener(Listener):
             why = self._how_wrong(self._model.relative_error) if trained else "there were too few exemplars to train it"
             say(f"{NOT_ASKED}: {why}")
 
-    def new_curves(self) -> dict[str, float]:
-        """For the board, by tag: what the last refresh left, none where they were given already."""
+    def curves(self) -> dict[str, float]:
+        """Numbers of the last refresh, once, by tag."""
         curves, self._curves = self._curves, {}
         return curves
 
@@ -86,5 +83,6 @@ class ModelListener(Listener):
         self._curves["model/coverage"] = coverage(outcomes, predicted.mean, spread, LEVEL)
 
     def _how_wrong(self, error: float) -> str:
-        proof = "" if self._asked or error > self._trust else ", once it predicts movements better than a local process"
-        return f"its relative error is {error:.3f}, it is trusted up to {self._trust:g}{proof}"
+        unproved = not self._asked and self._model.trusted
+        proof = ", once it predicts movements as well as a local process" if unproved else ""
+        return f"its relative error is {error:.3f}, it is trusted up to {self._model.trust:g}{proof}"

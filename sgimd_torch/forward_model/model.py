@@ -1,6 +1,6 @@
-"""Forward model L: where will the float land? An ensemble of networks, trained while the robot learns.
+"""Forward model L: which outcome will a movement have? An ensemble of networks, trained while the robot learns.
 
-Not in Nguyen & Oudeyer (2014), who use local models only. `OnlineTrainer` trains it; this file says what it predicts.
+Not in Nguyen & Oudeyer (2014), who use local models only. `OnlineTrainer` trains it.
     model = ForwardModel(0, 25, 2, seed=3); model.refresh(memory); model.predict(contexts, thetas).mean
 """
 
@@ -9,34 +9,34 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-
-try:
-    import torch
-    from safetensors import SafetensorError, safe_open
-    from safetensors.torch import save
-except ImportError as error:
-    raise ImportError(f"the forward model needs torch: pip install 'sgimd-torch[forward]' ({error})") from error
+import torch
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save
 
 from sgimd_torch.files import write_bytes
 from sgimd_torch.forward_model.ensemble import Ensemble
-from sgimd_torch.forward_model.training import RECENT, OnlineTrainer
+from sgimd_torch.forward_model.training import OnlineTrainer
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, check_count, check_vector, stream
 
+TRUSTED_UP_TO: Final = 0.25  # relative error
 _FEWEST_EXEMPLARS: Final = 50  # for the first refresh
-_NEAR_A_GOAL: Final = 200  # exemplars that count as near a goal, for ``focus``
 _DIVERGED_ABOVE: Final = 2.0  # relative error, twice that of predicting the mean
 
 
 class Prediction(NamedTuple):
-    """All ``(..., outcome_dim)`` m. ``mean`` is where the float should land; ``epistemic`` is the standard deviation
-    between the members, which more data would reduce; ``aleatoric`` is the noise that they predict, which it would
-    not."""
+    """Prediction of outcomes; all are ``(..., outcome_dim)``, in the unit of T.
+
+    Attributes:
+        mean: outcomes that are expected.
+        epistemic: standard deviation between the members; more data would reduce it.
+        aleatoric: standard deviation of the noise that the members predict; more data would not reduce it.
+    """
 
     mean: Array
     epistemic: Array
@@ -44,10 +44,16 @@ class Prediction(NamedTuple):
 
 
 class Refresh(NamedTuple):
-    """What a refresh did: ``steps`` of the optimiser; negative log likelihood of the ``held_out`` exemplars at its end
-    (of standardised outcomes; lower is better); whether it ``diverged``, so that the weights before it are kept;
-    ``first``, the row of the first new exemplar; and what was ``predicted`` for this and the later ones before they
-    were learnt from, None at the first refresh."""
+    """What a refresh did.
+
+    Attributes:
+        steps: steps of the optimiser.
+        held_out: negative log likelihood of the held-out exemplars at its end, in standardised outcomes; lower is
+            better.
+        diverged: true if the weights before the refresh are back.
+        first: row of the first new exemplar.
+        predicted: prediction for the new exemplars before they were learnt from; None at the first refresh.
+    """
 
     steps: int
     held_out: float
@@ -60,18 +66,21 @@ class ForwardModel(Ensemble):
     """(c, theta) -> outcome, with its spread; differentiable in theta through ``landing``.
 
     Args:
-        context_dim, theta_dim, outcome_dim: those of the memory.
-        seed: of the weights and of all batches; torch's global generator is not used.
-        members, hidden, noise_heads: as in ``Ensemble``; each member draws batches of its own.
+        context_dim: dimension of C.
+        theta_dim: dimension of Pi.
+        outcome_dim: dimension of T.
+        seed: number from which weights and batches come; torch's global generator is not used.
+        members: number of networks; their disagreement is what more data would reduce.
         every: number of new exemplars that a refresh waits for.
-        rate: steps of the optimiser for each new exemplar, the cost of learning: .3 steps take about a fifth of the
-            time of a movement of the fishing rod, 2 steps as long as a movement.
-        focus: share of every batch that is drawn from the 200 exemplars nearest to the goal that ``refresh`` is told;
-            a quarter is drawn from the newest ``every`` exemplars.
-        accelerator: Lightning's name of where to train: "cpu", the fastest for these sizes, "auto" or "cuda".
+        rate: steps of the optimiser for each new exemplar; .3 steps take a fifth of the time of a movement of the
+            fishing rod, 2 steps as long as a movement.
+        noise_heads: true predicts a noise that depends on the movement, false one noise for all.
+        accelerator: Lightning's name of the device that trains: cpu, the fastest for these sizes, auto or cuda.
+        trust: relative error above which the forward model is not used.
 
-    Who wants to test it on exemplars that it has not learnt from is in ``before_learning``: called with the memory, and
-    with how many of its exemplars were learnt from.
+    Attributes:
+        before_learning: functions that test the model on new exemplars. Each refresh calls them first, with the memory
+            and the number of its exemplars that the model has learnt from.
 
     Raises:
         ValueError: a number out of its range.
@@ -83,7 +92,7 @@ class ForwardModel(Ensemble):
     outcome_scale: torch.Tensor
     n_seen: torch.Tensor  # exemplars trained on
     n_scaled: torch.Tensor  # exemplars that the scales were taken from
-    missed: torch.Tensor  # see ``relative_error``
+    missed: torch.Tensor  # ``relative_error``
 
     def __init__(
         self,
@@ -93,32 +102,23 @@ class ForwardModel(Ensemble):
         *,
         seed: int = 0,
         members: int = 3,
-        hidden: Sequence[int] = (64, 64),
         every: int = 50,
         rate: float = 1.0,
-        focus: float = 0.0,
         noise_heads: bool = True,
         accelerator: str = "cpu",
+        trust: float = TRUSTED_UP_TO,
     ) -> None:
         sizes = {"context_dim": context_dim, "theta_dim": theta_dim, "outcome_dim": outcome_dim}
         for name, count in {**sizes, "members": members, "every": every}.items():
             check_count(name, count, 0 if name == "context_dim" else 1)
-        if not isinstance(hidden, Sequence) or not hidden:
-            raise ValueError(f"hidden must be a sequence with the units of each layer, as (64, 64), got {hidden}")
-        for units in hidden:
-            check_count("hidden", units, 1)
-        if not 0 < rate < math.inf:
-            raise ValueError(f"rate must be positive and finite, got {rate}")
-        if not 0 <= focus <= 1 - RECENT:
-            raise ValueError(f"focus must lie in [0, {1 - RECENT}], got {focus}; it is a share of a batch")
+        for name, value in {"rate": rate, "trust": trust}.items():
+            if not 0 < value < math.inf:
+                raise ValueError(f"{name} must be positive and finite, got {value}")
         generator = torch.Generator().manual_seed(int(stream(seed, "forward model").integers(2**63)))
-        shape = members, list(hidden), noise_heads
-        super().__init__(context_dim + theta_dim, outcome_dim, generator, *shape)
-        self.sizes = sizes
-        self.shape = dict(zip(("members", "hidden", "noise_heads"), shape, strict=True))
-        self.every, self.rate = every, rate
+        super().__init__(context_dim + theta_dim, outcome_dim, generator, members, noise_heads)
+        self.sizes, self.every, self.rate, self.trust = sizes, every, rate, trust
         self.before_learning: list[Callable[[Memory, int], object]] = []
-        self._online = OnlineTrainer(self, generator, every, focus, accelerator)
+        self._online = OnlineTrainer(self, generator, every, accelerator)
         for name, dim in {"input": context_dim + theta_dim, "outcome": outcome_dim}.items():
             self.register_buffer(f"{name}_mean", torch.zeros(dim))
             self.register_buffer(f"{name}_scale", torch.ones(dim))
@@ -133,13 +133,18 @@ class ForwardModel(Ensemble):
 
     @property
     def relative_error(self) -> float:
-        """Error of predictions for the held-out outcomes, over the error of always predicting their mean: 0 is perfect,
-        1 no better than the mean, infinite before the first refresh. It is too low for a learner that repeats few
-        movements with small variations, because the other exemplars then contain near copies of the held-out ones."""
+        """Error of predictions for the held-out exemplars, divided by the error of always predicting their mean: 0 is
+        perfect, 1 no better than the mean, infinite before the first refresh. It is too low for a learner that repeats
+        few movements with small variations, because it then trains on near copies of the held-out ones."""
         return float(self.missed) if self.trained else math.inf
 
+    @property
+    def trusted(self) -> bool:
+        """Whether its relative error is small enough to use it."""
+        return self.relative_error <= self.trust
+
     def landing(self, context: torch.Tensor, theta: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """The mean (m) and the variance of the noise (m^2), ``(members, ..., outcome_dim)`` each; differentiable.
+        """Mean and variance of outcomes, noise alone, by each member, ``(members, ..., outcome_dim)``; differentiable.
 
         Args:
             context: ``(..., context_dim)``, or one for all of them.
@@ -152,7 +157,7 @@ class ForwardModel(Ensemble):
         return self.outcome_mean + self.outcome_scale * mean, self.outcome_scale**2 * variance
 
     def predict(self, contexts: Array, thetas: Array) -> Prediction:
-        """Where movements should land.
+        """The outcomes that are expected of movements.
 
         Args:
             contexts: ``(..., context_dim)``, or one for all of them.
@@ -171,22 +176,23 @@ class ForwardModel(Ensemble):
         means, variances = (part.cpu().double().numpy() for part in members)
         return Prediction(means.mean(axis=0), means.std(axis=0), np.sqrt(variances.mean(axis=0)))
 
-    def refresh(self, memory: Memory, goal: Array | None = None) -> Refresh | None:
+    def refresh(self, memory: Memory) -> Refresh | None:
         """Learn from the new exemplars in ``memory``, and again from old ones; None if fewer than ``every`` are new, or
-        all that is known had the same outcome.
+        all exemplars have the same outcome.
+
+        It ends early when predictions for the held-out exemplars (one in ten, never trained on) do not improve. The
+        weights before it come back when the loss is not finite or the error is twice that of predicting the mean, and
+        also when it is interrupted.
 
         Args:
-            memory: of the learner; only read.
-            goal: ``(outcome_dim,)`` m that the learner pursues, for ``focus``; None if it pursues none.
-
-        It ends early when predictions for the held-out exemplars (one in ten, never trained on) do not improve. It goes
-        back to the weights before it when the loss is not finite or the error twice that of predicting the mean, and
-        also when it is interrupted.
+            memory: memory of the learner; it is only read.
 
         Raises:
             ValueError: a memory of other dimensions, or with fewer exemplars than it was trained on.
         """
-        self.check_fits("memory", **{name: getattr(memory, name) for name in self.sizes})
+        sizes = {name: getattr(memory, name) for name in self.sizes}
+        if sizes != self.sizes:
+            raise ValueError(f"the model has dimensions {self.sizes}, the memory {sizes}; is it another robot's?")
         n, seen = len(memory), int(self.n_seen)
         if n < seen:
             raise ValueError(f"the model was trained on {seen} exemplars, the memory has {n}; is it another run's?")
@@ -194,13 +200,10 @@ class ForwardModel(Ensemble):
             return None
         if not seen and not np.ptp(memory.outcomes, axis=0).any():  # no movement has had an effect yet
             return None
-        near = None
-        if goal is not None and self._online.focus:
-            near = torch.as_tensor(memory.near_outcomes(memory.contexts[-1], goal, _NEAR_A_GOAL))
         if seen:
             for test in self.before_learning:
                 test(memory, seen)
-        self._online.prepare()  # first the weights move to where they are trained, then the exemplars
+        self._online.prepare()  # the device that trains gets the weights first, then the exemplars
         inputs, outcomes = np.hstack([memory.contexts, memory.thetas]), memory.outcomes
         predicted = self.predict(memory.contexts[seen:], memory.thetas[seen:]) if seen else None
         if n > 2 * int(self.n_scaled):
@@ -213,19 +216,13 @@ class ForwardModel(Ensemble):
             self.outcome_scale,
             steps=max(1, round(self.rate * (n - seen))),
             give_up=max(_DIVERGED_ABOVE, 2 * self.relative_error),
-            favoured=near,
         )
         self.missed.fill_(fit.relative_error)
         self.n_seen.fill_(n)
         return Refresh(fit.steps, fit.loss, fit.diverged, seen, predicted)
 
-    def check_fits(self, what: str, **sizes: int) -> None:
-        """Raise ``ValueError`` unless the dimensions of ``what`` (``theta_dim=25``) are the model's."""
-        if any(self.sizes[name] != size for name, size in sizes.items()):
-            raise ValueError(f"the model has dimensions {self.sizes}, the {what} {sizes}; is it another robot's?")
-
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write a safetensors file; it appears whole or not at all. Its header says of which sizes the model is.
+        """Write a safetensors file, whose header has the sizes of the model; it appears whole or not at all.
 
         The optimiser's moments are not in it: a loaded model predicts the same, and learns on with new moments.
 
@@ -233,11 +230,12 @@ class ForwardModel(Ensemble):
             OSError: ``path`` is a directory, or cannot be written.
         """
         state = {name: values.cpu().contiguous() for name, values in self.state_dict().items()}
-        write_bytes(path, save(state, {"model": json.dumps({**self.sizes, **self.shape})}))
+        about = {**self.sizes, "members": self.members, "noise_heads": self.noise_heads}
+        write_bytes(path, save(state, {"model": json.dumps(about)}))
 
     def _scale(self, inputs: Array, outcomes: Array) -> None:
-        """Measure inputs and outcomes in their standard deviations; what is predicted stays what it was, but
-        for its noise, which keeps its share of the spread."""
+        """Measure inputs and outcomes in their standard deviations. Predictions stay as they were, but for their noise,
+        which keeps its share of the spread."""
         n = len(inputs)
         (mean, scale), (new_mean, new_scale) = (self.input_mean, self.input_scale), self._spread(inputs)
         first, last = self.weights[0].data, self.weights[-1].data
@@ -262,7 +260,7 @@ class ForwardModel(Ensemble):
 
 
 def load_forward_model(path: str | os.PathLike[str], **options: Any) -> ForwardModel:
-    """The model that ``ForwardModel.save`` wrote; ``options`` are the constructor's options for training.
+    """The model that ``ForwardModel.save`` wrote; ``options`` are options of `ForwardModel` for training.
 
     Raises:
         ValueError: not such a file, or truncated.

@@ -1,98 +1,88 @@
-"""A forward model that has to prove itself: it answers once it has predicted movements better than a local process.
+"""A forward model that has to prove itself: it answers once it predicts movements as well as a local process.
 
-Our addition, not in the paper. Before the model learns from new movements, it and the process predict what came of
-them, from what both had been told by then (prequential analysis: Dawid, J. R. Stat. Soc. A 147, 1984). Whoever missed
-the recent ones by less answers. Those count that the process was surest of: its answers are such movements. So neither
-judges its own answers, and no movement is spent on judging.
-    inverse = ProvedModel(memory, model, environment.policies, outcome_noise=environment.outcome_noise)
+Our addition, not in the paper. Before the model learns from new movements, it and the process predict their outcomes,
+each from all earlier movements (prequential analysis: Dawid, J. R. Stat. Soc. A 147, 1984). The two are compared on the
+movements that the process was surest of, as answers are like them. So neither judges its own answers, and no movement
+is spent on judging.
+    inverse = ProvedModel(problem); inverse.trusted
 """
 
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
-from sgimd_torch.forward_model.anchored import TRUST, Trust
-from sgimd_torch.forward_model.model import ForwardModel
+from sgimd_torch.catalogue.options import hands_on
+from sgimd_torch.forward_model.inverse import ModelInverse
+from sgimd_torch.forward_model.shared import ThroughModel
 from sgimd_torch.inverses.local_process import LocalProcess
-from sgimd_torch.inverses.through_model import ModelInverse
 from sgimd_torch.memory import Memory
-from sgimd_torch.spaces import Array, Box, Estimate
+from sgimd_torch.parts import Inverse, Problem
+from sgimd_torch.spaces import Array, Estimate
 
 _FEWEST: Final = 200  # recent movements before the model can have proved itself
-_SUREST: Final = 10  # the process was surest of one in so many of them
-# With predictions of these a tenth worse the model still answers as well, as lucky outcomes mislead the process. Where
-# there is no noise they cannot, and it has to predict a tenth better. Measured on five tasks.
+_SUREST: Final = 10  # one in so many recent movements is compared, those that the process was surest of
+# The model may predict a tenth worse and still answers as well, as lucky outcomes mislead the process. Without noise
+# there are none, and it has to predict a tenth better. Measured on five tasks.
 _NEARLY: Final = 1.1
 _TINY: Final = np.finfo(float).tiny
-_MOST: Final = 10.0  # times that either misses a movement by more counts as so many
+_MOST: Final = 10.0  # error ratios are clipped to [1/10, 10]
 
 
-class ProvedModel:
-    """The answer of `ModelInverse` where the model has proved itself, else that of `LocalProcess`.
+class ProvedModel(ThroughModel):
+    """Local process, then a forward model once that predicts as well (extra forward).
 
-    Tests are made when the model learns, in ``model.refresh``. So to ask it, in an evaluation say, changes nothing.
+    The model answers as in `ModelInverse`. It is tested when it learns, in ``model.refresh``, so to ask for an answer,
+    in an evaluation say, changes nothing.
 
     Args:
-        memory, model, policies, trust: as for `ModelInverse`.
-        outcome_noise: as for `LocalProcess`.
-
-    Raises:
-        ValueError: ``outcome_noise`` out of its range, or a model of other dimensions.
+        problem: Pi, memory and noise are read.
     """
 
-    def __init__(
-        self, memory: Memory, model: ForwardModel, policies: Box, *, outcome_noise: float = 0.0, trust: Trust = TRUST
-    ) -> None:
-        self.process = LocalProcess(memory, outcome_noise=outcome_noise)
-        self.through_model = ModelInverse(memory, model, policies, trust=trust)
-        self._told = Memory(memory.context_dim, memory.theta_dim, memory.outcome_dim)
-        self._rivals = (
-            LocalProcess(self._told, outcome_noise=outcome_noise),
-            ModelInverse(self._told, model, policies, trust=trust),
-        )
-        # Of each movement its row, the variance that the process expected, and by how much process and model missed it.
+    @hands_on(ThroughModel)
+    def __init__(self, problem: Problem, **options: Any) -> None:
+        super().__init__(problem, **options)
+        self.process, self.through_model = LocalProcess(problem), ModelInverse(problem)
+        self._told = Memory(*problem.dims)
+        earlier = problem.over(self._told)
+        self._rivals = LocalProcess(earlier), ModelInverse(earlier)
+        # One for each movement: its row, the variance that the process expected, the errors of process and model.
         self._tests: list[tuple[int, float, float, float]] = []
         self._proved = False
-        model.before_learning.append(self._test)
+        self.model.before_learning.append(self._test)
 
     @property
     def trusted(self) -> bool:
-        """Whether the model has proved itself, on the newer half of what it was told."""
-        return self._proved and self.through_model.trusted
+        """Whether the model has proved itself on the newer half of the movements, and its own error is small."""
+        return self._proved and self.model.trusted
 
     def __call__(self, context: Array, goal: Array) -> Estimate:
-        """The answer, and the exemplars of the nearest outcomes.
+        """The answer, and the exemplars of the nearest outcomes."""
+        return self._better(context, goal)
 
-        Raises:
-            RuntimeError: the memory is empty.
-        """
-        return self.through_model(context, goal) if self.trusted else self.process(context, goal)
-
-    def many(self, context: Array, goals: Array) -> list[Estimate]:
-        """An estimate for each of ``(n, outcome_dim)`` goals, several times faster than one by one.
-
-        Raises:
-            RuntimeError: the memory is empty.
-        """
-        if self.trusted:
-            return self.through_model.many(context, goals)
-        return [self.process(context, goal) for goal in goals]
+    def answer_many(self, contexts: Array, goals: Array) -> list[Estimate]:
+        """Estimates for ``goals`` ``(n, outcome_dim)``, see `ModelInverse.answer_many`."""
+        return self._better.answer_many(contexts, goals)
 
     def predict(self, context: Array, theta: Array) -> Array | None:
-        """``(outcome_dim,)`` what ``theta`` should lead to, as `LocalProcess` has it."""
+        """``(outcome_dim,)`` outcome of ``theta`` that the `LocalProcess` expects; None while there are too few."""
         return self.process.predict(context, theta)
 
+    @property
+    def _better(self) -> Inverse:
+        return self.through_model if self.trusted else self.process
+
     def _test(self, memory: Memory, learnt: int) -> None:
-        """Both predict movements that the model has not learnt from; then they are told them."""
-        self._tell(memory, learnt)
+        """Both predict the movements that are new to the model, from the ``learnt`` ones before."""
+        for row in range(len(self._told), learnt):
+            self._told.add(memory.contexts[row], memory.thetas[row], memory.outcomes[row])
         process, through_model = self._rivals
         new = slice(learnt, len(memory))
         contexts, thetas, outcomes = memory.contexts[new], memory.thetas[new], memory.outcomes[new]
         by_process = [process.predict_variance(*each) for each in zip(contexts, thetas, strict=True)]
-        by_model = through_model.predict(contexts, thetas)
+        by_model = through_model.predict_many(contexts, thetas)
         for row, (one, other, outcome) in enumerate(zip(by_process, by_model, outcomes, strict=True), learnt):
             if one is not None:
                 expected, variance = one
@@ -100,7 +90,8 @@ class ProvedModel:
         self._proved = self._is_nearly_as_good(len(memory))
 
     def _is_nearly_as_good(self, n: int) -> bool:
-        """Whether it missed those of the newer half of ``n`` movements that the process was surest of by as little."""
+        """Whether the model predicted as well those of the newer half of ``n`` movements that the process was surest
+        of."""
         recent = np.array([test for row, *test in self._tests if row >= n / 2])
         if len(recent) < _FEWEST:
             return False
@@ -108,7 +99,3 @@ class ProvedModel:
         times = np.maximum(by_model, _TINY) / np.maximum(by_process, _TINY)
         limit = _NEARLY if self.process.noise > 0 else 1 / _NEARLY
         return bool(np.log(times.clip(1 / _MOST, _MOST)).mean() <= math.log(limit))
-
-    def _tell(self, memory: Memory, n: int) -> None:
-        for row in range(len(self._told), n):
-            self._told.add(memory.contexts[row], memory.thetas[row], memory.outcomes[row])

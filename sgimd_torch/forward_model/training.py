@@ -1,6 +1,6 @@
-"""Online training: an ensemble is fitted again and again while exemplars come in, and goes back when it diverges.
+"""Online training: an ensemble is fitted again and again while exemplars come in; a fit that diverges is undone.
 
-It uses Lightning Fabric, with one optimiser for all fits, so that Adam's moments last from one fit to the next.
+Lightning Fabric, with one optimiser for all fits, so that Adam's moments last from one fit to the next.
     trainer.prepare(); fit = trainer.fit(x, y, scale, steps=15, give_up=2.0)
 """
 
@@ -15,16 +15,22 @@ from lightning import Fabric
 
 from sgimd_torch.forward_model.ensemble import Ensemble, nll
 
-RECENT: Final = 0.25  # share of every batch that is drawn from the newest exemplars
+_RECENT: Final = 0.25  # share of every batch that is drawn from the newest exemplars
 _BATCH: Final = 128  # exemplars per step, for each member
-_HELD_OUT_EVERY: Final = 10  # the last of this many exemplars is held out: never trained on
-_STEPS_PER_LOOK: Final = 20  # of the optimiser, between two looks at what is held out
+_HELD_OUT_EVERY: Final = 10  # the last of so many exemplars is held out: never trained on
+_STEPS_PER_LOOK: Final = 20  # steps of the optimiser between two looks at the held-out exemplars
 _PATIENCE: Final = 5  # looks without improvement that end a fit
 
 
 class Fit(NamedTuple):
-    """How a fit ended: ``steps`` made; for the held-out exemplars ``loss``, the negative log likelihood, and
-    ``relative_error``; and whether it ``diverged``, so that the weights before it are kept."""
+    """How a fit ended.
+
+    Attributes:
+        steps: steps of the optimiser.
+        loss: negative log likelihood of the held-out exemplars.
+        relative_error: error of predictions for the held-out exemplars, see `ForwardModel.relative_error`.
+        diverged: true if the weights before the fit are back.
+    """
 
     steps: int
     loss: float
@@ -37,23 +43,21 @@ class OnlineTrainer:
     """Fits one ensemble many times.
 
     Args:
-        ensemble: its weights change.
-        generator: draws the batches, of each member its own.
-        newest: how many exemplars count as new.
-        focus: share of every batch that is drawn from the exemplars that a fit favours.
-        accelerator: Lightning's name of where to train.
+        ensemble: networks, whose weights change.
+        generator: random stream of the batches; each member has batches of its own.
+        newest: number of exemplars that count as new.
+        accelerator: Lightning's name of the device that trains.
     """
 
     ensemble: Ensemble
     generator: torch.Generator
     newest: int
-    focus: float
     accelerator: str
     fabric: Fabric | None = None
     optimizer: Any = None
 
     def prepare(self) -> Fabric:
-        """Move the weights to where they are trained, and make the optimiser, unless that is done."""
+        """Move the weights to the device that trains, and make the optimiser, unless that is done."""
         if self.fabric is None:
             self.fabric = Fabric(accelerator=self.accelerator, devices=1)
             self.ensemble.to(self.fabric.device)
@@ -61,41 +65,28 @@ class OnlineTrainer:
             self.optimizer = self.fabric.setup_optimizers(self.ensemble.configure_optimizers())
         return self.fabric
 
-    def fit(
-        self,
-        x: torch.Tensor,
-        y: torch.Tensor,
-        scale: torch.Tensor,
-        *,
-        steps: int,
-        give_up: float,
-        favoured: torch.Tensor | None = None,
-    ) -> Fit:
+    def fit(self, x: torch.Tensor, y: torch.Tensor, scale: torch.Tensor, *, steps: int, give_up: float) -> Fit:
         """Train until predictions for the held-out exemplars, one in ten, do not improve.
 
-        Goes back to the weights before it if it diverges, and also when it is interrupted.
+        The weights before it come back if it diverges, and also when it is interrupted.
 
         Args:
-            x, y: ``(n, n_inputs)`` and ``(n, n_outputs)``, standardised, the newest last, where `prepare` moved the
-                ensemble.
-            scale: ``(n_outputs,)`` by which outputs are multiplied to measure distances.
-            steps: the most steps of the optimiser, at least 1.
-            give_up: relative error above which the fit has diverged, as it has when the loss is not finite.
-            favoured: ``(k,)`` rows of x and y, for ``focus``.
+            x: ``(n, n_inputs)`` standardised inputs, the newest last, on the device of the ensemble.
+            y: ``(n, n_outputs)`` standardised outputs.
+            scale: ``(n_outputs,)`` factors that turn outputs into lengths.
+            steps: largest number of steps of the optimiser, at least 1.
+            give_up: relative error above which the fit has diverged; a loss that is not finite has diverged, too.
         """
         fabric = self.prepare()
         is_held = torch.arange(len(x)) % _HELD_OUT_EVERY == _HELD_OUT_EVERY - 1
         rows = torch.nonzero(~is_held)[:, 0]
-        shares = [(rows[-self.newest :], round(RECENT * _BATCH))]
-        if favoured is not None:
-            shares.append((favoured[~is_held[favoured]], round(self.focus * _BATCH)))
         before = {name: values.clone() for name, values in self.ensemble.state_dict().items()}
         best, waited, done = math.inf, 0, 0
         try:
             while done < steps and waited < _PATIENCE:
                 n_steps = min(_STEPS_PER_LOOK, steps - done)
                 for _ in range(n_steps):
-                    picked = self._draw(rows, shares)
+                    picked = self._draw(rows)
                     self.optimizer.zero_grad()
                     fabric.backward(self.ensemble.training_step((x[picked], y[picked])))
                     self.optimizer.step()
@@ -111,8 +102,8 @@ class OnlineTrainer:
         return Fit(done, loss, error, diverged=False)
 
     def judge(self, x: torch.Tensor, y: torch.Tensor, scale: torch.Tensor) -> tuple[float, float]:
-        """Negative log likelihood without ``beta``, mean over the members; and the error of their mean prediction, over
-        the error of always predicting the mean of ``y``."""
+        """Negative log likelihood, mean over the members, without ``beta``; and the error of their mean prediction,
+        divided by the error of always predicting the mean of ``y``."""
         with torch.no_grad():
             mean, log_variance = self.ensemble(x)
             length = scale * torch.stack([mean.mean(dim=0) - y, y.mean(dim=0) - y])
@@ -123,15 +114,11 @@ class OnlineTrainer:
         """For copies and other processes: without the optimiser."""
         return {**self.__dict__, "fabric": None, "optimizer": None}
 
-    def _draw(self, rows: torch.Tensor, shares: list[tuple[torch.Tensor, int]]) -> torch.Tensor:
-        """``(members, batch)`` of the ``rows``, of which each of ``shares`` gives as many as it says."""
-        members = self.ensemble.members
+    def _draw(self, rows: torch.Tensor) -> torch.Tensor:
+        """``(members, batch)`` rows, the first of each batch among the newest."""
+        members, recent, n_recent = self.ensemble.members, rows[-self.newest :], round(_RECENT * _BATCH)
         picked = rows[torch.randint(len(rows), (members, _BATCH), generator=self.generator)]
-        taken = 0
-        for some, count in shares:
-            drawn = torch.randint(len(some), (members, count), generator=self.generator)
-            picked[:, taken : taken + count] = some[drawn]
-            taken += count
+        picked[:, :n_recent] = recent[torch.randint(len(recent), (members, n_recent), generator=self.generator)]
         return picked
 
     def _restore(self, weights: dict[str, torch.Tensor]) -> None:

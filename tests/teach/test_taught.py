@@ -12,9 +12,9 @@ from sgimd_torch.runs.config import Config, words
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.tasks.robots import arm_demonstrations
-from sgimd_torch.teachers.by_hand import BY_HAND, ByHand
-from sgimd_torch.views.teach import main, options_of
-from sgimd_torch.views.teach.taught import TaughtRun
+from sgimd_torch.teach.by_hand import BY_HAND, ByHand
+from sgimd_torch.teach.command import main, options_of
+from sgimd_torch.teach.taught import TaughtRun
 
 SHOWN = arm_demonstrations(PlanarArm())
 
@@ -28,7 +28,7 @@ def taught(tmp_path):
         settings = {name: value for name, value in given.items() if value is not None}
         fixed = {"name": "taught", "out": tmp_path, "repeats": 0, "environment": "planar-arm-7"}
         learning = TaughtRun(Config.from_settings({**settings, **fixed}))
-        learning.practise(made)
+        learning.go_on(made)
         return learning
 
     return open_run
@@ -47,7 +47,7 @@ def assert_same(one, other, n=None):
 
 def test_a_lesson_is_answered_at_once_and_the_map_is_better_where_it_landed(taught):
     learning = taught()
-    before = learning.standing()
+    before = learning.status()
     assert (before.movements, before.lessons) == (30, 0)
     after = learning.show(SHOWN[120])
     assert (after.movements, after.lessons) == (30 + learning.config["social.repeats"], 1)
@@ -65,7 +65,7 @@ def test_a_teacher_of_the_run_shows_the_same_whether_or_not_a_person_does():
         def offer(self, index, memory):
             return SHOWN[index]
 
-    hand, offered = ByHand(Counting()), []
+    hand, offered = ByHand(teacher=Counting()), []
     for index in range(4):
         if index == 2:
             hand.give(SHOWN[50])
@@ -85,12 +85,12 @@ def test_it_goes_on_where_it_was_stopped_with_or_without_a_person(taught, teache
     learning.close()
     before = lived(learning)
     other = TaughtRun(learning.config)
-    assert other.practise(15).replaying
+    assert other.go_on(15).replaying
     with pytest.raises(ValueError, match="still replays"):
         other.show(SHOWN[7])
-    assert not other.practise(25).replaying
-    other.practise(10)
-    assert other.standing().lessons == 1
+    assert not other.go_on(25).replaying
+    other.go_on(10)
+    assert other.status().lessons == 1
     other.close()
     assert_same(before, lived(learning), 40)
     assert command(run, [*words(replace(learning.config, movements=60)), "--resume"]) == 0
@@ -110,7 +110,7 @@ def test_what_cannot_be_shown_is_refused_and_nothing_happens(taught, options, le
     learning = taught(**{"teacher": "periodic", **options})
     with pytest.raises(ValueError, match=message):
         learning.show(lesson)
-    assert (learning.standing().movements, learning.standing().lessons) == (30, 0)
+    assert (learning.status().movements, learning.status().lessons) == (30, 0)
     learning.close()
 
 

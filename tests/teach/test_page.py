@@ -1,6 +1,5 @@
 """The page in a real browser: leading, teaching; several tabs, and tabs and servers that go away."""
 
-from functools import partial
 from http import HTTPStatus
 from itertools import pairwise
 from urllib.error import HTTPError
@@ -11,39 +10,12 @@ import pytest
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
-from browser import Tab, chromium, served
-from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.read import read_run
-from sgimd_torch.views.teach import serving
-from sgimd_torch.views.teach.guard import guard, guarded
-from sgimd_torch.views.teach.taught import TaughtRun
+from sgimd_torch.teach.command import serving
+from sgimd_torch.teach.guard import guard, guarded
 
 PATH = np.array([[0.05, 0.0, 0.02], [0.12, -0.02, 0.1], [0.2, -0.06, 0.2], [0.26, -0.1, 0.12], [0.3, -0.12, 0.0]])
 """m, from where the hand begins: it swings to the right, up and down again."""
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with chromium() as browser:
-        yield browser
-
-
-@pytest.fixture
-def open_tab(browser):
-    """Opens tabs, which are closed at the end."""
-    yield partial(Tab, browser)
-    for context in browser.contexts:
-        context.close()
-
-
-@pytest.fixture
-def rod(tmp_path):
-    """A served run on the fishing rod after its first movements."""
-    given = {"teacher": "by-hand", "movements": 400, "evaluate_at": ()}
-    taught = TaughtRun(Config.from_settings({**given, "name": "taught", "out": tmp_path, "repeats": 0}))
-    taught.practise(5)
-    with served(taught) as page:
-        yield page
 
 
 def lead(tab, path):
@@ -78,10 +50,10 @@ def test_a_person_leads_the_arm_teaches_it_and_sees_what_changed(open_tab, rod):
     tab.tab.get_by_role("button", name="Show it to the learner").click()
     tab.tab.get_by_text("goals within reach.").wait_for()
     tab.until_changed(landing, 60, before, 30, 0.3)
-    assert rod.standing.lessons == 1
+    assert rod.status.lessons == 1
     assert np.array_equal(rod.taught.parts.learner.memory.thetas[5], lesson.theta_d)
     tab.tab.get_by_role("button", name="Let the learner go on").click()
-    rod.until(lambda: rod.standing.movements > 50)
+    rod.until(lambda: rod.status.movements > 50)
 
 
 @pytest.mark.slow
@@ -106,7 +78,7 @@ def test_a_tab_closed_in_mid_drag_lets_go_its_recording_is_over_and_another_one_
 def test_the_first_minute(open_tab, rod):
     """It waits for a lesson, says what one sees, and what was wrong with a recording; an old throw goes away."""
     tab = open_tab(rod)
-    assert rod.standing.movements == 5
+    assert rod.status.movements == 5
     tab.tab.get_by_text("The ground is the task space, x (m) and y (m)").wait_for()
     show = tab.tab.get_by_role("button", name="Show it to the learner")
     tab.tab.get_by_role("button", name="Record").click()

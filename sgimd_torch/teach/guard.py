@@ -1,8 +1,8 @@
-"""Who may see the page and press its buttons: whoever has its address, with the token in it.
+"""Access to the page: only requests that know its address, with the token in it, are answered.
 
     with guarded(token): server = viser.ViserServer(host="127.0.0.1", port=port)
 Any web page that is open in a browser can send requests to this machine. So a request needs the token, from the address
-or from the cookie that the address has set, and a Host and an Origin that are this machine's own.
+or from the cookie that the address has set. Its Host and Origin must be this machine.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ LONGEST: Final = 200  # characters of an address; a file name has at most 255
 
 @contextmanager
 def guarded(token: str) -> Iterator[None]:
-    """In this block, a server of websockets answers only to whoever has the ``token``.
+    """Servers of websockets that start in this block answer only requests with the ``token``.
 
     Raises:
-        RuntimeError: the block has started no server, so there is none to guard.
+        RuntimeError: no server was started in the block.
     """
     serve, started = websockets.asyncio.server.serve, []
 
@@ -46,7 +46,7 @@ def guarded(token: str) -> Iterator[None]:
 
 
 def guard(token: str, process: Process) -> Process:
-    """``process``, for requests with the token and from this machine's own pages; others are refused."""
+    """``process`` for requests that have the token and come from pages of this machine; others are refused."""
     name = f"teach-{hmac.digest(token.encode(), b'cookie', 'sha256').hex()[:8]}"
 
     def guarded(connection: Any, request: Request) -> Response | None:

@@ -1,7 +1,7 @@
 """The scene: the robot that a hand leads, and the map of T on the ground.
 
     scene = Scene(server, led, links, outcomes, goals); scene.draw_arm(leading.data, leading.hand)
-Places in T are places in the model's plane z = 0: what lands there lands on the map.
+Places in T are places in the plane z = 0 of the model: a movement that lands there lands on the map.
 """
 
 from __future__ import annotations
@@ -13,26 +13,29 @@ import mujoco
 import numpy as np
 import trimesh
 import viser
-from numpy.typing import NDArray
+from viser.transforms import SO3
 
-from sgimd_torch.environments.protocol import HandLed
 from sgimd_torch.spaces import Array, Box
-from sgimd_torch.views.teach.chart import CELLS, SKILL, Colours
+from sgimd_torch.teach.chart import CELLS, SKILL, Chart, by_error
+from sgimd_torch.teach.led import HandLed
 
 HAND, LEARNER, MET, UNMET = (240, 120, 30), (60, 70, 190), (10, 110, 50), (120, 140, 160)
 ABOVE: Final = 0.002  # m, from one layer of the map to the next
-SEEN: Final = 1e-4  # of the map's side: a robot that has moved less is not drawn again
+SEEN: Final = 1e-4  # share of the map's side: a robot that has moved less is not drawn again
 
 
 class Scene:
     """Everything that is drawn.
 
     Args:
-        server: that shows it, to all viewers alike.
+        server: web server of the page.
         led: the robot.
-        links: names of the bodies that a hand leads; what hangs on them, such as a line, is not drawn.
+        links: names of the bodies that a hand leads; other bodies, such as a line, are not drawn.
         outcomes: T.
-        goals: ``(n, outcome_dim)`` of the benchmark.
+        goals: ``(n_goals, outcome_dim)`` goals of the benchmark.
+
+    Attributes:
+        grips: name and picture of each body that can be dragged, the hand first.
     """
 
     def __init__(
@@ -57,16 +60,14 @@ class Scene:
         self._mark = self._scene.add_mesh_simple("/mark", ring.vertices, ring.faces, color=HAND, visible=False)
         names = [model.body(model.geom_bodyid[k]).name for k in shown]
         self.grips = [(led.hand, self._hand), *zip(names, self._geoms.values(), strict=True)]
-        """What can be dragged, the hand first: the name of a body, and its picture."""
-        # Browsers without a GPU draw every pixel on the processor: an environment map, shadows, a sky or a sheet of
-        # water would leave 2 pictures a second instead of 25.
+        # A browser without a GPU draws 25 pictures a second of this, but 2 with an environment map, shadows, or water.
         self._scene.configure_environment_map(None)
         self._scene.configure_default_lights(cast_shadow=False)
         self._scene.add_light_ambient("/light", intensity=0.6)
         self._look(server, middle)
 
     def ground(self, points: Array, layer: int = 0) -> Array:
-        """``(..., 3)`` m, where places ``(..., outcome_dim)`` of T are in the scene."""
+        """``(..., 3)`` m in the scene, of places ``(..., outcome_dim)`` of T; a higher ``layer`` lies above."""
         points = np.asarray(points)
         flat = np.zeros((*points.shape[:-1], 3))
         flat[..., : min(2, points.shape[-1])] = points[..., :2]
@@ -74,27 +75,28 @@ class Scene:
         return flat
 
     def draw_arm(self, data: Any, hand: Array) -> None:
-        """The led robot in the posture of ``data``, its hand at ``(3,)`` m."""
+        """Draw the robot in the posture of ``data``, and its ``hand`` ``(3,)`` m."""
         if np.allclose(data.geom_xpos, self._drawn, rtol=0, atol=SEEN * self.size):
             return
         self._drawn = data.geom_xpos.copy()
         for k, handle in self._geoms.items():
-            handle.position, handle.wxyz = data.geom_xpos[k], _quaternion(data.geom_xmat[k])
+            handle.position = data.geom_xpos[k]
+            handle.wxyz = SO3.from_matrix(data.geom_xmat[k].reshape(3, 3)).wxyz
         self._hand.position = hand
 
-    def draw_map(self, colours: Colours, met: NDArray[np.bool_]) -> None:
-        """Another picture on the ground, and on it the goals of the benchmark; ``met`` ``(n,)`` are within reach."""
-        self.map.image = colours
-        self._goals.colors = np.where(met[:, None], MET, UNMET).astype(np.uint8)
+    def draw_map(self, chart: Chart) -> None:
+        """Draw the skill of the learner on the ground, and the goals of the benchmark on it."""
+        self.map.image = by_error(chart, self._outcomes)
+        self._goals.colors = np.where(chart.met[:, None], MET, UNMET).astype(np.uint8)
 
     def draw_landings(self, outcomes: Array) -> None:
-        """Where the last movements ended, ``(n, outcome_dim)``."""
+        """Draw the last ``outcomes`` ``(n, outcome_dim)``."""
         self._landings.visible = len(outcomes) > 0
         if len(outcomes):
             self._landings.points = self.ground(outcomes, 5).astype(np.float16)
 
     def mark(self, place: Array | None) -> None:
-        """Put the ring of a lesson at a place of T, or hide it."""
+        """Draw the ring of a lesson at a ``place`` ``(outcome_dim,)`` of T; None hides it."""
         self._mark.visible = place is not None
         if place is not None:
             self._mark.position = self.ground(place, 3)
@@ -110,7 +112,7 @@ class Scene:
         return self._scene.add_mesh_simple(f"/arm/{k}", shape.vertices, shape.faces, color=colour)
 
     def _look(self, server: viser.ViserServer, middle: Array) -> None:
-        """From the shore, or from above where the robot lies in the plane."""
+        """Place the camera: on the shore, or above a robot that lies in the plane of the map."""
         data = mujoco.MjData(self._model)
         mujoco.mj_kinematics(self._model, data)
         flat = float(np.ptp(data.xpos[1:, 2])) < 1e-6 and abs(float(data.xpos[1, 2])) < 1e-6
@@ -121,7 +123,7 @@ class Scene:
 
 
 def _shape(model: Any, k: int) -> Any:
-    """A geom as a mesh."""
+    """Geom ``k`` as a mesh."""
     kind, size, make = mujoco.mjtGeom(model.geom_type[k]), model.geom_size[k], trimesh.creation
     match kind:
         case mujoco.mjtGeom.mjGEOM_CAPSULE:
@@ -143,9 +145,3 @@ def _shape(model: Any, k: int) -> Any:
 def _rgba(model: Any, k: int) -> Array:
     material = model.geom_matid[k]
     return np.asarray(model.geom_rgba[k] if material < 0 else model.mat_rgba[material])
-
-
-def _quaternion(matrix: Array) -> Array:
-    found = np.empty(4)
-    mujoco.mju_mat2Quat(found, np.asarray(matrix).ravel())
-    return found

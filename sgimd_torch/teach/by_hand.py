@@ -1,8 +1,8 @@
-"""A person who teaches by hand: what they give is shown at once.
+"""A person who teaches by hand: the learner is shown each lesson at once.
 
 Section 2.3 of Nguyen & Oudeyer (2014): kinesthetic demonstrations.
-    teacher = ByHand(teacher); teacher.give(demonstration); teacher.offer(120, memory)
-Nothing is drawn here, and the record of a run keeps what was shown, so a replay needs no person.
+    teacher = ByHand(teacher=other); teacher.give(demonstration); teacher.offer(120, memory)
+Nothing is drawn at random here. The record of a run keeps the lessons, so a replay needs no person.
 """
 
 from __future__ import annotations
@@ -17,20 +17,19 @@ from sgimd_torch.parts import Teacher
 from sgimd_torch.spaces import Demonstration
 
 BY_HAND: Final = "by-hand"
-"""Who has shown a lesson by hand, in the record; also the word of the command line."""
+"""Name of the person in a record, and on the command line."""
 
 
 class ByHand(Teacher):
-    """A person who shows what they like, when they like: sgimd teach.
+    """A person with sgimd teach; they give lessons at any time.
 
-    What a person gives is offered; otherwise, what another teacher offers.
-
-    That teacher is asked before each movement, also where a person shows something, so that its draws stay the same.
+    Another teacher may come with them. It is asked before each movement, even when the person gives a lesson, so that
+    its draws do not change.
 
     Args:
         demonstrations: not needed.
         rng: not needed, as nothing is drawn.
-        teacher: another teacher; None if there is none.
+        teacher: the other teacher, None for a person alone.
     """
 
     needs_demonstrations = False
@@ -46,11 +45,11 @@ class ByHand(Teacher):
         self._given: Demonstration | None = None
 
     def give(self, demonstration: Demonstration) -> None:
-        """Have this offered before the next movement for which the learner takes an offer."""
+        """Offer this demonstration before the next movement for which the learner takes an offer."""
         self._given = demonstration
 
     def offer(self, index: int, memory: Memory) -> Demonstration | None:
-        """See ``Teacher``."""
+        """The given lesson, or what the other teacher offers."""
         offered = None if self.teacher is None else self.teacher.offer(index, memory)
         given, self._given = self._given, None
         self.who = "teacher" if given is None else BY_HAND

@@ -1,9 +1,11 @@
-"""Teach a learner by hand, in a browser: lead the arm, show it, see at once what changed. Only this machine sees it.
+"""Teach a learner by hand, in a browser.
+
+Lead the arm, show your movement to the learner, and see what it can do now. Only this machine has access to the page.
 
 Examples:
   sgimd teach                                           a new learner on the fishing rod, into runs/taught/seed-000
-  sgimd teach runs/taught/seed-000                      go on with a run, taught or not
-  sgimd teach --environment planar-arm-7 --seed 3       other options are those of sgimd run
+  sgimd teach runs/taught/seed-000                      go on with an earlier run, taught or not
+  sgimd teach --environment planar-arm-7 --seed 3       with options of sgimd run
 """
 
 from __future__ import annotations
@@ -23,14 +25,15 @@ from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.process import Failed, loading, say
 from sgimd_torch.runs.read import config_of, read_run
 from sgimd_torch.session import NoOutcomeError, ReplayError
+from sgimd_torch.teach.by_hand import BY_HAND
 
 if TYPE_CHECKING:
     from viser import ViserServer
 
-NAME: Final = "taught"  # of the run, if no other is given
+NAME: Final = "taught"  # of a new run
 WHERE: Final = """
-Teach it here:  http://127.0.0.1:{port}/?token={token}   (Ctrl-C ends it; {path} keeps everything)
-      From another machine:  ssh -L {port}:127.0.0.1:{port} THIS-MACHINE   and open the same address there.
+Teach it here:  http://127.0.0.1:{port}/?token={token}   (Ctrl-C ends the session; {path} keeps everything)
+From another machine:  ssh -L {port}:127.0.0.1:{port} THIS-MACHINE   and open the address above there.
 """
 
 
@@ -38,16 +41,16 @@ def main(argv: Sequence[str] | None = None) -> int:
     """The command ``sgimd teach``; it serves until Ctrl-C.
 
     Raises:
-        ValueError: the request is wrong, or this task cannot be led by the hand.
+        ValueError: the request is wrong, or the robot cannot be led by the hand.
     """
     config, port = options_of(sys.argv[1:] if argv is None else argv)
     token = secrets.token_urlsafe(16)
     with loading():
         from sgimd_torch.runs.build import task_of
-        from sgimd_torch.runs.tasks import hand_led_of
-        from sgimd_torch.views.teach.page import Page
-        from sgimd_torch.views.teach.taught import TaughtRun
-    hand_led_of(task_of(config))  # what cannot be led is refused before anything is made
+        from sgimd_torch.teach.led import hand_led_of
+        from sgimd_torch.teach.page import Page
+        from sgimd_torch.teach.taught import TaughtRun
+    hand_led_of(task_of(config))  # refused before anything is written
     taught = TaughtRun(config)
     with serving(port, token) as server:
         page = Page(server, taught)
@@ -57,23 +60,23 @@ def main(argv: Sequence[str] | None = None) -> int:
         except (NoOutcomeError, ReplayError) as error:
             raise Failed(str(error)) from error
         except KeyboardInterrupt:
-            say(f"all of it is kept; to go on: sgimd teach {config.directory}")
+            say(f"everything is kept; to go on: sgimd teach {config.directory}")
             raise
     return 0
 
 
 @contextlib.contextmanager
 def serving(port: int, token: str) -> Iterator[ViserServer]:
-    """A web server on 127.0.0.1, at the first free port from ``port`` on, for whoever has the ``token``.
+    """A web server on 127.0.0.1 that answers requests with the ``token``, at the first free port from ``port`` on.
 
     Raises:
         ValueError: no such port, or none is free.
     """
-    import viser  # only when it is needed
+    import viser  # loaded only when it is needed
 
-    from sgimd_torch.views.teach.guard import guarded
+    from sgimd_torch.teach.guard import guarded
 
-    with contextlib.redirect_stdout(io.StringIO()), guarded(token):  # a banner, and where it listens
+    with contextlib.redirect_stdout(io.StringIO()), guarded(token):  # viser prints a banner
         server = viser.ViserServer(host="127.0.0.1", port=port, verbose=False)
     try:
         yield server
@@ -91,8 +94,8 @@ def parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
-    parser.add_argument("--port", type=int, default=8080, help="the first port to try (8080)")
-    parser.add_argument("--trust", action="store_true", help="execute code that the settings of RUN name")
+    parser.add_argument("--port", type=int, default=8080, help="first port to try (default: 8080)")
+    parser.add_argument("--trust", action="store_true", help="allow code that the settings of RUN name to be executed")
     return parser
 
 
@@ -111,5 +114,5 @@ def options_of(argv: Sequence[str]) -> tuple[Config, int]:
     words = [f"--name={NAME}", "--repeats=0", *words]
     config, _ = parse(words)
     if "teacher" in config:
-        config, _ = parse(["--teacher=by-hand", *words])
+        config, _ = parse([f"--teacher={BY_HAND}", *words])
     return config, options.port

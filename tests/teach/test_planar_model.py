@@ -4,13 +4,13 @@ import mujoco
 import numpy as np
 
 from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.environments.planar_model import planar_model
 from sgimd_torch.spaces import stream
+from sgimd_torch.teach.led import arm_led, planar_model
 
 
 def test_its_end_is_where_the_arm_ends_for_any_theta():
     arm, rng = PlanarArm(5), stream(0, "thetas")
-    model = arm.hand_led.model
+    model = arm_led(arm).model
     data = mujoco.MjData(model)
     for _ in range(20):
         theta = arm.policies.sample(rng)

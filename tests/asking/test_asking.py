@@ -6,14 +6,15 @@ import numpy as np
 import pytest
 
 from sgimd_torch.algorithms import sagg_riac
-from sgimd_torch.algorithms.asking import searched, sgim_acts, sgim_im
+from sgimd_torch.asking.algorithms import SEARCHING, sgim_acts, sgim_eer, sgim_im
+from sgimd_torch.asking.teachers import AnsweringTeacher, high_half, low_half, mislabelled
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.learner import ReplayError
-from sgimd_torch.rivals.entropy import sgim_eer
+from sgimd_torch.parts import Demonstrator, Strategy
+from sgimd_torch.record.lives import load_life, save_life
 from sgimd_torch.runs.tasks.robots import arm_demonstrations
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Demonstration, Lesson, Request, stream
-from sgimd_torch.teachers.answering import AnsweringTeacher, high_half, low_half, mislabelled
 from worlds import NO_CONTEXT, demonstrate, demonstrations, last_posture
 
 ARM = PlanarArm(4, noise=0.02)
@@ -83,7 +84,7 @@ def test_a_teacher_who_cannot_answer_is_refused(options, message):
 
 def test_it_asks_both_teachers_for_goals_and_uses_the_answers_in_both_ways():
     teachers = halves()
-    episodes = live(acts(base=searched), teachers, 300)
+    episodes = live(acts(**SEARCHING), teachers, 300)
     asked = [e for e in episodes if e.reply == "shown"]
     assert {e.request.teacher for e in asked} == {"low", "high"}
     for e in asked:
@@ -110,12 +111,12 @@ def test_a_life_that_asked_goes_on_as_if_it_had_never_stopped_without_asking_aga
     for episode in run(whole, arm, 1, movements=140, teachers=teachers):
         episodes.append(episode)
         if episode.index in (0, 13, 40, 77, 99):
-            whole.save(tmp_path / f"{episode.index}.npz")
+            save_life(whole, tmp_path / f"{episode.index}.sqlite")
     assert any(e.request for e in episodes[:78])
     assert any(e.move is None for e in episodes)
     for last in (0, 13, 40, 77, 99):
         again = make(arm, 1, teachers)
-        again.load(tmp_path / f"{last}.npz")  # the teachers' answers are in the file
+        load_life(again, tmp_path / f"{last}.sqlite")  # the teachers' answers are in the file
         rest = live(again, teachers, 140, arm, 1)
         assert lines(rest) == lines(episodes[last + 1 :])
         assert again.memory.outcomes.tobytes() == whole.memory.outcomes.tobytes()
@@ -125,17 +126,17 @@ def test_a_request_that_waits_for_its_answer_is_saved_too(tmp_path):
     seed = next(seed for seed in range(1000, 1100) if acts(seed=seed).request(NO_CONTEXT))
     robot = acts(seed=seed)
     assert robot.request(NO_CONTEXT)
-    robot.save(tmp_path / "life.npz")
+    save_life(robot, tmp_path / "life.sqlite")
     again = acts(seed=seed)
-    again.load(tmp_path / "life.npz")
+    load_life(again, tmp_path / "life.sqlite")
     assert again.request(NO_CONTEXT).goal.tolist() == robot.request(NO_CONTEXT).goal.tolist()
     for each in (robot, again):
         each.watch(SHOWN[3])
     assert np.array_equal(robot.ask(NO_CONTEXT).theta, again.ask(NO_CONTEXT).theta)
     robot.tell([0.1, 0.2])
-    robot.save(tmp_path / "life.npz")
+    save_life(robot, tmp_path / "life.sqlite")
     with pytest.raises(ReplayError, match="before movement 0 it asked for a demonstration, the learner now does not"):
-        sagg_riac(ARM, seed).load(tmp_path / "life.npz")
+        load_life(sagg_riac(ARM, seed), tmp_path / "life.sqlite")
 
 
 def fails(context, goal, memory):
@@ -156,7 +157,7 @@ def demonstration(outcome=(0.1, 0.2), context=(), theta=0.5):
     return Demonstration(np.array(context), np.arange(2.0), np.full((2, 4), theta), np.array(outcome))
 
 
-class Silent:
+class Silent(Demonstrator):
     def demonstrate(self, context, goal, memory):
         return None
 
@@ -198,13 +199,13 @@ def test_for_a_slow_teacher_it_rests_before_it_uses_the_answer():
 def test_an_attempt_gets_its_lesson_with_the_policy_that_it_corresponds_to():
     got = []
 
-    class Asks:
+    class Asks(Strategy):
         def attempt(self, context):
             got.append((yield Request("t", np.zeros(2))))
             yield None
 
     learner = acts()
-    learner.autonomous = Asks()
+    learner.autonomous = Asks(learner.problem)
     assert learner.request(NO_CONTEXT).teacher == "t"
     learner.watch(SHOWN[0])
     assert isinstance(got[0], Lesson)

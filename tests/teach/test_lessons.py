@@ -5,11 +5,14 @@ import pytest
 
 from sgimd_torch.algorithms import observation
 from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
-from sgimd_torch.demonstrations.leading import Leading
-from sgimd_torch.demonstrations.lessons import LedMovement, lesson_by_hand, misfit_of, resampled
+from sgimd_torch.demonstrations.fit import misfit_of
 from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.environments.planar_arm import PlanarArm
+from sgimd_torch.runs.tasks import Task
 from sgimd_torch.spaces import Demonstration, stream
+from sgimd_torch.teach.leading import Leading
+from sgimd_torch.teach.led import arm_led, rod_led
+from sgimd_torch.teach.lessons import lesson_by_hand, moving, resampled
 
 
 @pytest.fixture(scope="module")
@@ -17,22 +20,22 @@ def rod():
     return FishingRod()
 
 
-def led(times, joints, gap=0.0):
-    return LedMovement(np.asarray(times), np.asarray(joints), np.full(len(times), gap))
+def led(times, joints):
+    return np.asarray(times), np.asarray(joints)
 
 
-def give(robot, recording, **options):
-    translate = robot.primitive.correspondence if hasattr(robot, "primitive") else robot.correspondence
-    return lesson_by_hand(recording, robot, translate, robot.hand_led, stream(3, "lessons", 0), **options)
+def give(robot, recording):
+    translate = robot.primitive.correspondence if isinstance(robot, FishingRod) else None
+    return lesson_by_hand(*recording, Task(robot, correspondence=translate), stream(3, "lessons", 0))
 
 
 def swung(rod, goal=(0.4, 0.3, 0.6), seconds=1.0):
-    leading = Leading(rod.hand_led)
+    leading = Leading(rod_led(rod))
     leading.grab()
-    leading.record()
+    leading.begin_recording()
     leading.drag(goal)
     leading.step(seconds)
-    return leading.stop()
+    return leading.end_recording()
 
 
 def played(rod, theta, rate=200.0):
@@ -79,7 +82,8 @@ def test_the_misfit_is_the_root_mean_square_in_radians(rod):
 
 
 def test_a_slow_hand_is_played_in_the_longest_movement_and_told(rod):
-    slow = led(swung(rod).times * 3.2, swung(rod).joints)  # 3.2 s
+    times, joints = swung(rod)
+    slow = times * 3.2, joints  # 3.2 s
     lesson = give(rod, slow)
     assert lesson.demonstration.times[-1] == 1.6
     assert lesson.theta_d[-1] == 1.0
@@ -90,10 +94,8 @@ def test_what_could_not_be_followed_is_told(rod):
     start = (rod.primitive.joints.low + rod.primitive.joints.high) / 2
     times = np.linspace(0, 1.0, 51)
     yaw = np.outer(np.clip(times / 0.1, 0, 1), [1.4, 0, 0, 0, 0, 0])  # 14 rad/s
-    remarks = give(rod, led(times, start + yaw, 0.25)).remarks
-    assert "the arm stayed up to 0.25 m behind the hand, which went too far or too fast for it" in remarks
-    assert "yaw would turn at 14 rad/s, its movements at 5.7 rad/s at most" in remarks
-    assert len(remarks) == 2
+    remarks = give(rod, led(times, start + yaw)).remarks
+    assert remarks == ("yaw would turn at 14 rad/s, its movements at 5.7 rad/s at most",)
     elsewhere = np.tile(start + np.array([0.5, 0, 0, 0, 0, 0]), (51, 1))
     (remark,) = give(rod, led(times, elsewhere)).remarks
     assert remark == "it starts 0.5 rad from where movements start, so the robot begins with a jerk"
@@ -105,25 +107,22 @@ def test_what_could_not_be_followed_is_told(rod):
 
 def test_a_planar_arm_is_taught_by_its_last_posture():
     arm = PlanarArm()
-    leading = Leading(arm.hand_led)
+    leading = Leading(arm_led(arm))
     leading.grab()
-    leading.record()
+    leading.begin_recording()
     leading.drag([-0.2, 0.7, 0.0])
     leading.step(3.0)
-    lesson = give(arm, leading.stop())
+    lesson = give(arm, leading.end_recording())
     np.testing.assert_allclose(lesson.demonstration.outcome, [-0.2, 0.7], atol=1e-3)
     assert np.isnan(lesson.misfit)  # its movements are not angles over time
 
 
-def test_a_lesson_may_have_a_context():
+def test_a_lesson_has_the_middle_of_c_as_its_context():
     arm = PlanarArm(context=True)
     recording = led(np.linspace(0, 1, 11), np.zeros((11, 7)))
-    lesson = give(arm, recording, context=[0.5])
-    np.testing.assert_allclose(lesson.demonstration.context, [0.5])
-    np.testing.assert_allclose(lesson.demonstration.outcome, [np.cos(0.5), np.sin(0.5)], atol=1e-9)
-    np.testing.assert_allclose(give(arm, recording).demonstration.context, [0.0])
-    with pytest.raises(ValueError, match="context must lie in its box"):
-        give(arm, recording, context=[2.0])
+    lesson = give(arm, recording)
+    np.testing.assert_array_equal(lesson.demonstration.context, [0.0])
+    np.testing.assert_allclose(lesson.demonstration.outcome, [1.0, 0.0], atol=1e-9)
 
 
 def test_a_recording_of_another_robot_is_refused(rod):
@@ -133,15 +132,14 @@ def test_a_recording_of_another_robot_is_refused(rod):
 
 def test_stillness_before_and_after_a_movement_is_left_out():
     times, turn = np.arange(201) / 100, np.clip(np.arange(201) / 100 - 0.5, 0, 0.8)
-    part = LedMovement(times, np.stack([turn, -turn], axis=1), times / 10).moving()
-    np.testing.assert_allclose(part.times, np.arange(81) / 100, atol=1e-12)
-    np.testing.assert_allclose(part.joints[[0, -1], 0], [0.0, 0.8], atol=1e-12)
-    np.testing.assert_allclose(part.gaps, times[50:131] / 10)
+    kept, joints = moving(times, np.stack([turn, -turn], axis=1))
+    np.testing.assert_allclose(kept, np.arange(81) / 100, atol=1e-12)
+    np.testing.assert_allclose(joints[[0, -1], 0], [0.0, 0.8], atol=1e-12)
 
 
 def test_an_arm_that_did_not_move_teaches_nothing():
     with pytest.raises(ValueError, match="you did not move the arm"):
-        led(np.arange(201) / 100, np.zeros((201, 2))).moving()
+        moving(np.arange(201) / 100, np.zeros((201, 2)))
 
 
 def test_resampling_has_equal_steps_and_both_ends():

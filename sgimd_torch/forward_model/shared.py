@@ -1,0 +1,67 @@
+"""One forward model for all parts of a learner: the inverse model, the search and the listener of a run.
+
+model = model_of(problem, members=5); model_of(problem) is model
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+from sgimd_torch.catalogue.options import hands_on
+from sgimd_torch.forward_model.listener import ModelListener
+from sgimd_torch.forward_model.model import ForwardModel, Refresh
+from sgimd_torch.memory import Memory
+from sgimd_torch.parts import Inverse, Problem, Trained
+from sgimd_torch.spaces import Array
+
+
+class SharedModel(Trained):
+    """Forward model of a problem.
+
+    Args:
+        problem: problem whose dimensions and seed the model has.
+        options: options of `ForwardModel`.
+    """
+
+    def __init__(self, problem: Problem, **options: Any) -> None:
+        self.model = ForwardModel(*problem.dims, seed=problem.seed, **options)
+
+    def refresh(self, memory: Memory, goal: Array | None = None) -> Refresh | None:
+        """`ForwardModel.refresh`, whatever the ``goal``."""
+        return self.model.refresh(memory)
+
+    def listener(self, life: Any) -> ModelListener:
+        """Listener that refreshes the model in this `runs.run.Life`."""
+        learner = life.parts.learner
+        asked = partial(is_asked, learner.inverse, self.model)
+        return ModelListener(life.record, self.model, asked, learner.memory, life.seconds)
+
+
+@hands_on(ForwardModel, "members", "rate", "noise_heads", "accelerator", "trust")
+def model_of(problem: Problem, **options: Any) -> ForwardModel:
+    """The forward model of a problem. The first part that wants one makes it, with its options."""
+    return problem.shared(SharedModel, partial(SharedModel, problem, **options)).model
+
+
+class ThroughModel(Inverse):
+    """Inverse model that asks the forward model of its problem when that can be trusted.
+
+    Attributes:
+        model: forward model.
+    """
+
+    @hands_on(model_of)
+    def __init__(self, problem: Problem, **options: Any) -> None:
+        super().__init__(problem)
+        self.model = model_of(problem, **options)
+
+    @property
+    def trusted(self) -> bool:
+        """Whether it asks the model now."""
+        return self.model.trusted
+
+
+def is_asked(inverse: Inverse, model: ForwardModel) -> bool:
+    """Whether a learner with this ``inverse`` asks the model now; an inverse model that asks it, too, decides."""
+    return inverse.trusted if isinstance(inverse, ThroughModel) else model.trusted
