@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, ABCMeta
 from typing import Any, Self
 
-from sgimd_torch.catalogue import function_of, place_of
+from sgimd_torch.catalogue import called, function_of, place_of
 
 
 class Built(ABC):  # noqa: B024
@@ -16,7 +16,8 @@ class Built(ABC):  # noqa: B024
         """The thing of this class that a constructor builds from what it is ``given``.
 
         Raises:
-            ValueError: no constructor, an abstract method is missing, or what was built is of another class.
+            ValueError: no constructor, one that takes something else, an abstract method is missing, or what was built
+                is of another class.
         """
         kind = cls.__name__
         if isinstance(make, str):
@@ -28,7 +29,7 @@ class Built(ABC):  # noqa: B024
         if isinstance(found, ABCMeta) and found.__abstractmethods__:
             missing = ", ".join(sorted(found.__abstractmethods__))
             raise ValueError(f"{found.__name__} has no {missing}, which {kind} demands; see sgimd_torch.parts")
-        made: Any = make(*given)
+        made: Any = called(f"{kind} {found.__name__}", make, *given)
         if not isinstance(made, cls):
             raise ValueError(f"{found.__name__} must derive from {kind} of sgimd_torch.parts, or give one")
         return made
