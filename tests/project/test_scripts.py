@@ -217,12 +217,13 @@ def test_setup_refuses_another_word(setup):
     assert setup("demos", wanted=2) == []
 
 
-def test_the_bench_compares_two_checkouts_side_by_side(capsys, monkeypatch):
-    monkeypatch.setitem(bench.PARTS, "movement", bench.PARTS["movement"][:2])  # two learners are enough here
-    assert go(bench, f"--only movement life --rounds 1 --movements 40 --against '{bench.HERE}'") == 0
+def test_the_bench_compares_two_commits_side_by_side(capsys, monkeypatch):
+    measurements, movements = bench.PARTS["learning"]
+    monkeypatch.setitem(bench.PARTS, "learning", (measurements[1:3], movements))  # two lives are enough here
+    assert go(bench, "--only learning life --rounds 1 --movements 40 --against HEAD") == 0
     head, *lines = capsys.readouterr().out.splitlines()
     assert head.split() == ["here", "there", "here/there"]
-    assert len(lines) == 2 * 2 + 3
+    assert len(lines) == 2 * 3 + 3
     for line in lines:
         if "checksum" in line:
             assert line.endswith(" equal")
