@@ -1,4 +1,4 @@
-"""How a record is laid out: what an event is, the columns of every table, cells of vectors, and seals of rows."""
+"""The layout of a record: kinds of events, columns of every table, cells of vectors, seals of rows."""
 
 from __future__ import annotations
 
@@ -14,37 +14,37 @@ import numpy as np
 
 from sgimd_torch.spaces import Array, Demonstration
 
-DERIVED: Final = ("goals", "evaluations", "errors", "regions", "predictions", "refreshes")  # a replay makes them again
-SEALS: Final = ["name TEXT", "n_rows INTEGER", "seal INTEGER"]  # columns of the table of seals
+DERIVED: Final = ("goals", "evaluations", "errors", "regions", "predictions", "refreshes")  # a replay makes these again
+SEALS: Final = ["name TEXT", "n_rows INTEGER", "seal INTEGER"]  # columns of the table ``seals``
 HINT: Final = "was it damaged or edited?"
 
 Dims = tuple[int, int, int]
-"""Of context, theta and outcome."""
+"""Dimensions of context, theta and outcome."""
 
 Row = tuple[Any, ...]
 
 
 class RunError(ValueError):
-    """A record cannot be used: it is damaged, of another run, in use, or there is none."""
+    """A record cannot be used: it is missing, damaged, in use, or belongs to another run."""
 
 
 class InUseError(RunError):
-    """Another process writes it."""
+    """Another process is writing the record."""
 
 
 class Kind(StrEnum):
-    """What happened."""
+    """The kinds of events."""
 
     MOVED = "moved"
     RESTED = "rested"
     SHOWN = "shown"
-    ASKED = "asked"  # an attempt began that may ask for a demonstration; what is shown next by that teacher answers it
-    FAILED = "failed"  # a movement got no outcome: ``reply`` says why; without theta, no context could be observed
-    INTERRUPTED = "interrupted"  # by the caller; with theta, before the outcome of that movement was told
+    ASKED = "asked"  # an attempt began that may ask a teacher; the teacher's next demonstration is the reply
+    FAILED = "failed"  # a movement had no outcome: ``reply`` says why; without theta, no context was observed
+    INTERRUPTED = "interrupted"  # the caller stopped; with theta, before the outcome of that movement was known
 
 
 class Event(NamedTuple):
-    """Something that happened to a learner, with what belongs to its kind; ``who`` has shown something or was asked."""
+    """One event in a learner's life; fields that do not apply to its kind are None. ``who`` is a teacher's name."""
 
     kind: Kind
     context: Array | None = None
@@ -63,7 +63,7 @@ _IN_CONTEXT: Final = (*_COUNTED, Kind.ASKED, Kind.INTERRUPTED)
 
 
 def layout(dims: Dims) -> dict[str, list[str]]:
-    """The columns of every table, as SQL declares them. SQLite has at most 2,000 of them in a table."""
+    """The columns of every table, as SQL declares them. SQLite allows at most 2,000 in a table."""
     c, p, t = dims
     context, theta, goal, outcome = (
         _vector(name, dim) for name, dim in (("context", c), ("theta", p), ("goal", t), ("outcome", t))
@@ -90,7 +90,7 @@ def layout(dims: Dims) -> dict[str, list[str]]:
 
 
 def event_row(event: Event, movement: int, lesson: int | None, dims: Dims) -> Row:
-    """An event before the ``movement``-th movement; ``lesson`` is the row of its demonstration."""
+    """The row of an event after ``movement`` movements; ``lesson`` is the row number of its demonstration."""
     c, p, t = dims
     vectors = (
         *_cells(event.context, c),
@@ -101,14 +101,8 @@ def event_row(event: Event, movement: int, lesson: int | None, dims: Dims) -> Ro
     return movement, str(event.kind), event.origin, *vectors, lesson, event.who, event.strategy, event.reply
 
 
-def lesson_of(row: Row) -> int | None:
-    """The row of the demonstration of such an event."""
-    found: int | None = row[-4]
-    return found
-
-
 def event_reader(dims: Dims, shown: Sequence[Demonstration]) -> Callable[[Row], Event]:
-    """What makes an event of such a row, ``shown`` being the demonstrations."""
+    """A function from such a row to its event; ``shown`` are the demonstrations by row number."""
     every = (*dims, dims[2])
     parts = [slice(*ends) for ends in pairwise(accumulate(every, initial=3))]
 
@@ -125,12 +119,12 @@ def event_reader(dims: Dims, shown: Sequence[Demonstration]) -> Callable[[Row], 
 
 
 def movements_after(movement: int, kind: str) -> int:
-    """How many movements were made once an event has come, rests included."""
+    """Number of movements after an event of this kind, rests included."""
     return movement + (kind in _COUNTED)
 
 
 def demonstration_row(shown: Demonstration, dims: Dims) -> Row:
-    """A demonstration."""
+    """The row of a demonstration."""
     times, trajectory = (np.asarray(each, dtype=np.float64).tobytes() for each in (shown.times, shown.trajectory))
     vectors = *_cells(shown.context, dims[0]), *_cells(shown.outcome, dims[2])
     return *vectors, shown.trajectory.shape[1], times, trajectory
@@ -159,7 +153,7 @@ def about_rows(about: Mapping[str, Any]) -> list[Row]:
 
 
 def row_bytes(row: Sequence[Any]) -> bytes:
-    """Of a row, for its seal: floats in binary, so this takes a fifth of the time of their text."""
+    """A row as bytes, for its seal; floats in binary take a fifth of the time of text."""
     return marshal.dumps(tuple(row), 2)
 
 
@@ -182,11 +176,11 @@ def _cells(values: Array | None, dim: int) -> list[Any]:
 
 
 def _array(cells: Row) -> Array | None:
-    """The vector in these cells, None where they are NULL."""
+    """The vector in these cells, None if one is NULL."""
     return None if None in cells else np.array(cells, dtype=np.float64)
 
 
 def plain(row: Sequence[Any]) -> Row:
-    """As SQLite gives it back: NaN is NULL, numbers of numpy are Python's."""
+    """A row as SQLite returns it: NaN becomes NULL, numpy's numbers become Python's."""
     values = (value.item() if isinstance(value, np.generic) else value for value in row)
     return tuple((None if value != value else value + 0.0) if isinstance(value, float) else value for value in values)

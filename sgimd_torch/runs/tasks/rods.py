@@ -1,4 +1,4 @@
-"""The fishing rod as a task: its benchmark and its demonstrations are shipped files."""
+"""The fishing rod as a task, with the shipped benchmark and demonstrations."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from sgimd_torch.evaluation import SHIPPED as SHIPPED_BENCHMARK
 from sgimd_torch.runs.tasks import Task
 from sgimd_torch.spaces import Box, Demonstration
 
-LARGEST: Final = 1e6  # m, of T
+LARGEST: Final = 1e6  # m, the largest ``task_space``
 
 
 @hands_on(FishingRod, "noise", "max_yaw", "max_wind", "line")
 def fishing_rod(*, task_space: float = 1.0, threads: int = 1, **physics: Any) -> Task:
-    """The paper's task; goals come from a square of half side ``task_space`` m.
+    """The paper's task; goals are drawn from a square of half side ``task_space`` m.
 
-    With a context, ``max_yaw`` or ``max_wind`` above 0, what was demonstrated was demonstrated in the context
-    0, and the goals are those that can be reached in it. So, too, with another ``line``: both are those of the
-    paper's rod.
+    Demonstrations and benchmark goals are always those of the paper's rod: in the context 0, even with ``max_yaw`` or
+    ``max_wind`` above 0, and with its line, even with another ``line``.
 
     Args:
-        task_space: half the side (m) of the square that goals come from; 100 in the paper's large-space experiment.
-        threads: that an evaluation may use; results do not depend on it.
+        task_space: half the side (m) of the square from which goals are drawn, above 0; 100 in the paper's
+            large-space experiment.
+        threads: threads of an evaluation, at least 1; results do not depend on it.
 
     Raises:
         ValueError: a number out of its range.
