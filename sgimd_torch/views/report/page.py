@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from sgimd_torch.views.report import figures, record
+from sgimd_torch.views.report import figures, provenance
 from sgimd_torch.views.statistics import LEAST_SEEDS, Interval, show
 from sgimd_torch.views.variants import EARLY, Variant, baseline_of, compare, unit_of
 
@@ -41,7 +41,7 @@ def page(place: Path, variants: Sequence[Variant], baseline: str | None = None) 
         variants=variants,
         single=runs[0] if len(runs) == 1 else None,
         n_runs=len(runs),
-        warnings=list(record.doubts(variants)),
+        warnings=list(provenance.doubts(variants)),
         baseline=reference,
         compared=compare(variants, reference),
         colours=figures.colours_of(variants),
@@ -49,7 +49,7 @@ def page(place: Path, variants: Sequence[Variant], baseline: str | None = None) 
         early=EARLY,
         least_seeds=LEAST_SEEDS,
         figures=figures,
-        record=record,
+        provenance=provenance,
         unit=unit_of(variants),
     )
     return html.encode(errors="backslashreplace").decode()  # a name may hold invalid characters
