@@ -23,10 +23,11 @@ import os
 import sqlite3
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, Final, Self
 
+from sgimd_torch.files import replacing
 from sgimd_torch.record.layout import (
     DERIVED,
     HINT,
@@ -216,6 +217,29 @@ class Record:
             except RunError as error:
                 wrong[table] = str(error)
         return wrong
+
+    def rewrite(self) -> Record:
+        """Replace the file by one with the events before the first damaged row, and close this record.
+
+        Returns:
+            The new record, open for writing, without ``DERIVED`` tables: a replay makes them again.
+
+        Raises:
+            OSError: it cannot be written.
+        """
+        about = {name: value for name, value in self.about.items() if name not in ("run", "dims")}
+        shown = list[Demonstration]()
+        with replacing(self.path) as partial:
+            with Record.make(partial, self.dims, about) as new:
+                with suppress(RunError):
+                    for row in self.rows("demonstrations"):
+                        shown.append(read_demonstration(row, self.dims))
+                with suppress(RunError, IndexError):  # an event may refer to a demonstration that is lost
+                    for event in map(event_reader(self.dims, shown), self.rows("events")):
+                        new.add(event)
+                new.commit()
+            self.close()
+        return Record(self.path, write=True)
 
     def _demonstration(self, shown: Demonstration) -> int:
         """The row number of a demonstration; a new one is appended."""

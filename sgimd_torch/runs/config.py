@@ -211,6 +211,7 @@ RUN: Final = tuple(each.name for each in fields(Config) if each.name != "parts")
 """The options that every run has."""
 FLAGS: Final = {
     "resume": "go on with a stopped or killed run, or lengthen a finished one.",
+    "accept_loss": "with --resume: go on even if the log has lost movements; a copy of it is kept.",
 }
 
 

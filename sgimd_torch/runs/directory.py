@@ -1,6 +1,6 @@
-"""Opens the record of a run, and refuses a damaged one or that of another run.
+"""Opens the record of a run: refuses another run, and keeps what is undamaged.
 
-record, notes = open_run(build(config), resume=True)
+record, notes = open_run(build(config), resume=True, accept_loss=False)
 A run is the file ``run.sqlite`` in OUT/NAME/seed-003; ``docs/runs.md`` explains its tables.
 """
 
@@ -9,8 +9,9 @@ from __future__ import annotations
 import importlib.metadata
 import importlib.util
 import platform
+import shutil
 import subprocess
-from itertools import takewhile
+from itertools import count, takewhile
 from pathlib import Path
 from typing import Any, Final
 
@@ -27,16 +28,17 @@ EVALUATED: Final = ("evaluations", "errors", "regions")  # tables that each eval
 OF_MODEL: Final = ("predictions", "refreshes")  # tables that a forward model adds to
 
 
-def open_run(parts: RunParts, *, resume: bool) -> tuple[Record, list[str]]:
+def open_run(parts: RunParts, *, resume: bool, accept_loss: bool = False) -> tuple[Record, list[str]]:
     """The record of a run, open for writing, and messages. The file does not change before the first commit.
 
     Args:
         parts: parts of the run; its configuration has the directory.
         resume: whether to continue an existing run; False refuses it.
+        accept_loss: whether to continue a damaged run; a copy is kept, and everything from the damage on is repeated.
 
     Raises:
-        RunError: there is a run and ``resume`` is False; it is damaged, or has other settings or more movements; the
-            file is no record; another process writes it.
+        RunError: there is a run and ``resume`` is False; it has other settings, or more movements; it is damaged and
+            the loss is not accepted; the file is no record; another process writes it.
         OSError: it cannot be written.
     """
     config, robot = parts.config, parts.environment
@@ -57,7 +59,7 @@ def open_run(parts: RunParts, *, resume: bool) -> tuple[Record, list[str]]:
             notes.append(f"{path.parent} holds no run yet: it starts from the beginning")
         record = Record.make(path, dims, about)
     elif resume:
-        record = _reopened(path, about, dims, config, notes)
+        record = _reopened(path, about, dims, config, accept_loss, notes)
     else:
         raise RunError(f"{path.parent} already holds a run; continue it with --resume, or choose another --out")
     record.replace_rows("goals", ((k, *goal) for k, goal in enumerate(parts.benchmark.goals.tolist())))
@@ -69,8 +71,10 @@ def holds_run(path: Path) -> bool:
     return path.is_file() and path.stat().st_size > 0
 
 
-def _reopened(path: Path, about: dict[str, Any], dims: Dims, config: Config, notes: list[str]) -> Record:
-    """The record at ``path``, open for writing, without the tables that the replay fills again.
+def _reopened(
+    path: Path, about: dict[str, Any], dims: Dims, config: Config, accept_loss: bool, notes: list[str]
+) -> Record:
+    """The record at ``path``, open for writing, undamaged, without the tables that the replay fills again.
 
     ``about`` describes the run now; the versions of its earlier parts are added. Messages are added to ``notes``.
     """
@@ -78,8 +82,8 @@ def _reopened(path: Path, about: dict[str, Any], dims: Dims, config: Config, not
     try:
         differ = _refuse_other(record, about, dims)
         if damage := record.check():
-            hint = "restore it from a backup, or see docs/robustness.md"
-            raise RunError("; ".join([*damage.values(), hint]))
+            record.close()  # a copy made while it is open would give up its lock
+            record = _salvaged(path, "; ".join(damage.values()), accept_loss, notes)
         if record.movements > config.movements:
             raise RunError(f"{path} has {record.movements} movements already, {config.movements} were requested")
         _forget_evaluations(record, config, anew=bool(differ & {*EVALUATES}), notes=notes)
@@ -90,6 +94,20 @@ def _reopened(path: Path, about: dict[str, Any], dims: Dims, config: Config, not
     except BaseException:
         record.close()
         raise
+    return record
+
+
+def _salvaged(path: Path, damage: str, accept_loss: bool, notes: list[str]) -> Record:
+    """The damaged record at ``path``, cut before the damage and open for writing; a copy of it is kept."""
+    if not accept_loss:
+        raise RunError(
+            f"{damage} Restore it from a backup, or repeat what is damaged with --resume --accept-loss; a copy is kept"
+        )
+    copy = next(place for k in count() if not (place := path.with_name(f"run.lost-{k}.sqlite")).exists())
+    shutil.copy2(path, copy)
+    record = Record(path, write=True).rewrite()
+    notes.append(f"{damage} It is kept as {copy}")
+    notes.append(f"{record.movements} movements of {path} are kept, everything else is repeated")
     return record
 
 

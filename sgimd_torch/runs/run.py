@@ -1,6 +1,6 @@
 """One life: replay what was recorded, live on, evaluate now and then; everything else listens.
 
-print(carry_out(build(Config(seed=3)), stopping, resume=False, again="sgimd run --seed 3 --resume"))
+print(carry_out(build(Config(seed=3)), stopping, resume=False, accept_loss=False, again="sgimd run --seed 3 --resume"))
 """
 
 from __future__ import annotations
@@ -28,13 +28,14 @@ TOLD: Final = 3  # failed movements that are told one by one; later ones, if the
 COMMIT_EVERY: Final = 1.0  # s; a killed run loses what came since
 
 
-def carry_out(parts: RunParts, stopping: Stopping, *, resume: bool, again: str) -> str:
+def carry_out(parts: RunParts, stopping: Stopping, *, resume: bool, accept_loss: bool, again: str) -> str:
     """Make a run, or go on with one; what came of it, in a line.
 
     Args:
         parts: of the run.
         stopping: says when a signal has come.
         resume: go on with what is there.
+        accept_loss: also if movements of it are damaged.
         again: the command that goes on, for whoever stops it.
 
     Raises:
@@ -42,7 +43,7 @@ def carry_out(parts: RunParts, stopping: Stopping, *, resume: bool, again: str) 
         Failed: it failed under way.
         Stopped: by a signal.
     """
-    with Life(parts, resume=resume) as life:
+    with Life(parts, resume=resume, accept_loss=accept_loss) as life:
         try:
             life.go_on(stopping)
         except Stopped:
@@ -66,7 +67,7 @@ class Life:
     manager; leaving it brings to the disk what was lived, but where it was broken off, as by Ctrl-C.
 
     Args:
-        parts, resume: see ``carry_out``.
+        parts, resume, accept_loss: see ``carry_out``.
 
     Attributes:
         record: of the run; it is written from the end of the replay on.
@@ -76,9 +77,9 @@ class Life:
         RunError, OSError: see ``open_run``.
     """
 
-    def __init__(self, parts: RunParts, *, resume: bool) -> None:
+    def __init__(self, parts: RunParts, *, resume: bool, accept_loss: bool = False) -> None:
         self.parts = parts
-        self.record, notes = open_run(parts, resume=resume)
+        self.record, notes = open_run(parts, resume=resume, accept_loss=accept_loss)
         say(*parts.notes, *notes)
         self.movements, self.recorded, self.failed = 0, self.record.movements, 0
         self.seconds = Seconds(self.record.about.get("seconds", {}))

@@ -63,17 +63,18 @@ def parser() -> argparse.ArgumentParser:
 def main(argv: Sequence[str] | None = None) -> int:
     """Carry out all unfinished runs; the exit code, 1 if runs failed."""
     options, rest = parser().parse_known_args(argv)
-    variants = variants_of(options.vary, rest)
+    variants, flags = variants_of(options.vary, rest)
     configs = [replace(variant, seed=seed) for seed in options.seeds for variant in variants]
-    return carry_out(configs, options, variants[0].out)
+    return carry_out(configs, options, flags, variants[0].out)
 
 
-def carry_out(whole: Sequence[Config], options: argparse.Namespace, out: Path) -> int:
+def carry_out(whole: Sequence[Config], options: argparse.Namespace, flags: Sequence[str], out: Path) -> int:
     """Carry out the unfinished runs of a study, or list them; the exit code, 1 if runs failed.
 
     Args:
         whole: all runs of the study.
         options: parsed options of ``add_options`` and ``add_engines``.
+        flags: flags of ``sgimd run`` for all runs, besides --resume.
         out: folder of the study.
 
     Raises:
@@ -93,7 +94,7 @@ def carry_out(whole: Sequence[Config], options: argparse.Namespace, out: Path) -
         build(config)  # refuses wrong options before any run starts
     with engine_of(options, left) as submit:
         make_folder(out)
-        failures = sweep(left, submit)
+        failures = sweep(left, submit, flags=flags)
     say(f"{len(left) - len(failures)} runs ended well, {len(failures)} failed: {out}", *failures)
     return 1 if failures else 0
 
@@ -193,8 +194,8 @@ class Shard(NamedTuple):
         return f", shard {self.k}/{self.n} of {len(whole)} runs" if self.n > 1 else ""
 
 
-def variants_of(varied: Sequence[str], options: Sequence[str]) -> list[Config]:
-    """A run for every combination of varied values, named after them.
+def variants_of(varied: Sequence[str], options: Sequence[str]) -> tuple[list[Config], list[str]]:
+    """A run for every combination of varied values, named after them, and the flags among ``options``.
 
     Args:
         varied: values of --vary, such as ``["goals=interest-map,uniform", "budget=5,15"]``.
@@ -221,10 +222,10 @@ def variants_of(varied: Sequence[str], options: Sequence[str]) -> list[Config]:
     found = []
     for combination in itertools.product(*values.values()):
         chosen = dict(zip(values, combination, strict=True))
-        config, _ = parse([*options, *(f"--{option}={value}" for option, value in chosen.items())])
+        config, flags = parse([*options, *(f"--{option}={value}" for option, value in chosen.items())])
         in_order = sorted(chosen, key=lambda option: (option != "algorithm", option))
         found.append(replace(config, name=",".join(_in_name(option, chosen[option]) for option in in_order) or None))
-    return found
+    return found, [f"--{dashed(flag)}" for flag, on in flags.items() if on]
 
 
 def _in_name(option: str, value: str) -> str:

@@ -83,8 +83,8 @@ SHARED: Final = ("movements", "evaluate_at", "evaluated_by", "repeats", "floor_a
 def main(argv: Sequence[str] | None = None) -> int:
     """Carry out unfinished runs and print a table for each task; the exit code, 1 if runs failed."""
     options, rest = _options(argv)
-    configs = runs_of(options, rest)
-    code = carry_out(configs, options, configs[0].out.parent)
+    configs, flags = runs_of(options, rest)
+    code = carry_out(configs, options, flags, configs[0].out.parent)
     from sgimd_torch.views import table  # slow: it imports scipy's statistics
 
     for place in [] if options.dry_run else dict.fromkeys(config.out for config in configs if finished(config)):
@@ -93,8 +93,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     return code
 
 
-def runs_of(options: argparse.Namespace, rest: Sequence[str]) -> list[Config]:
-    """All runs, task by task within a seed.
+def runs_of(options: argparse.Namespace, rest: Sequence[str]) -> tuple[list[Config], list[str]]:
+    """All runs, task by task within a seed, and the flags of ``sgimd run``.
 
     Args:
         options: parsed ``tasks``, ``seeds`` and ``vary``.
@@ -108,10 +108,10 @@ def runs_of(options: argparse.Namespace, rest: Sequence[str]) -> list[Config]:
         if name in {word.partition(".")[0] for word in given}:
             raise ValueError(f"--{name} cannot be given here: each task has its own; choose tasks with --tasks")
     words = [*(f"--{name}={value}" for name, value in DEFAULTS.items() if name not in given), *rest]
-    learners = variants_of(options.vary, words)
+    learners, flags = variants_of(options.vary, words)
     shared = {name: learners[0][name] for name in SHARED}
     others = [Config.from_settings({"name": name, **line, **shared}) for name, line in REFERENCES.items()]
-    return [
+    configs = [
         replace(
             each,
             seed=seed,
@@ -123,6 +123,7 @@ def runs_of(options: argparse.Namespace, rest: Sequence[str]) -> list[Config]:
         for task in options.tasks
         for each in [*others, *learners]
     ]
+    return configs, flags
 
 
 def titled(task: str) -> str:

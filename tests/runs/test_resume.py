@@ -2,14 +2,12 @@
 
 import shutil
 import signal
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from runs import (
     MOVEMENTS,
-    ROOT,
     STOPS,
     arguments,
     content_of,
@@ -180,48 +178,53 @@ def rows_of_movements(content):
 
 
 @pytest.mark.parametrize(
-    "damage",
+    ("damage", "kept"),
     [
-        "UPDATE events SET outcome_0 = 0.5 WHERE movement = 40 AND kind = 'moved'",
-        "DELETE FROM events WHERE movement = 40 AND kind = 'moved'",
-        "DELETE FROM events WHERE movement >= 70",
-        "DELETE FROM events",
-        "UPDATE events SET rowid = rowid + 1000 WHERE movement = 12",
-        "INSERT INTO events SELECT * FROM events WHERE movement = 89 AND kind = 'moved'",
-        "UPDATE demonstrations SET outcome_0 = 0.5 WHERE rowid = 2",
-        *(f"UPDATE {table} SET seal = 0 WHERE rowid = 1" for table in ("goals", "evaluations", "errors")),
-        "DELETE FROM regions WHERE rowid = 1",
+        ("UPDATE events SET outcome_0 = 0.5 WHERE movement = 40 AND kind = 'moved'", 40),
+        ("DELETE FROM events WHERE movement = 40 AND kind = 'moved'", 40),
+        ("DELETE FROM events WHERE movement >= 70", 70),
+        ("DELETE FROM events", 0),
+        ("UPDATE events SET rowid = rowid + 1000 WHERE movement = 12", 12),
+        ("INSERT INTO events SELECT * FROM events WHERE movement = 89 AND kind = 'moved'", 90),
+        ("UPDATE demonstrations SET outcome_0 = 0.5 WHERE rowid = 2", 60),
+        ("DELETE FROM demonstrations", 30),
+        *((f"UPDATE {table} SET seal = 0 WHERE rowid = 1", 90) for table in ("goals", "evaluations", "errors")),
+        ("DELETE FROM regions WHERE rowid = 1", 90),
     ],
 )
-def test_a_damaged_run_is_refused_and_left_as_it_is(tmp_path, copy, go, capsys, damage):
+def test_what_is_damaged_is_made_again_only_if_the_loss_is_accepted(
+    tmp_path, copy, go, reference, capsys, damage, kept
+):
     edit(copy / FILE, damage)
     before = files_of(copy)
     assert go(tmp_path, "--resume") == 2
-    assert "was it damaged or edited?; restore it from a backup" in capsys.readouterr().err
+    message = capsys.readouterr().err
+    assert "Restore it" in message
+    assert "--accept-loss" in message
     assert files_of(copy) == before
+    assert go(tmp_path, "--resume", "--accept-loss") == 0
+    assert f"{kept} movements of {copy / FILE} are kept" in capsys.readouterr().err
+    assert content_of(copy) == reference
+    assert files_of(copy).keys() == {FILE, "run.lost-0.sqlite"}
+    assert (copy / "run.lost-0.sqlite").read_bytes() == before[FILE]
+    assert go(tmp_path, "--resume") == 0  # nothing is missing any more
 
 
 @pytest.mark.parametrize("content", [b"index,origin\n" * 300, bytes(8192)])
-def test_a_file_of_which_nothing_can_be_read_is_refused_and_left_as_it_is(tmp_path, copy, go, capsys, content):
+def test_a_file_of_which_nothing_can_be_read_is_refused_and_kept(tmp_path, copy, go, capsys, content):
     (copy / FILE).write_bytes(content)
-    assert go(tmp_path, "--resume") == 2
-    assert "cannot be read as a record" in capsys.readouterr().err
+    for options in ((), ("--accept-loss",)):
+        assert go(tmp_path, "--resume", *options) == 2
+        assert "cannot be read as a record" in capsys.readouterr().err
     assert files_of(copy) == {FILE: content}
 
 
-def test_the_events_before_the_damage_are_saved_as_the_page_on_robustness_says(
-    tmp_path, copy, go, reference, monkeypatch
-):
-    edit(copy / FILE, "DELETE FROM events WHERE movement >= 40")
-    (tmp_path / "damaged").mkdir()
-    (copy / FILE).rename(tmp_path / "damaged" / FILE)
-    (tmp_path / "runs").mkdir()
-    copy.parent.rename(tmp_path / "runs/sgim-d")
-    monkeypatch.chdir(tmp_path)
-    exec((ROOT / "docs/robustness.md").read_text().split("```")[1])
-    assert movements_on_disk(Path("runs/sgim-d/seed-003")) == 40
-    assert go("runs", "--resume") == 0
-    assert content_of(Path("runs/sgim-d/seed-003")) == reference
+def test_an_earlier_copy_of_a_damaged_record_is_not_overwritten(tmp_path, copy, go):
+    edit(copy / FILE, "DELETE FROM events WHERE movement >= 70")
+    (copy / "run.lost-0.sqlite").write_text("an earlier loss")
+    assert go(tmp_path, "--resume", "--accept-loss") == 0
+    assert (copy / "run.lost-0.sqlite").read_text() == "an earlier loss"
+    assert (copy / "run.lost-1.sqlite").exists()
 
 
 def rewritten(path, change):

@@ -40,7 +40,7 @@ def swept(*options):
 
 
 def names(varied, *options):
-    return [variant.variant for variant in variants_of(varied, options)]
+    return [variant.variant for variant in variants_of(varied, options)[0]]
 
 
 def listed(capsys, *options):
@@ -67,9 +67,10 @@ def test_options_are_crossed_and_each_combination_has_its_name():
 
 
 def test_values_and_further_options_become_those_of_the_runs():
-    few, many = variants_of(["floor-at=[],[20,40]"], ["--movements", "60"])
+    (few, many), flags = variants_of(["floor-at=[],[20,40]"], ["--movements", "60", "--accept_loss"])
     assert (few.floor_at, many.floor_at) == ((), (20, 40))
     assert few.movements == many.movements == 60
+    assert flags == ["--accept-loss"]
 
 
 def test_seeds_are_one_or_a_range_or_a_list(tmp_path, monkeypatch, capsys):
@@ -149,7 +150,7 @@ def test_failures_are_named_in_the_order_of_the_list_and_the_others_go_on(tmp_pa
         if config.seed == 2:
             raise ValueError("its rows are damaged")
 
-    failures = loop.sweep(configs, lambda config: ended(errors.get(config.seed)), on_end=on_end)
+    failures = loop.sweep(configs, lambda config, flags: ended(errors.get(config.seed)), on_end=on_end)
     assert failures == [
         *("random seed 1 failed: refused", "random seed 2 failed: its rows are damaged"),
         *("random seed 3 failed: broke", "random seed 4 failed: no disk"),

@@ -20,7 +20,7 @@ def suite(*words):
 
 
 def configs_of(*words):
-    return runs_of(*_options(words))
+    return runs_of(*_options(words))[0]
 
 
 def test_half_of_the_tasks_and_no_more_are_used_to_choose_defaults():

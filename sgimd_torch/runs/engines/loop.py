@@ -2,7 +2,7 @@
 
 with local(processes=4) as submit: failures = sweep([Config(seed=seed) for seed in range(20)], submit)
 
-An engine is a context manager that gives ``submit(config)``. It starts runs in order, as many at a time as it
+An engine is a context manager that gives ``submit(config, flags)``. It starts runs in order, as many at a time as it
 has room for. Leaving its block stops the runs that have not ended. ``local`` is the engine of one machine, with a
 process for each run.
 """
@@ -31,8 +31,8 @@ PATIENCE: Final = (
     20.0  # s that stopped runs have to save their movements; then they are killed, and lose a second at most
 )
 
-Submit = Callable[[Config], Future[None]]
-"""(config) -> a future that ends with the run, which is started or resumed. The future raises
+Submit = Callable[[Config, Sequence[str]], Future[None]]
+"""(config, flags of ``sgimd run``) -> a future that ends with the run, which is started or resumed. The future raises
 the errors of ``check_end``, and OSError if a file cannot be written or a process cannot start."""
 
 
@@ -40,6 +40,7 @@ def sweep(
     configs: Sequence[Config],
     submit: Submit,
     *,
+    flags: Sequence[str] = (),
     on_end: Callable[[Config], None] | None = None,
 ) -> list[str]:
     """Carry out runs in this order and show progress; a failed run does not stop the others.
@@ -47,6 +48,7 @@ def sweep(
     Args:
         configs: the runs, each with its own directory.
         submit: submission function of an engine.
+        flags: flags of ``sgimd run`` for all runs, besides --resume.
         on_end: function to call in this thread with each run that ended well; its ValueError or OSError is a failure.
 
     Returns:
@@ -63,7 +65,7 @@ def sweep(
     failures: dict[Config, str] = {}
     try:
         with Progress("sweep", sum(config.movements for config in configs), sum(done.values()), every=30.0) as progress:
-            pending = {submit(config): config for config in configs}
+            pending = {submit(config, flags): config for config in configs}
             while pending:
                 for future in wait(pending, REFRESH, FIRST_COMPLETED).done:
                     config = pending.pop(future)
@@ -90,9 +92,9 @@ def local(processes: int) -> Iterator[Submit]:
     running, stopped = set[subprocess.Popen[bytes]](), False
     starting = Lock()  # so that no run starts after all were stopped
 
-    def carry_out(config: Config) -> None:
+    def carry_out(config: Config, flags: Sequence[str]) -> None:
         make_folder(config.directory.parent)
-        command = [sys.executable, "-m", "sgimd_torch", *run_words(config)]
+        command = [sys.executable, "-m", "sgimd_torch", *run_words(config, flags)]
         with log_of(config).open("ab") as log:
             before = log.tell()
             with starting:
@@ -108,7 +110,7 @@ def local(processes: int) -> Iterator[Submit]:
     # Each thread waits for one process. A pool of processes would fail for all runs if one of them were killed.
     pool = ThreadPoolExecutor(processes)
     try:
-        yield lambda config: pool.submit(carry_out, config)
+        yield lambda config, flags: pool.submit(carry_out, config, flags)
     finally:
         with starting:
             stopped = True
@@ -123,9 +125,9 @@ def local(processes: int) -> Iterator[Submit]:
         pool.shutdown(cancel_futures=True)
 
 
-def run_words(config: Config) -> list[str]:
+def run_words(config: Config, flags: Sequence[str]) -> list[str]:
     """The command line of a run, without ``sgimd``."""
-    return ["run", "--resume", *words(config)]
+    return ["run", "--resume", *flags, *words(config)]
 
 
 def log_of(config: Config) -> Path:

@@ -77,7 +77,7 @@ def on_ray(address: str | None, processes: int = 1, *, ships: bool = False, out:
     # Ray repeats a task only if its node or its worker process dies. A run that fails ends its task.
     task: Any = ray.remote(num_cpus=1, max_retries=-1)(carry_out)
 
-    def submit(config: Config) -> Future[None]:
+    def submit(config: Config, flags: Sequence[str]) -> Future[None]:
         future = Future[None]()
 
         def end(returned: Future[Ended]) -> None:
@@ -99,7 +99,7 @@ def on_ray(address: str | None, processes: int = 1, *, ships: bool = False, out:
         except (OSError, sqlite3.Error) as error:
             future.set_exception(ValueError(f"its files cannot be sent: {error}"))
         else:
-            task.remote(run_words(away), record, files).future().add_done_callback(end)
+            task.remote(run_words(away, flags), record, files).future().add_done_callback(end)
         return future
 
     try:
