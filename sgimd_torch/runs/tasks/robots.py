@@ -1,4 +1,4 @@
-"""Other robots as tasks: what they are judged by and what they are shown is made here, the same for every seed."""
+"""Other robots as tasks; their benchmark goals and demonstrations are made here, equal for every seed."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from sgimd_torch.runs.tasks import Task
 from sgimd_torch.spaces import Array, Box, Demonstration, stream
 
 DATA: Final = SHIPPED_BENCHMARK.parent
-SIDE: Final = 0.1  # m, of a benchmark tile; it leaves 311 goals in the disc of radius 1 m that these arms reach
+SIDE: Final = 0.1  # m, side of a benchmark tile; 311 goals lie in the disc of radius 1 m that these arms reach
 SHOWN: Final = 127  # demonstrations, as many as each shipped demonstrator recorded
-SAMPLES: Final = 5  # of each of them
-REACHING: Final = 20_000  # uniform movements that show what a toy can reach
+SAMPLES: Final = 5  # rows of the trajectory of each demonstration
+REACHING: Final = 20_000  # uniform movements that find the outcomes a toy can reach
 
 
 def planar_arm(*, n_joints: int) -> Task:
@@ -84,7 +84,7 @@ def fetch() -> Task:
 
 
 def toy_benchmark(robot: Toy, side: float) -> Benchmark:
-    """One random goal in each tile that uniform movements reach, in the middle of C; always the same ones."""
+    """One random goal in each tile that uniform movements reach in the middle of C; equal in every run."""
     rng = stream(0, "goals for a toy")
     thetas = robot.policies.low + robot.policies.sides * rng.random((REACHING, robot.policies.dim))
     context = (robot.contexts.low + robot.contexts.high) / 2
@@ -93,12 +93,12 @@ def toy_benchmark(robot: Toy, side: float) -> Benchmark:
 
 
 def last_row(times: Array, trajectory: Array) -> Array:
-    """The correspondence of a toy: a demonstration of it is theta itself."""
+    """The correspondence of a toy: each row of its demonstrations is theta itself."""
     return trajectory[-1]
 
 
 def toy_demonstrations(robot: Toy) -> list[Demonstration]:
-    """Movements in contexts all over C, each to another place that uniform movements reach; always the same ones."""
+    """Movements in contexts all over C, to different outcomes of uniform movements; equal in every run."""
     rng = stream(0, "demonstrations by a toy")
     thetas = robot.policies.low + robot.policies.sides * rng.random((REACHING, robot.policies.dim))
     found = []
@@ -111,22 +111,22 @@ def toy_demonstrations(robot: Toy) -> list[Demonstration]:
 
 
 def arm_benchmark(arm: PlanarArm) -> Benchmark:
-    """One random goal in each tile of T, without those that the arm cannot reach; always the same ones."""
+    """One random goal in each tile of T that the arm can reach; equal in every run."""
     box = arm.outcomes
     goals = tile_goals(np.tile(_grid(box, SIDE), (2, 1)), box, SIDE, stream(0, "goals for an arm"))
     return Benchmark(type(arm).__name__, goals[arm.reachable(goals)], SIDE)
 
 
 def arm_demonstrations(arm: PlanarArm) -> list[Demonstration]:
-    """Movements from rest to postures with all bends equal; their end positions are spread evenly within reach."""
-    shares = (np.arange(SHOWN) + 0.5) / SHOWN  # of the area within reach: a sunflower's spiral
+    """Movements from rest to postures with equal joint angles; their ends spread evenly over the reachable disc."""
+    shares = (np.arange(SHOWN) + 0.5) / SHOWN  # of the disc's area, along a sunflower spiral
     turns = np.pi * (3 - np.sqrt(5)) * np.arange(SHOWN)
     ends = np.sqrt(shares)[:, None] * np.stack([np.cos(turns), np.sin(turns)], axis=1)
     return [_led_to(arm, end) for end in ends]
 
 
 def _grid(box: Box, side: float) -> Array:
-    """``(n, dim)``, the middles of tiles."""
+    """``(n, dim)`` centres of tiles."""
     middles = [np.arange(low + side / 2, high, side) for low, high in zip(box.low, box.high, strict=True)]
     return np.stack(np.meshgrid(*middles), axis=-1).reshape(-1, box.dim)
 
