@@ -80,9 +80,9 @@ def run(
         NoOutcomeError: ``failures`` movements in a row have failed. They are made; a `run` may go on after them.
     """
     check_count("failures", failures, 1)
-    check_instance(environment)
     if not isinstance(learner, Learner):
         raise ValueError(f"learner must be a Learner, got a {type(learner).__name__}; sagg_riac(environment, seed)?")
+    check_instance(environment)
     if teacher is not None and not isinstance(teacher, Teacher):
         raise ValueError(f"teacher must be a Teacher, got a {type(teacher).__name__}; PeriodicTeacher(shown, rng)?")
     made = learner.movements

@@ -26,10 +26,12 @@ class Built(ABC):  # noqa: B024
         if isinstance(make, cls) or not callable(make):
             raise ValueError(f"a {kind} is given as its constructor, got a {type(make).__name__} that is made already")
         found = function_of(make)
+        if isinstance(found, type) and not issubclass(found, cls):
+            raise ValueError(f"{found.__name__} must derive from {kind} of sgimd_torch.parts")
         if isinstance(found, ABCMeta) and found.__abstractmethods__:
             missing = ", ".join(sorted(found.__abstractmethods__))
             raise ValueError(f"{found.__name__} has no {missing}, which {kind} demands; see sgimd_torch.parts")
         made: Any = called(f"{kind} {found.__name__}", make, *given)
         if not isinstance(made, cls):
-            raise ValueError(f"{found.__name__} must derive from {kind} of sgimd_torch.parts, or give one")
+            raise ValueError(f"{found.__name__} must give a {kind} of sgimd_torch.parts, got a {type(made).__name__}")
         return made

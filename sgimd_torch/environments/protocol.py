@@ -16,6 +16,8 @@ from numpy.typing import ArrayLike
 
 from sgimd_torch.spaces import Array, Box, check_point, check_vector, first_entry, read_only
 
+MEMBERS: Final = ("contexts", "policies", "outcomes", "rest", "outcome_noise", "observe", "execute")
+
 
 class Environment(Protocol):
     """A robot and its world. No state carries over from one movement to the next."""
@@ -283,15 +285,15 @@ def check_instance(environment: object) -> None:
     """Refuse a class, or another object, in place of an environment.
 
     Raises:
-        ValueError: ``environment`` is a class, or lacks ``policies``.
+        ValueError: ``environment`` is a class, or lacks a member.
     """
     if isinstance(environment, type):
         name = environment.__name__
         raise ValueError(f"an environment is wanted, got the class {name} itself; write {name}()")
-    if not hasattr(environment, "policies"):
-        raise ValueError(
-            f"an environment is wanted, got a {type(environment).__name__}; is the order of arguments right?"
-        )
+    missing = [name for name in MEMBERS if not hasattr(environment, name)]
+    if missing:
+        hint = f"it has no {', '.join(missing)}" if len(missing) < len(MEMBERS) else "is the order of arguments right?"
+        raise ValueError(f"an environment is wanted, got a {type(environment).__name__}; {hint}")
 
 
 def check_robot(environment: Environment) -> None:
