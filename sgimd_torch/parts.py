@@ -31,7 +31,7 @@ class Problem:
         environment: robot and world; its boxes, rest and noise are read, it is not executed.
         seed: number from which all random streams of the learner come, at least 0.
         memory: exemplars to start from, which are copied; None for none.
-        inverse: constructor of the inverse model; None for a learner that is given one later.
+        inverse: constructor of the inverse model.
 
     Attributes:
         contexts, policies, outcomes: boxes C, Pi and T.
@@ -57,7 +57,7 @@ class Problem:
         seed: int,
         memory: Memory | None = None,
         *,
-        inverse: Callable[[Problem], Inverse] | None = None,
+        inverse: Callable[[Problem], Inverse],
     ) -> None:
         check_robot(environment)
         self.contexts, self.policies, self.outcomes = environment.contexts, environment.policies, environment.outcomes
@@ -68,8 +68,7 @@ class Problem:
         self.memory = Memory(*self.dims) if memory is None else memory.copy_for(self.dims)
         self.policies.check("thetas of a memory to start from", self.memory.thetas, "of another robot?")
         self.remarks: list[str] = []
-        if inverse is not None:
-            self.inverse = Inverse.of(inverse, self)
+        self.inverse = Inverse.of(inverse, self)
 
     @property
     def dims(self) -> tuple[int, int, int]:

@@ -156,6 +156,7 @@ class Sketch:
 Tracer = Callable[[Array, Array, np.random.Generator], Trace]
 """(context, theta, rng) -> the movement, to be filmed."""
 
+_MEMBERS: Final = ("contexts", "policies", "outcomes", "rest", "outcome_noise", "observe", "execute")
 FAILURES: Final = 10
 """Number of failed movements in a row that end a run."""
 
@@ -295,12 +296,16 @@ def check_instance(environment: object) -> None:
 
 
 def check_robot(environment: Environment) -> None:
-    """Refuse an environment whose rest or noise makes no sense, before a learner is built for it.
+    """Refuse an environment that lacks a member or whose rest or noise makes no sense, before a learner is built.
 
     Raises:
-        ValueError: a class, a rest that is not one point of T, or a noise that is negative or not finite.
+        ValueError: a class, a missing member, a rest that is not one point of T, or a noise that is negative or not
+            finite.
     """
     check_instance(environment)
+    if missing := [name for name in _MEMBERS if not hasattr(environment, name)]:
+        name = type(environment).__name__
+        raise ValueError(f"{name} has no {', '.join(missing)}; an environment has {', '.join(_MEMBERS)}")
     if environment.outcomes.check("rest of the environment", environment.rest, "is it a theta?").ndim != 1:
         raise ValueError(f"rest of the environment must be one outcome, got shape {np.shape(environment.rest)}")
     if not 0 <= environment.outcome_noise < np.inf:
