@@ -11,7 +11,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Generator, Sequence
 from copy import copy
-from typing import Any, ClassVar, Final, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
@@ -20,7 +20,6 @@ from sgimd_torch.environments.protocol import Environment, check_robot
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, AskingAttempt, Attempt, Demonstration, Estimate, stream
 
-LEAST_TOLERANCE: Final = 0.02  # m
 Made = TypeVar("Made")
 
 
@@ -44,8 +43,7 @@ class Problem:
         autonomous: strategy of the learner's own, made before the answer to demonstrations.
 
     Raises:
-        ValueError: ``rest`` outside T, a noise that is negative or not finite, or exemplars that this robot cannot
-            have: other dimensions, thetas outside Pi.
+        ValueError: a robot that `check_robot` refuses; exemplars of other dimensions, or with thetas outside Pi.
     """
 
     inverse: Inverse
@@ -62,9 +60,8 @@ class Problem:
         check_robot(environment)
         self.contexts, self.policies, self.outcomes = environment.contexts, environment.policies, environment.outcomes
         self.rest, self.outcome_noise, self.seed = environment.rest, environment.outcome_noise, seed
-        self.tolerance = max(environment.outcome_noise, LEAST_TOLERANCE)
-        self._streams: dict[str, np.random.Generator] = {}
-        self._shared: dict[type, Any] = {}
+        self.tolerance = max(environment.outcome_noise, 0.02)
+        self._shared: dict[object, Any] = {}
         self.memory = Memory(*self.dims) if memory is None else memory.copy_for(self.dims)
         self.policies.check("thetas of a memory to start from", self.memory.thetas, "of another robot?")
         self.remarks: list[str] = []
@@ -77,16 +74,13 @@ class Problem:
 
     def stream(self, name: str) -> np.random.Generator:
         """The random stream of a name; the same name gives the same stream."""
-        if name not in self._streams:
-            self._streams[name] = stream(self.seed, name)
-        return self._streams[name]
+        return self.shared(name, lambda: stream(self.seed, name))
 
-    def shared(self, kind: type[Made], make: Callable[[], Made] | None = None) -> Made:
-        """The one object of this ``kind``, for all parts that ask; made at the first call."""
-        if kind not in self._shared:
-            self._shared[kind] = kind() if make is None else make()
-        found: Made = self._shared[kind]
-        return found
+    def shared(self, key: object, make: Callable[[], Made]) -> Made:
+        """The one object of this ``key``, for all parts that ask; made at the first call."""
+        if key not in self._shared:
+            self._shared[key] = make()
+        return self._shared[key]
 
     def over(self, memory: Memory) -> Problem:
         """This problem with another memory, for a part that looks at some exemplars only."""
@@ -101,20 +95,17 @@ class Problem:
 
 
 class Part(Built):
-    """A part of a learner."""
+    """A part of a learner. One that draws has ``rng`` for it, the random stream ``draws_from`` of the problem."""
+
+    draws_from: str = ""
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
 
-
-class RandomPart(Part):
-    """A part that draws, from ``rng`` alone: the stream ``draws_from`` of the problem."""
-
-    draws_from: ClassVar[str]
-
-    def __init__(self, problem: Problem) -> None:
-        super().__init__(problem)
-        self.rng = problem.stream(self.draws_from)
+    @property
+    def rng(self) -> np.random.Generator:
+        """Random stream of this part."""
+        return self.problem.stream(self.draws_from)
 
 
 class Trained(ABC):
@@ -129,7 +120,7 @@ class Trained(ABC):
         """A `runs.listeners.Listener` that does so in this `runs.run.Life`."""
 
 
-class Goals(RandomPart):
+class Goals(Part):
     """Goal model: which goal next, given what came of earlier ones (section 3.2). `goals.checks` has its checks."""
 
     draws_from = "goals"
@@ -185,7 +176,7 @@ class Inverse(Part):
         return None
 
 
-class Search(RandomPart):
+class Search(Part):
     """Search: movement by movement from an estimate towards a goal (section 4.4.2)."""
 
     draws_from = "search"
@@ -195,7 +186,7 @@ class Search(RandomPart):
         """Yield thetas ``(theta_dim,)`` in Pi to execute; each is sent its outcome ``(outcome_dim,)``."""
 
 
-class Explore(RandomPart):
+class Explore(Part):
     """Global exploration: movements where the inverse model knows nothing (section 4.4.1)."""
 
     draws_from = "look"

@@ -24,9 +24,11 @@ from sgimd_torch.spaces import Array, Attempt, Demonstration, Move, check_count
 class Babble(Strategy):
     """Random exploration of the policy space: one uniform theta."""
 
+    draws_from = "babble"
+
     def attempt(self, context: Array) -> Attempt:
         """One movement."""
-        yield Move(self.problem.policies.sample(self.problem.stream("babble")), None, "babble")
+        yield Move(self.problem.policies.sample(self.rng), None, "babble")
 
 
 class Rest(Strategy):
@@ -62,6 +64,8 @@ class GoalBabbling(Strategy):
         ValueError: a number out of its range, or a part of another kind.
     """
 
+    draws_from = "regime"
+
     def __init__(
         self,
         problem: Problem,
@@ -83,7 +87,7 @@ class GoalBabbling(Strategy):
             raise ValueError(f"global_range must be two probabilities, the least first, got {global_range}")
         if not give_up <= 0:
             raise ValueError(f"give_up must be a competence, 0 at most, got {give_up}")
-        self.memory, self.inverse, self.rng = problem.memory, problem.inverse, problem.stream("regime")
+        self.memory, self.inverse = problem.memory, problem.inverse
         self.competence = Competence(problem)
         self.explore = Explore.of(explore, problem)
         self.goals = Goals.of(goals, problem)
@@ -190,7 +194,7 @@ class Mimic(Social):
         if not 0 <= epsilon < np.inf:
             raise ValueError(f"epsilon must be a bound of variations, finite and >= 0, got {epsilon}")
         self.repeats = repeats if repeats is None else check_count("repeats", repeats, 1)
-        self.epsilon, self.rng = epsilon, problem.stream(draws_from)
+        self.epsilon, self.draws_from = epsilon, draws_from
 
     def attempt(self, context: Array, theta_d: Array, demonstration: Demonstration) -> Attempt:
         """theta_d, then its variations."""

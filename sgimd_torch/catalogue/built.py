@@ -16,7 +16,8 @@ class Built(ABC):  # noqa: B024
         """The thing of this class that a constructor builds from what it is ``given``.
 
         Raises:
-            ValueError: no constructor, an abstract method is missing, or what was built is of another class.
+            ValueError: no constructor, one that takes something else, an abstract method is missing, or what was built
+                is of another class.
         """
         kind = cls.__name__
         if isinstance(make, str):
@@ -31,7 +32,7 @@ class Built(ABC):  # noqa: B024
         if isinstance(found, ABCMeta) and found.__abstractmethods__:
             missing = ", ".join(sorted(found.__abstractmethods__))
             raise ValueError(f"{found.__name__} has no {missing}, which {kind} demands; see sgimd_torch.parts")
-        made: Any = called(found.__name__, make, *given)
+        made: Any = called(f"{kind} {found.__name__}", make, *given)
         if not isinstance(made, cls):
             raise ValueError(f"{found.__name__} must give a thing of class {kind}, gave a {type(made).__name__}")
         return made

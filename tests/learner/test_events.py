@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from sgimd_torch.teachers.by_hand import ByHand
 
 from sgimd_torch.algorithms import observation, sgim_d
 from sgimd_torch.asking.algorithms import SEARCHING, sgim_acts
@@ -18,7 +19,6 @@ from sgimd_torch.record.lives import load_life, save_life
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Demonstration, stream
 from sgimd_torch.teachers import AskedTeacher, PeriodicTeacher
-from sgimd_torch.teachers.by_hand import ByHand
 from worlds import demonstrate, last_posture
 
 ARM = PlanarArm(3, noise=0.02, context=True)

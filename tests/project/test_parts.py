@@ -109,6 +109,13 @@ class Halfway(Goals):
         return context
 
 
+class Unasked(UniformGoals):
+    """Goals that take no problem."""
+
+    def __init__(self):
+        pass
+
+
 class Alien:
     """What could be goals but is not."""
 
@@ -124,6 +131,7 @@ class Alien:
         ("grid", "given as its constructor, got 'grid'; from sgimd_torch.goals.progress_grid import ProgressGrid"),
         ("gird", "unknown goals 'gird'; did you mean grid?"),
         (UniformGoals(problem()), "given as its constructor, got a UniformGoals that is made already"),
+        (Unasked, "Goals Unasked cannot be called as others of its kind are: too many positional arguments"),
         (NelderMead, "NelderMead must derive from Goals"),
         (Alien, "Alien must derive from Goals"),
     ],
