@@ -22,9 +22,10 @@ class Built(ABC):  # noqa: B024
         kind = cls.__name__
         if isinstance(make, str):
             module, _, name = place_of(kind.lower(), make).partition(":")
-            raise ValueError(f"a {kind} is given as its constructor, got {make!r}; from {module} import {name}")
+            raise ValueError(f"{kind} must be given as its constructor, got {make!r}; from {module} import {name}")
         if isinstance(make, cls) or not callable(make):
-            raise ValueError(f"a {kind} is given as its constructor, got a {type(make).__name__} that is made already")
+            made_already = " that is made already" if isinstance(make, cls) else ""
+            raise ValueError(f"{kind} must be given as its constructor, got a {type(make).__name__}{made_already}")
         found = function_of(make)
         if isinstance(found, type) and not issubclass(found, cls):
             raise ValueError(f"{found.__name__} must derive from {kind} of sgimd_torch.parts")
@@ -33,5 +34,5 @@ class Built(ABC):  # noqa: B024
             raise ValueError(f"{found.__name__} has no {missing}, which {kind} demands; see sgimd_torch.parts")
         made: Any = called(f"{kind} {found.__name__}", make, *given)
         if not isinstance(made, cls):
-            raise ValueError(f"{found.__name__} must give a {kind} of sgimd_torch.parts, got a {type(made).__name__}")
+            raise ValueError(f"{found.__name__} must give a thing of class {kind}, gave a {type(made).__name__}")
         return made

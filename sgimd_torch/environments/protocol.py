@@ -290,17 +290,19 @@ def check_instance(environment: object) -> None:
     if isinstance(environment, type):
         name = environment.__name__
         raise ValueError(f"an environment is wanted, got the class {name} itself; write {name}()")
-    missing = [name for name in MEMBERS if not hasattr(environment, name)]
+    name, missing = type(environment).__name__, [each for each in MEMBERS if not hasattr(environment, each)]
+    if len(missing) == len(MEMBERS):
+        raise ValueError(f"an environment is wanted, got a {name}; is the order of arguments right?")
     if missing:
-        hint = f"it has no {', '.join(missing)}" if len(missing) < len(MEMBERS) else "is the order of arguments right?"
-        raise ValueError(f"an environment is wanted, got a {type(environment).__name__}; {hint}")
+        raise ValueError(f"{name} has no {', '.join(missing)}; an environment has {', '.join(MEMBERS)}")
 
 
 def check_robot(environment: Environment) -> None:
-    """Refuse an environment whose rest or noise makes no sense, before a learner is built for it.
+    """Refuse an environment that lacks a member or whose rest or noise makes no sense, before a learner is built.
 
     Raises:
-        ValueError: a class, a rest that is not one point of T, or a noise that is negative or not finite.
+        ValueError: a class, a missing member, a rest that is not one point of T, or a noise that is negative or not
+            finite.
     """
     check_instance(environment)
     if environment.outcomes.check("rest of the environment", environment.rest, "is it a theta?").ndim != 1:

@@ -16,11 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sgimd_torch.learner.events import Event, Kind
-from sgimd_torch.learner.replay import ReplayError
 from sgimd_torch.parts import Inverse, Problem, Social, Strategy
 from sgimd_torch.spaces import Array, AskingAttempt, Demonstration, Lesson, Move, Request, check_point, read_only
-
-__all__ = ["Correspondence", "Learner", "ReplayError"]
 
 Correspondence = Callable[[Array, Array], Array]
 """Function from times ``(n_times,)`` and trajectory ``(n_times, n_joints)`` to theta_d ``(theta_dim,)``, eq. (6)."""

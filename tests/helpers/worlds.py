@@ -46,7 +46,7 @@ def problem(
     rest: Sequence[float] | Array | None = None,
     noise: float = 0.0,
     memory: Memory | None = None,
-    inverse: Callable[[Problem], Inverse] | None = None,
+    inverse: Callable[[Problem], Inverse] = NearestNeighbour,
     seed: int = 0,
 ) -> Problem:
     """The problem of an environment; without one, of these boxes.
@@ -59,10 +59,10 @@ def problem(
         outcomes = outcomes or Box.cube(-1, 1, t)
         at_rest = outcomes.clip(np.zeros(outcomes.dim)) if rest is None else np.array(rest, dtype=float)
         environment = Boxes(contexts or Box.cube(0, 1, c), policies or Box.cube(0, 1, p), outcomes, at_rest, noise)
-    found = Problem(environment, seed, inverse=inverse or NearestNeighbour)
+    found = Problem(environment, seed, inverse=inverse)
     if memory is not None:
         found = found.over(memory)
-        found.inverse = Inverse.of(inverse or NearestNeighbour, found)
+        found.inverse = inverse(found)
     return found
 
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from sgimd_torch.teachers.by_hand import ByHand
 
 from sgimd_torch.algorithms import observation, sgim_d
 from sgimd_torch.asking.algorithms import SEARCHING, sgim_acts
@@ -18,6 +17,7 @@ from sgimd_torch.record import Record
 from sgimd_torch.record.lives import load_life, save_life
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Demonstration, stream
+from sgimd_torch.teach.by_hand import ByHand
 from sgimd_torch.teachers import AskedTeacher, PeriodicTeacher
 from worlds import demonstrate, last_posture
 

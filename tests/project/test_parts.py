@@ -34,7 +34,7 @@ LEARNING = (
 BY_NAME = {"getattr", "hasattr", "attrgetter"}
 FIELDS = {  # file and definition that go through the fields of a class: why
     ("goals/regions", "Region"): "hands out its own arrays read-only",
-    ("learner/replay", "_check_lesson"): "compares two demonstrations field by field",
+    ("record/replay", "_check_lesson"): "compares two demonstrations field by field",
     ("forward_model/model", "ForwardModel"): "compares its sizes with those of a memory",
 }
 SIGNATURES = {"signature", "Signature", "getfullargspec", "parameters_of", "__code__", "__defaults__", "__kwdefaults__"}
