@@ -19,7 +19,7 @@ from sgimd_torch.learner import Correspondence, Learner
 from sgimd_torch.memory import Memory
 from sgimd_torch.rivals import quality_diversity
 from sgimd_torch.runs.tasks import Task
-from sgimd_torch.runs.tasks.robots import toy_benchmark
+from sgimd_torch.runs.tasks.toys import toy_benchmark
 from sgimd_torch.spaces import Array, Box
 
 

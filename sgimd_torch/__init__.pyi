@@ -1,8 +1,8 @@
-from .algorithms import imitation as imitation
-from .algorithms import observation as observation
-from .algorithms import random_exploration as random_exploration
-from .algorithms import sagg_riac as sagg_riac
-from .algorithms import sgim_d as sgim_d
+from .algorithms.paper import imitation as imitation
+from .algorithms.paper import observation as observation
+from .algorithms.paper import random_exploration as random_exploration
+from .algorithms.paper import sagg_riac as sagg_riac
+from .algorithms.paper import sgim_d as sgim_d
 from .algorithms.practice import practice as practice
 from .algorithms.practice import practice_taught as practice_taught
 from .competence import performance as performance

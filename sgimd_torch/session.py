@@ -24,8 +24,8 @@ from sgimd_torch.parts import Teacher
 from sgimd_torch.spaces import Array, Demonstration, Episode, Request, check_count, check_point, read_only, stream
 
 if TYPE_CHECKING:
+    from sgimd_torch.learner.requests import Demonstrator
     from sgimd_torch.record import Record
-    from sgimd_torch.teachers import Demonstrator
 
 Execute = Callable[[int, Array, Array], Array]
 """(index, context, theta) -> outcome of movement ``index``."""

@@ -9,15 +9,13 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
 from sgimd_torch.competence import Competence
 from sgimd_torch.explore.anywhere import Anywhere
-from sgimd_torch.goals.interest_map import InterestMap
-from sgimd_torch.goals.regions import Region
 from sgimd_torch.parts import Explore, Goals, Judge, Problem, Search, Social, Strategy
-from sgimd_torch.searches.simplex import NelderMead
 from sgimd_torch.spaces import Array, Attempt, Demonstration, Move, check_count
 
 
@@ -70,8 +68,8 @@ class GoalBabbling(Strategy):
         self,
         problem: Problem,
         *,
-        goals: Callable[[Problem], Goals] = InterestMap,
-        search: Callable[[Problem], Search] = NelderMead,
+        goals: Callable[[Problem], Goals],
+        search: Callable[[Problem], Search],
         explore: Callable[[Problem], Explore] = Anywhere,
         judge: Callable[[Problem], Judge] = Competence,
         budget: int = 15,
@@ -97,7 +95,7 @@ class GoalBabbling(Strategy):
         self.tolerance, self.global_range, self.give_up = tolerance, global_range, give_up
 
     @property
-    def regions(self) -> Sequence[Region]:
+    def regions(self) -> Sequence[Any]:
         """Regions of its goal model."""
         return self.goals.regions
 

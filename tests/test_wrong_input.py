@@ -8,7 +8,7 @@ import pytest
 
 import sgimd_torch as s
 from sgimd_torch.__main__ import _call
-from sgimd_torch.algorithms import sgim_d
+from sgimd_torch.algorithms.paper import sgim_d
 from sgimd_torch.environments.protocol import execute_many
 from sgimd_torch.evaluation import evaluate
 from sgimd_torch.runs.process import command
@@ -203,7 +203,7 @@ CALLS = {
     "swapped": (lambda: s.sagg_riac(0, ARM), "an environment is wanted, got a int; is the order of arguments right?"),
     "swapped in a run": (
         lambda: next(s.run(ARM, learner(), 0, movements=3)),
-        "an environment is wanted, got a Learner; is the order of arguments right?",
+        "learner must be a Learner, got a PlanarArm",
     ),
     "a builder": (lambda: next(s.run(s.sagg_riac, ARM, 0, movements=3)), "learner must be a Learner, got a function"),
     "a list for a teacher": (

@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 import numpy as np
 import pytest
 
-from sgimd_torch.algorithms import imitation, observation, random_exploration, sagg_riac, sgim_d
+from sgimd_torch.algorithms.paper import imitation, observation, random_exploration, sagg_riac, sgim_d
 from sgimd_torch.catalogue import load_word
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.environments.protocol import Environment

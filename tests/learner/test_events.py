@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sgimd_torch.algorithms import observation, sgim_d
+from sgimd_torch.algorithms.paper import observation, sgim_d
 from sgimd_torch.asking.algorithms import SEARCHING, sgim_acts
 from sgimd_torch.asking.teachers import AnsweringTeacher
 from sgimd_torch.environments.planar_arm import PlanarArm

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from runs import edit
-from sgimd_torch.algorithms import observation, random_exploration, sagg_riac, sgim_d
+from sgimd_torch.algorithms.paper import observation, random_exploration, sagg_riac, sgim_d
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import evaluate
 from sgimd_torch.inverses.local_process import LocalProcess

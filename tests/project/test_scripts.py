@@ -14,7 +14,7 @@ import check_physics
 import make_benchmark
 import make_demonstrations
 import make_teachers
-from sgimd_torch.algorithms import random_exploration, sagg_riac, sgim_d
+from sgimd_torch.algorithms.paper import random_exploration, sagg_riac, sgim_d
 from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.evaluation import load_benchmark, tile_goals

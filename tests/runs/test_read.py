@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from runs import edit, settle
-from sgimd_torch.algorithms import random_exploration
+from sgimd_torch.algorithms.paper import random_exploration
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.learner.events import Kind
 from sgimd_torch.record import DERIVED, Record, RunError
