@@ -53,7 +53,7 @@ def babbling(memory: Memory, *, goal: Array = FAR, seed: int = 0, **options) -> 
     given = problem(ARM, memory=memory, inverse=NearestNeighbour, seed=seed)
     usual = {"search": Perturb, "budget": 12, "tolerance": 1e-9, "global_range": (0.0, 0.0), "give_up": -1.0}
     parts = {"goals": partial(Diary, goal=goal), "judge": AttemptCompetence, **usual, **options}
-    given.autonomous = GoalBabbling(given, **parts)
+    given.autonomous = GoalBabbling(given, **{"goals": InterestMap, "search": NelderMead, **parts})
     return given.autonomous
 
 

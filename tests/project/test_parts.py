@@ -81,7 +81,7 @@ def test_a_use_by_name_is_found(tmp_path):
 def given():
     """The problem of a small arm, with an inverse model and goal babbling."""
     made = problem(PlanarArm(3), inverse=NearestNeighbour)
-    made.autonomous = GoalBabbling(made)
+    made.autonomous = GoalBabbling(made, goals=UniformGoals, search=NelderMead)
     return made
 
 
