@@ -170,7 +170,7 @@ def runs_of(experiments: Sequence[str], only: Sequence[str], seeds: Sequence[int
 
 def last_rows(experiment: str, config: Config) -> set[tuple[Any, ...]]:
     """Keys of the rows of a run's last evaluation; if they are in the table, so are the others."""
-    answers = {own_answer(config) if answer == OWN else answer for answer in config.answered}
+    answers = {own_answer(config) if answer == OWN else answer for answer in config.evaluated_by}
     answers.intersection_update(ANSWERS.get(experiment, ALIKE))
     return {(experiment, config.variant, config.seed, config.movements, answer) for answer in answers}
 

@@ -15,12 +15,11 @@ from typing import Final
 
 import numpy as np
 
-from sgimd_torch.algorithms import answering, start_memory
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Learner
-from sgimd_torch.memory import Memory
-from sgimd_torch.spaces import Array, Attempt, Move, stream
+from sgimd_torch.parts import Problem, Strategy
+from sgimd_torch.spaces import Array, Attempt, Move
 
 HOMEWARD: Final = 0.1  # of ways begin with the movement home
 NEAREST: Final = 20  # outcomes around a goal that the estimate is made from
@@ -29,22 +28,21 @@ ORIGIN: Final = "home-babbling"
 TINY: Final = np.finfo(float).tiny
 
 
-class HomeBabbling:
+class HomeBabbling(Strategy):
     """A way of goals each attempt.
 
     Args:
-        environment: its boxes are read.
-        memory: of the learner, which began empty.
-        rng: draws goals and variations.
+        problem: what has to be learnt; its memory began empty.
         steps: movements on a way.
         sd: standard deviation of the variations, in sides of Pi.
     """
 
-    def __init__(
-        self, environment: Environment, memory: Memory, rng: np.random.Generator, *, steps: int = 10, sd: float = 0.1
-    ) -> None:
-        self.policies, self.outcomes = environment.policies, environment.outcomes
-        self.memory, self.rng, self.steps, self.sd = memory, rng, steps, sd
+    draws_from = ORIGIN
+
+    def __init__(self, problem: Problem, *, steps: int = 10, sd: float = 0.1) -> None:
+        super().__init__(problem)
+        self.policies, self.outcomes, self.memory = problem.policies, problem.outcomes, problem.memory
+        self.steps, self.sd = steps, sd
         self.home = (self.policies.low + self.policies.high) / 2
         self._from: Array | None = None  # where the last way ended; None: at home
         self._weights: list[float] = []  # of each exemplar
@@ -92,14 +90,15 @@ def home_babbling(environment: Environment, seed: int, *, steps: int = 10, sd: f
     """Goal babbling from home; the learner answers by `LocalProcess`, as others do.
 
     Args:
-        environment, steps, sd: as in `HomeBabbling`.
-        seed: of this learner's stream.
+        environment: robot, which is not executed here.
+        seed: number from which the random stream of the learner comes.
+        steps: movements on a way.
+        sd: standard deviation of the variations, in sides of Pi.
 
     Raises:
         ValueError: an environment with contexts, between which a way cannot go.
     """
     if environment.contexts.dim:
         raise ValueError(f"home babbling knows one context only, got contexts of dim {environment.contexts.dim}")
-    memory = start_memory(environment, None)
-    babbling = HomeBabbling(environment, memory, stream(seed, ORIGIN), steps=steps, sd=sd)
-    return Learner(memory, babbling, inverse=answering(environment, memory, LocalProcess))
+    problem = Problem(environment, seed, inverse=LocalProcess)
+    return Learner(problem, HomeBabbling(problem, steps=steps, sd=sd))

@@ -15,6 +15,7 @@ from typing import Any, Final
 import numpy as np
 import pandas as pd
 
+from sgimd_torch.asking.teachers import middle
 from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.files import make_folder, write_text
 from sgimd_torch.runs.build import task_of
@@ -22,7 +23,6 @@ from sgimd_torch.runs.config import OWN, Config
 from sgimd_torch.runs.read import Run
 from sgimd_torch.runs.tasks import benchmark_of, demonstrations_of
 from sgimd_torch.spaces import Array
-from sgimd_torch.teachers.answering import middle
 from variants import ALIKE, ANSWERS
 
 Row = dict[str, Any]
@@ -163,7 +163,7 @@ def asked_rows(config: Config, run: Run) -> list[Row]:
     ``late``: from movement 1000 on, ``late_own``: of these in the teacher's half (if teachers have one); ``strong`` and
     ``weak``: where the first context is in the outer and in the inner third of its range.
     """
-    if "teachers" not in config:
+    if config.teaching != "teachers":
         return []
     task = task_of(config)
     dim, contexts = task.environment.contexts.dim, task.environment.contexts
@@ -173,7 +173,7 @@ def asked_rows(config: Config, run: Run) -> list[Row]:
     border = (2 * (asked["wanted_0"] - contexts.low[0]) / contexts.sides[0] - 1).abs() if dim else 0 * asked["index"]
     late = asked["index"] >= LATE
     rows: list[Row] = []
-    for teacher in config["teachers"]:
+    for teacher in config.teachers or ("all",):
         own = low_half if teacher == "low-half" else ~low_half
         mine, shown, near = asked["teacher"] == teacher, asked["reply"] == "shown", (border < 1 / 3) & bool(dim)
         counted = (mine, mine & shown, mine & late, mine & late & own, mine & (border > 2 / 3), mine & near)

@@ -41,12 +41,12 @@ with loading():  # Ctrl-C shows no traceback
     )
     from sgimd_torch.evaluation import Benchmark, load_benchmark
     from sgimd_torch.goals.uniform import UniformGoals
-    from sgimd_torch.inverses.local import NearestNeighbour
     from sgimd_torch.inverses.local_process import LocalProcess
+    from sgimd_torch.inverses.nearest import NearestNeighbour
     from sgimd_torch.learner import Learner
     from sgimd_torch.rivals.quality_diversity import cma_mae, cma_me, isoline, map_elites
     from sgimd_torch.runs.sweep import add_options
-    from sgimd_torch.searches.perturb import perturb
+    from sgimd_torch.searches.perturb import Perturb
     from table import Row, merge, read_table
 
 TABLE, FIRST_TUNING_SEED = "rivals.csv", 1000
@@ -66,7 +66,7 @@ class Rival(NamedTuple):
 
 def baseline(rod: FishingRod, seed: int, *, correspondence: Any, sd: float = 0.05, budget: int = 15) -> Learner:
     """The field's standard one: uniform goals, demonstrations, noise around the nearest movement."""
-    search = partial(perturb, sd=sd)
+    search = partial(Perturb, sd=sd)
     return sgim_d(
         rod,
         seed,
@@ -120,10 +120,7 @@ def errors_of(
     for episode in run(learner, rod, seed, movements=max(times), teacher=teacher):
         if episode.index + 1 in times:
             judged = (rod, benchmark.goals, seed, episode.index + 1)
-            linear, process = (
-                LocallyLinear(learner.memory),
-                LocalProcess(learner.memory, outcome_noise=rod.outcome_noise),
-            )
+            linear, process = LocallyLinear(learner.problem), LocalProcess(learner.problem)
             linear_error, process_error = (evaluate(each, *judged, repeats=0).mean_error for each in (linear, process))
             found.append((linear_error, process_error))
     return found

@@ -137,7 +137,7 @@ SESSION: Final[Variant] = {"movements": 1000, "evaluate_at": (300, 500)}  # and 
 SHOWN: Final[dict[str, Variant]] = {"goals": {**SGIM_D, "teacher": "initial"}, "practice": TAUGHT}
 # Movements of an arm take no time, so training may take more.
 ON_ARMS: Final[Variant] = {"movements": 2000, "evaluate_at": (250, 500, 1000)}  # and at the end
-LONGER: Final[Variant] = {"model.rate": 2.0}
+LONGER: Final[Variant] = {"inverse.rate": 2.0}
 
 # Learners that ask. All are answered by ``process``, too, the answer of those that practise.
 IM: Final[Variant] = {"algorithm": "sgim-im"}
@@ -153,10 +153,10 @@ ASKING: Final[dict[str, Variant]] = {
     "sgim-im": IM,
     "sgim-im-83": {**IM, "demonstrations": MANY},
     "sgim-im-cost-10": {**IM, "cost": 10.0},
-    "sgim-im-search": {**IM, "base": "search"},
+    "sgim-im-search": {"algorithm": "sgim-im-search"},
     **{f"sgim-acts-{number}": {**ACTS, "teachers": (f"demonstrator-{number}",)} for number in (1, 2, 3)},
     "sgim-acts-four": {**ACTS, "teachers": FOUR},
-    "sgim-acts-four-search": {**ACTS, "teachers": FOUR, "base": "search"},
+    "sgim-acts-four-search": {"algorithm": "sgim-acts-search", "teachers": FOUR},
     "sgim-acts-halves": {**ACTS, "teachers": HALVES},
     "sgim-eer": {"algorithm": "sgim-eer"},
     "alone-toss": {**UNIFORM_PRACTICE, **TOSS},
@@ -379,6 +379,6 @@ def make_subsets(folder: Path, *, by_hand: bool = False) -> None:
     for name, chosen in (*first, (HALF, right), (CORNER, corner), (SHUFFLED, shuffled)):
         save_demonstrations(folder / name, chosen)
     if by_hand:
-        from parts import lessons_of_a_script  # MuJoCo is loaded only when it is needed
+        from hand import lessons_of_a_script  # MuJoCo is loaded only when it is needed
 
         save_demonstrations(folder / HAND, [lesson.demonstration for lesson in lessons_of_a_script()])

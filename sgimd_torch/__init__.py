@@ -9,16 +9,18 @@ Where each part of the paper lives:
     4.1    motor primitives, correspondence                environments.motor_primitives (eqs. 5, 6)
     4.2    imitate a policy                                strategies
     4.3    performance                                     competence (eq. 7)
-    4.4    goal-directed policy optimisation               strategies, inverses (eqs. 8, 9), searches
+    4.4    goal-directed policy optimisation               strategies, explore, inverses (eqs. 8, 9), searches
     5.2    evaluation                                      evaluation (eq. 10)
     5.3    demonstrations and teachers                     demonstrations, teachers
-    -      asking teachers: SGIM-IM, SGIM-ACTS             learner.asking, goals.strategic, teachers.answering
-    -      our addition: a forward model                   forward_model, inverses.through_model, searches.through_model
+    -      practice, our default learner                   algorithms.practice, goals.within_reach, explore
+    -      asking teachers: SGIM-IM, SGIM-ACTS             asking
+    -      our addition: a forward model                   forward_model
     -      robots of gymnasium, and ours as its            environments.from_gymnasium, environments.to_gymnasium
-    -      rivals of other schools                         rivals, goals.alp_gmm, searches.cma_es
+    -      rivals of other schools                         rivals
 
-Runs on disk are made by ``runs`` and looked at by ``views``, with ``board`` (TensorBoard) and ``figures``; the command
-``sgimd`` is their front door. What this package offers by name is listed in ``__init__.pyi`` and loaded when asked for.
+What each kind of part is given and must do stands in ``parts``. A life is kept by ``record``. ``runs`` makes runs on
+disk, ``views`` shows them, with ``board`` (TensorBoard) and ``figures``; their command is ``sgimd``. Names that this
+package offers are listed in ``__init__.pyi`` and loaded when they are used.
 """
 
 import lazy_loader

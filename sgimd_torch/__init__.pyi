@@ -1,12 +1,10 @@
 from .algorithms import imitation as imitation
 from .algorithms import observation as observation
-from .algorithms import practice as practice
-from .algorithms import practice_taught as practice_taught
 from .algorithms import random_exploration as random_exploration
 from .algorithms import sagg_riac as sagg_riac
 from .algorithms import sgim_d as sgim_d
-from .algorithms.asking import sgim_acts as sgim_acts
-from .algorithms.asking import sgim_im as sgim_im
+from .algorithms.practice import practice as practice
+from .algorithms.practice import practice_taught as practice_taught
 from .competence import performance as performance
 from .demonstrations import load_demonstrations as load_demonstrations
 from .demonstrations import save_demonstrations as save_demonstrations
@@ -25,12 +23,20 @@ from .goals.interest_map import InterestMap as InterestMap
 from .goals.progress_grid import ProgressGrid as ProgressGrid
 from .goals.uniform import UniformGoals as UniformGoals
 from .inverses.local import LocalInverse as LocalInverse
-from .inverses.local import NearestNeighbour as NearestNeighbour
 from .inverses.locally_linear import LocallyLinear as LocallyLinear
+from .inverses.nearest import NearestNeighbour as NearestNeighbour
 from .learner import Learner as Learner
 from .memory import Memory as Memory
-from .searches.perturb import perturb as perturb
-from .searches.simplex import nelder_mead as nelder_mead
+from .parts import Explore as Explore
+from .parts import Goals as Goals
+from .parts import Inverse as Inverse
+from .parts import Problem as Problem
+from .parts import Search as Search
+from .parts import Teacher as Teacher
+from .record.lives import load_life as load_life
+from .record.lives import save_life as save_life
+from .searches.perturb import Perturb as Perturb
+from .searches.simplex import NelderMead as NelderMead
 from .session import run as run
 from .spaces import Box as Box
 from .spaces import Demonstration as Demonstration
@@ -41,6 +47,5 @@ from .spaces import stream as stream
 from .teachers import AskedTeacher as AskedTeacher
 from .teachers import InitialTeacher as InitialTeacher
 from .teachers import PeriodicTeacher as PeriodicTeacher
-from .teachers.answering import AnsweringTeacher as AnsweringTeacher
 
 __version__: str

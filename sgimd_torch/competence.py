@@ -1,4 +1,4 @@
-"""Performance and competence: how well was a goal met, and how well can it be met by now?
+"""Performance J rates an outcome for a goal; competence gamma is the best performance so far.
 
 Section 4.3 and eqs. (2) and (7) of Nguyen & Oudeyer (2014).
     competence = Competence(problem); competence(context, goal)   # -1 never came near ... 0 reached
@@ -13,16 +13,17 @@ from sgimd_torch.spaces import Array
 
 
 def performance(goal: Array, outcome: Array, rest: Array, d_min: float) -> Array:
-    """How nearly an outcome meets a goal: 0 when met, -1 when no better than not moving.
+    """Eq. (7): the distance left between goal and outcome, relative to the distance from the goal to ``rest``.
 
-    Eq. (7): the distance left, relative to how far the goal lies from where the float rests.
+    It is 0 when the outcome meets the goal, and -1 when it is no better than not moving.
 
     Args:
-        goal: ``(..., outcome_dim)`` metres on the water plane.
-        outcome: ``(..., outcome_dim)``; leading axes broadcast with ``goal``.
-        rest: ``(outcome_dim,)`` where the float lands without moving, the paper's tau_org.
-        d_min: metres, > 0, for example the standard deviation of the noise. Deviation: eq. (7) is 0/0 for a goal at
-            ``rest``, and near it noise alone gives -1, so goals nearer than ``d_min`` are judged as if at ``d_min``.
+        goal: ``(..., outcome_dim)`` m.
+        outcome: ``(..., outcome_dim)`` m; leading axes broadcast with ``goal``.
+        rest: ``(outcome_dim,)`` m, the outcome of not moving, the paper's tau_org.
+        d_min: least distance (m) of a goal from ``rest``, > 0, for example the standard deviation of the noise.
+            Deviation: eq. (7) is 0/0 for a goal at ``rest``, and near ``rest`` noise alone gives -1, so nearer goals
+            are judged as if they were ``d_min`` away.
 
     Returns:
         ``(...)`` in [-1, 0].
@@ -36,11 +37,13 @@ def performance(goal: Array, outcome: Array, rest: Array, d_min: float) -> Array
 
 
 class Competence(Judge):
-    """gamma of eq. (2), the `memory` reading: the best performance remembered. In one context it never falls.
+    """Competence by the best outcome ever remembered, as in the paper.
+
+    gamma of eq. (2), the `memory` reading. In one context it never falls.
 
     Deviation: the paper prints the minimum over memory, but J is negative, so the best is the maximum. J falls with
-    distance, so the nearest outcome has the best. Deviation: eq. (2) asks for exactly the same context, which never
-    comes again where contexts vary; the nearest exemplar in (context, outcome) is used instead.
+    distance, so the nearest outcome is the best. Deviation: eq. (2) demands an equal context, but contexts drawn from a
+    continuum never recur; the nearest exemplar in (context, outcome) is used instead.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -49,9 +52,9 @@ class Competence(Judge):
         self._row: int | None = None
 
     def __call__(self, context: Array, goal: Array, outcomes: Array | None = None) -> float:
-        """In [-1, 0], -1 for an empty memory. ``outcomes`` of the attempt are not needed: they are in memory.
+        """Competence in [-1, 0], -1 for an empty memory; the ``outcomes`` of the attempt are in memory already.
 
-        Asked again for the same goal, as after each movement of an attempt, it looks at the newest exemplars only.
+        A second call for an equal goal, as after each movement of an attempt, compares only newer exemplars.
         """
         asked = np.asarray(context).tobytes(), np.asarray(goal).tobytes()
         if asked != self._asked:
@@ -64,11 +67,13 @@ class Competence(Judge):
 
 
 class AttemptCompetence(Judge):
-    """The `attempt` reading, SAGG-RIAC's own: the best performance of this attempt alone. It can fall when a movement
-    stops working, and then the interest measure sees a change."""
+    """Competence by the best outcome of the attempt alone.
+
+    SAGG-RIAC's own. It falls when a movement stops working, so interest responds to the change.
+    """
 
     def __call__(self, context: Array, goal: Array, outcomes: Array) -> float:
-        """In [-1, 0] from the ``outcomes`` ``(n, outcome_dim)`` of this attempt, -1 if nothing was executed."""
+        """Competence in [-1, 0] by the ``outcomes`` ``(n, outcome_dim)`` of this attempt; -1 if there are none."""
         return _best(self.problem, goal, outcomes)
 
 

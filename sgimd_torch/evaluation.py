@@ -1,7 +1,7 @@
-"""Evaluation: how near does the robot come to goals spread over all that can be reached?
+"""Evaluation: the mean distance between goals spread over the reachable space and the outcomes of the answers.
 
-Section 5.2 and eq. (10) of Nguyen & Oudeyer (2014). An evaluation changes nothing: it executes without learning or
-remembering, with random streams of its own.
+Section 5.2 and eq. (10) of Nguyen & Oudeyer (2014). An evaluation does not change the learner: it executes movements
+without learning or remembering, with random streams of its own.
     benchmark = load_benchmark(); evaluation = evaluate(inverse, environment, benchmark.goals, seed, step)
 """
 
@@ -22,14 +22,19 @@ from sgimd_torch.parts import Inverse
 from sgimd_torch.spaces import Array, Box, check_count, check_vector, first_entry, stream
 
 SHIPPED = Path(__file__).with_name("data") / "benchmark.npz"
-TILES: Final = 358  # of the paper's benchmark
-SIDES: Final = np.linspace(0.025, 0.1, 301)  # of a tile in the plane, as parts of T's; they leave 1600 to 100 tiles
+TILES: Final = 358  # goals in the paper's benchmark
+SIDES: Final = np.linspace(0.025, 0.1, 301)  # sides of a tile over T's in the plane: 1600 to 100 tiles
 
 
 @dataclass(frozen=True, eq=False)
 class Benchmark:
-    """The goals that learners are judged by. ``environment`` is the class that they were made for; ``goals`` is
-    ``(n, outcome_dim)`` m; ``side`` (m) is that of the tiles that they were drawn from."""
+    """The goals of an evaluation.
+
+    Args:
+        environment: name of the class of the environment that the goals were made for.
+        goals: ``(n, outcome_dim)`` m.
+        side: side (m) of the tiles in which the goals were drawn.
+    """
 
     environment: str
     goals: Array
@@ -45,7 +50,7 @@ class Benchmark:
         if found != self.environment or environment.outcomes.dim != self.goals.shape[1]:
             raise ValueError(
                 f"the benchmark was made for the class {self.environment} ({self.goals.shape[1]} outcome dimensions), "
-                f"got {found} ({environment.outcomes.dim}); make one with sgimd benchmark"
+                f"got {found} ({environment.outcomes.dim}); sgimd benchmark makes another one"
             )
         space = environment.outcomes
         if not space.contains(self.goals).all():
@@ -58,11 +63,17 @@ class Benchmark:
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """What ``evaluate`` found. ``errors`` ``(n,)`` m, one for each goal; ``thetas`` ``(n, theta_dim)`` that were
-    executed; ``outcomes`` ``(n, outcome_dim)`` where they landed; ``scatter`` ``(n,)`` m, the mean distance of the
-    repeated landing points of each theta to their true mean (estimated, see ``evaluate``), NaN without repeats;
-    ``contexts`` ``(n, context_dim)`` in which they were executed; ``failed`` ``(n,)``, whether there was none: the
-    error is then the distance from ``rest`` to the goal, and the outcome NaN."""
+    """The result of ``evaluate``, a row for each goal.
+
+    Args:
+        errors: ``(n,)`` m; the distance from ``rest`` to the goal if the movement failed.
+        thetas: ``(n, theta_dim)``, the movements executed.
+        outcomes: ``(n, outcome_dim)``; NaN if the movement failed.
+        scatter: ``(n,)`` m, estimated mean distance of the repeated outcomes of a theta to their true mean; NaN without
+            repeats.
+        contexts: ``(n, context_dim)``, the contexts of the movements.
+        failed: ``(n,)``, whether the movement failed.
+    """
 
     errors: Array
     thetas: Array
@@ -78,25 +89,22 @@ class Evaluation:
 
     @property
     def noise_floor(self) -> float:
-        """The part of ``mean_error`` that noise alone makes, m; the rest is bias."""
+        """The part of ``mean_error`` (m) that noise alone makes; the rest is bias."""
         known = self.scatter[np.isfinite(self.scatter)]
         return float(known.mean()) if len(known) else float("nan")
 
     @property
     def without_noise(self) -> Evaluation:
-        """The same, its noise not measured."""
+        """This evaluation without ``scatter``."""
         return replace(self, scatter=np.full_like(self.scatter, np.nan))
 
     def met(self, near: float) -> int:
-        """How many goals were missed by ``near`` (m) or less."""
+        """The number of goals with an error of ``near`` (m) or less."""
         return int((self.errors <= near).sum())
 
 
 def contexts_of_goals(environment: Environment, n: int) -> Array:
-    """``(n, context_dim)`` as the environment gives them, one for each goal: the same in all evaluations of all runs.
-
-    So comparisons are paired. An environment without contexts is not asked.
-    """
+    """``(n, context_dim)``, a context observed for each goal; equal in all evaluations, so comparisons are paired."""
     if environment.contexts.dim == 0:
         return np.zeros((n, 0))
     drawn = [environment.observe(stream(0, "contexts of evaluation", goal)) for goal in range(n)]
@@ -113,22 +121,20 @@ def evaluate(
     context: ArrayLike | None = None,
     repeats: int = 3,
 ) -> Evaluation:
-    """Invert every goal, execute the result once, and ``repeats`` times more to measure the noise.
+    """Execute the answer to every goal once, and ``repeats`` times more to measure the noise.
 
-    Two inverses that are evaluated with the same ``seed`` and ``step`` get the same noise, goal by goal.
+    Two inverse models evaluated with equal ``seed`` and ``step`` get equal noise, goal by goal.
 
     Args:
-        inverse: (context, goal) -> estimate; its memory must not be empty. If it has a method ``many``, (context,
-            goals) -> estimates, that is used instead.
-        environment: executed, all goals side by side if it can do that.
+        inverse: inverse model, whose ``answer_many`` is called; its memory must not be empty.
+        environment: environment of the movements; a `BatchEnvironment` executes them together.
         goals: ``(n, outcome_dim)`` m.
-        seed, step: name the random streams: each evaluation of a run has a step of its own, such as the number of
+        seed, step: numbers of the random streams; each evaluation of a run has its own step, such as the number of
             movements so far.
-        context: in which to execute: ``(context_dim,)`` for all goals, or ``(n, context_dim)``; None draws one for
-            each goal, see `contexts_of_goals`.
-        repeats: k; 0 does not measure the noise; otherwise 2 or more, as one landing point does not scatter. Landing
-            points lie nearer to their own mean than to the true one, so the scatter is multiplied by sqrt(k / (k - 1)):
-            for Gaussian noise its mean is then the same for every k.
+        context: ``(context_dim,)`` for all goals, or ``(n, context_dim)``; None for `contexts_of_goals`.
+        repeats: number k of repetitions of each movement, 2 or more; 0 does not measure the noise. Outcomes lie nearer
+            to their own mean than to the true one, so the scatter is multiplied by sqrt(k / (k - 1)): for Gaussian
+            noise its mean is then equal for all k.
 
     Raises:
         ValueError: no goals, of another dimension, or not finite; repeats or step out of range.
@@ -146,7 +152,7 @@ def evaluate(
         given = environment.contexts.check("context", context)
         contexts = np.broadcast_to(given, (len(goals), environment.contexts.dim))
     thetas = np.stack([estimate.theta for estimate in inverse.answer_many(contexts, goals)])
-    copies = np.tile(thetas, (1 + repeats, 1))  # all goals once, then again: the judged rows do not depend on repeats
+    copies = np.tile(thetas, (1 + repeats, 1))  # all goals once, then again, so that errors do not depend on repeats
     landed = _landed(environment, np.tile(contexts, (1 + repeats, 1)), copies, seed, f"evaluation {step}")
     landed = landed.reshape(1 + repeats, *goals.shape)
     outcomes, again = landed[0], landed[1:]
@@ -160,14 +166,14 @@ def evaluate(
 
 
 def _landed(environment: Environment, contexts: Array, thetas: Array, seed: int, name: str) -> Array:
-    """``(n, outcome_dim)``, NaN for a movement that failed; movement i has stream i of this ``name``."""
+    """``(n, outcome_dim)``, NaN for a failed movement; movement i has stream i of this ``name``."""
     rows = range(len(thetas))
     if isinstance(environment, BatchEnvironment):
-        with suppress(Exception, SystemExit):  # one of them failed; which one is found below
+        with suppress(Exception, SystemExit):  # one of them failed; the loop below finds it
             return execute_many(environment, contexts, thetas, [stream(seed, name, row) for row in rows])
     landed = np.full((len(thetas), environment.outcomes.dim), np.nan)
     for row in rows:
-        with suppress(Exception, SystemExit):  # whatever a robot does, it must not end an evaluation
+        with suppress(Exception, SystemExit):  # no error of a robot may end an evaluation
             landed[row] = execute_many(environment, contexts[[row]], thetas[[row]], [stream(seed, name, row)])[0]
     return landed
 
@@ -176,10 +182,10 @@ def tile_goals(outcomes: Array, box: Box, side: float, rng: np.random.Generator)
     """One random goal in each tile of the apparent reachable space.
 
     Args:
-        outcomes: ``(n, outcome_dim)`` m, of several runs together; those outside ``box`` do not count.
+        outcomes: ``(n, outcome_dim)`` m, outcomes of several runs; outcomes outside ``box`` do not count.
         box: T.
-        side: of a tile (m).
-        rng: draws the goals.
+        side: side of a tile (m).
+        rng: random stream of the goals.
 
     Returns:
         ``(n_tiles, outcome_dim)`` m, in the order of the tiles.
@@ -191,8 +197,8 @@ def tile_goals(outcomes: Array, box: Box, side: float, rng: np.random.Generator)
 def tile_side(outcomes: Array, box: Box, tiles: int = TILES) -> float:
     """The side (m) that gives about ``tiles`` reachable tiles; other arguments as for `tile_goals`.
 
-    Tried are sides of a fortieth to a tenth of T's in the plane, and in other dimensions those that leave as many tiles
-    of T. Where less than a tenth of a side of T was reached, what was reached counts in its place.
+    In the plane the side is a fortieth to a tenth of T's; in other dimensions T has as many tiles as in the plane. If
+    outcomes span less than a tenth of a side of T, their span counts instead of that side.
     """
     inside = outcomes[box.contains(outcomes)]
     reached = np.ptp(inside, axis=0) if len(inside) else box.sides
@@ -202,11 +208,11 @@ def tile_side(outcomes: Array, box: Box, tiles: int = TILES) -> float:
 
 
 def _reached(outcomes: Array, box: Box, side: float) -> Array:
-    """``(n_tiles, dim)`` the tiles of T with two outcomes or more, counted from its lower corner, in order."""
+    """``(n_tiles, dim)``, the tiles of T with two outcomes or more, counted from its lower corner, in order."""
     inside = outcomes[box.contains(outcomes)]
     tiles = np.floor((inside - box.low) / side)
     per_side = np.floor(box.sides / side) + 1
-    if np.log2(per_side).sum() < 53:  # each tile has a number of its own, which is quicker to sort than its row
+    if np.log2(per_side).sum() < 53:  # numbers of tiles are quicker to sort than their rows
         numbers = tiles @ np.append(np.cumprod(per_side[:0:-1])[::-1], 1.0)
         _, first, counts = np.unique(numbers, return_index=True, return_counts=True)
         tiles = tiles[first]
@@ -216,7 +222,7 @@ def _reached(outcomes: Array, box: Box, side: float) -> Array:
 
 
 def save_benchmark(path: str | os.PathLike[str], benchmark: Benchmark) -> None:
-    """Write a file that ``load_benchmark`` reads; the file appears whole or not at all.
+    """Write a file for ``load_benchmark``; it appears whole or not at all.
 
     Raises:
         ValueError: a benchmark that ``load_benchmark`` would refuse.
@@ -228,11 +234,11 @@ def save_benchmark(path: str | os.PathLike[str], benchmark: Benchmark) -> None:
 
 
 def load_benchmark(path: str | os.PathLike[str] = SHIPPED) -> Benchmark:
-    """Read a benchmark; by default the shipped one for ``FishingRod``.
+    """Read a benchmark; by default the shipped one of ``FishingRod``.
 
     Raises:
-        ValueError: not such a file, damaged, without goals, or with numbers that are not finite.
-        OSError: there is no file, or it is a directory.
+        ValueError: the file is no benchmark, is damaged, has no goals, or numbers that are not finite.
+        OSError: there is no file, or ``path`` is a directory.
     """
     arrays = read_npz(path, "benchmark", "sgimd benchmark", ("environment", "goals", "side"))
     return _checked(str(path), *arrays)

@@ -1,6 +1,6 @@
-"""Files on disk: written whole or not at all, refused by name when they are broken.
+"""Files on disk: writers write them whole or not at all, readers refuse damaged ones by name.
 
-Everything that replaces a file goes through here.
+Every function that replaces a file uses this module.
     write_text(folder / "report.html", page)
     with replacing(folder / "film.mp4") as partial: encode(frames, partial)
 """
@@ -29,9 +29,9 @@ _UNREADABLE: Final = (
 
 @contextmanager
 def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """A file next to ``path``, to be written in the block; it replaces ``path`` when the block ends.
+    """A file next to ``path`` for the block to write; it replaces ``path`` when the block ends.
 
-    ``path`` holds the old file or the whole new one, also after a power cut; after an error nothing else is left.
+    ``path`` holds the old file or the whole new one, even after a power cut. An error removes the file next to it.
 
     Raises:
         OSError: ``path`` is a directory, or cannot be written.
@@ -50,34 +50,34 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 
 def write_bytes(path: str | os.PathLike[str], content: bytes) -> None:
-    """Replace ``path``, see ``replacing``."""
+    """Replace ``path`` by ``content``, see ``replacing``."""
     with replacing(path) as partial:
         partial.write_bytes(content)
 
 
 def write_text(path: str | os.PathLike[str], content: str) -> None:
-    """Replace ``path`` by text in UTF-8, line ends as they are; see ``replacing``."""
+    """Replace ``path`` by text in UTF-8, line ends unchanged; see ``replacing``."""
     write_bytes(path, content.encode())
 
 
 def write_npz(path: str | os.PathLike[str], arrays: Mapping[str, Any]) -> None:
-    """Replace ``path`` by a packed npz file, which holds ``arrays`` by name; see ``replacing``."""
+    """Replace ``path`` by a compressed npz file of named ``arrays``; see ``replacing``."""
     buffer = io.BytesIO()
     np.savez_compressed(buffer, **arrays)
     write_bytes(path, buffer.getvalue())
 
 
 def read_npz(path: str | os.PathLike[str], kind: str, writer: str, names: Sequence[str]) -> list[Stored]:
-    """The arrays called ``names``, read-only; nothing in the file is executed.
+    """Read arrays by their ``names``, read-only; no code in the file is executed.
 
     Args:
-        path: of the file.
-        kind, writer: what the file should be and what writes it, for errors.
-        names: of the arrays.
+        path: npz file.
+        kind, writer: words for error messages: the kind of the file, and the command that writes such files.
+        names: names of the arrays.
 
     Raises:
-        ValueError: not an npz file, damaged, without one of the arrays, or with one of objects.
-        OSError: there is no file, it is a directory, or it may not be read.
+        ValueError: the file is not an npz file, is damaged, lacks an array, or holds an array of objects.
+        OSError: there is no file, ``path`` is a directory, or the file may not be read.
     """
 
     def refused(why: str) -> ValueError:
@@ -92,7 +92,7 @@ def read_npz(path: str | os.PathLike[str], kind: str, writer: str, names: Sequen
                 found = {name: stored[name] for name in names if name in stored}
             for array in found.values():
                 array.flags.writeable = False
-        except _UNREADABLE as error:  # whose own words advise to allow pickle
+        except _UNREADABLE as error:  # numpy's own message advises to allow pickle
             raise refused("it is damaged, or holds more than numbers") from error
     if missing := [name for name in names if name not in found]:
         raise refused(f"it lacks {', '.join(missing)}")
@@ -100,15 +100,15 @@ def read_npz(path: str | os.PathLike[str], kind: str, writer: str, names: Sequen
 
 
 def checksum(path: Path) -> str:
-    """Of the content of a file, in hexadecimal."""
+    """CRC-32 of the content of a file, in hexadecimal."""
     return f"{zlib.crc32(path.read_bytes()):08x}"
 
 
 def make_folder(path: Path) -> None:
-    """Make a folder, and its parents if they are missing.
+    """Make a folder and its missing parents.
 
     Raises:
-        OSError: something is in the way, or it may not be made.
+        OSError: a file is in its place, or it may not be made.
     """
     try:
         path.mkdir(parents=True, exist_ok=True)

@@ -8,20 +8,18 @@ A part derives from the class of its kind and is built from one `Problem`. Its o
 
 from __future__ import annotations
 
-import inspect
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Generator, Sequence
 from copy import copy
-from typing import Any, ClassVar, Final, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
-from sgimd_torch.catalogue import function_of, place_of
-from sgimd_torch.environments.protocol import Environment, check_rest
+from sgimd_torch.catalogue.built import Built
+from sgimd_torch.environments.protocol import Environment, check_robot
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, AskingAttempt, Attempt, Demonstration, Estimate, stream
 
-LEAST_TOLERANCE: Final = 0.02  # m
 Made = TypeVar("Made")
 
 
@@ -45,8 +43,7 @@ class Problem:
         autonomous: strategy of the learner's own, made before the answer to demonstrations.
 
     Raises:
-        ValueError: ``rest`` outside T, a noise that is negative or not finite, or exemplars that this robot cannot
-            have: other dimensions, thetas outside Pi.
+        ValueError: a robot that `check_robot` refuses; exemplars of other dimensions, or with thetas outside Pi.
     """
 
     inverse: Inverse
@@ -60,19 +57,16 @@ class Problem:
         *,
         inverse: Callable[[Problem], Inverse] | None = None,
     ) -> None:
-        check_rest(environment)
-        if not 0 <= environment.outcome_noise < np.inf:
-            wanted = "a standard deviation, finite and >= 0"
-            raise ValueError(f"outcome_noise must be {wanted}, got {environment.outcome_noise}")
+        check_robot(environment)
         self.contexts, self.policies, self.outcomes = environment.contexts, environment.policies, environment.outcomes
         self.rest, self.outcome_noise, self.seed = environment.rest, environment.outcome_noise, seed
-        self.tolerance = max(environment.outcome_noise, LEAST_TOLERANCE)
-        self._streams: dict[str, np.random.Generator] = {}
-        self._shared: dict[type, Any] = {}
-        self.memory = self._start(memory)
+        self.tolerance = max(environment.outcome_noise, 0.02)
+        self._shared: dict[object, Any] = {}
+        self.memory = Memory(*self.dims) if memory is None else memory.copy_for(self.dims)
+        self.policies.check("thetas of a memory to start from", self.memory.thetas, "of another robot?")
         self.remarks: list[str] = []
         if inverse is not None:
-            self.inverse = made(Inverse, inverse, self)
+            self.inverse = Inverse.of(inverse, self)
 
     @property
     def dims(self) -> tuple[int, int, int]:
@@ -81,16 +75,13 @@ class Problem:
 
     def stream(self, name: str) -> np.random.Generator:
         """The random stream of a name; the same name gives the same stream."""
-        if name not in self._streams:
-            self._streams[name] = stream(self.seed, name)
-        return self._streams[name]
+        return self.shared(name, lambda: stream(self.seed, name))
 
-    def shared(self, kind: type[Made], make: Callable[[], Made] | None = None) -> Made:
-        """The one object of this ``kind``, for all parts that ask; made at the first call."""
-        if kind not in self._shared:
-            self._shared[kind] = kind() if make is None else make()
-        found: Made = self._shared[kind]
-        return found
+    def shared(self, key: object, make: Callable[[], Made]) -> Made:
+        """The one object of this ``key``, for all parts that ask; made at the first call."""
+        if key not in self._shared:
+            self._shared[key] = make()
+        return self._shared[key]
 
     def over(self, memory: Memory) -> Problem:
         """This problem with another memory, for a part that looks at some exemplars only."""
@@ -103,33 +94,19 @@ class Problem:
         """Shared objects that have to be trained."""
         return [each for each in self._shared.values() if isinstance(each, Trained)]
 
-    def _start(self, start: Memory | None) -> Memory:
-        if start is None:
-            return Memory(*self.dims)
-        found = start.context_dim, start.theta_dim, start.outcome_dim
-        if found != self.dims:
-            raise ValueError(
-                f"a memory to start from must have dims {self.dims} of context, theta, outcome, got {found}"
-            )
-        self.policies.check("thetas of a memory to start from", start.thetas, "of another robot?")
-        return start.copy()
 
+class Part(Built):
+    """A part of a learner. One that draws has ``rng`` for it, the random stream ``draws_from`` of the problem."""
 
-class Part(ABC):  # noqa: B024
-    """Something that a learner is put together from."""
+    draws_from: str = ""
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
 
-
-class RandomPart(Part):
-    """A part that draws, from ``rng`` alone: the stream ``draws_from`` of the problem."""
-
-    draws_from: ClassVar[str]
-
-    def __init__(self, problem: Problem) -> None:
-        super().__init__(problem)
-        self.rng = problem.stream(self.draws_from)
+    @property
+    def rng(self) -> np.random.Generator:
+        """Random stream of this part."""
+        return self.problem.stream(self.draws_from)
 
 
 class Trained(ABC):
@@ -144,7 +121,7 @@ class Trained(ABC):
         """A `runs.listeners.Listener` that does so in this `runs.run.Life`."""
 
 
-class Goals(RandomPart):
+class Goals(Part):
     """Goal model: which goal next, given what came of earlier ones (section 3.2). `goals.checks` has its checks."""
 
     draws_from = "goals"
@@ -200,7 +177,7 @@ class Inverse(Part):
         return None
 
 
-class Search(RandomPart):
+class Search(Part):
     """Search: movement by movement from an estimate towards a goal (section 4.4.2)."""
 
     draws_from = "search"
@@ -210,7 +187,7 @@ class Search(RandomPart):
         """Yield thetas ``(theta_dim,)`` in Pi to execute; each is sent its outcome ``(outcome_dim,)``."""
 
 
-class Explore(RandomPart):
+class Explore(Part):
     """Global exploration: movements where the inverse model knows nothing (section 4.4.1)."""
 
     draws_from = "look"
@@ -254,62 +231,20 @@ class Social(Part):
         """Yield movements, or none, after ``demonstration``, which corresponds to ``theta_d`` ``(theta_dim,)``."""
 
 
-class FromDemonstrations(ABC):  # noqa: B024
-    """Somebody who shows what was recorded; built from ``(demonstrations, rng)`` and options.
+class Teacher(Built):
+    """Teacher who demonstrates of their own accord: the paper's What, How and When in one call (section 2.3).
+
+    Built from ``(demonstrations, rng)`` and options.
 
     Attributes:
+        who: name in the record of whoever has shown the last offer.
         needs_demonstrations: False for somebody who has nothing prepared.
     """
 
     needs_demonstrations: ClassVar[bool] = True
-
-
-class Teacher(FromDemonstrations):
-    """Teacher who demonstrates of their own accord: the paper's What, How and When in one call (section 2.3).
-
-    Attributes:
-        who: name in the record of whoever has shown the last offer.
-    """
 
     who: str = "teacher"
 
     @abstractmethod
     def offer(self, index: int, memory: Memory) -> Demonstration | None:
         """A demonstration before movement ``index`` (0, 1, ...) of the learner with this ``memory``, or None."""
-
-
-class Demonstrator(FromDemonstrations):
-    """Teacher who is asked for a demonstration of a goal.
-
-    Attributes:
-        takes: movements at which the learner rests until a reply has come.
-    """
-
-    takes: int = 0
-
-    @abstractmethod
-    def demonstrate(self, context: Array, goal: Array, memory: Memory) -> Demonstration | None:
-        """A demonstration of ``goal`` ``(outcome_dim,)`` in ``context`` ``(context_dim,)``, or None. A replay asks
-        again, so what is drawn may depend on the seed and on the arguments only."""
-
-
-def made(kind: type[Made], make: Callable[..., Made], *given: Any) -> Made:
-    """The part of this ``kind`` that a constructor builds from what it is ``given``.
-
-    Raises:
-        ValueError: no constructor, an abstract method is missing, or what was built is of another kind.
-    """
-    if isinstance(make, str):
-        module, _, name = place_of(kind.__name__.lower(), make).partition(":")
-        raise ValueError(f"a {kind.__name__} is given as its constructor, got {make!r}; from {module} import {name}")
-    if isinstance(make, kind) or not callable(make):
-        raise ValueError(f"a {kind.__name__} is given as its constructor, got a {type(make).__name__} made already")
-    built = function_of(make)
-    if inspect.isclass(built) and inspect.isabstract(built):
-        missing = ", ".join(sorted(built.__abstractmethods__))
-        raise ValueError(f"{built.__name__} has no {missing}, which {kind.__name__} demands; see sgimd_torch.parts")
-    part = make(*given)
-    if not isinstance(part, kind):
-        name = built.__name__ if inspect.isclass(built) else f"the {type(part).__name__} that was built"
-        raise ValueError(f"{name} must derive from {kind.__name__} of sgimd_torch.parts")
-    return part

@@ -20,8 +20,9 @@ from numpy.typing import ArrayLike
 from sgimd_torch.environments.protocol import FAILURES, Environment, SimulationError, check_instance
 from sgimd_torch.learner import Learner, ReplayError
 from sgimd_torch.learner.replay import BeforeMovement, replay
-from sgimd_torch.parts import Demonstrator, Teacher
+from sgimd_torch.parts import Teacher
 from sgimd_torch.spaces import Array, Demonstration, Episode, Request, check_count, check_point, read_only, stream
+from sgimd_torch.teachers import Demonstrator
 
 if TYPE_CHECKING:
     from sgimd_torch.record import Record

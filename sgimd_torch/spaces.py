@@ -1,7 +1,7 @@
-"""Spaces, records and random streams: the words that all other modules use.
+"""Spaces, episodes and random streams: the vocabulary of all other modules.
 
 Section 2.1 of Nguyen & Oudeyer (2014): contexts c in C, policies theta in Pi, outcomes tau in T, and a
-learning episode [context][policy][outcome]. Numpy only; nothing here knows about learning or physics.
+learning episode (context, policy, outcome). This module needs numpy only, no learning and no physics.
 """
 
 from __future__ import annotations
@@ -17,23 +17,23 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 
-_LARGEST: Final = 1e100  # squared distances between numbers up to here do not overflow
+_LARGEST: Final = 1e100  # squared distances between numbers up to this size do not overflow
 
 
 def stream(seed: int, name: str, index: int | None = None) -> np.random.Generator:
     """A separate random stream for each use, so that removing one part does not change the draws of the others.
 
     Args:
-        seed: of the run, >= 0.
-        name: what the draws are for: ``"environment"``, ``"goals"``, ``"search"``, ``"teacher"`` ...
-        index: for one stream each, of each movement for example; None for a single stream.
+        seed: seed of the run, >= 0.
+        name: use of the draws, such as ``"environment"``, ``"goals"``, ``"search"`` or ``"teacher"``.
+        index: number of the stream among several of this name, such as that of the movement; None for a single one.
 
     Raises:
         ValueError: the seed or the index is not a whole number >= 0.
     """
     words = _words_of_name(check_count("seed", seed, 0), name)
     if index is not None:
-        # 256 separates the index from the name: no byte is that large.
+        # 256 separates the index from the name: no byte is as large.
         end = np.array([256, *_words(check_count("index", index, 0))], dtype=np.uint32)
         words = np.concatenate((words, end))
     return np.random.Generator(np.random.PCG64(np.random.SeedSequence(words)))
@@ -41,13 +41,13 @@ def stream(seed: int, name: str, index: int | None = None) -> np.random.Generato
 
 @lru_cache
 def _words_of_name(seed: int, name: str) -> NDArray[np.uint32]:
-    """What ``SeedSequence(seed, spawn_key=name.encode())`` mixes; as an array it is taken several times faster."""
+    """The words that ``SeedSequence(seed, spawn_key=name.encode())`` mixes; an array is several times faster."""
     words = _words(seed)
     return np.array([*words, *[0] * (4 - len(words)), *name.encode()], dtype=np.uint32)
 
 
 def _words(number: int) -> list[int]:
-    """Its 32-bit words, the lowest first."""
+    """The 32-bit words of a number, the lowest first."""
     if number < 2**32:
         return [number]
     return [number >> shift & 0xFFFFFFFF for shift in range(0, number.bit_length(), 32)]
@@ -60,7 +60,7 @@ def check_vector(name: str, value: ArrayLike, dim: int, hint: str = "") -> Array
         ValueError: anything but real numbers (complex numbers, text, True and False, dates, masked arrays), another
             last axis, or an entry that is NaN, infinite or so large that squared distances may overflow.
     """
-    # Nearly all calls end here: of numbers above 1e100, infinite or NaN the squares do not add up to this little.
+    # Nearly all calls end here: with a number above 1e100, infinite or NaN the sum of squares is larger, or NaN.
     if type(value) is np.ndarray and value.dtype == np.float64 and value.shape[-1:] == (dim,):
         with_itself = np.vdot(value, value)
         if with_itself < 1e199:
@@ -87,7 +87,7 @@ def check_point(name: str, value: ArrayLike, dim: int, hint: str = "") -> Array:
     """``value`` as float64 of shape ``(dim,)``: one context, theta, goal or outcome.
 
     Raises:
-        ValueError: as `check_vector`, or there are several.
+        ValueError: see `check_vector`; or several points.
     """
     array = check_vector(name, value, dim, hint)
     if array.ndim != 1:
@@ -99,7 +99,7 @@ def check_count(name: str, value: object, least: int) -> int:
     """``value`` as int, a whole number of at least ``least``, of Python or numpy.
 
     Raises:
-        ValueError: it is something else; True and False are no counts.
+        ValueError: any other value, True and False included.
     """
     if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < least:
         raise ValueError(f"{name} must be a whole number >= {least}, got {_in_short(value)}")
@@ -107,10 +107,10 @@ def check_count(name: str, value: object, least: int) -> int:
 
 
 def check_rng(rng: object) -> None:
-    """Refuse what is not a random stream, before anything is drawn from it.
+    """Refuse anything but a random stream, before the first draw.
 
     Raises:
-        TypeError: it is not a Generator.
+        TypeError: ``rng`` is not a Generator.
     """
     if not isinstance(rng, np.random.Generator):
         hint = "was the seed passed instead of a Generator, such as stream(seed, name)?"
@@ -118,7 +118,7 @@ def check_rng(rng: object) -> None:
 
 
 def first_entry(array: Array, wrong: NDArray[np.bool_]) -> str:
-    """The first ``wrong`` entry of ``array`` and how many more there are, for an error message of one line."""
+    """The first ``wrong`` entry of ``array`` and the number of others, for an error message of one line."""
     entries = np.argwhere(wrong)
     more = f" (and {len(entries) - 1} more)" if len(entries) > 1 else ""
     return f"entry {entries[0].tolist()} is {array[tuple(entries[0])]}{more}"
@@ -135,11 +135,11 @@ class Box:
     Args:
         low: ``(dim,)`` lower corner.
         high: ``(dim,)`` upper corner, above ``low`` in every dimension.
-        names: of the dimensions, for axes, columns and messages; () for none.
-        unit: of all dimensions, such as "m"; "" for none.
+        names: names of the dimensions, for axes, columns and messages; () for none.
+        unit: unit of all dimensions, such as "m"; "" for none.
 
     Raises:
-        ValueError: corners of different shapes, not finite, or not in order; or not a name for each dimension.
+        ValueError: corners of different shapes, not finite or not in order, or another number of names.
     """
 
     low: Array
@@ -157,7 +157,7 @@ class Box:
         names = tuple(given)
         texts = all(isinstance(each, str) for each in (*names, self.unit))
         if isinstance(given, str) or len(names) not in (0, len(low)) or not texts:
-            raise ValueError(f"Box needs {len(low)} names, texts, and a unit, a text, got {given} and {self.unit!r}")
+            raise ValueError(f"Box needs {len(low)} names and a unit, all texts, got {given} and {self.unit!r}")
         object.__setattr__(self, "names", names)
         for name, corner in (("low", low), ("high", high)):
             corner.flags.writeable = False
@@ -175,31 +175,31 @@ class Box:
 
     @property
     def sides(self) -> Array:
-        """``(dim,)`` lengths of the sides."""
+        """``(dim,)``, lengths of the sides."""
         return self.high - self.low
 
     def axis(self, k: int, kind: str = "outcome") -> str:
-        """What dimension ``k`` is called: "x (m)", or "outcome 0" where it has no name."""
+        """The name of dimension ``k``: "x (m)", or "outcome 0" without names."""
         return self.in_unit(self.names[k] if self.names else f"{kind} {k}")
 
     def in_unit(self, quantity: str) -> str:
-        """ "error (m)", or "error" where there is no unit."""
+        """The quantity with its unit: "error (m)", or "error" without unit."""
         return f"{quantity} ({self.unit})" if self.unit else quantity
 
     def amount(self, value: float, form: str = ".3g") -> str:
-        """ "0.12 m", or "0.12" where there is no unit."""
+        """The value with its unit: "0.12 m", or "0.12" without unit."""
         return f"{value:{form}} {self.unit}".rstrip()
 
     def sample(self, rng: np.random.Generator) -> Array:
-        """``(dim,)`` one uniform point."""
-        return self.low + self.sides * rng.random(self.dim)  # as rng.uniform, several times faster
+        """``(dim,)``, a uniform point."""
+        return self.low + self.sides * rng.random(self.dim)  # several times faster than rng.uniform, with equal draws
 
     def clip(self, points: ArrayLike) -> Array:
-        """``(..., dim)`` the nearest points inside."""
+        """``(..., dim)``, the nearest points inside."""
         return np.asarray(points, dtype=np.float64).clip(self.low, self.high)
 
     def contains(self, points: ArrayLike) -> NDArray[np.bool_]:
-        """``(...)`` whether each point of ``(..., dim)`` lies inside, the border included."""
+        """``(...)``, whether each of the points ``(..., dim)`` lies inside, the border included."""
         points = np.asarray(points, dtype=np.float64)
         return np.logical_and.reduce((points >= self.low) & (points <= self.high), axis=-1)
 
@@ -220,10 +220,10 @@ class Box:
 
 @dataclass(frozen=True, eq=False)
 class Move:
-    """What a strategy wants executed.
+    """A proposed movement: ``theta`` ``(theta_dim,)`` for ``goal`` ``(outcome_dim,)``, None when babbling.
 
-    ``theta`` is ``(theta_dim,)``; ``goal`` ``(outcome_dim,)`` what it was for, None when babbling; ``origin`` names the
-    regime ("babble", "global", "local", "imitate") for analysis, never for control flow. Arrays are read-only copies.
+    ``origin`` names the regime ("babble", "global", "local", "imitate"), for analysis only. Arrays are read-only
+    copies.
     """
 
     theta: Array
@@ -235,9 +235,9 @@ class Move:
 
 
 class Estimate(NamedTuple):
-    """What the inverse model infers for a goal: ``theta`` ``(theta_dim,)``, and the exemplars that it is based on,
-    ``thetas`` ``(k, theta_dim)`` with their ``outcomes`` ``(k, outcome_dim)``. ``context`` ``(context_dim,)`` is that
-    of the goal, empty where there are no contexts."""
+    """The answer of an inverse model to a goal: ``theta`` ``(theta_dim,)``, and the exemplars behind it, ``thetas``
+    ``(k, theta_dim)`` with their ``outcomes`` ``(k, outcome_dim)``. ``context`` ``(context_dim,)`` is that of the goal.
+    """
 
     theta: Array
     thetas: Array
@@ -247,8 +247,13 @@ class Estimate(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Demonstration:
-    """(c_d, zeta_d, tau_d): ``context`` ``(context_dim,)``; ``trajectory`` ``(n_times, n_joints)`` rad at ``times``
-    ``(n_times,)`` s, or commands; ``outcome`` ``(outcome_dim,)``, what came of it. All are read-only copies.
+    """(c_d, zeta_d, tau_d), kept as read-only copies.
+
+    Args:
+        context: ``(context_dim,)``.
+        times: ``(n_times,)`` s, increasing.
+        trajectory: ``(n_times, n_joints)``, joint angles (rad) or commands at ``times``.
+        outcome: ``(outcome_dim,)`` of this movement.
 
     Raises:
         ValueError: other shapes, numbers that are not finite, or times that do not increase.
@@ -276,8 +281,8 @@ class Demonstration:
 
 @dataclass(frozen=True, eq=False)
 class Request:
-    """What a learner would like to be shown: ``goal`` ``(outcome_dim,)``, a read-only copy, by the ``teacher`` of this
-    name. ``strategy`` is what it would do with the answer, for analysis."""
+    """A learner's request to the ``teacher`` of this name for a demonstration of ``goal`` ``(outcome_dim,)``, kept as a
+    read-only copy. ``strategy`` names the strategy that would use it, for analysis only."""
 
     teacher: str
     goal: Array
@@ -288,7 +293,7 @@ class Request:
 
 
 class Lesson(NamedTuple):
-    """The answer to a `Request`: a demonstration, and the ``theta_d`` ``(theta_dim,)`` that it corresponds to."""
+    """The reply to a `Request`: a demonstration, and its translation ``theta_d`` ``(theta_dim,)``, eq. (6)."""
 
     theta_d: Array
     demonstration: Demonstration
@@ -296,11 +301,18 @@ class Lesson(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Episode:
-    """[context][policy][outcome] and why it happened. ``move`` and ``outcome`` are None when the learner rested;
-    ``outcome`` is None, too, of a movement that ``failed``, which says why ("" if it did not);
-    ``demonstration`` is what a teacher showed just before, if anything, and ``request`` what the learner had asked for,
-    answered or not; then ``reply`` says "shown", or why not: "nothing", "again" (it was shown this before), "failed" or
-    "timed out". Arrays are read-only copies."""
+    """A learning episode (context, policy, outcome) and its causes; arrays are read-only copies.
+
+    Args:
+        index: number of the movement, from 0.
+        context: ``(context_dim,)``.
+        move: movement of the learner; None if it rested.
+        outcome: ``(outcome_dim,)``; None if the learner rested or the movement failed.
+        demonstration: demonstration just before the movement; None without one.
+        request: request just before the movement; None without one.
+        reply: reply to the request: "shown", "nothing", "again" (shown before), "failed" or "timed out".
+        failed: reason why the movement failed; "" if it did not.
+    """
 
     index: int
     context: Array
@@ -315,12 +327,12 @@ class Episode:
         _own(self, "context", "outcome")
 
 
-def _own(record: Move | Demonstration | Request | Episode, *names: str) -> None:
-    """Replace arrays of a new record by read-only copies, so that later changes elsewhere do not reach it."""
+def _own(new: Move | Demonstration | Request | Episode, *names: str) -> None:
+    """Replace arrays of a new object by read-only copies, so that later changes elsewhere do not reach it."""
     for name in names:
-        value = getattr(record, name)
+        value = getattr(new, name)
         if value is not None:
-            object.__setattr__(record, name, read_only(value))
+            object.__setattr__(new, name, read_only(value))
 
 
 def read_only(value: ArrayLike) -> Array:
@@ -331,11 +343,11 @@ def read_only(value: ArrayLike) -> Array:
 
 
 Attempt = Generator[Move | None, Array, None]
-"""Yields movements and is sent their outcomes. To yield None is to stay still for one movement; ``close()`` interrupts
+"""A generator of movements that is sent their outcomes. It yields None to rest for one movement; ``close()`` interrupts
 it."""
 
 AskingAttempt = Generator[Move | Request | None, Any, None]
-"""An attempt that may also yield a `Request`: it is sent a `Lesson`, or None if nobody answers."""
+"""An attempt that may also yield a `Request`; it is then sent a `Lesson`, or None without a demonstration."""
 
 Search = Callable[[Estimate, Array], Generator[Array, Array, None]]
-"""(start, goal) -> yields thetas to execute and is sent their outcomes ``(outcome_dim,)``."""
+"""(start, goal) -> a generator of thetas that is sent their outcomes ``(outcome_dim,)``."""

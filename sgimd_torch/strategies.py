@@ -16,7 +16,7 @@ from sgimd_torch.competence import Competence
 from sgimd_torch.explore.anywhere import Anywhere
 from sgimd_torch.goals.interest_map import InterestMap
 from sgimd_torch.goals.regions import Region
-from sgimd_torch.parts import Explore, Goals, Judge, Problem, Search, Social, Strategy, made
+from sgimd_torch.parts import Explore, Goals, Judge, Problem, Search, Social, Strategy
 from sgimd_torch.searches.simplex import NelderMead
 from sgimd_torch.spaces import Array, Attempt, Demonstration, Move, check_count
 
@@ -24,9 +24,11 @@ from sgimd_torch.spaces import Array, Attempt, Demonstration, Move, check_count
 class Babble(Strategy):
     """Random exploration of the policy space: one uniform theta."""
 
+    draws_from = "babble"
+
     def attempt(self, context: Array) -> Attempt:
         """One movement."""
-        yield Move(self.problem.policies.sample(self.problem.stream("babble")), None, "babble")
+        yield Move(self.problem.policies.sample(self.rng), None, "babble")
 
 
 class Rest(Strategy):
@@ -62,6 +64,8 @@ class GoalBabbling(Strategy):
         ValueError: a number out of its range, or a part of another kind.
     """
 
+    draws_from = "regime"
+
     def __init__(
         self,
         problem: Problem,
@@ -83,12 +87,12 @@ class GoalBabbling(Strategy):
             raise ValueError(f"global_range must be two probabilities, the least first, got {global_range}")
         if not give_up <= 0:
             raise ValueError(f"give_up must be a competence, 0 at most, got {give_up}")
-        self.memory, self.inverse, self.rng = problem.memory, problem.inverse, problem.stream("regime")
+        self.memory, self.inverse = problem.memory, problem.inverse
         self.competence = Competence(problem)
-        self.explore = made(Explore, explore, problem)
-        self.goals = made(Goals, goals, problem)
-        self.search = made(Search, search, problem)
-        self.judge = made(Judge, judge, problem)
+        self.explore = Explore.of(explore, problem)
+        self.goals = Goals.of(goals, problem)
+        self.search = Search.of(search, problem)
+        self.judge = Judge.of(judge, problem)
         self.budget = check_count("budget", budget, 1)
         self.tolerance, self.global_range, self.give_up = tolerance, global_range, give_up
 
@@ -190,7 +194,7 @@ class Mimic(Social):
         if not 0 <= epsilon < np.inf:
             raise ValueError(f"epsilon must be a bound of variations, finite and >= 0, got {epsilon}")
         self.repeats = repeats if repeats is None else check_count("repeats", repeats, 1)
-        self.epsilon, self.rng = epsilon, problem.stream(draws_from)
+        self.epsilon, self.draws_from = epsilon, draws_from
 
     def attempt(self, context: Array, theta_d: Array, demonstration: Demonstration) -> Attempt:
         """theta_d, then its variations."""
@@ -208,8 +212,10 @@ class Mimic(Social):
 
 
 class Imitate(Mimic):
-    """How SGIM-D answers a demonstration: a short imitation, then emulation of the goal (section 3.2.3): the goal model
-    is told the competence at the demonstrated outcome. An outcome outside T is imitated, but never a goal.
+    """A short imitation, then emulation of the goal, as in SGIM-D.
+
+    Section 3.2.3: afterwards the goal model is told the competence at the demonstrated outcome. An outcome outside T is
+    imitated, but never a goal.
 
     Args:
         problem: what has to be learnt, with its goal babbling.
@@ -236,7 +242,7 @@ class Imitate(Mimic):
 
 
 class Emulate(Social):
-    """Take over the teacher's goal but not the movement: pursue the demonstrated outcome by goal babbling.
+    """Pursues the demonstrated outcome, but not by the demonstrated movement.
 
     Args:
         problem: what has to be learnt.

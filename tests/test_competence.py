@@ -7,10 +7,10 @@ import pytest
 
 from sgimd_torch.competence import AttemptCompetence, Competence, performance
 from sgimd_torch.spaces import Array, stream
-from worlds import NO_CONTEXT, remember
+from worlds import NO_CONTEXT, problem, remember
 
 REST = np.array([0.0, 0.5])
-relative = partial(performance, rest=REST, d_min=0.01)
+relative = partial(performance, rest=REST, d_min=0.02)
 
 
 def from_rest(x: float, y: float) -> Array:
@@ -42,8 +42,8 @@ def test_a_goal_ten_times_farther_missed_ten_times_more_scores_the_same() -> Non
 
 def test_a_goal_at_rest_is_judged_by_the_noise_instead_of_dividing_by_zero() -> None:
     assert relative(REST, REST) == 0
-    assert relative(REST, from_rest(0.004, 0.0)) == pytest.approx(-0.4)
-    assert relative(from_rest(0.002, 0.0), REST) == pytest.approx(-0.2)
+    assert relative(REST, from_rest(0.004, 0.0)) == pytest.approx(-0.2)
+    assert relative(from_rest(0.002, 0.0), REST) == pytest.approx(-0.1)
 
 
 def test_leading_axes_broadcast_and_agree_with_one_at_a_time() -> None:
@@ -65,15 +65,15 @@ def test_a_scale_that_is_not_positive_is_refused(wrong: float) -> None:
 def test_competence_is_the_best_performance_over_all_of_memory() -> None:
     rng = stream(1, "test")
     memory = remember(np.zeros((60, 1)), rng.uniform(-1, 1, (60, 2)))
-    competence = Competence(memory, relative)
+    competence = Competence(problem(memory=memory, rest=REST))
     for goal in rng.uniform(-2, 2, (30, 2)):
         assert competence(NO_CONTEXT, goal) == max(relative(goal, outcome) for outcome in memory.outcomes)
 
 
 def test_competence_never_falls_while_the_attempt_reading_can() -> None:
     goal = np.array([1.0, 0.5])
-    memory = remember(np.zeros((1, 1)), np.array([[0.9, 0.5]]))
-    remembered, attempted = Competence(memory, relative), AttemptCompetence(relative)
+    given = problem(memory=remember(np.zeros((1, 1)), np.array([[0.9, 0.5]])), rest=REST)
+    remembered, attempted = Competence(given), AttemptCompetence(given)
     good, bad = np.array([[0.2, 0.5], [0.9, 0.5]]), np.array([[0.2, 0.5], [0.4, 0.5]])
     assert remembered(NO_CONTEXT, goal, bad) == pytest.approx(-0.1)
     assert attempted(NO_CONTEXT, goal, good) == pytest.approx(-0.1)
@@ -82,7 +82,7 @@ def test_competence_never_falls_while_the_attempt_reading_can() -> None:
 
 def test_competence_belongs_to_a_context() -> None:
     memory = remember(np.zeros((2, 1)), np.array([[1.0, 0.5], [0.0, 0.5]]), np.array([[0.0], [9.0]]))
-    competence = Competence(memory, relative)
+    competence = Competence(problem(memory=memory, rest=REST))
     goal = np.array([1.0, 0.5])
     assert competence(np.array([0.0]), goal) == 0
     assert competence(np.array([9.0]), goal) == -1

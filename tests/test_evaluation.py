@@ -17,27 +17,32 @@ from sgimd_torch.evaluation import (
     save_benchmark,
     tile_goals,
 )
-from sgimd_torch.inverses.local import NearestNeighbour
+from sgimd_torch.inverses.nearest import NearestNeighbour
+from sgimd_torch.parts import Inverse
 from sgimd_torch.spaces import Array, Box, Estimate, stream
-from worlds import NO_CONTEXT, executed
+from worlds import NO_CONTEXT, executed, problem
 
 
-def perfect(arm: PlanarArm):
-    """The exact inverse."""
+class Perfect(Inverse):
+    """The exact inverse of an arm, and the contexts that it was asked about."""
 
-    def inverse(context: Array, goal: Array) -> Estimate:
-        theta = arm.solve(context, goal)
+    def __init__(self, arm: PlanarArm) -> None:
+        super().__init__(problem(arm))
+        self.arm = arm
+        self.asked: list[list[float]] = []
+
+    def __call__(self, context: Array, goal: Array) -> Estimate:
+        self.asked.append(context.tolist())
+        theta = self.arm.solve(context, goal)
         return Estimate(theta, theta[None], goal[None])
-
-    return inverse
 
 
 def test_errors_are_the_distances_between_goals_and_where_the_best_movements_end() -> None:
     # Two links of .5 m: straight ahead at (1, 0), a first joint at +pi/2 (theta .75) ends at (0, 1).
     arm = PlanarArm(2)
-    memory = executed(arm, np.array([[0.5, 0.5], [0.75, 0.5]]))
+    inverse = NearestNeighbour(problem(memory=executed(arm, np.array([[0.5, 0.5], [0.75, 0.5]]))))
     goals = np.array([[1.0, 0.0], [0.7, 0.4], [0.3, 1.4]])
-    evaluation = evaluate(NearestNeighbour(memory), arm, goals, 0, 1000, repeats=0)
+    evaluation = evaluate(inverse, arm, goals, 0, 1000, repeats=0)
     assert evaluation.errors == pytest.approx([0.0, 0.5, 0.5])
     assert evaluation.mean_error == pytest.approx(1 / 3)
     assert evaluation.outcomes == pytest.approx(np.array([[1.0, 0.0], [1.0, 0.0], [0.0, 1.0]]))
@@ -46,17 +51,12 @@ def test_errors_are_the_distances_between_goals_and_where_the_best_movements_end
 
 def test_each_goal_has_a_context_of_its_own_the_same_in_every_evaluation_of_every_run() -> None:
     arm, goals = PlanarArm(5, context=True), stream(0, "goals").uniform(-0.6, 0.6, (200, 2))
-    asked: list[list[float]] = []
-
-    def inverse(context: Array, goal: Array) -> Estimate:
-        asked.append(context.tolist())
-        return perfect(arm)(context, goal)
-
+    inverse = Perfect(arm)
     first = evaluate(inverse, arm, goals, seed=0, step=100, repeats=2)
     assert first.errors == pytest.approx(np.zeros(200), abs=1e-9)  # executed in the context that was asked about
-    assert first.contexts.tolist() == asked
+    assert first.contexts.tolist() == inverse.asked
     for seed, step in ((0, 200), (1, 100)):
-        later = evaluate(perfect(arm), arm, goals, seed, step, repeats=0)
+        later = evaluate(Perfect(arm), arm, goals, seed, step, repeats=0)
         assert np.array_equal(later.contexts, first.contexts)
     assert np.array_equal(contexts_of_goals(arm, 50), first.contexts[:50])  # goal k, whatever their number
     # Uniform in +-pi / 4: mean 0, sd pi / 4 / sqrt(3) = .453; four standard errors of 200 are .13 and .06.
@@ -68,7 +68,7 @@ def test_each_goal_has_a_context_of_its_own_the_same_in_every_evaluation_of_ever
 def test_a_perfect_inverse_makes_no_error_in_any_context_given_for_all_goals_or_for_each() -> None:
     arm, goals = PlanarArm(5, context=True), stream(0, "goals").uniform(-0.6, 0.6, (4, 2))
     for context in (None, np.array([0.0]), np.array([0.7]), np.array([[0.1], [-0.2], [0.3], [0.0]])):
-        found = evaluate(perfect(arm), arm, goals, 0, 0, context=context, repeats=0)
+        found = evaluate(Perfect(arm), arm, goals, 0, 0, context=context, repeats=0)
         assert found.errors == pytest.approx(np.zeros(4), abs=1e-9)
         assert context is None or np.array_equal(found.contexts, np.broadcast_to(context, (4, 1)))
 
@@ -78,14 +78,14 @@ def test_without_contexts_an_environment_is_not_asked_for_any() -> None:
         def observe(self, rng: np.random.Generator) -> Array:
             raise AssertionError
 
-    found = evaluate(perfect(PlanarArm(5)), Silent(5), np.array([[0.5, 0.5]]), 0, 0)
+    found = evaluate(Perfect(PlanarArm(5)), Silent(5), np.array([[0.5, 0.5]]), 0, 0)
     assert found.contexts.shape == (1, 0)
 
 
 def test_without_repeats_there_is_no_noise_floor_and_without_noise_it_is_zero() -> None:
     arm, goals = PlanarArm(5), np.array([[0.5, 0.5], [-0.3, 0.2]])
-    assert np.isnan(evaluate(perfect(arm), arm, goals, 0, 0, repeats=0).noise_floor)
-    assert evaluate(perfect(arm), arm, goals, 0, 0, repeats=10).noise_floor == pytest.approx(0, abs=1e-15)
+    assert np.isnan(evaluate(Perfect(arm), arm, goals, 0, 0, repeats=0).noise_floor)
+    assert evaluate(Perfect(arm), arm, goals, 0, 0, repeats=10).noise_floor == pytest.approx(0, abs=1e-15)
 
 
 @pytest.mark.parametrize("repeats", [2, 3, 10])
@@ -93,7 +93,7 @@ def test_the_noise_floor_is_the_mean_distance_to_the_true_mean_however_many_repe
     # Stretched out along y, joint noise s moves the end along x by s times the distances of the joints to the end,
     # 1, .8, .6, .4, .2: sd s sqrt(2.2). Mean distance of a Gaussian: sd sqrt(2 / pi).
     arm = PlanarArm(5, noise=0.001)
-    evaluation = evaluate(perfect(arm), arm, np.tile([0.0, 1.0], (1200, 1)), 0, 0, repeats=repeats)
+    evaluation = evaluate(Perfect(arm), arm, np.tile([0.0, 1.0], (1200, 1)), 0, 0, repeats=repeats)
     expected = 0.001 * np.sqrt(2.2) * np.sqrt(2 / np.pi)
     # Its standard error is at most .76 / sqrt(1200 (repeats - 1)) of it, so five of them are 11, 8 and 4 %.
     assert evaluation.noise_floor == pytest.approx(expected, rel={2: 0.11, 3: 0.08, 10: 0.04}[repeats])
@@ -102,7 +102,7 @@ def test_the_noise_floor_is_the_mean_distance_to_the_true_mean_however_many_repe
 
 def test_the_movement_that_is_judged_is_not_one_of_its_own_repeats() -> None:
     arm = PlanarArm(5, noise=0.05)
-    seen = evaluate(perfect(arm), arm, np.array([[0.0, 0.5]]), 0, 0, repeats=2)
+    seen = evaluate(Perfect(arm), arm, np.array([[0.0, 0.5]]), 0, 0, repeats=2)
     judged, *again = (arm.execute(NO_CONTEXT, seen.thetas[0], stream(0, "evaluation 0", row)) for row in range(3))
     assert np.array_equal(seen.outcomes[0], judged)
     assert seen.scatter[0] == pytest.approx(
@@ -121,14 +121,14 @@ def test_the_movement_that_is_judged_is_not_one_of_its_own_repeats() -> None:
 def test_counts_and_goals_that_are_none_are_refused(wrong: dict[str, object]) -> None:
     arm, right = PlanarArm(5), {"goals": np.array([[0.5, 0.5]]), "seed": 0, "step": 0}
     with pytest.raises(ValueError, match=f"{next(iter(wrong))} must"):
-        evaluate(perfect(arm), arm, **right | wrong)
+        evaluate(Perfect(arm), arm, **right | wrong)
 
 
 def test_the_same_streams_give_the_same_and_every_evaluation_of_a_run_has_its_own() -> None:
     arm, goals = PlanarArm(5, noise=0.05), np.array([[0.5, 0.5], [-0.3, 0.2]])
 
     def look(seed: int, step: int) -> Evaluation:
-        return evaluate(perfect(arm), arm, goals, seed, step, repeats=2)
+        return evaluate(Perfect(arm), arm, goals, seed, step, repeats=2)
 
     first, same, later, other = look(0, 1000), look(0, 1000), look(0, 2000), look(1, 1000)
     assert np.array_equal(first.outcomes, same.outcomes)

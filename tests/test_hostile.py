@@ -12,13 +12,13 @@ from sgimd_torch.runs.read import read_run
 
 MODULE = '''
 import numpy as np
+from sgimd_torch.asking.teachers import AnsweringTeacher
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.goals.uniform import UniformGoals
-from sgimd_torch.inverses.local import NearestNeighbour
+from sgimd_torch.inverses.nearest import NearestNeighbour
 from sgimd_torch.spaces import Box, Demonstration
 from sgimd_torch.teachers import PeriodicTeacher
-from sgimd_torch.teachers.answering import AnsweringTeacher
 from sgimd_torch.runs.tasks import Task
 from sgimd_torch.runs.tasks.robots import arm_demonstrations
 
@@ -48,7 +48,7 @@ HABITS = {
     "shape": lambda part, found: np.zeros((3, 3)),
     "objects": lambda part, found: np.array([None, {}]),
     "scribbles": scribble,
-    "boxes": lambda part, found: (setattr(part, "outcomes", Box.cube(0, 1, 5)), found)[1],
+    "boxes": lambda part, found: (setattr(getattr(part, "problem", part), "outcomes", Box.cube(0, 1, 5)), found)[1],
 }
 
 def spoilt(kind, member, habit):

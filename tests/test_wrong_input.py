@@ -56,7 +56,7 @@ COMMANDS = {
     "run --goals.window 12": "--goals.window: goals within-reach has no such option; goals interest-map, grid have it",
     "run --noise 0.1": r"--noise: .* environment fishing-rod, .* \(--environment.noise\)",
     "run --inverse gaussian": "unknown inverse 'gaussian'; known are linear",
-    "run --teacher human": "unknown teacher 'human'; did you mean by-hand?",
+    "run --teacher periodical": "unknown teacher 'periodical'; did you mean periodic?",
     "run --environment toss.Toss": "unknown environment 'toss.Toss'; .*; is it toss:Toss?",
     "run --environment toss.py:Toss": "named without .py and with dots: toss:Toss",
     "run --environment toss:Tos": "toss has no Tos; did you mean Toss?",

@@ -18,7 +18,7 @@ from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Correspondence, Learner
 from sgimd_torch.memory import Memory
-from sgimd_torch.parts import Inverse, Problem, Social, made
+from sgimd_torch.parts import Inverse, Problem, Social
 from sgimd_torch.strategies import Babble, GoalBabbling, Imitate, Mimic, Remember, Rest
 
 MakeInverse = Callable[[Problem], Inverse]
@@ -28,7 +28,7 @@ MakeInverse = Callable[[Problem], Inverse]
 def random_exploration(
     environment: Environment, seed: int, *, inverse: MakeInverse = LocalProcess, memory: Memory | None = None
 ) -> Learner:
-    """Random: uniform movements."""
+    """Uniform movements: random exploration."""
     problem = Problem(environment, seed, memory, inverse=inverse)
     return Learner(problem, Babble(problem))
 
@@ -41,7 +41,7 @@ def observation(
     inverse: MakeInverse = LocalProcess,
     memory: Memory | None = None,
 ) -> Learner:
-    """Observation: watches and remembers, never moves."""
+    """Watches and remembers, never moves: learning by observation."""
     problem = Problem(environment, seed, memory, inverse=inverse)
     return Learner(problem, Rest(problem), social=Remember(problem), correspondence=correspondence)
 
@@ -55,7 +55,7 @@ def imitation(
     inverse: MakeInverse = LocalProcess,
     memory: Memory | None = None,
 ) -> Learner:
-    """Imitation: repeats the last demonstration with small variations until the next one.
+    """Repeats the last demonstration with small variations until the next one.
 
     Args:
         environment: robot, which is not executed here.
@@ -79,7 +79,7 @@ def sagg_riac(
     memory: Memory | None = None,
     **parts: Any,
 ) -> Learner:
-    """SAGG-RIAC: active goal babbling, without a teacher.
+    """Goal babbling without a teacher: SAGG-RIAC.
 
     Args:
         environment: robot, which is not executed here.
@@ -103,7 +103,7 @@ def sgim_d(
     memory: Memory | None = None,
     **parts: Any,
 ) -> Learner:
-    """SGIM-D: goal babbling, interrupted by a short imitation whenever the teacher demonstrates.
+    """Goal babbling, interrupted by a short imitation whenever the teacher demonstrates: SGIM-D.
 
     Args:
         environment: robot, which is not executed here.
@@ -116,4 +116,4 @@ def sgim_d(
     """
     problem = Problem(environment, seed, memory, inverse=inverse)
     problem.autonomous = GoalBabbling(problem, **parts)
-    return Learner(problem, problem.autonomous, social=made(Social, social, problem), correspondence=correspondence)
+    return Learner(problem, problem.autonomous, social=Social.of(social, problem), correspondence=correspondence)

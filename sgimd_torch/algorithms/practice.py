@@ -32,11 +32,13 @@ PRACTICE: Final[dict[str, Any]] = {
 
 @hands_on(sagg_riac, **PRACTICE, inverse=AmongEffects)
 def practice(environment: Environment, seed: int, **parts: Any) -> Learner:
-    """Practice: one movement at a goal within reach, by a local process."""
+    """One movement at each goal within reach, by a local process; no teacher."""
     return sagg_riac(environment, seed, **parts)
 
 
 @hands_on(sgim_d, **PRACTICE, inverse=AmongEffects, social=partial(Imitate, repeats=1))
 def practice_taught(environment: Environment, seed: int, *, correspondence: Correspondence, **parts: Any) -> Learner:
-    """Practice that executes each demonstration once, exactly. Best when all come at the start."""
+    """Practice that executes each demonstration once, exactly.
+
+    Best when all demonstrations come at the start."""
     return sgim_d(environment, seed, correspondence=correspondence, **parts)

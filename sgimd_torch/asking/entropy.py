@@ -50,7 +50,9 @@ def doubt(known: Array, points: Array) -> Array:
 
 
 class EntropyGoals(StrategicGoals):
-    """Chooses mode and goal by the expected reduction of the epistemic entropy; see `StrategicGoals`.
+    """Goals and strategies by the expected reduction of entropy, to ask teachers.
+
+    See `StrategicGoals`.
 
     Args:
         problem: C, T and the memory are read.

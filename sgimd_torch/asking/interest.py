@@ -70,7 +70,9 @@ class StrategicGoals(Goals):
 
 
 class StrategicInterest(StrategicGoals):
-    """Interest of each (region, strategy): e^(progress / temperature), over the cost of the strategy. Of its progress,
+    """Goals and strategies of most progress for their cost, to ask teachers.
+
+    Interest of each (region, strategy): e^(progress / temperature), over the cost of the strategy. Of its progress,
     what exceeds that of the cheapest strategy there is divided by the cost, too. See `StrategicGoals`.
 
     The papers draw in proportion to progress, and try strategies by chance where they were not tried. Ours: progress

@@ -16,9 +16,8 @@ import numpy as np
 
 from sgimd_torch.demonstrations import SHIPPED, load_demonstrations
 from sgimd_torch.memory import Memory
-from sgimd_torch.parts import Demonstrator
 from sgimd_torch.spaces import Array, Demonstration, check_count, check_point
-from sgimd_torch.teachers import check_demonstrations
+from sgimd_torch.teachers import Demonstrator, check_demonstrations
 
 Knows = Callable[[Sequence[Demonstration], np.random.Generator], Sequence[Demonstration]]
 """(demonstrations, rng) -> those that a teacher has, as they take them to be."""
@@ -56,7 +55,9 @@ def _recorded(number: int, demonstrations: Sequence[Demonstration], rng: np.rand
 
 
 class AnsweringTeacher(Demonstrator):
-    """Shows the demonstration nearest to the goal; of equally near ones the first.
+    """Shows the demonstration nearest to the goal, of all there are.
+
+    Of equally near ones it shows the first.
 
     Args:
         demonstrations: demonstrations to choose from.

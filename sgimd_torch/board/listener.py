@@ -1,111 +1,115 @@
 """The board of a run: what TensorBoard shows of it. Steps are movements.
 
-A resumed run tells everything again from its record, so the board is written anew and holds each point once.
+A resumed run tells its listeners all of its record again, so the board is written anew and holds each point once.
     board = BoardListener(folder, parts, seconds); board.episode(episode, replayed=False); board.flush(); board.close()
 ``tensorboard --logdir RUNS`` shows it.
 """
 
 from __future__ import annotations
 
+import json
+import math
+import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
-from sgimd_torch.board.curves import Behaviour, Competent, of_regions
+from tensorboardX import summary
+
+from sgimd_torch.board.curves import Behaviour, of_evaluation, of_regions, places_of
 from sgimd_torch.board.events import EventFile
-from sgimd_torch.board.legend import LEGEND, charts
+from sgimd_torch.board.legend import page, sentence
 from sgimd_torch.board.pictures import draw
-from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.evaluation import Benchmark, Evaluation
-from sgimd_torch.spaces import Episode
+from sgimd_torch.spaces import Box, Episode
 
 EVERY: Final = 50  # movements from one point of a curve to the next
+METRIC: Final = "error/mean"  # on TensorBoard's page of hyperparameters
 
 
-class Watched(Protocol):
-    """The parts of a run that a board looks at."""
-
-    @property
-    def config(self) -> Any: ...
-    @property
-    def environment(self) -> Environment: ...
-    @property
-    def learner(self) -> Any: ...
-    @property
-    def benchmark(self) -> Benchmark: ...
-
-
-class BoardListener:
-    """Shows what a run does.
+class BoardListener(EventFile):
+    """Writes the curves and pictures of a run.
 
     Args:
-        folder: of the run; its event files stay as they are until ``begin``.
-        parts: of the run.
-        seconds: gives the seconds spent so far, by what they were spent on.
+        folder: folder of the run; its event files stay as they are until ``begin``, the end of a replay.
+        parts: parts of the run; read are config, environment, learner and benchmark.
+        seconds: gives the seconds spent so far, by part of the run.
         curves: gives what a forward model has learnt from the last movement, by tag.
     """
 
     def __init__(
         self,
         folder: Path,
-        parts: Watched,
+        parts: Any,
         seconds: Callable[[], Mapping[str, float]],
         curves: Callable[[], Mapping[str, float]] = dict,
     ) -> None:
-        self._parts, self._seconds, self._curves, self._file = parts, seconds, curves, EventFile(folder)
+        super().__init__(folder)
+        self._config, self._learner, self._seconds, self._curves = parts.config, parts.learner, seconds, curves
+        self._space: Box = parts.environment.outcomes
+        self._benchmark: Benchmark = parts.benchmark
+        self._places = places_of(self._space, self._benchmark.goals)
+        self._behaviour = Behaviour(parts.learner.problem.tolerance)
         self._movements = self._drawn_at = 0
-        self._page: dict[str, dict[str, str]] = {}
-        self._behaviour = Behaviour(getattr(parts.learner.autonomous, "tolerance", 0.02))
-        self._competent = Competent(parts.benchmark.goals, parts.benchmark.side / 2, parts.environment.outcomes)
-        rows = "\n".join(f"| {name} | {value} |" for name, value in parts.config.settings.items())
-        self._file.text(0, "about/settings", f"| option | value |\n|---|---|\n{rows}")
-        rows = "\n".join(f"| **{tag if '/' in tag else f'{tag}/…'}** | {what} |" for tag, what in LEGEND.items())
-        self._file.text(
-            0,
-            "about/legend",
-            f"Steps are movements; distances are in the unit of T.\n\n| tag | what it shows |\n|---|---|\n{rows}",
-        )
+        self._explained: set[str] = set()
+        for each in summary.hparams(hparams_of(parts.config), {METRIC: math.nan})[:2]:  # the last tells how it ended
+            self.add(0, each)
+        self.add(0, summary.text("about/legend", page(self._space.unit)))
 
     def episode(self, episode: Episode, replayed: bool) -> None:
-        """Count a movement; every 50th gives the curves a point. When a recorded one was made, nobody knows."""
+        """Count a movement; every 50th gives the curves a point. Replayed movements have no times."""
         self._movements = episode.index + 1
         self._behaviour.episode(episode)
         if self._movements % EVERY == 0:
-            self._scalars({**self._behaviour.curves(), **of_regions(self._parts.learner.regions)})
+            self._scalars({**self._behaviour.curves(), **of_regions(self._learner.regions)})
             if not replayed:
                 self._scalars({f"time/{name.removeprefix('seconds_')}": s for name, s in self._seconds().items()})
         self._scalars(self._curves())
 
     def evaluated(self, movements: int, found: Mapping[str, Evaluation]) -> None:
-        """Show an evaluation by each answer, "own" among them; of the others only the mean error. Pictures take as long
-        as 100 movements, so they are drawn when the number of movements has doubled, and at the end."""
-        own = found["own"]
-        others = {f"answers/{answer}": each.mean_error for answer, each in found.items() if answer != "own"}
-        self._scalars({**self._competent.curves(own), **others})
-        if movements >= 2 * self._drawn_at or movements == self._parts.config.movements:
+        """Show an evaluation; of other answers than the run's own, the mean error alone.
+
+        Pictures take as long as 100 movements, so they are drawn when the number of movements has doubled, and at the
+        end.
+        """
+        own, goals = found["own"], self._benchmark.goals
+        others = {f"error/by_{answer}": each.mean_error for answer, each in found.items() if answer != "own"}
+        self._scalars({**of_evaluation(own, self._benchmark.side / 2, self._places), **others})
+        if movements >= 2 * self._drawn_at or movements == self._config.movements:
             self._drawn_at = movements
-            self._draw(own)
+            for tag, picture in draw(self._learner.regions, self._space, goals, own.errors).items():
+                self._show(tag, summary.image(tag, picture, dataformats="HWC"), "images")
 
-    def begin(self) -> None:
-        """The replay is over: replace earlier event files."""
-        self._file.begin()
-
-    def flush(self) -> None:
-        """Hand everything to the operating system."""
-        self._file.flush()
-
-    def close(self) -> None:
-        """The run has ended, or was stopped."""
-        self._file.close()
+    def curves(self) -> Mapping[str, float]:
+        """Nothing: the board draws what others tell."""
+        return {}
 
     def _scalars(self, values: Mapping[str, float]) -> None:
-        self._file.scalars(self._movements, values)
-        page = charts(self._file.tags, self._parts.environment.outcomes.amount(self._competent.near, ".2g"))
-        if page != self._page:  # a chart appears with its first point
-            self._page = page
-            self._file.layout(page)
+        """A point for each curve, by tag; values that are not finite are left out."""
+        for tag, value in values.items():
+            if math.isfinite(value):
+                self._show(tag, summary.scalar(tag, value), "scalars")
 
-    def _draw(self, found: Evaluation) -> None:
-        parts, space, regions = self._parts, self._parts.environment.outcomes, self._parts.learner.regions
-        for tag, png in draw(regions, space, parts.benchmark.goals, found.errors).items():
-            self._file.image(self._movements, tag, png)
+    def _show(self, tag: str, made: Any, plugin: str) -> None:
+        """Add what tensorboardX has ``made`` for a page of TensorBoard, ``plugin``; the first explains its tag."""
+        if tag not in self._explained:
+            self._explained.add(tag)
+            made.value[0].metadata.summary_description = sentence(tag, self._space.unit)
+            made.value[0].metadata.plugin_data.plugin_name = plugin
+        self.add(self._movements, made)
+
+
+def hparams_of(config: Any) -> dict[str, bool | float | str]:
+    """Options that tell a run from others, for TensorBoard's page of hyperparameters, by their names on a command line.
+
+    These are algorithm, environment, seed, options of parts that differ from their defaults, and options in the name of
+    a variant, such as "sgim-d,budget=5": so each run of a sweep has all options that the sweep varies.
+    """
+    varied = re.findall(r"(?:^|,)([\w.-]+)=", config.variant)
+    typed = {name.replace("_", "-"): value for name, value in config.settings.items()}
+    chosen = ["algorithm", "environment", "seed", *(name.replace("_", "-") for name in dict(config.parts)), *varied]
+    return {
+        name: value if isinstance(value, bool | int | float | str) else json.dumps(value)
+        for name, value in typed.items()
+        if name in chosen
+    }

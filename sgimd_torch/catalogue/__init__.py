@@ -47,7 +47,6 @@ WORDS: Final[dict[str, dict[str, str]]] = {
     "environment": {
         ROD: "runs.tasks.rods:fishing_rod",
         "rod-wind": "runs.tasks.rods:rod_wind",
-        "rod-yaw": "runs.tasks.rods:rod_yaw",
         "rod-long": "runs.tasks.rods:rod_long",
         "planar-arm-7": "runs.tasks.robots:planar_arm_7",
         "planar-arm-50": "runs.tasks.robots:planar_arm_50",
@@ -110,7 +109,7 @@ WORDS: Final[dict[str, dict[str, str]]] = {
         "initial": "teachers:InitialTeacher",
         "at-once": "teachers:at_once",
         "asked": "teachers:AskedTeacher",
-        "by-hand": "teachers.by_hand:ByHand",
+        "by-hand": "teach.by_hand:ByHand",
     },
     "choose": {
         "least-explored": "teachers:least_explored",
@@ -135,7 +134,7 @@ WORDS: Final[dict[str, dict[str, str]]] = {
         "benchmark": "views.benchmark",
         "table": "views.table",
         "report": "views.report.command",
-        "teach": "views.teach",
+        "teach": "teach.command",
         "film": "views.film.command",
         "demo": "views.demo",
     },
@@ -187,7 +186,7 @@ def about(kind: str, word: str) -> str:
     path = _PACKAGE / module.replace(".", "/")
     tree = ast.parse((path / "__init__.py" if path.is_dir() else path.with_suffix(".py")).read_text(encoding="utf-8"))
     found = ast.get_docstring(tree) if not name else None
-    for node, after in pairwise(tree.body):
+    for node, after in pairwise((*tree.body, ast.Pass())):
         if isinstance(node, ast.FunctionDef | ast.ClassDef) and node.name == name:
             found = ast.get_docstring(node)
         elif isinstance(node, ast.Assign) and isinstance(after, ast.Expr) and ast.unparse(node.targets[0]) == name:

@@ -48,7 +48,7 @@ def help_of(make: Callable[..., Any]) -> dict[str, str]:
     found = help_of(_TARGETS[decorated]) if decorated in _TARGETS else {}
     text = inspect.getdoc(make) or ""
     for each in docstring_parser.parse(text, docstring_parser.DocstringStyle.GOOGLE).params:
-        about = " ".join((each.description or "").split())
+        about = " ".join((each.description or "").split()).partition(" Deviation:")[0]
         found |= dict.fromkeys(each.arg_name.split(", "), about)
     return found
 

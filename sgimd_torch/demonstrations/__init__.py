@@ -1,13 +1,13 @@
-"""Demonstrations on disk: recorded joint trajectories, their times and where the float landed.
+"""Demonstrations on disk: recorded joint trajectories, their times and outcomes.
 
-One ``.npz`` file without pickle, which any numpy reads. The n recordings may differ in length and stand end to end:
+They are one ``.npz`` file without pickle. The n recordings may differ in length, and are stored end to end:
     version          ()                   1
-    lengths          (n,) int             samples of each recording, 2 or more
+    lengths          (n,) int             number of samples of each recording, at least 2
     times            (sum,) s             increasing within each recording
     trajectories     (sum, n_joints) rad
-    outcomes         (n, outcome_dim) m   where the float landed
+    outcomes         (n, outcome_dim) m   landing points of the float
     contexts         (n, context_dim)     (n, 0) in the fishing task
-``save_demonstrations`` writes it from a list of ``Demonstration``, so that is all your own recordings need.
+``save_demonstrations`` writes such a file from a list of ``Demonstration``.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _FIELDS = ("lengths", "times", "trajectories", "outcomes", "contexts")
 
 
 def save_demonstrations(path: str | os.PathLike[str], demonstrations: Sequence[Demonstration]) -> None:
-    """Write a file that ``load_demonstrations`` reads; the file appears whole or not at all.
+    """Write a file for ``load_demonstrations``; the file appears whole or not at all.
 
     Raises:
         ValueError: no demonstration, or demonstrations of several robots.
@@ -52,15 +52,15 @@ def load_demonstrations(
     outcome_dim: int | None = None,
     context_dim: int | None = None,
 ) -> list[Demonstration]:
-    """Read recordings; by default the shipped ones of the (simulated) human demonstrator 3.
+    """Read demonstrations; by default the shipped ones of the (simulated) human demonstrator 3.
 
     Args:
-        path: a ``.npz`` file as described above.
-        n_joints, outcome_dim, context_dim: what the robot expects; None accepts any.
+        path: ``.npz`` file in the format above.
+        n_joints, outcome_dim, context_dim: dimensions of the robot; None accepts any.
 
     Raises:
-        ValueError: not such a file, or empty, truncated, not numbers, unsorted in time, not finite, or made for another
-            robot; the message names the file and the recording.
+        ValueError: the file is none of this format, is empty or truncated, has times that do not increase or numbers
+            that are not finite, or is for another robot; the message names the file and the recording.
         OSError: there is no file, or it is a directory.
     """
     source = str(path)
@@ -103,7 +103,7 @@ def _check(source: str, fields: dict[str, Array]) -> None:
     if not len(fields["outcomes"]) == len(fields["contexts"]) == n:
         rows = f"{len(fields['outcomes'])} outcomes, {len(fields['contexts'])} contexts"
         raise ValueError(f"{source}: {n} recordings, but {rows}")
-    total = sum(lengths.tolist())  # of any size; a sum of numpy's may come round to a small number
+    total = sum(lengths.tolist())  # a sum of numpy may overflow to a small number
     if not len(fields["times"]) == len(fields["trajectories"]) == total:
         rows = f"{len(fields['times'])} times, {len(fields['trajectories'])} postures"
         raise ValueError(f"{source}: lengths add up to {total} samples, but there are {rows}; is it truncated?")

@@ -1,10 +1,10 @@
-"""Recordings as people have them: tables with a row for each sample, whose columns the user names.
+"""Recordings from tables with a row for each sample, whose columns the user names.
 
     columns = Columns(joints=("shoulder", "elbow"), outcome=("x", "y"))
-    shown = read_csv("recordings", columns)                  # a folder with one file a demonstration, or one long table
+    shown = read_csv("recordings", columns)              # a folder with a file for each recording, or one long table
     save_demonstrations("shown.npz", shown)
-A column may hold vectors, as those of LeRobot do: ``observation.state`` is all its entries, ``observation.state[0:6]``
-and ``observation.state[2]`` are some.
+A column may hold vectors, as in LeRobot: ``observation.state`` is the whole vector, ``observation.state[0:6]`` and
+``observation.state[2]`` are some of its entries.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ _NAME: Final = re.compile(r"(?P<name>[^\[\]]+)(\[(?P<first>\d+)(?P<slice>:(?P<en
 
 @dataclass(frozen=True)
 class Columns:
-    """Which columns of a table hold what.
+    """Names of the columns of a table.
 
     Args:
-        joints: angles (rad) or commands, in the order in which the robot's correspondence wants them.
-        outcome: where the movement ended; of each recording the last row counts.
-        context: of each recording the first row counts; empty without contexts.
-        time: s; a recording may begin at any time.
-        recording: the number or name of the recording that a row belongs to; None if a table is one recording.
-        degrees: joints are in degrees; they are turned to rad.
+        joints: joint angles (rad) or commands, in the order that the robot's correspondence expects.
+        outcome: outcome of a recording, in its last row.
+        context: context of a recording, in its first row; empty without contexts.
+        time: time (s); a recording may begin at any time.
+        recording: number or name of the recording that a row belongs to; None if a table is one recording.
+        degrees: whether joints are in degrees, to be converted to rad.
     """
 
     joints: tuple[str, ...]
@@ -53,47 +53,44 @@ class Columns:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of all columns, as the user wrote them."""
+        """All columns, as the user wrote them."""
         grouped = () if self.recording is None else (self.recording,)
         return (*self.joints, *self.outcome, *self.context, self.time, *grouped)
 
     @property
     def plain(self) -> list[str]:
-        """Names of the table's columns that are needed, each once."""
+        """All columns without the entries of vectors, each once."""
         return list(dict.fromkeys(name.partition("[")[0] for name in self.names))
 
 
 def read_csv(path: str | os.PathLike[str], columns: Columns) -> list[Demonstration]:
-    """Recordings from CSV: a folder of files, one for each demonstration, or one file.
+    """Read recordings from a CSV file, or from all CSV files of a folder in the order of their names.
 
-    A file may hold many recordings, if ``columns.recording`` tells which row belongs to which. The first line names the
-    columns.
+    The first line of a file names its columns. A file is one recording unless ``columns.recording`` divides it.
 
     Raises:
-        ValueError: a column is missing, a field is no number, or a recording is none; file, line or recording is named.
+        ValueError: a column is missing, a field is no number, or rows make no recording; the message names the file and
+            the row or recording.
         OSError: there is no file.
     """
     path = Path(path)
     files = sorted(path.glob("*.csv")) if path.is_dir() else [path]
     if not files:
         raise ValueError(f"{path} holds no .csv file")
-    found: list[Demonstration] = []
-    for file in files:
-        found += recordings(str(file), _table(file, columns.plain), columns)
-    return found
+    return [each for file in files for each in recordings(str(file), _table(file, columns.plain), columns)]
 
 
 def recordings(source: str, table: Mapping[str, np.ndarray], columns: Columns) -> list[Demonstration]:
     """The recordings of one table.
 
     Args:
-        source: what to call it in errors.
-        table: for each of ``columns.plain`` its ``(n,)`` values, or ``(n, k)`` vectors.
-        columns: which is which.
+        source: name of the table in errors.
+        table: ``(n_rows,)`` values or ``(n_rows, k)`` vectors of each of ``columns.plain``.
+        columns: meaning of the columns.
 
     Raises:
-        ValueError: the name of a vector's entry that it does not have, or a recording of fewer than two samples, whose
-            rows are apart, or whose times do not increase.
+        ValueError: a vector lacks an entry, or a recording has fewer than two samples, rows that are apart, or times
+            that do not increase.
     """
     times = _values(source, table, (columns.time,))
     if times.shape[1] != 1:
@@ -131,7 +128,7 @@ def _table(file: Path, names: Sequence[str]) -> dict[str, np.ndarray]:
 
 
 def _values(source: str, table: Mapping[str, np.ndarray], names: Sequence[str]) -> Array:
-    """``(n, dim)`` of the columns called ``names``, side by side."""
+    """``(n_rows, dim)`` values of the columns ``names``, side by side."""
     parts = [np.empty((len(next(iter(table.values()))), 0))]
     for written in names:
         match = _NAME.fullmatch(written)
@@ -152,14 +149,16 @@ def _values(source: str, table: Mapping[str, np.ndarray], names: Sequence[str]) 
 
 
 def _groups(source: str, table: Mapping[str, np.ndarray], recording: str | None, n: int) -> list[tuple[str, slice]]:
-    """What to call each recording in errors, and its rows, in order."""
+    """The name in errors and the rows of each recording, in order."""
     if recording is None:
         return [(source, slice(0, n))]
     names = table[recording].tolist()
     starts = [row for row in range(n) if row == 0 or names[row] != names[row - 1]]
     found = [names[row] for row in starts]
     if len(set(found)) < len(found):
-        twice = next(name for k, name in enumerate(found) if name in found[:k])
+        twice = next(name for name in found if found.count(name) > 1)
         raise ValueError(f"{source}: the rows of recording {twice} are apart; sort them by {recording} and time")
-    ends = [*starts[1:], n]
-    return [(f"{source}: recording {names[row]}", slice(row, end)) for row, end in zip(starts, ends, strict=True)]
+    return [
+        (f"{source}: recording {names[row]}", slice(row, end))
+        for row, end in zip(starts, [*starts[1:], n], strict=True)
+    ]

@@ -3,8 +3,8 @@
     columns = Columns(joints=("observation.state[0:6]",), outcome=("observation.environment_state[0:2]",),
                       time="timestamp", recording="episode_index")
     shown = read_lerobot("datasets/my_arm", columns)
-The layout, as its version 3.0 has it: ``meta/info.json`` with the version, the counts and the features, and
-``data/chunk-000/file-000.parquet`` and so on with a row for each frame.
+Format v3 has ``meta/info.json`` with the version, the counts and the features, and ``data/chunk-000/file-000.parquet``
+and so on with a row for each frame.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ except ImportError as error:
 
 
 def read_lerobot(root: str | os.PathLike[str], columns: Columns) -> list[Demonstration]:
-    """All episodes of a dataset, in order.
+    """Read all episodes of a dataset, in order.
 
     Args:
-        root: its folder, which holds ``meta`` and ``data``.
-        columns: of the features; ``time`` is usually ``timestamp``, ``recording`` is ``episode_index``.
+        root: folder of the dataset, with ``meta`` and ``data``.
+        columns: names of the features; ``time`` is usually ``timestamp``, ``recording`` is ``episode_index``.
 
     Raises:
-        ValueError: no such dataset, of another version, without one of the columns, with fewer episodes or frames than
-            it says, or with an episode that is no recording.
+        ValueError: no dataset, another version, a missing feature, another number of episodes or frames than
+            ``info.json`` says, or an episode that is no recording.
         OSError: a file cannot be read.
     """
     root = Path(root)
@@ -72,9 +72,9 @@ def _info(path: Path) -> dict[str, Any]:
 
 
 def _columns(file: Path, names: list[str]) -> dict[str, np.ndarray]:
-    """``(n,)`` or ``(n, k)`` for each name."""
+    """``(n_rows,)`` values or ``(n_rows, k)`` vectors of each name."""
     try:
         table = pyarrow.parquet.read_table(file, columns=names, page_checksum_verification=True)
         return {name: np.array(table.column(name).to_pylist()) for name in names}
-    except (pyarrow.ArrowException, OSError, ValueError, KeyError) as error:  # vectors of several lengths, too
+    except (pyarrow.ArrowException, OSError, ValueError, KeyError) as error:  # ValueError: vectors differ in length
         raise ValueError(f"{file} cannot be read: {str(error)[:200]}; is it whole, with all of {names}?") from error

@@ -1,4 +1,4 @@
-"""Every promise of `Environment`, tried on a real one; a promise that it breaks is told with the likely slip.
+"""A check of every promise of `Environment` on a real one; each broken promise is named with its likely cause.
 
 check_environment(Toss())        # ValueError with a line for each slip; ``sgimd check toss:Toss`` prints them
 """
@@ -11,10 +11,10 @@ from typing import Any, Final
 
 import numpy as np
 
-from sgimd_torch.environments.protocol import BatchEnvironment, Environment, check_instance, check_rest
+from sgimd_torch.environments.protocol import BatchEnvironment, Environment, check_instance, check_robot
 from sgimd_torch.spaces import Array, Box, check_count, stream
 
-_FACTOR: Final = 10.0  # between the noise announced and that of a few movements; a wrong unit is farther off
+_FACTOR: Final = 10.0  # largest ratio of the announced noise to the measured one; a wrong unit gives a larger one
 Movements = Sequence[tuple[Array, Array]]
 
 
@@ -22,12 +22,12 @@ def check_environment(environment: Environment, *, movements: int = 3) -> None:
     """Refuse an environment that breaks a promise of its protocol.
 
     Args:
-        environment: is observed and executed, about 8 times for each movement.
-        movements: number of random movements to try; two corners of Pi are tried, too.
+        environment: environment to check; it is observed and executed about 8 times for each movement.
+        movements: number of random movements to try, besides two corners of Pi.
 
     Raises:
-        ValueError: a line for each slip: what was found, what was wanted, the likely cause. Promises that rest on a
-            broken one are not tried, so a second look may find more.
+        ValueError: a line for each slip: what was found, what was wanted, the likely cause. Promises that depend on
+            a broken one are not checked, so a second check may find more.
     """
     check_count("movements", movements, 1)
     if isinstance(environment, type):
@@ -65,7 +65,7 @@ def _spaces(environment: Environment, _: Movements) -> Iterator[str]:
             hint = "; without contexts it is Box.cube(0, 1, 0)" if name == "contexts" else ""
             yield f"{name} must be a sgimd_torch.Box, got {type(box).__name__}{hint}"
         elif box.dim < least:
-            yield f"{name} must have a dimension at least, got a Box of none"
+            yield f"{name} must have at least one dimension, got a Box without any"
     for name in ("observe", "execute"):
         if not callable(getattr(environment, name, None)):
             yield f"{name} must be a method, got {type(getattr(environment, name, None)).__name__}"
@@ -77,7 +77,7 @@ def _spaces(environment: Environment, _: Movements) -> Iterator[str]:
         yield f"rest must be an array, the outcome of not moving, got {type(rest).__name__}; np.zeros(2), for example"
     elif isinstance(getattr(environment, "outcomes", None), Box):
         try:
-            check_rest(environment)
+            check_robot(environment)
         except ValueError as error:
             yield f"{error}; rest is the outcome of not moving, one point of T (outcomes)"
 
@@ -95,7 +95,7 @@ def _contexts(environment: Environment, _: Movements) -> Iterator[str]:
     if not np.array_equal(context, kept):
         yield _used_twice("observe()")
     if not np.array_equal(_call(environment, "observe", stream(1, "observe")), kept):
-        yield "observe() gave two contexts for equal streams; does it draw from something else than its rng?"
+        yield "observe() gave two contexts for equal streams; does it draw from anything but its rng?"
     if _global_streams() != before:
         yield _drew_from_global("observe()")
 
@@ -112,16 +112,16 @@ def _outcomes(environment: Environment, tried: Movements) -> Iterator[str]:
             return
         for name, given, now in zip(("context", "theta"), (context, theta), arguments, strict=True):
             if not np.array_equal(given, now):
-                yield f"execute() changed the {name} that it was given; write x = x * 2 in the place of x *= 2"
+                yield f"execute() changed the {name} that it was given; write x = x * 2 instead of x *= 2"
                 return
 
 
 def _repeats(environment: Environment, tried: Movements) -> Iterator[str]:
-    """Equal streams give equal outcomes, whatever was executed before."""
+    """Equal streams must give equal outcomes, whatever was executed before."""
     context, theta = tried[0]
     before, rng = _global_streams(), stream(1, "execute")
     untouched = rng.bit_generator.state
-    _call(environment, "execute", context, theta, stream(1, "execute"))  # so that the next two come after the same one
+    _call(environment, "execute", context, theta, stream(1, "execute"))  # the next two then follow the same one
     first = _call(environment, "execute", context, theta, rng)
     kept, again = first.copy(), _call(environment, "execute", context, theta, stream(1, "execute")).copy()
     if _global_streams() != before:
@@ -129,9 +129,9 @@ def _repeats(environment: Environment, tried: Movements) -> Iterator[str]:
     elif not np.array_equal(kept, again):
         found = f"execute() gave {_text(kept)}, then {_text(again)} for the same movement and equal streams"
         if environment.outcome_noise and rng.bit_generator.state == untouched:
-            yield f"{found}: its noise is not from the rng, of which nothing was drawn; has it a generator of its own?"
+            yield f"{found}: nothing was drawn from rng; does its noise come from a generator of its own?"
         else:
-            yield f"{found}: state is carried over; does each movement begin with positions, speeds, filters set anew?"
+            yield f"{found}: state carries over; does each movement reset positions, speeds and filters?"
     else:
         _call(environment, "execute", *tried[1], stream(2, "execute"))
         if not np.array_equal(first, kept):
@@ -139,8 +139,8 @@ def _repeats(environment: Environment, tried: Movements) -> Iterator[str]:
         last = _call(environment, "execute", context, theta, stream(1, "execute"))
         if not np.array_equal(last, kept):
             yield (
-                f"execute() gave {_text(kept)}, but {_text(last)} after another movement: state is carried over; does "
-                "each movement begin with positions, speeds, filters set anew?"
+                f"execute() gave {_text(kept)}, but {_text(last)} after another movement: state carries over; does "
+                "each movement reset positions, speeds and filters?"
             )
 
 
@@ -204,7 +204,7 @@ def _refusals(environment: Environment, tried: Movements) -> Iterator[str]:
 
 
 def _invalid(point: Array, box: Box) -> list[Array]:
-    """Of another length, a batch, and with a last entry that is NaN, infinite or outside."""
+    """Points of another length, a batch, and points with a last entry that is NaN, infinite or outside ``box``."""
     values = [np.append(point, 0.0), np.stack((point, point))]
     if len(point) > 0:
         outside = box.high[-1] + box.sides[-1]
@@ -231,15 +231,15 @@ def _misshapen(what: str, value: Any, *shape: int) -> str | None:
 
 
 def _used_twice(what: str) -> str:
-    return f"{what} changed an array that it gave before: one buffer is used twice; give a copy"
+    return f"{what} changed an array that it gave before: one buffer is used twice; return a copy"
 
 
 def _drew_from_global(what: str) -> str:
-    return f"{what} drew from a global random stream; write rng.normal() in the place of np.random.normal()"
+    return f"{what} drew from a global random stream; write rng.normal() instead of np.random.normal()"
 
 
 def _global_streams() -> tuple[str, str]:
-    return str(np.random.get_state()), str(random.getstate())  # noqa: NPY002 - of which nobody may draw
+    return str(np.random.get_state()), str(random.getstate())  # noqa: NPY002 - only compared
 
 
 def _text(point: Array) -> str:

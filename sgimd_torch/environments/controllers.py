@@ -1,7 +1,7 @@
-"""How a theta becomes a sequence of commands: here, by a sinusoid for each joint.
+"""Controllers turn a theta into a sequence of commands; here, a sinusoid for each joint.
 
-A controller has ``policies``, its Pi, and ``at(theta, times)``, the commands, as `GaussianPrimitive` has; so each can
-replace the other. Both translate a recording by their ``correspondence``, eq. (6) of Nguyen & Oudeyer (2014).
+A controller has ``policies``, its Pi, and ``at(theta, times)``, the commands. `GaussianPrimitive` has both, too, so it
+can replace `Sinusoids`. Both translate a recording by ``correspondence``, eq. (6) of Nguyen & Oudeyer (2014).
     swim = Sinusoids(actions, frequencies=(0.2, 2.0)); commands = swim.at(theta, times)
 """
 
@@ -12,15 +12,15 @@ from typing import Final, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sgimd_torch.environments.protocol import check_recording
+from sgimd_torch.environments.protocol import Primitive, check_recording
 from sgimd_torch.spaces import Array, Box
 
-_GRID: Final = 200  # frequencies that are tried before the best one is refined
-STEER: Final = 0.5  # half ranges, the largest offset
+_GRID: Final = 200  # frequencies to try; the best one is then refined
+STEER: Final = 0.5  # largest offset, in half ranges of the command
 
 
 class Controller(Protocol):
-    """Open loop: the commands of a movement depend on its theta alone."""
+    """An open-loop controller: the commands of a movement depend on its theta alone."""
 
     @property
     def policies(self) -> Box:
@@ -28,20 +28,20 @@ class Controller(Protocol):
         ...
 
     def at(self, theta: Array, times: Array) -> Array:
-        """``(n_times, n_commands)`` at ``times`` ``(n_times,)`` s after the start."""
+        """Commands ``(n_times, n_commands)`` at ``times`` ``(n_times,)`` s after the start."""
         ...
 
 
-class Sinusoids:
+class Sinusoids(Primitive):
     """One sinusoid for each command: amplitude, phase and offset; all share one frequency.
 
     theta in [0, 1]^(3 n_commands + 1) holds amplitude, phase and offset command by command, then the frequency. An
-    amplitude of 1 is half of the command's range, an offset moves the middle by half of that at most; what leaves
-    the range is clipped. A phase of 1 is that of 0.
+    amplitude of 1 is half the range of the command; an offset moves the middle by at most a quarter of the range.
+    Commands are clipped to their ranges. The phases 0 and 1 are equal.
 
     Args:
-        commands: ``(n_commands,)`` box of their ranges, such as the torques of motors.
-        frequencies: lowest and highest (Hz).
+        commands: ``(n_commands,)`` box of the ranges of the commands, such as the torques of motors.
+        frequencies: lowest and highest frequency (Hz).
 
     Raises:
         ValueError: frequencies that are not 0 < lowest < highest.
@@ -50,11 +50,12 @@ class Sinusoids:
     def __init__(self, commands: Box, frequencies: tuple[float, float]) -> None:
         if not 0 < frequencies[0] < frequencies[1] < np.inf:
             raise ValueError(f"frequencies must be 0 < lowest < highest in Hz, got {frequencies}")
-        self.commands, self.frequencies = commands, frequencies
+        self.commands = self.ranges = commands
+        self.frequencies = frequencies
         self.policies = Box.cube(0.0, 1.0, 3 * commands.dim + 1)
 
     def at(self, theta: Array, times: Array) -> Array:
-        """``(n_times, n_commands)`` at ``times`` (s)."""
+        """Commands ``(n_times, n_commands)`` at ``times`` (s)."""
         amplitudes, phases, offsets = theta[:-1].reshape(-1, 3).T
         angles = 2 * np.pi * (self._frequency(theta[-1]) * times[:, None] + phases)
         waves = amplitudes * np.sin(angles) + STEER * (2 * offsets - 1)
@@ -64,12 +65,12 @@ class Sinusoids:
     def correspondence(self, times: ArrayLike, trajectory: ArrayLike) -> Array:
         """theta_d, the policy whose commands come nearest to the recorded ones, eq. (6).
 
-        For a fixed frequency the fit is linear; the frequency is the best of a grid, then refined. It is exact where no
-        command is clipped.
+        The frequency is the best of a grid, then refined; for a fixed frequency the fit is linear. It is exact if no
+        command was clipped.
 
         Args:
             times: ``(n_times,)`` s, increasing.
-            trajectory: ``(n_times, n_commands)``.
+            trajectory: ``(n_times, n_commands)``, the commands at ``times``.
 
         Raises:
             ValueError: shapes that do not fit, values that are not finite, or unsorted times.

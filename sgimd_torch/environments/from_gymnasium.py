@@ -1,10 +1,9 @@
-"""Any gymnasium environment with continuous actions as one of ours: a movement is an episode, from reset to its end.
+"""Gymnasium environments with continuous actions as environments of ours; a movement is an episode.
 
-theta are the parameters of a controller, which gives the actions; the outcome is a function of what was observed.
+theta holds the parameters of a controller, which gives the actions; the outcome is a function of the observations.
     actions = Box(world.action_space.low, world.action_space.high)
     swimmer = FromGymnasium(world, Sinusoids(actions, (0.2, 2.0)), steps=150, outcome=travelled, outcomes=..., ...)
-Another controller needs the two members of `Controller`.
-The other direction is ``to_gymnasium.py``.
+A controller of your own needs the two members of `Controller`. ``to_gymnasium.py`` converts in the other direction.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sgimd_torch.environments.controllers import Controller
-from sgimd_torch.environments.protocol import SimulationError, check_movement, check_rest
+from sgimd_torch.environments.protocol import Primitive, SimulationError, check_movement, check_robot
 from sgimd_torch.spaces import Array, Box, check_count, check_point, check_rng, check_vector, stream
 
 try:
@@ -29,18 +28,18 @@ except ImportError as error:
 class FromGymnasium:
     """An environment of ours that plays episodes of a gymnasium environment.
 
-    Each episode is reset with a seed that ``rng`` draws, so what the reset leaves to chance is the noise. Only one
-    thread at a time may use it. A warning of MuJoCo, which goes on from a state of its own, is a ``SimulationError``.
+    Each episode is reset with a seed drawn from ``rng``, so the randomness of the reset is the noise. Only one thread
+    at a time may use the environment. A warning of MuJoCo raises ``SimulationError``, as MuJoCo has reset its state.
 
     Args:
-        world: of gymnasium, with a Box of actions; its wrappers are used as they are.
-        controller: makes actions from theta; they are clipped to the action space.
+        world: gymnasium environment with a Box of actions, with or without wrappers.
+        controller: controller that turns theta into actions; they are clipped to the action space.
         outcomes: T.
-        rest: ``(outcome_dim,)`` the outcome of doing nothing, in T.
+        rest: ``(outcome_dim,)`` in T, the outcome of not moving.
         outcome_noise: standard deviation of the outcomes of one movement, per dimension; see `measured_noise`.
-        steps: the most actions of an episode; it ends earlier when the world says so.
-        outcome: the observations of an episode, the first included -> ``(outcome_dim,)``.
-        dt: s from one action to the next; None for that of the world, which those of MuJoCo have.
+        steps: largest number of actions of an episode; the world may end it earlier.
+        outcome: (observations of an episode, the first included) -> ``(outcome_dim,)``.
+        dt: time between two actions (s); None for ``dt`` of the world, which worlds of MuJoCo have.
 
     Raises:
         ValueError: no Box of actions, no ``dt``, or ``rest`` outside T.
@@ -62,24 +61,25 @@ class FromGymnasium:
             raise ValueError(f"needs continuous actions, a gymnasium Box of one axis, got {world.action_space}")
         dt = getattr(world.unwrapped, "dt", None) if dt is None else dt
         if dt is None or not 0 < dt < np.inf:
-            raise ValueError(f"needs dt > 0, seconds from one action to the next, got {dt}; this world does not say it")
+            raise ValueError(f"needs dt > 0, seconds between two actions, got {dt}; this world has none")
         self.world, self.controller, self._actions = world, controller, world.action_space
+        self.primitive = controller if isinstance(controller, Primitive) else Primitive()
         self.policies, self.outcomes = controller.policies, outcomes
         self.contexts = Box.cube(0.0, 1.0, 0)
         self.rest = check_point("rest", rest, outcomes.dim).copy()
         self.rest.flags.writeable = False
-        check_rest(self)
         self.outcome_noise, self.steps, self.dt = float(outcome_noise), check_count("steps", steps, 1), float(dt)
+        check_robot(self)
         if hasattr(controller, "correspondence"):
             self.correspondence = controller.correspondence
         self._outcome = outcome
 
     def observe(self, rng: np.random.Generator) -> Array:
-        """``(0,)``: where an episode starts is noise."""
+        """``(0,)``, as the start of an episode is noise."""
         return self.contexts.sample(rng)
 
     def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
-        """``(outcome_dim,)`` of one episode.
+        """``(outcome_dim,)``, the outcome of one episode.
 
         Raises:
             ValueError: ``theta`` is not one point of Pi, or the observations make no outcome.
@@ -91,7 +91,7 @@ class FromGymnasium:
         return self._play(actions, rng, theta)
 
     def replay(self, actions: ArrayLike) -> Array:
-        """``(outcome_dim,)`` of recorded ``actions`` ``(n, action_dim)``, from the reset of seed 0.
+        """``(outcome_dim,)``, the outcome of recorded ``actions`` ``(n, action_dim)``, with the seed 0.
 
         Raises:
             ValueError: actions of another shape, or more than the ``steps`` of a movement.
@@ -105,7 +105,7 @@ class FromGymnasium:
         return self._play(actions, stream(0, "replay"), actions[-1])
 
     def _play(self, actions: Array, rng: np.random.Generator, theta: Array) -> Array:
-        """The outcome of an episode of these ``actions``; ``theta`` is named if it fails."""
+        """The outcome of an episode of these ``actions``; an error names ``theta``."""
         check_rng(rng)
         observation, _ = self.world.reset(seed=int(rng.integers(2**31)))
         observations = [deepcopy(observation)]
@@ -124,7 +124,7 @@ class FromGymnasium:
 
 
 def measured_noise(environment: FromGymnasium, rng: np.random.Generator, *, movements: int = 20) -> float:
-    """``outcome_noise`` as it is: root mean square over random movements, each executed three times."""
+    """The true ``outcome_noise``: root mean square over random movements, each executed three times."""
     variances = []
     for _ in range(movements):
         context, theta = environment.observe(rng), environment.policies.sample(rng)

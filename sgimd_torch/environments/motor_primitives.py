@@ -8,42 +8,41 @@ reproduces it most closely (eq. 6).
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sgimd_torch.environments.protocol import check_recording
+from sgimd_torch.environments.protocol import Primitive, check_recording
 from sgimd_torch.spaces import Array, Box
 
+KNOTS: Final = 4  # per joint
 
-class GaussianPrimitive:
+
+class GaussianPrimitive(Primitive):
     """Joint trajectories by Gaussian distance weighting of knots, eq. (5).
 
-    theta in [0, 1]^(n_joints * n_knots + 1) holds the knots joint by joint, scaled to the joint ranges, then the
-    duration.
+    theta in [0, 1]^(4 n_joints + 1) holds the knots joint by joint, scaled to the joint ranges, then the duration.
 
     Args:
         joints: ``(n_joints,)`` box of joint ranges (rad).
         durations: shortest and longest duration delta (s), above 0.
-        n_knots: knots per joint, 4 in the paper.
-        sharpness: s in sigma = s / delta^2. Below 5 the fit is ill-conditioned, above 12 movements are jerky.
+        sharpness: factor s in sigma = s / delta^2. Below 5 the fit is ill-conditioned, above 12 movements are jerky.
 
     Raises:
-        ValueError: durations that are not 0 < shortest < longest, fewer than two knots, or sharpness not above 0.
+        ValueError: durations that are not 0 < shortest < longest, or sharpness not above 0.
     """
 
-    def __init__(
-        self, joints: Box, durations: tuple[float, float], *, n_knots: int = 4, sharpness: float = 9.0
-    ) -> None:
+    def __init__(self, joints: Box, durations: tuple[float, float], *, sharpness: float = 9.0) -> None:
         if not 0 < durations[0] < durations[1]:
             raise ValueError(f"durations must be 0 < shortest < longest in seconds, got {durations}")
-        if n_knots < 2 or not sharpness > 0:
-            raise ValueError(f"need n_knots >= 2 and sharpness > 0, got {n_knots} and {sharpness}")
-        self.joints = joints
+        if not sharpness > 0:
+            raise ValueError(f"sharpness must be above 0, got {sharpness}")
+        self.joints = self.ranges = joints
         self.durations = durations
-        self.n_knots = n_knots
         self.sharpness = sharpness
-        self.policies = Box.cube(0.0, 1.0, joints.dim * n_knots + 1)
-        self._centres = np.arange(n_knots) / (n_knots - 1)  # of the knots, as parts of the duration
+        self.policies = Box.cube(0.0, 1.0, joints.dim * KNOTS + 1)
+        self._centres = np.arange(KNOTS) / (KNOTS - 1)  # of the knots, as parts of the duration
 
     def duration(self, theta: Array) -> float:
         """delta (s) of one ``(theta_dim,)`` theta."""
@@ -60,7 +59,7 @@ class GaussianPrimitive:
 
         Args:
             theta: ``(theta_dim,)`` in [0, 1].
-            rate: the fewest samples per second; the last sample is at delta.
+            rate: least number of samples per second; the last sample is at delta.
 
         Raises:
             ValueError: theta has another shape or leaves the box.
@@ -73,7 +72,7 @@ class GaussianPrimitive:
     def fastest(self) -> tuple[Array, Array]:
         """``(n_joints,)`` rad/s and rad/s^2: the largest speeds and accelerations that any theta commands.
 
-        They are those of the shortest duration, with each knot at that end of its range which adds to them.
+        They occur at the shortest duration, with each knot at the end of its range that increases them.
         """
         phases = np.linspace(0.0, 1.0, 1001)
         weights = self._weights(phases)
@@ -81,20 +80,20 @@ class GaussianPrimitive:
         apart = slopes - (weights * slopes).sum(axis=1, keepdims=True)
         first = weights * apart
         second = weights * (apart**2 - (first * slopes).sum(axis=1, keepdims=True))
-        # The weights always add up to 1, so what some gain the others lose: half of all change is the positive part.
+        # The weights add up to 1, so increases and decreases balance: the positive part is half of all change.
         speed, acceleration = (np.abs(each).sum(axis=1).max() / 2 for each in (first, second))
         return self.joints.sides * speed / self.durations[0], self.joints.sides * acceleration / self.durations[0] ** 2
 
     def correspondence(self, times: ArrayLike, trajectory: ArrayLike) -> Array:
         """theta_d, the policy that reproduces a demonstrated trajectory most closely, eq. (6).
 
-        delta is the demonstration's own duration. One shorter than ``durations`` allow is played in the shortest of
-        them; a longer one is refused, as it would be another movement if it were played faster. For a fixed delta eq.
-        (5) is linear in the knots, so each joint is one bounded linear least squares problem (trust-region reflective,
-        the paper's algorithm), exact up to its tolerance.
+        delta is the demonstration's own duration. A demonstration shorter than ``durations`` allow is slowed down to
+        the shortest duration; a longer one is refused, as playing it faster would make it another movement. For a fixed
+        delta eq. (5) is linear in the knots, so each joint is one bounded linear least squares problem (trust-region
+        reflective, the paper's algorithm), exact up to its tolerance.
 
         Args:
-            times: ``(n_times,)`` s, increasing, at least ``n_knots`` of them.
+            times: ``(n_times,)`` s, increasing, at least 4 of them.
             trajectory: ``(n_times, n_joints)`` rad.
 
         Returns:
@@ -107,13 +106,13 @@ class GaussianPrimitive:
         from scipy.optimize import lsq_linear  # takes longer to import than this whole library
 
         times, trajectory = check_recording(
-            times, trajectory, self.joints.dim, samples=self.n_knots, longest=self.durations[1]
+            times, trajectory, self.joints.dim, samples=KNOTS, longest=self.durations[1]
         )
         span = times[-1] - times[0]
         weights = self._weights((times - times[0]) / span)
         low, sides = self.joints.low, self.joints.sides
         scaled = (trajectory - low) / sides
-        # Least squares without bounds is exact, up to rounding, where the knots stay inside. lsq_linear is not.
+        # Where the knots stay inside, least squares without bounds is exact up to rounding; lsq_linear is not.
         knots = np.linalg.lstsq(weights, scaled, rcond=None)[0]
         for joint in np.flatnonzero((np.abs(knots - 0.5) > 0.5 + 1e-9).any(axis=0)):
             knots[:, joint] = lsq_linear(weights, scaled[:, joint], bounds=(0.0, 1.0), method="trf", tol=1e-12).x
@@ -122,11 +121,11 @@ class GaussianPrimitive:
         return self.policies.clip(np.append(knots.T.ravel(), pace))
 
     def _knots(self, theta: Array) -> Array:
-        knots = theta[:-1].reshape(self.joints.dim, self.n_knots)
+        knots = theta[:-1].reshape(self.joints.dim, KNOTS)
         return self.joints.low[:, None] + knots * self.joints.sides[:, None]
 
     def _weights(self, phases: Array) -> Array:
         # Deviation: the paper prints exp(+sigma |.|^2) and five terms; the sign and i = 0..3 are ours. With
-        # sigma = s / delta^2 the weights depend on the phase t / delta alone.
+        # sigma = s / delta^2 the weights depend only on the phase t / delta.
         weights = np.exp(-self.sharpness * (phases[:, None] - self._centres) ** 2)  # eq. (5)
         return weights / weights.sum(axis=1, keepdims=True)

@@ -1,8 +1,8 @@
-"""Toy robots that act on an object: most movements do not touch it, and then nothing happens.
+"""Toy robots that act on an object: most movements do not touch it and have no effect.
 
-What is seen is where the object ends, not where the hand is. So a movement that misses says nothing about by how much,
-and babbling learns from few of its movements.
-    puck: has to be hit; where it lies is the context        fetch: a ball has to be grasped, then it comes along
+The outcome is the final place of the object, not that of the hand. So a movement that misses does not tell by how
+much, and babbling learns from few of its movements.
+    puck: a puck to hit; its place is the context        fetch: a ball to grasp and carry
     robot = puck(); outcome = robot.execute(robot.observe(rng), theta, rng)
 """
 
@@ -16,25 +16,25 @@ from numpy.typing import NDArray
 from sgimd_torch.environments.toys import GRAVITY, Toy
 from sgimd_torch.spaces import Array, Box
 
-_STEPS: Final = 50  # of a swing, between which the hand moves straight
+_STEPS: Final = 50  # of a swing; the hand moves straight within each
 _FRICTION: Final = 0.3  # of the puck on the table
 _BOUNCE: Final = 0.5  # restitution of hand and puck
 
 
 def puck(*, noise: float = 0.005) -> Toy:
-    """An arm hits a puck, which slides until friction stops it; walls reflect it. Context: where the puck lies.
+    """An arm hits a puck, which slides until friction stops it; walls reflect it. Context: the puck's place (m).
 
-    theta: turn and reach of the arm where the hand is lowered to the table, turn and reach where its swing ends, and
-    how fast it is. When it touches the puck, this leaves along the line from the hand, and the arm stops. A hand that
-    is lowered onto the puck holds it. Outcome: where the puck comes to rest (m).
+    theta: turn and reach of the arm at the start of its swing on the table, turn and reach at the end, and the speed.
+    When the hand touches the puck, the puck leaves along the line from the hand, and the arm stops. A hand that is
+    lowered onto the puck holds it. Outcome: the place where the puck comes to rest (m).
     """
     ranges = Box(np.array([-np.pi * 5 / 12, 0.3]), np.array([np.pi * 5 / 12, 0.9]))  # rad and m
-    apart = 0.1  # m, the middles of hand and puck when they touch
+    apart = 0.1  # m between the middles of hand and puck when they touch
     shortest, longest = 0.5, 1.5  # s, of a swing
     table = Box(np.array([0.0, -0.8]), np.array([1.2, 0.8]), ("x", "y"), "m")
     places = Box(np.array([0.35, 0.2]), np.array([0.65, 0.5]), ("puck x", "puck y"), "m")
     times = np.linspace(0, 1, _STEPS + 1)
-    course = (3 * times**2 - 2 * times**3)[:, None]  # from rest to rest
+    course = (3 * times**2 - 2 * times**3)[:, None]  # begins and ends at rest
 
     def rest(context: Array, theta: Array) -> Array:
         start, end = (ranges.low + theta[..., None, k : k + 2] * ranges.sides for k in (0, 2))
@@ -46,7 +46,7 @@ def puck(*, noise: float = 0.005) -> Toy:
         hit = (first > 0)[..., None]
         before, after = (_at(away, np.maximum(first, 1) - k) for k in (1, 0))
         touch = before + _until(apart, before, after - before) * (after - before)
-        ahead = touch / apart  # of length 1
+        ahead = touch / apart  # unit vector
         duration = longest + theta[..., 4:] * (shortest - longest)
         speed = (1 + _BOUNCE) * ((before - after) * ahead).sum(axis=-1, keepdims=True) * _STEPS / duration
         return np.where(hit, _reflected(context + ahead * speed**2 / (2 * _FRICTION * GRAVITY), table), context)
@@ -56,9 +56,9 @@ def puck(*, noise: float = 0.005) -> Toy:
 
 
 def fetch(*, noise: float = 0.005) -> Toy:
-    """An arm closes its hand in one posture and opens it in another: a ball that lay within .15 m of it comes along.
+    """An arm closes its hand in one posture and opens it in another; it carries a ball within .15 m of the closed hand.
 
-    theta: the angles of four joints where the hand closes, and those where it opens. Outcome: where the ball is (m).
+    theta: angles of the four joints where the hand closes, then where it opens. Outcome: final place of the ball (m).
     """
     ball = np.array([0.45, 0.45])
 
@@ -76,19 +76,19 @@ def fetch(*, noise: float = 0.005) -> Toy:
 
 
 def _at(path: Array, index: NDArray[np.intp]) -> Array:
-    """``(..., 2)`` the point of each path ``(..., times, 2)`` at its own index ``(...)``."""
+    """``(..., 2)``, the point of each path ``(..., times, 2)`` at its own index ``(...)``."""
     found: Array = np.take_along_axis(path, index[..., None, None], axis=-2)[..., 0, :]
     return found
 
 
 def _until(distance: float, before: Array, step: Array) -> Array:
-    """``(..., 1)`` the share of ``step`` after which a point that starts at ``before`` is so near to 0."""
+    """``(..., 1)``, the share of ``step`` after which a point that starts at ``before`` is within ``distance`` of 0."""
     a, b = ((each * step).sum(axis=-1, keepdims=True) for each in (step, before))
     c = (before * before).sum(axis=-1, keepdims=True) - distance**2
     return np.clip((-b - np.sqrt(np.maximum(b * b - a * c, 0))) / np.maximum(a, 1e-300), 0, 1)
 
 
 def _reflected(places: Array, box: Box) -> Array:
-    """Where what slides on without loss at the walls of ``box`` comes to rest: ``places`` folded into it."""
+    """``places`` folded into ``box``: where an object comes to rest that the walls reflect without loss."""
     laps = (places - box.low) / box.sides % 2
     return box.low + box.sides * (1 - np.abs(1 - laps))

@@ -8,24 +8,24 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sgimd_torch.environments.protocol import HandLed, Sketch, check_movement, check_recording
+from sgimd_torch.environments.protocol import Sketch, check_movement, check_recording
 from sgimd_torch.spaces import Array, Box, check_count, check_rng, check_vector, first_entry
 
-_STEP = 0.04  # s, of a recorded movement
-_STEPS = 26  # of it, from rest to its posture
+_STEP = 0.04  # s between two drawings of a movement
+_STEPS = 26  # drawings, from rest to the last posture
 
 
 class PlanarArm:
     """An arm of equal links in the plane, 1 m long; the outcome is the position of its end.
 
     ``theta`` in [0, 1]^n_joints is scaled to joint angles, .5 to the angle 0: the first joint turns in [-pi, pi], the
-    others bend by 2 pi / n_joints at most. So it can reach exactly the disc of radius 1 m.
+    others bend by 2 pi / n_joints at most. So the arm reaches exactly the disc of radius 1 m.
 
     Args:
-        n_joints: at least 2.
-        noise: standard deviation of every joint angle, rad; its effect on the outcome depends on the movement.
+        n_joints: number of joints, at least 2.
+        noise: standard deviation of the noise on every joint angle (rad).
         context: whether a context turns the whole arm, by an angle in [-pi/4, pi/4]; ``rest`` is in the context 0.
-        outcomes: T; None means the square around the disc.
+        outcomes: T; None for the square around the disc.
 
     Raises:
         ValueError: a number out of its range, or ``outcomes`` that do not contain ``rest``.
@@ -48,15 +48,15 @@ class PlanarArm:
         self.rest = self.outcomes.check("rest, where the straight arm ends,", [1.0, 0.0], "T has 2 dimensions")
         self.rest.flags.writeable = False
         self.noise = noise
-        self._limits = np.array([np.pi] + [2 * np.pi / n_joints] * (n_joints - 1))  # the least that close a circle
+        self._limits = np.array([np.pi] + [2 * np.pi / n_joints] * (n_joints - 1))  # the smallest that close a circle
         self.outcome_noise = self._mean_outcome_noise()
 
     def observe(self, rng: np.random.Generator) -> Array:
-        """``(context_dim,)`` uniform in C."""
+        """``(context_dim,)``, uniform in C."""
         return self.contexts.sample(rng)
 
     def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
-        """``(2,)`` m, where the end is after one movement.
+        """``(2,)`` m, position of the end after one movement.
 
         Raises:
             ValueError: ``context`` is not one point of C, or ``theta`` not one of Pi.
@@ -65,8 +65,8 @@ class PlanarArm:
         context, theta = check_movement(self, context, theta)
         return self._end(context, self._moved(theta, rng))
 
-    def record(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Sketch:
-        """As ``execute``, drawn: from the straight arm, ``rest``, all joints turn smoothly to their angles in 1 s."""
+    def trace(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Sketch:
+        """A movement as a drawing: in 1 s all joints turn smoothly from the straight arm to their angles."""
         context, theta = check_movement(self, context, theta)
         angles, times = self._moved(theta, rng), np.linspace(0, 1, _STEPS)[:, None]
         directions = np.cumsum(times**2 * (3 - 2 * times) * angles, axis=1) + context.sum()
@@ -74,18 +74,8 @@ class PlanarArm:
         joints = np.concatenate([np.zeros((_STEPS, 1, 2)), np.cumsum(links, axis=1)], axis=1)
         return Sketch(self._end(context, angles), _STEP, joints)
 
-    @property
-    def hand_led(self) -> HandLed:
-        """The arm in the context 0, led no faster than ``record`` moves it: smoothly, in 1 s."""
-        from sgimd_torch.environments.planar_model import JOINT, planar_model  # MuJoCo is loaded only when it is needed
-
-        n = self.policies.dim
-        names = tuple(JOINT.format(k) for k in range(n))
-        ranges, fastest = Box(-self._limits, self._limits), (1.5 * self._limits, 6 * self._limits)  # of 3 t^2 - 2 t^3
-        return HandLed(planar_model([1 / n] * n), names, "end", ranges, np.zeros(n), *fastest)
-
     def angles(self, theta: ArrayLike) -> Array:
-        """``(..., n_joints)`` rad, the angle of each joint without noise; ``theta`` is ``(..., n_joints)``.
+        """``(..., n_joints)`` rad, the joint angles of ``theta`` ``(..., n_joints)`` without noise.
 
         Raises:
             ValueError: ``theta`` is not in Pi.
@@ -93,9 +83,9 @@ class PlanarArm:
         return (2 * self.policies.check("theta", theta, "was a goal passed instead?") - 1) * self._limits
 
     def correspondence(self, times: ArrayLike, trajectory: ArrayLike) -> Array:
-        """theta_d, the policy that takes the last posture of a demonstrated trajectory: the inverse of ``angles``.
+        """theta_d, the policy that ends in the last posture of a demonstrated trajectory: the inverse of ``angles``.
 
-        The outcome depends only on the last posture, which theta_d meets exactly: this solves eq. (6).
+        The outcome depends only on the last posture, which theta_d meets exactly; so theta_d solves eq. (6).
 
         Args:
             times: ``(n_times,)`` s, increasing.
@@ -114,16 +104,16 @@ class PlanarArm:
         if beyond.any():
             limits = f"+-{self._limits[0]:.3f} rad, the others +-{self._limits[1]:.3f} rad"
             entry = first_entry(trajectory[-1], beyond)
-            raise ValueError(f"the first joint turns within {limits}, but of the last posture {entry}; is it in deg?")
+            raise ValueError(f"the first joint turns within {limits}, but in the last posture {entry}; is it in deg?")
         return self.policies.clip((turned + 1) / 2)
 
     def reachable(self, points: ArrayLike) -> NDArray[np.bool_]:
-        """``(...)`` whether some theta without noise reaches each of ``points`` ``(..., 2)``, to rounding."""
+        """``(...)``, whether some theta without noise reaches each of ``points`` ``(..., 2)``, up to rounding."""
         is_reachable: NDArray[np.bool_] = np.linalg.norm(check_vector("points", points, 2), axis=-1) <= 1 + 1e-12
         return is_reachable
 
     def solve(self, context: ArrayLike, goal: ArrayLike) -> Array:
-        """``(n_joints,)`` a theta that reaches ``goal`` without noise: equal bends; the first joint sets the direction.
+        """``(n_joints,)``, a theta that reaches ``goal`` without noise: the first joint turns, the others bend equally.
 
         Raises:
             ValueError: ``goal`` is not one reachable point ``(2,)``, or ``context`` not one of C.
@@ -142,9 +132,9 @@ class PlanarArm:
         return self.policies.clip((angles / self._limits + 1) / 2)
 
     def _moved(self, theta: Array, rng: np.random.Generator) -> Array:
-        """``(n_joints,)`` rad, the angles with their noise."""
+        """``(n_joints,)`` rad, the angles with noise."""
         check_rng(rng)
-        # Also drawn without noise: the stream then goes on in the same way.
+        # Drawn even if the noise is 0, so that the stream continues in the same way.
         return self.angles(theta) + self.noise * rng.standard_normal(len(theta))
 
     def _end(self, context: Array, angles: Array) -> Array:
@@ -152,15 +142,15 @@ class PlanarArm:
         return 1 / len(angles) * np.array([np.cos(directions).sum(), np.sin(directions).sum()])
 
     def _radius(self, bend: float) -> float:
-        """How far the end is when all joints but the first have this bend: from 1 down to 0 at a full turn."""
+        """Distance of the end if all joints but the first have this bend: from 1 m down to 0 at a full turn."""
         n = self.policies.dim
         return float(1 / n * np.cos((np.arange(n) - (n - 1) / 2) * bend).sum())
 
     def _mean_outcome_noise(self) -> float:
-        """Root mean square, over uniform thetas, of an outcome's deviation per dimension, to first order in noise."""
+        """Root mean square deviation of outcomes per dimension, over uniform thetas, to first order in ``noise``."""
         n, straightness = self.policies.dim, np.sinc(self._limits[1] / np.pi)  # the mean cosine of a bend
         apart = np.abs(np.subtract.outer(np.arange(n), np.arange(n)))
         alignment = straightness**apart  # (n, n) the mean cosine between two links
-        # A joint moves the end by its angle times its distance to the end, the length of the links beyond it.
+        # A joint moves the end by its angle times its lever, the distance from the joint to the end.
         levers = [alignment[joint:, joint:].sum() for joint in range(n)]
         return float(self.noise / n * np.sqrt(np.sum(levers) / 2))

@@ -1,4 +1,4 @@
-"""What an environment is for a learner: observe a context, execute a movement, see its outcome.
+"""The protocol of environments: observe a context, execute a movement, return its outcome.
 
 Section 2.1 of Nguyen & Oudeyer (2014): M(c, theta) = tau. An environment of your own needs the seven members of
 `Environment`: three boxes, ``rest``, ``outcome_noise``, ``observe`` and ``execute``.
@@ -18,11 +18,11 @@ from sgimd_torch.spaces import Array, Box, check_point, check_vector, first_entr
 
 
 class Environment(Protocol):
-    """What a learner can observe and execute. Nothing carries over from one movement to the next."""
+    """A robot and its world. No state carries over from one movement to the next."""
 
     @property
     def contexts(self) -> Box:
-        """C; ``dim`` 0 when all movements start in the same way."""
+        """C; ``dim`` 0 if all movements start in the same way."""
         ...
 
     @property
@@ -32,7 +32,7 @@ class Environment(Protocol):
 
     @property
     def outcomes(self) -> Box:
-        """T, from which goals are drawn. Outcomes may lie outside."""
+        """T, the space of goals. Outcomes may lie outside."""
         ...
 
     @property
@@ -46,11 +46,11 @@ class Environment(Protocol):
         ...
 
     def observe(self, rng: np.random.Generator) -> Array:
-        """``(context_dim,)`` in which the next movement will start."""
+        """``(context_dim,)``, the context of the next movement."""
         ...
 
     def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
-        """``(outcome_dim,)`` of one movement, tau = M(c, theta); all noise comes from ``rng``.
+        """``(outcome_dim,)``, the outcome of one movement, tau = M(c, theta); all noise comes from ``rng``.
 
         Raises:
             ValueError: ``context`` is not one point of C or ``theta`` not one of Pi; see `check_movement`.
@@ -68,30 +68,65 @@ class BatchEnvironment(Environment, Protocol):
         ...
 
 
-class Recorded(Protocol):
-    """A movement that can be filmed: its ``outcome`` ``(outcome_dim,)``, and ``landed``, how long (s) it takes."""
+class Primitive:
+    """How theta becomes joint angles (rad) or commands over time.
+
+    A robot that knows this offers it as its attribute ``primitive``, so that recordings can be compared with what the
+    robot plays. The defaults stand for what is unknown.
+
+    Attributes:
+        ranges: ``(n_joints,)`` box of the angles or commands.
+        durations: shortest and longest movement (s).
+    """
+
+    ranges: Box | None = None
+    durations: tuple[float, float] = (0.0, np.inf)
+
+    def at(self, theta: Array, times: Array) -> Array | None:
+        """``(n_times, n_joints)`` angles or commands at ``times`` ``(n_times,)`` s after the start."""
+        return None
+
+
+@runtime_checkable
+class HasPrimitive(Protocol):
+    """A robot that says how it plays a theta."""
+
+    @property
+    def primitive(self) -> Primitive:
+        """Plays the movements of this robot."""
+        ...
+
+
+def primitive_of(environment: Environment) -> Primitive:
+    """The primitive of an environment; one that knows nothing if it has none."""
+    found = environment.primitive if isinstance(environment, HasPrimitive) else None
+    return found if isinstance(found, Primitive) else Primitive()
+
+
+class Trace(Protocol):
+    """A movement that can be filmed: a `Sketch`, or that of the rod in MuJoCo."""
 
     @property
     def outcome(self) -> Array:
-        """``(outcome_dim,)`` as ``execute`` gives it with an equal stream."""
+        """``(outcome_dim,)``, equal to that of ``execute`` with an equal stream."""
         ...
 
     @property
     def landed(self) -> float:
-        """s, when the outcome is reached."""
+        """Time (s) when the outcome is reached."""
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class Sketch:
-    """A movement as a drawing, which `sgimd film` shows: what ``record(context, theta, rng)`` gives, an optional method
-    of an environment.
+    """A movement as a drawing for `sgimd film`: the result of ``trace(context, theta, rng)``, an optional method of an
+    environment.
 
     Args:
-        outcome: ``(outcome_dim,)`` as ``execute`` gives it with an equal stream. Its first two dimensions are places in
-            the drawing; with one, y is 0.
-        step: s from one drawing to the next.
-        chains: ``(n_steps, n_points, 2)`` the robot as points that are joined by lines; one point is a ball. The last
+        outcome: ``(outcome_dim,)``, equal to that of ``execute`` with an equal stream. The first two dimensions are
+            places in the drawing; with only one, y is 0.
+        step: time between two drawings (s).
+        chains: ``(n_steps, n_points, 2)``, the robot as points joined by lines; a single point is a ball. The last
             point leaves a path.
 
     Raises:
@@ -114,48 +149,22 @@ class Sketch:
 
     @property
     def landed(self) -> float:
-        """How long (s) the movement takes."""
+        """Duration (s) of the movement."""
         return self.step * (len(self.chains) - 1)
 
 
-@dataclass(frozen=True, eq=False)
-class HandLed:
-    """A robot that a person can lead by the hand: the optional attribute ``hand_led`` of an environment.
-
-    ``Leading`` in demonstrations/leading.py moves it and checks what is said here.
-
-    Args:
-        model: a ``mujoco.MjModel``, where the robot stands at its start, or can be put there by its joints.
-        joints: names of its joints that a policy moves, in the order of a recording's columns.
-        hand: name of the body or site by which it is led if nothing else is grabbed.
-        ranges: ``(n_joints,)`` rad, or m of a slide joint; None for those of the model.
-        start: ``(n_joints,)`` where every movement starts, in the context 0; None for the model's own posture.
-        speeds, accelerations: ``(n_joints,)`` rad/s and rad/s^2, the largest that the robot's own movements have, so
-            that it can do again what it was led through; None for an arm that crosses its ranges in about a second.
-    """
-
-    model: Any
-    joints: tuple[str, ...]
-    hand: str
-    ranges: Box | None = None
-    start: Array | None = None
-    speeds: Array | None = None
-    accelerations: Array | None = None
-
-
-Record = Callable[[Array, Array, np.random.Generator], Recorded]
+Tracer = Callable[[Array, Array, np.random.Generator], Trace]
 """(context, theta, rng) -> the movement, to be filmed."""
 
-
 FAILURES: Final = 10
-"""Failed movements in a row that end a run."""
+"""Number of failed movements in a row that end a run."""
 
 
 class SimulationError(RuntimeError):
-    """There is no usable outcome: ``SimulationError("diverged")``, or with the movement ``theta`` ``(theta_dim,)``."""
+    """A movement without usable outcome: ``SimulationError("diverged")``, or with its ``theta`` ``(theta_dim,)``."""
 
     def __init__(self, reason: str, theta: Array | None = None) -> None:
-        super().__init__(reason, theta)  # both in args: other processes rebuild the error from them
+        super().__init__(reason, theta)  # args rebuild the error in another process
         self.reason, self.theta = reason, theta
 
     def __str__(self) -> str:
@@ -165,20 +174,20 @@ class SimulationError(RuntimeError):
 def execute_many(
     environment: Environment, contexts: ArrayLike, thetas: ArrayLike, rngs: Sequence[np.random.Generator]
 ) -> Array:
-    """Many movements: together if the environment can, else one by one, with the same outcomes.
+    """Execute many movements: together if the environment can, else one by one, with equal outcomes.
 
     Args:
-        environment: any; a `BatchEnvironment` is called once for all.
+        environment: environment of the movements; a `BatchEnvironment` is called once for all.
         contexts: ``(n, context_dim)`` in C.
         thetas: ``(n, theta_dim)`` in Pi.
-        rngs: n streams, one for each movement, so that no outcome depends on what else is in the batch.
+        rngs: n streams, one for each movement, so that no outcome depends on the others in the batch.
 
     Returns:
         ``(n, outcome_dim)``, row i equal to ``environment.execute(contexts[i], thetas[i], rngs[i])`` bit for bit.
 
     Raises:
-        ValueError: the numbers of rows differ, a row lies outside C or Pi, or the environment gives anything else than
-            numbers of this shape.
+        ValueError: the numbers of rows differ, a row lies outside C or Pi, or the environment does not return numbers
+            of this shape.
         SimulationError: a movement has no finite outcome.
     """
     # Copies, so that an environment may write into them.
@@ -208,30 +217,28 @@ def _numbers(what: str, value: Any, *shape: int) -> Array:
     return array.astype(np.float64)
 
 
-def recorded(
-    environment: Environment, record: Record, context: Array, theta: Array, rng: np.random.Generator
-) -> Recorded:
-    """What ``record``, of this environment or of a task in it, gives.
+def traced(environment: Environment, trace: Tracer, context: Array, theta: Array, rng: np.random.Generator) -> Trace:
+    """The result of ``trace``, the optional method of ``environment``, checked.
 
     Raises:
-        ValueError: it fails, or gives something that cannot be drawn.
+        ValueError: ``trace`` fails, or its result cannot be drawn.
     """
     name, dim = type(environment).__name__, environment.outcomes.dim
     try:
-        found = record(context, theta, rng)
-    except Exception as error:  # whatever a user's code does
-        raise ValueError(f"record() of {name} failed: {type(error).__name__}: {error}") from error
+        found = trace(context, theta, rng)
+    except Exception as error:  # code of the user may raise anything
+        raise ValueError(f"trace() of {name} failed: {type(error).__name__}: {error}") from error
     if hasattr(found, "states"):  # of the rod in MuJoCo
         return found
     if not isinstance(found, Sketch) or len(found.outcome) != dim:
         what = f"one of {len(found.outcome)}" if isinstance(found, Sketch) else type(found).__name__
         wanted = f"a Sketch with an outcome of {dim} dimension{'s' * (dim != 1)}"
-        raise ValueError(f"record() of {name} must give {wanted}, got {what}")
+        raise ValueError(f"trace() of {name} must give {wanted}, got {what}")
     return found
 
 
 def check_movement(environment: Environment, context: ArrayLike, theta: ArrayLike) -> tuple[Array, Array]:
-    """One point of C and one of Pi, as float64; to be called first in an ``execute``.
+    """One point of C and one of Pi, as float64; call it first in ``execute``.
 
     Raises:
         ValueError: another shape, NaN or infinity, or a point outside its box.
@@ -266,17 +273,17 @@ def check_recording(
     lasts = times[-1] - times[0]
     if lasts > longest * (1 + 1e-9):
         raise ValueError(
-            f"a movement lasts {longest:g} s at most, the recording {lasts:g} s; is it in milliseconds? A slow one can "
-            "be played faster: multiply its times"
+            f"a movement lasts {longest:g} s at most, the recording {lasts:g} s; is it in milliseconds? Multiply the "
+            "times of a slow recording to play it faster"
         )
     return times, trajectory
 
 
 def check_instance(environment: object) -> None:
-    """Refuse a class, or something else, in the place of an environment.
+    """Refuse a class, or another object, in place of an environment.
 
     Raises:
-        ValueError: it is none.
+        ValueError: ``environment`` is a class, or lacks ``policies``.
     """
     if isinstance(environment, type):
         name = environment.__name__
@@ -287,12 +294,15 @@ def check_instance(environment: object) -> None:
         )
 
 
-def check_rest(environment: Environment) -> None:
-    """Refuse an environment whose ``rest`` is not one point of T, before a learner is built for it.
+def check_robot(environment: Environment) -> None:
+    """Refuse an environment whose rest or noise makes no sense, before a learner is built for it.
 
     Raises:
-        ValueError: a class, another shape, NaN or infinity, or a point outside T.
+        ValueError: a class, a rest that is not one point of T, or a noise that is negative or not finite.
     """
     check_instance(environment)
     if environment.outcomes.check("rest of the environment", environment.rest, "is it a theta?").ndim != 1:
         raise ValueError(f"rest of the environment must be one outcome, got shape {np.shape(environment.rest)}")
+    if not 0 <= environment.outcome_noise < np.inf:
+        wanted = "a standard deviation, finite and >= 0"
+        raise ValueError(f"outcome_noise of the environment must be {wanted}, got {environment.outcome_noise}")

@@ -1,7 +1,7 @@
-"""gymnasium's Swimmer-v5 as a task of ours: how does a swimmer of three links get to a place in 6 seconds?
+"""Gymnasium's Swimmer-v5: a swimmer of three links travels for 6 seconds.
 
-theta: amplitude, phase and offset of a sinusoid for each of its two joints, and a frequency. The outcome is how far the
-body has come (m), x and y. Where it starts is a little uncertain: this is the noise.
+theta: amplitude, phase and offset of a sinusoid for each of the two joints, and a frequency. The outcome is the
+distance travelled (m), along x and y. The noise is a small random change of the start posture and speeds.
     swimmer = Swimmer(); outcome = swimmer.execute(np.zeros(0), theta, rng)
 """
 
@@ -16,17 +16,17 @@ from sgimd_torch.environments.controllers import Sinusoids
 from sgimd_torch.environments.from_gymnasium import FromGymnasium, gymnasium
 from sgimd_torch.spaces import Array, Box
 
-STEPS: Final = 150  # of .04 s
+STEPS: Final = 150  # of .04 s each
 FREQUENCIES: Final = (0.2, 2.0)  # Hz
 START: Final = 0.02  # half range of positions (m, rad) and speeds at the start
-NOISE: Final = 0.015  # m, as measured_noise gives it
+NOISE: Final = 0.015  # m, the result of measured_noise
 
 
 class Swimmer(FromGymnasium):
-    """theta in [0, 1]^7 -> how far it has come (m).
+    """theta in [0, 1]^7 -> distance travelled (m), along x and y.
 
     Args:
-        start: half the range from which its first positions and speeds are drawn; 0 always starts alike.
+        start: half range of the random positions (m, rad) and speeds at the start; 0 for no noise.
     """
 
     def __init__(self, *, start: float = START) -> None:
@@ -35,7 +35,7 @@ class Swimmer(FromGymnasium):
                 "Swimmer-v5",
                 reset_noise_scale=start,
                 exclude_current_positions_from_observation=False,
-                disable_env_checker=True,  # of every step
+                disable_env_checker=True,  # it would check every step
             ),
             Sinusoids(Box.cube(-1.0, 1.0, 2), FREQUENCIES),
             outcomes=Box.cube(-1.5, 1.5, 2, names=("x", "y"), unit="m"),
@@ -47,5 +47,5 @@ class Swimmer(FromGymnasium):
 
 
 def travelled(observations: Sequence[Any]) -> Array:
-    """``(2,)`` m, x and y from the first observation to the last; of both they are the first two numbers."""
+    """``(2,)`` m, the way from the first observation to the last; an observation begins with x and y."""
     return np.asarray(observations[-1][:2] - observations[0][:2], dtype=np.float64)

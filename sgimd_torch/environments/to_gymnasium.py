@@ -1,7 +1,6 @@
-"""Our environments as gymnasium's: an episode is one movement, the action is theta, observations are those of a goal
-environment.
+"""Our environments as goal environments of gymnasium: an episode is one movement, the action is theta.
 
-    world = ToGymnasium(PlanarArm()); observation, _ = world.reset(seed=0); world.step(world.action_space.sample())
+world = ToGymnasium(PlanarArm()); observation, _ = world.reset(seed=0); world.step(world.action_space.sample())
 """
 
 from __future__ import annotations
@@ -26,15 +25,17 @@ class ToGymnasium(gymnasium.Env[Any, Any]):
     """A goal environment of one step.
 
     ``observation`` is the context, ``achieved_goal`` the outcome (``rest`` before the movement), ``desired_goal`` the
-    goal, uniform over T or given as ``reset(options={"goal": ...})``; likewise ``"context"``. The reward is minus their
-    distance; ``info`` has ``is_success``, whether that is no more than the outcome noise or .02.
+    goal. Goal and context are drawn, or given as ``reset(options={"goal": ..., "context": ...})``. The reward is minus
+    the distance between goal and outcome; ``is_success`` in ``info`` means at most the outcome noise or .02.
     """
 
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 - as gymnasium declares it
 
     def __init__(self, environment: Environment) -> None:
         self.environment = environment
-        anywhere = gymnasium.spaces.Box(-np.inf, np.inf, (environment.outcomes.dim,), np.float64)  # also outside T
+        anywhere = gymnasium.spaces.Box(
+            -np.inf, np.inf, (environment.outcomes.dim,), np.float64
+        )  # outcomes may lie outside T
         self.observation_space: gymnasium.spaces.Dict[Any] = gymnasium.spaces.Dict(
             {
                 "observation": _box(environment.contexts),
@@ -61,7 +62,7 @@ class ToGymnasium(gymnasium.Env[Any, Any]):
         return self._observation(robot.rest), {}
 
     def step(self, action: ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """The movement ``action`` ``(theta_dim,)``; it ends the episode.
+        """Execute the movement ``action`` ``(theta_dim,)``, which ends the episode.
 
         Raises:
             RuntimeError: the episode has ended.
@@ -78,7 +79,7 @@ class ToGymnasium(gymnasium.Env[Any, Any]):
         return observation, -distance, True, False, info
 
     def compute_reward(self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: Any = None) -> Array:
-        """Minus the distance, ``(...)`` for ``(..., outcome_dim)``; what hindsight relabelling needs."""
+        """Minus the distance, ``(...)`` for goals ``(..., outcome_dim)``; hindsight relabelling calls it."""
         return -np.linalg.norm(np.subtract(achieved_goal, desired_goal), axis=-1)
 
     def _observation(self, outcome: Array) -> Observation:

@@ -1,8 +1,8 @@
-"""Toy robots that differ in what makes learning hard; a movement takes microseconds.
+"""Toy robots, each hard to learn for another reason; a movement takes microseconds.
 
-Each is a ``Toy``: boxes, and a function from a movement to its outcome, on which Gaussian noise is added.
-    toss: the wind is the context                    crawler: parameters are phases, and 0 is the same as 1
-    two_elbows: two families of postures             spatial_arm: three outcomes, in cm
+Each is a ``Toy``: boxes, and a function from a movement to its outcome, to which Gaussian noise is added.
+    toss: the wind is the context                    crawler: parameters are phases, 0 equals 1
+    two_elbows: two families of postures             spatial_arm: three outcome dimensions, in cm
     robot = toss(); outcome = robot.execute(robot.observe(rng), theta, rng)
 """
 
@@ -19,7 +19,7 @@ from sgimd_torch.environments.protocol import check_movement
 from sgimd_torch.spaces import Array, Box, check_rng
 
 GRAVITY: Final = 9.81  # m/s^2
-_STROKES: Final = 10  # of the crawler, in one movement
+_STROKES: Final = 10  # of one movement of the crawler
 _PLANE: Final = Box.cube(-1, 1, 2, names=("x", "y"), unit="m")
 
 
@@ -29,8 +29,8 @@ class Toy:
 
     Args:
         contexts, policies, outcomes: C, Pi and T.
-        effect: (contexts, thetas), ``(..., context_dim)`` and ``(..., theta_dim)`` -> outcomes without noise.
-        still: ``(theta_dim,)`` the movement whose outcome is ``rest``, in the middle of C.
+        effect: (contexts ``(..., context_dim)``, thetas ``(..., theta_dim)``) -> outcomes without noise.
+        still: ``(theta_dim,)``, the movement whose outcome in the middle of C is ``rest``.
         outcome_noise: standard deviation of the noise on each dimension of the outcome, in the unit of T.
     """
 
@@ -47,11 +47,11 @@ class Toy:
         object.__setattr__(self, "rest", self.outcomes.clip(rest))
 
     def observe(self, rng: np.random.Generator) -> Array:
-        """``(context_dim,)`` uniform in C."""
+        """``(context_dim,)``, uniform in C."""
         return self.contexts.sample(rng)
 
     def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
-        """``(outcome_dim,)`` of one movement.
+        """``(outcome_dim,)``, the outcome of one movement.
 
         Raises:
             ValueError: ``context`` is not one point of C, or ``theta`` not one of Pi.
@@ -63,10 +63,10 @@ class Toy:
 
 
 def toss(*, noise: float = 0.03) -> Toy:
-    """A ball is thrown on a floor; the context is the wind (m/s^2) from the left.
+    """An arm throws a ball on a floor; the context is the wind (m/s^2) from the left.
 
-    theta: direction, elevation, speed, height of release. A high throw and a flat one land in the same place, and a
-    high one is blown farther. Outcome: sideways and forwards (m).
+    theta: direction, elevation, speed, height of release. A high and a flat throw can land in the same place; the wind
+    blows a high one farther. Outcome: landing place, sideways and forwards (m).
     """
     ranges = Box(np.array([-np.pi / 3, np.pi / 18, 1.0, 0.5]), np.array([np.pi / 3, np.pi * 8 / 18, 6.0, 1.5]))
 
@@ -84,11 +84,11 @@ def toss(*, noise: float = 0.03) -> Toy:
 
 
 def crawler(*, noise: float = 0.02) -> Toy:
-    """Four legs that push once in each of ten strokes; the policy is periodic.
+    """A robot of four legs that push once in each of ten strokes; the policy is periodic.
 
-    theta: the phase of each leg in a stroke, where 0 is the same as 1, and how far the legs swing. The lags between
-    legs that follow each other drive it on, the phases of the left and right legs turn it. Outcome: where it is (m)
-    after ten strokes.
+    theta: phase of each leg in a stroke, where 0 equals 1, and amplitude of the swing. Phase lags between successive
+    legs drive the robot forwards, phase differences between left and right legs turn it. Outcome: its place (m) after
+    ten strokes.
     """
     side = np.array([1.0, 0.5, -0.5, -1.0])
 
@@ -103,11 +103,10 @@ def crawler(*, noise: float = 0.02) -> Toy:
 
 
 def two_elbows(*, noise: float = 0.01) -> Toy:
-    """A planar arm of three links whose elbow bends either way but not through the straight: two separate families.
+    """A planar arm of three links whose elbow bends to either side by 30 degrees or more: two families of postures.
 
-    theta: shoulder, elbow, wrist; below .5 the elbow bends to the right, above to the left, at least 30 degrees each.
-    Nearly every place is reached by both families, and what lies between them in Pi lands elsewhere. Outcome: where
-    the hand is (m).
+    theta: shoulder, elbow, wrist; below .5 the elbow bends to the right, above to the left. Both families reach nearly
+    every place; the mean of two postures of different families lands elsewhere. Outcome: place of the hand (m).
     """
     lengths = np.array([0.5, 0.4, 0.1])
 
@@ -124,9 +123,10 @@ def two_elbows(*, noise: float = 0.01) -> Toy:
 
 
 def spatial_arm(*, noise: float = 1.0) -> Toy:
-    """An arm that turns about the vertical and bends in five joints; the outcome has three dimensions, in cm.
+    """An arm that turns about the vertical and bends in five joints, with links of 20 cm.
 
-    theta: the turn, within +-150 degrees, and five bends, within +-60 degrees, of links of 20 cm.
+    theta: the turn, within +-150 degrees, and five bends, within +-60 degrees. Outcome: place of the hand (cm) in three
+    dimensions.
     """
 
     def hand(context: Array, theta: Array) -> Array:

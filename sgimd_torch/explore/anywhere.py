@@ -10,7 +10,7 @@ from sgimd_torch.spaces import Array
 
 
 class Anywhere(Explore):
-    """Uniform movements."""
+    """Uniform movements, anywhere in Pi."""
 
     draws_from = "regime"
 

@@ -23,8 +23,10 @@ _NEAREST: Final = 10  # effects in the most similar contexts, of which one is va
 
 
 class Returning(Explore):
-    """`Widening` while every movement has an effect of its own. Else anywhere in Pi, and as soon as something had an
-    effect, every other time around a movement that had one in a similar context.
+    """Widening; where effects are rare, varies movements that had one.
+
+    It is `Widening` while every movement has an effect of its own. Else it moves anywhere in Pi, and as soon as
+    something had an effect, every other time around a movement that had one in a similar context.
 
     Args:
         problem: ``effects`` of the inverse model are read. One that knows none, unlike `AmongEffects`, makes this
@@ -33,7 +35,7 @@ class Returning(Explore):
 
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem)
-        self.width, self._widening = problem.shared(Width), Widening(problem)
+        self.width, self._widening = problem.shared(Width, Width), Widening(problem)
         self._varied: Array | None = None  # the last variation
         inverse = type(problem.inverse)
         if inverse.effects is Inverse.effects:

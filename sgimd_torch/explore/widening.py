@@ -34,7 +34,7 @@ class Width:
 
 
 class Widening(Explore):
-    """Gaussian noise around the middle of Pi; a good prediction of what came of it makes it wider, a bad one narrower.
+    """Gaussian movements around the middle of Pi, wider while outcomes are predicted well.
 
     Args:
         problem: memory and inverse model are read. Where the inverse model predicts nothing, the width stays.
@@ -42,7 +42,7 @@ class Widening(Explore):
 
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem)
-        self.width = problem.shared(Width)
+        self.width = problem.shared(Width, Width)
         self._expected: tuple[int, Array] | None = None  # of the last movement: its row in memory, its outcome
         inverse = type(problem.inverse)
         if inverse.predict is Inverse.predict:

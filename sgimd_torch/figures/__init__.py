@@ -1,1 +1,1 @@
-"""Figures of learning, movements, predictions and results. Needs matplotlib."""
+"""What figures share: maps of T, axes, colours and files. Needs matplotlib."""

@@ -1,7 +1,7 @@
-"""Figures: where movements landed, where competence changes, which goals are missed.
+"""Maps of T: outcomes, interest, competence, errors.
 
-Sections 5.2 and 6 of Nguyen & Oudeyer (2014). Each function draws on the axis it is given and returns what it drew; the
-caller owns the figure, its size and its file.   landing_points(ax, outcomes, box, section)
+Sections 5.2 and 6 of Nguyen & Oudeyer (2014). Each function draws on the axes that it gets and returns what it drew;
+the caller owns the figure, its size and its file.   landing_points(ax, outcomes, box, section)
 """
 
 from __future__ import annotations
@@ -16,13 +16,12 @@ from matplotlib.colors import ListedColormap, LogNorm
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import LogLocator, NullLocator
 
-from sgimd_torch.catalogue import CATALOGUE
-from sgimd_torch.figures.axes import alike, colour_bar, note
+from sgimd_torch.figures.axes import alike, colour_bar, note, rounded
+from sgimd_torch.figures.names import COLOURS, NAMES
 from sgimd_torch.figures.sections import Section
 from sgimd_torch.spaces import Array, Box
 
-COLOURS = {word: entry.colour for word, entry in CATALOGUE["algorithm"].items()}
-NAMES = {word: entry.label for word, entry in CATALOGUE["algorithm"].items()}
+__all__ = ["COLOURS", "NAMES"]
 
 
 def landing_points(
@@ -34,21 +33,23 @@ def landing_points(
     demonstrated: Array | None = None,
     side: float = 0.05,
 ) -> QuadMesh:
-    """Where movements landed, and how often: a histogram on a logarithmic scale, empty tiles white.
+    """Outcomes of movements: a histogram on a logarithmic scale, empty tiles white.
 
     Args:
-        ax: drawn on, and given a colour bar.
-        outcomes: ``(n, outcome_dim)``; those outside ``box`` are marked at its edge, with their number.
-        box: T, or another part of it, which is shown.
-        section: which dimensions to show.
-        demonstrated: ``(n, outcome_dim)``, drawn as crosses, those that were demonstrated several times once.
-        side: of a tile, in the unit of T.
+        ax: axes, which get a colour bar.
+        outcomes: ``(n, outcome_dim)``; outcomes outside ``box`` are squares at its edge, and a note has their number.
+        box: part of T to show.
+        section: dimensions to show.
+        demonstrated: ``(n, outcome_dim)`` demonstrated outcomes, each drawn once as a cross.
+        side: side of a tile, in the unit of T.
 
     Returns:
-        The tiles; their array holds the counts, ``(n_y, n_x)``, masked where 0.
+        Tiles; their array holds the counts, ``(n_y, n_x)``, masked where 0.
     """
-    edges, (x, y) = _edges(section.box, section.tile(side)), section.points(outcomes).T
-    tiles = np.ma.masked_equal(np.histogram2d(x, y, bins=edges)[0].T, 0)
+    shown, (x, y) = section.box, section.points(outcomes).T
+    n_tiles = np.maximum(1, np.round(shown.sides / section.tile(side))).astype(int)
+    counts, *edges = np.histogram2d(x, y, bins=n_tiles, range=np.stack((shown.low, shown.high), axis=1))
+    tiles = np.ma.masked_equal(counts.T, 0)
     norm = LogNorm(1, max(2, float(tiles.filled(0).max())))
     blues = ListedColormap(colormaps["Blues"](np.linspace(0.25, 1.0, 256)))  # a single point is visible on white
     mesh = ax.pcolormesh(*edges, tiles, norm=norm, cmap=blues)
@@ -74,17 +75,17 @@ def landing_points(
 def interest_map(
     ax: Axes, lows: Array, highs: Array, interests: Array, section: Section, *, goals: Array
 ) -> PatchCollection:
-    """The regions of the interest map, coloured by interest, eq. (3); recent goals as points.
+    """Regions of the interest map, coloured by interest, eq. (3); recent goals as points.
 
     Args:
-        ax: drawn on, and given a colour bar.
-        lows, highs: ``(n_regions, context_dim + outcome_dim)``, the corners of the regions.
+        ax: axes, which get a colour bar.
+        lows, highs: ``(n_regions, context_dim + outcome_dim)`` corners of the regions.
         interests: ``(n_regions,)``.
-        section: which dimensions to show.
+        section: dimensions to show.
         goals: ``(n, outcome_dim)``.
 
     Returns:
-        One rectangle for each region that is shown, in their order; their array holds the interests.
+        One rectangle for each region that is shown, in the order of the regions; their array holds the interests.
     """
     drawn = _regions_in(ax, lows, highs, interests, section, "Oranges", (0, max(float(interests.max()), 1e-6)))
     colour_bar(ax, drawn, "interest: recent change of competence")
@@ -93,35 +94,39 @@ def interest_map(
     return drawn
 
 
-def competence_map(
-    ax: Axes, lows: Array, highs: Array, competences: Array, section: Section, *, worst: float = -1.0
-) -> PatchCollection:
-    """Like ``interest_map``, but coloured by mean competence, eqs. (2) and (7): 0 met, -1 no better than rest.
+def competence_map(ax: Axes, lows: Array, highs: Array, competences: Array, section: Section) -> PatchCollection:
+    """Regions of the interest map, coloured by mean competence, eqs. (2) and (7): 0 met, -1 no better than rest.
+
+    The colours span the competences of these regions, in round numbers.
 
     Args:
-        ax, lows, highs, section: as for ``interest_map``.
-        competences: ``(n_regions,)``; NaN, a region without goals, is left white.
-        worst: the competence at the end of the colour scale.
+        ax, lows, highs, section: see ``interest_map``.
+        competences: ``(n_regions,)``; NaN for a region without goals, which stays white.
     """
-    drawn = _regions_in(ax, lows, highs, np.ma.masked_invalid(competences), section, "viridis", (worst, 0.0))
-    colour_bar(ax, drawn, "mean competence: 0 met, -1 not at all")
+    known = competences[np.isfinite(competences)]
+    least, most = (known.min(), known.max()) if len(known) else (-1.0, 0.0)
+    step = rounded(max(most - least, 0.05) / 5)
+    low = min(np.floor(least / step) * step, -step)
+    span = low, max(np.ceil(most / step) * step, low + step)
+    drawn = _regions_in(ax, lows, highs, np.ma.masked_invalid(competences), section, "viridis", span)
+    colour_bar(ax, drawn, "mean competence (0: goals met)")
     section.frame(ax)
     return drawn
 
 
 def misses(ax: Axes, goals: Array, errors: Array, space: Box, section: Section, most: float) -> None:
-    """Where is it bad? Each goal of an evaluation, coloured by its error.
+    """Goals of an evaluation, coloured by their error; on a strip the error is the height.
 
     Args:
-        ax: drawn on, and given a colour bar.
+        ax: axes, which get a colour bar.
         goals: ``(n, outcome_dim)``.
         errors: ``(n,)``, in the unit of T.
         space: T.
-        section: which dimensions to show.
-        most: the error at the end of the colours.
+        section: dimensions to show.
+        most: error at the end of the colours.
     """
     label = space.in_unit("distance from goal to outcome")
-    if section.is_strip:  # there is room for heights
+    if section.is_strip:
         ax.plot(goals[:, 0], errors, ".", color="#0072b2", markersize=4)
         ax.set(xlabel=space.axis(0), ylabel=label)
         ax.set_ylim(bottom=0)
@@ -133,8 +138,11 @@ def misses(ax: Axes, goals: Array, errors: Array, space: Box, section: Section, 
 
 
 def map_after(regions: Mapping[str, np.ndarray], movements: int) -> tuple[Array, Array, Array]:
-    """Corners ``(n_regions, context_dim + outcome_dim)`` m, twice, and interest ``(n_regions,)``: one map of the
-    columns of the table ``regions``."""
+    """The interest map after so many movements, from the columns of the table ``regions`` of a record.
+
+    Returns:
+        Corners, twice ``(n_regions, context_dim + outcome_dim)``, and interests ``(n_regions,)``.
+    """
     now = regions["movements"] == movements
     dims = range(sum(name.startswith("low_") for name in regions))
     lows, highs = (np.stack([regions[f"{side}_{k}"][now] for k in dims], axis=1) for side in ("low", "high"))
@@ -150,8 +158,7 @@ def _regions_in(
     colours: str,
     limits: tuple[float, float],
 ) -> PatchCollection:
-    """The regions that a ``section`` meets, coloured by their ``values`` ``(n_regions,)``; a note says where they are
-    cut."""
+    """The regions in a ``section``, coloured by their ``values`` ``(n_regions,)``; a note says where they are cut."""
     if where := section.cut_at(lows, highs):
         note(ax, f"at {where}")
     lows, highs, met = section.cut(lows, highs)
@@ -159,11 +166,3 @@ def _regions_in(
     drawn = PatchCollection(patches, cmap=colours, edgecolor="0.35", linewidth=0.8, array=values[met], clim=limits)
     ax.add_collection(drawn)
     return drawn
-
-
-def _edges(box: Box, side: float | Array) -> tuple[Array, Array]:
-    x, y = (
-        np.linspace(low, high, max(1, round((high - low) / each)) + 1)
-        for low, high, each in zip(box.low, box.high, np.broadcast_to(side, 2), strict=True)
-    )
-    return x, y

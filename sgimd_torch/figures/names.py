@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Final
 
-_NAMES: Final = {
+_DRAWN: Final = {
     "random": ("Random", "#7f7f7f"),
     "sagg-riac": ("SAGG-RIAC", "#0072b2"),
     "practice": ("Practice", "#332288"),
@@ -29,13 +29,15 @@ _NAMES: Final = {
     "cma-mae": ("CMA-MAE", "#882255"),
     "cma-mae-taught": ("CMA-MAE, taught", "#4d1330"),
 }
+NAMES: Final = {word: name for word, (name, _) in _DRAWN.items()}
+COLOURS: Final = {word: colour for word, (_, colour) in _DRAWN.items()}
 
 
 def label(algorithm: str) -> str:
     """Name of an algorithm in figures; the word itself where it has no other name."""
-    return _NAMES.get(algorithm, (algorithm, ""))[0]
+    return NAMES.get(algorithm, algorithm)
 
 
 def colour(algorithm: str) -> str:
     """Colour of an algorithm in figures."""
-    return _NAMES.get(algorithm, ("", "black"))[1]
+    return COLOURS.get(algorithm, "black")

@@ -1,4 +1,4 @@
-"""Figures as files: one style, one resolution, written whole or not at all, and the same data give the same file.
+"""Figures as files: one style, one resolution. A file is written whole or not at all; the same data give the same file.
 
 save_figure(lambda: errors(data), Path("results/figures/errors"), "png", "svg")    # errors.png and errors.svg
 """
@@ -23,18 +23,23 @@ STYLE: Final[Any] = {
     "axes.spines.right": False,
     "lines.linewidth": 2,
     "legend.fontsize": 10.5,
-    "svg.hashsalt": "sgimd_torch",  # else names inside an svg are random
+    "svg.hashsalt": "sgimd_torch",  # otherwise names inside an svg are random
 }
 
 
 def save_figure(draw: Callable[[], Figure], stem: Path, *kinds: str) -> list[Path]:
-    """Draw a figure in our style and write it as ``stem`` for each of the ``kinds`` of file, such as "png".
+    """Draw a figure in ``STYLE`` and write a file for each kind.
+
+    Args:
+        draw: makes the figure.
+        stem: path of the files without their suffix.
+        kinds: suffixes, such as "png".
 
     Returns:
         The files.
 
     Raises:
-        OSError: one cannot be written.
+        OSError: a file cannot be written.
     """
     files = {stem.with_name(f"{stem.name}.{kind}"): kind for kind in kinds}
     with rc_context(STYLE):

@@ -25,7 +25,7 @@ _MIN_SIDE: Final = 1 / 15
 
 
 class InterestMap(Goals):
-    """The interest map over C x T, a tree of regions, and the choice of goals from it.
+    """Goals where competence changes fastest, from regions that split.
 
     Args:
         problem: C and T; reading ``regions`` draws nothing.

@@ -23,7 +23,7 @@ _MAX_CELLS = 100_000  # more than any run has goals
 
 
 class ProgressGrid(Goals):
-    """Equal cells over C x T, and the choice of goals from them by eqs. (3) and (4).
+    """Goals where competence changes fastest, from equal cells.
 
     Args:
         problem: C and T. Goals come from the cells that contain the context.

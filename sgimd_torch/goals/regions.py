@@ -22,7 +22,7 @@ each attempt raised the competence at its own goal; below 0, how far it stayed b
 
 
 def gained_progress(points: Array, competences: Array, gains: Array) -> float:
-    """Mean gain: how much an attempt here raises the competence at its goal.
+    """Rise of the competence at the goals themselves, in the mean.
 
     Deviation: eq. (3) compares the competences of older and newer goals, which also differ because the goals differ. In
     most regions of a large task space some goals can be reached and others cannot, and eq. (3) sees little else.
@@ -31,7 +31,9 @@ def gained_progress(points: Array, competences: Array, gains: Array) -> float:
 
 
 def absolute_progress(points: Array, competences: Array, gains: Array) -> float:
-    """Eq. (3): |newer half - older half| over the number of values; an odd window loses its oldest."""
+    """Difference of newer and older competences, the paper's eq. (3).
+
+    |newer half - older half| over the number of values; an odd window loses its oldest."""
     # Deviation: the paper's two sums share their middle term; these halves are disjoint and of equal length.
     half = len(competences) // 2
     newer, older = competences[-half:], competences[-2 * half : -half]
@@ -39,7 +41,7 @@ def absolute_progress(points: Array, competences: Array, gains: Array) -> float:
 
 
 def paired_progress(points: Array, competences: Array, gains: Array) -> float:
-    """Mean |competence - competence at the nearest earlier goal of the window|, over all goals but the first.
+    """Difference from the competence at the nearest earlier goal, in the mean over all goals but the first.
 
     Forestier et al. (2017) and Portelas et al. (2019) measure progress in this way. It tells competence that changes in
     time from competence that only differs between places, but it never averages out the noise of single goals. Of

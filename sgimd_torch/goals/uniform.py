@@ -13,7 +13,7 @@ from sgimd_torch.spaces import Array
 
 
 class UniformGoals(Goals):
-    """Uniform goals, see `Goals`."""
+    """Uniform goals, anywhere in T."""
 
     def sample(self, context: ArrayLike) -> Array:
         """``(outcome_dim,)`` uniform in T."""

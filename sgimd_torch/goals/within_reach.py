@@ -31,7 +31,9 @@ _MOST: Final = 0.7  # of a side of T, in the geometric mean: the box is then as 
 
 
 class WithinReach(UniformGoals):
-    """Uniform goals in a box around what was reached, which is T where that is nearly as large; see `Goals`.
+    """Uniform goals in a box around the outcomes that were reached.
+
+    The box is T where T is nearly as large.
 
     Each draw is one of `UniformGoals`, moved from T to the box. The step beyond is the same on all sides, in the unit
     of T, so a dimension that nothing has moved yet is aimed at, too. It follows a success rule (Rechenberg 1973): of

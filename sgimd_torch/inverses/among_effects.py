@@ -15,7 +15,9 @@ from sgimd_torch.spaces import Array, Estimate
 
 
 class AmongEffects(Inverse):
-    """`LocalProcess` while every movement has an effect of its own, or none had one yet.
+    """Local Gaussian process, fitted to effective movements alone where most have no effect.
+
+    It is `LocalProcess` while every movement has an effect of its own, or none had one yet.
 
     Args:
         problem: memory and noise are read.

@@ -16,7 +16,9 @@ from sgimd_torch.spaces import Array, Estimate
 
 
 class LocalInverse(Inverse):
-    """Mean theta of the most reliable neighbourhood, weighted towards the goal. It only reads, and draws nothing.
+    """Mean of the most reliable neighbourhood, weighted towards the goal, eq. (9).
+
+    It only reads, and draws nothing.
 
     Args:
         problem: the memory is read.

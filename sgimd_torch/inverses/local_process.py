@@ -32,7 +32,9 @@ _CLEARLY: Final = 0.8  # of the squared error expected of the nearest exemplar: 
 
 
 class LocalProcess(Inverse):
-    """The inverse model; it only reads, draws nothing, and depends on the memory alone.
+    """Local Gaussian process; the nearest exemplar, unless the process is clearly better.
+
+    It only reads, draws nothing, and depends on the memory alone.
 
     Lengths and kernel are refitted when the memory has 1.5 times its size at the last fit; other calls use neighbours
     only. Units do not matter. The answer is clipped to the box around all that was ever executed.

@@ -21,8 +21,10 @@ _COINCIDENT = 1e-12  # outcomes that spread less, relative to their size, count 
 
 
 class LocallyLinear(Inverse):
-    """:class:`LocalInverse`, corrected to first order. Its mean theta, eq. (9), should land on the weighted mean of the
-    outcomes; a weighted ridge regression of theta on outcome corrects it from there to the goal.
+    """Mean of the most reliable neighbourhood, eq. (9), corrected to first order.
+
+    The mean theta should land on the weighted mean of the outcomes; a weighted ridge regression of theta on outcome
+    corrects it from there to the goal.
 
     The answer is clipped to the box around all that was ever executed, because far goals extrapolate far.
 

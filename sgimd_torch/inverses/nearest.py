@@ -13,7 +13,7 @@ from sgimd_torch.spaces import Array, Estimate
 
 
 class NearestNeighbour(Inverse):
-    """The movement that came nearest.
+    """Movement whose outcome came nearest to the goal.
 
     Args:
         problem: the memory is read.

@@ -108,6 +108,8 @@ class Learner:
             if isinstance(each, int):
                 each = Event(Kind.MOVED, memory.contexts[each], memory.thetas[each], outcome=memory.outcomes[each])
             yield each
+        if self._untold:
+            yield self._begun_event
 
     def ask(self, context: ArrayLike) -> Move | None:
         """The next movement, or None to stay still this time, when there is no outcome to tell.
@@ -190,9 +192,9 @@ class Learner:
         self._asked = False
         self.movements += 1
         row = len(self.memory) - 1
-        outcome = self.memory.outcomes[-1]
-        self._advance(outcome)
-        self._publish(Event(Kind.MOVED, context, move.theta, move.goal, outcome, move.origin), row=row)
+        reached = self.memory.outcomes[-1]
+        self._advance(reached)
+        self._publish(Event(Kind.MOVED, context, move.theta, move.goal, reached, move.origin), row=row)
 
     def watch(self, demonstration: Demonstration, *, who: str | None = None) -> None:
         """See a demonstration: the attempt under way ends, and the social strategy answers from the next ``ask`` on.
@@ -200,7 +202,8 @@ class Learner:
 
         Args:
             demonstration: demonstration that is shown.
-            who: name of the teacher of a `run` who offers it, see ``lesson_waits``; None outside of a run.
+            who: name of the teacher who offers it, if one is asked before each movement, as in a `run`; see
+                ``lesson_waits``. None for a lesson besides.
 
         Raises:
             RuntimeError: this learner has no social strategy, or the last movement's outcome was not told.
@@ -219,12 +222,12 @@ class Learner:
             self._advance(Lesson(theta_d, demonstration))
             self._publish(asked, Event(Kind.SHOWN, lesson=demonstration, who=who))
         elif self.social is not None:
-            before = self._begun_untold()
+            self._tell_begun()
             self._end()
             self._offered_at = -1 if who is None else self.movements
             context = np.asarray(demonstration.context, dtype=np.float64)
             self._begin(self.social.attempt(context, theta_d, demonstration), context)
-            self._publish(*before, Event(Kind.SHOWN, lesson=demonstration, who=who))
+            self._publish(Event(Kind.SHOWN, lesson=demonstration, who=who))
 
     def translate(self, demonstration: Demonstration) -> Array:
         """theta_d, eq. (6): the policy to which a demonstration corresponds.
@@ -257,14 +260,13 @@ class Learner:
         Args:
             reason: why it failed, for the record.
         """
-        self.movements += 1
         self._stop(Kind.FAILED, reason)
 
     def interrupt(self) -> None:
-        """End the attempt under way; what it learnt so far counts. An outcome not yet told is no longer expected."""
+        """End the attempt under way, if there is one; what it learnt so far counts. An outcome not yet told is no
+        longer expected."""
         if self._attempt is not None:
             self._stop(Kind.INTERRUPTED, None)
-        self._end()
 
     def _go_on_alone(self) -> None:
         while self.waits_for_answer:
@@ -273,11 +275,13 @@ class Learner:
     def _stop(self, kind: Kind, reply: str | None) -> None:
         if self._asked and isinstance(self._next, Move):
             move = self._next
-            events = [Event(kind, self._context, move.theta, move.goal, None, move.origin, reply=reply)]
+            stopped = Event(kind, self._context, move.theta, move.goal, None, move.origin, reply=reply)
         else:
-            events = [*self._begun_untold(), Event(kind, reply=reply)]
+            self._tell_begun()
+            stopped = Event(kind, reply=reply)
         self._end()
-        self._publish(*events)
+        self.movements += kind == Kind.FAILED
+        self._publish(stopped)
 
     def _publish(self, *events: Event, row: int | None = None) -> None:
         self._untold = False
@@ -287,12 +291,17 @@ class Learner:
                 listener(event)
 
     def _request_event(self, request: Request, reply: str) -> Event:
-        asked = {"goal": request.goal, "who": request.teacher, "strategy": request.strategy, "reply": reply}
-        return Event(Kind.ASKED, self._context, **asked)
+        goal, who, strategy = request.goal, request.teacher, request.strategy
+        return Event(Kind.ASKED, self._context, goal=goal, who=who, strategy=strategy, reply=reply)
 
-    def _begun_untold(self) -> list[Event]:
-        """What a replay needs to know of an attempt that ends before its first movement: it was begun."""
-        return [Event(Kind.ASKED, self._context)] if self._untold else []
+    @property
+    def _begun_event(self) -> Event:
+        """An attempt was begun, as a replay has to know if it ends before its first movement."""
+        return Event(Kind.ASKED, self._context)
+
+    def _tell_begun(self) -> None:
+        if self._untold:
+            self._publish(self._begun_event)
 
     def _end(self) -> None:
         if self._attempt is not None:

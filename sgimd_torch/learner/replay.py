@@ -40,7 +40,8 @@ def replay(
         learner: `Learner` freshly built; its file imports this one.
         events: events of the record.
         teacher: teacher freshly built, too: it is asked before each movement what it offers, so that its draws go on as
-            they would have. None for what was recorded alone.
+            they would have. Lessons that nobody had offered (``who`` None) come besides. None for what was recorded
+            alone.
 
     Yields:
         The episodes, as `run` has yielded them.
@@ -56,7 +57,8 @@ def replay(
     before = BeforeMovement()
     for event in events:
         index = learner.movements
-        between = event.kind == Kind.INTERRUPTED and event.theta is None  # two movements
+        # Between two runs the caller may show something, begin an attempt or end one; no teacher is asked before that.
+        between = event.kind in (Kind.SHOWN, Kind.ASKED, Kind.INTERRUPTED) and event.who is None and event.theta is None
         if teacher is not None and asked_at < index and not between:
             asked_at, offered = index, teacher.offer(index, learner.memory)
         match event.kind:
@@ -67,7 +69,8 @@ def replay(
                     found = f"before movement {index} it asked for a demonstration, the learner now does not"
                     raise ReplayError(f"{found}; is it built in the same way, with the same seed?")
                 learner.watch(event.lesson, who=event.who)
-                offered, before = None, before._replace(demonstration=event.lesson)
+                if not between:
+                    offered, before = None, before._replace(demonstration=event.lesson)
             case Kind.ASKED:
                 assert event.context is not None
                 learner.request(event.context)
@@ -78,6 +81,7 @@ def replay(
                         learner.go_on_alone(event.reply or "")
             case Kind.INTERRUPTED if between:
                 learner.interrupt()
+                asked_at = -1  # the run that went on asked its teacher once more
             case Kind.FAILED if event.theta is None:
                 learner.fail(event.reply or "")
                 yield Episode(

@@ -110,6 +110,17 @@ class Memory:
         """For each of ``rows`` what :meth:`near_policies` gives for its context and theta; it is its own neighbour."""
         return self._policy_side.nearest(self._policy_side.keys.rows[rows], k, within)
 
+    def copy_for(self, dims: tuple[int, int, int]) -> Memory:
+        """A copy, to start from.
+
+        Raises:
+            ValueError: its dimensions of context, theta and outcome are others.
+        """
+        found = self.context_dim, self.theta_dim, self.outcome_dim
+        if found != dims:
+            raise ValueError(f"a memory to start from must have dims {dims} of context, theta, outcome, got {found}")
+        return self.copy()
+
     def copy(self) -> Memory:
         """The same exemplars, in a memory that grows on its own."""
         same = Memory(self.context_dim, self.theta_dim, self.outcome_dim)

@@ -31,7 +31,9 @@ _COMPONENTS = 10  # largest number of Gaussians; Akaike's criterion chooses one 
 
 
 class AlpGmm(Goals):
-    """Goals from a mixture of Gaussians over (context, goal, absolute learning progress).
+    """Goals from Gaussians of high absolute learning progress.
+
+    A mixture of Gaussians over (context, goal, absolute learning progress) is fitted.
 
     Without contexts a Gaussian is chosen in proportion to its mean progress, and a goal is drawn from it. In a context
     it is chosen in proportion to its mean progress times its density there, and the goal is drawn from the Gaussian

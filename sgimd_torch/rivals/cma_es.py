@@ -21,7 +21,9 @@ except ImportError as error:
 
 
 class CmaEs(Search):
-    """Covariance matrix adaptation on the distance to the goal, around theta_g, which is executed first.
+    """Evolution strategy CMA-ES on the distance to the goal.
+
+    It works around theta_g, which is executed first.
 
     Each goal starts a new strategy. Of the estimate it uses theta_g only, because its distribution cannot take over
     remembered exemplars. It prints and writes nothing, and all its draws are from ``rng``.

@@ -14,10 +14,11 @@ from sgimd_torch.catalogue import called, function_of, load_word
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.learner import Learner
-from sgimd_torch.parts import Demonstrator, FromDemonstrations, Inverse, Teacher, made
+from sgimd_torch.parts import Inverse, Teacher
 from sgimd_torch.runs.config import ALGORITHM, OWN, Config, part_of
 from sgimd_torch.runs.tasks import Task, benchmark_of, correspondence_of, demonstrations_of
 from sgimd_torch.spaces import Demonstration, stream
+from sgimd_torch.teachers import Demonstrator
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,9 +75,9 @@ def build(config: Config) -> RunParts:
     teacher: Teacher | None = None
     if "teacher" in config.chosen:
         rng = stream(config.seed, "teacher")
-        teacher = made(Teacher, _maker(config, "teacher"), demonstrations, rng)
+        teacher = Teacher.of(_maker(config, "teacher"), demonstrations, rng)
     teachers = {
-        word: made(Demonstrator, make, demonstrations, stream(config.seed, f"teacher {word}"))
+        word: Demonstrator.of(make, demonstrations, stream(config.seed, f"teacher {word}"))
         for word, make in makers.items()
     }
     if config.teaching == "teachers":
@@ -88,7 +89,7 @@ def build(config: Config) -> RunParts:
     answers = {OWN: learner.inverse}
     for word in config.evaluated_by[1:]:
         own = config.values.get("inverse") == word
-        answers[word] = learner.inverse if own else made(Inverse, load_word("inverse", word), learner.problem)
+        answers[word] = learner.inverse if own else Inverse.of(load_word("inverse", word), learner.problem)
     return RunParts(
         config=config,
         task=task,
@@ -135,7 +136,7 @@ def _asked(config: Config) -> tuple[str, ...]:
 
 def _needs_demonstrations(make: Callable[..., Any]) -> bool:
     kind = function_of(make)
-    return not (isinstance(kind, type) and issubclass(kind, FromDemonstrations)) or kind.needs_demonstrations
+    return not (isinstance(kind, type) and issubclass(kind, Teacher)) or kind.needs_demonstrations
 
 
 def _maker(config: Config, name: str) -> Callable[..., Any]:

@@ -102,8 +102,8 @@ class Config:
                 place_of(kind, word)
         if self.teachers is not None and self.teaching != "teachers":
             raise self._refused("teachers")
-        if self.board and importlib.util.find_spec("tensorboard") is None:
-            raise ValueError("board true needs tensorboard, which is not installed; pip install 'sgimd-torch[board]'")
+        if self.board and importlib.util.find_spec("tensorboardX") is None:
+            raise ValueError("board true needs tensorboardX, which is not installed; pip install 'sgimd-torch[board]'")
         if self.variant in ("", ".", "..") or any(sign in self.variant for sign in "/\\\0"):
             raise ValueError(f"name must be that of one directory, got {self.variant!r}; is the path for --out?")
 

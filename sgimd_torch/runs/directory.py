@@ -48,7 +48,7 @@ def open_run(parts: RunParts, *, resume: bool, accept_loss: bool = False) -> tup
     about: dict[str, Any] = {
         "settings": config.settings,
         "files": parts.data,
-        "versions": {**versions(forward="torch" in sys.modules), **sources(config)},
+        "versions": {**versions(forward=bool(parts.learner.problem.trained)), **sources(config)},
         "robot": type(robot).__name__,
         "words": words(config),
         "spaces": {n: [b.low.tolist(), b.high.tolist(), b.names, b.unit] for n, b in spaces.items()},

@@ -5,13 +5,13 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, Protocol
 
 from sgimd_torch.evaluation import Evaluation
 from sgimd_torch.spaces import Episode
 
 
-class Listener:
+class Listener(Protocol):
     """Listener of a run: is told what happens. A resumed run tells it everything again, from its record.
 
     A listener overrides what concerns it.

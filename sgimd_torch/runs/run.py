@@ -18,7 +18,7 @@ from sgimd_torch.record import RunError
 from sgimd_torch.runs.build import RunParts
 from sgimd_torch.runs.directory import open_run
 from sgimd_torch.runs.evaluations import Evaluations
-from sgimd_torch.runs.listeners import Seconds
+from sgimd_torch.runs.listeners import Listener, Seconds
 from sgimd_torch.runs.process import Failed, Progress, Stopped, Stopping, say
 from sgimd_torch.session import NoOutcomeError, ReplayError, live, reason_of, run
 from sgimd_torch.spaces import Episode
@@ -84,7 +84,7 @@ class Life:
         self.seconds = Seconds(self.record.about.get("seconds", {}))
         judged = parts.config, parts.environment, parts.benchmark, parts.learner, parts.answers
         self.evaluations = Evaluations(*judged, self.record)
-        self.listeners = [each.listener(self) for each in parts.learner.problem.trained]
+        self.listeners: list[Listener] = [each.listener(self) for each in parts.learner.problem.trained]
         if parts.config.board:
             from sgimd_torch.board.listener import BoardListener  # most runs have no board
 

@@ -16,7 +16,9 @@ from sgimd_torch.spaces import Array, Estimate
 
 
 class Perturb(Search):
-    """Gaussian noise around the best theta so far, remembered or executed here, clipped to Pi; never ends.
+    """Best movement so far plus Gaussian noise.
+
+    The noise is around the best theta so far, remembered or executed here, and clipped to Pi; it never ends.
 
     It executes theta_g first, unless that is a copy of a remembered theta, whose outcome is known.
 
@@ -50,7 +52,9 @@ class Perturb(Search):
 
 
 class Vary(Search):
-    """Gaussian noise around theta_g, whatever came of it, clipped to Pi; never ends.
+    """Answer of the inverse model plus a little Gaussian noise.
+
+    The noise is around theta_g, whatever came of it, and clipped to Pi; it never ends.
 
     So the inverse model is corrected where it errs, and sees in which directions the outcome changes. It is meant for
     an inverse model that is nearly right, and for one movement or two at each goal. Where theta_g is the copy of a
@@ -67,7 +71,7 @@ class Vary(Search):
 
     def __init__(self, problem: Problem, *, sd: float = 0.02) -> None:
         super().__init__(problem)
-        self.sd, self.width = _positive(sd), problem.shared(Width)
+        self.sd, self.width = _positive(sd), problem.shared(Width, Width)
 
     def __call__(self, start: Estimate, goal: Array) -> Generator[Array, Array, None]:
         """Movements around theta_g of ``start``."""

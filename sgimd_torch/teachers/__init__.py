@@ -7,12 +7,14 @@ movements, demonstrates something from a tile chosen at random among those the l
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Final
 
 import numpy as np
 
+from sgimd_torch.catalogue.built import Built
 from sgimd_torch.memory import Memory
 from sgimd_torch.parts import Teacher
 from sgimd_torch.spaces import Array, Demonstration, check_count, check_rng, check_vector
@@ -20,19 +22,36 @@ from sgimd_torch.spaces import Array, Demonstration, check_count, check_rng, che
 _STALLED: Final = 0.01  # share by which distances fall at least while a learner progresses
 
 
+class Demonstrator(Built):
+    """Teacher who is asked for a demonstration of a goal. Built from ``(demonstrations, rng)`` and options.
+
+    Attributes:
+        takes: movements at which the learner rests until a reply has come.
+    """
+
+    takes: int = 0
+
+    @abstractmethod
+    def demonstrate(self, context: Array, goal: Array, memory: Memory) -> Demonstration | None:
+        """A demonstration of ``goal`` ``(outcome_dim,)`` in ``context`` ``(context_dim,)``, or None. A replay asks
+        again, so what is drawn may depend on the seed and on the arguments only."""
+
+
 Choose = Callable[[Sequence[Demonstration], Memory, np.random.Generator], Demonstration]
 """(demonstrations, the learner's memory, rng) -> the demonstration to give."""
 
 
 def at_random(demonstrations: Sequence[Demonstration], memory: Memory, rng: np.random.Generator) -> Demonstration:
-    """Any of them, all equally likely."""
+    """Any demonstration, all equally likely."""
     return demonstrations[int(rng.integers(len(demonstrations)))]
 
 
 def least_explored(
     demonstrations: Sequence[Demonstration], memory: Memory, rng: np.random.Generator, *, tiles: int = 10
 ) -> Demonstration:
-    """A demonstration from a tile chosen at random among the tiles that have any and that the learner reached least.
+    """Demonstration from a tile that the learner has reached least.
+
+    The tile is chosen at random among those that have any and were reached least.
 
     Args:
         demonstrations: demonstrations to choose from.
@@ -60,7 +79,9 @@ def least_explored(
 
 
 class PeriodicTeacher(Teacher):
-    """Demonstrates regularly, as in the paper: before the movements ``every``, 2 ``every``, ...
+    """Demonstrates regularly, one every so many movements, as in the paper.
+
+    It demonstrates before the movements ``every``, 2 ``every``, ...
 
     Args:
         demonstrations: demonstrations to choose from.
@@ -91,7 +112,9 @@ class PeriodicTeacher(Teacher):
 
 
 class InitialTeacher(Teacher):
-    """Gives each demonstration once, at the start, in random order: one before the movements 0, ``every``, ...
+    """Demonstrates all at the start, one every so many movements, in random order.
+
+    One demonstration comes before the movements 0, ``every``, ...
 
     Args:
         demonstrations: demonstrations to give.
@@ -118,7 +141,9 @@ at_once = partial(InitialTeacher, every=1)
 
 
 class AskedTeacher(Teacher):
-    """Demonstrates when the learner's competence stalls, as if the learner had asked.
+    """Demonstrates when the learner's competence stalls.
+
+    It is as if the learner had asked.
 
     Every ``patience`` movements it looks how near the learner has come to each demonstrated outcome. It demonstrates if
     the mean distance fell by less than a hundredth since the last look.

@@ -78,21 +78,21 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _check_picture(task: Task) -> None:
-    """One movement that is executed and recorded.
+    """Compare the outcomes of ``execute`` and ``trace`` for one movement.
 
     Raises:
-        ValueError: it ends in two places, or cannot be recorded; see `recorded`.
+        ValueError: the outcomes differ, or the movement cannot be traced; see `traced`.
     """
-    robot, record = task.environment, task.picture
-    if record is None:
+    robot, trace = task.environment, task.picture
+    if trace is None:
         return
     context, theta = robot.observe(stream(0, "check")), robot.policies.sample(stream(1, "check"))
     outcome = robot.execute(context.copy(), theta.copy(), stream(2, "check"))
     name = type(robot).__name__
-    drawn = record(context, theta, stream(2, "check")).outcome
+    drawn = trace(context, theta, stream(2, "check")).outcome
     if not np.array_equal(drawn, outcome):
         raise ValueError(
-            f"record() of {name} ends at {drawn.tolist()}, execute() with an equal stream at "
+            f"trace() of {name} ends at {drawn.tolist()}, execute() with an equal stream at "
             f"{outcome.tolist()}; does it draw its noise in the same order?"
         )
 

@@ -1,13 +1,13 @@
-"""Demonstrations: are they right for a robot? And how do they get here from other files?
+"""Check demonstrations on a robot, or import them from other formats.
 
-  check    a table with a line for each recording: what it says and where it lands on the simulated robot, how far it is
-           from what the robot can play, what lies outside its limits
-  import   recordings in CSV or in a LeRobot dataset (v3) become a file for sgimd run --demonstrations
+  check    prints a line for each recording: its outcome as recorded (says) and on the simulated robot (lands), the
+           distance between them (apart) and to the movement that the robot plays (misfit), and limits that it leaves
+  import   converts recordings in CSV or in a LeRobot dataset (v3) to a file for sgimd run --demonstrations
 
-SOURCE is a file that save_demonstrations wrote (.npz); a CSV file or a folder of them, one for each recording; or the
-folder of a LeRobot dataset. All but the first need the names of the columns; a column may be a vector, as in LeRobot:
-observation.state is all its entries, observation.state[0:6] some. The outcome is read in the last row of a recording,
-the context in the first.
+SOURCE is an .npz file of save_demonstrations; a CSV file, or a folder with one for each recording; or the folder of a
+LeRobot dataset. CSV and LeRobot need the names of the columns. A column may be a vector, as in LeRobot:
+observation.state is the whole vector, observation.state[0:6] some of its entries. The last row of a recording holds
+the outcome, the first row the context.
 
 Examples:
   sgimd demonstrations check shown.npz --task fishing-rod
@@ -15,7 +15,7 @@ Examples:
   sgimd demonstrations import datasets/my_arm --joints observation.state[0:6] --outcome observation.place[0:2]
       --time timestamp --recording episode_index --degrees --out shown.npz
 
-Exit code: 0 each recording can be used, 2 some cannot, or the request is wrong.
+Exit code: 0 if all recordings can be used, 2 if some cannot, or if the request is wrong.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ import numpy as np
 
 from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
 from sgimd_torch.demonstrations.columns import Columns, read_csv
-from sgimd_torch.demonstrations.lessons import beyond_limits, misfit_of
+from sgimd_torch.demonstrations.fit import beyond_limits, misfit_of
 from sgimd_torch.environments.protocol import SimulationError, execute_many
 from sgimd_torch.runs.build import task_of
 from sgimd_torch.runs.config import Config
@@ -43,10 +43,14 @@ HEADS: Final = ("recording", "lasts (s)", "samples", "says", "lands", "apart", "
 
 @dataclass(frozen=True, eq=False)
 class Checked:
-    """One recording on a robot.
+    """A recording on a robot.
 
-    ``lands`` ``(outcome_dim,)`` is None if it cannot be translated; ``refused`` says why. ``misfit`` is NaN where the
-    robot cannot tell. ``remarks`` say what lies outside a limit.
+    Attributes:
+        shown: the recording.
+        lands: ``(outcome_dim,)`` outcome on the robot, None if there is none.
+        misfit: distance to the movement that the robot plays, NaN if unknown; see `misfit_of`.
+        remarks: a sentence for each limit that the recording leaves.
+        refused: reason for a missing outcome, "" if there is one.
     """
 
     shown: Demonstration
@@ -57,7 +61,7 @@ class Checked:
 
     @property
     def apart(self) -> float:
-        """How far it lands from where it says; NaN if it cannot be translated."""
+        """Distance between the outcomes on the robot and in the recording; NaN without the former."""
         return float("nan") if self.lands is None else float(np.linalg.norm(self.lands - self.shown.outcome))
 
 
@@ -65,23 +69,36 @@ def parser() -> argparse.ArgumentParser:
     """The options of ``sgimd demonstrations``."""
     source = argparse.ArgumentParser(add_help=False)
     source.add_argument("source", type=Path, metavar="SOURCE")
-    for option in ("joints", "outcome", "context"):
-        source.add_argument(f"--{option}", type=_names, default=(), metavar="COLUMN,COLUMN")
-    source.add_argument("--time", metavar="COLUMN", help="seconds (default: time; of a LeRobot dataset: timestamp)")
-    source.add_argument("--recording", metavar="COLUMN", help="its number or name (of LeRobot: episode_index)")
-    source.add_argument("--degrees", action="store_true", help="joints are in degrees")
+    for option, about in (("joints", "joint angles or commands"), ("outcome", "outcome"), ("context", "context")):
+        source.add_argument(
+            f"--{option}", type=_names, default=(), metavar="COLUMN,COLUMN", help=f"columns of the {about}"
+        )
+    source.add_argument("--time", metavar="COLUMN", help="column of seconds (default: time; LeRobot: timestamp)")
+    source.add_argument(
+        "--recording",
+        metavar="COLUMN",
+        help="column that divides a table into recordings (default: none; LeRobot: episode_index)",
+    )
+    source.add_argument("--degrees", action="store_true", help="convert joints from degrees")
     shown: dict[str, Any] = {"description": __doc__, "formatter_class": argparse.RawDescriptionHelpFormatter}
     parser = argparse.ArgumentParser(prog="sgimd demonstrations", **shown)
     commands = parser.add_subparsers(dest="command", required=True, metavar="check|import")
-    checked = commands.add_parser("check", help="are they right for a robot?", parents=[source], **shown)
-    checked.add_argument("--task", required=True, metavar="ENVIRONMENT", help="as sgimd run --environment")
-    imported = commands.add_parser("import", help="into a file for --demonstrations", parents=[source], **shown)
-    imported.add_argument("--out", type=Path, required=True, metavar="FILE.npz")
+    checked = commands.add_parser("check", help="execute them on a robot", parents=[source], **shown)
+    checked.add_argument(
+        "--task",
+        required=True,
+        metavar="ENVIRONMENT",
+        help="robot, a word or module:attribute, see --environment of sgimd run",
+    )
+    imported = commands.add_parser(
+        "import", help="convert them to a file for --demonstrations", parents=[source], **shown
+    )
+    imported.add_argument("--out", type=Path, required=True, metavar="FILE.npz", help="file to write")
     return parser
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Check or import; the exit code, 0.
+    """Check or import demonstrations; returns 0.
 
     Raises:
         ValueError: the source cannot be read, or the robot cannot use all of it.
@@ -99,7 +116,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     contexts = task.environment.contexts
     if contexts.dim and not shown[0].context.size:
         what = ", ".join(contexts.axis(k, "context") for k in range(contexts.dim))
-        raise ValueError(f"{options.source} says nothing of the context ({what}); name its columns with --context")
+        raise ValueError(f"{options.source} has no context ({what}); name its columns with --context")
     found = [check(task, each, row) for row, each in enumerate(shown)]
     print_table([HEADS, *(_cells(row, each) for row, each in enumerate(found))])
     apart = [each.apart for each in found if each.lands is not None]
@@ -117,10 +134,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def read(options: argparse.Namespace) -> list[Demonstration]:
-    """The recordings of the source, whatever kind it is.
+    """Read the recordings of a source of any format.
 
     Raises:
-        ValueError: see the readers; or columns are not named.
+        ValueError: the source is damaged, or columns are not named.
         OSError: there is no such source.
     """
     source: Path = options.source
@@ -141,13 +158,13 @@ def read(options: argparse.Namespace) -> list[Demonstration]:
     )
     if not is_dataset:
         return read_csv(source, columns)
-    from sgimd_torch.demonstrations.lerobot import read_lerobot  # pyarrow is loaded only when it is needed
+    from sgimd_torch.demonstrations.lerobot import read_lerobot  # loads pyarrow
 
     return read_lerobot(source, columns)
 
 
 def check(task: Task, shown: Demonstration, row: int) -> Checked:
-    """One recording, translated and executed on the task's robot with a noise of its own."""
+    """Translate a recording and execute it on the robot of a task, with the noise of stream number ``row``."""
     robot = task.environment
     remarks = beyond_limits(robot, shown)
     try:
@@ -163,7 +180,7 @@ def check(task: Task, shown: Demonstration, row: int) -> Checked:
 
 
 def _cells(row: int, found: Checked) -> tuple[str, ...]:
-    """Of the table, below ``HEADS``."""
+    """A row of the table, below ``HEADS``."""
     times = found.shown.times
     refused = [f"cannot be used: {found.refused}"] if found.refused else []
     return (

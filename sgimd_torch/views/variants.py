@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from sgimd_torch.catalogue import label
+from sgimd_torch.figures.names import label
 from sgimd_torch.runs.read import Run, find_runs, read_run
 from sgimd_torch.spaces import Array
 from sgimd_torch.views.statistics import LEAST_SEEDS, Interval, over_seeds

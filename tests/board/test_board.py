@@ -6,17 +6,24 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from tensorboard.plugins.hparams.metadata import (
+    EXPERIMENT_TAG,
+    SESSION_START_INFO_TAG,
+    parse_experiment_plugin_data,
+    parse_session_start_info_plugin_data,
+)
+from tensorboardX import summary
 
-from boards import charts_of, curves_of, values_of
+from boards import board_of, curves_of, pictures_of
 from runs import arguments, content_of, end, stopped_at
 from sgimd_torch import InterestMap, stream
 from sgimd_torch.board import pictures
-from sgimd_torch.board.curves import Behaviour, Competent, Grid, branches, cells_of, of_regions
+from sgimd_torch.board.curves import Behaviour, branches, of_evaluation, of_regions, places_of
 from sgimd_torch.board.events import EventFile
 from sgimd_torch.board.legend import LEGEND
-from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.evaluation import Evaluation, load_benchmark
 from sgimd_torch.figures.sections import sections
+from sgimd_torch.runs import sweep
 from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
@@ -53,7 +60,7 @@ def test_a_goal_counts_once_and_as_reached_when_one_of_its_movements_came_near()
         behaviour.episode(movement(index, GOAL, outcome))
     behaviour.episode(movement(3, -GOAL, FAR))
     values = behaviour.curves()
-    assert values["goals/reached_share"] == 0.5
+    assert values["goals/reached"] == 0.5
     assert values["goals/missed_by"] == pytest.approx((0.01 + np.hypot(1, 1.4)) / 2)
 
 
@@ -63,7 +70,7 @@ def test_imitations_count_for_the_teacher_and_not_as_goals_of_the_learners_own()
     behaviour.episode(movement(1, SHOWN.outcome, SHOWN.outcome * 1.2, "imitate", SHOWN))
     behaviour.episode(movement(2, SHOWN.outcome, SHOWN.outcome * 1.4, "imitate"))
     values = behaviour.curves()
-    assert values["goals/reached_share"] == 1
+    assert values["goals/reached"] == 1
     assert values["teacher/demonstrations"] == 1
     assert values["teacher/missed_by"] == pytest.approx(0.3 * np.sqrt(0.5))
 
@@ -84,7 +91,11 @@ def test_requests_are_counted_by_strategy():
         request = Request(strategy[-3:], GOAL, strategy) if strategy else None
         behaviour.episode(Episode(index, np.zeros(0), Move(np.zeros(1), GOAL, "local"), FAR, None, request, reply))
     values = behaviour.curves()
-    assert (values["strategy/imitate ann"], values["strategy/imitate ben"], values["asked/answered"]) == (0.25, 0.25, 1)
+    assert (values["strategy/imitate ann"], values["strategy/imitate ben"], values["teacher/replies"]) == (
+        0.25,
+        0.25,
+        1,
+    )
     behaviour.episode(movement(8, GOAL, FAR))
     assert behaviour.curves()["strategy/imitate ann"] == 0
 
@@ -102,41 +113,35 @@ def test_a_region_that_was_cut_goes_on_as_the_mean_over_the_goals_of_its_parts()
     assert values["regions/count"] == len(regions)
 
 
-def test_cells_of_the_grid_hold_each_point_once_the_border_included():
-    grid = Grid(PLANE)
-    assert len(grid.names) == len(set(grid.names)) == 4
-    means = grid.means(np.array([[-1, -1], [1, 1], [0, 0], [0.1, 0.4], [1.1, 0]]), np.array([1.0, 2, 3, 4, 5]))
-    assert means == {"x -1..0, y -1..0": 1, "x 0..1, y 0..1": 3}
+@pytest.mark.parametrize(("dim", "n"), [(1, 4), (2, 4)])
+def test_places_are_at_most_four_and_hold_each_goal_once_the_border_included(dim, n):
+    goals = np.vstack((np.zeros(dim), np.ones(dim), stream(0, "test").random((500, dim))))
+    places = places_of(Box.cube(-5, 5, dim), goals)
+    assert len(places) == n
+    assert all(name.count("..") == dim for name in places)
+    assert (np.sum(list(places.values()), axis=0) == 1).all()
 
 
-@pytest.mark.parametrize(("dim", "cells"), [(1, 8), (2, 4), (3, 8)])
-def test_a_grid_has_at_most_eight_cells_in_any_dimension(dim, cells):
-    grid = Grid(Box.cube(0, 1, dim))
-    assert len(grid.names) == cells
-    assert all(name.count("..") == dim for name in grid.names)
-    with pytest.raises(ValueError, match="points"):
-        grid.means(np.full((4, dim + 1), 0.6), np.ones(4))
+def test_a_task_space_of_three_dimensions_and_more_has_no_places():
+    assert places_of(Box.cube(0, 1, 3), np.eye(3)) == {}
 
 
-def test_cells_lie_where_the_goals_of_the_benchmark_do_so_that_task_spaces_of_any_size_have_the_same():
+def test_places_lie_where_the_goals_of_the_benchmark_do_so_that_task_spaces_of_any_size_have_the_same():
     goals = load_benchmark().goals
+    names = {"x -1..0 y -1..0", "x -1..0 y 0..1", "x 0..1 y -1..0", "x 0..1 y 0..1"}
     for half_side in (1.0, 10.0, 100.0):
-        cells = cells_of(FishingRod(outcomes=Box.cube(-half_side, half_side, 2)).outcomes, goals)
-        assert cells.low.tolist() == [-1, -1]
-        assert cells.high.tolist() == [1, 1]
-    small = cells_of(Box(np.array([0.0, -3, -1]), np.array([0.8, 3, 1])), np.array([[0.1, 0, 0], [0.79, 2.2, 0]]))
-    assert small.low.tolist() == [0.1, 0, -1]  # goals that are all alike in a dimension leave all of it
-    assert small.high.tolist() == [0.8, 2.5, 1]
+        assert places_of(Box.cube(-half_side, half_side, 2, names=("x", "y")), goals).keys() == names
+    small = places_of(Box(np.array([0.0, -1]), np.array([0.8, 1])), np.array([[0.1, 0], [0.79, 0]]))
+    assert list(small) == ["t0 0.1..0.45 t1 0..1", "t0 0.45..0.8 t1 0..1"]  # goals alike in t1 leave all of it
 
 
 def test_the_share_of_goals_met_is_counted_by_place_and_everywhere():
     goals = np.array([[-0.9, -0.9], [-0.8, -0.9], [0.5, 0.5], [0.9, 0.9]])
-    competent = Competent(goals, 0.05, PLANE)
-    values = competent.curves(evaluation([0.01, 0.2, 0.05, 0.0]))
+    values = of_evaluation(evaluation([0.01, 0.2, 0.05, 0.0]), 0.05, places_of(PLANE, goals))
     assert values["met/everywhere"] == 0.75
     assert {tag: share for tag, share in values.items() if "x" in tag} == {
-        "met/x -1..0, y -1..0": 0.5,
-        "met/x 0..1, y 0..1": 1,
+        "met/x -1..0 y -1..0": 0.5,
+        "met/x 0..1 y 0..1": 1,
     }  # and of no place without goals
     assert (values["error/mean"], values["error/noise_floor"]) == pytest.approx((0.065, 0.01))
 
@@ -145,7 +150,7 @@ def test_the_names_of_regions_lie_where_they_are_and_are_those_of_the_curves():
     regions = interest_map().regions
     ax = Figure().add_subplot()
     pictures._competence(ax, regions, *sections(PLANE))
-    named = branches(regions, 3)
+    named = branches(regions)
     places = {text.get_text(): text.get_position() for text in ax.texts}
     assert places.keys() == {path for path in named if not {f"{path}0", f"{path}1"} & named.keys()}
     for path, (x, y) in places.items():
@@ -153,23 +158,25 @@ def test_the_names_of_regions_lie_where_they_are_and_are_those_of_the_curves():
 
 
 def test_earlier_event_files_stay_until_the_replay_is_over(tmp_path):
-    first = EventFile(tmp_path)
-    first.begin()
-    first.scalars(50, {"error/mean": 1.0})
-    first.close()
+    def told(*points, begins_after=0):
+        file = EventFile(tmp_path)
+        for n, (step, value) in enumerate(points):
+            if n == begins_after:
+                file.begin()
+            file.add(step, summary.scalar("error/mean", value))
+        return file
+
+    told((50, 1.0)).close()
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
-    second = EventFile(tmp_path)
-    second.scalars(50, {"error/mean": 3.0, "error/noise_floor": np.nan})
-    second.close()  # stopped within the replay
+    told((50, 3.0), begins_after=1).close()  # stopped within the replay
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
-    third = EventFile(tmp_path)
-    third.scalars(50, {"error/mean": 3.0, "error/noise_floor": np.nan})
-    third.begin()
-    third.scalars(100, {"error/mean": 4.0})
+    third = told((50, 3.0), (100, 4.0), begins_after=1)
     third.flush()
     assert curves_of(tmp_path) == {"error/mean": {50: 3.0, 100: 4.0}}
     third.close()
-    assert before.keys().isdisjoint(path.name for path in tmp_path.iterdir())  # else an open TensorBoard ignores it
+    assert before.keys().isdisjoint(
+        path.name for path in tmp_path.iterdir()
+    )  # otherwise an open TensorBoard ignores it
 
 
 OPTIONS = ("--movements", "160", "--evaluate_at", "60,120", "--board", "true")
@@ -198,43 +205,57 @@ def test_the_curves_of_a_run_are_those_of_its_record(watched):
     shown = {step: (read.demonstration[:step] >= 0).sum() for step in (50, 100, 150)}
     assert curves["teacher/demonstrations"] == shown
     assert curves["competence/R"].keys() == curves["time/physics"].keys() == {50, 100, 150}
-    assert all(picture[2].startswith(b"\x89PNG") for picture in curves["map/error"].values())
-    assert curves["map/error"].keys() == {60, 120, 160}  # when the movements have doubled, and at the end
+    pictures = pictures_of(watched)
+    assert all(png.startswith(b"\x89PNG") for png in pictures["map/error"].values())
+    assert pictures["map/error"].keys() == {60, 120, 160}  # when the movements have doubled, and at the end
 
 
-def test_every_tag_is_explained_once_in_the_file_and_in_the_legend(watched):
-    explained = [value.tag for _, value in values_of(watched) if value.metadata.summary_description]
-    curves = curves_of(watched)
-    assert sorted(explained) == sorted(tag for tag in curves if not tag.startswith("custom_scalars"))
-    (legend,) = curves["about/legend"].values()
-    assert all(f"**{tag}" in legend.decode() for tag in LEGEND)
+@pytest.mark.filterwarnings("ignore:The inplace keyword:DeprecationWarning")  # of tbparse 0.0.9, in pandas 3.1
+def test_other_readers_find_every_curve(watched):
+    found = pytest.importorskip("tbparse").SummaryReader(str(watched)).scalars
+    assert set(found.tag) == curves_of(watched).keys()
+    assert {"error/mean", "error/by_linear", "met/x_-0.4..-0.05_y_0.4..0.5", "competence/R"} < set(found.tag)
 
 
-def test_the_page_of_charts_begins_with_where_it_is_competent_by_places_with_goals(watched):
-    first, *others = charts_of(watched).items()
-    assert first[0] == "Where is it competent (half of the goals met, within 0.05 m), and since when?"
-    places = ("x -0.4..-0.05, y 0.4..0.5", "x -0.05..0.3, y 0.4..0.5", "x -0.05..0.3, y 0.5..0.6")
-    assert first[1] == ["met/everywhere", *(f"met/{place}" for place in places)]  # not the one that no goal lies in
-    assert [len(tags) for _, tags in others] == [3, 5]
+def test_every_tag_is_explained_in_the_file_with_its_unit_and_in_the_legend(watched):
+    board = board_of(watched)
+    for tag in (*board.Tags()["scalars"], *board.Tags()["images"]):
+        assert board.SummaryMetadata(tag).summary_description
+    assert "(m)" in board.SummaryMetadata("error/mean").summary_description
+    (page,) = board.Tensors("about/legend/text_summary")
+    assert all(f"**{tag}" in page.tensor_proto.string_val[0].decode() for tag in LEGEND)
 
 
-@pytest.mark.parametrize("options", [("--goals", "grid", "--search", "perturb")])
-def test_no_chart_is_empty_whatever_the_learner(tmp_path, go, options):
-    assert go(tmp_path, "--board", "true", *options) == 0
-    ((directory,),) = [list(path.glob("seed-*")) for path in tmp_path.iterdir()]
-    tags = [tag for each in charts_of(directory).values() for tag in each]
-    assert len(tags) == len(set(tags)) > 5
-    assert set(tags) < curves_of(directory).keys()
+def hparams_of(directory):
+    board = board_of(directory)
+    start = parse_session_start_info_plugin_data(board.SummaryMetadata(SESSION_START_INFO_TAG).plugin_data.content)
+    values = {name: value.string_value or value.number_value for name, value in start.hparams.items()}
+    about = parse_experiment_plugin_data(board.SummaryMetadata(EXPERIMENT_TAG).plugin_data.content)
+    assert {info.name for info in about.hparam_infos} == values.keys()
+    return values, [info.name.tag for info in about.metric_infos]
+
+
+def test_hyperparameters_of_a_sweep_are_what_tells_its_runs_apart_defaults_included(own):
+    words = "--environment planar-arm-7 --movements 50 --seeds 0 --repeats 0 --board true --out sweep"
+    vary = ["--vary", "algorithm=sagg-riac,practice", "--vary", "budget=1,15"]  # 1 is the default of practice
+    assert command(sweep.main, [*words.split(), *vary]) == 0
+    found = {path.parent.name: hparams_of(path) for path in Path("sweep").glob("*/seed-000")}
+    assert found == {
+        f"{algorithm},budget={budget}": (
+            {"algorithm": algorithm, "budget": budget, "environment": "planar-arm-7", "seed": 0},
+            ["error/mean"],
+        )
+        for algorithm in ("sagg-riac", "practice")
+        for budget in (1, 15)
+    }
 
 
 def assert_same_board(directory, whole):
     """By tag, step and value; but for seconds, which a replayed movement does not have."""
     found, wanted = (
-        {tag: curve for tag, curve in curves_of(each).items() if not tag.startswith("time/")}
+        {tag: curve for tag, curve in {**curves_of(each), **pictures_of(each)}.items() if not tag.startswith("time/")}
         for each in (directory, whole)
     )
-    for found_settings in (found, wanted):
-        found_settings.pop("about/settings")  # which say where the run is
     assert found == wanted
 
 
@@ -262,9 +283,9 @@ def live_as(robot, *options):
 
 @pytest.mark.parametrize("robot", ["Slider", "Slider3", "Shifted"])
 def test_outcomes_of_any_dimension_have_curves_and_pictures(own, robot):
-    curves = curves_of(live_as(robot))
-    assert {"error/mean", "competence/R", "interest/R", "goals/missed_by"} < curves.keys()
-    assert {tag for tag in curves if tag.startswith("map/")} == {"map/error", "map/competence"}
+    directory = live_as(robot)
+    assert {"error/mean", "competence/R", "interest/R", "goals/missed_by"} < curves_of(directory).keys()
+    assert pictures_of(directory).keys() == {"map/error", "map/competence"}
 
 
 HALVES = '''
@@ -287,6 +308,8 @@ class Halves:
 
 def test_the_regions_of_any_goal_model_are_shown(own, module):
     module("halves", HALVES)
-    curves = curves_of(live_as("Slider2", "--goals", "halves:Halves"))
+    directory = live_as("Slider2", "--goals", "halves:Halves")
+    curves = curves_of(directory)
     assert curves["regions/count"] == {50: 2, 100: 2}
-    assert {"competence/R0", "interest/R", "map/competence"} < curves.keys()
+    assert {"competence/R0", "interest/R"} < curves.keys()
+    assert "map/competence" in pictures_of(directory)

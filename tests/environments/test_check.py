@@ -136,9 +136,9 @@ USED_TWICE = "changed an array that it gave before: one buffer is used twice"
             rf"{EXECUTE} raised AttributeError for theta \[.*\]: .* has no attribute 'nothing'",
         ),
         (with_(execute=lambda own, *_: own() + np.random.normal(0, 0.1)), GLOBAL),  # noqa: NPY002 - the slip
-        (OfItsOwn("noise"), "its noise is not from the rng, of which nothing was drawn"),
-        (Carrying(), r"then \[.*\] for the same movement and equal streams: state is carried over"),
-        (CarryingOthers(), r"but \[.*\] after another movement: state is carried over"),
+        (OfItsOwn("noise"), "nothing was drawn from rng; does its noise come from a generator of its own"),
+        (Carrying(), r"then \[.*\] for the same movement and equal streams: state carries over"),
+        (CarryingOthers(), r"but \[.*\] after another movement: state carries over"),
         (with_(outcome_noise=0.0), "outcome_noise is 0, but outcomes of a movement scatter by about 0.1"),
         (
             with_(execute=lambda own, context, theta, rng: own(context, theta, stream(0, "always the same"))),
@@ -219,7 +219,7 @@ class Exits(PlanarArm):
         raise SystemExit(0)
 
 class Unseen(PlanarArm):
-    def record(self, context, theta, rng):
+    def trace(self, context, theta, rng):
         raise SystemExit(0)
 
 class Forgets(PlanarArm):

@@ -155,7 +155,7 @@ def test_a_posture_at_its_limits_is_accepted_also_with_rounding():
 
 @pytest.mark.parametrize("last", [[0, 1.6, 0, 0], [-3.2, 0, 0, 0]])
 def test_a_posture_that_the_joints_cannot_take_is_refused(last):
-    with pytest.raises(ValueError, match="of the last posture entry"):
+    with pytest.raises(ValueError, match="in the last posture entry"):
         PlanarArm(4).correspondence([0.0, 1.0], [[0] * 4, last])
 
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-from sgimd_torch.demonstrations.lessons import misfit_of
+from sgimd_torch.demonstrations.fit import misfit_of
 from sgimd_torch.environments.check import check_environment
 from sgimd_torch.environments.controllers import Sinusoids
 from sgimd_torch.environments.from_gymnasium import FromGymnasium, measured_noise
@@ -91,7 +91,7 @@ def test_a_movement_is_an_episode_of_the_controllers_commands():
             lambda: sled(world=gymnasium.make("CartPole-v1")),
             r"needs continuous actions, .* Discrete\(2\)",
         ),
-        (lambda: sled(world=gymnasium.make("MountainCarContinuous-v0")), "needs dt > 0, .* this world does not say it"),
+        (lambda: sled(world=gymnasium.make("MountainCarContinuous-v0")), "needs dt > 0, .* this world has none"),
         (lambda: sled(steps=0), "steps must be a whole number >= 1"),
     ],
 )

@@ -12,23 +12,23 @@ JOINTS = Box(np.array([-1.0, 0.0]), np.array([1.0, 10.0]))
 DURATIONS = (0.8, 1.6)
 
 
-def primitive(*, n_knots: int = 4, sharpness: float = 9.0, joints: Box = JOINTS) -> GaussianPrimitive:
-    return GaussianPrimitive(joints, DURATIONS, n_knots=n_knots, sharpness=sharpness)
+def primitive(*, sharpness: float = 9.0, joints: Box = JOINTS) -> GaussianPrimitive:
+    return GaussianPrimitive(joints, DURATIONS, sharpness=sharpness)
 
 
-def unit_joint(n_knots: int, sharpness: float) -> GaussianPrimitive:
-    return primitive(n_knots=n_knots, sharpness=sharpness, joints=Box.cube(0, 1, 1))
+def unit_joint(sharpness: float) -> GaussianPrimitive:
+    return primitive(sharpness=sharpness, joints=Box.cube(0, 1, 1))
 
 
-def test_two_knots_are_blended_by_the_gaussians_of_equation_5() -> None:
-    # Knots 0 and 1 at the phases 0 and 1, s = ln 3: at phase p the second weighs 3^-(p-1)^2 against 3^-p^2.
-    trajectory = unit_joint(2, np.log(3.0)).at(np.array([0.0, 1.0, 0.5]), np.array([0.0, 0.6, 1.2]))
-    assert trajectory.ravel() == pytest.approx([1 / 4, 1 / 2, 3 / 4])
+def test_the_knots_are_blended_by_the_gaussians_of_equation_5() -> None:
+    # With s = 9 ln 3 a knot that is k thirds of the duration away weighs 3^-(k^2): 1, 1/3, 1/81, 1/19683.
+    trajectory = unit_joint(9 * np.log(3.0)).at(np.array([0.0, 1.0, 0.0, 0.0, 0.5]), np.array([0.0, 0.4, 0.8]))
+    assert trajectory.ravel() == pytest.approx([6561 / 26488, 81 / 136, 27 / 136])
 
 
 def test_a_movement_starts_near_its_first_knot_and_not_its_last() -> None:
     # The paper's printed sign, exp(+ sigma |.|^2), would play it backwards.
-    _, trajectory = unit_joint(4, 9.0).trajectory(np.array([0.0, 0.0, 0.0, 1.0, 0.0]))
+    _, trajectory = unit_joint(9.0).trajectory(np.array([0.0, 0.0, 0.0, 1.0, 0.0]))
     assert trajectory[0, 0] < 0.01
     assert trajectory[-1, 0] > 0.7
 
@@ -121,10 +121,10 @@ def test_a_theta_outside_the_box_has_no_trajectory(theta: Array) -> None:
         primitive().trajectory(theta)
 
 
-def test_a_primitive_without_time_knots_or_width_is_refused() -> None:
+def test_a_primitive_without_time_or_width_is_refused() -> None:
     for durations in ((0.0, 1.0), (1.0, 1.0), (2.0, 1.0), (np.nan, 1.0)):
         with pytest.raises(ValueError, match="durations"):
             GaussianPrimitive(JOINTS, durations)
-    for options in ({"n_knots": 1}, {"sharpness": 0.0}, {"sharpness": np.nan}):
-        with pytest.raises(ValueError, match="n_knots"):
-            GaussianPrimitive(JOINTS, DURATIONS, **options)
+    for sharpness in (0.0, np.nan):
+        with pytest.raises(ValueError, match="sharpness"):
+            GaussianPrimitive(JOINTS, DURATIONS, sharpness=sharpness)

@@ -1,14 +1,11 @@
-"""The script that leads the rod as a person would."""
+"""Rivals with tuned settings."""
 
 import numpy as np
 import pytest
 
 import parts
-from sgimd_torch.demonstrations import load_demonstrations
-from sgimd_torch.environments.fishing_rod import JOINT_RANGES
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.session import run
-from sgimd_torch.spaces import Demonstration, stream
 
 
 def test_map_elites_may_begin_around_the_middle_and_goes_on_from_its_elites():
@@ -19,52 +16,3 @@ def test_map_elites_may_begin_around_the_middle_and_goes_on_from_its_elites():
     assert abs(thetas[:100].mean() - 0.5) < 0.02
     away = np.abs(thetas[100:, None] - thetas[:100]).max(axis=2).min(axis=1)
     assert np.median(away) < 0.35  # of a movement from the nearest first one
-
-
-@pytest.fixture(scope="module")
-def lessons():
-    return parts.lessons_of_a_script()
-
-
-def test_a_sweep_goes_around_the_base_and_ends_near_the_place_that_was_meant():
-    tip, end = np.array([0.0, 0.43, 0.85]), np.array([-0.5, -0.3, 0.5])
-    hand = parts.sweep(tip, end, stream(0, "hand"))
-    np.testing.assert_array_equal(hand[0], tip)
-    assert np.linalg.norm(hand[-1] - end) < 4 * parts.BESIDE * np.sqrt(3)
-    away = np.linalg.norm(hand[:, :2], axis=1)
-    assert away.min() > 0.2  # the straight way would pass the base at .14 m
-    speed = np.linalg.norm(np.diff(hand, axis=0), axis=1)
-    assert speed.argmax() == pytest.approx(len(speed) / 2, abs=3)  # a bell
-
-
-def test_lessons_last_as_long_as_movements_do_and_stay_within_ranges(lessons):
-    for lesson in lessons:
-        assert 0.8 < lesson.demonstration.times[-1] <= 1.6
-        assert JOINT_RANGES.contains(lesson.demonstration.trajectory).all()
-        assert lesson.misfit < 0.2
-
-
-def test_lessons_land_on_all_sides_and_none_twice_in_one_place(lessons):
-    landed = np.stack([lesson.demonstration.outcome for lesson in lessons])
-    apart = np.linalg.norm(landed[:, None] - landed, axis=2) + np.eye(len(landed))
-    assert len(landed) == 10
-    assert apart.min() > 0.05
-    assert (landed.max(axis=0) > 0.3).all()
-    assert (landed.min(axis=0) < -0.3).all()
-
-
-def test_the_same_lessons_are_made_again(lessons, tmp_path, capsys):
-    parts.main(["--out", str(tmp_path / "again.npz")])
-    for lesson, again in zip(lessons, load_demonstrations(tmp_path / "again.npz"), strict=True):
-        np.testing.assert_array_equal(again.trajectory, lesson.demonstration.trajectory)
-        np.testing.assert_array_equal(again.outcome, lesson.demonstration.outcome)
-    said = capsys.readouterr().out.splitlines()
-    assert len(said) == 10 + 2
-    assert said[-1].startswith("jerk, shipped: ")
-
-
-def test_jerk_is_that_of_a_cubic():
-    """The third derivative of 2 t^3 is 12; of two joints one does not move."""
-    times = np.arange(51) / 50
-    cubic = Demonstration(np.zeros(0), times, np.stack([2 * times**3, 0 * times], axis=1), np.zeros(2))
-    assert parts.jerk(cubic) == pytest.approx(12 / np.sqrt(2))

@@ -87,9 +87,23 @@ def test_the_rectangles_of_an_interest_map_are_its_regions_and_tile_the_task_spa
     np.testing.assert_array_equal(ax.lines[0].get_xydata(), regions[0].goals)
 
 
-def test_competence_is_shown_from_minus_one_to_zero_and_unknown_regions_are_left_white(ax):
+@pytest.mark.parametrize(
+    ("competences", "span"),
+    [
+        ((-0.7, -0.35), (-0.7, -0.3)),
+        ((-0.62, -0.38), (-0.65, -0.35)),
+        ((-0.049, -0.011), (-0.05, -0.01)),
+        ((-0.43, -0.43), (-0.43, -0.42)),
+        ((0.0, 0.0), (-0.01, 0.0)),
+        ((np.nan, np.nan), (-1.0, 0.0)),
+    ],
+)
+def test_the_colours_of_competence_span_the_competences_in_round_numbers(ax, competences, span):
+    assert competence_map(ax, LOWS, HIGHS, np.array(competences), PLANE).get_clim() == pytest.approx(span)
+
+
+def test_regions_of_unknown_competence_are_left_white(ax):
     drawn = competence_map(ax, LOWS, HIGHS, np.array([-0.3, np.nan]), PLANE)
-    assert drawn.get_clim() == (-1, 0)
     np.testing.assert_array_equal(np.ma.getmaskarray(drawn.get_array()), [False, True])
     corners = np.stack([path.vertices for path in drawn.get_paths()])
     np.testing.assert_array_equal(corners.min(axis=1), LOWS)

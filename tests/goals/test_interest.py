@@ -12,9 +12,9 @@ from sgimd_torch.goals.interest_map import InterestMap
 from sgimd_torch.goals.progress_grid import ProgressGrid
 from sgimd_torch.goals.regions import absolute_progress, gained_progress
 from sgimd_torch.spaces import Array, Box, stream
+from worlds import NO_CONTEXT, problem
 
-NO_CONTEXTS, LINE, SQUARE = Box.cube(0, 1, 0), Box.cube(0, 1, 1), Box.cube(0, 1, 2)
-NO_CONTEXT = np.empty(0)
+LINE, SQUARE = Box.cube(0, 1, 1), Box.cube(0, 1, 2)
 BY_EQ_3 = {"g_max": 50, "max_aspect": np.inf, "progress": absolute_progress}
 
 
@@ -30,7 +30,7 @@ GRID = partial(ProgressGrid, cells=4, progress=absolute_progress)
 
 def four_regions_of_interest_1_2_3_4(make=MAP, **options):
     """The line, cut into quarters of interests .1, .2, .3 and .4: eq. (4) makes of them 0, 1/6, 2/6 and 3/6."""
-    goals = make(NO_CONTEXTS, LINE, stream(1, "goals"), window=4, **options)
+    goals = make(problem(outcomes=LINE, seed=1), window=4, **options)
     for index in range(112):
         goals.add(NO_CONTEXT, [(index * 0.6180339887) % 1], -1)  # the golden ratio spreads evenly: quarters
     assert len(goals.regions) == 4
@@ -46,19 +46,8 @@ def counts_in(regions: list, samples: Array) -> Array:
 
 
 @pytest.mark.parametrize("make", [MAP, GRID], ids=["map", "grid"])
-def test_regions_are_chosen_in_proportion_to_their_interest_above_the_least(make):
-    goals = four_regions_of_interest_1_2_3_4(make, modes=(1, 0, 0))
-    samples = np.array([goals.sample(NO_CONTEXT) for _ in range(10_000)])
-    counts = counts_in(goals.regions, samples)
-    assert counts[0] == 0
-    assert chi_square(counts[1:], [1 / 6, 2 / 6, 3 / 6]) < 13.8  # 2 degrees of freedom: odds 1 in 1000
-    last = samples[samples[:, 0] >= goals.regions[-1].low[0]]
-    within = np.histogram(last, 10, (goals.regions[-1].low[0], 1.0))[0]
-    assert chi_square(within, np.full(10, 0.1)) < 27.9  # uniform in it, 9 degrees of freedom: odds 1 in 1000
-
-
-def test_the_three_modes_share_the_goals_7_to_2_to_1():
-    goals = four_regions_of_interest_1_2_3_4(near=0.01)
+def test_the_three_modes_share_the_goals_7_to_2_to_1_and_the_first_and_last_follow_interest_above_the_least(make):
+    goals = four_regions_of_interest_1_2_3_4(make, near=0.01)
     samples = np.array([goals.sample(NO_CONTEXT) for _ in range(10_000)])
     counts = counts_in(goals.regions, samples)
     volumes = np.array([region.high[0] - region.low[0] for region in goals.regions])
@@ -77,7 +66,7 @@ def test_the_three_modes_share_the_goals_7_to_2_to_1():
 
 
 def test_goals_are_uniform_in_every_context_while_all_interests_are_equal():
-    goals = InterestMap(LINE, LINE, stream(3, "goals"), modes=(1, 0, 0))
+    goals = InterestMap(problem(contexts=LINE, outcomes=LINE, seed=3), near=1.0)  # a whole region is near its worst
     for context, goal in stream(3, "planted").uniform(size=(400, 2)) ** [2, 3]:
         goals.add([context], [goal], -1)
     assert len({region.high[0] - region.low[0] for region in goals.regions}) > 2
@@ -87,7 +76,7 @@ def test_goals_are_uniform_in_every_context_while_all_interests_are_equal():
 
 
 def test_only_regions_that_contain_the_context_are_chosen():
-    goals = InterestMap(LINE, LINE, stream(5, "goals"), modes=(1, 0, 0), **BY_EQ_3)
+    goals = InterestMap(problem(contexts=LINE, outcomes=LINE, seed=5), **BY_EQ_3)
     rng, n_late = stream(5, "planted"), 0
     for _ in range(600):  # progress only in the upper half of contexts, and there for lower goals
         context, goal = rng.uniform(size=2)
@@ -96,41 +85,46 @@ def test_only_regions_that_contain_the_context_are_chosen():
         goals.add([context], [goal], -1 + n_late / 200 if improves else -1)
     upper = np.array([goals.sample([0.9]) for _ in range(500)])
     lower = np.array([goals.sample([0.1]) for _ in range(500)])
-    assert np.mean(upper < 0.55) > 0.9
+    assert np.mean(upper < 0.55) > 0.85  # mode 2 leaves .2 * .55 + .8 = .91, less six standard errors
     assert 0.35 < np.mean(lower < 0.5) < 0.65  # no progress in this context: uniform, six standard errors
 
 
-def test_mode_3_stays_near_the_least_competent_goal():
-    goals = InterestMap(NO_CONTEXTS, Box(np.zeros(2), np.array([1.0, 100.0])), stream(6, "goals"), modes=(0, 0, 1))
+def test_mode_3_stays_near_the_least_competent_goal_in_the_unit_of_each_dimension():
+    goals = InterestMap(problem(outcomes=Box(np.zeros(2), np.array([1.0, 100.0])), seed=6))
     for goal, competence in (([0.2, 20], -0.1), ([0.5, 50], -0.9), ([0.8, 80], -0.2)):
         goals.add(NO_CONTEXT, goal, competence)
-    away = np.abs(np.array([goals.sample(NO_CONTEXT) for _ in range(500)]) - [0.5, 50]).max(axis=0)
-    assert (away <= [0.05, 5]).all()
-    assert (away > [0.049, 4.9]).all()  # 500 draws all miss the last 2 % with odds .98^500 = 4e-5
+    away = np.abs(np.array([goals.sample(NO_CONTEXT) for _ in range(10_000)]) - [0.5, 50]) / [1, 100]
+    rings = np.histogram(away.max(axis=1), [0, 0.025, 0.05, 0.075, 0.5])[0]
+    # Squares around the goal: a tenth of all goals in the second, a quarter of these in the first; others anywhere.
+    sides = np.diff(np.square([0, 0.05, 0.1, 0.15, 1]))
+    assert chi_square(rings, 0.9 * sides + 0.1 * np.array([0.25, 0.75, 0, 0])) < 16.3  # 3 degrees: 1 in 1000
 
 
 def test_mode_3_does_not_cross_a_cut():
-    goals = InterestMap(NO_CONTEXTS, LINE, stream(7, "goals"), modes=(0, 0, 1), **BY_EQ_3)
+    goals = InterestMap(problem(outcomes=LINE, seed=7), **BY_EQ_3)
     for index in range(51):
         goals.add(NO_CONTEXT, [index / 50], -0.5)
     _, above = goals.regions
     goals.add(NO_CONTEXT, above.low, -1)  # the only progress, so this region is chosen, and its worst goal
-    samples = np.array([goals.sample(NO_CONTEXT) for _ in range(200)])
-    assert samples.min() == above.low
-    assert samples.max() <= above.low + 0.05 * (above.high - above.low)
+    samples = np.array([goals.sample(NO_CONTEXT) for _ in range(10_000)])
+    below, cut, near = samples < above.low, above.low[0], 0.05 * (1 - above.low[0])
+    assert np.mean(below) == pytest.approx(0.2 * cut, abs=5 * 0.003)  # mode 2 alone; five standard errors
+    of_its_own = 0.1 + 0.7 * 0.05 + 0.2 * near  # all of mode 3 within its reach
+    assert np.mean(~below & (samples <= cut + near)) == pytest.approx(of_its_own, abs=5 * 0.0034)
 
 
 def test_mode_3_tries_all_goals_that_are_equally_bad():
-    goals = InterestMap(NO_CONTEXTS, LINE, stream(8, "goals"), modes=(0, 0, 1))
+    goals = InterestMap(problem(outcomes=LINE, seed=8), near=0.01)
     for goal, competence in ((0.2, -1), (0.5, -0.5), (0.8, -1)):
         goals.add(NO_CONTEXT, [goal], competence)
-    nearest = {round(float(goals.sample(NO_CONTEXT)[0]), 1) for _ in range(60)}  # all on one side: odds 2^-59
-    assert {0.2, 0.8} <= nearest
-    assert 0.5 not in nearest
+    samples = np.array([goals.sample(NO_CONTEXT) for _ in range(5000)])
+    near = [np.mean(np.abs(samples - place) <= 0.01) for place in (0.2, 0.5, 0.8)]
+    # Half of mode 3 near each of the two, and the others anywhere: .05 + .9 * .02; six standard errors.
+    assert near == pytest.approx([0.068, 0.018, 0.068], abs=6 * 0.0036)
 
 
 def test_a_region_is_cut_when_it_holds_more_goals_than_allowed_and_not_before():
-    goals = InterestMap(NO_CONTEXTS, LINE, stream(9, "goals"), g_max=40)
+    goals = InterestMap(problem(outcomes=LINE, seed=9), g_max=40)
     for index in range(40):
         goals.add(NO_CONTEXT, [index / 40], -1)
     assert [region.path for region in goals.regions] == ["R"]
@@ -140,7 +134,7 @@ def test_a_region_is_cut_when_it_holds_more_goals_than_allowed_and_not_before():
 
 def cut_of(points: Array, competences: Array, gains: Array | None = None, **options) -> tuple[int, float]:
     """(axis, position) of the first cut of the square, which is made at the 51st goal."""
-    goals = InterestMap(NO_CONTEXTS, SQUARE, stream(11, "goals"), **{**BY_EQ_3, **options})
+    goals = InterestMap(problem(outcomes=SQUARE, seed=11), **{**BY_EQ_3, **options})
     for point, competence, gain in zip(points, competences, np.zeros(51) if gains is None else gains, strict=True):
         goals.add(NO_CONTEXT, point, competence, gain=gain)
     below, _ = goals.regions
@@ -178,7 +172,7 @@ def test_a_small_part_of_great_progress_does_not_outweigh_a_balanced_cut():
 
 
 def test_without_any_difference_a_region_is_halved_across_its_longest_side():
-    goals = InterestMap(NO_CONTEXTS, Box(np.zeros(2), np.array([1.0, 1000.0])), stream(12, "goals"), **BY_EQ_3)
+    goals = InterestMap(problem(outcomes=Box(np.zeros(2), np.array([1.0, 1000.0])), seed=12), **BY_EQ_3)
     for point in stream(12, "planted").uniform([0, 0], [1, 1000], size=(60 * 16, 2)):
         goals.add(NO_CONTEXT, point, -1)
     sides = np.array([(region.high - region.low) / [1, 1000] for region in goals.regions])
@@ -188,7 +182,7 @@ def test_without_any_difference_a_region_is_halved_across_its_longest_side():
 
 
 def test_where_no_cut_is_valid_the_oldest_quarter_is_forgotten():
-    goals = InterestMap(NO_CONTEXTS, LINE, stream(13, "goals"), g_max=50)
+    goals = InterestMap(problem(outcomes=LINE, seed=13), g_max=50)
     competences = -np.arange(51) / 51
     for competence in competences:
         goals.add(NO_CONTEXT, [0.3], competence, gain=-competence)
@@ -202,7 +196,7 @@ def test_where_no_cut_is_valid_the_oldest_quarter_is_forgotten():
 
 def test_a_cut_leaves_a_twentieth_of_g_max_on_both_sides():
     for n_right, n_goals in ((2, [39]), (3, [48, 3])):  # 2 < 50 / 20 <= 3; 39 are left of 51 when none is cut
-        goals = InterestMap(NO_CONTEXTS, LINE, stream(14, "goals"), g_max=50, cuts=50)  # a cut between any two goals
+        goals = InterestMap(problem(outcomes=LINE, seed=14), g_max=50, cuts=50)  # a cut between any two goals
         for goal in [0.2] * (51 - n_right) + [0.8] * n_right:
             goals.add(NO_CONTEXT, [goal], -1)
         assert [len(region.goals) for region in goals.regions] == n_goals
@@ -218,7 +212,7 @@ def test_leaves_tile_the_box_and_keep_each_goal_once_in_order_whatever_is_added(
     box, points = Box.cube(-1, 1, 3), np.array(points)
     contexts, outcomes = Box.cube(-1, 1, 1), Box.cube(-1, 1, 2)
     options = {"max_aspect": max_aspect, "cuts": cuts}  # few cuts fall on goals, many between them
-    goals = InterestMap(contexts, outcomes, stream(seed, "goals"), g_max=8, window=4, **options)
+    goals = InterestMap(problem(contexts=contexts, outcomes=outcomes, seed=seed), g_max=8, window=4, **options)
     competences = -np.arange(len(points)) / len(points)  # tells when a goal was added
     kept, after = 0, goals.regions
     for point, competence in zip(points, competences, strict=True):
@@ -254,7 +248,7 @@ def test_leaves_tile_the_box_and_keep_each_goal_once_in_order_whatever_is_added(
 
 def share_near_the_origin(seed: int, side: float, *, n: int, teach_every: int | None = None, **options) -> float:
     """Share of goals within [-2, 2]^2 of [-side, side]^2 after n goals, when only those in [-1, 1]^2 make progress."""
-    goals = InterestMap(NO_CONTEXTS, Box.cube(-side, side, 2), stream(seed, "goals"), **{**BY_EQ_3, **options})
+    goals = InterestMap(problem(outcomes=Box.cube(-side, side, 2), seed=seed), **{**BY_EQ_3, **options})
     teacher, reached = stream(seed, "teacher"), 0
     for index in range(n):
         taught = teach_every is not None and index % teach_every == 0
@@ -274,7 +268,7 @@ def test_goals_concentrate_where_a_teacher_shows_progress_in_a_ten_thousandfold_
 
 
 def test_sides_are_not_cut_much_shorter_than_others_beyond_the_largest_aspect():
-    goals = InterestMap(NO_CONTEXTS, SQUARE, stream(16, "goals"), **{**BY_EQ_3, "max_aspect": 2})
+    goals = InterestMap(problem(outcomes=SQUARE, seed=16), **{**BY_EQ_3, "max_aspect": 2})
     rng = stream(16, "planted")
     for x, y in rng.uniform(size=(600, 2)):
         goals.add(NO_CONTEXT, [x, y], -1 + x * rng.uniform())
@@ -284,7 +278,7 @@ def test_sides_are_not_cut_much_shorter_than_others_beyond_the_largest_aspect():
 
 
 def test_a_context_that_never_changes_is_never_cut():
-    goals = InterestMap(LINE, LINE, stream(17, "goals"), **{**BY_EQ_3, "max_aspect": 2})
+    goals = InterestMap(problem(contexts=LINE, outcomes=LINE, seed=17), **{**BY_EQ_3, "max_aspect": 2})
     for goal in stream(17, "planted").uniform(size=400):
         goals.add([0.3], [goal], -goal)
     assert len(goals.regions) > 8

@@ -5,10 +5,9 @@ import pytest
 
 from sgimd_torch.goals.uniform import UniformGoals
 from sgimd_torch.goals.within_reach import WithinReach
-from sgimd_torch.spaces import Box, stream
-from worlds import remember
-
-NO_CONTEXTS, NO_CONTEXT = Box.cube(0, 1, 0), np.empty(0)
+from sgimd_torch.inverses.nearest import NearestNeighbour
+from sgimd_torch.spaces import Box
+from worlds import NO_CONTEXT, problem, remember
 
 
 def remembering(outcomes, context_dim=0, thetas=None):
@@ -21,10 +20,14 @@ def scattered(dim, n=300, seed=0):
     return np.random.default_rng(seed).uniform(-1, 1, (n, dim))
 
 
-def drawn(memory, space, n=400, landed=None, contexts=NO_CONTEXTS):
+def within_reach(memory, space):
+    return WithinReach(problem(outcomes=space, memory=memory, inverse=NearestNeighbour))
+
+
+def drawn(memory, space, n=400, landed=None):
     """So many goals, each of them attempted; ``landed``: goal -> the outcome, an old one if there is none."""
-    goals, found = WithinReach(contexts, space, stream(0, "goals"), reached=memory), []
-    context = contexts.low
+    goals, found = within_reach(memory, space), []
+    context = np.zeros(memory.context_dim)
     for _ in range(n):
         goal = goals.sample(context)
         outcome = memory.outcomes[0] if landed is None else landed(goal)
@@ -37,7 +40,7 @@ def drawn(memory, space, n=400, landed=None, contexts=NO_CONTEXTS):
 @pytest.mark.parametrize("dim", [1, 2, 6])
 def test_where_most_of_t_is_near_what_was_reached_goals_are_the_uniform_ones_bit_for_bit(dim):
     space = Box.cube(-1, 1, dim)
-    uniform = UniformGoals(NO_CONTEXTS, space, stream(0, "goals"))
+    uniform = UniformGoals(problem(outcomes=space))
     found = drawn(remembering(scattered(dim)), space, landed=lambda goal: goal)
     assert np.array_equal(found, [uniform.sample(NO_CONTEXT) for _ in found])
 
@@ -64,7 +67,7 @@ def test_the_step_beyond_narrows_where_only_noise_leads_unless_goals_within_are_
     noise_within, least, most
 ):
     rng, memory = np.random.default_rng(1), remembering(scattered(2))
-    goals = WithinReach(NO_CONTEXTS, Box.cube(-100, 100, 2), stream(0, "goals"), reached=memory)
+    goals = within_reach(memory, Box.cube(-100, 100, 2))
     farthest = []
     for _ in range(1000):
         goal = goals.sample(NO_CONTEXT)
@@ -77,7 +80,7 @@ def test_the_step_beyond_narrows_where_only_noise_leads_unless_goals_within_are_
 
 def test_goals_are_uniform_until_anything_has_had_an_effect():
     space = Box.cube(-100, 100, 2)
-    uniform = UniformGoals(NO_CONTEXTS, space, stream(0, "goals"))
+    uniform = UniformGoals(problem(outcomes=space))
     found = drawn(remembering(np.zeros((50, 2))), space)
     assert np.array_equal(found, [uniform.sample(NO_CONTEXT) for _ in found])
 
@@ -97,10 +100,10 @@ def test_a_rare_outcome_far_away_is_not_chased():
 
 
 def test_a_context_changes_nothing_but_what_is_checked():
-    contexts, space = Box.cube(0, 1, 1), Box.cube(-100, 100, 2)
-    with_contexts = drawn(remembering(scattered(2), 1), space, contexts=contexts)
+    space = Box.cube(-100, 100, 2)
+    with_contexts = drawn(remembering(scattered(2), 1), space)
     assert np.array_equal(with_contexts, drawn(remembering(scattered(2)), space))
-    goals = WithinReach(contexts, space, stream(0, "goals"), reached=remembering(scattered(2), 1))
+    goals = within_reach(remembering(scattered(2), 1), space)
     with pytest.raises(ValueError, match="context"):
         goals.sample([2.0])
 

@@ -1,31 +1,27 @@
-"""What the tests of boards share: the curves and the charts that an event file holds."""
+"""What the tests of boards share: the event file of a run, as TensorBoard's own reader has it."""
 
-import numpy as np
-from tensorboard.backend.event_processing.event_file_loader import EventFileLoader
-from tensorboard.plugins.custom_scalar import layout_pb2
-from tensorboard.util.tensor_util import make_ndarray
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 
-def values_of(directory):
+def board_of(directory):
+    """What the only event file of a run holds."""
     (path,) = directory.glob("events.out.tfevents.*")
-    return [(event.step, value) for event in EventFileLoader(str(path)).Load() for value in event.summary.value]
+    return EventAccumulator(str(path), size_guidance={"scalars": 0, "images": 0, "tensors": 0}).Reload()
 
 
 def curves_of(directory):
     """By tag: {step: value}; a step that is there twice fails."""
-    found = {}
-    for step, value in values_of(directory):
-        tensor = make_ndarray(value.tensor)
-        assert step not in found.setdefault(value.tag, {}), (value.tag, step)
-        found[value.tag][step] = tensor.item() if tensor.dtype == np.float32 and tensor.size else tensor.tolist()
+    board, found = board_of(directory), {}
+    for tag in board.Tags()["scalars"]:
+        points = board.Scalars(tag)
+        found[tag] = {point.step: point.value for point in points}
+        assert len(found[tag]) == len(points), tag
     return found
 
 
-def charts_of(directory):
-    """Of the last page of charts: the tags by category."""
-    (*_, last) = curves_of(directory)["custom_scalars__config__"].values()
-    layout = layout_pb2.Layout.FromString(last)
+def pictures_of(directory):
+    """By tag: {step: png}."""
+    board = board_of(directory)
     return {
-        each.title: [tag.strip("^$").replace("\\", "") for chart in each.chart for tag in chart.multiline.tag]
-        for each in layout.category
+        tag: {image.step: image.encoded_image_string for image in board.Images(tag)} for tag in board.Tags()["images"]
     }

@@ -22,7 +22,7 @@ class Slider:
         context, theta = check_movement(self, context, theta)
         return theta + context.sum() + rng.normal(0, self.outcome_noise, self.dim)
 
-    def record(self, context, theta, rng):
+    def trace(self, context, theta, rng):
         outcome = self.execute(context, theta, rng)
         x, y = np.linspace(0, 1, 11), np.sin(np.pi * np.linspace(0, 1, 11))
         return Sketch(outcome, 0.1, np.stack([outcome[0] * x, y], axis=1)[:, None])
@@ -37,21 +37,21 @@ class Shifted(Slider2):
     context_dim = 2
 
 class NoPicture(Slider):
-    record = None
+    trace = None
 
 class WrongPicture(Slider):
-    def record(self, context, theta, rng):
+    def trace(self, context, theta, rng):
         return [0.0, 1.0]
 
 class StillPicture(Slider):
-    def record(self, context, theta, rng):
+    def trace(self, context, theta, rng):
         return Sketch(np.zeros(1), 0.1, np.zeros((5, 1, 2)))
 
 class OtherPicture(Slider):
-    def record(self, context, theta, rng):
+    def trace(self, context, theta, rng):
         return Sketch(np.zeros(2), 0.1, np.zeros((5, 1, 2)))
 
 class LostPicture(Slider):
-    def record(self, context, theta, rng):
+    def trace(self, context, theta, rng):
         return {}["where"]
 '''

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from sgimd_torch.record import DERIVED, Event, Kind, Record, layout
+from sgimd_torch.learner.events import Event, Kind
+from sgimd_torch.record import DERIVED, Record, layout
 from sgimd_torch.spaces import Demonstration, stream
 
 DIMS = 1, 3, 2

@@ -1,17 +1,69 @@
-"""What the tests of the learning side share: a planar arm, demonstrations on it, and the five learners of the paper."""
+"""What the tests of the learning side share: problems, a planar arm, demonstrations on it, and the paper's learners."""
 
 from collections.abc import Callable, Generator, Sequence
-from typing import TypeVar
+from dataclasses import dataclass
+from typing import Any, TypeVar
 
 import numpy as np
+import pytest
 
 from sgimd_torch.algorithms import imitation, observation, random_exploration, sagg_riac, sgim_d
+from sgimd_torch.catalogue import load_word
 from sgimd_torch.environments.planar_arm import PlanarArm
+from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.learner import Learner
 from sgimd_torch.memory import Memory
-from sgimd_torch.spaces import Array, Demonstration, stream
+from sgimd_torch.parts import Inverse, Problem, Search
+from sgimd_torch.spaces import Array, Box, Demonstration, Estimate, stream
 
 NO_CONTEXT = np.zeros(0)
+
+
+@dataclass
+class Boxes:
+    """The smallest environment: an outcome is the movement itself, cut or repeated to the dimensions of T."""
+
+    contexts: Box
+    policies: Box
+    outcomes: Box
+    rest: Array
+    outcome_noise: float = 0.0
+
+    def observe(self, rng: np.random.Generator) -> Array:
+        return self.contexts.sample(rng)
+
+    def execute(self, context: Array, theta: Array, rng: np.random.Generator) -> Array:
+        return np.resize(theta, self.outcomes.dim) + rng.normal(0, self.outcome_noise, self.outcomes.dim)
+
+
+def problem(
+    environment: Environment | None = None,
+    *,
+    contexts: Box | None = None,
+    policies: Box | None = None,
+    outcomes: Box | None = None,
+    rest: Sequence[float] | Array | None = None,
+    noise: float = 0.0,
+    memory: Memory | None = None,
+    inverse: Callable[[Problem], Inverse] | None = None,
+    seed: int = 0,
+) -> Problem:
+    """The problem of an environment; without one, of these boxes.
+
+    Boxes that are not given have the dimensions of ``memory``: none for C, [0, 1] for Pi, [-1, 1]^2 for T. ``rest`` is
+    0, or the point of T nearest to it. The problem keeps ``memory`` itself, so that a test can add to it.
+    """
+    if environment is None:
+        c, p, t = (0, 1, 2) if memory is None else (memory.context_dim, memory.theta_dim, memory.outcome_dim)
+        outcomes = outcomes or Box.cube(-1, 1, t)
+        at_rest = outcomes.clip(np.zeros(outcomes.dim)) if rest is None else np.array(rest, dtype=float)
+        environment = Boxes(contexts or Box.cube(0, 1, c), policies or Box.cube(0, 1, p), outcomes, at_rest, noise)
+    found = Problem(environment, seed)
+    if memory is not None:
+        found = found.over(memory)
+    if inverse is not None:
+        found.inverse = Inverse.of(inverse, found)
+    return found
 
 
 def last_posture(times: Array, trajectory: Array) -> Array:
@@ -36,6 +88,17 @@ def demonstrations(arm: PlanarArm, n: int = 20, seed: int = 0) -> list[Demonstra
     return [demonstrate(arm, goal) for goal in goals]
 
 
+def part(kind: str, word: str) -> Callable[..., Any]:
+    """Constructor of the part that a word names; without its extra the test is skipped."""
+    try:
+        return load_word(kind, word)
+    except ValueError as error:
+        missing = error.__cause__
+        if not isinstance(missing, ImportError) or (missing.name or "").startswith("sgimd_torch"):
+            raise
+        pytest.skip(str(error))
+
+
 Sent = TypeVar("Sent")
 
 
@@ -50,6 +113,34 @@ def drive(search: Generator[Array, Sent, None], execute: Callable[[Array], Sent]
     except StopIteration:
         pass
     return thetas
+
+
+class World:
+    """Linear outcomes of unit-cube movements, and an estimate from ``k`` neighbours ``spread`` around a centre."""
+
+    def __init__(self, dim: int, k: int, *, spread: float = 0.1, centre: Array | None = None, seed: int = 0) -> None:
+        rng = stream(seed, "world")
+        self.policies = Box.cube(0, 1, dim)
+        self.jacobian = rng.normal(size=(dim, 2))
+        self.theta = np.full(dim, 0.5) if centre is None else centre
+        self.thetas = self.policies.clip(self.theta + rng.uniform(-spread, spread, (k, dim)))
+        self.goal = self.execute(self.theta) + np.array([0.12, -0.07])
+
+    def execute(self, theta: Array) -> Array:
+        return theta @ self.jacobian
+
+    def distance(self, theta: Array) -> float:
+        return float(np.linalg.norm(self.execute(theta) - self.goal))
+
+    def problem(self, seed: int = 0) -> Problem:
+        return problem(policies=self.policies, seed=seed)
+
+    @property
+    def start(self) -> Estimate:
+        return Estimate(self.theta, self.thetas, self.execute(self.thetas))
+
+    def run(self, search: Search, n: int = 10_000) -> list[Array]:
+        return drive(search(self.start, self.goal), self.execute, n)
 
 
 def remember(thetas: Array, outcomes: Array, contexts: Array | None = None) -> Memory:

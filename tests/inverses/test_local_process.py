@@ -1,30 +1,32 @@
 """The local Gaussian process: its laws, and an answer that is given only where it should beat the nearest exemplar."""
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 from threadpoolctl import threadpool_info
 
 from sgimd_torch.environments.toys import Toy, toss, two_elbows
 from sgimd_torch.inverses.gaussian_process import Kernel, Process, choose_kernel, fit_lengths, one_thread
-from sgimd_torch.inverses.local import NearestNeighbour
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.inverses.locally_linear import LocallyLinear
-from sgimd_torch.memory import Memory
-from sgimd_torch.spaces import Array, Estimate, stream
-from worlds import NO_CONTEXT, remember
+from sgimd_torch.inverses.nearest import NearestNeighbour
+from sgimd_torch.parts import Inverse, Problem
+from sgimd_torch.spaces import Array, stream
+from worlds import NO_CONTEXT, problem, remember
 
 SMOOTH = Kernel(scale=1.0, finer=1.0, share=0.0, noise=1e-6)
 ROUGH = Kernel(scale=0.5, finer=4.0, share=0.3, noise=0.1)
 
 
-def played(toy: Toy, n: int, seed: int = 0) -> Memory:
+def remembering(thetas: Array, outcomes: Array, contexts: Array | None = None, **options) -> Problem:
+    return problem(memory=remember(thetas, outcomes, contexts), **options)
+
+
+def played(toy: Toy, n: int, seed: int = 0, **options) -> Problem:
     """Uniform movements, each in a context of its own, without noise."""
     rng = stream(seed, "test process")
     thetas = rng.uniform(size=(n, toy.policies.dim))
     contexts = np.array([toy.observe(rng) for _ in range(n)]).reshape(n, toy.contexts.dim)
-    return remember(thetas, toy.effect(contexts, thetas), contexts)
+    return remembering(thetas, toy.effect(contexts, thetas), contexts, **options)
 
 
 def waves(n: int = 30) -> tuple[Array, Array]:
@@ -89,16 +91,16 @@ def test_the_kernel_takes_about_as_much_for_noise_as_is_stated(noise: float) -> 
     assert choose_kernel([(inputs, outcomes)], 0.0).noise == 1e-6
 
 
-def mean_error(toy: Toy, inverse: Callable[[Array, Array], Estimate], goals: Array, contexts: Array) -> float:
-    thetas = np.stack([inverse(context, goal).theta for context, goal in zip(contexts, goals, strict=True)])
+def mean_error(toy: Toy, inverse: Inverse, goals: Array, contexts: Array) -> float:
+    thetas = np.stack([estimate.theta for estimate in inverse.answer_many(contexts, goals)])
     return float(np.linalg.norm(toy.effect(contexts, thetas) - goals, axis=1).mean())
 
 
 def test_where_several_families_of_movements_lead_to_a_place_it_beats_the_nearest_and_the_linear() -> None:
     toy = two_elbows()
-    memory, goals = played(toy, 300), played(toy, 40, seed=1).outcomes
+    given, goals = played(toy, 300), played(toy, 40, seed=1).memory.outcomes
     process, nearest, linear = (
-        mean_error(toy, make(memory), goals, np.zeros((40, 0)))
+        mean_error(toy, make(given), goals, np.zeros((40, 0)))
         for make in (LocalProcess, NearestNeighbour, LocallyLinear)
     )
     assert process < 0.6 * min(nearest, linear)
@@ -106,17 +108,17 @@ def test_where_several_families_of_movements_lead_to_a_place_it_beats_the_neares
 
 def test_in_a_context_that_never_came_it_beats_the_nearest() -> None:
     toy = toss()
-    memory, asked = played(toy, 200), played(toy, 40, seed=1)
+    given, asked = played(toy, 200), played(toy, 40, seed=1).memory
     process, nearest = (
-        mean_error(toy, make(memory), asked.outcomes, asked.contexts) for make in (LocalProcess, NearestNeighbour)
+        mean_error(toy, make(given), asked.outcomes, asked.contexts) for make in (LocalProcess, NearestNeighbour)
     )
     assert process < 0.4 * nearest
 
 
 def test_where_nothing_can_be_predicted_the_nearest_exemplar_answers() -> None:
     rng = stream(0, "chaos")
-    memory = remember(rng.uniform(size=(200, 3)), rng.normal(size=(200, 2)))
-    inverse, nearest = LocalProcess(memory), NearestNeighbour(memory)
+    given = remembering(rng.uniform(size=(200, 3)), rng.normal(size=(200, 2)))
+    inverse, nearest = LocalProcess(given), NearestNeighbour(given)
     same = [
         np.array_equal(inverse(NO_CONTEXT, g).theta, nearest(NO_CONTEXT, g).theta) for g in rng.normal(size=(30, 2))
     ]
@@ -126,21 +128,20 @@ def test_where_nothing_can_be_predicted_the_nearest_exemplar_answers() -> None:
 def test_stated_noise_is_averaged_out() -> None:
     rng = stream(0, "noisy line")
     thetas = rng.uniform(size=(300, 1))
-    memory = remember(thetas, thetas + rng.normal(0, 0.2, thetas.shape))
+    given = remembering(thetas, thetas + rng.normal(0, 0.2, thetas.shape), noise=0.2)
     goals = np.linspace(0.2, 0.8, 30)
-    off = {
-        make: np.mean([abs(make(memory)(NO_CONTEXT, np.array([goal])).theta[0] - goal) for goal in goals])
-        for make in (NearestNeighbour, lambda memory: LocalProcess(memory, outcome_noise=0.2))
-    }
-    nearest, process = off.values()
+    nearest, process = (
+        np.mean([abs(make(given)(NO_CONTEXT, np.array([goal])).theta[0] - goal) for goal in goals])
+        for make in (NearestNeighbour, LocalProcess)
+    )
     assert process < 0.4 * nearest
 
 
 def test_units_do_not_matter() -> None:
     toy = two_elbows()
-    memory, goals = played(toy, 120), played(toy, 5, seed=1).outcomes
-    other = LocalProcess(remember(memory.thetas * 7 + 3, memory.outcomes * 1000), outcome_noise=10.0)
-    inverse = LocalProcess(memory, outcome_noise=0.01)
+    given, goals = played(toy, 120, noise=0.01), played(toy, 5, seed=1).memory.outcomes
+    other = LocalProcess(remembering(given.memory.thetas * 7 + 3, given.memory.outcomes * 1000, noise=10.0))
+    inverse = LocalProcess(given)
     for goal in goals:
         theta = inverse(NO_CONTEXT, goal).theta
         assert other(NO_CONTEXT, 1000 * goal).theta == pytest.approx(7 * theta + 3, abs=1e-3)
@@ -149,9 +150,9 @@ def test_units_do_not_matter() -> None:
 def in_wind(contexts: Array) -> float:
     """The mean error of a robot that does not feel the wind that it remembers."""
     toy = two_elbows()
-    memory, goals = played(toy, 200), played(toy, 20, seed=1).outcomes
-    inverse = LocalProcess(remember(memory.thetas, memory.outcomes, contexts[:200]))
-    thetas = np.stack([inverse(*asked).theta for asked in zip(contexts[200:], goals, strict=True)])
+    memory, goals = played(toy, 200).memory, played(toy, 20, seed=1).memory.outcomes
+    inverse = LocalProcess(remembering(memory.thetas, memory.outcomes, contexts[:200]))
+    thetas = np.stack([estimate.theta for estimate in inverse.answer_many(contexts[200:], goals)])
     return float(np.linalg.norm(toy.effect(np.zeros((20, 0)), thetas) - goals, axis=1).mean())
 
 
@@ -168,7 +169,7 @@ def test_a_wide_movement_after_many_nearly_alike_is_answered(far: float) -> None
     thetas = np.concatenate((1e-4 * rng.uniform(size=(120, 3)), rng.uniform(size=(4, 3))))
     outcomes = np.stack([np.sin(3 * thetas.sum(axis=1)), np.cos(2 * thetas[:, 0])], axis=1)
     thetas += far
-    inverse = LocalProcess(remember(thetas, outcomes))
+    inverse = LocalProcess(remembering(thetas, outcomes))
     expected = inverse.predict(NO_CONTEXT, thetas[-1])
     assert expected == pytest.approx(outcomes[-1], abs=0.01)
     assert inverse(NO_CONTEXT, outcomes[-1]).theta == pytest.approx(thetas[-1])
@@ -176,11 +177,11 @@ def test_a_wide_movement_after_many_nearly_alike_is_answered(far: float) -> None
 
 def test_an_answer_depends_on_the_memory_and_not_on_when_it_was_asked() -> None:
     whole = played(two_elbows(), 200)
-    memory, goal = remember(whole.thetas[:50], whole.outcomes[:50]), np.array([0.3, 0.2])
-    inverse = LocalProcess(memory)
+    thetas, outcomes, goal = whole.memory.thetas, whole.memory.outcomes, np.array([0.3, 0.2])
+    inverse = LocalProcess(remembering(thetas[:50], outcomes[:50]))
     inverse(NO_CONTEXT, goal)
     for row in range(50, 200):
-        memory.add(NO_CONTEXT, whole.thetas[row], whole.outcomes[row])
+        inverse.memory.add(NO_CONTEXT, thetas[row], outcomes[row])
         if row % 40 == 0:
             inverse(NO_CONTEXT, goal)
     assert np.array_equal(inverse(NO_CONTEXT, goal).theta, LocalProcess(whole)(NO_CONTEXT, goal).theta)
@@ -188,7 +189,7 @@ def test_an_answer_depends_on_the_memory_and_not_on_when_it_was_asked() -> None:
 
 def test_outcomes_that_are_all_the_same_teach_it_nothing() -> None:
     thetas = stream(0, "still").uniform(size=(40, 2))
-    inverse = LocalProcess(remember(thetas, np.ones((40, 2))))
+    inverse = LocalProcess(remembering(thetas, np.ones((40, 2))))
     assert inverse(NO_CONTEXT, np.zeros(2)).theta.tolist() == thetas[0].tolist()
     predicted = inverse.predict(NO_CONTEXT, thetas[0])
     assert predicted is not None

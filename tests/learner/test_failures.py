@@ -9,11 +9,13 @@ import pytest
 from numpy.typing import ArrayLike
 
 from runs import content_of, end, stopped_at
-from sgimd_torch.algorithms import practice, sgim_d
+from sgimd_torch.algorithms import sgim_d
+from sgimd_torch.algorithms.practice import practice
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.environments.protocol import SimulationError
 from sgimd_torch.evaluation import evaluate
-from sgimd_torch.record import Kind, Record
+from sgimd_torch.learner.events import Kind
+from sgimd_torch.record import Record
 from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run

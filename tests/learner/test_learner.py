@@ -5,20 +5,23 @@ import pytest
 
 from sgimd_torch.algorithms import sagg_riac
 from sgimd_torch.environments.planar_arm import PlanarArm
+from sgimd_torch.inverses.nearest import NearestNeighbour
 from sgimd_torch.learner import Learner
-from sgimd_torch.memory import Memory
-from sgimd_torch.spaces import Array, Attempt, Demonstration, Move, stream
-from sgimd_torch.strategies import Imitate, Rest
-from worlds import NO_CONTEXT, demonstrate, last_posture
+from sgimd_torch.parts import Strategy
+from sgimd_torch.spaces import Array, Attempt, Box, Demonstration, Move
+from sgimd_torch.strategies import Mimic, Rest
+from worlds import NO_CONTEXT, demonstrate, last_posture, problem
 
 ARM = PlanarArm(4)
 LESSON, SECOND = demonstrate(ARM, [-0.5, 0.5]), demonstrate(ARM, [0.2, -0.6])
 
 
-class Pursuit:
+class Pursuit(Strategy):
     """A strategy of ``n`` movements at a time that notes contexts, outcomes and how often its attempts ended."""
 
-    def __init__(self, n: int = 3) -> None:
+    def __init__(self, n: int = 3, *, context_dim: int = 0) -> None:
+        contexts = Box.cube(0, 1, context_dim)
+        super().__init__(problem(contexts=contexts, policies=ARM.policies, inverse=NearestNeighbour))
         self.n = n
         self.contexts: list[Array] = []
         self.outcomes: list[list[float]] = []
@@ -39,9 +42,9 @@ class Pursuit:
             self.n_ended += 1
 
 
-def learner(pursuit: Pursuit, *, context_dim: int = 0, repeats: int | None = 2) -> Learner:
-    imitate = Imitate(ARM.policies, stream(0, "imitate"), repeats=repeats, epsilon=0.05)
-    return Learner(Memory(context_dim, 4, 2), pursuit, social=imitate, correspondence=last_posture)
+def learner(pursuit: Pursuit, *, repeats: int | None = 2) -> Learner:
+    mimic = Mimic(pursuit.problem, repeats=repeats)
+    return Learner(pursuit.problem, pursuit, social=mimic, correspondence=last_posture)
 
 
 def step(robot: Learner, outcome: tuple[float, float] = (0.1, 0.2), context: Array = NO_CONTEXT) -> Move | None:
@@ -129,7 +132,8 @@ def test_a_demonstration_interrupts_the_imitation_of_the_one_before() -> None:
 
 
 def test_after_resting_there_is_nothing_to_tell_and_the_next_ask_may_follow() -> None:
-    robot = Learner(Memory(0, 4, 2), Rest())
+    pursuit = Pursuit()
+    robot = Learner(pursuit.problem, Rest(pursuit.problem))
     assert robot.ask(NO_CONTEXT) is None
     assert robot.ask(NO_CONTEXT) is None
     with pytest.raises(RuntimeError, match="ask"):
@@ -137,8 +141,8 @@ def test_after_resting_there_is_nothing_to_tell_and_the_next_ask_may_follow() ->
 
 
 def test_an_attempt_keeps_its_context_until_it_ends() -> None:
-    pursuit = Pursuit(n=2)
-    robot = learner(pursuit, context_dim=1)
+    pursuit = Pursuit(n=2, context_dim=1)
+    robot = learner(pursuit)
     one, other = np.array([0.1]), np.array([0.2])
     step(robot, context=one)
     with pytest.raises(RuntimeError, match="idle"):
@@ -150,7 +154,7 @@ def test_an_attempt_keeps_its_context_until_it_ends() -> None:
 
 
 def test_a_demonstration_brings_its_own_context() -> None:
-    robot = learner(Pursuit(), context_dim=1)
+    robot = learner(Pursuit(context_dim=1))
     step(robot, context=np.array([0.1]))
     robot.watch(Demonstration(np.array([0.7]), LESSON.times, LESSON.trajectory, LESSON.outcome))
     with pytest.raises(RuntimeError, match="context"):
@@ -191,8 +195,9 @@ def test_a_demonstration_that_does_not_fit_is_refused_and_interrupts_nothing() -
 
 
 def test_a_social_strategy_without_a_correspondence_is_refused() -> None:
+    pursuit = Pursuit()
     with pytest.raises(ValueError, match="correspondence"):
-        Learner(Memory(0, 4, 2), Pursuit(), social=Imitate(ARM.policies, stream(0, "imitate")))
+        Learner(pursuit.problem, pursuit, social=Mimic(pursuit.problem))
 
 
 def test_a_strategy_without_any_movement_is_an_error_not_an_endless_loop() -> None:
@@ -206,8 +211,8 @@ def test_there_is_no_context_to_keep_while_nothing_is_under_way() -> None:
 
 
 def test_what_callers_hand_in_may_change_afterwards() -> None:
-    pursuit = Pursuit(n=2)
-    robot = learner(pursuit, context_dim=1)
+    pursuit = Pursuit(n=2, context_dim=1)
+    robot = learner(pursuit)
     context, outcome, shown = np.array([0.1]), np.array([0.2, 0.3]), LESSON.outcome.copy()
     lesson = Demonstration(context, LESSON.times, LESSON.trajectory, shown)
     step(robot, outcome, context)
@@ -222,7 +227,7 @@ def test_what_callers_hand_in_may_change_afterwards() -> None:
 
 
 def test_what_the_learner_hands_out_is_read_only() -> None:
-    robot = learner(Pursuit(), context_dim=1)
+    robot = learner(Pursuit(context_dim=1))
     move = robot.ask([0.1])
     for array in (move.theta, robot.context):
         with pytest.raises(ValueError, match="read-only"):
@@ -232,4 +237,4 @@ def test_what_the_learner_hands_out_is_read_only() -> None:
 @pytest.mark.parametrize("context", [[[0.1]], [[0.1], [0.2]], [True], ["0.1"], [0.1j]])
 def test_a_context_of_another_shape_or_kind_is_refused(context: object) -> None:
     with pytest.raises(ValueError, match=r"context must .*got"):
-        learner(Pursuit(), context_dim=1).ask(context)
+        learner(Pursuit(context_dim=1)).ask(context)

@@ -34,7 +34,7 @@ def errors(name: str, seed: int, last: int) -> dict[int, float]:
     seen = {}
     for episode in run(learner, ARM, seed, movements=last, teacher=teacher):
         if (movements := episode.index + 1) in (1000, 2000, 5000, 10_000):
-            inverse = LocalInverse(learner.memory)
+            inverse = LocalInverse(learner.problem)
             seen[movements] = evaluate(inverse, ARM, goals(), seed, movements, repeats=0).mean_error
     return seen
 

@@ -9,13 +9,15 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
-from sgimd_torch.algorithms import imitating, sagg_riac, sgim_d
+from sgimd_torch.algorithms import sagg_riac, sgim_d
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import evaluate
 from sgimd_torch.inverses.local import LocalInverse
 from sgimd_torch.record import Record
+from sgimd_torch.record.lives import load_life, save_life
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Array, Episode, stream
+from sgimd_torch.strategies import Imitate
 from sgimd_torch.teachers import InitialTeacher, PeriodicTeacher
 from worlds import ALGORITHMS, TAUGHT, demonstrations, last_posture, make
 
@@ -69,7 +71,7 @@ def test_a_run_has_exactly_as_many_movements_as_asked_for(name: str) -> None:
 
 def test_sgim_d_imitates_exactly_first_and_then_returns_to_its_own_goals() -> None:
     arm = PlanarArm(5)
-    learner = sgim_d(arm, 0, correspondence=last_posture, social=partial(imitating, repeats=7))
+    learner = sgim_d(arm, 0, correspondence=last_posture, social=partial(Imitate, repeats=7))
     episodes = list(run(learner, arm, 0, movements=120, teacher=teacher_of(arm)))
     for episode in episodes[30::30]:
         assert np.array_equal(episode.move.theta, episode.demonstration.trajectory[-1])
@@ -87,7 +89,7 @@ def test_evaluating_does_not_disturb_learning(name: str) -> None:
         for episode in run(learner, arm, 0, movements=150, teacher=teacher):
             episodes.append(episode)
             if every and (episode.index + 1) % every == 0 and len(learner.memory):
-                evaluate(LocalInverse(learner.memory), arm, np.eye(2) / 2, 0, episode.index + 1, repeats=3)
+                evaluate(LocalInverse(learner.problem), arm, np.eye(2) / 2, 0, episode.index + 1, repeats=3)
         return summary(episodes)
 
     assert watched(every=None) == watched(every=10)
@@ -205,13 +207,13 @@ def test_a_life_saved_where_a_movement_was_broken_off_goes_on_as_if_it_never_was
     learner = make("sgim-d", arm)
     with pytest.raises(KeyboardInterrupt):
         list(run(learner, arm, 0, movements=60, teacher=teacher_of(other, 5)))
-    learner.save(tmp_path / "life.sqlite")
+    save_life(learner, tmp_path / "life.sqlite")
     again, teacher = make("sgim-d", arm), teacher_of(other, 5)
-    again.load(tmp_path / "life.sqlite", teacher=teacher)
+    load_life(again, tmp_path / "life.sqlite", teacher=teacher)
     rest = list(run(again, arm, 0, movements=60, teacher=teacher))
     assert summary(rest) == summary(whole[after:])
-    again.save(tmp_path / "later.sqlite")
-    make("sgim-d", arm).load(tmp_path / "later.sqlite", teacher=teacher_of(other, 5))
+    save_life(again, tmp_path / "later.sqlite")
+    load_life(make("sgim-d", arm), tmp_path / "later.sqlite", teacher=teacher_of(other, 5))
 
 
 def test_after_a_movement_that_was_broken_off_a_run_goes_on_when_it_is_given_up() -> None:
@@ -234,8 +236,8 @@ def test_a_lesson_whose_answer_was_given_up_is_offered_again_and_such_a_life_can
     learner.interrupt()
     rest = list(run(learner, arm, 0, movements=40, teacher=teacher))
     assert [e.index for e in rest if e.demonstration is not None] == [15, 20, 25, 30, 35]
-    learner.save(tmp_path / "life.sqlite")
-    make("sgim-d", arm).load(tmp_path / "life.sqlite", teacher=teacher_of(other, 5))
+    save_life(learner, tmp_path / "life.sqlite")
+    load_life(make("sgim-d", arm), tmp_path / "life.sqlite", teacher=teacher_of(other, 5))
 
 
 def test_a_lesson_of_ones_own_before_a_run_takes_none_of_the_teachers_away() -> None:

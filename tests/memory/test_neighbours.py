@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from sgimd_torch.competence import Competence, performance
+from sgimd_torch.competence import Competence
 from sgimd_torch.memory import Memory
 from sgimd_torch.memory.neighbours import EXACT_UP_TO, PolicyNeighbours, Table, TreeNeighbours
-from sgimd_torch.spaces import Array, stream
+from sgimd_torch.spaces import Array, Box, stream
+from worlds import problem
 
 
 def table(rows: Array) -> Table:
@@ -98,14 +99,12 @@ def test_keys_and_queries_beyond_float32_are_still_answered() -> None:
 def test_competence_asked_again_after_each_movement_is_that_of_a_fresh_look(context_dim: int) -> None:
     rng, memory = stream(context_dim, "test"), Memory(context_dim, 1, 2)
 
-    def measure(goal: Array, outcome: Array) -> Array:
-        return performance(goal, outcome, np.full(2, 2.0), 0.1)
-
-    kept, looks = Competence(memory, measure), 0
+    given = problem(outcomes=Box.cube(0, 2, 2), rest=[2, 2], noise=0.1, memory=memory)
+    kept, looks = Competence(given), 0
     for _ in range(20):
         context, goal = rng.random(context_dim), np.round(rng.random(2), 1)
         for _ in range(8):
-            expected = Competence(memory, measure)(context, goal)
+            expected = Competence(given)(context, goal)
             assert kept(context, goal) == expected
             near = memory.near_outcomes(context, goal, 1)
             assert memory.nearest(context, goal).row == (int(near[0]) if len(near) else None)

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from records import DIMS, fill, moved, read, shown
 from runs import edit, end, start, stopped
-from sgimd_torch.record import Event, InUseError, Kind, Record, RunError
+from sgimd_torch.learner.events import Event, Kind
+from sgimd_torch.record import InUseError, Record, RunError
 from sgimd_torch.spaces import Demonstration
 
 numbers = st.floats(allow_nan=False)
@@ -130,7 +131,8 @@ def test_of_a_commit_that_a_kill_cuts_short_nothing_is_there(tmp_path, spilt):
     path = fill(tmp_path / "run.sqlite")
     before = read(path)
     program = (
-        "import os, signal, sys, numpy as np; from sgimd_torch.record import Event, Kind, Record\n"
+        "import os, signal, sys, numpy as np\n"
+        "from sgimd_torch.learner.events import Event, Kind; from sgimd_torch.record import Record\n"
         f"record = Record(sys.argv[1], write=True); record._connection.execute('PRAGMA cache_size = {int(spilt)}')\n"
         "event = Event(Kind.MOVED, np.zeros(1), np.zeros(3), np.zeros(2), np.zeros(2), 'local')\n"
         "for k in range(2000): record.add(event)\n"

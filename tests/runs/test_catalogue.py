@@ -1,17 +1,19 @@
-"""The catalogue: what it says of each thing is true, and a user's own parts work like ours."""
+"""The table of words: what it says of each thing is true, and a user's own parts work like ours."""
 
+import inspect
 import json
 import re
 import sys
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from runs import content_of
-from sgimd_torch.catalogue import CATALOGUE, colour, find, label, load
-from sgimd_torch.catalogue.options import parameters_of
+from sgimd_torch.catalogue import WORDS, about, load_word, place_of
+from sgimd_torch.figures.names import colour, label
 from sgimd_torch.runs import command_line
 from sgimd_torch.runs.build import build
 from sgimd_torch.runs.command_line import main, overview, parse
@@ -21,10 +23,10 @@ from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.tasks import MOST_GOALS, goals_all_over
 from sgimd_torch.session import run
 
-ENTRIES = [(kind, word, entry) for kind, entries in CATALOGUE.items() for word, entry in entries.items()]
+ENTRIES = [(kind, word) for kind, words in WORDS.items() for word in words]
 TOSS = '''
 import numpy as np
-from sgimd_torch import Box, Demonstration
+from sgimd_torch import Box, Demonstration, Goals
 from sgimd_torch.environments.protocol import check_movement
 from sgimd_torch.runs.tasks import Task
 
@@ -46,16 +48,17 @@ def shown():
 def taught():
     return Task(Toss(), demonstrations=shown, correspondence=lambda times, trajectory: trajectory[-1])
 
-class Worst:
+class Worst(Goals):
     """Goals anywhere.
 
     Args:
-        window: how many are looked at.
+        window: number of goals that are looked at.
     """
-    def __init__(self, contexts, outcomes, rng, *, window=8):
-        self.outcomes, self.rng, self.window = outcomes, rng, window
+    def __init__(self, problem, *, window=8):
+        super().__init__(problem)
+        self.window = window
     def sample(self, context):
-        return self.outcomes.sample(self.rng)
+        return self.problem.outcomes.sample(self.rng)
     def add(self, context, goal, competence, strategy="autonomous", gain=0.0):
         pass
 '''
@@ -68,9 +71,14 @@ def toss(module):
     return module("toss", TOSS)
 
 
-@pytest.mark.parametrize(("kind", "word", "entry"), ENTRIES, ids=lambda each: each if isinstance(each, str) else "")
-def test_what_an_entry_fixes_its_parameters_are(kind, word, entry):
-    assert entry.fixed.keys() <= parameters_of(load(entry.at)).keys()
+@pytest.mark.parametrize(("kind", "word"), ENTRIES)
+def test_a_word_is_described_by_its_docstring_in_a_line(kind, word):
+    said = about(kind, word)
+    assert 10 < len(said) <= 118
+    if kind != "command":
+        assert callable(load_word(kind, word))
+        own = inspect.getdoc(load_word(kind, word))
+        assert said in own or isinstance(load_word(kind, word), partial)
 
 
 def test_algorithms_have_a_name_and_a_colour_and_unknown_ones_their_word():
@@ -111,7 +119,7 @@ def test_an_option_of_a_users_goal_model_is_its_parameter_and_nothing_else(toss,
     with pytest.raises(SystemExit):
         parse([*words_, "--help"])
     said = capsys.readouterr().out
-    assert re.search(r"--goals.window .*\n? *how many are .*default: 8", said), said
+    assert re.search(r"--goals.window .*\n? *number of goals .*default: 8", said), said
     assert command(main, [*words_, "--goals.window", "x"]) == 2
     assert "--goals.window must be int, got x" in capsys.readouterr().err
 
@@ -135,9 +143,10 @@ def test_goals_all_over_a_space_are_at_most_500_and_inside():
 
 CHANGED = [
     Config(),
-    Config("sagg-riac", evaluate_at=(5, 6), parts={"goals": "grid", "goals.progress": "signed", "goals.window": 8}),
-    Config("sgim-d", parts={"environment.task_space": 2.5, "global_range": (0.1, 0.2), "goals.modes": (1.0, 0.0, 0.0)}),
-    Config("sgim-acts", name="x", parts={"teachers": ("low-half", "slow"), "base": "search", "base.budget": 3}),
+    Config("sagg-riac", evaluate_at=(5, 6), parts={"goals": "grid", "goals.progress": "absolute", "goals.window": 8}),
+    Config("sgim-d", parts={"environment.task_space": 2.5, "global_range": (0.1, 0.2), "goals.near": 0.1}),
+    Config("sgim-acts", name="x", teachers=("low-half", "slow"), parts={"budget": 3}),
+    Config("sgim-im-search", parts={"inverse": "nearest", "inverse.k": 3}),
     Config("imitation", out=Path("here"), parts={"teacher": "asked", "teacher.choose": "random"}),
 ]
 
@@ -154,7 +163,7 @@ def test_the_words_and_the_settings_of_a_config_make_it_again(config):
 
 def test_what_a_part_is_anyway_is_no_difference():
     own = Config("practice-taught")
-    assert (own["goals"], own["search"], own["budget"], own["teacher"]) == ("within-reach", "practice", 1, "at-once")
+    assert (own["goals"], own["search"], own["budget"], own["teacher"]) == ("within-reach", "vary", 1, "at-once")
     assert Config("practice-taught", parts={"goals": "within-reach", "budget": 1}) == own
     assert words(own) == ["--algorithm=practice-taught"]
     assert words(replace(own, parts={"goals": "interest-map"}))[1:] == ["--goals=interest-map"]
@@ -182,12 +191,12 @@ def test_help_is_one_screen_and_a_parts_options_are_shown_once_it_is_chosen(caps
     assert len(overview(command_line.__doc__).splitlines()) <= 60
     said = capsys.readouterr().out
     assert said.count("--goals.window ") == 2  # of which one is an example
-    assert "how many recent goals the interest looks at" in " ".join(said.split())
+    assert "number of recent goals in a cell's interest" in " ".join(said.split())
 
 
 PARTS_OF_PRACTICE = {
     "goals": "within-reach",
-    "search": "practice",
+    "search": "vary",
     "explore": "returning",
     "inverse": "among-effects",
     "budget": 1,
@@ -213,6 +222,27 @@ def test_sagg_riac_with_every_part_of_practice_by_name_is_practice():
 
 def test_an_entry_that_is_not_installed_names_its_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "cma", None)
-    sys.modules.pop("sgimd_torch.searches.cma_es", None)
+    sys.modules.pop("sgimd_torch.rivals.cma_es", None)
     with pytest.raises(ValueError, match=r"pip install 'sgimd-torch\[rivals\]'"):
-        find("search", "cma-es").load()
+        load_word("search", "cma-es")
+
+
+def test_a_word_that_is_no_word_says_what_would_have_been_right(toss):
+    for kind, word, meant in (
+        ("goals", "toss", "toss is a module here: name what is in it, toss:NAME"),
+        ("environment", "toss.Toss", "is it toss:Toss?"),
+        ("environment", "arm.xml", "arm.xml is a model file: write a class around it"),
+        ("environment", "planar-arm", "did you mean planar-arm-7?"),
+    ):
+        with pytest.raises(ValueError, match=re.escape(meant)):
+            place_of(kind, word)
+
+
+def test_a_choice_that_switches_a_part_off_is_told():
+    def remarks(**parts):
+        return build(Config("practice", parts={"environment": "planar-arm-7", **parts})).learner.problem.remarks
+
+    assert remarks() == []
+    assert remarks(inverse="process") == ["exploration does not look for effects: LocalProcess does not tell them"]
+    assert remarks(inverse="nearest")[0] == "exploration does not widen: NearestNeighbour predicts nothing"
+    assert remarks(inverse="process", explore="anywhere") == []

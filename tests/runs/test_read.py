@@ -8,7 +8,9 @@ import pytest
 from runs import edit, settle
 from sgimd_torch.algorithms import random_exploration
 from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.record import DERIVED, Kind, Record, RunError
+from sgimd_torch.learner.events import Kind
+from sgimd_torch.record import DERIVED, Record, RunError
+from sgimd_torch.record.lives import save_life
 from sgimd_torch.runs.command_line import parse
 from sgimd_torch.runs.directory import FILE
 from sgimd_torch.runs.read import config_of, find_runs, finished, movements_on_disk, read_run, variant_of
@@ -87,7 +89,7 @@ def test_a_run_that_has_just_begun_is_read_as_empty(run):
 
 def test_what_is_no_run_is_refused(tmp_path, run):
     (tmp_path / "old").mkdir()
-    random_exploration(PlanarArm(7), 0).save(tmp_path / "old" / FILE)
+    save_life(random_exploration(PlanarArm(7), 0), tmp_path / "old" / FILE)
     (tmp_path / "csv").mkdir()
     for path, message in (
         (tmp_path, "holds no run;"),

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from runs import content_of
+from sgimd_torch.asking.teachers import AnsweringTeacher, mislabelled
 from sgimd_torch.demonstrations import SHIPPED, load_demonstrations
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.runs.build import build, task_of
@@ -15,7 +16,6 @@ from sgimd_torch.runs.run import Life
 from sgimd_torch.runs.tasks import demonstrations_of
 from sgimd_torch.runs.tasks.robots import toy_demonstrations
 from sgimd_torch.spaces import stream
-from sgimd_torch.teachers.answering import AnsweringTeacher, mislabelled
 
 FOUR = ("demonstrator-1", "demonstrator-2", "demonstrator-3", "mislabelling")
 ACTS = ("--environment=planar-arm-7", "--algorithm=sgim-acts", "--teachers=low-half,mislabelling", "--seed=3")
@@ -39,7 +39,7 @@ def test_each_request_has_a_row_that_says_what_came_of_it(whole):
     first = ("index", "teacher", "strategy", "reply", "shown")
     assert tuple(asked) == (*first, "wanted_0", "wanted_1")
     teachers = build(
-        Config("sgim-acts", seed=3, parts={"environment": "planar-arm-7", "teachers": ("low-half", "mislabelling")})
+        Config("sgim-acts", seed=3, teachers=("low-half", "mislabelling"), parts={"environment": "planar-arm-7"})
     ).teachers
     assert {*asked["teacher"]} == {"low-half", "mislabelling"}
     assert {*asked["strategy"]} == {"imitate low-half", "imitate mislabelling"}
@@ -81,7 +81,7 @@ def test_a_run_that_lost_its_robot_just_after_it_was_shown_something_has_that_an
 
 @pytest.mark.parametrize("environment", ["fishing-rod", "rod-wind"])
 def test_demonstrators_have_their_own_recordings_whatever_is_there(environment):
-    parts = build(Config("sgim-acts", parts={"environment": environment, "teachers": FOUR}))
+    parts = build(Config("sgim-acts", teachers=FOUR, parts={"environment": environment}))
     context = np.zeros(parts.environment.contexts.dim)
     for number in (1, 2, 3):
         theirs = load_demonstrations(SHIPPED.with_name(f"demonstrator_{number}.npz"))
@@ -94,7 +94,7 @@ def test_demonstrators_have_their_own_recordings_whatever_is_there(environment):
 
 def test_a_demonstrator_of_the_rod_teaches_no_other_robot():
     with pytest.raises(ValueError, match="demonstrator 2 has shown the fishing rod, and nothing that this robot could"):
-        build(Config("sgim-acts", parts={"environment": "planar-arm-7", "teachers": ("demonstrator-2",)}))
+        build(Config("sgim-acts", teachers=("demonstrator-2",), parts={"environment": "planar-arm-7"}))
 
 
 def test_the_toss_is_demonstrated_in_winds_all_over_c():

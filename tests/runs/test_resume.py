@@ -20,7 +20,8 @@ from runs import (
 )
 from sgimd_torch.evaluation import evaluate
 from sgimd_torch.inverses.locally_linear import LocallyLinear
-from sgimd_torch.record import Kind, Record
+from sgimd_torch.learner.events import Kind
+from sgimd_torch.record import Record
 from sgimd_torch.runs import evaluations
 from sgimd_torch.runs.directory import FILE
 from sgimd_torch.runs.read import movements_on_disk, read_run
@@ -34,7 +35,7 @@ LEARNERS = {
     "rod, observing": "--algorithm observation",
     "arm": f"{ARM} --algorithm sagg-riac",
     "asking": f"{ARM} --algorithm sgim-acts --teachers low-half,mislabelling",
-    "model": f"{ARM} --search gradient --inverse model --model.rate 0.5 --model.members 2 --evaluated-by own",
+    "model": f"{ARM} --search gradient --inverse model --inverse.rate 0.5 --inverse.members 2 --evaluated-by own",
     "contexts": f"{ARM} --environment toss --algorithm sgim-im --teachers all",
 }
 

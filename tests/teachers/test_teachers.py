@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from sgimd_torch.memory import Memory
+from sgimd_torch.parts import Teacher
 from sgimd_torch.spaces import Demonstration, stream
-from sgimd_torch.teachers import AskedTeacher, InitialTeacher, PeriodicTeacher, Teacher, at_random, least_explored
+from sgimd_torch.teachers import AskedTeacher, InitialTeacher, PeriodicTeacher, at_random, least_explored
 
 NO_CONTEXT = np.zeros(0)
 

@@ -14,7 +14,7 @@ from typing import Final
 
 import numpy as np
 
-from sgimd_torch.environments.protocol import Environment, HandLed, Record, check_instance, recorded
+from sgimd_torch.environments.protocol import Environment, Tracer, check_instance, primitive_of, traced
 from sgimd_torch.evaluation import Benchmark, load_benchmark
 from sgimd_torch.files import checksum
 from sgimd_torch.learner import Correspondence
@@ -48,10 +48,10 @@ class Task:
         check_instance(self.environment)
 
     @property
-    def picture(self) -> Record | None:
-        """The environment's ``record``, which gives a movement to be filmed, checked; None if it has none."""
-        found = getattr(self.environment, "record", None)
-        return partial(recorded, self.environment, found) if callable(found) else None
+    def picture(self) -> Tracer | None:
+        """The environment's ``trace``, which gives a movement to film, checked; None if it has none."""
+        found = getattr(self.environment, "trace", None)
+        return partial(traced, self.environment, found) if callable(found) else None
 
 
 def goals_all_over(environment: Environment) -> Benchmark:
@@ -116,11 +116,12 @@ def demonstrations_of(task: Task, file: Path | None) -> tuple[Sequence[Demonstra
     crc32: str | None = None
     if isinstance(source, Path):
         from sgimd_torch.demonstrations import load_demonstrations  # most learners read none
-        from sgimd_torch.demonstrations.lessons import durations_of, misfit_of, ranges_of
+        from sgimd_torch.demonstrations.fit import misfit_of
 
         crc32 = checksum(source)
         shown = load_demonstrations(source, outcome_dim=robot.outcomes.dim, context_dim=robot.contexts.dim)
-        translate, ranges, shortest = correspondence_of(task), ranges_of(robot), durations_of(robot)[0]
+        translate, primitive = correspondence_of(task), primitive_of(robot)
+        shortest, ranges = primitive.durations[0], primitive.ranges
         for row, each in enumerate(shown):
             try:
                 if (lasts := each.times[-1] - each.times[0]) < shortest / FASTER:
@@ -156,21 +157,4 @@ def correspondence_of(task: Task) -> Correspondence:
             f"{type(task.environment).__name__} has no correspondence, so demonstrations cannot be translated; give it "
             "a method correspondence(times, trajectory) -> theta, or return Task(environment, correspondence=...)"
         )
-    return found
-
-
-def hand_led_of(task: Task) -> HandLed:
-    """What a person can lead by the hand to teach this task.
-
-    Raises:
-        ValueError: its environment has no such thing, or nothing translates what is led.
-    """
-    found = getattr(task.environment, "hand_led", None)
-    if not isinstance(found, HandLed):
-        raise ValueError(
-            f"{type(task.environment).__name__} cannot be led by the hand: it does not say which joints of which model "
-            "a hand moves; give it an attribute hand_led, a HandLed(model, joints, hand) with a MuJoCo model (see "
-            "sgimd_torch.environments.protocol)"
-        )
-    correspondence_of(task)
     return found

@@ -16,22 +16,21 @@ from sgimd_torch.evaluation import SHIPPED as SHIPPED_BENCHMARK
 from sgimd_torch.runs.tasks import Task
 from sgimd_torch.spaces import Box, Demonstration
 
-LARGEST: Final = 1e6  # m, of T
+LARGEST: Final = 1e6  # m, half side of T
 
 
-@hands_on(FishingRod, "noise", "max_yaw", "max_wind", "line")
+@hands_on(FishingRod, "noise", "max_wind", "line")
 def fishing_rod(*, task_space: float = 1.0, threads: int = 1, **physics: Any) -> Task:
-    """The paper's arm with a rod, in MuJoCo.
+    """Arm with a fishing rod, in MuJoCo: the paper's task.
 
     Goals come from a square of half side ``task_space`` m.
 
-    With a context, ``max_yaw`` or ``max_wind`` above 0, what was demonstrated was demonstrated in the context
-    0, and the goals are those that can be reached in it. So, too, with another ``line``: both are those of the
-    paper's rod.
+    Demonstrations and goals of evaluation are always those of the paper's rod, without wind: with ``max_wind`` above 0
+    they belong to the context 0.
 
     Args:
-        task_space: half the side (m) of the square that goals come from; 100 in the paper's large-space experiment.
-        threads: that an evaluation may use; results do not depend on it.
+        task_space: half side (m) of the square of goals; 100 in the paper's large-space experiment.
+        threads: number of threads of an evaluation; results do not depend on it.
 
     Raises:
         ValueError: a number out of its range.

@@ -1,6 +1,6 @@
 """Films of the fishing rod: the arm casts, the line swings, the float lands near its goal.
 
-Section 4 of Nguyen & Oudeyer (2014). A film shows what ``FishingRod.record`` has simulated, in real time. Line and
+Section 4 of Nguyen & Oudeyer (2014). A film shows what ``FishingRod.trace`` has simulated, in real time. Line and
 float are drawn thicker than they are, so that they can be seen. Light, shadow and reflection are those of
 ``fishing_rod.xml``.
     with Camera(rod.model) as camera: write_film(Path("film.mp4"), shoot(camera.frame, [Shot(recording, goal)]))
@@ -21,7 +21,7 @@ import mujoco
 import numpy as np
 from PIL import Image
 
-from sgimd_torch.environments.rod_physics import Recording
+from sgimd_torch.environments.rod_physics import RodTrace
 from sgimd_torch.spaces import Array
 from sgimd_torch.views.film.reel import HEIGHT, WIDTH, Shot
 
@@ -72,7 +72,7 @@ class Camera:
         """The scene at ``time`` (s); from the landing on, the landing: line, float, and where the float has been; on
         the water circles of half a metre and of a metre around the arm, past landings, the goal."""
         recording = shot.recording
-        assert isinstance(recording, Recording)
+        assert isinstance(recording, RodTrace)
         time = min(time, recording.landed)
         row = min(round(time / recording.step), len(recording.states) - 1)
         mujoco.mj_setState(self._model, self._data, recording.states[row], mujoco.mjtState.mjSTATE_FULLPHYSICS)

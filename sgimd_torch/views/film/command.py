@@ -5,7 +5,7 @@ where there are contexts, in the middle of their range. A yellow ring is the goa
 rod, circles are half a metre and a metre around the base. If the float has not met the water after the movement, the
 line is let out and the float falls; the film says so. Beside it: each goal of the benchmark, coloured by how far its
 answer misses it, and how the mean error has fallen. Planar arms, and environments of your own with
-record(context, theta, rng) -> Sketch, are drawn in the plane; a red cross is the outcome, in the plane of the goals.
+trace(context, theta, rng) -> Sketch, are drawn in the plane; a red cross is the outcome, in the plane of the goals.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
-from sgimd_torch.catalogue import colour, label
 from sgimd_torch.environments.protocol import Sketch
 from sgimd_torch.evaluation import evaluate
+from sgimd_torch.figures.names import colour, label
 from sgimd_torch.runs.build import RunParts, build
 from sgimd_torch.runs.read import Run, config_of, read_run
 from sgimd_torch.spaces import Array, stream
@@ -54,7 +54,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     if parts.task.picture is None:
         raise ValueError(
             f"{run.path} is of {run.config['environment']}, which cannot be filmed: it brings no picture of its "
-            "movements, a method record(context, theta, rng) -> Sketch"
+            "movements, a method trace(context, theta, rng) -> Sketch"
         )
     if options.goals is None:
         known = np.unique(parts.benchmark.goals, axis=0)

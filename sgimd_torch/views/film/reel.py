@@ -22,7 +22,7 @@ from imageio_ffmpeg import get_ffmpeg_exe
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from sgimd_torch.environments.protocol import Recorded
+from sgimd_torch.environments.protocol import Trace
 from sgimd_torch.files import replacing
 from sgimd_torch.spaces import Array
 
@@ -45,7 +45,7 @@ class Shot:
     """One movement to film: the ``goal`` ``(outcome_dim,)`` that it is for, a ``title``, the ``unit`` of T, ``past``
     outcomes ``(n, outcome_dim)``, and a picture to stand ``beside`` it."""
 
-    recording: Recorded
+    recording: Trace
     goal: Array
     title: str = ""
     unit: str = ""

@@ -1,4 +1,4 @@
-"""Films of robots in the plane: what their ``record`` gives, drawn as a chain of links, without OpenGL.
+"""Films of robots in the plane: what their ``trace`` gives, drawn as a chain of links, without OpenGL.
 
     write_film(Path("film.mp4"), shoot(Sketchbook(arm.outcomes, shots).frame, shots))
 The goal is a ring, past outcomes are dots, the outcome is a cross, the end of the chain leaves a path. The first two

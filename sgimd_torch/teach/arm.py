@@ -1,0 +1,115 @@
+"""The geometry of an arm in MuJoCo: where its points are, and how its joints move them. No forces, no time.
+
+arm = Arm(led); arm.pose(q); arm.where(*arm.place_of("hand")); arm.levers(body, point)
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sgimd_torch.spaces import Array, Box, check_point, read_only
+from sgimd_torch.teach.led import HandLed
+
+TURN_OR_SLIDE: Final = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
+CROSSING: Final = 1.0  # s, in which a joint of unknown speed crosses its range
+
+
+class Arm:
+    """The led joints of a model; everything else keeps its posture relative to the body that carries it.
+
+    Args:
+        led: the robot.
+
+    Attributes:
+        data: MuJoCo's data of the posture, to be drawn.
+        links: names of the bodies that the led joints alone move, from the base on.
+        ranges: ``(n_joints,)`` box of the postures (rad, or m of a slide joint).
+        start: ``(n_joints,)`` posture in which movements start.
+        speeds, accelerations: ``(n_joints,)`` limits (rad/s and rad/s^2).
+
+    Raises:
+        ValueError: a name that the model does not have, a joint that is no hinge or slide, a joint without a range, a
+            start outside the ranges, or a limit that is not above 0.
+    """
+
+    def __init__(self, led: HandLed) -> None:
+        self._model, self.data = led.model, mujoco.MjData(led.model)
+        self._numbers = [self._number(mujoco.mjtObj.mjOBJ_JOINT, name, "joint") for name in led.joints]
+        for name, number in zip(led.joints, self._numbers, strict=True):
+            if int(self._model.jnt_type[number]) not in TURN_OR_SLIDE:
+                raise ValueError(f"joint {name} is neither a hinge nor a slide; only these can be led")
+            if led.ranges is None and not self._model.jnt_limited[number]:
+                raise ValueError(f"joint {name} has no range in the model; give ranges")
+        self._angles, self._speeds = self._model.jnt_qposadr[self._numbers], self._model.jnt_dofadr[self._numbers]
+        self.ranges = Box(*self._model.jnt_range[self._numbers].T) if led.ranges is None else led.ranges
+        n, pace = len(led.joints), self.ranges.sides / CROSSING
+        if self.ranges.dim != n:
+            raise ValueError(f"needs a range for each of {n} joints, got {self.ranges.dim}")
+        self.speeds = _limits("speeds", 1.5 * pace if led.speeds is None else led.speeds, n)
+        self.accelerations = _limits("accelerations", 6 * pace if led.accelerations is None else led.accelerations, n)
+        start = self.ranges.clip(self.data.qpos[self._angles]) if led.start is None else led.start
+        self.start = read_only(self.ranges.check("start", check_point("start", start, n), "are they in rad?"))
+        self.links = tuple(self._model.body(k).name for k in range(self._model.nbody) if not self._trouble(k))
+
+    def pose(self, q: Array) -> None:
+        """Take the posture ``q``, ``(n_joints,)`` rad."""
+        self.data.qpos[self._angles] = q
+        mujoco.mj_kinematics(self._model, self.data)
+        mujoco.mj_comPos(self._model, self.data)  # mj_jac needs it
+
+    def place_of(self, name: str) -> tuple[int, Array]:
+        """The number of a link, and a place on it, ``(3,)`` m in its own frame: the origin of a body or a site.
+
+        Raises:
+            ValueError: the model has no such body or site, or other joints move it, or none.
+        """
+        body, place = mujoco.mj_name2id(self._model, mujoco.mjtObj.mjOBJ_BODY, name), np.zeros(3)
+        if body < 0:
+            site = self._number(mujoco.mjtObj.mjOBJ_SITE, name, "body or site")
+            body, place = int(self._model.site_bodyid[site]), self._model.site_pos[site].copy()
+        trouble = self._trouble(body)
+        if trouble:
+            raise ValueError(f"{name} cannot be grabbed, {trouble}; links that can are {', '.join(self.links)}")
+        return body, place
+
+    def where(self, body: int, place: Array) -> Array:
+        """``(3,)`` m in the world, of a place on a link."""
+        return np.asarray(self.data.xpos[body] + self.data.xmat[body].reshape(3, 3) @ place)
+
+    def place_at(self, body: int, point: Array) -> Array:
+        """``(3,)`` m in the frame of a link, of a ``point`` of the world; the inverse of ``where``."""
+        return np.asarray(self.data.xmat[body].reshape(3, 3).T @ (point - self.data.xpos[body]))
+
+    def levers(self, body: int, point: Array) -> Array:
+        """``(3, n_joints)`` m/rad: the motion of a ``point`` of the world, carried by a link, for each joint."""
+        jacobian = np.zeros((3, self._model.nv))
+        mujoco.mj_jac(self._model, self.data, jacobian, None, point, body)
+        return jacobian[:, self._speeds]
+
+    def _trouble(self, body: int) -> str:
+        """Why a body is no link of the arm; "" if it is one."""
+        moved_by, above = set[int](), body
+        while above:
+            first = int(self._model.body_jntadr[above])
+            moved_by |= set(range(first, first + int(self._model.body_jntnum[above])))
+            above = int(self._model.body_parentid[above])
+        if not moved_by:
+            return "no joint moves it"
+        return "" if moved_by <= set(self._numbers) else "other joints move it, too"
+
+    def _number(self, kind: mujoco.mjtObj, name: str, called: str) -> int:
+        number = mujoco.mj_name2id(self._model, kind, name)
+        if number < 0:
+            raise ValueError(f"the model has no {called} {name!r}; is it spelt as in the model?")
+        return int(number)
+
+
+def _limits(name: str, value: ArrayLike, n: int) -> Array:
+    limits = check_point(name, value, n, "one for each joint")
+    if not (limits > 0).all():
+        raise ValueError(f"{name} must be above 0, got {limits}")
+    return read_only(limits)

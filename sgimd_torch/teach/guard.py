@@ -1,0 +1,72 @@
+"""Access to the page: only requests that know its address, with the token in it, are answered.
+
+    with guarded(token): server = viser.ViserServer(host="127.0.0.1", port=port)
+Any web page that is open in a browser can send requests to this machine. So a request needs the token, from the address
+or from the cookie that the address has set. Its Host and Origin must be this machine.
+"""
+
+from __future__ import annotations
+
+import hmac
+import http
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from http.cookies import SimpleCookie
+from typing import Any, Final
+from urllib.parse import parse_qs, urlsplit
+
+import websockets.asyncio.server
+from websockets.http11 import Request, Response
+
+Process = Callable[[Any, Request], Response | None]
+OWN: Final = ("127.0.0.1", "localhost", "::1")
+LONGEST: Final = 200  # characters of an address; a file name has at most 255
+
+
+@contextmanager
+def guarded(token: str) -> Iterator[None]:
+    """Servers of websockets that start in this block answer only requests with the ``token``.
+
+    Raises:
+        RuntimeError: no server was started in the block.
+    """
+    serve, started = websockets.asyncio.server.serve, []
+
+    def guarding(*given: Any, process_request: Process, **options: Any) -> Any:
+        started.append(True)
+        return serve(*given, process_request=guard(token, process_request), **options)
+
+    websockets.asyncio.server.serve = guarding  # type: ignore[assignment,misc]
+    try:
+        yield
+    finally:
+        websockets.asyncio.server.serve = serve  # type: ignore[misc]
+    if not started:
+        raise RuntimeError("this version of viser starts its server in another way, so nothing would guard the page")
+
+
+def guard(token: str, process: Process) -> Process:
+    """``process`` for requests that have the token and come from pages of this machine; others are refused."""
+    name = f"teach-{hmac.digest(token.encode(), b'cookie', 'sha256').hex()[:8]}"
+
+    def guarded(connection: Any, request: Request) -> Response | None:
+        def refused(status: http.HTTPStatus) -> Response:
+            refusal: Response = connection.respond(status, f"{status.phrase}\n")
+            return refusal
+
+        if len(request.path) > LONGEST:
+            return refused(http.HTTPStatus.REQUEST_URI_TOO_LONG)
+        host, origin = request.headers.get("Host", ""), request.headers.get("Origin")
+        if urlsplit(f"//{host}").hostname not in OWN or origin not in (None, f"http://{host}"):
+            return refused(http.HTTPStatus.FORBIDDEN)
+        typed = parse_qs(urlsplit(request.path).query).get("token", [""])[0]
+        cookie = SimpleCookie(request.headers.get("Cookie", "")).get(name)
+        shown = typed or ("" if cookie is None else cookie.value)
+        if not hmac.compare_digest(shown.encode(), token.encode()):
+            return refused(http.HTTPStatus.FORBIDDEN)
+        response = process(connection, request)
+        if response is not None and typed:
+            response.headers["Set-Cookie"] = f"{name}={token}; HttpOnly; SameSite=Strict; Path=/"
+        return response
+
+    return guarded

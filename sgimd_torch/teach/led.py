@@ -1,0 +1,100 @@
+"""Robots that a person can lead by the hand: which joints of which MuJoCo model, and how fast.
+
+    led = hand_led_of(task); led.joints
+The arm and the rod are known here. A robot of your own has an attribute ``hand_led``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import mujoco
+import numpy as np
+
+from sgimd_torch.environments.fishing_rod import JOINT_RANGES, JOINTS, FishingRod
+from sgimd_torch.environments.planar_arm import PlanarArm
+from sgimd_torch.runs.tasks import Task, correspondence_of
+from sgimd_torch.spaces import Array, Box
+
+
+@dataclass(frozen=True, eq=False)
+class HandLed:
+    """A robot that a person can lead by the hand; `Arm` checks it.
+
+    Args:
+        model: MuJoCo model in which the robot stands at its start, or can be put there by its joints.
+        joints: names of the joints that a policy moves, in the order of a recording's columns.
+        hand: name of the body or site by which the robot is led if nothing else is grabbed.
+        ranges: ``(n_joints,)`` rad, or m of a slide joint; None for those of the model.
+        start: ``(n_joints,)`` posture in which every movement starts; None for the model's own.
+        speeds: ``(n_joints,)`` rad/s, the largest of the robot's own movements; None to cross a range in about a
+            second. The hand cannot lead the arm faster, as the robot could not repeat it.
+        accelerations: ``(n_joints,)`` rad/s^2, likewise.
+    """
+
+    model: mujoco.MjModel
+    joints: tuple[str, ...]
+    hand: str
+    ranges: Box | None = None
+    start: Array | None = None
+    speeds: Array | None = None
+    accelerations: Array | None = None
+
+
+@runtime_checkable
+class Leadable(Protocol):
+    """An environment of your own that can be led by the hand."""
+
+    @property
+    def hand_led(self) -> HandLed:
+        """The robot as a hand leads it, in the context 0."""
+        ...
+
+
+def hand_led_of(task: Task) -> HandLed:
+    """The robot of a task, as a hand leads it.
+
+    Raises:
+        ValueError: the robot cannot be led, or it has no correspondence that translates recordings.
+    """
+    robot = task.environment
+    if isinstance(robot, Leadable) and isinstance(robot.hand_led, HandLed):
+        led = robot.hand_led
+    elif isinstance(robot, FishingRod):
+        led = rod_led(robot)
+    elif isinstance(robot, PlanarArm):
+        led = arm_led(robot)
+    else:
+        raise ValueError(
+            f"{type(robot).__name__} cannot be led by the hand: it does not say which joints of which model a hand "
+            "moves; give it an attribute hand_led, a HandLed(model, joints, hand) of sgimd_torch.teach.led"
+        )
+    correspondence_of(task)
+    return led
+
+
+def rod_led(rod: FishingRod) -> HandLed:
+    """The fishing rod, led by its tip, no faster than its motor primitive moves it."""
+    middle = (JOINT_RANGES.low + JOINT_RANGES.high) / 2
+    return HandLed(rod.model, JOINTS, "tip", JOINT_RANGES, middle, *rod.primitive.fastest())
+
+
+def arm_led(arm: PlanarArm) -> HandLed:
+    """A planar arm, led by its end, no faster than in a smooth movement of 1 s."""
+    n, limits = arm.policies.dim, arm.angles(np.ones(arm.policies.dim))
+    names = tuple(f"joint_{k}" for k in range(n))
+    fastest = 1.5 * limits, 6 * limits  # of 3 t^2 - 2 t^3
+    return HandLed(planar_model([1 / n] * n), names, "end", Box(-limits, limits), np.zeros(n), *fastest)
+
+
+def planar_model(lengths: Sequence[float]) -> mujoco.MjModel:
+    """An arm in the plane z = 0 with a hinge before each link of ``lengths`` (m), along +x at zero angles."""
+    thickness = 0.02 * sum(lengths)
+    inner = f'<site name="end" pos="{lengths[-1]} 0 0"/>'
+    for k in reversed(range(len(lengths))):
+        begins = lengths[k - 1] if k else 0
+        inner = f"""<body name="link_{k}" pos="{begins} 0 0"><joint name="joint_{k}" axis="0 0 1"/>
+            <geom type="capsule" fromto="0 0 0 {lengths[k]} 0 0" size="{thickness}"/>{inner}</body>"""
+    return mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{inner}</worldbody></mujoco>")

@@ -1,0 +1,106 @@
+"""Lessons by hand: what a recording of a led arm teaches, and what the robot cannot repeat of it.
+
+Section 4.1 of Nguyen & Oudeyer (2014): the correspondence, eqs. (5) and (6), turns a led trajectory into theta_d; the
+robot executes theta_d, and where it lands is the outcome of the lesson.
+    lesson = lesson_by_hand(*moving(*leading.end_recording()), task, stream(seed, "lessons", 0))
+    save_demonstrations("mine.npz", [lesson.demonstration])
+The file holds everything that the learner is shown: a loaded lesson has an equal theta_d, bit for bit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from sgimd_torch.demonstrations.fit import beyond_limits, misfit_of
+from sgimd_torch.environments.protocol import primitive_of
+from sgimd_torch.runs.tasks import Task, correspondence_of
+from sgimd_torch.spaces import Array, Demonstration, read_only
+from sgimd_torch.teach.led import HandLed, hand_led_of
+
+RATE: Final = 50.0  # Hz, of the shipped demonstrations and of motor primitives
+FASTER: Final = 1.02  # times the speed of the robot's own movements: a faster joint is remarked
+MOVES: Final = 0.02  # rad/s: an arm that was never faster did not move
+STILL: Final = 0.05  # share of the largest speed: the arm pauses while all joints are slower
+AWAY: Final = 0.05  # rad from where movements start: a start farther away is remarked
+
+
+@dataclass(frozen=True, eq=False)
+class HandLesson:
+    """A lesson for the learner, and how well the robot can follow it.
+
+    Attributes:
+        demonstration: the recording, with the outcome of ``theta_d`` executed once.
+        theta_d: ``(theta_dim,)`` policy of the recording, by the correspondence.
+        misfit: distance between recording and movement (rad), see `misfit_of`.
+        remarks: a sentence for each thing that the robot cannot follow.
+    """
+
+    demonstration: Demonstration
+    theta_d: Array
+    misfit: float
+    remarks: tuple[str, ...]
+
+
+def lesson_by_hand(times: Array, joints: Array, task: Task, rng: np.random.Generator) -> HandLesson:
+    """Make a lesson of a recording; the robot executes ``theta_d`` once, in the middle of C.
+
+    A recording longer than the robot's longest movement is played faster, and a remark says so.
+
+    Args:
+        times: ``(n_times,)`` s, increasing from 0.
+        joints: ``(n_times, n_joints)`` rad, postures of the led arm.
+        task: task of the learner, whose robot was led.
+        rng: noise of the one movement, such as ``stream(seed, "lessons", number)``.
+
+    Raises:
+        ValueError: the robot cannot be led, or its correspondence refuses the recording.
+        SimulationError: theta_d has no outcome.
+    """
+    robot, led = task.environment, hand_led_of(task)
+    longest = primitive_of(robot).durations[1]
+    played = times / times[-1] * longest if times[-1] > longest else times  # ends exactly at longest
+    even, trajectory = resampled(played, joints)
+    theta_d = robot.policies.check("theta_d", correspondence_of(task)(even, trajectory))
+    context = robot.contexts.low + robot.contexts.sides / 2
+    shown = Demonstration(context, even, trajectory, robot.execute(context, theta_d.copy(), rng))
+    remarks = (*_unlike_led(times, played, joints, led), *beyond_limits(robot, shown))
+    return HandLesson(shown, read_only(theta_d), misfit_of(robot, theta_d, shown), remarks)
+
+
+def moving(times: Array, joints: Array) -> tuple[Array, Array]:
+    """The recording without the pauses before and after the movement; its times start at 0.
+
+    Raises:
+        ValueError: the arm never moved.
+    """
+    speeds = np.abs(np.diff(joints, axis=0)).max(axis=1) / np.diff(times)
+    if not speeds.max() > MOVES:
+        raise ValueError("you did not move the arm")
+    moved = np.flatnonzero(speeds > STILL * speeds.max())
+    kept = slice(moved[0], moved[-1] + 2)
+    return times[kept] - times[moved[0]], joints[kept]
+
+
+def resampled(times: Array, joints: Array) -> tuple[Array, Array]:
+    """The recording at equal steps, at least ``RATE`` a second, both ends kept."""
+    even = np.linspace(0.0, times[-1], max(2, int(np.ceil(times[-1] * RATE - 1e-9)) + 1))
+    return even, np.stack([np.interp(even, times, column) for column in joints.T], axis=1)
+
+
+def _unlike_led(times: Array, played: Array, joints: Array, led: HandLed) -> list[str]:
+    """A sentence for each difference between a recording at ``times`` and its repetition at the times ``played``."""
+    remarks = []
+    if times[-1] > played[-1]:
+        faster = times[-1] / played[-1]
+        remarks.append(f"it is played {faster:.3g} times faster: movements last {played[-1]:g} s at most")
+    speeds = np.abs(np.diff(joints, axis=0) / np.diff(played)[:, None]).max(axis=0)
+    for name, speed, most in zip(led.joints, speeds, speeds if led.speeds is None else led.speeds, strict=True):
+        if speed > most * FASTER:
+            remarks.append(f"{name} would turn at {speed:.2g} rad/s, its movements at {most:.2g} rad/s at most")
+    away = 0.0 if led.start is None else float(np.abs(joints[0] - led.start).max())
+    if away > AWAY:
+        remarks.append(f"it starts {away:.2g} rad from where movements start, so the robot begins with a jerk")
+    return remarks

@@ -1,0 +1,135 @@
+"""The run that is taught: a learner that practises, gets lessons by hand, and reports its status.
+
+    run = TaughtRun(config); run.go_on(20); run.show(demonstration); run.status().chart.mean_error; run.close()
+One thread at a time may use it. Its directory is that of ``sgimd run``, which can resume the run.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, replace
+from itertools import islice
+from typing import Final
+
+import numpy as np
+
+from sgimd_torch.runs.build import build
+from sgimd_torch.runs.config import Config
+from sgimd_torch.runs.directory import FILE, holds_run
+from sgimd_torch.runs.run import Life
+from sgimd_torch.spaces import Array, Demonstration, stream
+from sgimd_torch.teach.by_hand import BY_HAND, ByHand
+from sgimd_torch.teach.chart import Chart, chart_of
+from sgimd_torch.teach.lessons import HandLesson, lesson_by_hand
+
+LATEST: Final = 60  # landings that the page shows
+IMITATIONS: Final = 10  # movements that follow a lesson at once, at most
+NO_MORE: Final = "the learner has made all its {0} movements; end this session, and go on with --movements {1}"
+ALONE: Final = "{0} cannot be shown a lesson by hand; sgim-d, practice-taught, imitation and observation can"
+
+
+@dataclass(frozen=True, eq=False)
+class Status:
+    """The status of a taught run.
+
+    Attributes:
+        movements: movements so far.
+        lessons: lessons by hand so far.
+        replaying: whether the recorded movements are still being replayed.
+        landed: ``(n, outcome_dim)`` last outcomes.
+        chart: skill of the learner.
+    """
+
+    movements: int
+    lessons: int
+    replaying: bool
+    landed: Array
+    chart: Chart
+
+
+class TaughtRun:
+    """A run on disk, open for lessons. Movements that its directory holds already are replayed first.
+
+    Args:
+        config: settings of the run.
+
+    Attributes:
+        parts: parts of the run; its teacher is `ByHand`.
+        cannot_be_taught: reason why the learner takes no lessons, "" if it does.
+
+    Raises:
+        ValueError: the run cannot be made, or its directory belongs to another run.
+        OSError: a file of the run cannot be read.
+    """
+
+    def __init__(self, config: Config) -> None:
+        self.config, parts = config, build(config)
+        self._hand = ByHand(teacher=parts.teacher)
+        self.parts = replace(parts, teacher=self._hand)
+        teachable = parts.learner.social is not None and not parts.teachers
+        self.cannot_be_taught = "" if teachable else ALONE.format(config.algorithm)
+        self._life = Life(self.parts, resume=holds_run(config.directory / FILE))
+        self._episodes = self._life.episodes()
+        self._lessons = sum(each.kind == "shown" and each.who == BY_HAND for each in self._life.record.events())
+        self._landed: deque[Array] = deque(maxlen=LATEST)
+
+    def go_on(self, movements: int, *, until_idle: bool = False) -> Status:
+        """Make so many movements more, fewer if the run ends.
+
+        Args:
+            movements: number of movements.
+            until_idle: whether to stop earlier, at the end of an attempt.
+
+        Raises:
+            SimulationError, ReplayError, ValueError, OSError: as ``sgimd run``.
+        """
+        for episode in islice(self._episodes, movements):
+            if episode.outcome is not None:
+                self._landed.append(episode.outcome)
+            if until_idle and self.parts.learner.idle:
+                break
+        if not self._life.replaying:
+            self._life.commit()
+        return self.status()
+
+    def give(self, demonstration: Demonstration) -> None:
+        """Offer a lesson before the next movement.
+
+        Raises:
+            ValueError: the learner cannot be taught, or cannot use this lesson; nothing has changed then.
+        """
+        total = self.config.movements
+        if self.cannot_be_taught:
+            raise ValueError(self.cannot_be_taught)
+        if self._life.replaying:
+            raise ValueError("the run still replays its record; a lesson must wait until that is done")
+        if self._life.movements >= total:
+            raise ValueError(NO_MORE.format(total, 2 * total))
+        self.parts.environment.contexts.check("context of the lesson", demonstration.context)
+        self.parts.learner.translate(demonstration)
+        self._hand.give(demonstration)
+        self._lessons += 1
+
+    def imitate(self) -> Status:
+        """Make the movements by which the learner imitates the given lesson."""
+        return self.go_on(IMITATIONS, until_idle=True)
+
+    def show(self, demonstration: Demonstration) -> Status:
+        """Give a lesson and have it imitated; raises what `give` and `go_on` raise."""
+        self.give(demonstration)
+        return self.imitate()
+
+    def lesson_of(self, times: Array, joints: Array) -> HandLesson:
+        """Make a lesson of a recording for this learner; see `lesson_by_hand`."""
+        return lesson_by_hand(times, joints, self.parts.task, stream(self.config.seed, "lessons", self._lessons))
+
+    def status(self) -> Status:
+        """The present status."""
+        robot, memory = self.parts.environment, self.parts.learner.memory
+        landed = np.array(self._landed).reshape(-1, robot.outcomes.dim)
+        chart = chart_of(robot, memory, self.parts.benchmark)
+        return Status(self._life.movements, self._lessons, self._life.replaying, landed, chart)
+
+    def close(self) -> None:
+        """Write what is left to write, and free the directory for others."""
+        self._life.close()

@@ -1,0 +1,263 @@
+"""Learners that ask: when, whom and what for; teachers that answer, badly too; a life that asked is lived again."""
+
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from sgimd_torch.algorithms import sagg_riac
+from sgimd_torch.asking.algorithms import SEARCHING, sgim_acts, sgim_eer, sgim_im
+from sgimd_torch.asking.teachers import AnsweringTeacher, high_half, low_half, mislabelled
+from sgimd_torch.environments.planar_arm import PlanarArm
+from sgimd_torch.learner import ReplayError
+from sgimd_torch.parts import Demonstrator, Strategy
+from sgimd_torch.record.lives import load_life, save_life
+from sgimd_torch.runs.tasks.robots import arm_demonstrations
+from sgimd_torch.session import run
+from sgimd_torch.spaces import Demonstration, Lesson, Request, stream
+from worlds import NO_CONTEXT, demonstrate, demonstrations, last_posture
+
+ARM = PlanarArm(4, noise=0.02)
+TURNED = PlanarArm(4, noise=0.02, context=True)
+SHOWN = demonstrations(PlanarArm(4))
+
+
+def halves(seed=0, shown=SHOWN, **options):
+    return {
+        name: AnsweringTeacher(shown, stream(seed, name), knows=knows, **options)
+        for name, knows in (("low", low_half), ("high", high_half))
+    }
+
+
+def acts(arm=ARM, seed=0, teachers=None, **options):
+    teachers = halves() if teachers is None else teachers
+    return sgim_acts(arm, seed, correspondence=last_posture, teachers=teachers, **options)
+
+
+def live(learner, teachers, movements=150, arm=ARM, seed=0, **options):
+    return list(run(learner, arm, seed, movements=movements, teachers=teachers, **options))
+
+
+def lines(episodes):
+    return [
+        (
+            *(e.index, e.context.tobytes(), e.move and (e.move.theta.tobytes(), e.move.origin)),
+            *(
+                e.outcome is not None and e.outcome.tobytes(),
+                e.request and (e.request.teacher, e.request.goal.tobytes()),
+            ),
+            e.demonstration and e.demonstration.outcome.tobytes(),
+        )
+        for e in episodes
+    ]
+
+
+def test_a_teacher_answers_with_the_nearest_that_they_have_or_with_nothing():
+    low, high = halves(within=0.5).values()
+    assert len(low.demonstrations) == len(high.demonstrations) == 10
+    assert max(each.outcome[0] for each in low.demonstrations) < min(each.outcome[0] for each in high.demonstrations)
+    for shown in low.demonstrations:
+        assert low.demonstrate(NO_CONTEXT, shown.outcome + 0.001, None) is shown
+    assert high.demonstrate(NO_CONTEXT, np.array([-1.0, 0.0]), None) is None
+    assert AnsweringTeacher(SHOWN, stream(0, "t")).demonstrate(NO_CONTEXT, np.array([-9.0, 0.0]), None) is not None
+
+
+def test_a_mislabelling_teacher_shows_each_movement_under_another_outcome():
+    wrong = AnsweringTeacher(SHOWN, stream(0, "t"), knows=mislabelled).demonstrations
+    assert all(np.array_equal(a.trajectory, b.trajectory) for a, b in zip(wrong, SHOWN, strict=True))
+    assert not any(np.array_equal(a.outcome, b.outcome) for a, b in zip(wrong, SHOWN, strict=True))
+    assert sorted(each.outcome.tolist() for each in wrong) == sorted(each.outcome.tolist() for each in SHOWN)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"within": 0.0}, "within must be a distance above 0, got 0"),
+        ({"takes": -1}, "takes must be a whole number >= 0, got -1"),
+        ({"knows": lambda shown, rng: []}, "a teacher needs at least one demonstration"),
+    ],
+)
+def test_a_teacher_who_cannot_answer_is_refused(options, message):
+    with pytest.raises(ValueError, match=message):
+        AnsweringTeacher(SHOWN, stream(0, "t"), **options)
+
+
+def test_it_asks_both_teachers_for_goals_and_uses_the_answers_in_both_ways():
+    teachers = halves()
+    episodes = live(acts(**SEARCHING), teachers, 300)
+    asked = [e for e in episodes if e.reply == "shown"]
+    assert {e.request.teacher for e in asked} == {"low", "high"}
+    for e in asked:
+        assert e.demonstration is teachers[e.request.teacher].demonstrate(NO_CONTEXT, e.request.goal, None)
+    shown = [e for e in asked if np.array_equal(e.move.goal, e.demonstration.outcome)]
+    assert shown == asked  # imitated or emulated, it is the goal of the movements
+    assert Counter(e.move.origin == "imitate" for e in asked).keys() == {True, False}
+    imitated = next(e for e in asked if e.move.origin == "imitate")
+    assert np.array_equal(imitated.move.theta, imitated.demonstration.trajectory[-1])
+
+
+def by_entropy(arm, seed, teachers):
+    return sgim_eer(arm, seed, correspondence=last_posture, teachers={"low": teachers["low"]})
+
+
+@pytest.mark.parametrize(
+    ("arm", "make"), [(ARM, acts), (TURNED, acts), (ARM, by_entropy)], ids=["no context", "context", "by entropy"]
+)
+def test_a_life_that_asked_goes_on_as_if_it_had_never_stopped_without_asking_again(arm, make, tmp_path):
+    context = np.zeros(arm.contexts.dim)
+    shown = [demonstrate(arm, each.outcome, context) for each in SHOWN]
+    teachers = halves(shown=shown, takes=3)
+    whole, episodes = make(arm, 1, teachers), []
+    for episode in run(whole, arm, 1, movements=140, teachers=teachers):
+        episodes.append(episode)
+        if episode.index in (0, 13, 40, 77, 99):
+            save_life(whole, tmp_path / f"{episode.index}.sqlite")
+    assert any(e.request for e in episodes[:78])
+    assert any(e.move is None for e in episodes)
+    for last in (0, 13, 40, 77, 99):
+        again = make(arm, 1, teachers)
+        load_life(again, tmp_path / f"{last}.sqlite")  # the teachers' answers are in the file
+        rest = live(again, teachers, 140, arm, 1)
+        assert lines(rest) == lines(episodes[last + 1 :])
+        assert again.memory.outcomes.tobytes() == whole.memory.outcomes.tobytes()
+
+
+def test_a_request_that_waits_for_its_answer_is_saved_too(tmp_path):
+    seed = next(seed for seed in range(1000, 1100) if acts(seed=seed).request(NO_CONTEXT))
+    robot = acts(seed=seed)
+    assert robot.request(NO_CONTEXT)
+    save_life(robot, tmp_path / "life.sqlite")
+    again = acts(seed=seed)
+    load_life(again, tmp_path / "life.sqlite")
+    assert again.request(NO_CONTEXT).goal.tolist() == robot.request(NO_CONTEXT).goal.tolist()
+    for each in (robot, again):
+        each.watch(SHOWN[3])
+    assert np.array_equal(robot.ask(NO_CONTEXT).theta, again.ask(NO_CONTEXT).theta)
+    robot.tell([0.1, 0.2])
+    save_life(robot, tmp_path / "life.sqlite")
+    with pytest.raises(ReplayError, match="before movement 0 it asked for a demonstration, the learner now does not"):
+        load_life(sagg_riac(ARM, seed), tmp_path / "life.sqlite")
+
+
+def fails(context, goal, memory):
+    raise OSError("the camera is off")
+
+
+BAD = {
+    "raises": (fails, "OSError: the camera is off"),
+    "outside T": (lambda *_: demonstration(outcome=[9.0, 0.0]), "outcome of the demonstration must lie in its box"),
+    "another context": (lambda *_: demonstration(context=[0.5]), "context of the demonstration must have shape"),
+    "another shape": (lambda *_: demonstration(outcome=[0.1, 0.2, 0.3]), r"must have shape \(..., 2\), got \(3,\)"),
+    "outside Pi": (lambda *_: demonstration(theta=2.0), "theta_d of the correspondence must lie in its box"),
+    "no demonstration": (lambda *_: "later", "'str' object has no attribute 'context'"),
+}
+
+
+def demonstration(outcome=(0.1, 0.2), context=(), theta=0.5):
+    return Demonstration(np.array(context), np.arange(2.0), np.full((2, 4), theta), np.array(outcome))
+
+
+class Silent(Demonstrator):
+    def demonstrate(self, context, goal, memory):
+        return None
+
+
+@pytest.mark.parametrize("kind", BAD)
+def test_an_answer_that_cannot_be_used_is_told_and_counts_as_none(kind):
+    answer, message = BAD[kind]
+    bad = Silent()
+    bad.demonstrate = answer
+    with pytest.warns(RuntimeWarning, match=f"teacher t gave no answer that can be used, .*{message}"):
+        episodes = live(acts(teachers={"t": bad}), {"t": bad}, 60)
+    silent = live(acts(teachers={"t": Silent()}), {"t": Silent()}, 60)
+    assert lines(episodes) == lines(silent)
+    assert any(e.request for e in episodes)
+    assert all(e.move is not None and e.demonstration is None for e in episodes)
+
+
+def test_without_answers_it_moves_in_every_movement_also_when_nobody_hears_its_requests():
+    heard, unheard = live(acts(), {"low": Silent(), "high": Silent()}, 60), live(acts(), None, 60)
+    assert [e.move.theta.tolist() for e in heard] == [e.move.theta.tolist() for e in unheard]
+    assert not any(e.request for e in unheard)
+
+
+def test_a_teacher_whom_nobody_knows_is_refused_by_name():
+    with pytest.raises(ValueError, match=r"the learner asks '(low|high)', but teachers are other; are they those"):
+        live(acts(), {"other": Silent()})
+
+
+def test_for_a_slow_teacher_it_rests_before_it_uses_the_answer():
+    teachers = {"slow": AnsweringTeacher(SHOWN, stream(0, "t"), takes=4)}
+    episodes = live(acts(teachers=teachers), teachers, 200)
+    asked = [e.index for e in episodes[:-5] if e.reply == "shown"]
+    assert asked
+    for index in asked:
+        assert [e.move is None for e in episodes[index : index + 5]] == [True] * 4 + [False]
+    assert sum(e.move is None for e in episodes[: asked[-1] + 5]) == 4 * len(asked)
+
+
+def test_an_attempt_gets_its_lesson_with_the_policy_that_it_corresponds_to():
+    got = []
+
+    class Asks(Strategy):
+        def attempt(self, context):
+            got.append((yield Request("t", np.zeros(2))))
+            yield None
+
+    learner = acts()
+    learner.autonomous = Asks(learner.problem)
+    assert learner.request(NO_CONTEXT).teacher == "t"
+    learner.watch(SHOWN[0])
+    assert isinstance(got[0], Lesson)
+    assert np.array_equal(got[0].theta_d, SHOWN[0].trajectory[-1])
+    assert got[0].demonstration is SHOWN[0]
+    assert learner.ask(NO_CONTEXT) is None  # a rest
+    assert learner.ask(NO_CONTEXT) is None  # another attempt, whose request is not answered
+    assert got[1] is None
+
+
+def test_costs_make_it_ask_less():
+    asked = [sum(e.request is not None for e in live(acts(cost=cost), halves())) for cost in (1.0, 1000.0)]
+    assert asked[1] < 0.3 * asked[0]
+
+
+def test_nobody_shows_the_same_twice():
+    teachers = {"all": AnsweringTeacher(SHOWN, stream(0, "t"))}
+    episodes = live(acts(teachers=teachers), teachers, 300)
+    shown = [e.demonstration.outcome.tolist() for e in episodes if e.demonstration]
+    assert len(shown) == len({tuple(each) for each in shown}) > 10
+    again = [e for e in episodes if e.reply == "again"]
+    assert again
+    assert all(e.demonstration is None and e.move.origin != "imitate" for e in again)
+
+
+def late_requests(movements, after, noise=0.0, **more):
+    """Of two learners of two teachers, each for one half, and of ``more``."""
+    arm, found = PlanarArm(7, noise=noise), []
+    shown = arm_demonstrations(arm)
+    for seed in (1000, 1001):
+        teachers = halves(seed, shown)
+        teachers |= {name: AnsweringTeacher(shown, stream(seed, name), knows=knows) for name, knows in more.items()}
+        learner = sgim_acts(arm, seed, correspondence=arm.correspondence, teachers=teachers)
+        found += [e.request for e in live(learner, teachers, movements, arm, seed)[after:] if e.request]
+    assert len(found) > 40
+    return found
+
+
+def test_somebody_who_mislabels_is_soon_left_alone():
+    asked = [request.teacher for request in late_requests(600, 200, noise=0.02, wrong=mislabelled)]
+    assert asked.count("wrong") / len(asked) < 0.15  # a third, if it made no difference
+
+
+def test_of_two_teachers_each_is_asked_in_their_own_half():
+    own = [(request.goal[0] < 0) == (request.teacher == "low") for request in late_requests(1500, 800)]
+    assert np.mean(own) > 0.8
+
+
+def test_sgim_im_asks_one_teacher_and_imitates_what_it_is_shown():
+    teachers = {"all": AnsweringTeacher(SHOWN, stream(0, "t"))}
+    learner = sgim_im(ARM, 0, correspondence=last_posture, teachers=teachers)
+    asked = [e for e in live(learner, teachers) if e.reply == "shown"]
+    assert {e.move.origin for e in asked} == {"imitate"}
+    with pytest.raises(ValueError, match="sgim_im asks one teacher, got 2; is sgim_acts meant"):
+        sgim_im(ARM, 0, correspondence=last_posture, teachers=halves())
