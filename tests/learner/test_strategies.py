@@ -10,6 +10,7 @@ import pytest
 
 from sgimd_torch.competence import AttemptCompetence, performance
 from sgimd_torch.environments.planar_arm import PlanarArm
+from sgimd_torch.goals.interest_map import InterestMap
 from sgimd_torch.inverses.nearest import NearestNeighbour
 from sgimd_torch.memory import Memory
 from sgimd_torch.parts import Goals, Problem, Search, Social

@@ -182,7 +182,7 @@ def test_a_forward_model_learns_again_what_it_learnt_in_the_run(tmp_path, go):
     parts = build(film.config_of(run))
     film.remember(run, parts, 0, 60)
     film.remember(run, parts, 60, 80)
-    assert run.refreshes["relative_error"][-1] == parts.model.relative_error
+    assert run.refreshes["relative_error"][-1] == parts.learner.inverse.model.relative_error
 
 
 @pytest.mark.parametrize(
