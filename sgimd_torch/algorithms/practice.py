@@ -1,7 +1,7 @@
-"""Practice, which is ours: goals within reach, and for each one movement, the answer of a local process plus noise.
+"""Practice, our own algorithm: one movement for each goal within reach, the answer of a local process plus noise.
 
-Nothing in it knows a unit or a robot. What the answer gets wrong is what it learns next. Where most movements do
-nothing, it first looks for some that have an effect, and learns from those alone.
+Practice needs no unit and no knowledge of the robot. It learns next where the answer is wrong. Where most movements do
+nothing, it first looks for movements with an effect, and then learns from those alone.
     learner = practice(environment, seed)
 """
 
@@ -32,13 +32,13 @@ PRACTICE: Final[dict[str, Any]] = {
 
 @hands_on(sagg_riac, **PRACTICE, inverse=AmongEffects)
 def practice(environment: Environment, seed: int, **parts: Any) -> Learner:
-    """One movement at each goal within reach, by a local process; no teacher."""
+    """Practice: one movement for each goal within reach, by a local Gaussian process; no teacher."""
     return sagg_riac(environment, seed, **parts)
 
 
 @hands_on(sgim_d, **PRACTICE, inverse=AmongEffects, social=partial(Imitate, repeats=1))
 def practice_taught(environment: Environment, seed: int, *, correspondence: Correspondence, **parts: Any) -> Learner:
-    """Practice that executes each demonstration once, exactly.
+    """Practice, one movement for each goal within reach; executes each demonstration once, exactly.
 
-    Best when all demonstrations come at the start."""
+    It learns most when all demonstrations come at the start."""
     return sgim_d(environment, seed, correspondence=correspondence, **parts)
