@@ -1,4 +1,4 @@
-"""Things built by a constructor that may be a user's own: ``Goals.of(make, problem)`` says what is wrong with it."""
+"""Building parts from constructors, which may be a user's own: ``Goals.of(make, problem)`` explains each mistake."""
 
 from __future__ import annotations
 
@@ -9,27 +9,27 @@ from sgimd_torch.catalogue import called, function_of, place_of
 
 
 class Built(ABC):  # noqa: B024
-    """Something that a learner or a run is put together from."""
+    """A part of a learner or of a run."""
 
     @classmethod
     def of(cls, make: Any, *given: Any) -> Self:
-        """The thing of this class that a constructor builds from what it is ``given``.
+        """The part of this class that the constructor ``make`` builds from the arguments ``given``.
 
         Raises:
-            ValueError: no constructor, one that takes something else, an abstract method is missing, or what was built
+            ValueError: ``make`` is no constructor or takes other arguments, an abstract method is missing, or the part
                 is of another class.
         """
         kind = cls.__name__
         if isinstance(make, str):
             module, _, name = place_of(kind.lower(), make).partition(":")
-            raise ValueError(f"a {kind} is given as its constructor, got {make!r}; from {module} import {name}")
+            raise ValueError(f"a {kind} must be given as its constructor, got {make!r}; from {module} import {name}")
         if isinstance(make, cls) or not callable(make):
-            raise ValueError(f"a {kind} is given as its constructor, got a {type(make).__name__} that is made already")
+            raise ValueError(f"a {kind} must be given as its constructor, got a finished {type(make).__name__}")
         found = function_of(make)
         if isinstance(found, ABCMeta) and found.__abstractmethods__:
             missing = ", ".join(sorted(found.__abstractmethods__))
-            raise ValueError(f"{found.__name__} has no {missing}, which {kind} demands; see sgimd_torch.parts")
+            raise ValueError(f"{found.__name__} has no {missing}, but every {kind} needs it; see sgimd_torch.parts")
         made: Any = called(f"{kind} {found.__name__}", make, *given)
         if not isinstance(made, cls):
-            raise ValueError(f"{found.__name__} must derive from {kind} of sgimd_torch.parts, or give one")
+            raise ValueError(f"{found.__name__} must derive from {kind} of sgimd_torch.parts, or return one")
         return made
