@@ -43,7 +43,7 @@ class Problem:
         autonomous: autonomous strategy, which is made before the social one.
 
     Raises:
-        ValueError: `check_robot` refuses the robot; exemplars have other dimensions, or thetas outside Pi.
+        ValueError: `check_robot` refuses the robot, or exemplars do not fit it.
     """
 
     inverse: Inverse
@@ -141,8 +141,7 @@ class Goals(Part):
             goal: ``(outcome_dim,)`` in T.
             competence: competence at this goal now, in [-1, 0].
             strategy: name of the strategy that had chosen the goal.
-            gain: rise of the competence at this goal, in [-1, 1]; without a rise, competence of the attempt alone minus
-                competence before it.
+            gain: rise of the competence at this goal; without one, that of the attempt alone minus that before it.
         """
 
     @property
@@ -163,9 +162,7 @@ class Inverse(Part):
         """
 
     def answer_many(self, contexts: Array, goals: Array) -> list[Estimate]:
-        """Estimates for an evaluation: for ``goals`` ``(n, outcome_dim)`` in ``contexts`` ``(n, context_dim)``.
-        Default: one
-        call for each goal."""
+        """Estimates for ``goals`` ``(n, outcome_dim)`` in ``contexts`` ``(n, context_dim)``. Default: one by one."""
         return [self(context, goal) for context, goal in zip(contexts, goals, strict=True)]
 
     def predict(self, context: Array, theta: Array) -> Array | None:

@@ -28,7 +28,7 @@ class Built(ABC):  # noqa: B024
         found = function_of(make)
         if isinstance(found, ABCMeta) and found.__abstractmethods__:
             missing = ", ".join(sorted(found.__abstractmethods__))
-            raise ValueError(f"{found.__name__} has no {missing}, but every {kind} needs it; see sgimd_torch.parts")
+            raise ValueError(f"{found.__name__} has no {missing}, which {kind} demands; see sgimd_torch.parts")
         made: Any = called(f"{kind} {found.__name__}", make, *given)
         if not isinstance(made, cls):
             raise ValueError(f"{found.__name__} must derive from {kind} of sgimd_torch.parts, or return one")

@@ -49,9 +49,8 @@ class Config:
         evaluate_at: numbers of movements after which to evaluate, besides the end; null for 250, 500 and every 1000; []
             for no evaluation.
         evaluated_by: inverse models for evaluations: own for the run's, then words of --inverse.
-        repeats: number of further executions of each evaluation movement, to measure noise; 0 for no measurement.
-        floor_at: evaluations, by number of movements, that measure the noise; null for all. The measurement takes four
-            times as long.
+        repeats: number of extra executions of each evaluation movement, to measure the noise; 0 for none.
+        floor_at: evaluations, by number of movements, that measure the noise, in four times the time; null for all.
         benchmark: file of goals for evaluations; null for the environment's own goals.
         demonstrations: file of recorded demonstrations; null for the environment's own.
         failures: number of failed movements in a row that stops the run; null for ten.

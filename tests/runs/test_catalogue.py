@@ -191,7 +191,7 @@ def test_help_is_one_screen_and_a_parts_options_are_shown_once_it_is_chosen(caps
     assert len(overview(command_line.__doc__).splitlines()) <= 60
     said = capsys.readouterr().out
     assert said.count("--goals.window ") == 2  # of which one is an example
-    assert "number of recent goals in a cell's interest" in " ".join(said.split())
+    assert "number of recent goals that a cell remembers" in " ".join(said.split())
 
 
 PARTS_OF_PRACTICE = {
