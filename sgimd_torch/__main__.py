@@ -1,4 +1,4 @@
-"""The command ``sgimd``, also ``python -m sgimd_torch``; each of its commands is a module, loaded when asked for."""
+"""The command ``sgimd``, also ``python -m sgimd_torch``; the module of a command is loaded when it is called."""
 
 from __future__ import annotations
 
@@ -14,29 +14,29 @@ from sgimd_torch.runs.process import command, loading
 
 HELP: Final = f"""usage: sgimd COMMAND [OPTIONS]
 
-A robot arm learns where its float can land, by its own curiosity and by imitating a teacher
+Robots learn movements for goals by curiosity and by imitating a teacher
 (SGIM-D; Nguyen & Oudeyer, 2014).
 
 commands:
 {"".join(f"  {name:16}{about('command', name)}{chr(10)}" for name in WORDS["command"])}
 examples:
-  sgimd demo                                         see it learn, in a minute or two
+  sgimd demo                                         three learners learn to fish, in a minute or two
   sgimd run --algorithm sgim-d --seed 3              one run of 5000 movements, into runs/sgim-d/seed-003
-  sgimd run --algorithm sgim-d --seed 3 --resume     after Ctrl-C or a power cut
-  sgimd run --environment mypackage.toss:make        on a robot of your own
-  sgimd check mypackage.toss:make                    what is wrong with it, if anything
-  sgimd benchmark pool --out goals.npz               goals for it, where runs in pool have been
+  sgimd run --algorithm sgim-d --seed 3 --resume     go on with this run after Ctrl-C or a power cut
+  sgimd check mypackage.toss:make                    find the mistakes in a robot of your own
+  sgimd run --environment mypackage.toss:make        one run on it
+  sgimd benchmark pool --out goals.npz               make goals for evaluation where the runs in pool have been
   sgimd demonstrations check shown.npz --task fishing-rod
   sgimd sweep --vary goals=interest-map,uniform --seeds 0-9 --out study
-  sgimd table study                                  error of each variant, over its seeds
-  sgimd report study                                 curves, maps and tables on one page
+  sgimd table study                                  print the error of each variant, over its seeds
+  sgimd report study                                 write curves, maps and tables to one page
 
 sgimd COMMAND --help explains a command; sgimd --version prints the version."""
 
 
 def main() -> int:
-    """Run the command that the first word names; the exit code."""
-    for library in ("OMP", "OPENBLAS", "MKL"):  # matrices are small here: their threads would only wait for each other
+    """Run the command that the first word names, and return its exit code."""
+    for library in ("OMP", "OPENBLAS", "MKL"):  # for small matrices several threads are slower
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")
     return command(_call)
 

@@ -1,7 +1,7 @@
-"""Parts of a learner: what each kind is given, must do and may do.
+"""Parts of a learner: one base class for each kind, with what a part must do and may do.
 
-A part derives from the class of its kind and is built from one `Problem`. Its options are keywords with a default;
-``sgimd run`` takes them, too. Abstract methods must be there, all others have a default.
+A part derives from the class of its kind and is built from one `Problem`. Its options are keywords with a default, and
+also options of ``sgimd run``. A part must define the abstract methods; all other methods have a default.
     class Mine(Goals): ...
     learner = sagg_riac(environment, seed, goals=Mine)       # sgimd run --goals mine:Mine --goals.candidates 5
 """
@@ -24,26 +24,26 @@ Made = TypeVar("Made")
 
 
 class Problem:
-    """What has to be learnt, and what was made for it before: every part is given it.
+    """Problem to learn: spaces, noise, memory and random streams, which every part is built from.
 
     Args:
-        environment: robot and world; its boxes, rest and noise are read, it is not executed.
+        environment: robot and world; boxes, rest and noise are read, and nothing is executed.
         seed: number from which all random streams of the learner come, at least 0.
-        memory: exemplars to start from, which are copied; None for none.
+        memory: exemplars to start from; they are copied. None for none.
         inverse: constructor of the inverse model.
 
     Attributes:
         contexts, policies, outcomes: boxes C, Pi and T.
         rest: ``(outcome_dim,)`` tau_org, the outcome of not moving.
         outcome_noise: standard deviation of each outcome dimension, in the unit of T.
-        tolerance: distance in the unit of T at which a goal counts as reached: the noise, but at least .02.
+        tolerance: distance in the unit of T at which a goal counts as reached: the outcome noise, but at least .02.
         memory: exemplars of the learner.
-        inverse: inverse model, the first part that is made.
-        remarks: sentences that a run should be told, as on a part that another one switches off.
-        autonomous: strategy of the learner's own, made before the answer to demonstrations.
+        inverse: inverse model, which is made before all other parts.
+        remarks: sentences for the user, for example that one part switches another one off.
+        autonomous: autonomous strategy, which is made before the social one.
 
     Raises:
-        ValueError: a robot that `check_robot` refuses; exemplars of other dimensions, or with thetas outside Pi.
+        ValueError: `check_robot` refuses the robot, or exemplars do not fit it.
     """
 
     autonomous: Strategy
@@ -72,29 +72,29 @@ class Problem:
         return self.contexts.dim, self.policies.dim, self.outcomes.dim
 
     def stream(self, name: str) -> np.random.Generator:
-        """The random stream of a name; the same name gives the same stream."""
+        """The random stream of this ``name``; each call returns the same object."""
         return self.shared(name, lambda: stream(self.seed, name))
 
     def shared(self, key: object, make: Callable[[], Made]) -> Made:
-        """The one object of this ``key``, for all parts that ask; made at the first call."""
+        """Object that all parts share under this ``key``; the first call makes it."""
         if key not in self._shared:
             self._shared[key] = make()
         return self._shared[key]
 
     def over(self, memory: Memory) -> Problem:
-        """This problem with another memory, for a part that looks at some exemplars only."""
+        """This problem with another ``memory``, for a part that uses some exemplars only."""
         other = copy(self)
         other.memory = memory
         return other
 
     @property
     def trained(self) -> list[Trained]:
-        """Shared objects that have to be trained."""
+        """Shared objects that need training."""
         return [each for each in self._shared.values() if isinstance(each, Trained)]
 
 
 class Part(Built):
-    """A part of a learner. One that draws has ``rng`` for it, the random stream ``draws_from`` of the problem."""
+    """A part of a learner. Its random numbers come from ``rng``, the stream of the problem named ``draws_from``."""
 
     draws_from: str = ""
 
@@ -108,25 +108,25 @@ class Part(Built):
 
 
 class Trained(ABC):
-    """Something shared by parts that is trained while the learner moves, as a forward model is."""
+    """Object that parts share and that is trained while the learner moves, such as a forward model."""
 
     @abstractmethod
     def refresh(self, memory: Memory, goal: Array | None = None) -> Any:
-        """Learn from a movement for ``goal`` ``(outcome_dim,)`` that has come into ``memory``."""
+        """Learn from the newest exemplar in ``memory``, a movement for ``goal`` ``(outcome_dim,)``."""
 
     @abstractmethod
     def listener(self, life: Any) -> Any:
-        """A `runs.listeners.Listener` that does so in this `runs.run.Life`."""
+        """A `runs.listeners.Listener` that calls `refresh` in this `runs.run.Life`."""
 
 
 class Goals(Part):
-    """Goal model: which goal next, given what came of earlier ones (section 3.2). `goals.checks` has its checks."""
+    """Goal model: chooses goals by the results of earlier ones (section 3.2). `goals.checks` checks its arguments."""
 
     draws_from = "goals"
 
     @abstractmethod
     def sample(self, context: Array) -> Array:
-        """``(outcome_dim,)`` a goal in T for this ``context`` ``(context_dim,)``."""
+        """A goal ``(outcome_dim,)`` in T for this ``context`` ``(context_dim,)``."""
 
     @abstractmethod
     def add(
@@ -139,50 +139,48 @@ class Goals(Part):
             goal: ``(outcome_dim,)`` in T.
             competence: competence at this goal now, in [-1, 0].
             strategy: name of the strategy that had chosen the goal.
-            gain: rise of the best competence remembered at this goal; without a rise, what the attempt came to, less
-                what was known before; in [-1, 1].
+            gain: rise of the competence at this goal; without one, that of the attempt alone minus that before it.
         """
 
     @property
     def regions(self) -> Sequence[Any]:
-        """Leaves of its map of C x T, each a `goals.regions.Region`. Default: none."""
+        """Leaves of the map of C x T, each a `goals.regions.Region`. Default: none."""
         return ()
 
 
 class Inverse(Part):
-    """Inverse model: which movement should reach a goal (section 4.4.2). It reads the memory, and draws nothing."""
+    """Inverse model: infers a movement for a goal (section 4.4.2). It reads the memory and draws nothing."""
 
     @abstractmethod
     def __call__(self, context: Array, goal: Array) -> Estimate:
-        """The estimate for a ``goal`` ``(outcome_dim,)`` in a ``context`` ``(context_dim,)``.
+        """Estimate of the movement for a ``goal`` ``(outcome_dim,)`` in a ``context`` ``(context_dim,)``.
 
         Raises:
             RuntimeError: the memory is empty.
         """
 
     def answer_many(self, contexts: Array, goals: Array) -> list[Estimate]:
-        """Estimates by which evaluations judge: for ``goals`` ``(n, outcome_dim)`` in ``contexts``
-        ``(n, context_dim)``. Default: one by one."""
+        """Estimates for ``goals`` ``(n, outcome_dim)`` in ``contexts`` ``(n, context_dim)``. Default: one by one."""
         return [self(context, goal) for context, goal in zip(contexts, goals, strict=True)]
 
     def predict(self, context: Array, theta: Array) -> Array | None:
-        """``(outcome_dim,)`` expected outcome of ``theta`` ``(theta_dim,)``; None if it cannot tell, the default."""
+        """Expected outcome ``(outcome_dim,)`` of ``theta`` ``(theta_dim,)``; None, the default, if it is unknown."""
         return None
 
     def effects(self) -> Memory | None:
-        """Exemplars that changed anything, in a robot most of whose movements change nothing; None, the default, if
-        all do."""
+        """Exemplars with an effect, for a robot most of whose movements have none; None, the default, if all have
+        one."""
         return None
 
 
 class Search(Part):
-    """Search: movement by movement from an estimate towards a goal (section 4.4.2)."""
+    """Search: movements from an estimate towards a goal, one by one (section 4.4.2)."""
 
     draws_from = "search"
 
     @abstractmethod
     def __call__(self, start: Estimate, goal: Array) -> Generator[Array, Array, None]:
-        """Yield thetas ``(theta_dim,)`` in Pi to execute; each is sent its outcome ``(outcome_dim,)``."""
+        """Yield thetas ``(theta_dim,)`` in Pi to execute; the caller sends the outcome ``(outcome_dim,)`` of each."""
 
 
 class Explore(Part):
@@ -192,51 +190,52 @@ class Explore(Part):
 
     @abstractmethod
     def __call__(self, context: Array) -> Array:
-        """``(theta_dim,)`` the next movement, in Pi."""
+        """The next movement, ``(theta_dim,)`` in Pi."""
 
     @property
     def share(self) -> float | None:
-        """Probability of a global movement; None, the default, leaves it to competence."""
+        """Probability of a global movement; None, the default, if it follows from competence."""
         return None
 
 
 class Judge(Part):
-    """Judge: the competence that a goal model is told when an attempt has ended (eq. 2)."""
+    """Judge: measures the competence of an attempt, which the goal model is told at its end (eq. 2)."""
 
     @abstractmethod
     def __call__(self, context: Array, goal: Array, outcomes: Array) -> float:
-        """Competence in [-1, 0] at ``goal``, by the ``outcomes`` ``(n, outcome_dim)`` of the attempt."""
+        """Competence in [-1, 0] at ``goal``, from the ``outcomes`` ``(n, outcome_dim)`` of the attempt."""
 
 
 class Strategy(Part):
-    """What a learner does on its own."""
+    """Autonomous strategy: what a learner does without a demonstration."""
 
     @abstractmethod
     def attempt(self, context: Array) -> AskingAttempt:
-        """Yield movements in one context, at least one movement or rest, also if no request is answered."""
+        """Yield the movements of an attempt in one context. It must contain a movement or a rest, even without a
+        reply."""
 
     @property
     def regions(self) -> Sequence[Any]:
-        """Regions of its goal model. Default: none."""
+        """Regions of the goal model. Default: none."""
         return ()
 
 
 class Social(Part):
-    """How a learner answers a demonstration (sections 3.2.3 and 4.2)."""
+    """Social strategy: what a learner does after a demonstration (sections 3.2.3 and 4.2)."""
 
     @abstractmethod
     def attempt(self, context: Array, theta_d: Array, demonstration: Demonstration) -> Attempt:
-        """Yield movements, or none, after ``demonstration``, which corresponds to ``theta_d`` ``(theta_dim,)``."""
+        """Yield movements, or none, after a ``demonstration`` whose policy is ``theta_d`` ``(theta_dim,)``, eq. (6)."""
 
 
 class Teacher(Built):
-    """Teacher who demonstrates of their own accord: the paper's What, How and When in one call (section 2.3).
+    """Teacher who demonstrates without being asked: the paper's What, How and When (section 2.3).
 
-    Built from ``(demonstrations, rng)`` and options.
+    The constructor gets ``(demonstrations, rng)`` and options.
 
     Attributes:
-        who: name in the record of whoever has shown the last offer.
-        needs_demonstrations: False for somebody who has nothing prepared.
+        who: name, in the record, of the person who has shown the last offer.
+        needs_demonstrations: False for a teacher without prepared demonstrations.
     """
 
     needs_demonstrations: ClassVar[bool] = True
@@ -245,4 +244,5 @@ class Teacher(Built):
 
     @abstractmethod
     def offer(self, index: int, memory: Memory) -> Demonstration | None:
-        """A demonstration before movement ``index`` (0, 1, ...) of the learner with this ``memory``, or None."""
+        """The demonstration before movement ``index`` (0, 1, ...) of the learner with this ``memory``; None for
+        none."""

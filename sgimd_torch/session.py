@@ -1,4 +1,4 @@
-"""The main loop: a learner in an environment, movement by movement; what a record holds is replayed first.
+"""The main loop: a learner in an environment, movement by movement; a record is replayed first.
 
 Algorithm 1 of Nguyen & Oudeyer (2014).
     for episode in run(learner, environment, seed, movements=5000, teacher=teacher): ...
@@ -28,11 +28,11 @@ if TYPE_CHECKING:
     from sgimd_torch.record import Record
 
 Execute = Callable[[int, Array, Array], Array]
-"""(index, context, theta) -> outcome of movement ``index``."""
+"""Function (index, context, theta) -> outcome of movement ``index``."""
 
 
 class NoOutcomeError(RuntimeError):
-    """So many movements in a row have failed that somebody should look; ``__cause__`` is what the last one raised."""
+    """Too many movements in a row have failed; ``__cause__`` is the exception of the last one."""
 
 
 def run(
@@ -47,35 +47,35 @@ def run(
     record: Record | None = None,
     failures: int = FAILURES,
 ) -> Iterator[Episode]:
-    """Let ``learner`` make ``movements`` movements, counting those at rest and those that fail.
+    """Let ``learner`` make movements until it has made ``movements``; rests and failed movements count.
 
-    A movement fails if ``environment`` raises, or gives anything else than one finite outcome. The learner remembers
+    A movement fails if ``environment`` raises, or returns anything but one finite outcome. The learner remembers
     nothing of it and ends its attempt; the next movement has the next stream.
 
-    A context is observed when an attempt begins, and holds until it ends. The answer to a demonstration takes place in
+    A context is observed when an attempt begins, and stays until it ends. Movements after a demonstration are made in
     the context of the demonstration.
 
     Args:
-        learner: is asked, told and shown. The caller may stop iterating at any time and go on using it; if a
-            movement was broken off, as by Ctrl-C, after ``learner.interrupt()``.
-        environment: is observed and executed.
-        seed: of the environment's streams.
-        movements: in all, counting those that ``learner`` has made before: its run goes on.
-        teacher: is asked before every movement whether it demonstrates.
-        teachers: by name, for a learner that asks for demonstrations. One that fails, or shows what this robot cannot
-            use, counts as one without an answer, with a `RuntimeWarning`; so does one that raises TimeoutError.
-        execute: is called instead of the environment's, see ``live``.
-        record: what it holds is lived through again first, without executing anything or asking ``teachers``; what
-            happens then is added to it. It is for a learner and a teacher freshly built.
-        failures: failed movements in a row that end the run; at least 1.
+        learner: learner of this environment. The caller may stop iterating at any time and use the learner again. If
+            Ctrl-C has broken off a movement, call ``learner.interrupt()`` first.
+        environment: robot and world, which are observed and executed.
+        seed: number from which the environment's random streams come.
+        movements: number of movements in all; those that ``learner`` has made before count.
+        teacher: teacher who may demonstrate before each movement; None for none.
+        teachers: teachers by name, for a learner that asks. One that fails, shows a demonstration that this robot
+            cannot use or raises TimeoutError counts as one without a reply, with a `RuntimeWarning`.
+        execute: function that replaces the environment's, see ``live``.
+        record: record to write. Its events are replayed first: nothing is executed, and no one of ``teachers`` is
+            asked. Learner and teacher must be freshly built.
+        failures: number of failed movements in a row that ends the run, at least 1.
 
     Yields:
         Every episode, after the learner was told its outcome.
 
     Raises (when iterated):
-        ValueError: ``movements`` is not such a number, or the learner has made as many already; or it asks a teacher of
-            another name.
-        NoOutcomeError: ``failures`` movements in a row have failed. They are made; a `run` may go on after them.
+        ValueError: ``movements`` is not above the number that the learner has made, or the learner asks a teacher of
+            unknown name.
+        NoOutcomeError: ``failures`` movements in a row have failed. They count; another `run` may go on after them.
     """
     check_count("failures", failures, 1)
     if not isinstance(learner, Learner):
@@ -86,7 +86,7 @@ def run(
     made = learner.movements
     if check_count("movements", movements, 1) <= made:
         raise ValueError(
-            f"movements must be above {made}, which the learner has made already and which count, got {movements}"
+            f"movements must be above {made}, the number that the learner has made already, got {movements}"
         )
     execute = live(environment, seed) if execute is None else execute
     before = BeforeMovement()
@@ -124,7 +124,7 @@ def run(
 
 
 def _offered(learner: Learner, teacher: Teacher | None, index: int, before: BeforeMovement) -> BeforeMovement:
-    """Let the teacher offer a demonstration, unless one waits for an answer."""
+    """Let the teacher offer a demonstration, unless the learner has one that it has not yet used."""
     if teacher is None or learner.lesson_waits:
         return before
     offered = teacher.offer(index, learner.memory)
@@ -148,7 +148,7 @@ def _asked(
     teachers: Mapping[str, Demonstrator],
     before: BeforeMovement,
 ) -> BeforeMovement:
-    """Let the learner ask one of the ``teachers`` for a demonstration, and show it the answer."""
+    """Let the learner ask one of the ``teachers`` for a demonstration, and show it the reply."""
     request = learner.request(context)
     if request is None:
         return before
@@ -165,15 +165,15 @@ class _NoOutcome(Exception):
 
 
 def _tried(name: str, dim: int, robot: Callable[..., ArrayLike], *given: Any) -> Array:
-    """What the robot gives, as ``(dim,)`` finite numbers."""
+    """Result of a call of the robot, as ``(dim,)`` finite numbers."""
     try:
         return read_only(check_point(name, robot(*given), dim))
-    except (Exception, SystemExit) as error:  # whatever a robot does, it must not end the learner's life
+    except (Exception, SystemExit) as error:  # no failure of a robot may end the run
         raise _NoOutcome(reason_of(error)) from error
 
 
 def reason_of(error: BaseException) -> str:
-    """Why a robot failed, in one line of at most 300 characters that a terminal can show."""
+    """Reason why a robot failed, in one line of at most 300 printable characters."""
     simulated = isinstance(error, SimulationError)
     said = str(error) if simulated else "".join(traceback.format_exception_only(error))
     return "".join(sign if sign.isprintable() else " " for sign in said)[:300].strip()
@@ -182,13 +182,13 @@ def reason_of(error: BaseException) -> str:
 def _answer(
     learner: Learner, environment: Environment, context: Array, request: Request, teachers: Mapping[str, Demonstrator]
 ) -> tuple[Demonstration | None, str]:
-    """The answer to a request, None if there is none that is new and that the learner can use; and ``Episode.reply``.
+    """The demonstration that replies to a request, or None without one that is new and usable; and ``Episode.reply``.
 
-    The attempt stays in its own context: a demonstration of another one is a hint, as long as that lies in C.
+    The attempt stays in its own context. A demonstration from any other context in C is accepted as a hint.
     """
     name = request.teacher
     if name not in teachers:
-        raise ValueError(f"the learner asks {name!r}, but teachers are {', '.join(teachers)}; are they those it knows?")
+        raise ValueError(f"the learner asks {name!r}, but teachers are {', '.join(teachers)}; are they its own?")
     try:
         shown = teachers[name].demonstrate(context.copy(), request.goal, learner.memory)
         if shown is None:
@@ -197,9 +197,9 @@ def _answer(
         environment.outcomes.check("outcome of the demonstration", shown.outcome)
         return (None, "again") if learner.was_shown(shown) else (shown, "shown")
     except TimeoutError as error:
-        said, reply = f"did not answer in time, so the learner goes on: {error}", "timed out"
-    except Exception as error:  # whatever a teacher does, it must not end the learner's life
-        said = f"gave no answer that can be used, so the learner goes on: {type(error).__name__}: {error}"
+        said, reply = f"did not reply in time, so the learner goes on: {error}", "timed out"
+    except Exception as error:  # no failure of a teacher may end the run
+        said = f"gave no usable demonstration, so the learner goes on: {type(error).__name__}: {error}"
         reply = "failed"
     warnings.warn(f"teacher {name} {said}", RuntimeWarning, stacklevel=4)
     return None, reply

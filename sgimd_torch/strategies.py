@@ -1,7 +1,7 @@
-"""Policy space exploration: what the robot does next, on its own or after a demonstration.
+"""Strategies of exploration: the next movement, autonomous or after a demonstration.
 
-Sections 3.1, 4.2 and 4.4 of Nguyen & Oudeyer (2014). An attempt is a generator: it yields a movement and is sent the
-outcome. So it reads like the paper's pseudo-code, and a demonstration can interrupt it at any movement.
+Sections 3.1, 4.2 and 4.4 of Nguyen & Oudeyer (2014). An attempt is a generator: it yields a movement, and the learner
+sends the outcome. So it reads like the paper's pseudo-code, and a demonstration can interrupt it at any movement.
     autonomous: Babble, Rest, GoalBabbling          social: Mimic, Imitate, Emulate, Remember
 """
 
@@ -30,7 +30,7 @@ class Babble(Strategy):
 
 
 class Rest(Strategy):
-    """Stay still for one movement: the observation learner, or the imitation learner before the first demonstration."""
+    """Rest for one movement: observation learner, or imitation learner before the first demonstration."""
 
     def attempt(self, context: Array) -> Attempt:
         """No movement."""
@@ -40,26 +40,26 @@ class Rest(Strategy):
 class GoalBabbling(Strategy):
     """Goal-directed policy optimisation, section 4.4: choose a goal, then search for a movement that reaches it.
 
-    The inverse model is that of the problem. Competence, by all movements remembered, decides between the regimes.
+    The competence at the goal, from all remembered movements, decides between global and local movements.
 
     Args:
-        problem: what has to be learnt, with its inverse model.
+        problem: problem to learn; its inverse model is used.
         goals: goal model.
         search: search, which refines the estimate of the inverse model.
-        explore: explorer, for the movements of the global regime.
-        judge: judge of the competence that the goal model is told at the end of an attempt.
-        budget: largest number of movements for one goal. Deviation: the paper has no such number; with a complete
-            simplex of 26 movements a goal would take 60 or so, and a learner with the rod would come to a hundred goals
-            in its life.
-        tolerance: distance in the unit of T at which a goal counts as reached; None for the outcome noise, but at least
-            .02.
-        global_range: least and greatest probability of the global exploration regime.
-        give_up: competence below which a goal is given up at the first movement that does not raise it; -1 never gives
-            up. Deviation: the paper spends the whole budget on every goal. But in a task space far larger than what can
-            be reached nearly all goals are hopeless, and movements spent on them are lost.
+        explore: explorer, which makes the global movements.
+        judge: judge, which measures the competence of an attempt for the goal model.
+        budget: largest number of movements for one goal. Deviation: the paper has no such number. With a complete
+            simplex of 26 movements a goal would take about 60, and a learner with the rod could try only a hundred
+            goals.
+        tolerance: distance, in the unit of outcomes, at which a goal counts as reached; None for the outcome noise, but
+            at least .02.
+        global_range: least and greatest probability of a global movement instead of a movement of the search.
+        give_up: competence, from -1 to 0, below which a goal is given up after a movement without progress; -1 never
+            gives up. Deviation: the paper spends the whole budget on every goal. In a task space far larger than the
+            reachable part, nearly all goals are hopeless, and movements for them are lost.
 
     Raises:
-        ValueError: a number out of its range, or a part of another kind.
+        ValueError: a number is out of its range, or a part is of another kind.
     """
 
     draws_from = "regime"
@@ -96,7 +96,7 @@ class GoalBabbling(Strategy):
 
     @property
     def regions(self) -> Sequence[Any]:
-        """Regions of its goal model."""
+        """Regions of the goal model."""
         return self.goals.regions
 
     def attempt(self, context: Array) -> Attempt:
@@ -104,7 +104,7 @@ class GoalBabbling(Strategy):
         yield from self.pursue(context, self.goals.sample(context))
 
     def pursue(self, context: Array, goal: Array, strategy: str = "autonomous") -> Attempt:
-        """Search until ``goal`` is reached or given up, the budget is spent, or a demonstration interrupts."""
+        """Pursue ``goal`` until it is reached or given up, the budget is spent, or a demonstration interrupts."""
         outcomes: list[Array] = []
         before = best = self.competence(context, goal)
         moves = self._explore(context, goal)
@@ -123,22 +123,22 @@ class GoalBabbling(Strategy):
             self.conclude(context, goal, outcomes, before, strategy)
 
     def conclude(self, context: Array, goal: Array, outcomes: list[Array], before: float, strategy: str) -> None:
-        """Goal interest mapping at the end of an attempt with these ``outcomes``; nothing if it made no movement.
+        """Tell the goal model the result of an attempt with these ``outcomes``; nothing if it made no movement.
 
         Args:
             before: competence at the goal when the attempt began.
-            strategy: "autonomous", "social" or another name: who had chosen the goal, and how it was pursued.
+            strategy: name of the strategy that chose the goal: "autonomous", "social" or another one.
         """
         if outcomes:
             judged, after = self.judge(context, goal, np.stack(outcomes)), self.competence(context, goal)
-            # Where contexts vary, a new exemplar nearer in (context, outcome) may be farther in outcome alone: no loss.
+            # A new exemplar nearer in (context, outcome) may be farther in outcome alone. That is no loss.
             gain = max(0.0, after - before)
-            if gain == 0 and judged != after:  # an attempt judged by itself, which may be worse than what was known
+            if gain == 0 and judged != after:  # the judge saw the attempt alone, which may be worse than the memory
                 gain = min(0.0, judged - before)
             self.goals.add(context, goal, judged, strategy, gain)
 
     def _explore(self, context: Array, goal: Array) -> Attempt:
-        """Endless movements, in the global exploration or the local optimisation regime."""
+        """Endless movements, each by global exploration or by local optimisation."""
         while True:
             if self.rng.random() < self._global_probability(context, goal):
                 # Deviation: the paper prints "theta in T", which must be Pi.
@@ -147,16 +147,16 @@ class GoalBabbling(Strategy):
                 yield from self._optimise(context, goal)
 
     def _global_probability(self, context: Array, goal: Array) -> float:
-        """Global exploration is the more likely, the farther the goal is from all that was reached."""
+        """Probability of global exploration: the farther the goal from all reached outcomes, the higher."""
         if len(self.memory) == 0:
             return 1.0
         if self.explore.share is not None:
             return self.explore.share
-        # Deviation: the paper's probability is -J itself. It is kept off 0 and 1, so that both regimes stay possible.
+        # Deviation: the paper's probability is -J itself. Here it stays off 0 and 1, so both regimes stay possible.
         return float(np.clip(-self.competence(context, goal), *self.global_range))
 
     def _optimise(self, context: Array, goal: Array) -> Attempt:
-        """The movements of a search from the inverse model's estimate, until the search ends by itself."""
+        """Movements of a search that begins at the estimate of the inverse model, until the search ends."""
         search = self.search(self.inverse(context, goal), goal)
         theta = next(search, None)
         while theta is not None:
@@ -168,16 +168,16 @@ class GoalBabbling(Strategy):
 
 
 class Mimic(Social):
-    """Imitate a policy, section 4.2: repeat theta_d with small variations, the first time exactly.
+    """Imitate a policy, section 4.2: execute theta_d exactly, then with small variations.
 
     Args:
-        problem: what has to be learnt.
-        repeats: movements for one demonstration; None goes on until the next demonstration.
-        epsilon: bound of the variation in each parameter, |theta_rand| < epsilon.
+        problem: problem to learn.
+        repeats: number of movements for one demonstration; None for all until the next demonstration.
+        epsilon: largest variation of each parameter, in the unit of the parameter.
         draws_from: name of the random stream of the variations.
 
     Raises:
-        ValueError: a number out of its range.
+        ValueError: a number is out of its range.
     """
 
     def __init__(
@@ -199,7 +199,7 @@ class Mimic(Social):
         yield from self.repeat(theta_d, demonstration.outcome, [])
 
     def repeat(self, theta_d: Array, goal: Array, outcomes: list[Array]) -> Attempt:
-        """Movements; their outcomes are appended to ``outcomes``."""
+        """The movements of an imitation; their outcomes are appended to ``outcomes``."""
         for repeat in range(self.repeats) if self.repeats is not None else itertools.count():
             # Deviation: the paper varies all repeats; the exact one shows what theta_d itself leads to.
             theta = theta_d if repeat == 0 else self._vary(theta_d)
@@ -210,15 +210,14 @@ class Mimic(Social):
 
 
 class Imitate(Mimic):
-    """A short imitation, then emulation of the goal, as in SGIM-D.
+    """Imitates the demonstration, then tells the goal model the competence at its outcome, as in SGIM-D.
 
-    Section 3.2.3: afterwards the goal model is told the competence at the demonstrated outcome. An outcome outside T is
-    imitated, but never a goal.
+    Section 3.2.3. A demonstration with an outcome outside T is imitated, but its outcome is no goal.
 
     Args:
-        problem: what has to be learnt, with its goal babbling.
-        repeats: movements for one demonstration; None goes on until the next demonstration.
-        epsilon: bound of the variation in each parameter, |theta_rand| < epsilon.
+        problem: problem to learn, with the goal babbling of the learner.
+        repeats: number of movements for one demonstration; None for all until the next demonstration.
+        epsilon: largest variation of each parameter, in the unit of the parameter.
     """
 
     def __init__(self, problem: Problem, *, repeats: int | None = 10, epsilon: float = 0.05) -> None:
@@ -240,11 +239,11 @@ class Imitate(Mimic):
 
 
 class Emulate(Social):
-    """Pursues the demonstrated outcome, but not by the demonstrated movement.
+    """Pursues the demonstrated outcome as a goal, but does not use the demonstrated movement.
 
     Args:
-        problem: what has to be learnt.
-        strategy: name of the strategy that the goal model is told.
+        problem: problem to learn, with the goal babbling of the learner.
+        strategy: name of the strategy, for the goal model.
     """
 
     def __init__(self, problem: Problem, *, strategy: str = "social") -> None:
@@ -258,7 +257,7 @@ class Emulate(Social):
 
 
 class Remember(Social):
-    """Learn by observation: remember (theta_d, tau_d) as if it had been executed, and do not move."""
+    """Learn by observation: remember (theta_d, tau_d) like an executed movement, and do not move."""
 
     def attempt(self, context: Array, theta_d: Array, demonstration: Demonstration) -> Attempt:
         """No movement."""
@@ -267,7 +266,7 @@ class Remember(Social):
 
 
 def _babbling(problem: Problem) -> GoalBabbling:
-    """The goal babbling of a learner, whose goals a demonstration adds to."""
+    """Goal babbling of the learner, which demonstrated goals are added to."""
     if not isinstance(problem.autonomous, GoalBabbling):
         raise ValueError(f"a demonstrated goal needs goal babbling, got a {type(problem.autonomous).__name__}")
     return problem.autonomous

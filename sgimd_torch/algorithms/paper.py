@@ -1,11 +1,11 @@
-"""The five learners of the paper, a few lines each: which strategy is in which slot?
+"""The five learners of the paper, each built from an autonomous and a social strategy.
 
 Section 5.1 of Nguyen & Oudeyer (2014). Every part is a keyword, so an ablation changes one word:
     learner = sgim_d(environment, seed, correspondence=environment.primitive.correspondence, goals=UniformGoals)
-A part is given as its constructor; `sgimd_torch.parts` says what each kind is given and must do.
+A part is given as its constructor; `sgimd_torch.parts` describes each kind of part.
 
-Every algorithm takes a ``memory`` to start from, which it copies: of another run, of another version of the robot, or
-of demonstrations, such as the memory of an ``observation`` learner that has watched them all.
+Every algorithm copies the ``memory`` that it starts from. This may be the memory of another run, of another version of
+the robot, or of an ``observation`` learner that has watched all demonstrations.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from sgimd_torch.parts import Problem, Social
 from sgimd_torch.searches.simplex import NelderMead
 from sgimd_torch.strategies import Babble, GoalBabbling, Imitate, Mimic, Remember, Rest
 
-# Deviation: the paper infers by eq. (9) alone, which is `LocalInverse`. `LocalProcess` answers better.
+# Deviation: the paper infers by eq. (9) alone, which is `LocalInverse`; `LocalProcess` has smaller errors.
 
 
 def random_exploration(
@@ -43,7 +43,7 @@ def observation(
     inverse: MakeInverse = LocalProcess,
     memory: Memory | None = None,
 ) -> Learner:
-    """Watches and remembers, never moves: learning by observation."""
+    """Learning by observation: remembers each demonstration and never moves."""
     problem = Problem(environment, seed, memory, inverse=inverse)
     return Learner(problem, Rest(problem), social=Remember(problem), correspondence=correspondence)
 
@@ -60,10 +60,10 @@ def imitation(
     """Repeats the last demonstration with small variations until the next one.
 
     Args:
-        environment: robot, which is not executed here.
+        environment: robot and world; nothing is executed here.
         seed: number from which all random streams of the learner come.
         correspondence: function from times and trajectory to theta_d, eq. (6).
-        epsilon: bound of the variation in each parameter, |theta_rand| < epsilon.
+        epsilon: largest variation of each parameter, in the unit of the parameter.
         inverse: inverse model.
         memory: exemplars to start from; None for none.
     """
@@ -81,12 +81,12 @@ def sagg_riac(
     memory: Memory | None = None,
     **parts: Any,
 ) -> Learner:
-    """Goal babbling without a teacher: SAGG-RIAC.
+    """SAGG-RIAC: goal babbling without a teacher.
 
     Args:
-        environment: robot, which is not executed here.
+        environment: robot and world; nothing is executed here.
         seed: number from which all random streams of the learner come.
-        inverse: inverse model, where searches begin and by which the learner answers.
+        inverse: inverse model; searches begin at its answer.
         memory: exemplars to start from; None for none.
         parts: parts and options of `GoalBabbling`.
     """
@@ -105,14 +105,14 @@ def sgim_d(
     memory: Memory | None = None,
     **parts: Any,
 ) -> Learner:
-    """Goal babbling, interrupted by a short imitation whenever the teacher demonstrates: SGIM-D.
+    """SGIM-D: goal babbling; after each demonstration a short imitation.
 
     Args:
-        environment: robot, which is not executed here.
+        environment: robot and world; nothing is executed here.
         seed: number from which all random streams of the learner come.
         correspondence: function from times and trajectory to theta_d, eq. (6).
-        social: how it answers a demonstration.
-        inverse: inverse model, where searches begin and by which the learner answers.
+        social: social strategy, which uses the demonstrations.
+        inverse: inverse model; searches begin at its answer.
         memory: exemplars to start from; None for none.
         parts: parts and options of `GoalBabbling`.
     """

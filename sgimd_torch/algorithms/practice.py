@@ -1,7 +1,7 @@
-"""Practice, which is ours: goals within reach, and for each one movement, the answer of a local process plus noise.
+"""Practice, our own algorithm: one movement for each goal within reach, the answer of a local process plus noise.
 
-Nothing in it knows a unit or a robot. What the answer gets wrong is what it learns next. Where most movements do
-nothing, it first looks for some that have an effect, and learns from those alone.
+Practice needs no unit and no knowledge of the robot. It learns next where the answer is wrong. Where most movements do
+nothing, it first looks for movements with an effect, and then learns from those alone.
     learner = practice(environment, seed)
 """
 
@@ -43,7 +43,7 @@ def practice(
     memory: Memory | None = None,
     **parts: Any,
 ) -> Learner:
-    """One movement at each goal within reach, by a local process; no teacher."""
+    """Practice: one movement for each goal within reach, by a local Gaussian process; no teacher."""
     problem = Problem(environment, seed, memory, inverse=inverse)
     return Learner(problem, GoalBabbling(problem, **parts))
 
@@ -59,9 +59,9 @@ def practice_taught(
     memory: Memory | None = None,
     **parts: Any,
 ) -> Learner:
-    """Practice that executes each demonstration once, exactly.
+    """Practice, one movement for each goal within reach; executes each demonstration once, exactly.
 
-    Best when all demonstrations come at the start.
+    It learns most when all demonstrations come at the start.
     """
     problem = Problem(environment, seed, memory, inverse=inverse)
     problem.autonomous = GoalBabbling(problem, **parts)

@@ -1,4 +1,4 @@
-"""Learners that ask for demonstrations, a few lines each: SGIM-IM decides when, SGIM-ACTS also whom, how and what for.
+"""Learners that ask for demonstrations: SGIM-IM chooses when, SGIM-ACTS also the teacher, the goal and the strategy.
 
 learner = sgim_acts(environment, seed, correspondence=..., teachers={"ann": ann, "ben": ben}, cost=3)
 learner = sgim_im(environment, seed, correspondence=..., teachers={"ann": ann}, **SEARCHING)     # as in the papers
@@ -37,7 +37,7 @@ SEARCHING: Final[dict[str, Any]] = {
     "repeats": 10,
     "epsilon": 0.05,
 }
-"""Options that make it search at each goal, imitate with variations, and emulate, as in the papers."""
+"""Options of the papers: a search at each goal, imitation with variations, emulation."""
 
 
 @hands_on(GoalBabbling, **STRATEGIC)
@@ -55,18 +55,18 @@ def _asking(
     memory: Memory | None = None,
     **parts: Any,
 ) -> Learner:
-    """A learner that asks. Alone it practises, and executes a demonstration once; `SEARCHING` makes it search.
+    """A learner that asks for demonstrations. By default it practises and executes each demonstration once.
 
     Args:
-        cost: price of a demonstration, in attempts of its own.
-        repeats: movements for one demonstration.
-        epsilon: bound of the variation in each parameter, |theta_rand| < epsilon.
-        inverse: inverse model, where searches begin and by which the learner answers.
+        cost: cost of a demonstration; an attempt of the learner alone costs 1.
+        repeats: number of movements for one demonstration.
+        epsilon: largest variation of each parameter, in the unit of the parameter.        inverse: inverse model;
+            searches begin at its answer.
         memory: exemplars to start from; None for none.
     """
     problem = Problem(environment, seed, memory, inverse=inverse)
     problem.autonomous = babbling = GoalBabbling(problem, **parts)
-    emulates = babbling.budget > 1 and not imitates_only  # one movement at a goal is what it does alone
+    emulates = babbling.budget > 1 and not imitates_only  # emulation by one movement would be an attempt of its own
     asking = dict[str, Asking]()
     for teacher, demonstrator in teachers.items():
         name = f"imitate {teacher}"
@@ -90,12 +90,12 @@ def sgim_acts(
     """SGIM-ACTS: practice; chooses when, whom and what to ask, and how to use the demonstration.
 
     Args:
-        environment: robot, which is not executed here.
+        environment: robot and world; nothing is executed here.
         seed: number from which all random streams of the learner come.
-        correspondence: function from times and trajectory to theta_d, eq. (6).
-        teachers: teachers by name, those that ``run`` is given.
-        options: ``cost``, ``repeats``, ``epsilon``, ``inverse``, ``memory``, and those of `GoalBabbling`, whose goal
-            model has to choose strategies, too.
+        correspondence: function from times and trajectory to theta_d, eq. (6).        teachers: teachers by name, as
+            they are given to ``run``.
+        options: ``cost``, ``repeats``, ``epsilon``, ``inverse``, ``memory``, and options of `GoalBabbling`; its goal
+            model must be a `StrategicGoals`.
     """
     return _asking(environment, seed, False, correspondence=correspondence, teachers=teachers, **options)
 
@@ -109,13 +109,13 @@ def sgim_im(
     teachers: Mapping[str, Demonstrator],
     **options: Any,
 ) -> Learner:
-    """SGIM-IM: practice; chooses when to ask its one teacher.
+    """SGIM-IM: practice; chooses when to ask its only teacher, and for which goal.
 
     Args:
-        environment: robot, which is not executed here.
+        environment: robot and world; nothing is executed here.
         seed: number from which all random streams of the learner come.
-        correspondence: function from times and trajectory to theta_d, eq. (6).
-        teachers: its one teacher, by name.
+        correspondence: function from times and trajectory to theta_d, eq. (6).        teachers: mapping with one
+            teacher, by name.
         options: options of `sgim_acts`.
 
     Raises:
@@ -127,8 +127,8 @@ def sgim_im(
 
 
 sgim_acts_search = partial(sgim_acts, **SEARCHING)
-"""SGIM-ACTS with a search at each goal, as in its paper."""
+"""SGIM-ACTS, as published: a search at each goal instead of practice."""
 sgim_im_search = partial(sgim_im, **SEARCHING)
-"""SGIM-IM with a search at each goal, as in its paper."""
+"""SGIM-IM, as published: a search at each goal instead of practice."""
 sgim_eer = partial(sgim_im, goals=EntropyGoals)
-"""SGIM-IM that asks when a demonstration reduces entropy more."""
+"""SGIM-IM; asks when a demonstration should reduce entropy more than a movement of its own."""

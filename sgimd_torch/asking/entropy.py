@@ -1,11 +1,11 @@
-"""A rival by information: ask when a demonstration should reduce entropy more than a movement of one's own.
+"""A rival that compares entropies: it asks when a demonstration should reduce entropy more than its own movement.
 
 After Kulak & Calinon (2023), "Combining social and intrinsically-motivated learning for multi-task robot skill
-acquisition": the expected epistemic entropy over goals, and how much each mode should reduce it; a demonstration is
-asked for where the epistemic entropy is greatest.
+acquisition". They compute the expected epistemic entropy over goals, and how much each mode should reduce it. The
+learner asks for a demonstration of the goal with the greatest epistemic entropy.
     learner = sgim_im(environment, seed, correspondence=..., teachers={"ann": ann}, goals=EntropyGoals)
-Ours: what is known of the policy for a goal is linear in features of the goal, so that reductions have a closed form;
-and where a movement of one's own would land is told by the earlier attempt that was nearest.
+Ours: the policy for a goal is modelled as linear in features of the goal, so that reductions have a closed form. The
+nearest earlier attempt predicts where a movement of the learner's own would land.
 """
 
 from __future__ import annotations
@@ -22,25 +22,24 @@ from sgimd_torch.inverses.gaussian_process import Kernel, one_thread, squared_di
 from sgimd_torch.parts import Problem
 from sgimd_torch.spaces import Array, Box
 
-_GOALS: Final = 30  # over which the expected entropy is measured
-_KNOWN: Final = 400  # exemplars that a doubt is made from, spread over the memory
-_NOISE: Final = 0.1  # variance of what one exemplar says, in units of the doubt before there was any
-_LENGTH: Final = 0.1  # of the sides of C x T: how far an exemplar says something
+_GOALS: Final = 30  # goals that the expected entropy is averaged over
+_KNOWN: Final = 400  # exemplars that the Gaussian process is fitted to, spread over the memory
+_NOISE: Final = 0.1  # variance of the noise of one exemplar, in units of the prior variance
+_LENGTH: Final = 0.1  # length scale of the kernel, in sides of C x T
 _KERNEL: Final = Kernel(1 / _LENGTH, 1.0, 0.0, _NOISE)
 
 
 @one_thread
 def doubt(known: Array, points: Array) -> Array:
-    """What is not known about the policies for points, by a Gaussian process from outcomes to policies.
+    """Posterior covariance of the policies for points, by a Gaussian process from outcomes to policies.
 
     Deviation: Kulak & Calinon take a Bayesian mixture of Gaussians.
 
     Args:
-        known: ``(n, dim)`` exemplars, in sides of C x T.
-        points: ``(m, dim)``.
+        known: ``(n, dim)`` exemplars, in sides of C x T.        points: ``(m, dim)``, in sides of C x T.
 
     Returns:
-        ``(m, m)`` covariances, given the exemplars. 1 on the diagonal: nothing is known.
+        ``(m, m)`` covariances, given the exemplars; 1 on the diagonal where nothing is known.
     """
     known = _thinned(known)
     across = _KERNEL(squared_distances(points, known))
@@ -50,22 +49,21 @@ def doubt(known: Array, points: Array) -> Array:
 
 
 class EntropyGoals(StrategicGoals):
-    """Goals and strategies by the expected reduction of entropy, to ask teachers.
-
-    See `StrategicGoals`.
+    """Goals and strategies by the expected reduction of entropy, for learners that ask teachers.
 
     Args:
-        problem: C, T and the memory are read.
+        problem: problem to learn.
     """
 
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem)
         self.memory, contexts, outcomes = problem.memory, problem.contexts, problem.outcomes
         self._box = Box(np.concatenate((contexts.low, outcomes.low)), np.concatenate((contexts.high, outcomes.high)))
-        self._tried: dict[str, list[tuple[Array, Array]]] = {}  # goals, and by how much they were missed, in sides
+        self._tried: dict[str, list[tuple[Array, Array]]] = {}  # by strategy: goals, and outcomes minus goals, in sides
 
     def choose(self, context: ArrayLike, costs: Mapping[str, float]) -> tuple[str, Array]:
-        """The mode with the greatest expected reduction over its cost, and a goal ``(outcome_dim,)`` for it.
+        """The strategy with the greatest expected reduction of entropy for its cost, and a goal ``(outcome_dim,)`` for
+        it.
 
         Raises:
             ValueError: ``context`` is not one point of C.
@@ -80,7 +78,7 @@ class EntropyGoals(StrategicGoals):
         doubtful = int(entropies.argmax())
         found = dict[str, float]()
         for number, (name, cost) in enumerate(costs.items(), 1):
-            aimed = range(_GOALS) if name == AUTONOMOUS else [doubtful]  # alone, it pursues any goal
+            aimed = range(_GOALS) if name == AUTONOMOUS else [doubtful]  # alone, the goal is any of them
             reductions = [_reduction(covariance, entropies, number * _GOALS + goal) for goal in aimed]
             found[name] = float(np.mean(reductions)) / cost
         name = max(found, key=lambda each: found[each])
@@ -89,7 +87,7 @@ class EntropyGoals(StrategicGoals):
     def add(
         self, context: ArrayLike, goal: ArrayLike, competence: float, strategy: str = AUTONOMOUS, gain: float = 0.0
     ) -> None:
-        """Where an attempt at a goal has landed is read from memory.
+        """Remember where an attempt at a goal has landed; its outcome is the last one in memory.
 
         Raises:
             ValueError: see `Goals.add`.
@@ -98,13 +96,13 @@ class EntropyGoals(StrategicGoals):
         goals, last = (
             (point - self._box.low) / self._box.sides,
             self._scaled(self.memory.contexts, self.memory.outcomes),
-        )
-        # Without an answer nothing is learnt: as if it had landed where something has landed before.
+        )  # Without a reply nothing is learnt, as if the attempt had landed on an outcome that is known already.
         missed = np.full(len(point), np.nan) if gain == -1.0 else last[-1] - goals
         self._tried.setdefault(strategy, []).append((goals, missed))
 
     def _landing(self, points: Array, strategy: str) -> Array:
-        """Where attempts at ``points`` should end: they miss as the nearest earlier one did; at first not at all."""
+        """Expected outcomes of attempts at ``points``: each misses as the nearest earlier attempt did, the first not at
+        all."""
         tried = self._tried.get(strategy)
         if not tried:
             return points
@@ -124,12 +122,12 @@ def _thinned(known: Array) -> Array:
 
 
 def _entropy(variances: Array) -> Array:
-    """Of Gaussians, but for a constant."""
+    """Entropy of Gaussians with these variances, up to a constant."""
     return 0.5 * np.log(np.maximum(variances, 0) + _NOISE)
 
 
 def _reduction(covariance: Array, entropies: Array, place: int) -> float:
-    """Of the mean entropy of the goals, the first of the points, if there were one more exemplar at a ``place``."""
+    """Reduction of the mean entropy of the goals, the first points, by one more exemplar at point ``place``."""
     n, variances = len(entropies), np.diag(covariance)
     after = variances[:n] - covariance[:n, place] ** 2 / (variances[place] + _NOISE)
     return float((entropies - _entropy(after)).mean())

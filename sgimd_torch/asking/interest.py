@@ -1,7 +1,7 @@
-"""Which strategy, for which goal? Progress of each strategy in each region of C x T; both are drawn together.
+"""Progress of each strategy in each region of C x T: from it, a strategy and its goal are drawn together.
 
 SGIM-ACTS: Nguyen & Oudeyer (2012), "Active choice of teachers, learning strategies and goals for a socially guided
-intrinsic motivation learner". The measure of progress follows later work of that line: Duminy, Nguyen & Duhaut (2019),
+intrinsic motivation learner". The measure of progress follows later work of that group: Duminy, Nguyen & Duhaut (2019),
 "Learning a set of interrelated tasks by using a succession of motor policies for a socially guided intrinsically
 motivated learner".
     goals = StrategicInterest(problem)
@@ -25,26 +25,27 @@ from sgimd_torch.parts import Goals, Problem
 from sgimd_torch.spaces import Array
 
 AUTONOMOUS: Final = "autonomous"
-_FEWEST, _LAST = 4, 10  # attempts that say something, and that progress is measured over
-# Share of the choices whose goal is drawn from all of T, and whose strategy by its interest there.
+_FEWEST, _LAST = 4, 10  # least number of attempts for a measure of progress, and the most that it uses
+# Share of the choices that first draw a goal from all of T, and then a strategy by its interest there.
 _ANYWHERE: Final = 0.5
-_GREATEST: Final = 10  # pairs (region, strategy) of the greatest interest, from which the others are drawn
-_TEMPERATURE: Final = 0.03  # difference of progress that makes interest e times as large
-_UNTRIED: Final = 1.0  # progress that is hoped for: the most that there can be
+_GREATEST: Final = 10  # pairs (region, strategy) of the greatest interest; one of them is drawn
+_TEMPERATURE: Final = 0.03  # rise of progress that makes interest e times as large
+_UNTRIED: Final = 1.0  # progress of an untried strategy, the greatest possible
 
 
 def progresses(competences: Array, gains: Array) -> Array:
-    """(after - before) * max(after, before)^2 of each attempt, of competences in [0, 1]; ours lie in [-1, 0].
+    """Progress of each attempt: (after - before) * max(after, before)^2, with competences shifted from [-1, 0] to [0,
+    1].
 
-    Deviation: ``after`` is what the attempt itself came to, so progress is negative where it came to less than what
-    memory holds. Only this distinguishes a mislabelling teacher from one with nothing new.
+    Deviation: ``after`` is the competence of the attempt itself. So progress is negative if the attempt is worse than
+    the memory. Only this distinguishes a mislabelling teacher from one with nothing new.
     """
     return gains * (1 + competences + np.maximum(-gains, 0)) ** 2
 
 
 def strategic_progress(points: Array, competences: Array, gains: Array) -> float:
-    """The mean of these without its least and its greatest: one exemplar in a new place says nothing of the next one
-    there, but a cut that tells means apart puts it into a small region with few others."""
+    """Mean progress, trimmed by the least and the greatest value, so one lucky exemplar cannot dominate a small
+    region."""
     return float(np.sort(progresses(competences, gains))[1:-1].mean())
 
 
@@ -58,29 +59,29 @@ BY_STRATEGY: Final = partial(InterestMap, g_max=50, window=_LAST, progress=strat
 
 
 class StrategicGoals(Goals):
-    """A goal model that also chooses the strategy by which the goal is pursued."""
+    """Goal model that also chooses a strategy for the goal."""
 
     @abstractmethod
     def choose(self, context: ArrayLike, costs: Mapping[str, float]) -> tuple[str, Array]:
-        """A strategy of those that have ``costs``, and a goal ``(outcome_dim,)`` for it in this context."""
+        """One of the strategies in ``costs``, and a goal ``(outcome_dim,)`` for it in this context."""
 
     def sample(self, context: ArrayLike) -> Array:
-        """A goal for a learner that has no other strategy than the autonomous one."""
+        """A goal for a learner that has only the autonomous strategy."""
         return self.choose(context, {AUTONOMOUS: 1.0})[1]
 
 
 class StrategicInterest(StrategicGoals):
-    """Goals and strategies of most progress for their cost, to ask teachers.
+    """Goals and strategies of most progress for their cost, for learners that ask teachers.
 
-    Interest of each (region, strategy): e^(progress / temperature), over the cost of the strategy. Of its progress,
-    what exceeds that of the cheapest strategy there is divided by the cost, too. See `StrategicGoals`.
+    The interest of a pair (region, strategy) is e^(progress / temperature), divided by the cost of the strategy. If its
+    progress exceeds that of the cheapest strategy there, the excess is divided by the cost, too.
 
-    The papers draw in proportion to progress, and try strategies by chance where they were not tried. Ours: progress
-    can be negative, hence e; and where a strategy was hardly tried, its progress is that of where it was tried nearest.
-    So no choice has to be spent on a strategy drawn at random.
+    Ours: the papers draw in proportion to progress, and try untried strategies by chance. Here progress can be
+    negative, hence the exponential. A strategy with few attempts in a region has the progress of its nearest attempts,
+    so that no choice is spent on a random strategy.
 
     Args:
-        problem: C and T.
+        problem: problem to learn.
         make: constructor of the map of regions; interest is its progress.
     """
 
@@ -95,8 +96,8 @@ class StrategicInterest(StrategicGoals):
         return self._map.regions
 
     def progress(self, region: Region, strategy: str) -> float:
-        """Of a strategy in a region, over its last ten attempts there; or, where it made fewer than 4, over the ten
-        that were nearest to the middle of the region. 1, which is the most, if it made fewer than 4 at all."""
+        """Progress of a strategy in a region, over its last ten attempts there. With fewer than 4 attempts there: over
+        the ten nearest to the middle of the region. With fewer than 4 in all: 1, the greatest possible."""
         tried = self._tried.get(strategy)
         if tried is None or len(tried.points) < _FEWEST:
             return _UNTRIED
@@ -113,7 +114,7 @@ class StrategicInterest(StrategicGoals):
         return found
 
     def choose(self, context: ArrayLike, costs: Mapping[str, float]) -> tuple[str, Array]:
-        """A strategy of those that have ``costs``, and a goal ``(outcome_dim,)`` for it.
+        """One of the strategies in ``costs``, and a goal ``(outcome_dim,)`` for it.
 
         Raises:
             ValueError: ``context`` is not one point of C.
@@ -137,7 +138,7 @@ class StrategicInterest(StrategicGoals):
     def add(
         self, context: ArrayLike, goal: ArrayLike, competence: float, strategy: str = AUTONOMOUS, gain: float = 0.0
     ) -> None:
-        """What ``strategy`` came to at the goal that it was chosen for.
+        """Learn the competence and the gain of an attempt by ``strategy`` at its goal.
 
         Raises:
             ValueError: see `Goals.add`.
@@ -149,8 +150,8 @@ class StrategicInterest(StrategicGoals):
 
 
 class _Tried(NamedTuple):
-    """All attempts of a strategy. ``known``: by the path of a region, its progress there, and for which region and
-    number of attempts that is right."""
+    """All attempts of a strategy. ``known`` caches by path of a region: the region, the number of attempts, the
+    progress."""
 
     points: Array
     competences: Array
@@ -163,6 +164,6 @@ class _Tried(NamedTuple):
         return _Tried(np.vstack((self.points, point)), competences, gains, self.known)
 
     def progress_near(self, point: Array, sides: Array) -> float:
-        """Of the ten attempts that were nearest to a point of C x T with these ``sides``."""
+        """Progress over the ten attempts nearest to a point of C x T; distances are in ``sides``."""
         nearest = np.argsort(np.square((self.points - point) / sides).sum(axis=1), kind="stable")[:_LAST]
         return strategic_progress(self.points[nearest], self.competences[nearest], self.gains[nearest])

@@ -1,9 +1,9 @@
-"""Strategic learning: alone or with a teacher, with which one, how, and for which goal?
+"""Strategic learning: each attempt chooses a goal, and whether to pursue it alone or to ask a teacher.
 
 SGIM-IM and SGIM-ACTS, Nguyen & Oudeyer (2012): "Interactive learning gives the tempo to an intrinsically motivated
 robot learner", and "Active choice of teachers, learning strategies and goals for a socially guided intrinsic motivation
-learner". An attempt chooses a strategy and a goal together, asks for a demonstration of the goal if the strategy needs
-one, and tells the goal model what the strategy came to, at the goal and at what was shown.
+learner". An attempt chooses a strategy and a goal together. If the strategy needs one, it asks for a demonstration of
+the goal. At its end it tells the goal model the competence at the goal and at the demonstrated outcome.
     StrategicBabbling(problem, babbling, {"imitate left": Asking("left", Mimic(problem), cost=2.0)})
 """
 
@@ -22,8 +22,9 @@ from sgimd_torch.strategies import GoalBabbling
 
 
 class Asking(NamedTuple):
-    """A strategy with a teacher: who is asked, how a demonstration is ``answer``-ed, what it costs, and at how many
-    movements the learner rests until it comes."""
+    """Strategy that asks: name of the teacher, social strategy for the demonstration, cost of a demonstration, and
+    number
+    of movements that the learner rests until the reply comes."""
 
     teacher: str
     answer: Social
@@ -32,15 +33,15 @@ class Asking(NamedTuple):
 
 
 class StrategicBabbling(Strategy):
-    """Goal babbling, or asking a teacher: whatever brings most progress for its cost.
+    """Goal babbling, or asking a teacher: the goal model chooses by progress and cost.
 
     Args:
-        problem: what has to be learnt.
-        babbling: autonomous strategy, whose goal model chooses among all strategies.
-        asking: strategies with a teacher, by name.
+        problem: problem to learn.
+        babbling: autonomous strategy; its goal model chooses among all strategies.
+        asking: strategies that ask a teacher, by name.
 
     Raises:
-        ValueError: a cost is not positive, or the goal model does not choose strategies.
+        ValueError: a cost is not positive, or the goal model is no `StrategicGoals`.
     """
 
     def __init__(self, problem: Problem, babbling: GoalBabbling, asking: Mapping[str, Asking]) -> None:
@@ -61,10 +62,10 @@ class StrategicBabbling(Strategy):
         return self.goals.regions
 
     def attempt(self, context: Array) -> AskingAttempt:
-        """Movements by one strategy for one goal; alone if the teacher has no answer.
+        """Movements by one strategy for one goal; autonomous ones if the teacher has no reply.
 
-        Deviation: what it came to is measured at the goal and at what was shown, not at all outcomes on the way.
-        Somebody who mislabels has movements as good as any, only not for what they are asked for.
+        Deviation: competence is measured at the goal and at the demonstrated outcome, not at all outcomes on the way.
+        A mislabelling teacher shows good movements, but not for the goal of the request.
         """
         strategy, goal = self.goals.choose(context, self.costs)
         if strategy == AUTONOMOUS:
@@ -73,7 +74,7 @@ class StrategicBabbling(Strategy):
         teacher, answer, _, takes = self.asking[strategy]
         lesson = yield Request(teacher, goal, strategy)
         before = self.babbling.competence(context, goal)
-        if lesson is None:  # no answer counts as no progress
+        if lesson is None:  # a request without a reply counts as no progress
             self.goals.add(context, goal, -1.0, strategy, -1.0)
             yield from self.babbling.pursue(context, goal)
             return

@@ -1,4 +1,4 @@
-"""Teachers who are asked for a demonstration of a goal, and answer with what they have nearest, or with nothing.
+"""Teachers who are asked for a demonstration of a goal, and reply with the nearest one that they have, or with nothing.
 
 Nguyen & Oudeyer (2012), "Active choice of teachers, learning strategies and goals for a socially guided intrinsic
 motivation learner". The learner asks, see `sgimd_torch.asking`; `run` hands its requests to the teachers.
@@ -21,26 +21,26 @@ from sgimd_torch.spaces import Array, Demonstration, check_count, check_point
 from sgimd_torch.teachers import check_demonstrations
 
 Knows = Callable[[Sequence[Demonstration], np.random.Generator], Sequence[Demonstration]]
-"""(demonstrations, rng) -> those that a teacher has, as they take them to be."""
+"""Function (demonstrations, rng) -> demonstrations that a teacher has, with the outcomes that the teacher states."""
 
 
 def everything(demonstrations: Sequence[Demonstration], rng: np.random.Generator) -> Sequence[Demonstration]:
-    """All of them, as they are."""
+    """All demonstrations, unchanged."""
     return demonstrations
 
 
 def low_half(demonstrations: Sequence[Demonstration], rng: np.random.Generator) -> Sequence[Demonstration]:
-    """Those whose first outcome coordinate is below the median: half the plane."""
+    """Demonstrations whose first outcome coordinate is below the median."""
     return [shown for shown in demonstrations if shown.outcome[0] < middle(demonstrations)]
 
 
 def high_half(demonstrations: Sequence[Demonstration], rng: np.random.Generator) -> Sequence[Demonstration]:
-    """The others."""
+    """Demonstrations whose first outcome coordinate is the median or above."""
     return [shown for shown in demonstrations if shown.outcome[0] >= middle(demonstrations)]
 
 
 def mislabelled(demonstrations: Sequence[Demonstration], rng: np.random.Generator) -> Sequence[Demonstration]:
-    """All of them, each with the outcome of another one: what it is said to show it does not show."""
+    """All demonstrations, each with the outcome of another one, so that every stated outcome is wrong."""
     shift = 1 + int(rng.integers(max(1, len(demonstrations) - 1)))
     order = rng.permutation(len(demonstrations))
     labels = {int(row): demonstrations[label].outcome for row, label in zip(order, np.roll(order, shift), strict=True)}
@@ -51,22 +51,22 @@ def _recorded(number: int, demonstrations: Sequence[Demonstration], rng: np.rand
     here = demonstrations[0]
     theirs = load_demonstrations(SHIPPED.with_name(f"demonstrator_{number}.npz"))
     if theirs[0].trajectory.shape[1] != here.trajectory.shape[1]:
-        raise ValueError(f"demonstrator {number} has shown the fishing rod, and nothing that this robot could do")
+        raise ValueError(f"demonstrator {number} has shown movements of the fishing rod, which this robot cannot make")
     return [replace(shown, context=np.zeros_like(here.context)) for shown in theirs]
 
 
 class AnsweringTeacher(Demonstrator):
-    """Shows the demonstration nearest to the goal, of all there are.
+    """Has all demonstrations; shows the one nearest to the goal.
 
-    Of equally near ones it shows the first.
+    If several are equally near, it shows the first.
 
     Args:
         demonstrations: demonstrations to choose from.
         rng: random stream of ``knows``; nothing is drawn later.
         knows: choice of the demonstrations that this teacher has: `everything`, `low_half`, `high_half`, `mislabelled`
             or your own.
-        within: distance in C x T beyond which there is no reply.
-        takes: movements at which the learner rests until the reply has come.
+        within: distance in C x T beyond which there is no reply.        takes: number of movements that the learner
+            rests until the reply has come.
 
     Raises:
         ValueError: no demonstration, or a number out of its range.
@@ -100,7 +100,7 @@ low_half_teacher = partial(AnsweringTeacher, knows=low_half)
 high_half_teacher = partial(AnsweringTeacher, knows=high_half)
 """Has the upper half of the demonstrations, by the first outcome coordinate."""
 mislabelling = partial(AnsweringTeacher, knows=mislabelled)
-"""Shows another outcome than is said."""
+"""Has all demonstrations, but states a wrong outcome for each."""
 slow = partial(AnsweringTeacher, takes=10)
 """Has all demonstrations; the learner rests 10 movements for each."""
 demonstrator_1 = partial(AnsweringTeacher, knows=partial(_recorded, 1))

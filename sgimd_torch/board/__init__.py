@@ -1,1 +1,1 @@
-"""What a run shows in TensorBoard. Needs tensorboard."""
+"""The board: curves and pictures of a run in TensorBoard. Needs tensorboardX."""

@@ -33,8 +33,8 @@ class BoardListener(EventFile):
     Args:
         folder: folder of the run; its event files stay as they are until ``begin``, the end of a replay.
         parts: parts of the run; read are config, environment, learner and benchmark.
-        seconds: gives the seconds spent so far, by part of the run.
-        curves: gives what a forward model has learnt from the last movement, by tag.
+        seconds: function that returns the seconds spent so far, by part of the run.
+        curves: function that returns new numbers of other listeners, by tag.
     """
 
     def __init__(
@@ -67,7 +67,7 @@ class BoardListener(EventFile):
         self._scalars(self._curves())
 
     def evaluated(self, movements: int, found: Mapping[str, Evaluation]) -> None:
-        """Show an evaluation; of other answers than the run's own, the mean error alone.
+        """Show an evaluation; of inverse models other than the run's own, only the mean error.
 
         Pictures take as long as 100 movements, so they are drawn when the number of movements has doubled, and at the
         end.

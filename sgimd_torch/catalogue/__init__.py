@@ -1,9 +1,9 @@
-"""The table of words: all that the command line can name, and where it is.
+"""The table of words: every name that the command line knows, and the place of what it names.
 
     load_word("goals", "grid")                    # ProgressGrid; imported now
-    load_word("goals", "mypackage.goals:Curious") # of your own
-Whoever leaves a feature out deletes its folder and its lines of this table. A description is the first line of the
-docstring at the place, options are its signature (`sgimd_torch.catalogue.options`); nothing here repeats them.
+    load_word("goals", "mypackage.goals:Curious") # one of your own
+To remove a feature, delete its folder and its lines of this table. The help text of a word is the first line of the
+docstring at its place. Its options are the signature there (`sgimd_torch.catalogue.options`).
 """
 
 from __future__ import annotations
@@ -139,14 +139,14 @@ WORDS: Final[dict[str, dict[str, str]]] = {
         "demo": "views.demo",
     },
 }
-# Who shows an algorithm something, unless a run says otherwise; "teachers" are asked. Others learn alone.
+# Default teacher of each algorithm that is taught; "teachers" are asked. Other algorithms learn alone.
 TAUGHT_BY: Final = {
     **dict.fromkeys(("observation", "imitation", "sgim-d"), "periodic"),
     **dict.fromkeys((word for word in WORDS["algorithm"] if word.endswith("-taught")), "periodic"),
     "practice-taught": "at-once",
     **dict.fromkeys((word for word, at in WORDS["algorithm"].items() if at.startswith("asking.")), "teachers"),
 }
-# Extras that bring what a command imports.
+# Extras of the package that a command needs.
 EXTRAS: Final = {
     **dict.fromkeys(("demonstrations", "suite", "demo"), "plot"),
     **{name: name for name in ("report", "teach", "film")},
@@ -155,10 +155,10 @@ _PACKAGE: Final = Path(__file__).parents[1]
 
 
 def place_of(kind: str, word: str) -> str:
-    """Place of what ``word`` names, ``package.module:attribute``.
+    """Place of the thing that ``word`` names, as ``package.module:attribute``.
 
     Raises:
-        ValueError: it is neither in the table nor such a place.
+        ValueError: the word is neither in the table nor a place.
     """
     if word in WORDS[kind]:
         return f"{_PACKAGE.name}.{WORDS[kind][word]}"
@@ -171,17 +171,17 @@ def load_word(kind: str, word: str) -> Callable[..., Any]:
     """The thing that ``word`` names.
 
     Raises:
-        ValueError: it is not in the table, cannot be loaded or cannot be called.
+        ValueError: the word is not in the table, or the thing cannot be loaded or called.
     """
     made: Callable[..., Any] = load(place_of(kind, word), f"{kind} {word}" if ":" in word else "")
     if not callable(made):
-        raise ValueError(f"{kind} {word} must be something to call, but it is a {type(made).__name__}")
+        raise ValueError(f"{kind} {word} must be a class or a function, got a {type(made).__name__}")
     return made
 
 
 @cache
 def about(kind: str, word: str) -> str:
-    """First line of the docstring of what ``word`` of the table names, which is not imported for that."""
+    """Help text of a word of the table: the first line of a docstring, read without importing its module."""
     module, _, name = WORDS[kind][word].partition(":")
     path = _PACKAGE / module.replace(".", "/")
     tree = ast.parse((path / "__init__.py" if path.is_dir() else path.with_suffix(".py")).read_text(encoding="utf-8"))
@@ -195,22 +195,22 @@ def about(kind: str, word: str) -> str:
 
 
 def named(made: Callable[..., Any]) -> tuple[str, str] | None:
-    """Kind and word of what the table names; None for anything else."""
+    """Kind and word of a thing in the table; None for anything else."""
     place = f"{function_of(made).__module__}:{function_of(made).__qualname__}"
     places = ((kind, word, f"{_PACKAGE.name}.{at}") for kind, words in WORDS.items() for word, at in words.items())
     return next(((kind, word) for kind, word, at in places if at == place), None)
 
 
 def function_of(made: Callable[..., Any]) -> Callable[..., Any]:
-    """The function or class itself, without what is fixed."""
+    """The function or class itself, without keywords that a ``partial`` fixes."""
     return function_of(made.func) if isinstance(made, partial) else made
 
 
 def called(what: str, make: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
-    """Result of a call of ``make``; a thing of a user's own may not be callable as others of its kind are.
+    """Result of a call of ``make``, which may be a user's own.
 
     Raises:
-        ValueError: it takes other arguments, or would end the program.
+        ValueError: it takes other arguments than others of its kind, or it ends the program.
     """
     try:
         inspect.signature(make).bind(*arguments, **options)
@@ -218,15 +218,15 @@ def called(what: str, make: Callable[..., Any], *arguments: Any, **options: Any)
         raise ValueError(f"{what} cannot be called as others of its kind are: {error}") from error
     try:
         return make(*arguments, **options)
-    except SystemExit as end:  # it must not end the command, which would look like success
+    except SystemExit as end:  # the command would end, and look successful
         raise ValueError(f"{what} cannot be made: it calls exit({end})") from end
 
 
 def load(place: str, what: str = "") -> Any:
-    """The attribute at ``package.module:attribute``; packages of the working directory are found, too.
+    """The attribute at ``package.module:attribute``; the working directory is searched, too.
 
     Raises:
-        ValueError: no such module or attribute, or the module cannot be imported; its own error is shown.
+        ValueError: there is no such module or attribute, or the module cannot be imported; its error is shown.
     """
     module, _, attribute = place.partition(":")
     what = what or place
@@ -239,10 +239,10 @@ def load(place: str, what: str = "") -> Any:
         sys.path.append(here)
     try:
         found: Any = importlib.import_module(module)
-    except (Exception, SystemExit) as error:  # whatever that module does when it is imported
+    except (Exception, SystemExit) as error:  # a user's module may raise anything
         if isinstance(error, ImportError) and module.startswith(_PACKAGE.name):
             brings_torch = "; pip install 'sgimd-torch[forward]' brings it" if error.name == "torch" else ""
-            raise ValueError(f"{error}{brings_torch}") from error  # what needs another extra names it itself
+            raise ValueError(f"{error}{brings_torch}") from error  # modules that need another extra name it
         where = f"; is it installed, or in {here}?" if isinstance(error, ImportError) else ""
         raise ValueError(
             f"{what}: the module {module} cannot be imported: {type(error).__name__}: {error}{where}"
@@ -256,24 +256,25 @@ def load(place: str, what: str = "") -> Any:
 
 
 def unknown(what: str, word: str, known: Collection[str], also: str = "") -> ValueError:
-    """The error for a ``word`` that is none of those ``known``: the nearest first, then all, then ``also``."""
+    """The error for an unknown ``word``: it names the nearest of the ``known`` words, then all of them, then
+    ``also``."""
     near = did_you_mean(word, known)
     return ValueError(f"unknown {what} {word!r}{f'{near} Known' if near else '; known'} are {', '.join(known)}{also}")
 
 
 def did_you_mean(name: str, known: Iterable[str], most: int = 1) -> str:
-    """``; did you mean grid?``, with the ``most`` names that are near; nothing where no known name is."""
+    """A question such as ``; did you mean grid?`` with at most ``most`` similar names; empty if no name is similar."""
     spelt = {each.lower().replace("_", "-"): each for each in known}
     near = get_close_matches(name.lower().replace("_", "-"), spelt, most, 0.5)
     return f"; did you mean {' or '.join(spelt[each] for each in near)}?" if near else ""
 
 
 def _meant(word: str) -> str:
-    """What an unknown ``word`` was probably meant to be."""
+    """Hint for an unknown ``word``: its probable meaning."""
     module, dot, name = word.rpartition(".")
     if name in ("xml", "urdf"):
         return (
-            f"; {word} is a model file: write a class around it (docs/own-robot.md), and name it package.module:Class"
+            f"; {word} is a model file: write a class that loads it (docs/own-robot.md), and give package.module:Class"
         )
     if os.path.isfile(f"{word.replace('.', '/')}.py"):
         return f"; {word} is a module here: name what is in it, {word}:NAME"

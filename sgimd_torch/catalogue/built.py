@@ -1,4 +1,4 @@
-"""Things built by a constructor that may be a user's own: ``Goals.of(make, problem)`` says what is wrong with it."""
+"""Building parts from constructors, which may be a user's own: ``Goals.of(make, problem)`` explains each mistake."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from sgimd_torch.catalogue import called, function_of, place_of
 
 
 class Built(ABC):  # noqa: B024
-    """Something that a learner or a run is put together from."""
+    """A part of a learner or of a run."""
 
     @classmethod
     def of(cls, make: Any, *given: Any) -> Self:
-        """The thing of this class that a constructor builds from what it is ``given``.
+        """The part of this class that the constructor ``make`` builds from the arguments ``given``.
 
         Raises:
-            ValueError: no constructor, one that takes something else, an abstract method is missing, or what was built
+            ValueError: ``make`` is no constructor or takes other arguments, an abstract method is missing, or the part
                 is of another class.
         """
         kind = cls.__name__

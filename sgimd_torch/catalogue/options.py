@@ -1,8 +1,8 @@
-"""Options of a part: the keywords of simple types that a class or a function takes.
+"""Options of a part: those keywords of a class or a function that have a simple type and a default.
 
     options_of(InterestMap)["window"]                   # Option(kind=int, default=24)
     help_of(InterestMap)["window"]                      # from the docstring, "number of recent competences ..."
-The signature has name, type and default, the docstring the help, the body the bounds: nothing repeats them.
+The signature gives name, type and default; the docstring gives the help; the body checks the bounds.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any, Final, NamedTuple, TypeVar, cast
 
 F = TypeVar("F", bound=Callable[..., Any])
 _SIMPLE: Final = (int, float, bool, str, type(None), ...)
-_TARGETS: Final[dict[Callable[..., Any], Callable[..., Any]]] = {}  # of what `hands_on` has decorated
+_TARGETS: Final[dict[Callable[..., Any], Callable[..., Any]]] = {}  # by function decorated with `hands_on`
 _NAMED: Final = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
 
 
@@ -28,18 +28,18 @@ class Option(NamedTuple):
 
 
 def options_of(make: Callable[..., Any]) -> dict[str, Option]:
-    """The keywords of simple types (numbers, words, true or false, tuples of these, or None) that ``make`` takes."""
+    """Keywords of ``make`` of simple types: numbers, words, true or false, tuples of these, or None."""
     found = {name: Option(_simple(each), each.default) for name, each in parameters_of(make).items()}
     return {name: each for name, each in found.items() if each.kind is not None and each.default is not _EMPTY}
 
 
 def parameters_of(make: Callable[..., Any]) -> dict[str, inspect.Parameter]:
-    """The parameters that can be given by name."""
+    """Parameters of ``make`` that can be given by name."""
     return {each.name: each for each in inspect.signature(make).parameters.values() if each.kind in _NAMED}
 
 
 def help_of(make: Callable[..., Any]) -> dict[str, str]:
-    """What the docstring says of each parameter, on one line."""
+    """Description of each parameter in the docstring, as one line."""
     import docstring_parser  # only help needs it
 
     while isinstance(make, partial):
@@ -54,12 +54,12 @@ def help_of(make: Callable[..., Any]) -> dict[str, str]:
 
 
 def hands_on(target: Callable[..., Any], *names: str, **changed: Any) -> Callable[[F], F]:
-    """Give a function that hands its ``**keywords`` on to ``target`` a signature with those keywords.
+    """Decorator for a function with ``**keywords`` for ``target``: its signature gets the keywords of ``target``.
 
     Args:
-        target: function or class that has the keywords and their defaults.
-        names: keywords to hand on; none for all.
-        changed: other defaults, by keyword.
+        target: function or class with the keywords and their defaults.
+        names: keywords to take over; none given for all.
+        changed: defaults that replace those of ``target``, by keyword.
     """
 
     def decorate(function: F) -> F:
@@ -85,12 +85,12 @@ _EMPTY: Final = inspect.Parameter.empty
 
 
 def _simple(parameter: inspect.Parameter) -> Any:
-    """Its type if that is a simple one, else None."""
+    """Type of a parameter if it is simple, else None."""
     kind = parameter.annotation
     if isinstance(kind, str):
         try:
             kind = eval(kind, vars(typing).copy())
-        except Exception:  # whatever it names, it is no simple type
+        except Exception:  # an unknown name is no simple type
             return None
     kind = type(parameter.default) if kind is _EMPTY else kind
     return kind if kind is not type(None) and _is_simple(kind) else None

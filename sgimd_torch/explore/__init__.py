@@ -1,1 +1,1 @@
-"""Global exploration: where to look when the inverse model knows nothing (section 4.4.1)."""
+"""Global exploration: movements where the inverse model knows nothing (section 4.4.1)."""

@@ -1,8 +1,8 @@
-"""Effects: which movements changed anything, where most change nothing?
+"""Effects: the movements that changed anything, for robots most of whose movements change nothing.
 
 Our addition. A movement that misses an object leaves it where it lies. So the outcomes of all movements without an
-effect lie on one plateau: they depend on the context alone. It is looked for as RANSAC does (Fischler & Bolles 1981):
-an affine map of the context through few exemplars that fits as many others as possible, as closely as noise allows.
+effect lie on one plateau: they depend on the context alone. The plateau is found by RANSAC (Fischler & Bolles 1981), as
+an affine map of the context. It goes through few exemplars and fits as many others as possible within the noise.
     effects = Effects(memory, problem.outcome_noise); acted = effects()
 """
 
@@ -15,20 +15,20 @@ import numpy as np
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, stream
 
-_FIRST, _GROWTH = 16, 1.5  # exemplars at the first look for a plateau, and how many times more at each later one
+_FIRST, _GROWTH = 16, 1.5  # exemplars at the first look for a plateau, and the growth factor from look to look
 _GUESSES: Final = 50  # maps through few exemplars
 _GUESSED_ON: Final = 300  # exemplars, drawn from all
-_REFINED: Final = 5  # times, by least squares
-_NEAR, _WITHIN = 2.0, 4.0  # standard deviations of the noise: most of a plateau lies near it, nothing of it farther out
-_ROUNDING: Final = 1e-9  # of the spread of outcomes: noise of an environment that has none
-_LEAST, _SHARE = 16, 0.1  # exemplars on a plateau, and their share of all
+_REFINED: Final = 5  # fits of the best map by least squares
+_NEAR, _WITHIN = 2.0, 4.0  # noise deviations from a plateau: most of its points are near, all are within
+_ROUNDING: Final = 1e-9  # noise of an environment without noise, relative to the spread of outcomes
+_LEAST, _SHARE = 16, 0.1  # least number of exemplars on a plateau, and their least share of all
 _DENSE: Final = (
-    0.9  # share of points within 4 sd of the plateau that lie within 2 sd; half or fewer where outcomes go on
+    0.9  # least share within 2 sd, of the points within 4 sd of a plateau; without a plateau it is about half
 )
 
 
 class Effects:
-    """The exemplars with an effect. It only reads, draws nothing, and depends on the memory alone.
+    """Exemplars with an effect. They depend on the memory alone, and nothing is drawn from a stream of the problem.
 
     Args:
         memory: exemplars of the learner.
@@ -38,13 +38,13 @@ class Effects:
     def __init__(self, memory: Memory, outcome_noise: float) -> None:
         self.memory = memory
         self.noise = outcome_noise * np.sqrt(memory.outcome_dim)
-        self._looked = 0  # at so many exemplars for a plateau
+        self._looked = 0  # exemplars at the last look for a plateau
         self._plateau: Array | None = None  # (1 + context_dim, outcome_dim)
         self._seen = 0
 
     def __call__(self) -> Memory | None:
-        """Copies of the exemplars with an effect, perhaps none; another object when the plateau has changed. None while
-        there is no plateau: then every movement has its own effect."""
+        """Memory with copies of the exemplars with an effect, perhaps empty; a new object when the plateau has changed.
+        None without a plateau: then every movement has an effect."""
         n, size = len(self.memory), float(_FIRST)
         while size * _GROWTH <= n:
             size *= _GROWTH
@@ -61,7 +61,7 @@ class Effects:
         return self._acted
 
     def _look(self) -> Array | None:
-        """The plateau of the first ``_looked`` exemplars."""
+        """The plateau of the first ``_looked`` exemplars, None for none."""
         n = self._looked
         outcomes = self.memory.outcomes[:n]
         self._scale = max(self.noise, _ROUNDING * float(np.sqrt(outcomes.var(axis=0).sum())))
@@ -78,12 +78,12 @@ class Effects:
         return plateau if on >= max(_LEAST, _SHARE * n) and close >= _DENSE * on else None
 
     def _fit(self, rows: np.ndarray) -> Array:
-        """The affine map of the contexts in ``rows``, by least squares."""
+        """Affine map from contexts to outcomes, fitted to ``rows`` by least squares."""
         found: Array = np.linalg.lstsq(self._inputs(rows), self.memory.outcomes[rows], rcond=None)[0]
         return found
 
     def _distances(self, plateau: Array, rows: np.ndarray | slice) -> Array:
-        """``(n,)`` of the outcomes in ``rows`` to the plateau."""
+        """Distances ``(n,)`` of the outcomes in ``rows`` from the ``plateau``."""
         found: Array = np.linalg.norm(self.memory.outcomes[rows] - self._inputs(rows) @ plateau, axis=1)
         return found
 

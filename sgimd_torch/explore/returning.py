@@ -1,8 +1,8 @@
-"""Global exploration where most movements do nothing: find what has an effect at all, return to it, vary it.
+"""Global exploration where most movements do nothing: find movements with an effect, and vary them.
 
-Our addition. Forestier et al. (2022) vary, to reach a goal for an object, a movement that had moved that object; Go-
-Explore (Ecoffet et al. 2021) returns before it explores. How far to vary follows how often the effect persists, as the
-success rule of evolution strategies does (Rechenberg 1973).
+Our addition. Forestier et al. (2022) reach goals for an object by variations of movements that had moved it. Go-Explore
+(Ecoffet et al. 2021) returns to a state before it explores. The width of variations follows the share of them that keep
+the effect, like the success rule of evolution strategies (Rechenberg 1973).
     explore = Returning(problem); theta = explore(context)
 """
 
@@ -16,21 +16,20 @@ from sgimd_torch.explore.widening import Widening, Width
 from sgimd_torch.parts import Explore, Inverse, Problem
 from sgimd_torch.spaces import Array
 
-_ENOUGH: Final = 16  # effects, for an inverse model to learn from
-_SHARE: Final = 0.1  # of movements for exploration then; more would scatter what is learnt
-_ANYWHERE: Final = 0.5  # of these, in search of other effects
-_NEAREST: Final = 10  # effects in the most similar contexts, of which one is varied
+_ENOUGH: Final = 16  # effects from which an inverse model can learn
+_SHARE: Final = 0.1  # share of global movements once there are enough effects; more would blur the inverse model
+_ANYWHERE: Final = 0.5  # share of the global movements that look anywhere in Pi for other effects
+_NEAREST: Final = 10  # movements with an effect in the most similar contexts; one of them is varied
 
 
 class Returning(Explore):
-    """Widening; where effects are rare, varies movements that had one.
+    """Widening movements around the middle of Pi; where effects are rare, variations of movements that had one.
 
-    It is `Widening` while every movement has an effect of its own. Else it moves anywhere in Pi, and as soon as
-    something had an effect, every other time around a movement that had one in a similar context.
+    It is `Widening` while every movement has an effect. Otherwise it makes uniform movements in Pi. Once a movement had
+    an effect, every other movement is a variation of one with an effect in a similar context.
 
     Args:
-        problem: ``effects`` of the inverse model are read. One that knows none, unlike `AmongEffects`, makes this
-            `Widening` always.
+        problem: problem to learn. An inverse model without ``effects``, unlike `AmongEffects`, makes this `Widening`.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -39,11 +38,12 @@ class Returning(Explore):
         self._varied: Array | None = None  # the last variation
         inverse = type(problem.inverse)
         if inverse.effects is Inverse.effects:
-            problem.remarks.append(f"exploration does not look for effects: {inverse.__name__} does not tell them")
+            problem.remarks.append(f"exploration does not look for effects: {inverse.__name__} does not report them")
 
     @property
     def share(self) -> float | None:
-        """Share of global movements: 1 until enough of them had an effect, then few. None where all have an effect."""
+        """Share of global movements: 1 until enough had an effect, then a tenth. None if all movements have an
+        effect."""
         acted = self.problem.inverse.effects()
         return None if acted is None else _SHARE if len(acted) >= _ENOUGH else 1.0
 

@@ -1,10 +1,10 @@
-"""Global exploration around the middle of Pi, as wide as what comes of it can be predicted.
+"""Global exploration around the middle of Pi, whose width grows while its outcomes are predicted well.
 
 Our addition. Rolf, Steil & Gienger (2010) begin goal babbling at one posture and widen from there, so that all
-movements belong to one family. How wide to look depends on the robot: a movement of the fishing rod, drawn anywhere in
-25 dimensions, teaches nothing about others, one of an arm with three joints nearly everything.
+movements belong to one family. The right width depends on the robot. With the fishing rod, one of 25 dimensions, a
+movement drawn anywhere teaches nothing about others; with an arm of three joints it teaches nearly everything.
     explore = Widening(problem); theta = explore(context)
-All parts of a learner share one `Width`: `Practise` looks half as wide around a copied movement.
+All parts of a learner share one `Width`; the search `Vary` uses half of it around a copied movement.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from sgimd_torch.parts import Explore, Inverse, Problem
 from sgimd_torch.spaces import Array
 
 _FIRST, _NARROWEST, _WIDEST = 0.1, 0.03, 0.3  # standard deviations, in sides of Pi
-_FACTOR: Final = 1.15  # from one width to the next
-_WELL: Final = 0.1  # of the outcomes' variance: a squared error of at most this is a good prediction
-_LOOKED_AT: Final = 1000  # exemplars, for that variance
+_FACTOR: Final = 1.15  # ratio of one width to the next
+_WELL: Final = 0.1  # largest squared error of a good prediction, relative to the variance of the outcomes
+_LOOKED_AT: Final = 1000  # largest number of exemplars for this variance
 
 
 class Width:
-    """Standard deviation of exploration, in sides of Pi: it grows while its movements are predicted well."""
+    """Standard deviation of exploration, in sides of Pi: it grows while outcomes are predicted well."""
 
     def __init__(self) -> None:
         self.sd = _FIRST
@@ -37,13 +37,13 @@ class Widening(Explore):
     """Gaussian movements around the middle of Pi, wider while outcomes are predicted well.
 
     Args:
-        problem: memory and inverse model are read. Where the inverse model predicts nothing, the width stays.
+        problem: problem to learn. With an inverse model that predicts nothing, the width stays.
     """
 
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem)
         self.width = problem.shared(Width, Width)
-        self._expected: tuple[int, Array] | None = None  # of the last movement: its row in memory, its outcome
+        self._expected: tuple[int, Array] | None = None  # row and expected outcome of the last movement
         inverse = type(problem.inverse)
         if inverse.predict is Inverse.predict:
             problem.remarks.append(f"exploration does not widen: {inverse.__name__} predicts nothing")
@@ -59,7 +59,7 @@ class Widening(Explore):
         return theta
 
     def _compare(self) -> None:
-        """Was the last movement predicted well?"""
+        """Update the width if the last movement was a global one."""
         outcomes = self.problem.memory.outcomes
         if self._expected is None or self._expected[0] >= len(outcomes):
             return

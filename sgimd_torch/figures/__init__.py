@@ -1,1 +1,1 @@
-"""What figures share: maps of T, axes, colours and files. Needs matplotlib."""
+"""Parts of figures: maps of T, axes, colours and files. Needs matplotlib."""

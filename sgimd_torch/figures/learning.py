@@ -100,7 +100,7 @@ def competence_map(ax: Axes, lows: Array, highs: Array, competences: Array, sect
     The colours span the competences of these regions, in round numbers.
 
     Args:
-        ax, lows, highs, section: see ``interest_map``.
+        ax, lows, highs, section: arguments of ``interest_map``.
         competences: ``(n_regions,)``; NaN for a region without goals, which stays white.
     """
     known = competences[np.isfinite(competences)]

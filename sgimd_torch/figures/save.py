@@ -31,7 +31,7 @@ def save_figure(draw: Callable[[], Figure], stem: Path, *kinds: str) -> list[Pat
     """Draw a figure in ``STYLE`` and write a file for each kind.
 
     Args:
-        draw: makes the figure.
+        draw: function that makes the figure.
         stem: path of the files without their suffix.
         kinds: suffixes, such as "png".
 

@@ -1,7 +1,7 @@
-"""The forward model (not in the paper): networks that predict where a movement lands.
+"""The forward model (not in the paper): networks that predict the outcome of a movement.
 
-A `ForwardModel` predicts; all parts of a learner share one, see `shared`. `ProvedModel` and `ModelAlone` answer by it,
-`GradientSearch` searches through it. All of it needs torch.
+All parts of a learner share one `ForwardModel`, see `shared`. The inverse models `ProvedModel` and `ModelAlone` and the
+search `GradientSearch` use it. All of them need torch.
 """
 
 try:

@@ -1,8 +1,8 @@
-"""Anchored predictions: those of the forward model, corrected by its errors at executed movements nearby, the anchors.
+"""Anchored predictions of the forward model, corrected by its errors at similar executed movements, the anchors.
 
-Not in Nguyen & Oudeyer (2014). With one anchor k it is tau_k + L(theta) - L(theta_k). With many it is a Gaussian
-process of the network's errors at the anchors, whose variance grows away from them: a network is wrong where little was
-executed, and a search through it finds just those places.
+Not in Nguyen & Oudeyer (2014). With one anchor k the prediction is tau_k + L(theta) - L(theta_k). With many, the
+correction is a Gaussian process of the network's errors at the anchors, and its variance grows away from them. A
+network is wrong where few movements were executed, and without this variance a search ends at just those places.
     near = Anchored(model, policies, context, ...); theta = near.descend(candidates, goals, steps=40, step=0.005)
 """
 
@@ -15,28 +15,28 @@ import torch
 from sgimd_torch.forward_model.model import ForwardModel
 from sgimd_torch.spaces import Array, Box
 
-# All numbers are without a unit: lengths come from the data, so metres, millimetres or newtons make no difference.
+# All numbers are without a unit: lengths come from the data, so the unit of T does not matter.
 _REACH: Final = 0.08  # length scale of a correction, in sides of Pi, times the square root of the number of parameters
-# Part of the model's predicted variances that counts, of noise and of disagreement. A network that has not learnt
-# enough takes its own errors for noise (twice the true deviation late in a run on the fishing rod, and more early), so
-# that the anchors would not correct it.
+# Weight of the model's predicted variances, of noise and of disagreement. A network that has not learnt enough takes
+# its own errors for noise (twice the true deviation late in a run on the fishing rod, and more early). With the whole
+# variance the anchors would not correct it.
 _SHARE: Final = 0.1
-# Weight of the anchored prediction's variance against the squared distance. 1 would be the expectation, but the minimum
-# over many candidates selects those whose error makes them look good.
+# Weight of the correction's variance against the squared distance. 1 would be the expectation, but the minimum over
+# many candidates selects those whose prediction error is favourable.
 _CAUTION: Final = 10.0
-_LEAST_NOISE: Final = 0.003  # in spreads of the outcomes; less makes the covariance of coincident anchors singular
+_LEAST_NOISE: Final = 0.003  # in spreads of the outcomes; with less, the covariance of coincident anchors is singular
 
 
 class Anchored:
-    """Expected squared distance of each of n candidates to a goal, and its descent.
+    """Expected squared distance of n candidates from their goals, and descent on it.
 
     Args:
         model: forward model, trained.
-        policies: Pi, whose sides measure distances between movements.
-        context: ``(context_dim,)`` in which the candidates will be executed, or ``(n, context_dim)``, each in its own.
-        contexts: ``(n, m, context_dim)`` in which the anchors were executed.
-        thetas: ``(n, m, theta_dim)`` of the m anchors of each candidate; with n = 1, all candidates share them.
-        outcomes: ``(n, m, outcome_dim)`` of the anchors.
+        policies: Pi; distances between movements are in its sides.
+        context: ``(context_dim,)``, context of all candidates, or ``(n, context_dim)``, one for each.
+        contexts: ``(n, m, context_dim)``, contexts of the anchors.
+        thetas: ``(n, m, theta_dim)``, m anchors for each candidate; with n = 1, all candidates share them.
+        outcomes: ``(n, m, outcome_dim)``, outcomes of the anchors.
     """
 
     def __init__(
@@ -64,8 +64,8 @@ class Anchored:
         return torch.tensor(values, dtype=torch.float32, device=self.model.input_mean.device)
 
     def predict(self, theta: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """Outcomes ``(n, outcome_dim)`` expected of ``theta`` ``(n, theta_dim)``, and the variance ``(n,)`` about them:
-        noise, disagreement of the members, and the weighted variance of the correction."""
+        """Expected outcomes ``(n, outcome_dim)`` of ``theta`` ``(n, theta_dim)``, and their variances ``(n,)``: noise,
+        disagreement of the members, and the weighted variance of the correction."""
         means, variances = self.model.landing(self.context, theta)
         landing = means.mean(dim=0)
         spread = _SHARE * (variances.mean(dim=0) + means.var(dim=0, correction=0)).sum(dim=-1)
@@ -78,7 +78,7 @@ class Anchored:
         return landing + correction, spread + landing.shape[-1] * _CAUTION * doubt
 
     def expected(self, theta: torch.Tensor, goals: torch.Tensor) -> torch.Tensor:
-        """``(n,)`` squared distance to ``goals`` plus the spread, so that reliable movements win."""
+        """Squared distances ``(n,)`` to ``goals`` plus variances, so that reliable movements are preferred."""
         landing, spread = self.predict(theta)
         return ((landing - goals) ** 2).sum(dim=-1) + spread
 
@@ -91,18 +91,18 @@ class Anchored:
         step: float,
         radius: float | None = None,
     ) -> torch.Tensor:
-        """``(n, theta_dim)``: ``theta`` after ``steps`` of Adam, each of about ``step`` sides of Pi.
+        """Candidates ``(n, theta_dim)`` after a descent by Adam.
 
         Args:
-            theta: ``(n, theta_dim)`` candidates.
-            goals: ``(n, outcome_dim)``, or one for all.
+            theta: ``(n, theta_dim)`` candidates at the start.
+            goals: ``(n, outcome_dim)``, or one for all candidates.
             steps: number of steps.
-            step: length of a step in each parameter, in sides of Pi.
-            radius: largest distance from ``theta``, root mean square over the parameters, in sides; None for any.
+            step: length of a step in each parameter, in sides of Pi, about.
+            radius: largest distance from the start, root mean square over the parameters, in sides; None for any.
         """
         start = theta
         mean, square = torch.zeros_like(theta), torch.zeros_like(theta)
-        for i in range(1, steps + 1):  # torch's own Adam would have to be made for every goal
+        for i in range(1, steps + 1):  # torch's own Adam would need a new object for every goal
             theta = theta.detach().requires_grad_(True)
             (gradient,) = torch.autograd.grad(self.expected(theta, goals).sum(), theta)
             gradient = gradient * self.sides
@@ -119,6 +119,6 @@ class Anchored:
 
 
 def within(start: torch.Tensor, theta: torch.Tensor, sides: torch.Tensor, radius: float) -> torch.Tensor:
-    """Points nearest to ``theta`` in the trust region of ``start``: ``radius`` sides of Pi, root mean square."""
+    """``theta``, moved into the trust region of ``radius`` around ``start`` (root mean square, in ``sides``)."""
     change, longest = (theta - start) / sides, radius * theta.shape[-1] ** 0.5
     return start + sides * change * (longest / change.norm(dim=-1, keepdim=True).clamp(min=longest))

@@ -1,7 +1,7 @@
 """An ensemble of networks; each predicts a value and its noise. One batched product per layer computes all networks.
 
-Deep ensembles (Lakshminarayanan, Pritzel & Blundell, NeurIPS 2017). A plain LightningModule, which any of Lightning's
-loops can train; ``model.py`` trains it online.
+Deep ensembles (Lakshminarayanan, Pritzel & Blundell, NeurIPS 2017). It is a plain LightningModule, which any loop of
+Lightning can train; ``model.py`` trains it online.
     means, log_variances = Ensemble(25, 2, torch.Generator(), members=3)(inputs)
 """
 
@@ -25,11 +25,11 @@ class Ensemble(LightningModule):
         n_inputs: dimension of the inputs.
         n_outputs: dimension of the outputs.
         generator: random stream of the weights.
-        members: number of networks; each starts from other weights.
+        members: number of networks, which differ in their first weights.
         noise_heads: true for a predicted noise that depends on the input, false for one number for each output.
         lr: learning rate of Adam.
-        beta: weight of the noise in the loss: 0 is the likelihood itself; with .5 outputs of noisy inputs are learnt,
-            too (Seitzer et al., ICLR 2022).
+        beta: exponent of the noise variance in the weights of the loss: 0 is the likelihood itself; with .5 outputs of
+            noisy inputs are learnt, too (Seitzer et al., ICLR 2022).
     """
 
     def __init__(
@@ -68,7 +68,7 @@ class Ensemble(LightningModule):
         return (loss * (self.beta * log_variance).exp().detach()).mean()
 
     def configure_optimizers(self) -> torch.optim.Optimizer:
-        """Adam, in one kernel for all weights."""
+        """Adam, with one kernel for all weights."""
         return torch.optim.Adam(self.parameters(), lr=self.lr, fused=True)
 
 

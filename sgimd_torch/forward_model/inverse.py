@@ -1,7 +1,7 @@
-"""Inverse by the forward model: of all movements similar to the nearest ones, which should land nearest, and reliably?
+"""Inverse by the forward model: a descent from the nearest remembered movements on the expected distance to the goal.
 
-Not in Nguyen & Oudeyer (2014), whose inverse model, eqs. (8) and (9), only knows outcomes. Here candidates descend the
-expected squared distance to the goal, predicted noise included: of several movements to a goal a reliable one wins.
+Not in Nguyen & Oudeyer (2014), whose inverse model, eqs. (8) and (9), uses remembered outcomes only. Here candidates
+descend the expected squared distance to the goal, predicted noise included, so a reliable movement is preferred.
     inverse = ModelInverse(problem); inverse(context, goal).theta
 """
 
@@ -19,23 +19,22 @@ from sgimd_torch.inverses.locally_linear import LocallyLinear
 from sgimd_torch.parts import Problem
 from sgimd_torch.spaces import Array, Estimate
 
-_NEAREST: Final = 10  # remembered movements that landed nearest to the goal: candidates beside the first estimate
+_NEAREST: Final = 10  # candidates beside the first estimate: the remembered movements nearest to the goal
 _ANCHORS: Final = 40  # neighbours in policy space that correct the predictions for a candidate
-# Number and size of the steps of the descent, in sides of Pi. Many small steps end nearer to the start than few large
-# ones.
+# Number and size of the steps of the descent, in sides of Pi. Many small steps end nearer to the start than few large.
 _STEPS, _STEP = 40, 0.005
 _GOALS_PER_BATCH: Final = 64  # about 50 MB
 
 
 class ModelInverse(ThroughModel):
-    """Descends from the estimate of `LocallyLinear` and from the nearest remembered movements to what the model expects
-    to be best.
+    """Best end of descents through the model, from the estimate of `LocallyLinear` and the nearest remembered
+    movements.
 
     It never trains the model, so that an evaluation changes nothing: call ``model.refresh(memory)`` in the loop that
-    adds to the memory. Until the model is trusted it answers like `LocallyLinear`.
+    adds to the memory. Until the model is trusted, the answer is that of `LocallyLinear`.
 
     Args:
-        problem: Pi and the memory are read.
+        problem: problem to learn.
     """
 
     @hands_on(ThroughModel)
@@ -44,11 +43,11 @@ class ModelInverse(ThroughModel):
         self.start = LocallyLinear(problem)
 
     def __call__(self, context: Array, goal: Array) -> Estimate:
-        """The candidate that should be best, with the neighbours that ``start`` gives."""
+        """The candidate with the least expected distance, with the exemplars of the estimate of `LocallyLinear`."""
         return self.answer_many(context[None], goal[None])[0]
 
     def answer_many(self, contexts: Array, goals: Array) -> list[Estimate]:
-        """Estimates for ``goals`` ``(n, outcome_dim)``; in one context, several times faster than one by one."""
+        """Estimates for ``goals`` ``(n, outcome_dim)``; in one context, several times faster than single calls."""
         estimates = [self.start(*each) for each in zip(contexts, goals, strict=True)]
         if not self.trusted:
             return estimates
@@ -60,7 +59,7 @@ class ModelInverse(ThroughModel):
         return found
 
     def predict_many(self, contexts: Array, thetas: Array) -> Array:
-        """``(n, outcome_dim)`` outcomes expected by the model, corrected at the movements most like each.
+        """Expected outcomes ``(n, outcome_dim)`` by the model, corrected at similar movements.
 
         Args:
             contexts: ``(n, context_dim)``.
@@ -90,7 +89,8 @@ class ModelInverse(ThroughModel):
         return [estimate._replace(theta=policies.clip(row)) for estimate, row in zip(estimates, chosen, strict=True)]
 
     def _anchored(self, contexts: Array, thetas: Array) -> Anchored:
-        """Predictions for ``(n, theta_dim)`` in ``(n, context_dim)``, each with anchors of its own."""
+        """Predictions for ``thetas`` ``(n, theta_dim)`` in ``contexts`` ``(n, context_dim)``, each with its own
+        anchors."""
         memory = self.problem.memory
         rows = [memory.near_policies(*each, _ANCHORS) for each in zip(contexts, thetas, strict=True)]
         near = np.stack([row[: min(map(len, rows))] for row in rows])
@@ -99,10 +99,10 @@ class ModelInverse(ThroughModel):
 
 
 class ModelAlone(ModelInverse):
-    """Locally linear while learning, a forward model in evaluations, proved or not (extra forward).
+    """Locally linear model while learning; in evaluations a forward model, without a test (extra forward).
 
     Args:
-        problem: Pi and the memory are read.
+        problem: problem to learn.
     """
 
     def __call__(self, context: Array, goal: Array) -> Estimate:

@@ -1,6 +1,6 @@
-"""The forward model in a run: it is trained, its predictions are recorded, and a message says when it is not asked.
+"""The forward model in a run: training, a record of its predictions, and messages about its use.
 
-A replay makes its tables again, so a resumed run has them as if it had never stopped.
+A replay makes its tables again, so those of a resumed run are complete.
     listener = ModelListener(record, model, asked, learner.memory, seconds); listener.episode(episode, replayed=False)
 """
 
@@ -19,8 +19,8 @@ from sgimd_torch.runs.listeners import Listener, Seconds
 from sgimd_torch.runs.process import say
 from sgimd_torch.spaces import Array, Episode
 
-LEVEL: Final = 0.8  # share of outcomes that the regions whose coverage the board shows should contain
-NOT_ASKED: Final = "the forward model is not asked, the learner goes on without it"
+LEVEL: Final = 0.8  # share of outcomes that the predicted regions should contain, for the coverage on the board
+NOT_ASKED: Final = "the forward model is not used, the learner goes on without it"
 
 
 class ModelListener(Listener):
@@ -29,9 +29,9 @@ class ModelListener(Listener):
     Args:
         record: record of the run.
         model: forward model of the run.
-        asked: function that says whether the learner asks the model now.
+        asked: function that tells whether the learner uses the model now.
         memory: memory of the learner.
-        seconds: clock of the run; training is counted since movement 0, because a replay trains again.
+        seconds: clock of the run; training counts from movement 0, because a replay trains again.
     """
 
     def __init__(
@@ -42,7 +42,7 @@ class ModelListener(Listener):
         self._curves: dict[str, float] = {}
 
     def episode(self, episode: Episode, replayed: bool) -> None:
-        """Refresh after a movement; say what is new."""
+        """Refresh the model after a movement; print a message if its use changes or its training diverges."""
         memory, movements = self._memory, episode.index + 1
         with self._seconds.of("model"):
             refresh = self._model.refresh(memory)
@@ -58,20 +58,20 @@ class ModelListener(Listener):
         asked = self._is_asked()
         if asked != self._asked:
             self._asked = asked
-            who = "the forward model is asked from here on" if asked else NOT_ASKED
+            who = "the forward model is used from here on" if asked else NOT_ASKED
             news.append(f"{who}: {self._how_wrong(error)}")
         if not replayed:
             say(*(f"movement {movements}: {each}" for each in news))
 
     def close(self) -> None:
-        """Say so if the model is not asked."""
+        """Print a message if the model is not used."""
         if not self._asked:
             trained = self._model.trained
             why = self._how_wrong(self._model.relative_error) if trained else "there were too few exemplars to train it"
             say(f"{NOT_ASKED}: {why}")
 
     def curves(self) -> dict[str, float]:
-        """Numbers of the last refresh, once, by tag."""
+        """Numbers of the last refresh by tag; empty after the first call."""
         curves, self._curves = self._curves, {}
         return curves
 

@@ -1,4 +1,4 @@
-"""Forward model L: which outcome will a movement have? An ensemble of networks, trained while the robot learns.
+"""Forward model L, which predicts the outcome of a movement: an ensemble of networks, trained while the robot learns.
 
 Not in Nguyen & Oudeyer (2014), who use local models only. `OnlineTrainer` trains it.
     model = ForwardModel(0, 25, 2, seed=3); model.refresh(memory); model.predict(contexts, thetas).mean
@@ -25,7 +25,7 @@ from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, check_count, check_vector, stream
 
 TRUSTED_UP_TO: Final = 0.25  # relative error
-_FEWEST_EXEMPLARS: Final = 50  # for the first refresh
+_FEWEST_EXEMPLARS: Final = 50  # least number for the first refresh
 _DIVERGED_ABOVE: Final = 2.0  # relative error, twice that of predicting the mean
 
 
@@ -33,7 +33,7 @@ class Prediction(NamedTuple):
     """Prediction of outcomes; all are ``(..., outcome_dim)``, in the unit of T.
 
     Attributes:
-        mean: outcomes that are expected.
+        mean: expected outcomes.
         epistemic: standard deviation between the members; more data would reduce it.
         aleatoric: standard deviation of the noise that the members predict; more data would not reduce it.
     """
@@ -44,13 +44,13 @@ class Prediction(NamedTuple):
 
 
 class Refresh(NamedTuple):
-    """What a refresh did.
+    """Result of a refresh.
 
     Attributes:
         steps: steps of the optimiser.
-        held_out: negative log likelihood of the held-out exemplars at its end, in standardised outcomes; lower is
+        held_out: negative log likelihood of the held-out exemplars at the end, in standardised outcomes; lower is
             better.
-        diverged: true if the weights before the refresh are back.
+        diverged: true if the weights before the refresh were restored.
         first: row of the first new exemplar.
         predicted: prediction for the new exemplars before they were learnt from; None at the first refresh.
     """
@@ -70,20 +70,20 @@ class ForwardModel(Ensemble):
         theta_dim: dimension of Pi.
         outcome_dim: dimension of T.
         seed: number from which weights and batches come; torch's global generator is not used.
-        members: number of networks; their disagreement is what more data would reduce.
-        every: number of new exemplars that a refresh waits for.
+        members: number of networks; their disagreement shows what more data would improve.
+        every: number of new exemplars between two refreshes.
         rate: steps of the optimiser for each new exemplar; .3 steps take a fifth of the time of a movement of the
             fishing rod, 2 steps as long as a movement.
-        noise_heads: true predicts a noise that depends on the movement, false one noise for all.
-        accelerator: Lightning's name of the device that trains: cpu, the fastest for these sizes, auto or cuda.
+        noise_heads: true for a predicted noise that depends on the movement, false for one noise for all movements.
+        accelerator: name of the device for training, as in Lightning: cpu, the fastest for these sizes, auto or cuda.
         trust: relative error above which the forward model is not used.
 
     Attributes:
         before_learning: functions that test the model on new exemplars. Each refresh calls them first, with the memory
-            and the number of its exemplars that the model has learnt from.
+            and the number of exemplars that the model has learnt from.
 
     Raises:
-        ValueError: a number out of its range.
+        ValueError: a number is out of its range.
     """
 
     input_mean: torch.Tensor  # (context_dim + theta_dim,)
@@ -128,26 +128,26 @@ class ForwardModel(Ensemble):
 
     @property
     def trained(self) -> bool:
-        """Whether it has learnt from any exemplars; before that, it cannot predict."""
+        """Whether the model has learnt from any exemplars; before that, it cannot predict."""
         return int(self.n_seen) > 0
 
     @property
     def relative_error(self) -> float:
-        """Error of predictions for the held-out exemplars, divided by the error of always predicting their mean: 0 is
-        perfect, 1 no better than the mean, infinite before the first refresh. It is too low for a learner that repeats
-        few movements with small variations, because it then trains on near copies of the held-out ones."""
+        """Error of predictions for the held-out exemplars, divided by the error of always predicting their mean. 0 is
+        perfect, 1 no better than the mean; it is infinite before the first refresh. It is too low for a learner that
+        repeats few movements with small variations, as the held-out exemplars then have near copies in training."""
         return float(self.missed) if self.trained else math.inf
 
     @property
     def trusted(self) -> bool:
-        """Whether its relative error is small enough to use it."""
+        """Whether the relative error is small enough to use the model."""
         return self.relative_error <= self.trust
 
     def landing(self, context: torch.Tensor, theta: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """Mean and variance of outcomes, noise alone, by each member, ``(members, ..., outcome_dim)``; differentiable.
+        """Mean and noise variance of outcomes by each member, ``(members, ..., outcome_dim)`` each; differentiable.
 
         Args:
-            context: ``(..., context_dim)``, or one for all of them.
+            context: ``(..., context_dim)``, or one for all thetas.
             theta: ``(..., theta_dim)``.
         """
         inputs = torch.cat([context.expand(*theta.shape[:-1], context.shape[-1]), theta], dim=-1)
@@ -157,15 +157,15 @@ class ForwardModel(Ensemble):
         return self.outcome_mean + self.outcome_scale * mean, self.outcome_scale**2 * variance
 
     def predict(self, contexts: Array, thetas: Array) -> Prediction:
-        """The outcomes that are expected of movements.
+        """Prediction of the outcomes of movements.
 
         Args:
-            contexts: ``(..., context_dim)``, or one for all of them.
+            contexts: ``(..., context_dim)``, or one for all thetas.
             thetas: ``(..., theta_dim)``.
 
         Raises:
-            ValueError: other dimensions, or not finite.
-            RuntimeError: it is not ``trained``.
+            ValueError: an array has other dimensions, or is not finite.
+            RuntimeError: the model is not ``trained``.
         """
         if not self.trained:
             raise RuntimeError(f"the forward model is not trained yet; refresh() needs {_FEWEST_EXEMPLARS} exemplars")
@@ -177,18 +177,18 @@ class ForwardModel(Ensemble):
         return Prediction(means.mean(axis=0), means.std(axis=0), np.sqrt(variances.mean(axis=0)))
 
     def refresh(self, memory: Memory) -> Refresh | None:
-        """Learn from the new exemplars in ``memory``, and again from old ones; None if fewer than ``every`` are new, or
-        all exemplars have the same outcome.
+        """Learn from new and old exemplars in ``memory``; None if fewer than ``every`` are new, or all outcomes are
+        equal.
 
         It ends early when predictions for the held-out exemplars (one in ten, never trained on) do not improve. The
-        weights before it come back when the loss is not finite or the error is twice that of predicting the mean, and
-        also when it is interrupted.
+        earlier weights are restored if the loss is not finite, if the error is twice that of predicting the mean, or if
+        training is interrupted.
 
         Args:
             memory: memory of the learner; it is only read.
 
         Raises:
-            ValueError: a memory of other dimensions, or with fewer exemplars than it was trained on.
+            ValueError: the memory has other dimensions, or fewer exemplars than the model was trained on.
         """
         sizes = {name: getattr(memory, name) for name in self.sizes}
         if sizes != self.sizes:
@@ -203,7 +203,7 @@ class ForwardModel(Ensemble):
         if seen:
             for test in self.before_learning:
                 test(memory, seen)
-        self._online.prepare()  # the device that trains gets the weights first, then the exemplars
+        self._online.prepare()  # weights must be on the device before the exemplars
         inputs, outcomes = np.hstack([memory.contexts, memory.thetas]), memory.outcomes
         predicted = self.predict(memory.contexts[seen:], memory.thetas[seen:]) if seen else None
         if n > 2 * int(self.n_scaled):
@@ -222,9 +222,9 @@ class ForwardModel(Ensemble):
         return Refresh(fit.steps, fit.loss, fit.diverged, seen, predicted)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write a safetensors file, whose header has the sizes of the model; it appears whole or not at all.
+        """Write a safetensors file, whole or not at all; its header has the sizes of the model.
 
-        The optimiser's moments are not in it: a loaded model predicts the same, and learns on with new moments.
+        The moments of the optimiser are not saved: a loaded model predicts the same, and trains with new moments.
 
         Raises:
             OSError: ``path`` is a directory, or cannot be written.
@@ -234,8 +234,8 @@ class ForwardModel(Ensemble):
         write_bytes(path, save(state, {"model": json.dumps(about)}))
 
     def _scale(self, inputs: Array, outcomes: Array) -> None:
-        """Measure inputs and outcomes in their standard deviations. Predictions stay as they were, but for their noise,
-        which keeps its share of the spread."""
+        """Standardise inputs and outcomes anew. Predicted means do not change; predicted noise keeps its ratio to the
+        spread of outcomes."""
         n = len(inputs)
         (mean, scale), (new_mean, new_scale) = (self.input_mean, self.input_scale), self._spread(inputs)
         first, last = self.weights[0].data, self.weights[-1].data
@@ -260,13 +260,13 @@ class ForwardModel(Ensemble):
 
 
 def load_forward_model(path: str | os.PathLike[str], **options: Any) -> ForwardModel:
-    """The model that ``ForwardModel.save`` wrote; ``options`` are options of `ForwardModel` for training.
+    """The model in a file of ``ForwardModel.save``; ``options`` are options of `ForwardModel` for training.
 
     Raises:
-        ValueError: not such a file, or truncated.
+        ValueError: the file is no forward model, or truncated.
         OSError: there is no file, or it may not be read.
     """
-    Path(path).open("rb").close()  # says why it may not be read
+    Path(path).open("rb").close()  # raises the usual error of an unreadable file
     try:
         with safe_open(str(path), framework="pt") as file:
             about = json.loads(file.metadata()["model"])

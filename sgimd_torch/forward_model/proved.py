@@ -1,9 +1,9 @@
-"""A forward model that has to prove itself: it answers once it predicts movements as well as a local process.
+"""A forward model as inverse model once a test shows that it predicts movements as well as a local process.
 
-Our addition, not in the paper. Before the model learns from new movements, it and the process predict their outcomes,
+Our addition, not in the paper. Before the model learns from new movements, model and process predict their outcomes,
 each from all earlier movements (prequential analysis: Dawid, J. R. Stat. Soc. A 147, 1984). The two are compared on the
-movements that the process was surest of, as answers are like them. So neither judges its own answers, and no movement
-is spent on judging.
+movements that the process was surest of, as answers are like them. So neither tests its own answers, and the test needs
+no movements.
     inverse = ProvedModel(problem); inverse.trusted
 """
 
@@ -22,23 +22,23 @@ from sgimd_torch.memory import Memory
 from sgimd_torch.parts import Inverse, Problem
 from sgimd_torch.spaces import Array, Estimate
 
-_FEWEST: Final = 200  # recent movements before the model can have proved itself
-_SUREST: Final = 10  # one in so many recent movements is compared, those that the process was surest of
-# The model may predict a tenth worse and still answers as well, as lucky outcomes mislead the process. Without noise
-# there are none, and it has to predict a tenth better. Measured on five tasks.
+_FEWEST: Final = 200  # least number of recent movements for a test
+_SUREST: Final = 10  # one in ten recent movements is compared, those that the process was surest of
+# With noise, a model that predicts a tenth worse answers as well, because lucky outcomes mislead the process. Without
+# noise the model has to predict a tenth better. Measured on five tasks.
 _NEARLY: Final = 1.1
 _TINY: Final = np.finfo(float).tiny
 _MOST: Final = 10.0  # error ratios are clipped to [1/10, 10]
 
 
 class ProvedModel(ThroughModel):
-    """Local process, then a forward model once that predicts as well (extra forward).
+    """Local process; a forward model once it predicts as well (extra forward).
 
-    The model answers as in `ModelInverse`. It is tested when it learns, in ``model.refresh``, so to ask for an answer,
-    in an evaluation say, changes nothing.
+    The answers of the model are those of `ModelInverse`. The test is part of ``model.refresh``, so evaluations change
+    nothing.
 
     Args:
-        problem: Pi, memory and noise are read.
+        problem: problem to learn.
     """
 
     @hands_on(ThroughModel)
@@ -48,14 +48,14 @@ class ProvedModel(ThroughModel):
         self._told = Memory(*problem.dims)
         earlier = problem.over(self._told)
         self._rivals = LocalProcess(earlier), ModelInverse(earlier)
-        # One for each movement: its row, the variance that the process expected, the errors of process and model.
+        # For each movement: its row, the expected variance of the process, the errors of process and model.
         self._tests: list[tuple[int, float, float, float]] = []
         self._proved = False
         self.model.before_learning.append(self._test)
 
     @property
     def trusted(self) -> bool:
-        """Whether the model has proved itself on the newer half of the movements, and its own error is small."""
+        """Whether the model has passed the test on the newer half of the movements, and its relative error is small."""
         return self._proved and self.model.trusted
 
     def __call__(self, context: Array, goal: Array) -> Estimate:
@@ -67,7 +67,8 @@ class ProvedModel(ThroughModel):
         return self._better.answer_many(contexts, goals)
 
     def predict(self, context: Array, theta: Array) -> Array | None:
-        """``(outcome_dim,)`` outcome of ``theta`` that the `LocalProcess` expects; None while there are too few."""
+        """Expected outcome ``(outcome_dim,)`` of ``theta`` by `LocalProcess`; None while there are too few
+        exemplars."""
         return self.process.predict(context, theta)
 
     @property
@@ -75,7 +76,7 @@ class ProvedModel(ThroughModel):
         return self.through_model if self.trusted else self.process
 
     def _test(self, memory: Memory, learnt: int) -> None:
-        """Both predict the movements that are new to the model, from the ``learnt`` ones before."""
+        """Test both on the movements that are new to the model; they predict from the ``learnt`` ones before."""
         for row in range(len(self._told), learnt):
             self._told.add(memory.contexts[row], memory.thetas[row], memory.outcomes[row])
         process, through_model = self._rivals
@@ -90,8 +91,7 @@ class ProvedModel(ThroughModel):
         self._proved = self._is_nearly_as_good(len(memory))
 
     def _is_nearly_as_good(self, n: int) -> bool:
-        """Whether the model predicted as well those of the newer half of ``n`` movements that the process was surest
-        of."""
+        """Whether the model predicted as well, on the newer movements that the process was surest of."""
         recent = np.array([test for row, *test in self._tests if row >= n / 2])
         if len(recent) < _FEWEST:
             return False

@@ -1,6 +1,6 @@
-"""A search through the forward model: by its gradient, which movement should land nearer to the goal, and reliably?
+"""A search by the gradient of the forward model, towards reliable movements that land nearer to the goal.
 
-Not in Nguyen & Oudeyer (2014); a swap for the simplex of section 4.4.2, which needs no model.
+Not in Nguyen & Oudeyer (2014); an alternative to the simplex of section 4.4.2, which needs no model.
     search = GradientSearch(problem); movements = search(estimate, goal); theta = next(movements)
 """
 
@@ -22,24 +22,24 @@ from sgimd_torch.spaces import Array, Estimate
 _CANDIDATES: Final = 5  # remembered movements to start from
 _STEPS, _STEP = 5, 0.03  # number and size of the steps of a descent, in sides of Pi
 _RADIUS: Final = 0.15  # first radius of the trust region, in sides of Pi, root mean square over the parameters
-_RADII: Final = (0.02, 0.3)  # bounds of the radius: less would be below the noise, more leaves the neighbourhood
+_RADII: Final = (0.02, 0.3)  # bounds of the radius: less is below the noise, more leaves the neighbourhood
 
 
 class GradientSearch(Search):
-    """Gradient of a forward model; until that is trusted, the simplex (extra forward).
+    """Gradient of a forward model; until the model is trusted, the simplex (extra forward).
 
-    Every movement is planned from theta_g and the movements that landed nearest; the search never ends. The neighbours
-    of the estimate anchor the predictions, and so does each outcome, so that the model's error here corrects the next
-    prediction. A plan stays in a trust region, which grows when the outcome changes as predicted, and shrinks when it
-    does not.
+    A descent from theta_g and from the movements that landed nearest plans every movement; the search never ends.
+    Anchors of the predictions are the exemplars of the estimate and each new outcome, so the model's errors here
+    correct the next prediction. A plan stays in a trust region, which grows when the outcome changes as predicted, and
+    shrinks when it does not.
 
     Args:
-        problem: Pi is read; nothing outside is proposed.
-        noise: standard deviation of the noise on each parameter of every movement, in sides of Pi; without it the
-            memory soon holds too few different movements.
+        problem: problem to learn.
+        noise: standard deviation of the noise of every movement, as a fraction of each parameter's range in Pi; without
+            noise the memory soon holds too few different movements.
 
     Raises:
-        ValueError: ``noise`` not in [0, 0.5].
+        ValueError: ``noise`` is not in [0, 0.5].
     """
 
     def __init__(self, problem: Problem, *, noise: float = 0.05) -> None:
@@ -49,7 +49,7 @@ class GradientSearch(Search):
         self.model, self.noise, self._simplex = model_of(problem), noise, NelderMead(problem)
 
     def __call__(self, start: Estimate, goal: Array) -> Generator[Array, Array, None]:
-        """Movements from ``start`` on, each planned with the outcomes of those before."""
+        """Movements from ``start`` on, each planned with the outcomes of earlier ones."""
         if not is_asked(self.problem.inverse, self.model):
             yield from self._simplex(start, goal)
             return
@@ -59,7 +59,7 @@ class GradientSearch(Search):
         while True:
             nearest = np.linalg.norm(outcomes - goal, axis=1).argsort(kind="stable")[:_CANDIDATES]
             contexts = np.broadcast_to(start.context, (1, len(thetas), len(start.context)))
-            # All candidates share these anchors, which count as if executed in this context.
+            # All candidates share these anchors; they count as executed in this context.
             anchored = Anchored(self.model, policies, start.context, contexts, thetas[None], outcomes[None])
             theta = _best(anchored, np.vstack([first, thetas[nearest]]), goal, radius)
             theta = policies.clip(self.rng.normal(theta, self.noise * policies.sides) if self.noise else theta)
@@ -75,7 +75,7 @@ class GradientSearch(Search):
 
 
 def _best(anchored: Anchored, starts: Array, goal: Array, radius: float) -> Array:
-    """``(theta_dim,)`` the best end of descents of the expected squared distance from ``starts``."""
+    """The best end ``(theta_dim,)`` of descents from ``starts`` on the expected squared distance."""
     aim = anchored.tensor(goal[None])
     found = anchored.descend(anchored.tensor(starts), aim, steps=_STEPS, step=_STEP, radius=radius)
     with torch.no_grad():

@@ -20,7 +20,7 @@ class SharedModel(Trained):
     """Forward model of a problem.
 
     Args:
-        problem: problem whose dimensions and seed the model has.
+        problem: problem to learn; it gives dimensions and seed.
         options: options of `ForwardModel`.
     """
 
@@ -40,12 +40,12 @@ class SharedModel(Trained):
 
 @hands_on(ForwardModel, "members", "rate", "noise_heads", "accelerator", "trust")
 def model_of(problem: Problem, **options: Any) -> ForwardModel:
-    """The forward model of a problem. The first part that wants one makes it, with its options."""
+    """The forward model of a problem; the first call makes it, with these options."""
     return problem.shared(SharedModel, partial(SharedModel, problem, **options)).model
 
 
 class ThroughModel(Inverse):
-    """Inverse model that asks the forward model of its problem when that can be trusted.
+    """Inverse model that uses the forward model of its problem when it can be trusted.
 
     Attributes:
         model: forward model.
@@ -58,10 +58,10 @@ class ThroughModel(Inverse):
 
     @property
     def trusted(self) -> bool:
-        """Whether it asks the model now."""
+        """Whether the forward model is used now."""
         return self.model.trusted
 
 
 def is_asked(inverse: Inverse, model: ForwardModel) -> bool:
-    """Whether a learner with this ``inverse`` asks the model now; an inverse model that asks it, too, decides."""
+    """Whether a learner with this ``inverse`` uses the ``model`` now; an inverse model through the model decides."""
     return inverse.trusted if isinstance(inverse, ThroughModel) else model.trusted

@@ -1,6 +1,6 @@
-"""Online training: an ensemble is fitted again and again while exemplars come in; a fit that diverges is undone.
+"""Online training: repeated fits of an ensemble to a growing set of exemplars; a fit that diverges is undone.
 
-Lightning Fabric, with one optimiser for all fits, so that Adam's moments last from one fit to the next.
+By Lightning Fabric, with one optimiser for all fits, so that Adam's moments last from one fit to the next.
     trainer.prepare(); fit = trainer.fit(x, y, scale, steps=15, give_up=2.0)
 """
 
@@ -17,19 +17,19 @@ from sgimd_torch.forward_model.ensemble import Ensemble, nll
 
 _RECENT: Final = 0.25  # share of every batch that is drawn from the newest exemplars
 _BATCH: Final = 128  # exemplars per step, for each member
-_HELD_OUT_EVERY: Final = 10  # the last of so many exemplars is held out: never trained on
+_HELD_OUT_EVERY: Final = 10  # every tenth exemplar is held out, that is, never trained on
 _STEPS_PER_LOOK: Final = 20  # steps of the optimiser between two looks at the held-out exemplars
 _PATIENCE: Final = 5  # looks without improvement that end a fit
 
 
 class Fit(NamedTuple):
-    """How a fit ended.
+    """Result of a fit.
 
     Attributes:
         steps: steps of the optimiser.
         loss: negative log likelihood of the held-out exemplars.
         relative_error: error of predictions for the held-out exemplars, see `ForwardModel.relative_error`.
-        diverged: true if the weights before the fit are back.
+        diverged: true if the weights before the fit were restored.
     """
 
     steps: int
@@ -57,7 +57,7 @@ class OnlineTrainer:
     optimizer: Any = None
 
     def prepare(self) -> Fabric:
-        """Move the weights to the device that trains, and make the optimiser, unless that is done."""
+        """Move the weights to the device for training, and make the optimiser, at the first call."""
         if self.fabric is None:
             self.fabric = Fabric(accelerator=self.accelerator, devices=1)
             self.ensemble.to(self.fabric.device)
@@ -68,7 +68,7 @@ class OnlineTrainer:
     def fit(self, x: torch.Tensor, y: torch.Tensor, scale: torch.Tensor, *, steps: int, give_up: float) -> Fit:
         """Train until predictions for the held-out exemplars, one in ten, do not improve.
 
-        The weights before it come back if it diverges, and also when it is interrupted.
+        The weights before the fit are restored if it diverges or is interrupted.
 
         Args:
             x: ``(n, n_inputs)`` standardised inputs, the newest last, on the device of the ensemble.
@@ -102,8 +102,9 @@ class OnlineTrainer:
         return Fit(done, loss, error, diverged=False)
 
     def judge(self, x: torch.Tensor, y: torch.Tensor, scale: torch.Tensor) -> tuple[float, float]:
-        """Negative log likelihood, mean over the members, without ``beta``; and the error of their mean prediction,
-        divided by the error of always predicting the mean of ``y``."""
+        """Negative log likelihood without ``beta``, mean over the members; and the error of their mean prediction,
+        divided
+        by the error of always predicting the mean of ``y``."""
         with torch.no_grad():
             mean, log_variance = self.ensemble(x)
             length = scale * torch.stack([mean.mean(dim=0) - y, y.mean(dim=0) - y])
@@ -111,17 +112,17 @@ class OnlineTrainer:
             return float(nll(mean, log_variance, y).mean()), float(error)
 
     def __getstate__(self) -> dict[str, Any]:
-        """For copies and other processes: without the optimiser."""
+        """State for copies and other processes, without the optimiser."""
         return {**self.__dict__, "fabric": None, "optimizer": None}
 
     def _draw(self, rows: torch.Tensor) -> torch.Tensor:
-        """``(members, batch)`` rows, the first of each batch among the newest."""
+        """Random rows ``(members, batch)``; the first of each batch are among the newest."""
         members, recent, n_recent = self.ensemble.members, rows[-self.newest :], round(_RECENT * _BATCH)
         picked = rows[torch.randint(len(rows), (members, _BATCH), generator=self.generator)]
         picked[:, :n_recent] = recent[torch.randint(len(recent), (members, n_recent), generator=self.generator)]
         return picked
 
     def _restore(self, weights: dict[str, torch.Tensor]) -> None:
-        """Back to these weights, with a new optimiser: the moments of the old one belong to other weights."""
+        """Restore these weights, with a new optimiser, because the old moments belong to other weights."""
         self.ensemble.load_state_dict(weights)
         self.optimizer = None

@@ -1,4 +1,4 @@
-"""What goal models check first: is it a point of C, a goal in T, a competence?
+"""Checks of goal models: a context lies in C, a goal in T, a competence in its range.
 
 point = check_attempt(problem, context, goal, competence, gain)
 """
@@ -16,7 +16,7 @@ def check_in(box: Box, name: str, value: ArrayLike, hint: str = "was a goal pass
     """``value`` as one point ``(dim,)`` of ``box``.
 
     Raises:
-        ValueError: another shape, not finite, or outside.
+        ValueError: the value has another shape, is not finite, or lies outside the box.
     """
     point = check_vector(name, value, box.dim, hint)
     if point.ndim != 1 or not box.contains(point):
@@ -29,12 +29,10 @@ def check_attempt(problem: Problem, context: ArrayLike, goal: ArrayLike, compete
 
     Raises:
         ValueError: ``context`` is not one point of C, ``competence`` not in [-1, 0], ``gain`` not in [-1, 1], or
-            ``goal`` not one point of T. A demonstrated outcome may lie outside, so ask ``outcomes.contains`` first.
+            ``goal`` not one point of T. A demonstrated outcome may lie outside T: check it by ``outcomes.contains``.
     """
     point = check_in(problem.contexts, "context", context)
-    goal = check_in(
-        problem.outcomes, "goal", goal, "ask outcomes.contains before a demonstrated outcome becomes a goal"
-    )
+    goal = check_in(problem.outcomes, "goal", goal, "is it a demonstrated outcome? Check it by outcomes.contains first")
     if not -1 <= competence <= 0:  # NaN too
         raise ValueError(f"competence must lie in [-1, 0], got {competence}; was a distance passed instead?")
     if not -1 <= gain <= 1:

@@ -1,4 +1,4 @@
-"""Goal interest mapping: where in C x T does competence change fastest?
+"""Goal interest mapping: regions of C x T, and goals where competence changes fastest.
 
 Section 3.2.1 of Nguyen & Oudeyer (2014). Regions of C x T split as goals accumulate, so that each ends up with its own
 competence progress, eq. (3). Goals are drawn where progress is high, see `Tiling`.
@@ -19,28 +19,29 @@ from sgimd_torch.goals.tiling import Tiling
 from sgimd_torch.parts import Goals, Problem
 from sgimd_torch.spaces import Array
 
-# The least side of a new region as a part of its *parent's*. An absolute bound would stop the zoom into a task space
-# 100 times larger than what can be reached.
+# Least side of a new region, as a part of its *parent's* side. An absolute bound would stop the refinement in a task
+# space 100 times larger than the reachable part.
 _MIN_SIDE: Final = 1 / 15
 
 
 class InterestMap(Goals):
-    """Goals where competence changes fastest, from regions that split.
+    """Goals where competence changes fastest, from regions of C x T that split as goals accumulate.
 
     Args:
-        problem: C and T; reading ``regions`` draws nothing.
-        g_max: most goals of a region; with one more it is cut in two.
+        problem: problem to learn.
+        g_max: largest number of goals in a region; one more cuts the region in two.
         window: number of recent competences in eq. (3), the paper's zeta; even, at least 4, at most ``g_max``.
-        cuts: candidate cuts for each dimension, at equal counts of goals.
-        near: distance from a region's worst goal, for goals near it, as a part of the region's sides.
-        max_aspect: ratio of two sides, as parts of C x T, beyond which the shorter one is not cut. Deviation: the paper
-            has no such rule (inf), and ends in slivers when goals crowd in a small part of a large space.
+        cuts: number of candidate cuts of a region in each dimension.
+        near: largest distance of goals near a region's worst goal, as a fraction of the region's sides.
+        max_aspect: ratio of two sides of a region, relative to those of C x T, beyond which the shorter one is not cut.
+            Deviation: the paper has no such rule (inf). Its regions become slivers when goals crowd in a small part of
+            a large space.
         progress: measure of progress: `gained_progress`; `absolute_progress`, which is eq. (3); `paired_progress`; or a
             function of your own.
-        contrast: function of a region and of which goals lie below a cut: difference between the two sides.
+        contrast: function of a region and of the goals below a cut: difference between the two sides.
 
     Raises:
-        ValueError: a number out of its range.
+        ValueError: a number is out of its range.
     """
 
     def __init__(
@@ -65,7 +66,7 @@ class InterestMap(Goals):
 
     @property
     def regions(self) -> list[Region]:
-        """The leaves, which tile C x T, in the order of the tree: a region's halves stand where it stood."""
+        """The leaves, which tile C x T, in the order of the tree: the halves of a region take its place."""
         return list(self._tiling.regions)
 
     @property
@@ -74,8 +75,8 @@ class InterestMap(Goals):
         return self._tiling.box.sides
 
     def regions_at(self, point: Array) -> list[Region]:
-        """Those that contain a context ``(context_dim,)``, all of them where there are no contexts; or the one that
-        contains a point of C x T."""
+        """Regions that contain a context ``(context_dim,)``, all without contexts; or the region of a point of C x
+        T."""
         return [self._tiling.regions[index] for index in np.flatnonzero(self._tiling.containing(point))]
 
     def sample(self, context: ArrayLike) -> Array:
@@ -89,7 +90,7 @@ class InterestMap(Goals):
     def add(
         self, context: ArrayLike, goal: ArrayLike, competence: float, strategy: str = "autonomous", gain: float = 0.0
     ) -> None:
-        """Goal interest mapping, section 3.2.1: competence was measured at a goal, attempted or emulated.
+        """Goal interest mapping, section 3.2.1: learn the competence at a goal, attempted or emulated.
 
         Raises:
             ValueError: see `Goals.add`.
@@ -101,7 +102,7 @@ class InterestMap(Goals):
             return
         cut = self._best_cut(region)
         if cut is None:
-            # Deviation: the paper does not say what a region does that cannot be cut. It forgets the oldest quarter.
+            # Deviation: the paper leaves open what happens without a valid cut. The region forgets its oldest quarter.
             regions[index] = region.keep(slice(len(region.goals) // 4, None))
         else:
             self._tiling.plant([*regions[:index], *region.split(*cut), *regions[index + 1 :]])
@@ -109,8 +110,8 @@ class InterestMap(Goals):
     def _best_cut(self, region: Region) -> tuple[int, float] | None:
         """(axis, cut) with the largest n1 * n2 * contrast; None when no cut is valid.
 
-        Deviation: the paper maximises the difference of the interests alone, `contrast`, and says nothing of the
-        numbers of goals n1 and n2 on both sides. Without them the best cut often leaves a handful of goals on one.
+        Deviation: the paper maximises the difference of the interests, `contrast`, alone. Without the numbers of goals
+        n1 and n2 on both sides, the best cut often leaves a handful of goals on one side.
         """
         n, side = len(region.points), region.high - region.low
         cuts = np.quantile(region.points, np.arange(1, self.cuts + 1) / (self.cuts + 1), axis=0)  # (cuts, dim)
@@ -124,8 +125,8 @@ class InterestMap(Goals):
         def score(candidate: tuple[int, int]) -> tuple[float, float, int]:
             below = is_below[:, candidate[0], candidate[1]]
             balance = int(n_below[candidate]) * (n - int(n_below[candidate]))
-            # When all cuts score 0 (all competences are -1, say), the region is halved across its longest side rather
-            # than kept: progress that begins in a small part of a large space is only seen in a small region.
+            # When all cuts score 0 (for example, all competences are -1), the longest side is halved, because progress
+            # that begins in a small part of a large space is only visible in a small region.
             return balance * self.contrast(region, below), float(shares[candidate[1]]), balance
 
         candidates = [(int(row), int(axis)) for row, axis in np.argwhere(valid)]

@@ -1,7 +1,7 @@
-"""A fixed grid with the interest and the choice of goals of the interest map: what is the recursive split worth?
+"""A fixed grid with the interest and the choice of goals of the interest map, to measure the value of splitting.
 
-It differs from section 3.2.1 of Nguyen & Oudeyer (2014) only in that cells never split. A grid may do as well in few
-dimensions, when the task space is as large as what can be reached.
+It differs from section 3.2.1 of Nguyen & Oudeyer (2014) only in that cells never split. A grid may be as good in few
+dimensions, when all of the task space can be reached.
     goals = ProgressGrid(problem)
 """
 
@@ -23,17 +23,17 @@ _MAX_CELLS = 100_000  # more than any run has goals
 
 
 class ProgressGrid(Goals):
-    """Goals where competence changes fastest, from equal cells.
+    """Goals where competence changes fastest, from equal cells of C x T, which never split.
 
     Args:
-        problem: C and T. Goals come from the cells that contain the context.
+        problem: problem to learn.
         cells: number of cells in each dimension of C x T; None for about 100 in all, but at least 2 in each dimension.
-        window: number of recent goals in a cell's interest; even, at least 4. A cell remembers no more.
-        near: distance from a cell's worst goal, for goals near it, as a part of the cell's sides.
+        window: number of recent goals that a cell remembers; even, at least 4.
+        near: largest distance of goals near a cell's worst goal, as a fraction of the cell's sides.
         progress: measure of progress, as in `InterestMap`.
 
     Raises:
-        ValueError: a number out of its range, or so many cells that none would ever get four goals.
+        ValueError: a number is out of its range, or there are so many cells that none would get four goals.
     """
 
     def __init__(
@@ -70,8 +70,7 @@ class ProgressGrid(Goals):
 
     @property
     def regions(self) -> list[Region]:
-        """The cells, which tile C x T. ``R.3.7`` is the fourth from below in the first dimension, and the eighth in the
-        second."""
+        """The cells, which tile C x T. ``R.3.7`` is the fourth in the first dimension and the eighth in the second."""
         return list(self._tiling.regions)
 
     def sample(self, context: ArrayLike) -> Array:
@@ -85,7 +84,7 @@ class ProgressGrid(Goals):
     def add(
         self, context: ArrayLike, goal: ArrayLike, competence: float, strategy: str = "autonomous", gain: float = 0.0
     ) -> None:
-        """Competence was measured at a goal. Its cell forgets what is older than the window.
+        """Learn the competence at a goal. Its cell forgets goals older than the window.
 
         Raises:
             ValueError: see `Goals.add`.

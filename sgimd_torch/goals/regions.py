@@ -1,4 +1,4 @@
-"""Regions of C x T, and how interesting they are: the leaves of the interest map.
+"""Regions of C x T, the leaves of the interest map, and their interest.
 
 Section 3.2.1 and eq. (3) of Nguyen & Oudeyer (2014): interest is local competence progress over a sliding window of
 the last goals that were attempted.    region.goals, region.competences, region.interest()
@@ -16,24 +16,23 @@ from numpy.typing import NDArray
 from sgimd_torch.spaces import Array
 
 Progress = Callable[[Array, Array, Array], float]
-"""(points, competences, gains) of a window of n >= 4 goals, oldest first -> how much the robot progresses. Points
-``(n, dim)`` lie in C x T; competences ``(n,)`` were measured there when the attempts ended; gains ``(n,)`` say how much
-each attempt raised the competence at its own goal; below 0, how far it stayed behind, see `Goals.add`."""
+"""Function (points, competences, gains) of a window of n >= 4 goals, oldest first -> progress. Points ``(n, dim)`` lie
+in C x T. Competences ``(n,)`` were measured there when the attempts ended. Gains ``(n,)`` are those of `Goals.add`."""
 
 
 def gained_progress(points: Array, competences: Array, gains: Array) -> float:
-    """Rise of the competence at the goals themselves, in the mean.
+    """Mean rise of the competence at each goal during its attempt.
 
-    Deviation: eq. (3) compares the competences of older and newer goals, which also differ because the goals differ. In
-    most regions of a large task space some goals can be reached and others cannot, and eq. (3) sees little else.
+    Deviation: eq. (3) compares competences of older and newer goals, which also differ because the goals differ. In
+    most regions of a large task space only some goals can be reached, and this difference hides progress.
     """
     return float(np.maximum(gains, 0).mean())
 
 
 def absolute_progress(points: Array, competences: Array, gains: Array) -> float:
-    """Difference of newer and older competences, the paper's eq. (3).
+    """Difference between the newer and the older half of the competences, the paper's eq. (3).
 
-    |newer half - older half| over the number of values; an odd window loses its oldest."""
+    |sum of newer - sum of older| over the number of values; of an odd number, the oldest value is left out."""
     # Deviation: the paper's two sums share their middle term; these halves are disjoint and of equal length.
     half = len(competences) // 2
     newer, older = competences[-half:], competences[-2 * half : -half]
@@ -41,11 +40,11 @@ def absolute_progress(points: Array, competences: Array, gains: Array) -> float:
 
 
 def paired_progress(points: Array, competences: Array, gains: Array) -> float:
-    """Difference from the competence at the nearest earlier goal, in the mean over all goals but the first.
+    """Mean difference between the competence at a goal and at the nearest earlier goal.
 
-    Forestier et al. (2017) and Portelas et al. (2019) measure progress in this way. It tells competence that changes in
-    time from competence that only differs between places, but it never averages out the noise of single goals. Of
-    equally near goals the latest counts. Distances are measured in C x T: scale contexts of other units than goals.
+    Forestier et al. (2017) and Portelas et al. (2019) measure progress in this way. It separates change in time from
+    differences between places, but does not average out the noise of single goals. Of equally near goals the latest
+    counts. Distances are measured in C x T, so contexts should be scaled to the unit of goals.
     """
     n = len(points)
     apart = np.square(points[:, None] - points).sum(axis=2)  # (n, n)
@@ -57,7 +56,7 @@ def paired_progress(points: Array, competences: Array, gains: Array) -> float:
 def interest_of(points: Array, competences: Array, gains: Array, *, window: int, progress: Progress) -> float:
     """Progress over the last ``window`` goals, at ``points`` ``(n, dim)`` with ``competences`` and ``gains`` ``(n,)``.
 
-    Deviation: 0 for fewer than 4 goals, where the halves of eq. (3) have one value or none.
+    Deviation: 0 for fewer than 4 goals, because the halves of eq. (3) then have one value or none.
     """
     if len(competences) < 4:
         return 0.0
@@ -65,17 +64,17 @@ def interest_of(points: Array, competences: Array, gains: Array, *, window: int,
 
 
 def between_interests(region: Region, below: NDArray[np.bool_]) -> float:
-    """How far the interests on the two sides of a cut lie apart; ``below`` ``(n,)`` are the goals on one side."""
+    """Difference of the interests on the two sides of a cut; ``below`` ``(n,)`` marks the goals on one side."""
     return abs(region.interest_among(below) - region.interest_among(~below))
 
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """R_i, a leaf of the tree as it was when it was read: later goals make a new Region.
+    """R_i, a leaf of the tree. It never changes: a later goal makes a new Region.
 
-    ``path`` leads from the root: "R", then "R0" below and "R1" above its cut, "R01" ... It never changes its meaning.
+    ``path`` leads from the root: "R", then "R0" below and "R1" above its cut, "R01" ... Paths keep their meaning.
     ``low`` and ``high`` are the corners in C x T. In order of time: ``points`` ``(n, context_dim + outcome_dim)``,
-    ``competences`` and ``gains`` ``(n,)``, ``strategies`` ``(n,)`` names. ``attempts`` counts all goals that came here,
+    ``competences`` and ``gains`` ``(n,)``, ``strategies`` ``(n,)`` names. ``attempts`` counts all goals in the region,
     also forgotten ones, but not those that a parent had forgotten before it was cut. Arrays are read-only.
     """
 
@@ -98,20 +97,20 @@ class Region:
 
     @property
     def contexts(self) -> Array:
-        """``(n, context_dim)`` in which the goals were attempted."""
+        """Contexts ``(n, context_dim)`` of the attempts."""
         return self.points[:, : self.context_dim]
 
     @property
     def goals(self) -> Array:
-        """``(n, outcome_dim)`` in order of time."""
+        """Goals ``(n, outcome_dim)`` in order of time."""
         return self.points[:, self.context_dim :]
 
     def interest(self, strategy: str | None = None) -> float:
-        """Local competence progress, eq. (3); with a ``strategy``, over the goals that it alone has chosen."""
+        """Local competence progress, eq. (3); with a ``strategy``, over its goals alone."""
         return self._interest if strategy is None else self.interest_among(self.strategies == strategy)
 
     def interest_among(self, rows: NDArray[np.bool_] | slice) -> float:
-        """The interest that it would have with these goals alone."""
+        """Interest over the goals in ``rows`` alone."""
         return self.progress(self.points[rows], self.competences[rows], self.gains[rows])
 
     @cached_property

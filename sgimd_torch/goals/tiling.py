@@ -1,4 +1,4 @@
-"""Regions that tile C x T, and the choice of a goal from them: what the interest map and the progress grid share.
+"""Regions that tile C x T, and the choice of a goal from them; the interest map and the progress grid use it.
 
 Section 3.2.2 and eq. (4) of Nguyen & Oudeyer (2014). A map cuts C x T into regions and gives them to a `Tiling`.
     tiling.plant(regions); goal = tiling.sample(context); index = tiling.add(context, goal, competence, strategy, gain)
@@ -20,15 +20,15 @@ _MODES: Final = (0.7, 0.2, 0.1)  # probabilities of a goal where interest is hig
 
 
 class Tiling:
-    """Regions that tile C x T; at first one region, all of it.
+    """Regions that tile C x T; at first, one region is all of it.
 
     Args:
-        problem: C and T, and the random stream ``goals``.
-        progress: interest of a region, by its points, competences and gains.
-        near: distance from the worst goal that mode 3 goes, as a part of the region's sides.
+        problem: problem to learn.
+        progress: function for the interest of a region, from points, competences and gains.
+        near: largest distance from the worst goal in mode 3, as a fraction of the region's sides.
 
     Raises:
-        ValueError: a number out of its range.
+        ValueError: a number is out of its range.
     """
 
     def __init__(self, problem: Problem, progress: Progress, *, near: float) -> None:
@@ -53,7 +53,7 @@ class Tiling:
         self._ends = np.where(self._highs == self.box.high, np.inf, self._highs)
 
     def add(self, context: ArrayLike, goal: ArrayLike, competence: float, strategy: str, gain: float) -> int:
-        """Give a goal to the region in which it lies, and return the index of that region."""
+        """Add a goal to its region, and return the index of this region."""
         point = check_attempt(self.problem, context, goal, competence, gain)
         index = int(self.containing(point).argmax())
         self.regions[index] = self.regions[index].extend(point, competence, gain, strategy)
@@ -70,13 +70,13 @@ class Tiling:
         low, high = region.low[dim:], region.high[dim:]
         if mode == 1 or len(region.goals) == 0:
             return self._rng.uniform(low, high)
-        # Ties are common, as competence is -1 wherever nothing came near. The first would be tried again and again.
+        # Ties are common, as competence is -1 far from all outcomes. A fixed choice would repeat one goal forever.
         worst = self._rng.choice(np.flatnonzero(region.competences == region.competences.min()))
         step = self._near * (high - low)
         return Box(low, high).clip(region.goals[worst] + self._rng.uniform(-step, step))
 
     def containing(self, point: Array) -> NDArray[np.bool_]:
-        """``(n_regions,)`` which contain a point of C, or of C x T: only the coordinates that it has count."""
+        """Mask ``(n_regions,)`` of the regions that contain a point of C, or of C x T."""
         dim = len(point)
         inside = (self._lows[:, :dim] <= point) & (point < self._ends[:, :dim])  # (n_regions, dim)
         contain: NDArray[np.bool_] = np.all(inside, axis=1)
@@ -87,7 +87,7 @@ class Tiling:
         here = np.flatnonzero(self.containing(context))
         interests = np.array([self.regions[index].interest() for index in here])
         weights = interests - interests.min()  # eq. (4)
-        # Deviation: eq. (4) is 0/0 where no region stands out. Their shares of T then make goals uniform.
+        # Deviation: eq. (4) is 0/0 if all interests are equal. Weights by size in T then make goals uniform.
         if not weights.any():
             sides = (self._highs - self._lows)[here, self.problem.contexts.dim :]
             weights = (sides / self.problem.outcomes.sides).prod(axis=1)

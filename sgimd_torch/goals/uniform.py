@@ -1,4 +1,4 @@
-"""Goals drawn anywhere in T, whatever was learnt: instead of the interest map they show what interest is worth.
+"""Goals drawn anywhere in T, whatever was learnt; a baseline for the interest map.
 
 goals = UniformGoals(problem)
 """
@@ -16,12 +16,12 @@ class UniformGoals(Goals):
     """Uniform goals, anywhere in T."""
 
     def sample(self, context: ArrayLike) -> Array:
-        """``(outcome_dim,)`` uniform in T."""
+        """A goal ``(outcome_dim,)``, uniform in T."""
         check_in(self.problem.contexts, "context", context)
         return self.problem.outcomes.sample(self.rng)
 
     def add(
         self, context: ArrayLike, goal: ArrayLike, competence: float, strategy: str = "autonomous", gain: float = 0.0
     ) -> None:
-        """Checked, then forgotten."""
+        """Check the arguments, and remember nothing."""
         check_attempt(self.problem, context, goal, competence, gain)

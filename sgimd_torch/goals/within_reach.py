@@ -1,9 +1,9 @@
-"""Goals within reach: uniform in T where most of it is near what was reached, else in a box around that.
+"""Goals within reach: uniform in a box around the reached outcomes, or in T if T is hardly larger.
 
-Our addition. Where T is far wider than what can be reached, nearly all of its points are hopeless, and a learner that
-aims at them learns its most extreme movements. The box holds what can be reached again: for each movement, the mean
-outcome of those most like it counts, so a lucky landing hardly does. Goals lie a step beyond it, too, at first a wide
-one: so the box grows. The step narrows where such goals are missed: what lies there was reached by noise alone.
+Our addition. If T is far larger than the reachable part, nearly all of its points are hopeless, and a learner that aims
+at them learns its most extreme movements. The box holds outcomes that can be reached again: for each movement, the mean
+outcome of similar movements counts, so lucky outcomes hardly matter. Goals also lie within a step outside the box, so
+that the box can grow. The step is wide at first, and narrows if such goals are missed.
     goals = WithinReach(problem); goal = goals.sample(context)
 """
 
@@ -19,41 +19,39 @@ from sgimd_torch.parts import Problem
 from sgimd_torch.spaces import Array
 
 _FIRST: Final = 21  # exemplars; before, goals are uniform in T
-_LOOKED_AT, _GROWTH = 1000, 1.05  # exemplars at about equal distances in time, whenever there are so many times more
-_ALIKE: Final = 5  # movements whose mean outcome counts, fewer while a memory is small
-_TAIL: Final = 0.02  # of these means on each side of a dimension: rare ones do not make the box larger
-_NARROWEST, _WIDEST = 0.02, 0.2  # of the box's longest side, the step beyond it on all sides; at first the whole side
-_WIDE_FOR: Final = 250  # exemplars; before, the step is not narrowed
-_FACTOR: Final = 1.4  # the step times this after a goal beyond was met, over its cube root after one was missed
-_MEDIAN: Final = 1.1  # the median miss within the box times this after a larger miss, over it after a smaller one
-_ROUNDING: Final = 1e-9  # of a side of T: outcomes so near each other are all alike
-_MOST: Final = 0.7  # of a side of T, in the geometric mean: the box is then as good as T
+_LOOKED_AT, _GROWTH = 1000, 1.05  # exemplars that determine the box, and growth of the memory between two looks
+_ALIKE: Final = 5  # similar movements whose mean outcome counts, fewer while the memory is small
+_TAIL: Final = 0.02  # share of these means left out at each end of a dimension
+_NARROWEST, _WIDEST = 0.02, 0.2  # bounds of the step outside the box, relative to its longest side; wider at first
+_WIDE_FOR: Final = 250  # exemplars; before, the step stays wide
+_FACTOR: Final = 1.4  # step times 1.4 after a hit outside the box, over 1.4^(1/3) after a miss
+_MEDIAN: Final = 1.1  # running median of errors inside the box: times 1.1 after a larger error, else over 1.1
+_ROUNDING: Final = 1e-9  # spread of outcomes that counts as none, relative to the longest side of T
+_MOST: Final = 0.7  # side of the box relative to T, in the geometric mean, from which goals come from all of T
 
 
 class WithinReach(UniformGoals):
     """Uniform goals in a box around the outcomes that were reached.
 
-    The box is T where T is nearly as large.
-
-    Each draw is one of `UniformGoals`, moved from T to the box. The step beyond is the same on all sides, in the unit
-    of T, so a dimension that nothing has moved yet is aimed at, too. It follows a success rule (Rechenberg 1973): of
-    four goals beyond the box one should be met, that is, missed by less than it lies beyond, or by less than half of
-    the goals within the box are. The box is the same in all contexts. Where only some movements have an effect, by the
-    inverse model, goals are uniform in T: a few effects say little of what else could be had.
+    The step outside the box has one width, in the unit of T, on all sides, so goals also lie in directions without
+    movement so far. The width follows a success rule (Rechenberg 1973): one of four goals outside the box should be
+    met. A goal is met if its error is below its distance from the box, or below the median error of goals in the box.
+    All contexts share the box. If only some movements have an effect, by the inverse model, goals are uniform in T,
+    because a few effects do not show what can be reached.
 
     Args:
-        problem: T, the memory and the inverse model are read; ``add`` draws nothing.
+        problem: problem to learn.
     """
 
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem)
-        self._reach: Array | None = None  # (2, outcome_dim), the box; None until anything had an effect
-        self._step, self._looked = _WIDEST, 0  # how far beyond; exemplars at the last look
-        self._missed = 0.0  # by how much half of the goals within the box are, about
-        self._all_of_t = False  # T is hardly larger than the box at its widest
+        self._reach: Array | None = None  # (2, outcome_dim), the box; None while all outcomes are equal
+        self._step, self._looked = _WIDEST, 0  # width of the step; exemplars at the last look
+        self._missed = 0.0  # running median of the errors of goals in the box
+        self._all_of_t = False  # whether T is hardly larger than the box with its widest step
 
     def sample(self, context: ArrayLike) -> Array:
-        """``(outcome_dim,)`` uniform in the box, or in T.
+        """A goal ``(outcome_dim,)``, uniform in the box with its step, or in T.
 
         Raises:
             ValueError: ``context`` is not one point of C.
@@ -71,7 +69,7 @@ class WithinReach(UniformGoals):
     def add(
         self, context: ArrayLike, goal: ArrayLike, competence: float, strategy: str = "autonomous", gain: float = 0.0
     ) -> None:
-        """After an attempt at a goal beyond the box the step is wider or narrower.
+        """Learn from the error of the last movement: widen or narrow the step after a goal outside the box.
 
         Raises:
             ValueError: see `Goals.add`.
@@ -90,7 +88,7 @@ class WithinReach(UniformGoals):
             self._step = float(np.clip(step, _NARROWEST, _WIDEST))
 
     def _look(self) -> None:
-        """Where the box is now."""
+        """Update the box."""
         memory, space = self.problem.memory, self.problem.outcomes
         n = self._looked = len(memory)
         rows = np.arange(0, n, 1 + n // _LOOKED_AT)
@@ -105,7 +103,7 @@ class WithinReach(UniformGoals):
             self._all_of_t = bool(share >= _MOST)
 
     def _around(self, reach: Array, step: float) -> tuple[Array, Array]:
-        """Low and high ends of the box and a step beyond, within T."""
+        """Low and high corners of the box with its step, within T."""
         low, high = reach
         beyond = max(step, _FIRST / self._looked) * float((high - low).max())
         return self.problem.outcomes.clip(low - beyond), self.problem.outcomes.clip(high + beyond)

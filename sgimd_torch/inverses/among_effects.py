@@ -1,7 +1,7 @@
-"""Local process fitted to effective movements alone, where most movements have no effect.
+"""Local process fitted to effective movements alone, for robots most of whose movements have no effect.
 
-Our addition, not in the paper. Where an object is touched, what comes of it changes smoothly with the movement; where
-it is not, nothing changes. One process of both would be wrong about both, and most exemplars would say nothing.
+Our addition, not in the paper. If a movement touches an object, the outcome changes smoothly with the movement; if not,
+it stays the same. One process for both kinds would predict both badly, and most exemplars would carry no information.
     inverse = AmongEffects(problem); estimate = inverse(context, goal)
 """
 
@@ -15,12 +15,12 @@ from sgimd_torch.spaces import Array, Estimate
 
 
 class AmongEffects(Inverse):
-    """Local Gaussian process, fitted to effective movements alone where most have no effect.
+    """Local Gaussian process; where most movements have no effect, fitted to effective ones alone.
 
-    It is `LocalProcess` while every movement has an effect of its own, or none had one yet.
+    It is `LocalProcess` while every movement has an effect, or none has had one yet.
 
     Args:
-        problem: memory and noise are read.
+        problem: problem to learn.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -38,7 +38,7 @@ class AmongEffects(Inverse):
         return self._among(context, goal)
 
     def predict(self, context: Array, theta: Array) -> Array | None:
-        """Prediction of `LocalProcess`, from all movements."""
+        """Prediction of `LocalProcess`, fitted to all movements."""
         return self._all.predict(context, theta)
 
     def effects(self) -> Memory | None:

@@ -1,10 +1,10 @@
-"""A Gaussian process: what a movement would lead to, and how sure that is, from the movements most like it.
+"""A Gaussian process, which predicts outcomes and their variances from similar movements.
 
 Our addition, not in the paper; Rasmussen & Williams (2006), chapters 2 and 5. All outcome dimensions share one kernel,
-smooth plus rough, both Matern 5/2; the rough part stands for what the smooth one does not explain though it is no
-noise. So only the noise that the environment states counts as noise.
+smooth plus rough, both Matern 5/2. The rough part explains what the smooth part cannot, so that only the noise stated
+by the environment counts as noise.
     kernel = choose_kernel(groups, noise); process = Process(inputs, outcomes, kernel); process.predict(candidates)
-Inputs are in lengths: how far each must change for the outcome to change, see ``fit_lengths``.
+Each input is divided by its length scale, see ``fit_lengths``; inputs are then "in lengths".
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from sgimd_torch.spaces import Array
 
 _BLAS: Final = ThreadpoolController()
 _ROOT5: Final = np.sqrt(5)
-_LEAST: Final = 1e-6  # noise variance in units of the kernel's; less makes its matrix singular
+_LEAST: Final = 1e-6  # least noise variance, relative to the kernel's; less makes its matrix singular
 _TINY: Final = 1e-300
 _NOISES: Final = (_LEAST, 1e-4, 1e-3, 1e-2, 0.03, 0.1, 0.3, 1.0, 3.0)
 _SCALES: Final = (0.5, 1.0, 2.0)
 _ROUGH: Final = ((1.0, 0.0), *itertools.product((4.0, 12.0), (0.03, 0.1, 0.3, 0.6)))  # (finer, share)
-_STEPS: Final = 30  # of the fit of lengths
+_STEPS: Final = 30  # largest number of steps of the fit of lengths
 
 
 Inputs = ParamSpec("Inputs")
@@ -36,15 +36,16 @@ Output = TypeVar("Output")
 
 
 def one_thread(function: Callable[Inputs, Output]) -> Callable[Inputs, Output]:
-    """A decorator: linear algebra in one thread. The matrices here are so small that several would only wait for each
-    other: on two cores a life of `practice` would take twice as long, on sixteen far longer."""
+    """Decorator: linear algebra in one thread. For these small matrices several threads are slower: on two cores a run
+    of `practice` would take twice as long, on sixteen far longer."""
     found: Callable[Inputs, Output] = _BLAS.wrap(limits=1, user_api="blas")(function)
     return found
 
 
 class Kernel(NamedTuple):
-    """``scale`` multiplies all inputs; the rough part has ``share`` of the variance and is ``finer`` by that factor;
-    ``noise`` is a variance in units of the kernel's."""
+    """Kernel of variance 1. ``scale`` multiplies all inputs. The rough part has the ``share`` of the variance, and a
+    length
+    scale that is ``finer`` times shorter. ``noise`` is a variance, relative to the kernel's."""
 
     scale: float
     finer: float
@@ -52,24 +53,24 @@ class Kernel(NamedTuple):
     noise: float
 
     def __call__(self, squared: Array) -> Array:
-        """Covariances at these ``squared`` distances, 1 at 0."""
+        """Covariances at these ``squared`` distances; 1 at distance 0."""
         distances = self.scale * np.sqrt(squared)
         return (1 - self.share) * _matern(distances) + self.share * _matern(self.finer * distances)
 
     def slope(self, squared: Array) -> Array:
-        """The derivative of the covariance by the input, in units of the difference of the inputs."""
+        """Derivative of the covariance by the input, divided by the difference of the inputs."""
         distances = self.scale * np.sqrt(squared)
         rough = self.finer**2 * _matern_slope(self.finer * distances)
         return self.scale**2 * ((1 - self.share) * _matern_slope(distances) + self.share * rough)
 
 
 class Process:
-    """The process given some movements.
+    """Gaussian process given some movements.
 
     Args:
         inputs: ``(n, dim)``, theta and context in lengths.
         outcomes: ``(n, outcome_dim)``.
-        kernel: its variance is chosen here, as the most likely one.
+        kernel: kernel; the process multiplies it by the most likely variance.
     """
 
     def __init__(self, inputs: Array, outcomes: Array, kernel: Kernel) -> None:
@@ -78,7 +79,7 @@ class Process:
         n, dim = outcomes.shape
         try:
             lower = self._factor(inputs, origin=np.zeros(inputs.shape[1]))
-        except np.linalg.LinAlgError:  # far from 0, their squares hide by how little some of them differ
+        except np.linalg.LinAlgError:  # far from 0, rounding of squares hides small differences
             lower = self._factor(inputs, origin=inputs.mean(axis=0))
         root = solve_triangular(lower, np.eye(n), lower=True)
         self._root = root.T  # times its transpose it is the inverse of the covariance
@@ -87,41 +88,43 @@ class Process:
         self.variance = max(float(((outcomes - self.mean) * self._weights).sum()) / (n * dim), _TINY)
 
     def _factor(self, inputs: Array, origin: Array) -> Array:
-        """The Cholesky factor of the covariance ``(n, n)`` of the inputs, measured from ``origin`` from now on."""
+        """Cholesky factor ``(n, n)`` of the covariance of the inputs; from now on inputs are measured from
+        ``origin``."""
         self._origin, self._inputs = origin, inputs - origin
         covariance = self.kernel(squared_distances(self._inputs, self._inputs))
         return np.asarray(np.linalg.cholesky(covariance + self.kernel.noise * np.eye(len(inputs))), dtype=np.float64)
 
     def _covariances(self, inputs: Array) -> Array:
-        """``(m, n)`` of new inputs ``(m, dim)`` and those given."""
+        """Covariances ``(m, n)`` of new inputs ``(m, dim)`` with the inputs of the process."""
         return self.kernel(squared_distances(inputs - self._origin, self._inputs))
 
     def predict(self, inputs: Array) -> tuple[Array, Array]:
-        """The expected outcomes ``(m, outcome_dim)`` of ``(m, dim)`` new inputs, and the variance ``(m,)`` of each
-        dimension; noise comes on top."""
+        """Expected outcomes ``(m, outcome_dim)`` of new inputs ``(m, dim)``, and the variance ``(m,)`` of each
+        dimension,
+        without noise."""
         across = self._covariances(inputs)
         known = across @ self._root
         return across @ self._weights + self.mean, self.variance * np.maximum(1 - (known * known).sum(axis=1), 0)
 
     def expect(self, inputs: Array) -> Array:
-        """The expected outcomes alone."""
+        """Expected outcomes ``(m, outcome_dim)`` of new inputs ``(m, dim)``."""
         expected: Array = self._covariances(inputs) @ self._weights + self.mean
         return expected
 
     def without_noise(self, rows: Rows) -> tuple[Array, Array]:
-        """What the movements in ``rows`` lead to but for their noise, and the variance of that: as `predict`."""
+        """Expected outcomes of the movements in ``rows`` without their noise, and variances, as in `predict`."""
         noise = self.kernel.noise
         variances = self.variance * noise * np.maximum(1 - noise * self._precisions[rows], 0)
         return self.outcomes[rows] - noise * self._weights[rows], variances
 
     def surprise(self, rows: Rows) -> float:
-        """Mean squared error of predicting each of ``rows`` from all others, in units of what was expected; 1 if the
-        process is right about its own errors."""
+        """Mean squared error of predicting each of ``rows`` from all others, relative to the expected one; 1 if the
+        variances of the process are right."""
         squared = (self._weights[rows] ** 2).mean(axis=1)
         return float((squared / self._precisions[rows]).mean()) / self.variance
 
     def jacobians(self, points: Array) -> Array:
-        """``(m, outcome_dim, dim)`` of the expected outcomes at ``(m, dim)``."""
+        """Jacobians ``(m, outcome_dim, dim)`` of the expected outcomes at ``points`` ``(m, dim)``."""
         differences = (points - self._origin)[:, None] - self._inputs  # (m, n, dim)
         slopes = self.kernel.slope((differences * differences).sum(axis=2))
         found: Array = self._weights.T @ (slopes[..., None] * differences)
@@ -129,10 +132,10 @@ class Process:
 
 
 def fit_lengths(inputs: Array, outcomes: Array) -> Array:
-    """``(dim,)`` the most likely length of each input, in its standard deviations.
+    """Most likely length scale ``(dim,)`` of each input, in its standard deviations.
 
-    Type II maximum likelihood by L-BFGS, with a weak prior; an input without effect gets at most twice the first guess,
-    as few movements cannot show that it has none.
+    Type II maximum likelihood by L-BFGS, with a weak prior. A length is at most twice the first guess, because few
+    movements cannot show that an input has no effect.
 
     Args:
         inputs: ``(n, dim)`` of standard deviation 1; the time grows with n^3.
@@ -171,8 +174,8 @@ def choose_kernel(groups: Sequence[tuple[Array, Array]], noise: float) -> Kernel
 
     Args:
         groups: inputs ``(n, dim)`` in lengths, and outcomes ``(n, outcome_dim)``, not all the same.
-        noise: standard deviation of each outcome dimension, as the environment states it. It may be twice or half as
-            large near some movements, so other values are less likely, not impossible; but 0 is none.
+        noise: standard deviation of each outcome dimension, as the environment states it. Near some movements it may be
+            twice or half as large, so other values are only less likely. But 0 means no noise.
     """
     noises = np.array(_NOISES if noise > 0 else [_LEAST])
     scores: dict[tuple[float, float, float], Array] = {}
@@ -193,16 +196,16 @@ def choose_kernel(groups: Sequence[tuple[Array, Array]], noise: float) -> Kernel
 
 
 def squared_distances(one: Array, other: Array) -> Array:
-    """``(n, m)`` between rows."""
+    """Squared distances ``(n, m)`` between the rows of two arrays."""
     products = (one * one).sum(axis=1)[:, None] + (other * other).sum(axis=1) - 2 * one @ other.T
     return np.maximum(products, 0)
 
 
 def _matern(distances: Array) -> Array:
-    """Matern 5/2."""
+    """Matern 5/2 kernel."""
     return (1 + _ROOT5 * distances + 5 / 3 * distances**2) * np.exp(-_ROOT5 * distances)
 
 
 def _matern_slope(distances: Array) -> Array:
-    """Its derivative, divided by the distance."""
+    """Derivative of the Matern 5/2 kernel, divided by the distance."""
     return -5 / 3 * (1 + _ROOT5 * distances) * np.exp(-_ROOT5 * distances)

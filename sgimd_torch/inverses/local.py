@@ -1,7 +1,7 @@
-"""Local inverse model L^-1: which movement should land on the goal, judging by the outcomes of similar movements?
+"""Local inverse model L^-1: mean of similar movements whose outcomes are near the goal.
 
 Section 4.4.2 and eqs. (8) and (9) of Nguyen & Oudeyer (2014). Different movements can reach the same place, but their
-mean may land elsewhere. So it averages in one region of policy space only, which is near the goal *and* reliable.
+mean may land elsewhere. So the mean is over one neighbourhood of Pi only, which is near the goal *and* reliable.
     inverse = LocalInverse(problem); estimate = inverse(context, goal); estimate.theta
 """
 
@@ -18,17 +18,15 @@ from sgimd_torch.spaces import Array, Estimate
 class LocalInverse(Inverse):
     """Mean of the most reliable neighbourhood, weighted towards the goal, eq. (9).
 
-    It only reads, and draws nothing.
-
     Args:
-        problem: the memory is read.
+        problem: problem to learn.
         h_max: number of nearest outcomes that are compared, eq. (8).
-        k_max: largest number of exemplars in a neighbourhood K_h.
-        dist_n: radius of a neighbourhood in policy space, the paper's distN; None for 0.6 in 25 dimensions, otherwise
-            proportional to the square root of their number, like distances in a unit cube.
-        alpha: distance to the goal that counts as much as a spread of 1.
-        width: width of the Gaussian of eq. (9), in mean distances between the neighbourhood's outcomes and the goal. A
-            wide one averages the neighbourhood, a narrow one follows the exemplar nearest to the goal.
+        k_max: largest number of exemplars in a neighbourhood.
+        dist_n: radius of a neighbourhood in Pi, the paper's distN; None for 0.6 in 25 dimensions, and proportional to
+            the square root of their number in others.
+        alpha: weight of the spread of a neighbourhood's outcomes, against their distance from the goal.
+        width: width of the Gaussian of eq. (9), relative to the mean distance of the neighbourhood's outcomes from the
+            goal. A wide one averages the neighbourhood; a narrow one follows the exemplar nearest to the goal.
 
     Raises:
         ValueError: ``width`` is not positive.
@@ -52,7 +50,7 @@ class LocalInverse(Inverse):
         self.dist_n = 0.6 * np.sqrt(problem.policies.dim / 25) if dist_n is None else dist_n
 
     def __call__(self, context: Array, goal: Array) -> Estimate:
-        """theta_g, and K_best in the order of distance from its centre theta_h, nearest first.
+        """theta_g, and the exemplars of the best neighbourhood K_best, those nearest to its centre theta_h first.
 
         Raises:
             RuntimeError: the memory is empty.
@@ -72,9 +70,9 @@ class LocalInverse(Inverse):
 
 
 def gaussian_weights(goal: Array, outcomes: Array, width: float) -> Array:
-    """beta of eq. (9): ``(k,)`` with sum 1, a Gaussian of the distances between ``outcomes`` and ``goal``.
+    """Weights beta of eq. (9): ``(k,)`` with sum 1, a Gaussian of the distances between ``outcomes`` and ``goal``.
 
-    The paper does not give its width: here it is ``width`` mean distances.
+    The paper does not give the width of the Gaussian. Here it is ``width`` times the mean distance.
     """
     distances = distances_to(outcomes, goal)
     scaled = distances / max(np.finfo(float).tiny, width * distances.mean())
@@ -83,11 +81,11 @@ def gaussian_weights(goal: Array, outcomes: Array, width: float) -> Array:
 
 
 def _spreads(outcomes: Array, neighbourhoods: list[Rows]) -> Array:
-    """``(h,)`` the standard deviation of the outcomes within each neighbourhood.
+    """Standard deviations ``(h,)`` of the outcomes within each neighbourhood.
 
-    Deviation: the paper takes the variance, which is neither a distance nor large enough to matter beside one. A
-    movement without neighbours has no deviation, but is not certain: it gets the median of the others. If none has
-    neighbours, all get 0, and the movement nearest to the goal is chosen.
+    Deviation: the paper takes the variance, which is no distance, and too small to matter beside one. A movement
+    without neighbours has no deviation and gets the median of the others. If none has neighbours, all get 0, and the
+    movement nearest to the goal is chosen.
     """
     spreads = np.array([_standard_deviation(outcomes[rows]) for rows in neighbourhoods])
     known = ~np.isnan(spreads)
@@ -99,4 +97,4 @@ def _standard_deviation(outcomes: Array) -> float:
     if n < 2:
         return np.nan
     deviations = outcomes - outcomes.sum(axis=0) / n
-    return float(np.sqrt((deviations * deviations).sum() / (n - 1)))  # by n, small neighbourhoods look reliable
+    return float(np.sqrt((deviations * deviations).sum() / (n - 1)))  # n would favour small neighbourhoods

@@ -1,9 +1,9 @@
-"""Local Gaussian process as inverse model; the nearest exemplar answers unless the process is clearly better.
+"""Local Gaussian process as inverse model; the answer is the nearest exemplar, unless the process is clearly better.
 
-Our addition, not in the paper. The process learns from the movements near the goal and those most like them. Candidates
-are found by Gauss-Newton steps through it, from the nearest exemplars, and there is the answer of `LocallyLinear`. Each
-is judged by the squared error that the process expects of it, its own uncertainty included; where it was surprised by
-exemplars near the goal, it counts as less sure. If no candidate is clearly better, the nearest exemplar answers.
+Our addition, not in the paper. The process is fitted to the movements near the goal and to similar ones. Candidates are
+the ends of Gauss-Newton steps from the nearest exemplars, and the answer of `LocallyLinear`. Each has an expected
+squared error, variance included. Where the process predicted exemplars near the goal badly, its variance is inflated.
+If no candidate is clearly better, the answer is the nearest exemplar.
     inverse = LocalProcess(problem); estimate = inverse(context, goal)
 """
 
@@ -20,27 +20,26 @@ from sgimd_torch.memory.neighbours import PolicyNeighbours, Rows, Table
 from sgimd_torch.parts import Inverse, Problem
 from sgimd_torch.spaces import Array, Estimate, stream
 
-_FIRST, _GROWTH = 16, 1.5  # exemplars at the first fit, and how many times more at each later one
+_FIRST, _GROWTH = 16, 1.5  # exemplars at the first fit, and the growth factor from fit to fit
 _FITTED: Final = 300  # exemplars, drawn from all, that lengths are fitted to
-_GROUPS, _GROUP = 8, 60  # groups of neighbours that the kernel is chosen by, and exemplars in each
-_NEAR: Final = 20  # outcomes near the goal that the process learns from, and that its surprise is measured on
-_LEARNT: Final = 100  # exemplars that the process learns from
-_STARTS, _STEPS = 3, 4  # exemplars that steps begin at, and steps from each
+_GROUPS, _GROUP = 8, 60  # groups of neighbours that determine the kernel, and exemplars in each
+_NEAR: Final = 20  # outcomes near the goal: the process is fitted to them, and its surprise is measured on them
+_LEARNT: Final = 100  # exemplars that the process is fitted to
+_STARTS, _STEPS = 3, 4  # exemplars where steps begin, and steps from each
 _DAMPINGS: Final = np.array([1e-3, 0.1, 1.0, 10.0])
-_FAR: Final = 1e3  # spreads from 0: squares of inputs farther out would hide their differences
-_CLEARLY: Final = 0.8  # of the squared error expected of the nearest exemplar: what a candidate has to be below
+_FAR: Final = 1e3  # spreads from 0; rounding of squares hides differences of inputs farther out
+_CLEARLY: Final = 0.8  # error below which a candidate is clearly better, relative to the nearest exemplar's
 
 
 class LocalProcess(Inverse):
     """Local Gaussian process; the nearest exemplar, unless the process is clearly better.
 
-    It only reads, draws nothing, and depends on the memory alone.
-
-    Lengths and kernel are refitted when the memory has 1.5 times its size at the last fit; other calls use neighbours
-    only. Units do not matter. The answer is clipped to the box around all that was ever executed.
+    It depends on the memory alone. Lengths and kernel are refitted when the memory has 1.5 times its size at the last
+    fit; other calls use neighbours only. Units do not matter. The answer is clipped to the box around all executed
+    thetas.
 
     Args:
-        problem: memory and noise are read.
+        problem: problem to learn.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -48,7 +47,7 @@ class LocalProcess(Inverse):
         self.memory, self.noise = problem.memory, problem.outcome_noise
         self._nearest, self._linear = NearestNeighbour(problem, k=_NEAR), LocallyLinear(problem)
         self._fitted = 0  # exemplars at the last fit
-        self._kernel: Kernel | None = None  # None: outcomes are all the same
+        self._kernel: Kernel | None = None  # None while all outcomes are equal
 
     @one_thread
     def __call__(self, context: Array, goal: Array) -> Estimate:
@@ -73,14 +72,14 @@ class LocalProcess(Inverse):
         return estimate._replace(theta=candidates[chosen_one]) if clearly else estimate
 
     def predict(self, context: Array, theta: Array) -> Array | None:
-        """``(outcome_dim,)`` what ``theta`` should lead to, judging by the movements most like it, or by the last
-        one while all led to the same. None while there are too few."""
+        """Expected outcome ``(outcome_dim,)`` of ``theta``, from similar movements. While all outcomes are equal: that
+        outcome. None while there are too few exemplars."""
         found = self.predict_variance(context, theta)
         return None if found is None else found[0]
 
     @one_thread
     def predict_variance(self, context: Array, theta: Array) -> tuple[Array, float] | None:
-        """As `predict`, and the variance of each dimension, noise aside."""
+        """The result of `predict`, and the variance of each dimension, without noise."""
         self._catch_up()
         if self._kernel is None:
             return (self.memory.outcomes[-1], 0.0) if self._fitted else None
@@ -91,25 +90,27 @@ class LocalProcess(Inverse):
         return expected, float(variance)
 
     def _learn_near(self, context: Array, goal: Array) -> tuple[Process, Rows, float] | None:
-        """The process of the movements near the goal; the rows of the nearest outcomes, its first ones; and the
-        variance inflation factor. None before the first fit."""
+        """The process of the movements near the goal, the rows of the nearest outcomes (its first ones), and the
+        variance
+        inflation factor; None before the first fit."""
         self._catch_up()
         if self._kernel is None:
             return None
         near = self.memory.near_outcomes(context, goal, _NEAR)
         rows = self._neighbours(near)
         process = Process(self._inputs.keys.rows[rows], self.memory.outcomes[rows], self._kernel)
-        # Two corrections to how sure it is: by what it was surprised by here, and because a process with a length for
-        # each of many inputs, fitted to few movements, is wrong just where it looks for the best.
+        # Two corrections inflate the variance: one for surprising exemplars here, and one because a process with many
+        # lengths, fitted to few movements, errs most at the candidates that look best.
         dim, n = len(self._lengths), len(self.memory)
         return process, near, len(goal) * max(1.0, process.surprise(np.arange(len(near)))) * (1 + dim**2 / n)
 
     def _descend(
         self, process: Process, context: Array, goal: Array, doubt: float, starts: Array
     ) -> tuple[Array, Array]:
-        """Damped Gauss-Newton steps from each of ``starts`` ``(m, theta_dim)``, as long as they help: the least squared
-        errors expected ``(m,)``, and where. They are as short as possible in theta, so what hardly matters hardly
-        changes."""
+        """Least expected squared errors ``(m,)``, and their thetas, after damped Gauss-Newton steps from each of
+        ``starts``
+        ``(m, theta_dim)``; steps end when they do not help. Each is as short as possible, so unimportant parameters
+        hardly change."""
         least, found = np.full(len(starts), np.inf), starts.copy()
         going = np.arange(len(starts))
         dim, spreads, lengths = starts.shape[1], self._spreads[: starts.shape[1]], self._lengths[: starts.shape[1]]
@@ -134,13 +135,13 @@ class LocalProcess(Inverse):
         return least, found
 
     def _expected_errors(self, process: Process, context: Array, goal: Array, doubt: float, thetas: Array) -> Array:
-        """``(m,)`` squared errors that the process expects of ``thetas`` ``(m, theta_dim)``, noise aside."""
+        """Expected squared errors ``(m,)`` of ``thetas`` ``(m, theta_dim)``, without noise."""
         expected, variances = process.predict(self._in_lengths(context, thetas))
         errors: Array = ((expected - goal) ** 2).sum(axis=1) + doubt * variances
         return errors
 
     def _neighbours(self, near: Rows) -> Rows:
-        """Rows to learn from: those ``near`` the goal first, then those most like the first of them."""
+        """Rows to fit the process to: first those ``near`` the goal, then those most similar to the first of these."""
         keys = self._inputs.keys.rows[near[:_STARTS]]
         alike = self._inputs.nearest(keys, min(_LEARNT, len(self.memory)))
         rows = np.concatenate((near, np.stack(alike, axis=1).ravel()))
@@ -149,7 +150,7 @@ class LocalProcess(Inverse):
         return found
 
     def _catch_up(self) -> None:
-        """Take in new exemplars; fit anew when there are half as many again."""
+        """Add new exemplars; refit when the memory has grown by half."""
         n, wanted = len(self.memory), 0
         size = float(_FIRST)
         while size <= n:
@@ -160,10 +161,10 @@ class LocalProcess(Inverse):
             self._inputs.keys.append(self._scaled(len(self._inputs.keys)))
 
     def _fit(self, n: int) -> None:
-        """Fit lengths and kernel to the first ``n`` exemplars, whatever was added since."""
+        """Fit lengths and kernel to the first ``n`` exemplars; later ones do not count."""
         try:
             self._fit_to(n, _FAR)
-        except np.linalg.LinAlgError:  # some are so much alike that they have to be measured from one of them
+        except np.linalg.LinAlgError:  # inputs nearly coincide: measure them from one of them
             self._fit_to(n, 0.0)
 
     def _fit_to(self, n: int, far: float) -> None:
@@ -198,6 +199,6 @@ class LocalProcess(Inverse):
 
 
 def _spreads(inputs: Array) -> Array:
-    """``(dim,)`` standard deviations, 1 of what does not vary."""
+    """Standard deviations ``(dim,)`` of ``inputs``; 1 for constant ones."""
     found = inputs.std(axis=0)
     return np.where(found > 0, found, 1.0)

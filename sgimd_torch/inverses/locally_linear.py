@@ -1,6 +1,6 @@
 """Local inverse model, corrected to first order by a weighted regression of theta on outcome near the goal.
 
-Deviation: the paper stops at the weighted mean of eq. (9); this goes on from there.
+Deviation: the paper stops at the weighted mean of eq. (9); this model corrects it.
     inverse = LocallyLinear(problem); estimate = inverse(context, goal); estimate.theta
 """
 
@@ -14,8 +14,8 @@ from sgimd_torch.spaces import Array, Estimate
 
 # More exemplars in a neighbourhood, and a wider Gaussian, than `LocalInverse` averages: a slope needs them.
 _K_MAX, _WIDTH = 20, 1.0
-# Relative to the variance of the outcomes; the larger, the closer to `LocalInverse`. It also makes the regression
-# unique when outcomes lie on a line, or are fewer than its slopes.
+# Ridge, relative to the variance of the outcomes; the larger, the closer to `LocalInverse`. It also makes the
+# regression unique when outcomes lie on a line, or are fewer than the slopes.
 _RIDGE = 1e-3
 _COINCIDENT = 1e-12  # outcomes that spread less, relative to their size, count as one outcome, which has no slope
 
@@ -26,10 +26,10 @@ class LocallyLinear(Inverse):
     The mean theta should land on the weighted mean of the outcomes; a weighted ridge regression of theta on outcome
     corrects it from there to the goal.
 
-    The answer is clipped to the box around all that was ever executed, because far goals extrapolate far.
+    The answer is clipped to the box around all executed thetas, because far goals extrapolate far.
 
     Args:
-        problem: the memory is read.
+        problem: problem to learn.
     """
 
     def __init__(self, problem: Problem) -> None:

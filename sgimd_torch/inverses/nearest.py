@@ -1,4 +1,4 @@
-"""Nearest neighbour, the field's simplest inverse model: the remembered movement whose outcome is nearest to the goal.
+"""Nearest neighbour, the simplest inverse model: the remembered movement whose outcome is nearest to the goal.
 
 inverse = NearestNeighbour(problem); inverse(context, goal).theta
 """
@@ -16,7 +16,7 @@ class NearestNeighbour(Inverse):
     """Movement whose outcome came nearest to the goal.
 
     Args:
-        problem: the memory is read.
+        problem: problem to learn.
         k: number of exemplars in the estimate.
     """
 

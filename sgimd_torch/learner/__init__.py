@@ -1,10 +1,10 @@
-"""The learner: it explores on its own until a demonstration interrupts, and then answers the demonstration.
+"""The learner: it explores alone until a demonstration interrupts, and then uses the demonstration.
 
-Algorithm 1 of Nguyen & Oudeyer (2014), rebuilt. All five learners of the paper are this class with two slots, an
-autonomous and a social strategy. The caller owns the loop: ``move = learner.ask(context)``, execute it,
-``learner.tell(outcome)``; ``learner.watch(demonstration)`` whenever the teacher shows something. Some learners want to
-be shown a goal: ``learner.request(context)``, before ``ask``, says by whom. Which movement reaches a goal?
-``learner.inverse(context, goal).theta``. Whoever listens is told what happens: ``learner.listeners.append(print)``.
+Algorithm 1 of Nguyen & Oudeyer (2014), rebuilt. All five learners of the paper are this class with two strategies, an
+autonomous and a social one. The caller owns the loop: ``move = learner.ask(context)``, execute it,
+``learner.tell(outcome)``. ``learner.watch(demonstration)`` shows a demonstration. ``learner.request(context)``, before
+``ask``, returns the request of a learner that asks teachers. ``learner.inverse(context, goal).theta`` is the movement
+for a goal. ``learner.listeners.append(print)`` prints every event.
 """
 
 from __future__ import annotations
@@ -24,20 +24,20 @@ Correspondence = Callable[[Array, Array], Array]
 
 
 class Learner:
-    """Alternates between its own exploration and answers to demonstrations.
+    """Alternates between autonomous exploration and attempts after demonstrations.
 
     Args:
-        problem: what has to be learnt; its memory keeps the exemplar of every outcome that is told.
-        autonomous: strategy of its own.
-        social: how it answers a demonstration; None for a learner that cannot be taught.
+        problem: problem to learn; its memory gets an exemplar for every outcome that is told.
+        autonomous: autonomous strategy.
+        social: social strategy, which uses demonstrations; None for a learner that cannot be taught.
         correspondence: function from times and trajectory to theta_d, eq. (6); needed with ``social``.
 
     Attributes:
-        memory: exemplars, those of the problem.
-        inverse: inverse model by which it answers; it may be replaced by another one of the same problem.
+        memory: exemplars, the memory of the problem.
+        inverse: inverse model; it may be replaced by another one of this problem.
         listeners: functions that are called with each `Event`, after it has happened.
-        begun: number of exemplars that it began with.
-        movements: number of its movements, those at rest and those that failed included.
+        begun: number of exemplars at the start.
+        movements: number of movements, rests and failed movements included.
 
     Raises:
         ValueError: ``social`` without ``correspondence``.
@@ -58,38 +58,38 @@ class Learner:
         self.inverse: Inverse = problem.inverse
         self.listeners: list[Callable[[Event], object]] = []
         self.begun, self.movements = len(self.memory), 0
-        self._life: list[int | Event] = []  # a movement is the row of memory that keeps it
+        self._life: list[int | Event] = []  # of a movement, its row in memory
         self._attempt: AskingAttempt | None = None
         self._context: Array = np.zeros(0)
-        self._next: Move | Request | None = None  # of the attempt, not yet told or answered
+        self._next: Move | Request | None = None  # yielded by the attempt, without outcome or reply so far
         self._asked = False
-        self._untold = False  # an attempt was begun by `request`, and no event says so yet
+        self._untold = False  # whether `request` began an attempt that no event has reported yet
         self._lessons: set[tuple[bytes, bytes]] = set()
-        self._offered_at = -1  # how many movements it had made when a teacher offered the lesson under way
+        self._offered_at = -1  # number of movements when a teacher offered the current lesson
 
     @property
     def idle(self) -> bool:
-        """Whether no attempt is under way, so that the next ``ask`` begins one, also in a new context."""
+        """Whether no attempt is under way; then the next ``ask`` begins one, in any context."""
         return self._attempt is None
 
     @property
     def lesson_waits(self) -> bool:
-        """Whether an offered demonstration is still unanswered: a `run` that goes on here asks for no other."""
+        """Whether an offered demonstration is still unanswered; a `run` that continues then asks for no other."""
         return self._offered_at == self.movements
 
     @property
     def regions(self) -> Sequence[Any]:
-        """Regions of its goal model as they are now; none if that has no regions."""
+        """Current regions of the goal model; none if it has no regions."""
         return self.autonomous.regions
 
     @property
     def waits_for_answer(self) -> bool:
-        """Whether it has asked for a demonstration, which `watch` would answer."""
+        """Whether the learner has asked for a demonstration and has no reply yet."""
         return isinstance(self._next, Request)
 
     @property
     def context(self) -> Array:
-        """``(context_dim,)`` of the attempt under way, read-only.
+        """Context ``(context_dim,)`` of the attempt under way, read-only.
 
         Raises:
             RuntimeError: no attempt is under way.
@@ -99,7 +99,7 @@ class Learner:
         return self._context
 
     def events(self) -> Iterator[Event]:
-        """What has happened to it, in order; of a movement without goal and origin."""
+        """All events so far, in order; movements lack goal and origin."""
         memory = self.memory
         for each in self._life:
             if isinstance(each, int):
@@ -109,15 +109,15 @@ class Learner:
             yield self._begun_event
 
     def ask(self, context: ArrayLike) -> Move | None:
-        """The next movement, or None to stay still this time, when there is no outcome to tell.
+        """The next movement; None for a rest, which has no outcome to tell.
 
         Args:
-            context: ``(context_dim,)`` in which it will be executed. An attempt stays in the context in which it began;
-                ``idle`` says when a new context can come.
+            context: ``(context_dim,)``, the context of the movement. An attempt keeps its context until the learner is
+                ``idle``.
 
         Raises:
-            RuntimeError: the last movement's outcome was not told, or the context changed while not ``idle``.
-            ValueError: a context of another shape, or not finite.
+            RuntimeError: the outcome of the last movement was not told, or the context changed while not ``idle``.
+            ValueError: the context has another shape, or is not finite.
         """
         context = check_point("context", context, self.memory.context_dim)
         if self._asked:
@@ -141,14 +141,14 @@ class Learner:
         return self._next
 
     def request(self, context: ArrayLike) -> Request | None:
-        """Its request to a teacher before its next movement; None if there is none. `watch` answers; `go_on_alone`, or
-        `ask` at once, leaves it without an answer.
+        """The request to a teacher before the next movement; None for none. `watch` replies with a demonstration;
+        `go_on_alone`, or `ask` at once, leaves the request without one.
 
         Args:
-            context: ``(context_dim,)``; an attempt begins in it if none is under way.
+            context: ``(context_dim,)``, the context of a new attempt if none is under way.
 
         Raises:
-            ValueError: a context of another shape, or not finite.
+            ValueError: the context has another shape, or is not finite.
         """
         context = check_point("context", context, self.memory.context_dim)
         if self._attempt is None:
@@ -157,13 +157,13 @@ class Learner:
         return self._next if isinstance(self._next, Request) else None
 
     def go_on_alone(self, reply: str) -> None:
-        """Say that its request has no answer.
+        """Tell the learner that its request gets no demonstration.
 
         Args:
             reply: reason, for the record.
 
         Raises:
-            RuntimeError: it has asked for nothing.
+            RuntimeError: the learner has made no request.
         """
         if not isinstance(self._next, Request):
             raise RuntimeError("go_on_alone() needs a request, but request() has given none")
@@ -172,15 +172,15 @@ class Learner:
         self._publish(asked)
 
     def tell(self, outcome: ArrayLike) -> None:
-        """Tell the outcome of the movement that was asked for; it enters memory.
+        """Tell the outcome of the movement from `ask`; it enters the memory.
 
         Args:
             outcome: ``(outcome_dim,)``.
 
         Raises:
-            RuntimeError: no movement was asked for.
-            ValueError: an outcome of another shape, not finite or beyond 1e100; nothing is remembered and the learner
-                still waits.
+            RuntimeError: `ask` has given no movement.
+            ValueError: the outcome has another shape, is not finite or is beyond 1e100. Nothing is remembered, and the
+                learner still waits for an outcome.
         """
         if not self._asked or not isinstance(self._next, Move):
             raise RuntimeError("tell() needs the outcome of a movement, but ask() has not proposed one")
@@ -194,18 +194,19 @@ class Learner:
         self._publish(Event(Kind.MOVED, context, move.theta, move.goal, reached, move.origin), row=row)
 
     def watch(self, demonstration: Demonstration, *, who: str | None = None) -> None:
-        """See a demonstration: the attempt under way ends, and the social strategy answers from the next ``ask`` on.
-        One that was requested goes to the attempt that had requested it.
+        """Watch a demonstration. A requested one goes to the attempt that had requested it. Any other one ends the
+        attempt
+        under way, and the social strategy begins with the next ``ask``.
 
         Args:
             demonstration: demonstration that is shown.
-            who: name of the teacher who offers it, if one is asked before each movement, as in a `run`; see
-                ``lesson_waits``. None for a lesson besides.
+            who: name of the teacher whose offers a `run` checks before each movement, see ``lesson_waits``; None for
+                a demonstration from anybody else.
 
         Raises:
-            RuntimeError: this learner has no social strategy, or the last movement's outcome was not told.
-            ValueError: a demonstration that does not fit the spaces or the correspondence, or whose theta_d leaves Pi;
-                nothing has happened then.
+            RuntimeError: this learner has no social strategy, or the outcome of the last movement was not told.
+            ValueError: the demonstration does not fit the spaces or the correspondence, or theta_d lies outside Pi;
+                the learner is unchanged.
         """
         request = self._next if isinstance(self._next, Request) else None
         if self.social is None and request is None:
@@ -227,7 +228,7 @@ class Learner:
             self._publish(Event(Kind.SHOWN, lesson=demonstration, who=who))
 
     def translate(self, demonstration: Demonstration) -> Array:
-        """theta_d, eq. (6): the policy to which a demonstration corresponds.
+        """theta_d, eq. (6): the policy that corresponds to a demonstration.
 
         Raises:
             RuntimeError: this learner has no correspondence.
@@ -242,7 +243,7 @@ class Learner:
         return self.problem.policies.check("theta_d of the correspondence", theta_d)
 
     def was_shown(self, demonstration: Demonstration) -> bool:
-        """Whether it was shown the same movement in the same context before.
+        """Whether the learner has watched a demonstration with equal theta_d and context before.
 
         Raises:
             RuntimeError: this learner has no correspondence.
@@ -251,16 +252,17 @@ class Learner:
         return _lesson(demonstration, self.translate(demonstration)) in self._lessons
 
     def fail(self, reason: str) -> None:
-        """Say that a movement has failed, so that there is no outcome to tell. It counts as a movement, nothing is
-        remembered, and its attempt ends as by `interrupt`.
+        """Tell the learner that a movement has failed and has no outcome. It counts as a movement, nothing is
+        remembered,
+        and the attempt ends as by `interrupt`.
 
         Args:
-            reason: why it failed, for the record.
+            reason: reason of the failure, for the record.
         """
         self._stop(Kind.FAILED, reason)
 
     def interrupt(self) -> None:
-        """End the attempt under way, if there is one; what it learnt so far counts. An outcome not yet told is no
+        """End the attempt under way, if there is one; its movements so far count. An outcome that was not told is no
         longer expected."""
         if self._attempt is not None:
             self._stop(Kind.INTERRUPTED, None)
@@ -293,7 +295,7 @@ class Learner:
 
     @property
     def _begun_event(self) -> Event:
-        """An attempt was begun, as a replay has to know if it ends before its first movement."""
+        """Event of an attempt without movements so far; a replay needs it if the attempt ends before its first one."""
         return Event(Kind.ASKED, self._context)
 
     def _tell_begun(self) -> None:
@@ -311,7 +313,7 @@ class Learner:
         self._advance(None)
 
     def _advance(self, sent: Array | Lesson | None) -> None:
-        """To the next movement, request or rest of the attempt; None begins one, or says that there was no answer."""
+        """Go to the next movement, request or rest; ``sent`` is None at the start, or if there was no reply."""
         attempt, self._attempt, self._next = self._attempt, None, None
         assert attempt is not None
         try:

@@ -1,4 +1,4 @@
-"""Events: what happens to a learner. The learner alone makes them; whoever listens, as a record does, is told each."""
+"""Events of a learner. The learner alone makes them; its listeners, such as a record, are told each."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 from sgimd_torch.spaces import Array, Demonstration, Request
 
 TEACHER: Final = "teacher"
-"""``who`` of a demonstration that the teacher of a run offered."""
+"""Value of ``who`` for a demonstration offered by the teacher of a run."""
 
 
 class Kind(StrEnum):
@@ -17,13 +17,13 @@ class Kind(StrEnum):
     MOVED = "moved"
     RESTED = "rested"
     SHOWN = "shown"
-    ASKED = "asked"  # for a demonstration; ``reply`` says what came of it, and what is shown next answers it
-    FAILED = "failed"  # a movement got no outcome: ``reply`` says why; without theta, no context could be observed
-    INTERRUPTED = "interrupted"  # by the caller; with theta, before the outcome of that movement was told
+    ASKED = "asked"  # request; ``reply`` is its result, and after "shown" the next event is the demonstration
+    FAILED = "failed"  # movement without an outcome, ``reply`` is the reason; without theta, no context was observed
+    INTERRUPTED = "interrupted"  # by the caller; with theta, before the outcome of this movement was told
 
 
 class Event(NamedTuple):
-    """An event, with what belongs to its kind; ``who`` has shown something or was asked."""
+    """An event, with the fields of its kind; ``who`` is the teacher who has shown something or was asked."""
 
     kind: Kind
     context: Array | None = None

@@ -1,7 +1,7 @@
 """Memory: all exemplars (c, theta, tau) of a learner, and the nearest neighbours among them.
 
-Sections 3.2 and 4.4 of Nguyen & Oudeyer (2014): the set M. The outcome side answers "which movements landed near
-there?" (H of eq. 8), the policy side "which movements are like this one?" (K_h of eq. 8).
+Sections 3.2 and 4.4 of Nguyen & Oudeyer (2014): the set M. The outcome side finds movements that landed near a point (H
+of eq. 8), the policy side finds movements similar to one (K_h of eq. 8).
     memory.add(context, theta, outcome); rows = memory.near_outcomes(context, goal, k=10); memory.thetas[rows]
 """
 
@@ -23,11 +23,11 @@ _NO_CONTEXT: Final = "an environment without contexts gives np.zeros(0)"
 class Memory:
     """Exemplars in the order in which they were added; the row number of an exemplar never changes.
 
-    In distances a unit of context counts as much as a unit of outcome or theta.
+    In distances, a unit of context counts as much as a unit of outcome or theta.
 
     Args:
-        context_dim: 0 without contexts, as in the fishing task.
-        theta_dim, outcome_dim: at least 1.
+        context_dim: dimension of C; 0 without contexts, as in the fishing task.
+        theta_dim, outcome_dim: dimensions of Pi and T, at least 1.
 
     Raises:
         ValueError: a dimension is out of range.
@@ -41,7 +41,7 @@ class Memory:
             )
         self.context_dim, self.theta_dim, self.outcome_dim = context_dim, theta_dim, outcome_dim
         self._contexts, self._thetas, self._outcomes = Table(context_dim), Table(theta_dim), Table(outcome_dim)
-        # A key is the context and an outcome or a theta; without contexts nothing is kept twice.
+        # A key is a context with an outcome or a theta; without contexts, the tables themselves hold the keys.
         self._outcome_side = TreeNeighbours(Table(context_dim + outcome_dim) if context_dim else self._outcomes)
         self._policy_side = PolicyNeighbours(Table(context_dim + theta_dim) if context_dim else self._thetas)
         self._range, self._ranged = (np.full(theta_dim, np.inf), np.full(theta_dim, -np.inf)), 0
@@ -66,7 +66,7 @@ class Memory:
 
     @property
     def theta_range(self) -> tuple[Array, Array]:
-        """``(theta_dim,)`` the least and the greatest value of each parameter so far; infinite for an empty memory."""
+        """Least and greatest value of each parameter so far, ``(theta_dim,)`` each; infinite for an empty memory."""
         new, self._ranged = self.thetas[self._ranged :], len(self)
         if len(new):
             lowest, highest = self._range
@@ -88,33 +88,34 @@ class Memory:
         self._append(context[None], theta[None], outcome[None])
 
     def near_outcomes(self, context: ArrayLike, goal: ArrayLike, k: int) -> Rows:
-        """``(min(k, n),)`` rows whose outcomes lie nearest to ``goal`` ``(outcome_dim,)``, nearest first; of equally
-        near ones the oldest first."""
+        """Rows ``(min(k, n),)`` whose outcomes lie nearest to ``goal`` ``(outcome_dim,)``, nearest first; of equally
+        near
+        ones, the oldest first."""
         goal = check_point("goal", goal, self.outcome_dim, "was a theta passed instead?")
         return self._outcome_side.nearest(self._key(context, goal), k)
 
     def nearest(self, context: ArrayLike, goal: ArrayLike) -> Nearest:
-        """The first of :meth:`near_outcomes`, as something to ask again after each movement."""
+        """The first row of :meth:`near_outcomes`, as an object that follows the memory as it grows."""
         goal = check_point("goal", goal, self.outcome_dim, "was a theta passed instead?")
         return Nearest(self._outcome_side, self._key(context, goal))
 
     def near_policies(self, context: ArrayLike, theta: ArrayLike, k: int, within: float = np.inf) -> Rows:
         """At most ``k`` rows whose thetas lie nearest to ``theta`` ``(theta_dim,)``, not farther than ``within``.
 
-        Exact among up to ``EXACT_UP_TO`` exemplars; among more nearly all of them are found, see `PolicyNeighbours`.
+        The result is exact for up to ``EXACT_UP_TO`` exemplars, see `PolicyNeighbours`; later some rows may be missing.
         """
         theta = check_point("theta", theta, self.theta_dim, "was a goal passed instead?")
         return self._policy_side.nearest(self._key(context, theta)[None], k, within)[0]
 
     def neighbourhoods(self, rows: Rows, k: int, within: float = np.inf) -> list[Rows]:
-        """For each of ``rows`` what :meth:`near_policies` gives for its context and theta; it is its own neighbour."""
+        """Result of :meth:`near_policies` for the context and theta of each of ``rows``; a row is its own neighbour."""
         return self._policy_side.nearest(self._policy_side.keys.rows[rows], k, within)
 
     def copy_for(self, dims: tuple[int, int, int]) -> Memory:
-        """A copy, to start from.
+        """A copy for a learner with these dimensions.
 
         Raises:
-            ValueError: its dimensions of context, theta and outcome are others.
+            ValueError: the memory has other dimensions of context, theta or outcome.
         """
         found = self.context_dim, self.theta_dim, self.outcome_dim
         if found != dims:
@@ -140,7 +141,7 @@ class Memory:
 
 
 class Nearest:
-    """The row whose outcome lies nearest to one goal in one context; asked again, it looks at newer exemplars only."""
+    """The row whose outcome lies nearest to one goal in one context; each look compares the newest exemplars only."""
 
     def __init__(self, side: TreeNeighbours, key: Array) -> None:
         self._side, self._key = side, key
@@ -149,7 +150,7 @@ class Nearest:
 
     @property
     def row(self) -> int | None:
-        """Of equally near rows the oldest; None for an empty memory."""
+        """The nearest row, the oldest of equally near ones; None for an empty memory."""
         seen, self._seen = self._seen, len(self._side.keys)
         if seen < self._seen:
             rows = self._side.keys.rows

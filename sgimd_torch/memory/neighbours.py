@@ -1,9 +1,9 @@
-"""Nearest rows of a growing table: exact ones by a tree, or by comparing with all; of very many rows by cells.
+"""Nearest rows of a growing table: by a tree, by comparing all rows, or, for very many rows, by cells.
 
-Memory asks it "which movements landed near there?" (section 4.4.2 of Nguyen & Oudeyer, 2014: H of eq. 8) and "which
-movements are like this one?" (K_h). scipy or faiss proposes, float64 decides; of equally near rows the older is nearer.
+The memory uses it to find outcomes near a goal (section 4.4.2 of Nguyen & Oudeyer, 2014: H of eq. 8) and movements
+similar to one (K_h). scipy or faiss proposes rows, and float64 distances decide; of equal ones, the older row is first.
     side = TreeNeighbours(Table(2)); side.keys.append(keys); rows = side.nearest(query, k=10)
-What is found depends on the rows alone, not on when it is asked. Trees and indices catch up with the table when asked.
+Results depend on the rows alone, not on earlier queries. A query first adds new rows to the tree or the index.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from sgimd_torch.spaces import Array
 
 Rows = NDArray[np.int64]
 
-EXACT_UP_TO: Final = 2**15  # rows that a policy space compares with all; what it finds in more rows is approximate
+EXACT_UP_TO: Final = 2**15  # rows that `PolicyNeighbours` compares one by one; for more rows it is approximate
 _SPARE: Final = 8  # proposals beyond k, so that the last one nearly always lies clearly beyond the k-th
 _EPSILON32: Final = float(np.finfo(np.float32).eps)
-_LARGEST32: Final = float(np.finfo(np.float32).max)  # what faiss reports where float32 overflowed
-_ROUNDING: Final = 1e-9  # relative; far more than two ways to add up a float64 distance differ by
+_LARGEST32: Final = float(np.finfo(np.float32).max)  # distance that faiss reports where float32 overflows
+_ROUNDING: Final = 1e-9  # relative; far above the rounding of float64 distances
 
-faiss.omp_set_num_threads(1)  # queries last microseconds: to wake other threads costs more than they save
-# Above that, |a|^2 + |b|^2 - 2ab cancels, and `_surely_proposed` would be wrong.
+faiss.omp_set_num_threads(1)  # queries last microseconds, and waking threads costs more than it saves
+# Above this threshold faiss computes |a|^2 + |b|^2 - 2ab, whose cancellation would break `_surely_proposed`.
 faiss.cvar.distance_compute_blas_threshold = 2**20
 
 
 class Table:
-    """Rows in an array that doubles when full."""
+    """Rows in an array that doubles its size when full."""
 
     def __init__(self, dim: int) -> None:
         self._room = np.empty((64, dim))
@@ -77,7 +77,7 @@ class TreeNeighbours:
         self._n_in_tree = 0
 
     def nearest(self, query: Array, k: int) -> Rows:
-        """``(min(k, n),)`` rows, nearest to ``query`` ``(dim,)`` first.
+        """The ``(min(k, n),)`` rows nearest to ``query`` ``(dim,)``, nearest first.
 
         Raises:
             ValueError: ``k`` is below 1.
@@ -85,14 +85,14 @@ class TreeNeighbours:
         _check_k(k)
         keys, n = self.keys.rows, len(self.keys)
         if n - self._n_in_tree > max(self._NEWEST, self._n_in_tree // 32):
-            # Neither option changes what is found; without them it is built twice as fast.
+            # The two options do not change results; without them the tree is built twice as fast.
             self._tree, self._n_in_tree = cKDTree(keys, balanced_tree=False, compact_nodes=False), n
         newest = np.arange(self._n_in_tree, n)
         if self._tree is None:
             return _nearest_of(keys, query, newest, k)[0]
         n_proposed = min(k + _SPARE, self._tree.n)
         distances, proposed = self._tree.query(query, n_proposed)
-        beyond = distances[-1] if n_proposed < self._tree.n else np.inf  # no row that it did not propose is nearer
+        beyond = distances[-1] if n_proposed < self._tree.n else np.inf  # no other row of the tree is nearer
         rows, squared = _nearest_of(keys, query, np.concatenate((np.sort(proposed), newest)), k)
         reach = math.sqrt(squared[-1]) * (1 + _ROUNDING)
         if reach < beyond:
@@ -102,9 +102,9 @@ class TreeNeighbours:
 
 
 class PolicyNeighbours:
-    """Neighbours in many dimensions: exact among up to ``EXACT_UP_TO`` rows; among more nearly all of them are found.
+    """Neighbours in many dimensions: exact for up to ``EXACT_UP_TO`` rows; for more rows, nearly all are found.
 
-    Above that, rows lie in cells around some of the first ones, and only the cells nearest to a query are searched.
+    The rows then lie in cells around some of the first rows, and only the cells nearest to a query are searched.
     """
 
     def __init__(self, keys: Table) -> None:
@@ -134,13 +134,13 @@ class PolicyNeighbours:
             if self._exact:
                 enough = _surely_proposed(query, min(math.sqrt(squared[-1]), within), beyond)
             else:
-                enough = squared[-1] < np.inf  # not where cells are nearly empty, or the query is beyond float32
+                enough = squared[-1] < np.inf  # false if cells are nearly empty, or the query overflows float32
             found.append(rows[squared <= within * within] if enough else _rank(keys, query, k, within))
         return found
 
 
 def _in_cells(rows32: NDArray[np.float32]) -> faiss.IndexIVFFlat:
-    """An empty index that puts each row into the cell of the nearest of some of these ``(n, dim)``."""
+    """An empty index whose cells lie around some of these rows ``(n, dim)``."""
     n_cells = 4 * math.isqrt(len(rows32))
     centres = faiss.IndexFlatL2(rows32.shape[1])
     centres.add(rows32[:: len(rows32) // n_cells][:n_cells])
@@ -156,29 +156,30 @@ def _check_k(k: int) -> None:
 
 
 def _float32(array: Array) -> NDArray[np.float32]:
-    """What is too large becomes infinite.
+    """The ``array`` as float32; values that are too large become infinite.
 
-    Not by ``np.errstate``: it sets a context variable. In Python 3.11 the garbage collector may run meanwhile and end
-    the attempt of a learner that was dropped, which asks a memory, too; to set the variable twice at once is a crash.
+    ``np.errstate`` would be unsafe here, because it sets a context variable. In Python 3.11 the garbage collector may
+    run meanwhile and end the attempt of a dropped learner, which queries a memory, too. Setting the variable twice at
+    once is a crash.
     """
     large = np.abs(array) > _LARGEST32
     return np.where(large, np.copysign(np.inf, array), array).astype(np.float32)
 
 
 def _surely_proposed(query: Array, reach: float, beyond: float) -> bool:
-    """Whether all rows within ``reach`` of ``query`` were proposed, if those that were not lie ``beyond``, a squared
-    distance in float32.
+    """Whether all rows within ``reach`` of ``query`` were proposed, if all others have a squared float32 distance of at
+    least ``beyond``.
 
-    Rounding a key, the query, their difference and the sum to float32 puts nothing from ``reach`` to beyond
-    ``reach + error``.
+    Rounding a key, the query, their difference and the sum to float32 changes a distance of ``reach`` by at most
+    ``error``.
     """
     error = _EPSILON32 * (len(query) + 5) * (reach + math.sqrt((query * query).sum()))
     return (reach + error) ** 2 < beyond < _LARGEST32
 
 
 def _decide(keys: Array, queries: Array, proposed: Rows, k: int) -> tuple[Rows, Array]:
-    """Of the rows ``proposed`` ``(m, n)`` for each query the ``k`` nearest, nearest first, and their squared distances,
-    infinite for -1."""
+    """The ``k`` nearest of the rows ``proposed`` ``(m, n)`` for each query, nearest first, and their squared distances;
+    infinite for row -1."""
     proposed.sort(axis=1)  # the stable sort below then leaves ties in order of row number
     squared = squared_distances(keys[proposed], queries[:, None])
     squared[proposed < 0] = np.inf
@@ -192,16 +193,16 @@ def _rank(keys: Array, query: Array, k: int, within: float) -> Rows:
 
 
 def _nearest_of(keys: Array, query: Array, rows: Rows, k: int) -> tuple[Rows, Array]:
-    """The ``k`` nearest of increasing ``rows``, and their squared distances."""
+    """The ``k`` nearest of the increasing ``rows``, and their squared distances."""
     squared = squared_distances(keys[rows], query)
     if k < len(rows):
-        near = squared <= np.partition(squared, k - 1)[k - 1]  # with all that are as far, of which the older count
+        near = squared <= np.partition(squared, k - 1)[k - 1]  # ties included; the sort below keeps the older ones
         rows, squared = rows[near], squared[near]
     order = squared.argsort(kind="stable")[:k]
     return rows[order], squared[order]
 
 
 def squared_distances(points: Array, query: Array) -> Array:
-    """``(...)`` between ``points`` and ``query``, ``(..., dim)``."""
+    """Squared distances ``(...)`` between ``points`` and ``query``, ``(..., dim)`` each."""
     difference = points - query
     return (difference * difference).sum(axis=-1)

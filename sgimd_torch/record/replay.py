@@ -1,7 +1,7 @@
-"""Replaying a life: a learner of the same parts that lives through the same events becomes the same learner.
+"""Replay: a learner freshly built from equal parts becomes equal to the recorded one by repeating its events.
 
-It draws the same numbers again, so its goals, its searches and its memory come out the same, in the middle of an
-attempt, too. So a record keeps nothing but events.
+It draws the same random numbers again, so goals, searches and memory are equal, even in the middle of an attempt. So
+events are all that `sgimd_torch.record` has to keep.
     for episode in replay(learner, record.events(), teacher=teacher): ...
 """
 
@@ -21,36 +21,36 @@ _HINT: Final = "was it recorded by another version, on another processor or with
 
 
 class ReplayError(RuntimeError):
-    """The learner does not repeat what was recorded: another library version, processor or configuration."""
+    """The learner does not repeat its record; library version, processor or configuration differ."""
 
 
 def replay(
     learner: Learner, events: Iterable[Event], *, teacher: Teacher | None = None
 ) -> Generator[Episode, None, BeforeMovement]:
-    """Let ``learner`` live through ``events``. Nothing is executed and nobody is asked for a demonstration.
+    """Let ``learner`` repeat ``events``. Nothing is executed, and no demonstration is requested from anybody.
 
     Args:
         learner: learner freshly built.
         events: events of the record.
-        teacher: teacher freshly built, too: it is asked before each movement what it offers, so that its draws go on as
-            they would have. Lessons that nobody had offered (``who`` None) come besides. None for what was recorded
-            alone.
+        teacher: teacher, freshly built; its ``offer`` is called before each movement, so that its random draws continue
+            as in the recorded run. Demonstrations without ``who`` were not offered, and are taken from the record. None
+            to take all from the record.
 
     Yields:
-        The episodes, as `run` has yielded them.
+        Episodes, as `run` has yielded them.
 
     Returns:
-        What came after the last of them.
+        Demonstration, request and reply after the last episode.
 
     Raises (when iterated):
-        ReplayError: the learner proposes another movement than the recorded one, or the teacher shows something else.
+        ReplayError: the learner proposes another movement than the recorded one, or the teacher another demonstration.
     """
     offered: Demonstration | None = None
-    asked_at = -1  # the movement before which the teacher was asked last
+    asked_at = -1  # index of the movement before which the teacher was asked last
     before = BeforeMovement()
     for event in events:
         index = learner.movements
-        # Between two runs the caller may show something, begin an attempt or end one; no teacher is asked before that.
+        # Between two runs the caller may show something, or begin or end an attempt; no teacher is asked before it.
         between = event.kind in (Kind.SHOWN, Kind.ASKED, Kind.INTERRUPTED) and event.who is None and event.theta is None
         if teacher is not None and asked_at < index and not between:
             asked_at, offered = index, teacher.offer(index, learner.memory)
@@ -104,7 +104,7 @@ def replay(
 
 
 def _check_repeats(index: int, name: str, recorded: Array | None, now: Array | None) -> None:
-    """Refuse a learner that proposes another vector than the recorded one; None stands for a rest."""
+    """Refuse a learner that proposes another vector than the recorded one; None is a rest."""
     if recorded is None or now is None:
         if recorded is now:
             return
@@ -120,7 +120,7 @@ def _check_repeats(index: int, name: str, recorded: Array | None, now: Array | N
 
 
 def _check_lesson(index: int, recorded: Demonstration | None, offered: Demonstration | None) -> None:
-    """Refuse a teacher that offers something else than was shown."""
+    """Refuse a teacher that offers another demonstration than the recorded one."""
     fields = ("context", "times", "trajectory", "outcome")
     if recorded is None or offered is None:
         same = recorded is offered

@@ -1,1 +1,1 @@
-"""Learners of other schools, to compare with."""
+"""Rivals: learners and parts from the literature, for comparisons."""

@@ -23,9 +23,9 @@ try:
 except ImportError as error:
     raise ImportError(f"ALP-GMM needs scikit-learn: pip install 'sgimd-torch[rivals]' ({error})") from error
 
-_DRAWS = 20  # from a Gaussian; the first that lies in T is the goal
+_DRAWS = 20  # draws from a Gaussian; the first that lies in T is the goal
 # Goals between two fits; before the first fit, goals are uniform. Deviation: the publication waits for 250 goals, half
-# of what a run on the rod has.
+# of those in a run on the rod.
 _REFIT = 50
 _COMPONENTS = 10  # largest number of Gaussians; Akaike's criterion chooses one from 2 to this
 
@@ -33,19 +33,17 @@ _COMPONENTS = 10  # largest number of Gaussians; Akaike's criterion chooses one 
 class AlpGmm(Goals):
     """Goals from Gaussians of high absolute learning progress.
 
-    A mixture of Gaussians over (context, goal, absolute learning progress) is fitted.
-
     Without contexts a Gaussian is chosen in proportion to its mean progress, and a goal is drawn from it. In a context
     it is chosen in proportion to its mean progress times its density there, and the goal is drawn from the Gaussian
-    given this context. Distances are measured in sides of C x T.
+    given this context. A goal outside T is drawn again, and clipped after 20 draws. Distances are in sides of C x T.
 
     Args:
-        problem: C and T; ``add`` draws nothing. A goal drawn outside T is drawn again, and clipped after 20 draws.
-        memory: number of last goals that are fitted. The nearest earlier goal is looked for among all goals.
+        problem: problem to learn.
+        memory: number of last goals that the mixture is fitted to; progress at a goal uses all earlier goals.
         uniform: probability of a goal anywhere in T.
 
     Raises:
-        ValueError: a number out of its range.
+        ValueError: a number is out of its range.
     """
 
     def __init__(
@@ -70,7 +68,7 @@ class AlpGmm(Goals):
         self._mixture: GaussianMixture | None = None
 
     def sample(self, context: ArrayLike) -> Array:
-        """``(outcome_dim,)`` in T; fits the mixture first when that is due.
+        """A goal ``(outcome_dim,)`` in T; the mixture is fitted first if a fit is due.
 
         Raises:
             ValueError: ``context`` is not one point of C.
@@ -85,7 +83,8 @@ class AlpGmm(Goals):
     def add(
         self, context: ArrayLike, goal: ArrayLike, competence: float, strategy: str = "autonomous", gain: float = 0.0
     ) -> None:
-        """Competence was measured at a goal: how far is it from that at the nearest earlier goal, the latest of equals?
+        """Learn the competence at a goal; progress is its difference from the nearest earlier goal, the latest of
+        equals.
 
         Raises:
             ValueError: see `Goals.add`.
@@ -100,11 +99,11 @@ class AlpGmm(Goals):
         self._progress = np.append(self._progress, progress)
 
     def _fit(self) -> GaussianMixture:
-        """The best mixture of 2, 3 ... Gaussians over the last goals, by Akaike's criterion."""
+        """The best mixture of 2 to 10 Gaussians over the last goals, by Akaike's criterion."""
         rows = np.column_stack((self._points, self._progress))[-self.memory :]
         seed = int(self.rng.integers(2**32))
         with warnings.catch_warnings():
-            # Akaike's criterion may also judge a mixture of goals that coincide, or one that has not quite converged.
+            # Akaike's criterion also works for coincident goals, or a mixture that has not quite converged.
             warnings.simplefilter("ignore", ConvergenceWarning)
             numbers = range(2, _COMPONENTS + 1)
             mixtures = [GaussianMixture(number, random_state=seed).fit(rows) for number in numbers]

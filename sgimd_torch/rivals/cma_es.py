@@ -1,4 +1,4 @@
-"""CMA-ES as a search: the field's usual evolution strategy, instead of Nelder-Mead.
+"""CMA-ES, the usual evolution strategy, as a search instead of Nelder-Mead.
 
 Hansen & Ostermeier (2001), by Hansen's own package ``cma``; a rival of section 4.4.2 of Nguyen & Oudeyer (2014).
     learner = sgim_d(environment, seed, correspondence=..., search=CmaEs)
@@ -23,20 +23,18 @@ except ImportError as error:
 class CmaEs(Search):
     """Evolution strategy CMA-ES on the distance to the goal.
 
-    It works around theta_g, which is executed first.
-
-    Each goal starts a new strategy. Of the estimate it uses theta_g only, because its distribution cannot take over
-    remembered exemplars. It prints and writes nothing, and all its draws are from ``rng``.
+    Each goal starts a new strategy around theta_g, which is executed first. Other exemplars of the estimate are not
+    used, because the distribution of CMA-ES cannot include them. All draws come from ``rng``.
 
     Args:
-        problem: Pi is read; nothing outside is proposed.
-        sd: standard deviation of the first generation, in sides of Pi.
-        population: movements of a generation, at least 3; None for cma's own number, 4 + 3 ln(theta_dim). Deviation:
-            this is 13 for the rod, so that nearly all of a goal's 15 movements would be the first generation, and
-            nothing would be left to use what it taught. With 4 (two mirrored pairs) there are three generations.
+        problem: problem to learn.
+        sd: standard deviation of the first generation, as a fraction of each parameter's range in Pi.
+        population: number of movements in a generation, at least 3; None for cma's own, 4 + 3 ln(theta_dim). Deviation:
+            cma's own number is 13 for the rod, so the first generation would use up nearly all of a goal's 15
+            movements. With 4 (two mirrored pairs) there are three generations.
 
     Raises:
-        ValueError: a number out of its range, or a Pi of one dimension.
+        ValueError: a number is out of its range, or Pi has one dimension.
     """
 
     def __init__(self, problem: Problem, *, sd: float = 0.05, population: int | None = 4) -> None:
@@ -62,7 +60,7 @@ class CmaEs(Search):
         policies = self.problem.policies
         theta = policies.check("theta of the estimate", start.theta)
         yield theta
-        # In sides of Pi, so that the units of Pi do not matter.
+        # CMA-ES works in sides of Pi, so that the units of Pi do not matter.
         centre = np.clip((theta - policies.low) / policies.sides, 0, 1)
         strategy = CMAEvolutionStrategy(centre, self.sd, self._options)
         while not strategy.stop():

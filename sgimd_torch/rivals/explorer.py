@@ -1,4 +1,4 @@
-"""How quality diversity explores: a scheduler's movements, batch after batch, and what is demonstrated beside them.
+"""Quality diversity as strategies: movements of a scheduler, batch after batch, and imitation of demonstrations.
 
 explorer = QualityDiversity(problem, Scheduler(archive, emitters), "map-elites"); Learner(problem, explorer)
 """
@@ -18,18 +18,18 @@ if TYPE_CHECKING:
 
 
 class QualityDiversity(Strategy):
-    """The movements of a scheduler, batch after batch; it is told of a batch when all of it was executed.
+    """Movements of a scheduler, batch after batch; the scheduler is told a batch when all of it was executed.
 
     The objective, which decides between elites of one cell, is little effort: minus the mean square of a movement's
-    distance from the middle of Pi, in sides. Outcomes outside T count for the nearest cell of its border. In a T far
-    larger than what can be reached nearly all outcomes share a few cells, and few elites are left to vary.
+    distance from the middle of Pi, in sides. Outcomes outside T count for the nearest cell of its border. If T is far
+    larger than the reachable part, nearly all outcomes share a few cells, and few elites are left to vary.
 
-    Each attempt is one movement; if it is interrupted before its outcome is told, it is proposed again.
+    Each attempt is one movement. If it is interrupted before its outcome is told, it is proposed again.
 
     Args:
-        problem: Pi; exemplars of its memory are in the archive from the start.
-        scheduler: scheduler of ribs, with its archive over T, of movements in sides of Pi. Deviation: what lies outside
-            Pi is executed clipped, but told as it was proposed, and its effort counts. CMA-ES itself would draw again,
+        problem: problem to learn; exemplars of its memory are in the archive from the start.
+        scheduler: scheduler of ribs, with an archive over T, of movements in sides of Pi. Deviation: a movement outside
+            Pi is clipped for execution, but told as proposed, and its effort counts. CMA-ES itself would draw again,
             and never end once its mean lies in a corner of many dimensions.
         origin: origin of the movements, for the record.
     """
@@ -54,7 +54,7 @@ class QualityDiversity(Strategy):
             self._ask()
 
     def add(self, thetas: Array, outcomes: Array) -> None:
-        """Movements ``(n, theta_dim)`` in Pi that were not its own, with their outcomes, for the archive."""
+        """Add other movements, ``thetas`` ``(n, theta_dim)`` in Pi with their outcomes, to the archive."""
         batch = (thetas - self.policies.low) / self.policies.sides
         self.archive.add(batch, objectives_of(batch), outcomes)
 
@@ -67,7 +67,7 @@ class QualityDiversity(Strategy):
 
 
 class Shown(Social):
-    """Imitate what is demonstrated, as SGIM-D does; what was executed enters the archive, where it is varied."""
+    """Imitate a demonstration, as SGIM-D does; executed movements enter the archive, where they are varied."""
 
     def __init__(self, problem: Problem, explorer: QualityDiversity, mimic: Mimic) -> None:
         super().__init__(problem)

@@ -1,8 +1,8 @@
-"""Quality diversity: learners of another school, which fill an archive of outcomes with movements that reach them.
+"""Quality diversity: learners that fill an archive over T with movements for its cells.
 
 MAP-Elites (Mouret & Clune 2015), its line operator (Vassiliades & Mouret 2018), CMA-ME (Fontaine et al. 2020) and
-CMA-MAE (Fontaine & Nikolaidis 2023), by the package ``ribs``. They, too, end with a movement for every outcome that
-they found, but without goals: they vary movements that led somewhere new.
+CMA-MAE (Fontaine & Nikolaidis 2023), by the package ``ribs``. They also find a movement for every outcome that they
+reach. But they have no goals: they vary movements with new outcomes.
     learner = map_elites(environment, seed)        learner = cma_mae(environment, seed, correspondence=translate)
 """
 
@@ -34,7 +34,7 @@ except ImportError as error:
 
 _DEFAULT_CELLS = 400  # 20 x 20, of .1 m in the fishing task, like the tiles of its benchmark
 _MAX_CELLS = 1_000_000  # ribs keeps an array of all of them
-_LEAST_OBJECTIVE = -0.35  # of CMA-MAE's cells at the start: below the effort of the corners of Pi, .25
+_LEAST_OBJECTIVE = -0.35  # first threshold of CMA-MAE's cells: below the objective of the corners of Pi, -.25
 _SHARED = ("cells", "correspondence", "imitations", "epsilon", "inverse", "memory")
 MakeEmitters = Callable[[GridArchive, np.random.Generator], Sequence[EmitterBase]]
 
@@ -53,24 +53,23 @@ def quality_diversity(
     inverse: MakeInverse = LocalProcess,
     memory: Memory | None = None,
 ) -> Learner:
-    """What all of them share.
+    """A learner by quality diversity; the algorithms below choose its emitters.
 
     Args:
-        environment: its boxes are read; it is not executed.
-        seed: of this learner's stream.
-        origin: name of that stream, and of the movements in the log.
-        emitters: (archive, rng) -> what proposes movements.
+        environment: robot and world; nothing is executed here.
+        seed: number from which the random stream of the learner comes.
+        origin: name of this stream, and origin of the movements in the record.
+        emitters: function (archive, rng) -> emitters, which propose movements.
         annealed: keywords of the archive of CMA-MAE.
-        cells: for each dimension of T; None for about 400 in all.
-        correspondence: eq. (6): what is demonstrated is imitated as by SGIM-D, and enters the archive; None learns
-            alone.
-        imitations: movements that are spent on imitating a demonstration.
-        epsilon: bound of the variation in each parameter of theta when imitating.
-        inverse: (memory) -> the inverse model by which it answers.
-        memory: to start from: its exemplars enter the archive, and take the place of first movements.
+        cells: number of cells in each dimension of T; None for about 400 in all.
+        correspondence: function from times and trajectory to theta_d, eq. (6); None for a learner without teacher.
+        imitations: number of movements that imitate a demonstration.
+        epsilon: largest variation of each parameter in an imitation, in the unit of the parameter.
+        inverse: constructor of the inverse model.
+        memory: exemplars to start from, which enter the archive; None for none.
 
     Raises:
-        ValueError: a number out of its range, or an environment with contexts.
+        ValueError: a number is out of its range, or the environment has contexts.
     """
     if environment.contexts.dim:
         raise ValueError(f"quality diversity knows one context only, got contexts of dim {environment.contexts.dim}")
@@ -104,18 +103,18 @@ def map_elites(
     batch: int = 10,
     **options: Any,
 ) -> Learner:
-    """MAP-Elites: Gaussian variations of elites, which are drawn evenly from the cells of T that were reached.
+    """MAP-Elites with a teacher: Gaussian variations of elites, drawn evenly from the reached cells of T.
 
     Args:
-        environment: its boxes are read; it is not executed.
-        seed: of this learner's stream.
+        environment: robot and world; nothing is executed here.
+        seed: number from which the random stream of the learner comes.
         first: number of uniform movements at the start.
-        sd: standard deviation of the variations, in sides of Pi, as in `perturb`; what leaves Pi is clipped.
-        batch: movements between two looks at the archive.
-        options: see `quality_diversity`.
+        sd: standard deviation of the variations, as a fraction of each parameter's range in Pi.
+        batch: number of movements between two updates of the archive.
+        options: options of `quality_diversity`.
 
     Raises:
-        ValueError: a number out of its range, or an environment with contexts, which an archive over T does not know.
+        ValueError: a number is out of its range, or the environment has contexts, which an archive over T cannot hold.
     """
     _check_sd(sd)
     sizes = check_count("first", first, 1), check_count("batch", batch, 1)
@@ -137,15 +136,15 @@ def isoline(
     batch: int = 10,
     **options: Any,
 ) -> Learner:
-    """MAP-Elites with the line operator: an elite, a step along the line to another one, and a little noise.
+    """MAP-Elites along lines, with a teacher: an elite, a step towards another one, and a little noise.
 
     Args:
-        environment, seed, first, batch, options: as in `map_elites`.
-        sd: standard deviation of the noise, in sides of Pi.
-        line: standard deviation of the step, in distances between the two elites.
+        environment, seed, first, batch, options: arguments of `map_elites`.
+        sd: standard deviation of the noise, as a fraction of each parameter's range in Pi.
+        line: standard deviation of the step, relative to the distance between the two elites.
 
     Raises:
-        ValueError: as in `map_elites`.
+        ValueError: see `map_elites`.
     """
     _check_sd(sd)
     sizes = check_count("first", first, 1), check_count("batch", batch, 1)
@@ -166,19 +165,18 @@ def cma_me(
     batch: int | None = None,
     **options: Any,
 ) -> Learner:
-    """CMA-ME: CMA-ES that climbs towards new cells of the archive, and restarts from an elite when it finds none.
+    """CMA-ME with a teacher: CMA-ES towards new cells of the archive; restarts from an elite when it finds none.
 
     Args:
-        environment, seed, options: as in `map_elites`.
-        emitters: number of emitters of the improvement type; all start at the centre of Pi. Deviation: Fontaine et al.
-            have 15, of which each would get some 25 generations in a run on the rod.
-        sd: standard deviation of the first generation and after a restart, in sides of Pi; what leaves Pi is clipped.
-            Deviation: pyribs' examples start wider, but from the middle of a box of many dimensions that leads into its
-            corners.
-        batch: movements of a generation of each emitter, at least 2; None for 4 + 3 ln(theta_dim).
+        environment, seed, options: arguments of `map_elites`.
+        emitters: number of improvement emitters, which start at the centre of Pi. Deviation: Fontaine et al. have 15;
+            each would get only some 25 generations in a run on the rod.
+        sd: standard deviation at the start and after a restart, as a fraction of each parameter's range in Pi.
+            Deviation: pyribs' examples start wider, but in a box of many dimensions this leads into the corners.
+        batch: number of movements in a generation of each emitter, at least 2; None for 4 + 3 ln(theta_dim).
 
     Raises:
-        ValueError: as in `map_elites`.
+        ValueError: see `map_elites`.
     """
     team = _team(environment, emitters, sd, batch, ranker="2imp")
     return quality_diversity(environment, seed, "cma-me", team, **options)
@@ -195,14 +193,14 @@ def cma_mae(
     learning_rate: float = 0.01,
     **options: Any,
 ) -> Learner:
-    """CMA-MAE: as CMA-ME, but what an elite has to beat rises slowly, so that a cell stays worth improving.
+    """CMA-MAE with a teacher: CMA-ME with thresholds that rise slowly, so that cells stay worth improving.
 
     Args:
-        environment, seed, emitters, sd, batch, options: as in `cma_me`.
-        learning_rate: how far a cell's threshold moves towards the objective of a movement that enters it, in (0, 1].
+        environment, seed, emitters, sd, batch, options: arguments of `cma_me`.
+        learning_rate: step of a cell's threshold towards the objective of a new movement, in (0, 1].
 
     Raises:
-        ValueError: as in `map_elites`.
+        ValueError: see `map_elites`.
     """
     if not 0 < learning_rate <= 1:
         raise ValueError(f"learning_rate must lie in (0, 1], got {learning_rate}; 1 is CMA-ME's archive")
@@ -215,7 +213,7 @@ _ALONE: Final[dict[str, Any]] = {"correspondence": None, "imitations": 0, "epsil
 map_elites_alone = partial(map_elites, **_ALONE)
 """MAP-Elites: fills an archive of outcomes by variations of its elites."""
 isoline_alone = partial(isoline, **_ALONE)
-"""MAP-Elites along lines between elites."""
+"""MAP-Elites along lines between its elites."""
 cma_me_alone = partial(cma_me, **_ALONE)
 """CMA-ME: fills an archive by evolution strategies."""
 cma_mae_alone = partial(cma_mae, **_ALONE)
@@ -241,7 +239,7 @@ def _begun(environment: Environment, rng: np.random.Generator, first: int, batch
 
 
 def _team(environment: Environment, emitters: int, sd: float, batch: int | None, **rules: Any) -> MakeEmitters:
-    """Makes evolution strategies that all start at the centre of Pi."""
+    """Function that makes evolution strategies, which all start at the centre of Pi."""
     _check_sd(sd)
     if batch is not None:
         check_count("batch", batch, 2)

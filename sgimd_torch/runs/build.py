@@ -1,4 +1,4 @@
-"""The composition root: makes the parts of a run from a ``Config``.
+"""The composition root: builds the parts of a run from a ``Config``.
 
 parts = build(Config(seed=3)); for episode in run(parts.learner, parts.environment, 3, teacher=parts.teacher, ...): ...
 """
@@ -23,15 +23,15 @@ from sgimd_torch.spaces import Demonstration, stream
 
 @dataclass(frozen=True, eq=False)
 class RunParts:
-    """What a run needs.
+    """Parts of a run.
 
     Attributes:
-        config: settings that it was made from.
+        config: settings of the run.
         task: robot with its goals and demonstrations.
         learner: learner, freshly built.
-        teacher: teacher who demonstrates; None for none.
+        teacher: teacher who demonstrates without being asked; None for none.
         teachers: teachers who are asked, by name.
-        answers: inverse models to evaluate by, the run's own first.
+        answers: inverse models for evaluations, by word; the run's own comes first.
         benchmark: goals of evaluations.
         data: checksums of the files that were read.
         notes: messages for the user.
@@ -54,11 +54,11 @@ class RunParts:
 
 
 def build(config: Config) -> RunParts:
-    """Put a run together; nothing is executed yet.
+    """Build the parts of a run; nothing is executed yet.
 
     Raises:
-        ValueError: a part refuses its option, or a file does not fit the robot.
-        FileNotFoundError: there is no such file.
+        ValueError: a part refuses an option, or a file does not fit the robot.
+        FileNotFoundError: a file does not exist.
     """
     task = task_of(config)
     benchmark, notes, benchmark_crc32 = benchmark_of(task, config.benchmark)
@@ -85,7 +85,7 @@ def build(config: Config) -> RunParts:
     algorithm = f"algorithm {config.algorithm}"
     learner = called(algorithm, _maker(config, ALGORITHM), task.environment, config.seed, **shown)
     if not isinstance(learner, Learner):
-        raise ValueError(f"{algorithm} must give a Learner, got a {type(learner).__name__}")
+        raise ValueError(f"{algorithm} must return a Learner, got a {type(learner).__name__}")
     answers = {OWN: learner.inverse}
     for word in config.evaluated_by[1:]:
         own = config.values.get("inverse") == word
@@ -104,10 +104,10 @@ def build(config: Config) -> RunParts:
 
 
 def task_of(config: Config) -> Task:
-    """The environment of a run, with what belongs to it.
+    """The environment of a run, with its goals and demonstrations.
 
     Raises:
-        ValueError: it cannot be made, or is not an environment.
+        ValueError: the environment cannot be built, or is no environment.
     """
     found = _LOOKED_AT.pop(_place(config), None)
     if found is not None:
@@ -118,7 +118,8 @@ def task_of(config: Config) -> Task:
 
 
 def has_demonstrations(config: Config) -> bool:
-    """Whether its task comes with demonstrations. The next `task_of` gets the same task: some robots connect once."""
+    """Whether the task has demonstrations. The next `task_of` returns this task, as some robots can connect only
+    once."""
     task = _LOOKED_AT[_place(config)] = task_of(config)
     return task.demonstrations is not None
 
@@ -140,7 +141,7 @@ def _needs_demonstrations(make: Callable[..., Any]) -> bool:
 
 
 def _maker(config: Config, name: str) -> Callable[..., Any]:
-    """The constructor of a part, with its options and the constructors of the parts that it leads to."""
+    """The constructor of a part, with its options and the constructors of the parts that it chooses."""
     part = config.chosen[name]
     children = {keyword: _maker(config, part.full(keyword)) for keyword in part.choices}
     given = {**part.set_by(config.values), **children}

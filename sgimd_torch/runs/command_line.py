@@ -2,7 +2,7 @@
 
 Examples:
   sgimd run --algorithm sgim-d --seed 3
-  sgimd run --algorithm sgim-d --seed 3 --resume              after Ctrl-C, or with more --movements
+  sgimd run --algorithm sgim-d --seed 3 --resume              go on after Ctrl-C, or with more --movements
   sgimd run --algorithm sagg-riac --goals grid --goals.window 12 --name grid --movements 2000
   sgimd run --environment mypackage.toss:make                 on a robot of your own
 """
@@ -26,12 +26,24 @@ from sgimd_torch.runs.process import Stopping, loading
 
 ALONE: Final = "practice"  # the default learner of a robot without demonstrations
 _PARTS: Final = [kind for kind in WORDS if kind not in ("algorithm", "command")]
-_PLACES: Final = {"progress": "goals.progress", "choose": "teacher.choose"}  # of kinds that another part chooses
+_PLACES: Final = {"progress": "goals.progress", "choose": "teacher.choose"}  # options for parts of other parts
 _WIDTH: Final = 120
+_TYPES: Final = {  # names of types in help, longest first
+    "tuple[float, float]": "two numbers with a comma between",
+    "tuple[int, ...]": "whole numbers with commas",
+    "tuple[str, ...]": "words with commas",
+    "pathlib.Path": "a path",
+    "float": "a number",
+    "int": "a whole number",
+    "str": "text",
+    "bool": "true or false",
+    "None": "null",
+    " |": " or",
+}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """The command ``sgimd run``; 0 when the run has finished. It raises what ``carry_out`` raises."""
+    """The command ``sgimd run``; returns 0 when the run has finished, and raises as ``carry_out`` does."""
     argv = sys.argv[1:] if argv is None else argv
     config, flags = parse(argv, __doc__)
     program = ["sgimd"] if Path(sys.argv[0]).name == "sgimd" else [sys.executable, "-m", "sgimd_torch"]
@@ -46,12 +58,12 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def parse(argv: Sequence[str], description: str | None = None) -> tuple[Config, dict[str, bool]]:
-    """The run that a command line asks for, and its flags.
+    """The run that a command line describes, and its flags.
 
-    The choices are read first; they decide which options there are.
+    The choices of parts are read first, because they determine the options.
 
     Raises:
-        SystemExit: with code 2 and a message on stderr when it makes no sense, 0 after ``--help``.
+        SystemExit: code 2, with a message on stderr, for a wrong command line; code 0 after ``--help``.
     """
     try:
         given, asked = _read(argv)
@@ -73,7 +85,7 @@ def parse(argv: Sequence[str], description: str | None = None) -> tuple[Config, 
 
 
 def _read(argv: Sequence[str]) -> tuple[dict[str, str], set[str]]:
-    """The values that were typed, by the names of their options, and the flags.
+    """The typed values by option, and the flags.
 
     Raises:
         ValueError: a word belongs to no option, or an option has no value.
@@ -101,7 +113,7 @@ def _read(argv: Sequence[str]) -> tuple[dict[str, str], set[str]]:
 
 
 def _suited(given: Mapping[str, str]) -> str:
-    """The default learner for a robot: one that is taught if there are demonstrations, else one that learns alone."""
+    """The default algorithm for a robot: a taught one if there are demonstrations, else one that learns alone."""
     robot = {name: text for name, text in given.items() if name.partition(".")[0] == "environment"}
     if not robot or "demonstrations" in given:
         return Config.algorithm
@@ -112,10 +124,10 @@ def _suited(given: Mapping[str, str]) -> str:
 
 
 def _values(given: Mapping[str, str], parts: Mapping[str, Part]) -> dict[str, Any]:
-    """What was typed, as values of the types of the options; words of parts, and what there is not, stay words.
+    """The typed values, converted to the types of the options; words of parts and unknown options stay text.
 
     Raises:
-        ValueError: one is of another type.
+        ValueError: a value is of another type.
     """
     hints, found = get_type_hints(Config), dict[str, Any](given)
     kinds = {name: hints[name] for name in RUN}
@@ -130,17 +142,17 @@ def _values(given: Mapping[str, str], parts: Mapping[str, Part]) -> dict[str, An
 
 
 def _value(text: str, kind: Any) -> Any:
-    """``text`` as a value of a type; a list may be typed with brackets or without.
+    """``text`` as a value of type ``kind``; a list may be typed with brackets or without.
 
     Raises:
-        ValueError: it is of another type.
+        ValueError: the text is of another type.
     """
     inner = typing.get_args(kind)
     if typing.get_origin(kind) is tuple:
         items = [item.strip() for item in text.removeprefix("[").removesuffix("]").split(",") if item]
         kinds = [inner[0]] * len(items) if ... in inner else inner
         return tuple(_value(*each) for each in zip(items, kinds, strict=True))
-    if inner:  # of a union, None last
+    if inner:  # a union, with None last
         if text == "null" and types.NoneType in inner:
             return None
         return _value(text, inner[0])
@@ -152,13 +164,15 @@ def _value(text: str, kind: Any) -> Any:
 
 
 def _wanted(kind: Any) -> str:
-    """A type, as one types its values."""
-    text = inspect.formatannotation(kind).replace("bool", "true or false").replace("None", "null")
-    return f"{text}, with commas" if "tuple" in text else text
+    """Name of a type, for somebody who types its values."""
+    text = inspect.formatannotation(kind)
+    for python, plain in _TYPES.items():
+        text = text.replace(python, plain)
+    return text
 
 
 def overview(description: str | None) -> str:
-    """Text of ``sgimd run --help``: the options of every run, its flags, and the words for its parts."""
+    """Text of ``sgimd run --help``: options and flags of every run, and words for its parts."""
     about_run = help_of(Config)
     shown = {name: typed(getattr(Config, name)) for name in RUN}
     run = {name: about_run[name] + f" ({text})" * (text != "null") for name, text in shown.items()} | FLAGS
@@ -167,23 +181,27 @@ def overview(description: str | None) -> str:
         "usage: sgimd run [--OPTION VALUE ...] [--resume]",
         "",
         *(description or "").splitlines(),
-        "the run, with defaults (null, for no value, where there is none):",
+        "",
+        "options of every run, with defaults in brackets (no brackets: the default is null, no value):",
         *(_line(f"--{dashed(name)}", text) for name, text in run.items()),
-        "algorithms (--algorithm):",
+        "words for --algorithm:",
         *(_line(word, about("algorithm", word)) for word in WORDS["algorithm"] if word not in rivals),
         _line("extra rivals", ", ".join(rivals)),
-        "parts, each a word of these or package.module:attribute, one of your own:",
+        "words for the parts of a run; for a part of your own, type package.module:attribute:",
         *(_line(f"--{_PLACES.get(kind, kind)}", ", ".join(words)) for kind, words in WORDS.items() if kind in _PARTS),
         "",
-        "Parts have options of their own: sgimd run --goals interest-map --help shows those of the parts that are",
-        "chosen, such as --goals.window 12.",
+        "Parts have options, too, such as --goals.window 12. To see them, name the algorithm or a part before --help:",
+        "sgimd run --goals interest-map --help",
     ]
     return "\n".join(lines)
 
 
 def help_on(parts: Mapping[str, Part]) -> str:
-    """Text of ``sgimd run --goals grid --help``: the options of the parts that are chosen."""
-    lines = ["usage: sgimd run [--OPTION VALUE ...] [--resume]; sgimd run --help shows the options of every run"]
+    """Text of ``sgimd run --goals grid --help``: options of the chosen parts."""
+    lines = [
+        "usage: sgimd run [--OPTION VALUE ...] [--resume]; sgimd run --help shows the options of every run",
+        "C, Pi and T are the spaces of contexts, movement parameters (theta) and outcomes; goals are points of T.",
+    ]
     for part in parts.values():
         described = help_of(part.make)
         what = [about(part.kind, part.word)] if part.word in WORDS[part.kind] else []
@@ -191,8 +209,9 @@ def help_on(parts: Mapping[str, Part]) -> str:
         what += [f"its parts: {' '.join(leads_to)}"] if leads_to else []
         lines += ["", textwrap.fill(f"--{part.name or part.kind} {part.word}: {'; '.join(what)}", _WIDTH)]
         for name, option in part.options.items():
+            said = described.get(name, "").replace("``", "").replace("None", "null")
             meant = f"{_wanted(option.kind)}; default: {typed(option.default)}"
-            lines.append(_line(f"--{dashed(part.full(name))}", f"{described.get(name, '')} ({meant})"))
+            lines.append(_line(f"--{dashed(part.full(name))}", f"{said} ({meant})"))
     return "\n".join(lines)
 
 

@@ -1,9 +1,9 @@
-"""Settings of a run: its own options, and the parts that were chosen with theirs.
+"""Settings of a run: options of the run itself, its parts, and options of the parts.
 
-Each default is the library's own; a run with one changed option is an ablation.
+Defaults are those of the library, so a run with one changed option is an ablation.
     config = Config(algorithm="sagg-riac", parts={"goals": "grid", "goals.window": 12}); config["search.noise"]
-The keywords of a part's signature are its options (`sgimd_torch.catalogue.options`): one keyword more, one option more.
-A keyword whose default is in the catalogue is a choice, which leads to the next part.
+Options of a part are the keywords of its signature (`sgimd_torch.catalogue.options`). A keyword whose default is in the
+catalogue is a choice of another part.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from typing import Any, Final, Self
 from sgimd_torch.catalogue import ROD, TAUGHT_BY, WORDS, did_you_mean, load_word, named, place_of
 from sgimd_torch.catalogue.options import Option, options_of, parameters_of
 
-OWN: Final = "own"  # the answer of the inverse model that a run chose
+OWN: Final = "own"  # the inverse model of the run itself
 FILES: Final = ("benchmark", "demonstrations")  # options that name a file
 THREADS: Final = "environment.threads"
 PLACE: Final = ("seed", "out", "name", "board", THREADS)  # they do not change the learner
-EVALUATES: Final = ("evaluated_by", "repeats", "floor_at", "benchmark_crc32")  # all evaluations of a run share these
+EVALUATES: Final = ("evaluated_by", "repeats", "floor_at", "benchmark_crc32")  # equal in all evaluations of a run
 MAY_CHANGE: Final = (
     *("movements", "out", "name", "board", "failures", "evaluate_at"),
     *(*FILES, *EVALUATES, THREADS),
 )
-"""When a run is resumed, as they only say how long it lasts, where it is or how it is shown. Files count by their
-content, of which a checksum is recorded; a benchmark may be another one."""
+"""Options that may change when a run is resumed: they only affect its length, place or display. Files are compared by
+their recorded checksums; the benchmark may be another one."""
 ALGORITHM: Final = ""  # the name of this part; its options have no prefix
 
 
@@ -39,24 +39,25 @@ class Config:
     """One run.
 
     Args:
-        algorithm: learner, see below; default for a robot without demonstrations: practice.
+        algorithm: learner, see below; for a robot without demonstrations the default is practice.
         seed: number from which all random streams come; one seed gives one run.
-        movements: number of movements, those at rest included.
-        teachers: teachers whom the learner asks, by words; null is all demonstrations, for an algorithm that asks.
-        out: folder for runs; this one goes to OUT/NAME/seed-003.
-        name: NAME in that path, to keep a variant apart; null is the algorithm's.
+        movements: number of movements, rests included.
+        teachers: words of teachers for an algorithm that asks; null for one teacher with all demonstrations.
+        out: folder for runs; this run goes to OUT/NAME/seed-003.
+        name: name of the variant, NAME in the path of the run; null for the name of the algorithm.
         board: true writes curves and pictures for TensorBoard into the run's folder.
-        evaluate_at: movements after which to evaluate, besides the end; null is 250, 500 and every 1000; [] never.
-        evaluated_by: inverse models that answer in evaluations: own is the run's, others are words of --inverse.
-        repeats: executions of each movement of an evaluation that measure the noise; 0 does not.
-        floor_at: evaluations that measure the noise, which takes four times as long; null is all.
-        benchmark: file of goals to evaluate on; null is the environment's own.
-        demonstrations: file of recorded demonstrations; null is the environment's own.
-        failures: failed movements in a row that stop the run; null is ten.
-        parts: choices by name, such as "goals" or "goals.window"; what differs from its default is kept.
+        evaluate_at: numbers of movements after which to evaluate, besides the end; null for 250, 500 and every 1000; []
+            for no evaluation.
+        evaluated_by: inverse models for evaluations: own for the run's, then words of --inverse.
+        repeats: number of extra executions of each evaluation movement, to measure the noise; 0 for none.
+        floor_at: evaluations, by number of movements, that measure the noise, in four times the time; null for all.
+        benchmark: file of goals for evaluations; null for the environment's own goals.
+        demonstrations: file of recorded demonstrations; null for the environment's own.
+        failures: number of failed movements in a row that stops the run; null for ten.
+        parts: parts and their options by name, such as "goals" or "goals.window"; defaults may be left out.
 
     Raises:
-        ValueError: a value or a name that makes no sense.
+        ValueError: a value is out of its range, or a name is unknown.
     """
 
     algorithm: str = "practice-taught"
@@ -87,7 +88,7 @@ class Config:
             if value is not None and value < least:
                 raise ValueError(f"{name} must be at least {least}, got {value}")
         if self.repeats == 1:
-            raise ValueError("repeats must be 0 or at least 2, got 1; one landing point does not scatter")
+            raise ValueError("repeats must be 0 or at least 2, got 1; one outcome shows no scatter")
         for name in ("evaluate_at", "floor_at"):
             if min(getattr(self, name) or (1,)) < 1:
                 raise ValueError(f"{name} must be numbers of movements, at least 1, got {getattr(self, name)}")
@@ -105,10 +106,10 @@ class Config:
         if self.board and importlib.util.find_spec("tensorboardX") is None:
             raise ValueError("board true needs tensorboardX, which is not installed; pip install 'sgimd-torch[board]'")
         if self.variant in ("", ".", "..") or any(sign in self.variant for sign in "/\\\0"):
-            raise ValueError(f"name must be that of one directory, got {self.variant!r}; is the path for --out?")
+            raise ValueError(f"name must be the name of one directory, got {self.variant!r}; is it a path for --out?")
 
     def __getitem__(self, name: str) -> Any:
-        """Value of an option or a part in this run, "goals.window" say.
+        """Value of an option or a part in this run, such as "goals.window".
 
         Raises:
             KeyError: the run has no such option.
@@ -126,7 +127,8 @@ class Config:
 
     @property
     def teaching(self) -> str:
-        """ "teachers" that its learner asks, a "teacher" who shows it something, or "" if it learns alone."""
+        """How the learner is taught: by "teachers" that it asks, by a "teacher" who shows something, or "" for
+        alone."""
         return teaching(self.algorithm, dict(self.parts), asks=self.teachers is not None)
 
     @cached_property
@@ -141,20 +143,20 @@ class Config:
 
     @cached_property
     def values(self) -> dict[str, Any]:
-        """Every part and every option of a part, by name."""
+        """Values of every part and every option of a part, by name."""
         return {**self.standards, **dict(self.parts)}
 
     @property
     def settings(self) -> dict[str, Any]:
-        """All that makes this run, as json has it; ``from_settings`` makes the same one of it."""
+        """All options of this run as json values; ``from_settings`` makes the run from them."""
         return plain({**self.values, **{name: getattr(self, name) for name in RUN}})
 
     @classmethod
     def from_settings(cls, settings: Mapping[str, Any]) -> Self:
-        """The run with these ``settings``; what they lack has its default.
+        """The run with these ``settings``; missing ones have their defaults.
 
         Raises:
-            ValueError: they make no sense, or name an option that there is not.
+            ValueError: a value is out of its range, or an option does not exist.
         """
         own: dict[str, Any] = {
             name: tuple(value) if isinstance(value, list) else value for name, value in settings.items()
@@ -188,9 +190,9 @@ class Config:
         return sorted({movements for movements in wanted if movements < self.movements} | {self.movements})
 
     def _refused(self, name: str) -> ValueError:
-        """The error for a name that is none of this run, with the parts that have it."""
+        """The error for a name that this run does not have; it names the parts that have it."""
         owner, _, last = name.rpartition(".")
-        if owner not in self.chosen:  # what it belongs to is no part of this run, either
+        if owner not in self.chosen:  # its part does not belong to this run, either
             head = owner.partition(".")[0]
             owner, last = ALGORITHM, head if any(_with(kind, head) for kind in WORDS) else last
         part, having = self.chosen[owner], []
@@ -203,10 +205,10 @@ class Config:
 
 
 RUN: Final = tuple(each.name for each in fields(Config) if each.name != "parts")
-"""The options that every run has."""
+"""Options of every run."""
 FLAGS: Final = {
-    "resume": "go on with a stopped or killed run, or lengthen a finished one.",
-    "accept_loss": "with --resume: go on even if the log has lost movements; a copy of it is kept.",
+    "resume": "flag: go on with a stopped or killed run, or lengthen a finished one.",
+    "accept_loss": "flag, with --resume: go on even if the record has lost movements; a copy of it is kept.",
 }
 
 
@@ -215,13 +217,13 @@ class Part:
     """A part of a run.
 
     Args:
-        name: name of the part in the run, "goals" or "goals.progress" say.
+        name: name of the part in the run, such as "goals" or "goals.progress".
         kind: kind of the catalogue.
-        word: word of that kind that was chosen.
-        standard: word if nobody chooses.
-        make: constructor, with what its word fixes.
+        word: word of the chosen part.
+        standard: word of the default.
+        make: constructor, with the keywords that its word fixes.
         options: keywords that a run can set.
-        choices: keywords that lead to other parts, with the kind and the default of each.
+        choices: keywords that choose other parts, with the kind and the default of each.
     """
 
     name: str
@@ -237,33 +239,32 @@ class Part:
         return f"{self.name}.{keyword}" if self.name else keyword
 
     def set_by(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """The options that a run has set."""
+        """Options of this part, from the ``values`` of a run."""
         return {each: values[self.full(each)] for each in self.options}
 
 
 def part_of(name: str, kind: str, word: str, default: Callable[..., Any] | str = "") -> Part:
-    """The part that a word names.
+    """The part that ``word`` names.
 
     Args:
         name: name of the part in the run.
         kind: kind of the catalogue.
         word: word of that kind, or package.module:attribute; "" for the default.
-        default: word if nobody chooses, or the default of the keyword that leads here, which may have options of its
-            own.
+        default: word of the default, or the default of the keyword that chooses this part, which may fix options.
 
     Raises:
-        ValueError: there is no such thing, or a package that it needs is not installed.
+        ValueError: there is no such part, or a package that it needs is not installed.
     """
     found = named(default) if callable(default) else None
     standard = found[1] if found else default if isinstance(default, str) else ""
     word = word or standard
-    return (_read if ":" in word else _READ)(name, kind, word, standard, default)  # a user's own may change
+    return (_read if ":" in word else _READ)(name, kind, word, standard, default)  # a user's file may change
 
 
 def _read(name: str, kind: str, word: str, standard: str, default: Callable[..., Any] | str) -> Part:
     own = callable(default) and word == standard
     make = default if callable(default) and own else load_word(kind, word)
-    fixed = make.keywords if isinstance(make, partial) and not own else {}  # what its word fixes
+    fixed = make.keywords if isinstance(make, partial) and not own else {}  # fixed by its word
     free = {each: known.default for each, known in parameters_of(make).items() if each not in fixed}
     options = {each: known for each, known in options_of(make).items() if each in free}
     leads_to = {each: (named(value), value) for each, value in free.items() if each not in options and callable(value)}
@@ -275,7 +276,8 @@ _READ: Final = cache(_read)
 
 
 def teaching(algorithm: str, given: Mapping[str, Any], *, asks: bool) -> str:
-    """How a learner is taught: the catalogue says it; for one of your own, whether a teacher or teachers were given."""
+    """How a learner is taught, by the catalogue; for a user's own learner, by the teacher or teachers that were
+    given."""
     if ":" in algorithm:
         return "teachers" if asks else "teacher" if "teacher" in given else ""
     by = TAUGHT_BY.get(algorithm, "")
@@ -283,12 +285,12 @@ def teaching(algorithm: str, given: Mapping[str, Any], *, asks: bool) -> str:
 
 
 def chosen(algorithm: str, given: Mapping[str, Any], *, asks: bool = False) -> dict[str, Part]:
-    """Parts of a run by name: first the algorithm and the environment, then those that others lead to.
+    """Parts of a run by name: environment, algorithm, and the parts that these choose.
 
     Args:
         algorithm: word of the learner.
-        given: choices by name; names of no part of this run are passed over.
-        asks: true if teachers to ask were given.
+        given: choices by name; other names are ignored.
+        asks: true if the run has teachers to ask.
 
     Raises:
         ValueError: see ``part_of``.
@@ -308,10 +310,10 @@ def chosen(algorithm: str, given: Mapping[str, Any], *, asks: bool = False) -> d
 
 
 def _with(kind: str, name: str) -> list[str]:
-    """The words of a kind whose parts have an option, or lead to a part, of this name."""
+    """Words of a kind whose parts have an option, or a choice, of this name."""
     found = []
     for word in WORDS.get(kind, {}) if kind != "command" else ():
-        with suppress(ValueError):  # one that is not installed has nothing
+        with suppress(ValueError):  # parts that are not installed are left out
             part = part_of(ALGORITHM, kind, word)
             if name in (*part.options, *part.choices, teaching(word, {}, asks=False) if kind == "algorithm" else ""):
                 found.append(word)
@@ -319,14 +321,15 @@ def _with(kind: str, name: str) -> list[str]:
 
 
 def code_of(settings: Mapping[str, Any]) -> list[str]:
-    """The code of a user's own that ``settings`` name, ``package.module:attribute``: it is not in this library."""
+    """Places ``package.module:attribute`` of a user's code that ``settings`` name."""
     values = [value for name, value in settings.items() if name not in (*PLACE, *FILES)]
     words = [word for value in values for word in (value if isinstance(value, list) else [value])]
     return sorted({w for w in words if isinstance(w, str) and ":" in w and not w.startswith("sgimd_torch.")})
 
 
 def words(config: Config) -> list[str]:
-    """The command line of ``sgimd run`` for a run: ``--dashed-name=value`` for all that is not at its default."""
+    """Command line of ``sgimd run`` for a run: ``--dashed-name=value`` for each option that differs from its
+    default."""
     standard = {each.name: each.default for each in fields(Config)}
     own = [
         (name, getattr(config, name)) for name in RUN if getattr(config, name) != standard[name] or name == "algorithm"
@@ -335,17 +338,17 @@ def words(config: Config) -> list[str]:
 
 
 def dashed(name: str) -> str:
-    """Name as the command line spells it."""
+    """Name of an option as the command line spells it."""
     return name.replace("_", "-")
 
 
 def plain(value: Any) -> Any:
-    """Value as json has it."""
+    """Value of an option as a json value."""
     return json.loads(json.dumps(value, default=str))
 
 
 def typed(value: Any) -> str:
-    """Value as one types it."""
+    """Value of an option as it is typed."""
     if isinstance(value, tuple):
         return ",".join(map(typed, value)) or "[]"
     return json.dumps(value) if value is None or isinstance(value, bool) else str(value)

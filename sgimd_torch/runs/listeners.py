@@ -1,4 +1,4 @@
-"""What listens to a run is told: its movements, its evaluations, and where its time goes."""
+"""Listeners of a run, which are told its movements and evaluations; and a clock for its parts."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from sgimd_torch.spaces import Episode
 
 
 class Listener(Protocol):
-    """Listener of a run: is told what happens. A resumed run tells it everything again, from its record.
+    """Listener of a run. A resumed run tells it everything again, from its record.
 
-    A listener overrides what concerns it.
+    A listener overrides the methods that it needs.
     """
 
     def episode(self, episode: Episode, replayed: bool) -> None:
@@ -22,7 +22,7 @@ class Listener(Protocol):
         return
 
     def evaluated(self, movements: int, found: Mapping[str, Evaluation]) -> None:
-        """The learner was evaluated after so many movements, by each of its answers."""
+        """The learner was evaluated after this number of movements; ``found`` is by word of the inverse model."""
         return
 
     def begin(self) -> None:
@@ -34,7 +34,7 @@ class Listener(Protocol):
         return {}
 
     def flush(self) -> None:
-        """What was told so far is to be on the disk."""
+        """Write everything so far to the disk."""
         return
 
     def close(self) -> None:
@@ -43,7 +43,7 @@ class Listener(Protocol):
 
 
 class Seconds:
-    """Seconds spent so far. Those of a resumed run add to ``before``, but for those that a replay spends again."""
+    """Seconds spent so far, by part of the run. A resumed run adds to ``before``, except for replayed parts."""
 
     def __init__(self, before: Mapping[str, float]) -> None:
         self._spent = {part: before.get(f"seconds_{part}", 0.0) for part in ("physics", "evaluation")} | {
@@ -60,7 +60,7 @@ class Seconds:
             self._spend(part, begun)
 
     def of_physics(self, execute: Callable[..., Any]) -> Callable[..., Any]:
-        """``execute``, timed; that does not count as the learner's time."""
+        """``execute``, timed as physics; its time does not count as the learner's."""
 
         def timed(*arguments: Any) -> Any:
             begun = time.perf_counter()
@@ -73,7 +73,7 @@ class Seconds:
         return timed
 
     def of_learner(self, episodes: Iterator[Episode]) -> Iterator[Episode]:
-        """``episodes``, timed: asking, telling, watching and the teacher's choice."""
+        """``episodes``, timed as the learner's: asking, telling, watching and the teacher's choice."""
         while True:
             begun = time.perf_counter()
             episode = next(episodes, None)
@@ -86,5 +86,5 @@ class Seconds:
         self._spent[part] = self._spent.get(part, 0.0) + sign * (time.perf_counter() - begun)
 
     def summary(self) -> dict[str, float]:
-        """By name, as the record has them."""
+        """Seconds by name, as the record stores them."""
         return {f"seconds_{part}": round(seconds, 3) for part, seconds in self._spent.items()}

@@ -1,4 +1,4 @@
-"""One life: replay what was recorded, live on, evaluate now and then; everything else listens.
+"""One run: replay its record, make new movements, evaluate now and then; everything else is a listener.
 
 print(carry_out(build(Config(seed=3)), stopping, resume=False, accept_loss=False, again="sgimd run --seed 3 --resume"))
 """
@@ -24,24 +24,24 @@ from sgimd_torch.runs.process import Failed, Progress, Stopped, Stopping, say
 from sgimd_torch.session import NoOutcomeError, live, reason_of, run
 from sgimd_torch.spaces import Episode
 
-TOLD: Final = 3  # failed movements that are told one by one; later ones, if they fail in another way
-COMMIT_EVERY: Final = 1.0  # s; a killed run loses what came since
+TOLD: Final = 3  # failed movements with a message each; later ones get one if they fail in a new way
+COMMIT_EVERY: Final = 1.0  # s between two commits; a killed run loses the movements since the last one
 
 
 def carry_out(parts: RunParts, stopping: Stopping, *, resume: bool, accept_loss: bool, again: str) -> str:
-    """Make a run, or go on with one; what came of it, in a line.
+    """Make a run, or go on with one, and return its result as one line.
 
     Args:
-        parts: of the run.
-        stopping: says when a signal has come.
-        resume: go on with what is there.
-        accept_loss: also if movements of it are damaged.
-        again: the command that goes on, for whoever stops it.
+        parts: parts of the run.
+        stopping: object that knows whether a signal has come.
+        resume: true to go on with the run in the directory.
+        accept_loss: true to go on even if the record has damaged movements.
+        again: command that resumes the run, for messages.
 
     Raises:
-        ValueError, OSError: the request is wrong.
-        Failed: it failed under way.
-        Stopped: by a signal.
+        ValueError, OSError: the run cannot begin.
+        Failed: the run failed under way.
+        Stopped: a signal stopped the run.
     """
     with Life(parts, resume=resume, accept_loss=accept_loss) as life:
         try:
@@ -53,7 +53,7 @@ def carry_out(parts: RunParts, stopping: Stopping, *, resume: bool, accept_loss:
             raise RunError(str(error)) from error
         except OSError as error:
             raise Failed(f"{life.record.path} cannot be written: {reason_of(error)}; to go on: {again}") from error
-        except (Exception, SystemExit) as error:  # of a part, as one's own; or too many failed movements
+        except (Exception, SystemExit) as error:  # raised by a part, or by too many failed movements
             raised = error.__cause__ if isinstance(error, NoOutcomeError) and error.__cause__ else error
             if not isinstance(raised, SimulationError):
                 say("".join(traceback.format_exception(raised)).rstrip())
@@ -63,15 +63,16 @@ def carry_out(parts: RunParts, stopping: Stopping, *, resume: bool, accept_loss:
 
 
 class Life:
-    """A run under way. After each movement it is recorded, then listeners are told, then it is evaluated. A context
-    manager; leaving it brings to the disk what was lived, but where it was broken off, as by Ctrl-C.
+    """A run under way. Each movement is recorded first, then the listeners are told, then the learner may be evaluated.
+
+    It is a context manager. Leaving it writes the last movements to the disk, except after Ctrl-C.
 
     Args:
-        parts, resume, accept_loss: see ``carry_out``.
+        parts, resume, accept_loss: arguments of ``carry_out``.
 
     Attributes:
-        record: of the run; it is written from the end of the replay on.
-        movements, recorded, failed: how many it has made, how many were recorded before, and how many have failed.
+        record: record of the run, written from the end of the replay on.
+        movements, recorded, failed: numbers of movements made so far, recorded before, and failed.
 
     Raises:
         RunError, OSError: see ``open_run``.
@@ -92,7 +93,7 @@ class Life:
             board = BoardListener(parts.config.directory, parts, self.seconds.summary, self._curves)
             self.listeners.append(board)
         self._wanted = set(parts.config.evaluations)
-        self._failures: list[str] = []  # kinds of those that were told
+        self._failures: list[str] = []  # kinds of failures that had a message
         self._committed = time.monotonic()
 
     def __enter__(self) -> Self:
@@ -100,11 +101,11 @@ class Life:
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         broken_off = kind is not None and issubclass(kind, KeyboardInterrupt)
-        with suppress(*([] if kind is None else [OSError])):  # of a full disk the first error is told
+        with suppress(*([] if kind is None else [OSError])):  # on a full disk, the first error is raised
             self.close(keep=not broken_off)
 
     def close(self, *, keep: bool = True) -> None:
-        """Let others have the record, and ``keep`` what came since the last commit."""
+        """Close record and listeners; ``keep`` commits the last movements first."""
         try:
             if keep and not self.replaying and not self.record.failed:
                 self._settle()
@@ -120,7 +121,7 @@ class Life:
 
     @property
     def summary(self) -> str:
-        """What came of it, in a line."""
+        """Result of the run, as one line."""
         last, found = self.evaluations.last, "not evaluated"
         if last is not None:
             floor = last.noise_floor
@@ -133,7 +134,7 @@ class Life:
         return f"{self.parts.config.directory}: {self.movements} movements{failed}, {found}"
 
     def go_on(self, stopping: Stopping) -> None:
-        """From the first movement to the last, or to the one after which ``stopping`` has heard a signal."""
+        """Make all movements, or stop after the one during which ``stopping`` has heard a signal."""
         total, title = self.parts.config.movements, self.parts.config.title
         unit = self.parts.environment.outcomes.amount
         with Progress("replaying" if self.recorded else title, self.recorded or total) as progress:
@@ -149,7 +150,7 @@ class Life:
         self.commit()
 
     def episodes(self) -> Iterator[Episode]:
-        """The same, one movement after the other: first those that were recorded, then new ones."""
+        """All episodes, one by one: first the recorded ones, then new ones."""
         parts, seed = self.parts, self.parts.config.seed
         episodes = run(
             parts.learner,
@@ -169,14 +170,14 @@ class Life:
             yield episode
 
     def commit(self) -> None:
-        """Bring everything to the disk."""
+        """Write everything to the disk."""
         self._settle()
         for each in self.listeners:
             each.flush()
         self._committed = time.monotonic()
 
     def _curves(self) -> dict[str, float]:
-        """Numbers that listeners have for the board since it asked last, by tag."""
+        """Numbers of the listeners for the board since the last call, by tag."""
         return {tag: value for each in self.listeners for tag, value in each.curves().items()}
 
     def _settle(self) -> None:

@@ -1,1 +1,1 @@
-"""Searches: movement by movement from a first guess towards a goal (section 4.4.2)."""
+"""Searches: movements from an estimate towards a goal, one by one (section 4.4.2)."""

@@ -1,4 +1,4 @@
-"""The simplest searches: the best movement so far, plus noise; or again and again what was inferred, plus less noise.
+"""The simplest searches: the best movement so far plus noise, or the inferred movement plus less noise.
 
 search = Perturb(problem)(estimate, goal); theta = next(search); theta = search.send(outcome) ...
 """
@@ -18,13 +18,12 @@ from sgimd_torch.spaces import Array, Estimate
 class Perturb(Search):
     """Best movement so far plus Gaussian noise.
 
-    The noise is around the best theta so far, remembered or executed here, and clipped to Pi; it never ends.
-
-    It executes theta_g first, unless that is a copy of a remembered theta, whose outcome is known.
+    The best theta is a remembered one or one executed here. Movements are clipped to Pi; the search never ends. It
+    executes theta_g first, unless this is a copy of a remembered theta, whose outcome is known.
 
     Args:
-        problem: Pi is read; nothing outside is proposed.
-        sd: standard deviation of the noise, in sides of Pi.
+        problem: problem to learn.
+        sd: standard deviation of the noise, as a fraction of each parameter's range in Pi.
 
     Raises:
         ValueError: ``sd`` is not positive.
@@ -54,16 +53,15 @@ class Perturb(Search):
 class Vary(Search):
     """Answer of the inverse model plus a little Gaussian noise.
 
-    The noise is around theta_g, whatever came of it, and clipped to Pi; it never ends.
+    All movements vary theta_g, whatever their outcomes. They are clipped to Pi; the search never ends.
 
-    So the inverse model is corrected where it errs, and sees in which directions the outcome changes. It is meant for
-    an inverse model that is nearly right, and for one movement or two at each goal. Where theta_g is the copy of a
-    remembered theta, the inverse model knows nothing better, and more noise looks farther around it: half of the
-    `Width` of exploration.
+    The outcomes correct the inverse model, and show how the outcome changes with theta. The search is meant for an
+    inverse model that is nearly right, and for one or two movements at each goal. If theta_g is a copy of a remembered
+    theta, the noise is larger: half of the `Width` of exploration.
 
     Args:
-        problem: Pi is read; nothing outside is proposed.
-        sd: standard deviation of the noise, in sides of Pi.
+        problem: problem to learn.
+        sd: standard deviation of the noise, as a fraction of each parameter's range in Pi.
 
     Raises:
         ValueError: ``sd`` is not positive.
@@ -83,7 +81,7 @@ class Vary(Search):
 
 
 def _remembered(start: Estimate) -> bool:
-    """Whether theta_g is a copy of a theta that the estimate was made from."""
+    """Whether theta_g is a copy of one of the thetas of the estimate."""
     return bool((start.thetas == start.theta).all(axis=1).any())
 
 

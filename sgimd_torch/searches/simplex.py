@@ -1,4 +1,4 @@
-"""Nelder & Mead's simplex: which movement to try next, so that the outcome comes nearer to the goal?
+"""Nelder & Mead's simplex: a search that brings the outcome nearer to the goal.
 
 Section 4.4.2 of Nguyen & Oudeyer (2014), local optimisation (Lagarias et al. 1998). A search is a generator, so it can
 be paused, counted and interrupted at any movement:
@@ -18,34 +18,36 @@ from sgimd_torch.spaces import Array, Box, Estimate
 
 
 class NelderMead(Search):
-    """Simplex of neighbours, a little noise on every movement.
+    """Nelder-Mead simplex around remembered movements, with a little noise on every movement.
 
-    Downhill on the distance to the goal, around theta_g and its neighbours.
+    It minimises the distance to the goal, from theta_g and its neighbours.
 
     The first movement is theta_g, with noise. Neighbours become vertices with their remembered outcomes, which costs no
     movement (but takes outcomes in nearby contexts for outcomes in this one). A neighbour on a line, plane ... through
     better vertices is left out, as a flat simplex cannot turn.
 
     Args:
-        problem: Pi is read; nothing outside is proposed.
-        noise: standard deviation of the noise on each parameter of every movement, in sides of Pi; the vertex is the
-            noisy movement. Deviation: the paper adds none. But a simplex searches the flat through its vertices,
+        problem: problem to learn.
+        noise: standard deviation of the noise of every movement, as a fraction of each parameter's range in Pi; the
+            vertex is the noisy movement. Deviation: the paper adds none. But a simplex searches the flat through its
+            vertices,
             and neighbours from memory span the same flat again and again. Without new directions the learner soon
             repeats itself, and its inverse model cannot tell noise from the effect of theta.
-        step: size of the steps that replace missing neighbours, root mean square over the parameters, in sides of Pi.
+        step: size of the steps that replace missing neighbours, as a fraction of the ranges in Pi (root mean square).
             Deviation: the usual first simplex steps along one coordinate at a time, but one knot of one joint often
             hardly moves the float. These steps go in random directions, and no noise is added to them.
-        complete: true fills the simplex up to theta_dim + 1 vertices, the paper's 26, at one movement each; false fills
-            it up to outcome_dim + 1, so that with some neighbours the first reflection is the second movement. The
-            search then stays in the flat through its vertices, which usually contains a solution, because theta is
-            redundant. Deviation: False is the default, as 25 steps would be the whole budget of a goal.
-        xatol: distance in theta within which all vertices end the search. Below the noise of the outcomes a simplex
-            cannot tell better from worse, so by default the search ends early, and the next one begins with more in
-            memory. Deviation: the paper names no such end.
-        fatol: difference of distances from the goal, in the unit of T, within which all vertices end the search.
+        complete: true fills the simplex up to theta_dim + 1 vertices, the paper's 26, by one movement each; false only
+            up to outcome_dim + 1, so neighbours often suffice. The search then stays in the flat through the vertices,
+            which usually contains a solution, as theta is redundant. Deviation: False is the default, because 25 steps
+            would be the whole budget of a goal.
+        xatol: size of the simplex, in the unit of theta, at which the search ends, if it is within fatol, too. Below
+            the noise of the outcomes a simplex cannot tell better from worse, so by default the search ends early.
+            Deviation: the paper names no such end.
+        fatol: difference of the vertices' distances from the goal, in the unit of outcomes, at which the search ends,
+            if it is within xatol, too.
 
     Raises:
-        ValueError: ``step`` is not in (0, 0.5], or ``noise`` not in [0, 0.5].
+        ValueError: ``step`` is not in (0, 0.5], or ``noise`` is not in [0, 0.5].
     """
 
     def __init__(
@@ -66,7 +68,7 @@ class NelderMead(Search):
         self.noise, self.step, self.complete, self.xatol, self.fatol = noise, step, complete, xatol, fatol
 
     def __call__(self, start: Estimate, goal: Array) -> Generator[Array, Array, None]:
-        """Movements around ``start``, its theta_g first; it ends when the simplex has shrunk."""
+        """Movements around ``start``, theta_g first; the search ends when the simplex has shrunk."""
         policies = self.problem.policies
         theta = self._place(policies.check("theta of the estimate", start.theta))
         vertices = [theta]
@@ -92,10 +94,10 @@ class NelderMead(Search):
 
 
 exact = partial(NelderMead, noise=0.0)
-"""Simplex of neighbours, without noise."""
+"""Nelder-Mead simplex around remembered movements, without noise."""
 
 complete = partial(NelderMead, noise=0.0, complete=True, xatol=1e-4, fatol=1e-4)
-"""Simplex without noise, complete as in the paper (26), ended by the budget alone."""
+"""Nelder-Mead simplex without noise, with all 26 vertices as in the paper; ends with the budget."""
 
 
 def simplex_descent(
@@ -106,22 +108,22 @@ def simplex_descent(
     xatol: float = 1e-4,
     fatol: float = 1e-4,
 ) -> Generator[Array, float, None]:
-    """Nelder & Mead's method from a simplex with known values: yields points and is sent their values.
+    """Nelder & Mead's method from a simplex with known values: yields points; the caller sends their values.
 
     It visits the points that ``scipy.optimize.minimize(method="Nelder-Mead")`` visits after its first simplex, bit for
-    bit. (Of equal values the newest ranks last, as Lagarias et al. demand; in scipy that depends on an unstable sort.)
+    bit. (Of equal values the newest ranks last, as Lagarias et al. demand; in scipy an unstable sort decides.)
 
     Args:
         vertices: ``(n + 1, dim)``. With n < dim the search stays in the n-dimensional flat through them, unless
-            ``place`` leads out.
+            ``place`` leads out of it.
         values: ``(n + 1,)``.
-        place: function from a point to where it may be tried, into a box say; None leaves it where it is. (By clipping
-            alone, a simplex with all vertices on one face of the box cannot leave this face.)
-        xatol: distance in every coordinate within which all vertices end the descent.
-        fatol: difference of values within which all vertices end the descent.
+        place: function that moves a point to an allowed one, for example into a box; None for no change. (If it only
+            clips, a simplex with all vertices on one face of the box cannot leave this face.)
+        xatol: distance between vertices in every coordinate at which the descent ends, if ``fatol`` holds, too.
+        fatol: difference of the values at which the descent ends, if ``xatol`` holds, too.
 
     Raises:
-        ValueError: fewer than two vertices, or not one value for each.
+        ValueError: there are fewer than two vertices, or not one value for each.
     """
     if len(vertices) < 2 or len(values) != len(vertices):
         raise ValueError(
@@ -165,9 +167,9 @@ def simplex_descent(
 
 
 class _Flat:
-    """The flat (affine hull) through the vertices of an unfinished simplex: which points lie outside?"""
+    """The flat (affine hull) through the vertices of an unfinished simplex; it tells which points lie outside."""
 
-    _SINE = 0.1  # of 6 degrees: with a vertex at a smaller angle to the flat, a simplex hardly turns
+    _SINE = 0.1  # sine of 6 degrees; with a vertex at a smaller angle to the flat, a simplex hardly turns
 
     def __init__(self, origin: Array, shortest: float) -> None:
         self._origin = origin
@@ -186,7 +188,7 @@ class _Flat:
         self._add(across, _length(across))
 
     def widen_if_lacking(self, point: Array) -> bool:
-        """Add ``point`` as a vertex if it is far enough outside; whether it was."""
+        """Add ``point`` as a vertex if it is far enough outside, and return whether it was."""
         edge = point - self._origin
         across = self._across(edge)
         outside = _length(across)
@@ -218,11 +220,11 @@ def _length(vector: Array) -> float:
 def _step_out(policies: Box, theta: Array, flat: _Flat, rng: np.random.Generator, step: float) -> Array:
     """A random step from ``theta`` that leads out of the flat and stays in the box.
 
-    A coordinate that would leave the box steps the other way, because clipping it would flatten the simplex. In a
-    corner of a box of few dimensions this may flatten it, too; then random directions are tried.
+    A coordinate that would leave the box steps the other way, because clipping would flatten the simplex. In a corner
+    of a box of few dimensions this step may flatten it, too; then random directions are tried.
     """
     direction = flat.direction_out(rng)
-    for _ in range(100):  # never enough for a step no longer than xatol
+    for _ in range(100):  # a step no longer than xatol never suffices
         change = step * np.sqrt(policies.dim) * policies.sides * direction
         forth, back = theta + change, theta - change
         vertex = policies.clip(np.where((forth < policies.low) | (forth > policies.high), back, forth))
@@ -234,7 +236,7 @@ def _step_out(policies: Box, theta: Array, flat: _Flat, rng: np.random.Generator
 
 
 def _towards(goal: Array, descent: Generator[Array, float, None]) -> Generator[Array, Array, None]:
-    """Turns ``descent``, which is sent distances to ``goal``, into a search, which is sent outcomes."""
+    """Turn ``descent``, which expects distances to ``goal``, into a search, which expects outcomes."""
     try:
         theta = next(descent)
         while True:

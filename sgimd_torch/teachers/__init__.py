@@ -1,4 +1,4 @@
-"""Teachers: who demonstrates what, and when?
+"""Teachers: they choose demonstrations, and the movements before which they show them.
 
 Sections 2.3 and 5.3 of Nguyen & Oudeyer (2014). The paper's teacher watches what the learner has reached and, every 30
 movements, demonstrates something from a tile chosen at random among those the learner has reached least.
@@ -17,24 +17,24 @@ from sgimd_torch.memory import Memory
 from sgimd_torch.parts import Teacher
 from sgimd_torch.spaces import Array, Demonstration, check_count, check_rng, check_vector
 
-_STALLED: Final = 0.01  # share by which distances fall at least while a learner progresses
+_STALLED: Final = 0.01  # least relative fall of the mean distance from one look to the next while a learner progresses
 
 
 Choose = Callable[[Sequence[Demonstration], Memory, np.random.Generator], Demonstration]
-"""(demonstrations, the learner's memory, rng) -> the demonstration to give."""
+"""Function (demonstrations, memory of the learner, rng) -> the demonstration to show."""
 
 
 def at_random(demonstrations: Sequence[Demonstration], memory: Memory, rng: np.random.Generator) -> Demonstration:
-    """Any demonstration, all equally likely."""
+    """Random demonstration, all equally likely."""
     return demonstrations[int(rng.integers(len(demonstrations)))]
 
 
 def least_explored(
     demonstrations: Sequence[Demonstration], memory: Memory, rng: np.random.Generator, *, tiles: int = 10
 ) -> Demonstration:
-    """Demonstration from a tile that the learner has reached least.
+    """Demonstration from the tile of outcomes that the learner has reached least.
 
-    The tile is chosen at random among those that have any and were reached least.
+    Only tiles with demonstrations count. Of several equal ones, one is drawn.
 
     Args:
         demonstrations: demonstrations to choose from.
@@ -43,12 +43,12 @@ def least_explored(
         tiles: number of tiles in each dimension of the box around the demonstrated outcomes.
 
     Raises:
-        ValueError: outcomes of another dimension than those of the memory.
+        ValueError: demonstrated outcomes and the memory have different dimensions.
     """
     shown = [demonstration.outcome for demonstration in demonstrations]
     demonstrated = check_vector("outcomes of the demonstrations", shown, memory.outcome_dim, "of another robot?")
     low, high = demonstrated.min(axis=0), demonstrated.max(axis=0)
-    side = np.maximum(high - low, 1e-9) / tiles  # never 0, also for demonstrations on a line
+    side = np.maximum(high - low, 1e-9) / tiles  # above 0 even for demonstrations on a line
 
     def cells(outcomes: Array) -> Array:
         # The upper border belongs to the last tile; otherwise the farthest demonstrations would have their own tile.
@@ -62,14 +62,14 @@ def least_explored(
 
 
 class PeriodicTeacher(Teacher):
-    """Demonstrates regularly, one every so many movements, as in the paper.
+    """Demonstrates at regular intervals, as in the paper.
 
-    It demonstrates before the movements ``every``, 2 ``every``, ...
+    A demonstration comes before the movements ``every``, 2 ``every``, ...
 
     Args:
         demonstrations: demonstrations to choose from.
         rng: random stream of ``choose``.
-        every: movements from one demonstration to the next.
+        every: number of movements from one demonstration to the next.
         choose: choice of the next demonstration.
     """
 
@@ -95,14 +95,14 @@ class PeriodicTeacher(Teacher):
 
 
 class InitialTeacher(Teacher):
-    """Demonstrates all at the start, one every so many movements, in random order.
+    """Shows each demonstration once, at regular intervals from the start, in random order.
 
-    One demonstration comes before the movements 0, ``every``, ...
+    A demonstration comes before the movements 0, ``every``, ...
 
     Args:
-        demonstrations: demonstrations to give.
+        demonstrations: demonstrations to show.
         rng: random stream of their order.
-        every: movements from one demonstration to the next.
+        every: number of movements from one demonstration to the next.
     """
 
     def __init__(self, demonstrations: Sequence[Demonstration], rng: np.random.Generator, *, every: int = 10) -> None:
@@ -120,21 +120,19 @@ class InitialTeacher(Teacher):
 
 
 at_once = partial(InitialTeacher, every=1)
-"""Gives each demonstration once, at the start, one before each movement."""
+"""Shows each demonstration once: one before each of the first movements, in random order."""
 
 
 class AskedTeacher(Teacher):
     """Demonstrates when the learner's competence stalls.
 
-    It is as if the learner had asked.
-
-    Every ``patience`` movements it looks how near the learner has come to each demonstrated outcome. It demonstrates if
-    the mean distance fell by less than a hundredth since the last look.
+    Every ``patience`` movements the teacher measures the distance of the learner's nearest outcome from each
+    demonstrated outcome. If the mean distance fell by less than a hundredth since the last look, it demonstrates.
 
     Args:
         demonstrations: demonstrations to choose from.
         rng: random stream of ``choose``.
-        patience: movements from one look at the learner to the next.
+        patience: number of movements from one look at the learner to the next.
         choose: choice of the next demonstration.
     """
 
@@ -163,7 +161,7 @@ class AskedTeacher(Teacher):
         return self.choose(self.demonstrations, memory, self.rng)
 
     def _distance_left(self, memory: Memory) -> float:
-        if len(memory) == 0:  # a learner that has not moved yet stalls, too
+        if len(memory) == 0:  # a learner without exemplars counts as stalled
             return np.inf
         distances = [
             np.linalg.norm(memory.outcomes[memory.near_outcomes(d.context, d.outcome, 1)] - d.outcome)
@@ -173,10 +171,10 @@ class AskedTeacher(Teacher):
 
 
 def check_demonstrations(demonstrations: Sequence[Demonstration]) -> Sequence[Demonstration]:
-    """The same.
+    """The ``demonstrations``, checked.
 
     Raises:
-        ValueError: there are none, or their contexts or outcomes differ in shape.
+        ValueError: there are no demonstrations, or contexts or outcomes differ in shape.
     """
     if not demonstrations:
         raise ValueError("a teacher needs at least one demonstration; use no teacher to learn alone")

@@ -168,7 +168,7 @@ def test_an_answer_that_cannot_be_used_is_told_and_counts_as_none(kind):
     answer, message = BAD[kind]
     bad = Silent()
     bad.demonstrate = answer
-    with pytest.warns(RuntimeWarning, match=f"teacher t gave no answer that can be used, .*{message}"):
+    with pytest.warns(RuntimeWarning, match=f"teacher t gave no usable demonstration, .*{message}"):
         episodes = live(acts(teachers={"t": bad}), {"t": bad}, 60)
     silent = live(acts(teachers={"t": Silent()}), {"t": Silent()}, 60)
     assert lines(episodes) == lines(silent)
@@ -183,7 +183,7 @@ def test_without_answers_it_moves_in_every_movement_also_when_nobody_hears_its_r
 
 
 def test_a_teacher_whom_nobody_knows_is_refused_by_name():
-    with pytest.raises(ValueError, match=r"the learner asks '(low|high)', but teachers are other; are they those"):
+    with pytest.raises(ValueError, match=r"the learner asks '(low|high)', but teachers are other; are they its own"):
         live(acts(), {"other": Silent()})
 
 

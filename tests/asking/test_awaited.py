@@ -47,7 +47,7 @@ def mine(module):
 def test_a_resumed_run_agrees_on_who_was_given_up_and_asks_only_what_is_new(mine, tmp_path):
     options, directory = mine
     options = [*options, "--teachers", "mine:Busy"]
-    with pytest.warns(RuntimeWarning, match="teacher mine:Busy did not answer in time"):
+    with pytest.warns(RuntimeWarning, match="teacher mine:Busy did not reply in time"):
         assert command(main, [*options, "--movements", "15"]) == 0
     before = read_run(directory)
     replies = before.requests["reply"].tolist()

@@ -100,8 +100,8 @@ def test_around_a_copied_movement_practice_looks_half_as_wide_as_it_explores():
 @pytest.mark.parametrize(
     ("inverse", "said"),
     [
-        (NearestNeighbour, ["NearestNeighbour predicts nothing", "NearestNeighbour does not tell them"]),
-        (LocalProcess, ["LocalProcess does not tell them"]),
+        (NearestNeighbour, ["NearestNeighbour predicts nothing", "NearestNeighbour does not report them"]),
+        (LocalProcess, ["LocalProcess does not report them"]),
         (AmongEffects, []),
     ],
 )

@@ -139,7 +139,7 @@ def test_without_its_packages_a_run_with_a_model_is_refused_and_says_what_to_ins
 def test_a_model_that_is_asked_is_announced_once(tmp_path, live, capsys):
     assert live(tmp_path, *MODEL, "--movements", 110) == 0
     said = capsys.readouterr().err
-    found = re.findall(r"movement (\d+): the forward model is asked from here on: its relative error is (\S+), ", said)
+    found = re.findall(r"movement (\d+): the forward model is used from here on: its relative error is (\S+), ", said)
     assert [movements for movements, _ in found] == ["50"]
     refreshes = table(tmp_path / "sgim-d" / "seed-003", "refreshes")[1]
     assert float(found[0][1]) == pytest.approx(refreshes[0, 4], abs=6e-4)
@@ -156,7 +156,7 @@ def test_a_model_that_is_asked_is_announced_once(tmp_path, live, capsys):
 def test_a_model_that_was_never_asked_is_reported(tmp_path, live, capsys, options, why, rows):
     assert live(tmp_path, *MODEL, *options) == 0
     said = capsys.readouterr().err
-    assert re.search(f"the forward model is not asked, the learner goes on without it: {why}\n", said)
+    assert re.search(f"the forward model is not used, the learner goes on without it: {why}\n", said)
     run = read_run(tmp_path / "sgim-d" / "seed-003")
     assert (0 if run.refreshes is None else len(run.refreshes["movements"])) == rows
     assert run.predictions is None

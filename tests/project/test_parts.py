@@ -130,7 +130,7 @@ class Alien:
         (partial(Goals), "Goals has no add, sample, which Goals demands"),
         ("grid", "given as its constructor, got 'grid'; from sgimd_torch.goals.progress_grid import ProgressGrid"),
         ("gird", "unknown goals 'gird'; did you mean grid?"),
-        (UniformGoals(problem()), "given as its constructor, got a UniformGoals that is made already"),
+        (UniformGoals(problem()), "given as its constructor, got a finished UniformGoals"),
         (Unasked, "Goals Unasked cannot be called as others of its kind are: too many positional arguments"),
         (NelderMead, "NelderMead must derive from Goals"),
         (Alien, "Alien must derive from Goals"),

@@ -121,7 +121,7 @@ def test_an_option_of_a_users_goal_model_is_its_parameter_and_nothing_else(toss,
     said = capsys.readouterr().out
     assert re.search(r"--goals.window .*\n? *number of goals .*default: 8", said), said
     assert command(main, [*words_, "--goals.window", "x"]) == 2
-    assert "--goals.window must be int, got x" in capsys.readouterr().err
+    assert "--goals.window must be a whole number, got x" in capsys.readouterr().err
 
 
 def test_goals_all_over_a_space_are_at_most_500_and_inside():
@@ -191,7 +191,7 @@ def test_help_is_one_screen_and_a_parts_options_are_shown_once_it_is_chosen(caps
     assert len(overview(command_line.__doc__).splitlines()) <= 60
     said = capsys.readouterr().out
     assert said.count("--goals.window ") == 2  # of which one is an example
-    assert "number of recent goals in a cell's interest" in " ".join(said.split())
+    assert "number of recent goals that a cell remembers" in " ".join(said.split())
 
 
 PARTS_OF_PRACTICE = {
@@ -231,7 +231,7 @@ def test_a_word_that_is_no_word_says_what_would_have_been_right(toss):
     for kind, word, meant in (
         ("goals", "toss", "toss is a module here: name what is in it, toss:NAME"),
         ("environment", "toss.Toss", "is it toss:Toss?"),
-        ("environment", "arm.xml", "arm.xml is a model file: write a class around it"),
+        ("environment", "arm.xml", "arm.xml is a model file: write a class that loads it"),
         ("environment", "planar-arm", "did you mean planar-arm-7?"),
     ):
         with pytest.raises(ValueError, match=re.escape(meant)):
@@ -243,6 +243,6 @@ def test_a_choice_that_switches_a_part_off_is_told():
         return build(Config("practice", parts={"environment": "planar-arm-7", **parts})).learner.problem.remarks
 
     assert remarks() == []
-    assert remarks(inverse="process") == ["exploration does not look for effects: LocalProcess does not tell them"]
+    assert remarks(inverse="process") == ["exploration does not look for effects: LocalProcess does not report them"]
     assert remarks(inverse="nearest")[0] == "exploration does not widen: NearestNeighbour predicts nothing"
     assert remarks(inverse="process", explore="anywhere") == []
