@@ -24,8 +24,8 @@ class Built(ABC):  # noqa: B024
             module, _, name = place_of(kind.lower(), make).partition(":")
             raise ValueError(f"{kind} must be given as its constructor, got {make!r}; from {module} import {name}")
         if isinstance(make, cls) or not callable(make):
-            made_already = " that is made already" if isinstance(make, cls) else ""
-            raise ValueError(f"{kind} must be given as its constructor, got a {type(make).__name__}{made_already}")
+            finished = "finished " if isinstance(make, cls) else ""
+            raise ValueError(f"{kind} must be given as its constructor, got a {finished}{type(make).__name__}")
         found = function_of(make)
         if isinstance(found, type) and not issubclass(found, cls):
             raise ValueError(f"{found.__name__} must derive from {kind} of sgimd_torch.parts")

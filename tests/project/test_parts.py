@@ -138,7 +138,7 @@ class Alien:
 )
 def test_what_is_no_constructor_of_its_kind_is_refused_when_it_is_built(make, message):
     with pytest.raises(ValueError, match=message):
-        GoalBabbling(problem(inverse=NearestNeighbour), goals=make)
+        GoalBabbling(problem(inverse=NearestNeighbour), goals=make, search=NelderMead)
 
 
 @pytest.mark.parametrize("kind", [*KINDS.values(), parts.Teacher])
