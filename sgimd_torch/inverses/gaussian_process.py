@@ -23,7 +23,7 @@ from sgimd_torch.spaces import Array
 
 _BLAS: Final = ThreadpoolController()
 _ROOT5: Final = np.sqrt(5)
-_LEAST: Final = 1e-6  # least noise variance, relative to the kernel's; less makes its matrix singular
+_LEAST: Final = 1e-6  # least noise variance, relative to the kernel's; less makes the matrix singular
 _TINY: Final = 1e-300
 _NOISES: Final = (_LEAST, 1e-4, 1e-3, 1e-2, 0.03, 0.1, 0.3, 1.0, 3.0)
 _SCALES: Final = (0.5, 1.0, 2.0)
