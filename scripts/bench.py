@@ -45,11 +45,12 @@ def live(name: str, movements: int) -> Figures:
         name: algorithm and robot, one of ``LIVES``; a number is the joints of a planar arm.
         movements: length of the life.
     """
-    from sgimd_torch import Demonstration, FishingRod, PeriodicTeacher, PlanarArm, algorithms, run, stream
+    import sgimd_torch
+    from sgimd_torch import Demonstration, FishingRod, PeriodicTeacher, PlanarArm, run, stream
 
     algorithm, _, joints = name.rpartition("-")
     robot: Any = FishingRod() if joints == "rod" else PlanarArm(int(joints), noise=0.02)
-    make = getattr(algorithms, {"random": "random_exploration"}.get(algorithm, algorithm.replace("-", "_")))
+    make = getattr(sgimd_torch, {"random": "random_exploration"}.get(algorithm, algorithm.replace("-", "_")))
     teacher, taught = None, dict[str, Any]()
     if algorithm == "sgim-d":
         context, rng = np.zeros(0), stream(0, "bench")
