@@ -23,7 +23,6 @@ from sgimd_torch.views.statistics import (
     improvement_interval,
     interquartile_mean,
     interval,
-    movements_to_reach,
     point,
     rng,
 )
@@ -215,6 +214,27 @@ def shared(ours: pd.Series, theirs: pd.Series) -> tuple[pd.Series, pd.Series]:
     if len(seeds) < 2:
         raise NotRun("fewer than two seeds in common")
     return ours[seeds], theirs[seeds]
+
+
+def movements_to_reach(movements: Array, errors: Array, level: Array | float) -> Array:
+    """Number of movements at which the error first falls to a level; straight lines between evaluations.
+
+    Args:
+        movements: ``(n,)``, increasing.
+        errors: ``(..., n)`` m.
+        level: ``(...)`` m.
+
+    Returns:
+        ``(...)``, at least the first of ``movements``; inf if the level is never reached.
+    """
+    level = np.asarray(level, dtype=np.float64)[..., None]
+    reached = errors <= level
+    after = np.clip(reached.argmax(axis=-1, keepdims=True), 1, None)
+    high, low = (np.take_along_axis(errors, after - step, axis=-1) for step in (1, 0))
+    fall = np.where(high > low, high - low, 1.0)
+    share = np.clip((high - level) / fall, 0, 1)  # 0 if the first evaluation is low enough
+    found = movements[after - 1] + share * (movements[after] - movements[after - 1])
+    return np.where(reached.any(axis=-1), found[..., 0], np.inf)
 
 
 def _matched(ours: pd.Series, theirs: pd.Series) -> tuple[pd.Series, pd.Series, bool]:

@@ -28,6 +28,7 @@ with loading():  # Ctrl-C shows no traceback
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from claimed import WHOLE
     from evidence import LAST, Evidence, NotRun
     from page_tables import GAIN, SETTINGS, TAUGHT
     from sgimd_torch.figures.learning import COLOURS, NAMES
@@ -37,7 +38,6 @@ with loading():  # Ctrl-C shows no traceback
     from variants import EXPERIMENTS
 
 KIND: Final = "svg"
-TIMES: Final = (250, 500, 1000, 2000, LAST)
 ERROR: Final = "mean distance to the goals (m)"
 LEARNERS: Final = ("random", "sagg-riac", "observation", "imitation", "sgim-d")  # the paper's
 
@@ -98,14 +98,9 @@ FIGURES: Final[dict[str, Callable[[Evidence], Figure]]] = {
 
 
 def curves(ax: Axes, found: Evidence, shown: Mapping[str, str]) -> None:
-    """Draw errors against movements, with intervals as bands and names at the ends of the curves.
+    """Draw errors against movements, for the variant that is ``shown`` of each algorithm, with intervals as bands.
 
     Movements are on a logarithmic axis, because learners differ most early.
-
-    Args:
-        ax: axes to draw on.
-        found: rows of the experiments.
-        shown: variant of each algorithm, by the algorithm's word.
     """
     ends: dict[str, float] = {}
     for algorithm, name in shown.items():
@@ -118,7 +113,7 @@ def curves(ax: Axes, found: Evidence, shown: Mapping[str, str]) -> None:
     ax.set(xscale="log", xlabel="movements executed", ylabel=ERROR)
     ax.set_xlim(right=3.2 * LAST)
     ax.set_ylim(bottom=0)
-    ax.set_xticks(TIMES, map(str, TIMES))
+    ax.set_xticks(WHOLE, map(str, WHOLE))
     ax.set_xticks([], minor=True)
     ax.grid(alpha=0.3)
     height, gap = -np.inf, 0.06 * ax.get_ylim()[1]

@@ -37,10 +37,12 @@ class HomeBabbling(Strategy):
         sd: standard deviation of the variations, in sides of Pi.
     """
 
+    draws_from = ORIGIN
+
     def __init__(self, problem: Problem, *, steps: int = 10, sd: float = 0.1) -> None:
         super().__init__(problem)
         self.policies, self.outcomes, self.memory = problem.policies, problem.outcomes, problem.memory
-        self.rng, self.steps, self.sd = problem.stream(ORIGIN), steps, sd
+        self.steps, self.sd = steps, sd
         self.home = (self.policies.low + self.policies.high) / 2
         self._from: Array | None = None  # the last goal; None at home
         self._weights: list[float] = []  # of each exemplar

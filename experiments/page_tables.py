@@ -11,13 +11,13 @@ from itertools import chain
 from pathlib import Path
 from typing import Final
 
-from claimed import TIMES, paper
+from claimed import paper
 from evidence import LAST, Evidence, NotRun, Statistic
 from judging import MISSING, Claim, Verdict, judge
 from sgimd_torch.views.statistics import show
 from sgimd_torch.views.suite import RANDOM, UNIFORM, titled
 from table import read_table
-from variants import ARMS, EXPERIMENTS, REFINING, ROBOTS, SPARSE, SUITE, TEACHERS, ladder
+from variants import ARMS, EXPERIMENTS, REFINING, ROBOTS, SPARSE, SUITE, TEACHERS
 
 SETTINGS: Final = (*ROBOTS, *TEACHERS)
 VARIANTS: Final = {name for variants in EXPERIMENTS.values() for name in variants}
@@ -200,7 +200,8 @@ class Page:
     def steps(self) -> str:
         """The ladder from the letter to our defaults, in the small and in the large T."""
         rows = []
-        for name, large in zip(ladder(), ladder("-large"), strict=True):
+        both = [[f"sgim-d-letter{end}", *EXPERIMENTS[f"ladder{end}"], f"sgim-d{end}"] for end in ("", "-large")]
+        for name, large in zip(*both, strict=True):
             own = " by paper" if name.endswith("letter") else " by linear" if name.startswith("ladder") else ""
             rows.append([f"`{name}`", *(self.error(each) for each in (f"{name}{own}", name, large))])
         return markdown(("step", "T, by its own answer", "T, by `process`", "large T, by `process`"), rows)
@@ -249,13 +250,13 @@ class Page:
         ]
         return markdown(("idea", *SETTINGS), rows)
 
-    def swimmer(self) -> str:
-        """Each learner on the swimmer."""
-        return self._study("swimmer", "explored by", TIMES)
-
-    def by_hand(self) -> str:
-        """Each learner alone, with lessons by hand and with shipped demonstrations."""
-        return self._study("by-hand", "learner", (300, 500, 1000))
+    def study(self, experiment: str, head: str, times: Sequence[int]) -> str:
+        """Errors of each learner of an experiment, with intervals."""
+        rows = [
+            [f"`{name.removesuffix('-swimmer')}`", *self.errors(name, times, between=True)]
+            for name in EXPERIMENTS[experiment]
+        ]
+        return markdown((head, *map(str, times)), rows)
 
     def tuned(self) -> str:
         """The default of each rival and its best setting in the first round: errors (m) of first and later seeds."""
@@ -272,14 +273,6 @@ class Page:
             for place in places
         ]  # fmt: skip
         return markdown(("rival", "setting", "first seeds", "later seeds"), rows)
-
-    def _study(self, experiment: str, head: str, times: Sequence[int]) -> str:
-        """The errors of each learner of an experiment, with intervals."""
-        rows = [
-            [f"`{name.removesuffix('-swimmer')}`", *self.errors(name, times, between=True)]
-            for name in EXPERIMENTS[experiment]
-        ]
-        return markdown((head, *map(str, times)), rows)
 
     def _over_tasks(self, name: str, tasks: Sequence[str], at: int) -> str:
         names = [[f"{each}.{task}" for task in tasks] for each in (name, RANDOM)]

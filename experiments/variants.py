@@ -232,11 +232,6 @@ def _ladder(ending: str, where: Variant) -> dict[str, Variant]:
     return found
 
 
-def ladder(ending: str = "") -> list[str]:
-    """Names of the steps from the letter to our defaults; the ending is "-large" for the large task space."""
-    return [f"sgim-d-letter{ending}", *EXPERIMENTS[f"ladder{ending}"], f"sgim-d{ending}"]
-
-
 EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
     "learners": {name: {"algorithm": name} for name in ("random", "sagg-riac", "observation", "imitation", "sgim-d")},
     "teachers": {**_of_teacher(1), **_of_teacher(2)},

@@ -1,18 +1,16 @@
-"""What the library costs, as ratios measured side by side: this checkout against another one.
+"""What the library costs: this checkout alone, or beside another commit.
 
-Each part is done in turns (here, there, here, there ...), each time in a new process; a ratio is that of the medians.
-Times are processor time; other programs still lengthen it, as they empty the caches.
+Each measurement runs in turns (here, there, here, there ...), each time in a new process. A ratio is one of medians.
+Times are processor time; other programs still lengthen it, because they empty the caches.
 
-  movement  ms a movement that a learner takes on a planar arm of 25 joints, without the arm's own time, and a checksum
-            of all outcomes, which says whether both learnt the same
-  practice  what learning costs `practice`: over the rod's physics in a life of 2000 movements, and ms a movement on a
-            planar arm of 50 joints, in the first fifth of the life and after it
-  resume    a run on the fishing rod, and its replay once it has ended
-  life      a long run on a planar arm of 7 joints: time, the largest memory of the process, and the size of its folder
+  learning  time of a learner for a movement, without its robot's; its ratio to the robot's; a checksum of all outcomes,
+            which says whether both commits learn alike
+  resume    a run on the fishing rod, and its replay after its end
+  life      a long run on a planar arm of 7 joints: time, the largest memory of the process, the size of its folder
 
 Examples:
   python scripts/bench.py                                          this checkout alone, some minutes
-  python scripts/bench.py --against ../older --only movement resume
+  python scripts/bench.py --against main --only learning resume    beside another commit
 """
 
 from __future__ import annotations
@@ -24,7 +22,7 @@ import subprocess
 import sys
 import time
 import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -35,78 +33,64 @@ from jsonargparse.typing import PositiveInt
 from tqdm import tqdm
 
 HERE = Path(__file__).resolve().parents[1]
-LEARNERS = ("random", "sagg-riac", "sgim-d", "practice")
-JOINTS = 25
-ROBOTS = ("rod", "arm")
+LIVES = ("random-25", "sagg-riac-25", "sgim-d-25", "practice-25", "practice-50", "practice-rod")
 Figures = dict[str, float]
+Measurement = Callable[[Path, int], Figures]
 
 
-class Clock:
-    """Processor time (s) spent in the calls of a function."""
+def live(name: str, movements: int) -> Figures:
+    """Figures of a learner's life, by the library that this process imports.
 
-    def __init__(self, function: Callable[..., Any]) -> None:
-        self.seconds, self._function = 0.0, function
+    Args:
+        name: algorithm and robot, one of ``LIVES``; a number is the joints of a planar arm.
+        movements: length of the life.
+    """
+    from sgimd_torch import Demonstration, FishingRod, PeriodicTeacher, PlanarArm, algorithms, run, stream
 
-    def __call__(self, *arguments: Any) -> Any:
-        begun = time.process_time()
-        found = self._function(*arguments)
-        self.seconds += time.process_time() - begun
-        return found
-
-
-def life_of(name: str, movements: int) -> Figures:
-    """ms a movement over a learner's life on an arm, besides the arm's own, and a checksum of its outcomes."""
-    from sgimd_torch import Demonstration, PeriodicTeacher, PlanarArm, algorithms, run, stream
-
-    arm, rng = PlanarArm(JOINTS, noise=0.02), stream(0, "bench")
-    make = getattr(algorithms, {"random": "random_exploration"}.get(name, name.replace("-", "_")))
+    algorithm, _, joints = name.rpartition("-")
+    robot: Any = FishingRod() if joints == "rod" else PlanarArm(int(joints), noise=0.02)
+    make = getattr(algorithms, {"random": "random_exploration"}.get(algorithm, algorithm.replace("-", "_")))
     teacher, taught = None, dict[str, Any]()
-    if name == "sgim-d":
+    if algorithm == "sgim-d":
+        context, rng = np.zeros(0), stream(0, "bench")
         shown = [
-            Demonstration(np.zeros(0), np.arange(2.0), np.stack((theta, theta)), arm.execute(np.zeros(0), theta, rng))
-            for theta in rng.random((100, JOINTS))
+            Demonstration(context, np.arange(2.0), np.stack((theta, theta)), robot.execute(context, theta, rng))
+            for theta in rng.random((100, int(joints)))
         ]
         teacher, taught = PeriodicTeacher(shown, stream(0, "teacher")), {"correspondence": lambda times, path: path[-1]}
-    learner = make(arm, 0, **taught)
-    vars(arm)["execute"] = clock = Clock(arm.execute)
+    learner, execute, of_robot = make(robot, 0, **taught), robot.execute, 0.0
+
+    def timed(*arguments: Any) -> Any:
+        nonlocal of_robot
+        begun = time.process_time()
+        outcome = execute(*arguments)
+        of_robot += time.process_time() - begun
+        return outcome
+
+    robot.execute = timed
     checksum, begun = 0, time.process_time()
-    for episode in run(learner, arm, 0, movements=movements, teacher=teacher):
+    for episode in run(learner, robot, 0, movements=movements, teacher=teacher):
         checksum = zlib.crc32(np.asarray(episode.outcome).tobytes(), checksum)
-    seconds = time.process_time() - begun - clock.seconds
-    return {f"{name} (ms a movement)": 1000 * seconds / movements, f"{name}, checksum": checksum}
+    learning = time.process_time() - begun - of_robot
+    return {
+        f"{name} (ms a movement)": 1000 * learning / movements,
+        f"{name}, learning over robot": learning / of_robot,
+        f"{name}, checksum": checksum,
+    }
 
 
-def practised(robot: str, movements: int) -> Figures:
-    """What learning costs `practice` on the rod, over the physics; on an arm of 50 joints, ms a movement."""
-    from sgimd_torch import FishingRod, PlanarArm, practice, run
-
-    environment = FishingRod() if robot == "rod" else PlanarArm(50)
-    learner = practice(environment, 0)
-    vars(environment)["execute"] = clock = Clock(environment.execute)
-    found, last, before, begun = Figures(), 0, 0.0, time.process_time()
-    for episode in run(learner, environment, 0, movements=movements):
-        made, seconds = episode.index + 1, time.process_time() - begun - clock.seconds
-        if made == movements and robot == "rod":
-            found["practice on the rod, learning over physics"] = seconds / clock.seconds
-        if made in (movements // 5, movements) and robot == "arm":
-            found[f"practice on 50 joints, to {made} (ms)"] = 1000 * (seconds - before) / (made - last)
-            last, before = made, seconds
-    return found
-
-
-def measured(library: Path, name: str, movements: int) -> Figures:
-    """The same, in a new process that imports the library of another checkout."""
+def measured(name: str, library: Path, movements: int) -> Figures:
+    """Figures of a life in a new process that imports ``library``."""
     command = [sys.executable, __file__, "--child", name, "--movements", str(movements)]
-    done = subprocess.run(command, env=_environment(library), stdout=subprocess.PIPE, text=True, check=True)
-    found: Figures = json.loads(done.stdout.splitlines()[-1])
-    return found
+    done = subprocess.run(command, env=environment(library), stdout=subprocess.PIPE, text=True, check=True)
+    return dict(json.loads(done.stdout))
 
 
 def resume(library: Path, movements: int) -> Figures:
-    """A run with default options, and its replay after its end: processor time of each, that of starting included."""
+    """A run with default options, and its replay after its end; both include the start of the process."""
     with TemporaryDirectory() as folder:
-        fresh, _ = _run(library, folder, f"--movements={movements}")
-        replay, _ = _run(library, folder, f"--movements={movements}", "--resume")
+        fresh, _ = command_line(library, folder, f"--movements={movements}")
+        replay, _ = command_line(library, folder, f"--movements={movements}", "--resume")
     return {"run on the rod (s)": fresh, "its replay (s)": replay, "replay over run": replay / fresh}
 
 
@@ -114,80 +98,73 @@ def long_life(library: Path, movements: int) -> Figures:
     """A run on an arm of 7 joints, whose physics hardly counts."""
     with TemporaryDirectory() as folder:
         words = ("--environment=planar-arm-7", f"--movements={movements}", f"--evaluate-at=[{movements}]")
-        seconds, memory = _run(library, folder, *words)
-        size = sum(path.stat().st_size for path in Path(folder).rglob("*") if path.is_file())
-    return {
-        f"{movements} movements on an arm (s)": seconds,
-        "its largest memory (MiB)": memory,
-        "its folder (MB)": size / 1e6,
-    }
+        seconds, memory = command_line(library, folder, *words)
+        size = sum(path.stat().st_size for path in Path(folder).rglob("*") if path.is_file()) / 1e6
+    return {"life on an arm (s)": seconds, "its largest memory (MiB)": memory, "its folder (MB)": size}
 
 
-def _run(library: Path, folder: str, *words: str) -> tuple[float, float]:
-    """Processor time (s) and the largest memory (MiB) of a run by the command line of a checkout."""
+def command_line(library: Path, folder: str, *words: str) -> tuple[float, float]:
+    """Processor time (s) and largest memory (MiB) of ``sgimd run`` in a folder."""
     command = [sys.executable, "-m", "sgimd_torch", "run", "--out=runs", *words]
-    with open(Path(folder) / "said.txt", "wb") as said:
-        process = subprocess.Popen(command, cwd=folder, env=_environment(library), stdout=said, stderr=said)
-        _, status, used = os.wait4(process.pid, 0)
+    process = subprocess.Popen(command, cwd=folder, env=environment(library), stdout=subprocess.DEVNULL)
+    _, status, used = os.wait4(process.pid, 0)
     process.returncode = os.waitstatus_to_exitcode(status)
     if process.returncode:
-        raise RuntimeError(f"{' '.join(command)} failed in {library}: {(Path(folder) / 'said.txt').read_text()}")
+        raise RuntimeError(f"{' '.join(command)} failed, see above")
     kilobytes = used.ru_maxrss / (1024 if sys.platform == "darwin" else 1)
     return used.ru_utime + used.ru_stime, kilobytes / 1024
 
 
-def _environment(library: Path) -> dict[str, str]:
+def environment(library: Path) -> dict[str, str]:
+    """Variables of a process that imports ``library`` and computes with one thread."""
     one = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     return {**os.environ, **one, "PYTHONPATH": str(library)}
 
 
-def show(name: str, several: Sequence[Sequence[float]]) -> None:
-    """A line of the table: the medians of each checkout, and the ratio of ours to theirs."""
+def show(name: str, several: list[list[float]]) -> None:
+    """Print medians of each commit, and the ratio of ours to theirs."""
     if name.endswith("checksum"):
-        same = len({value for found in several for value in found}) == 1
-        print(f"{name:45}{'equal' if same else 'DIFFERENT':>12}", flush=True)
-        return
-    medians = [float(np.median(found)) for found in several]
-    ratio = f"{medians[0] / medians[1]:12.3f}" if len(medians) == 2 else ""
-    print(f"{name:45}" + "".join(f"{median:12.4g}" for median in medians) + ratio, flush=True)
+        cells = ["equal" if len({value for values in several for value in values}) == 1 else "DIFFERENT"]
+    else:
+        medians = [float(np.median(values)) for values in several]
+        cells = [f"{median:.4g}" for median in medians] + [f"{medians[0] / medians[-1]:.3f}"] * (len(medians) - 1)
+    print(f"{name:45}" + "".join(f"{cell:>12}" for cell in cells), flush=True)
 
 
-PARTS: dict[str, list[Callable[[Path, int], Figures]]] = {
-    "movement": [partial(lambda name, *of: measured(of[0], name, of[1]), name) for name in LEARNERS],
-    "practice": [partial(lambda name, *of: measured(of[0], name, of[1]), name) for name in ROBOTS],
-    "resume": [resume],
-    "life": [long_life],
+PARTS: dict[str, tuple[list[Measurement], int]] = {  # measurements of a library, and the movements of each
+    "learning": ([partial(measured, name) for name in LIVES], 2000),
+    "resume": ([resume], 5000),
+    "life": ([long_life], 100_000),
 }
-MOVEMENTS = {"movement": 2000, "practice": 2000, "resume": 5000, "life": 100_000}
 
 
 def main() -> int:
     """Measure, and print a table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--against", type=Path, help="folder of another checkout of this repository")
+    parser.add_argument("--against", metavar="COMMIT", help="a commit of this repository to compare with")
     parser.add_argument("--only", nargs="+", choices=PARTS, default=list(PARTS), metavar="PART", help=", ".join(PARTS))
-    parser.add_argument("--rounds", type=PositiveInt, default=3, help="measurements of each figure (3)")
-    parser.add_argument("--movements", type=PositiveInt, help=f"of each life ({MOVEMENTS})")
-    parser.add_argument("--child", choices=(*LEARNERS, *ROBOTS), help=argparse.SUPPRESS)
+    parser.add_argument("--rounds", type=PositiveInt, default=3, help="measurements of each figure (default: 3)")
+    parser.add_argument("--movements", type=PositiveInt, help="length of each life, in place of a part's own")
+    parser.add_argument("--child", choices=LIVES, help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.child:
-        live = practised if options.child in ROBOTS else life_of
         print(json.dumps(live(options.child, options.movements)))
         return 0
-    if options.against is not None and not (options.against / "sgimd_torch").is_dir():
-        parser.error(f"--against must be a folder with sgimd_torch in it, got {options.against}")
-    libraries = [HERE] if options.against is None else [HERE, options.against.resolve()]
-    print(f"{'':45}{'here':>12}" + ("" if options.against is None else f"{'there':>12}{'here/there':>12}"))
-    work = [(measure, options.movements or MOVEMENTS[part]) for part in options.only for measure in PARTS[part]]
-    with tqdm(total=len(work) * options.rounds * len(libraries), leave=False, disable=None) as progress:
-        for measure, movements in work:
-            figures: list[list[Figures]] = [[] for _ in libraries]
-            for _ in range(options.rounds):
-                for library, several in zip(libraries, figures, strict=True):
-                    several.append(measure(library, movements))
-                    progress.update()
+    with TemporaryDirectory() as folder:
+        libraries = [HERE]
+        if options.against:
+            libraries.append(Path(folder))
+            archive = ["git", "-C", str(HERE), "archive", options.against, "sgimd_torch"]
+            packed = subprocess.run(archive, stdout=subprocess.PIPE)
+            if packed.returncode:
+                parser.error(f"--against must be a commit with sgimd_torch in it, got {options.against}")
+            subprocess.run(["tar", "-x", "-C", folder], input=packed.stdout, check=True)
+        print(f"{'':45}" + "".join(f"{name:>12}" for name in ("here", "there", "here/there")[: 2 * len(libraries) - 1]))
+        work = [(measure, options.movements or PARTS[part][1]) for part in options.only for measure in PARTS[part][0]]
+        for measure, movements in tqdm(work, leave=False, disable=None):
+            figures = [[measure(library, movements) for library in libraries] for _ in range(options.rounds)]
             for name in figures[0][0]:
-                show(name, [[one[name] for one in several] for several in figures])
+                show(name, [[found[name] for found in several] for several in zip(*figures, strict=True)])
     return 0
 
 

@@ -1,8 +1,8 @@
 """Make the benchmark set: one goal in each tile that several learners reached together (section 5.2 of the paper).
 
-Random, SAGG-RIAC and SGIM-D are run on the fishing rod with several seeds each, and `sgimd benchmark` tiles what they
-reached together. The side of the tiles is chosen so that about 358 of them, the paper's number, were reached. One goal
-is drawn at random in each.
+The script runs Random, SAGG-RIAC and SGIM-D on the fishing rod, each with several seeds; `sgimd benchmark` tiles what
+they reached together. The side of a tile is chosen so that they reached about 358 tiles, the paper's number. Each of
+these gets one random goal.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from sgimd_torch.views import benchmark
 
 
 def live(learners: Iterable[tuple[str, int]], movements: int, processes: int, folder: Path) -> list[Path]:
-    """Run ``learners``, each an algorithm with a seed, without evaluations; their run directories, in this order."""
+    """Run directories of ``learners``, pairs of algorithm and seed, in this order; the runs have no evaluations."""
     configs = [
         Config(algorithm=algorithm, seed=seed, movements=movements, evaluate_at=(), out=folder)
         for algorithm, seed in learners
@@ -39,7 +39,7 @@ def live(learners: Iterable[tuple[str, int]], movements: int, processes: int, fo
 
 
 def pooled(learners: Iterable[tuple[str, int]], movements: int, processes: int) -> tuple[Array, Array]:
-    """The movements of all ``learners`` together: thetas ``(n, theta_dim)``, outcomes ``(n, 2)`` m."""
+    """Movements of all ``learners`` together: thetas ``(n, theta_dim)``, outcomes ``(n, 2)`` m."""
     with TemporaryDirectory() as folder:
         runs = [read_run(path) for path in live(learners, movements, processes, Path(folder))]
     moved = [np.isfinite(run.outcomes).all(axis=1) for run in runs]
@@ -54,13 +54,11 @@ def main() -> None:
     """Run the learners and make the goals from what they reached."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path_fc, default=SHIPPED, help="file to write (default: the shipped one)")
-    parser.add_argument(
-        "--seed", type=NonNegativeInt, default=2000, help="of the first run and of the draw (default: %(default)s)"
-    )
+    parser.add_argument("--seed", type=NonNegativeInt, default=2000, help="first seed (default: %(default)s)")
     parser.add_argument("--runs", type=PositiveInt, default=4, help="runs of each learner (default: %(default)s)")
-    parser.add_argument("--movements", type=PositiveInt, default=5000, help="of each run (default: %(default)s)")
-    parser.add_argument("--tiles", type=PositiveInt, default=358, help="about how many (default: %(default)s)")
-    parser.add_argument("--processes", type=PositiveInt, default=2, help="(default: %(default)s)")
+    parser.add_argument("--movements", type=PositiveInt, default=5000, help="length of a run (default: %(default)s)")
+    parser.add_argument("--tiles", type=PositiveInt, default=358, help="approximate number (default: %(default)s)")
+    parser.add_argument("--processes", type=PositiveInt, default=2, help="runs at a time (default: %(default)s)")
     options = parser.parse_args()
     learners = product(("random", "sagg-riac", "sgim-d"), range(options.seed, options.seed + options.runs))
     with TemporaryDirectory() as folder:

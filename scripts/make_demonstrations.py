@@ -1,9 +1,9 @@
 """Make the shipped demonstrations of demonstrator 3: simulated kinesthetic recordings on the fishing rod.
 
 The paper's demonstrator 3 was a person who led the arm by hand. These recordings are *simulated* as the paper describes
-that person's: every joint moves monotonically from the start configuration to an end posture, all with the same shape,
-scaled. End postures follow one rule, with variations like those of a hand, and are chosen so that the landing points
-spread evenly over the plane. The speed varies smoothly, as with a hand, so no recording is exactly a motor primitive.
+that person's: every joint moves monotonically from the start configuration to an end posture, all along one scaled
+curve. End postures follow one rule with the scatter of a hand, and are chosen so that landing points spread evenly over
+the plane. The speed varies smoothly, as with a hand, so no recording is exactly a motor primitive.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from sgimd_torch.spaces import Array, Demonstration, stream
 RATE = 50  # Hz
 DURATIONS = (1.0, 1.4)  # s
 HAND = 0.04  # rad, standard deviation of the hand at end postures
-TREMOR = 0.4  # how much the speed varies, relative to the speed
+TREMOR = 0.4  # variation of the speed, relative to it
 
 
 def end_posture(turn: float, stretch: float) -> Array:
-    """``(6,)`` rad, the rule of the teacher: ``turn`` in [-1, 1] from right to left, ``stretch`` in [-1, 1] from far
-    behind to far ahead. Yaw and wrist make the turn; shoulder, elbow and wrist make the stretch."""
+    """Rule of the teacher, ``(6,)`` rad: ``turn`` in [-1, 1] from right to left, ``stretch`` in [-1, 1] from far behind
+    to far ahead. Yaw and wrist make the turn; shoulder, elbow and wrist make the stretch."""
     middle = (JOINT_RANGES.low + JOINT_RANGES.high) / 2
     sideways = np.array([1.5, 0.0, 0.0, 0.0, 0.0, 1.2])
     ahead = np.array([0.0, -0.65, 0.1, 0.0, -0.75, 0.0])
@@ -50,7 +50,7 @@ def lead(end: Array, rng: np.random.Generator) -> tuple[Array, Array]:
 
 
 def farthest_points(points: Array, n: int) -> list[int]:
-    """Rows of ``n`` of the ``points``: the one nearest to the mean, then always the farthest from the chosen ones."""
+    """Rows of ``n`` of the ``points``: first the nearest to the mean, then always the farthest from the chosen ones."""
     chosen = [int(np.linalg.norm(points - points.mean(axis=0), axis=1).argmin())]
     distances = np.full(len(points), np.inf)
     while len(chosen) < n:
@@ -60,16 +60,12 @@ def farthest_points(points: Array, n: int) -> list[int]:
 
 
 def main() -> None:
-    """Record many movements, and keep those that spread evenly."""
+    """Record many movements; keep some that spread evenly."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path_fc, default=SHIPPED, help="file to write (default: the shipped one)")
-    parser.add_argument(
-        "--n", type=PositiveInt, default=127, help="demonstrations, 127 in the paper (default: %(default)s)"
-    )
-    parser.add_argument(
-        "--candidates", type=PositiveInt, default=4000, help="recordings to choose from (default: %(default)s)"
-    )
-    parser.add_argument("--seed", type=NonNegativeInt, default=2014, help="(default: %(default)s)")
+    parser.add_argument("--n", type=PositiveInt, default=127, help="demonstrations (default: 127, as in the paper)")
+    parser.add_argument("--candidates", type=PositiveInt, default=4000, help="recordings (default: %(default)s)")
+    parser.add_argument("--seed", type=NonNegativeInt, default=2014, help="seed of all draws (default: %(default)s)")
     options = parser.parse_args()
     if options.n > options.candidates:
         parser.error(f"--n must be at most --candidates, {options.candidates}, got {options.n}")
@@ -82,9 +78,7 @@ def main() -> None:
         if rod.outcomes.contains(outcome):
             recordings.append(Demonstration(np.zeros(0), times, trajectory, outcome))
     if options.n > len(recordings):
-        parser.error(
-            f"only {len(recordings)} recordings land inside T, too few for --n {options.n}; more --candidates?"
-        )
+        parser.error(f"only {len(recordings)} recordings land inside T, fewer than --n {options.n}; more --candidates?")
     chosen = farthest_points(np.stack([recording.outcome for recording in recordings]), options.n)
     save_demonstrations(options.out, [recordings[row] for row in chosen])
     print(f"{len(chosen)} demonstrations of {len(recordings)} recordings inside T: {options.out}")

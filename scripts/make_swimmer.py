@@ -1,9 +1,9 @@
 """Make goals and demonstrations of the swimmer (gymnasium's Swimmer-v5), which are shipped with the package.
 
-The goals: random movements are executed, T is tiled, and one goal is drawn in each tile that was reached twice. The
-teacher is a script that knows how snakes swim: a wave of torques travels along the body, forwards or backwards, and an
-offset steers. Its hand shakes, so that no recording is exactly a sinusoid; of many recordings those that spread most
-evenly are kept. They are played from the same start, without noise.
+Goals: the script executes random movements, tiles T, and draws one goal in each tile that was reached twice.
+Demonstrations: a simulated teacher swims like a snake. A wave of torques travels along the body, forwards or backwards,
+and an offset steers. The hand shakes, so no recording is exactly a sinusoid. All start alike, without noise; of many
+recordings the script keeps some that spread evenly.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from sgimd_torch.evaluation import Benchmark, save_benchmark, tile_goals
 from sgimd_torch.spaces import Array, Demonstration, stream
 
 DATA = Path(__file__).resolve().parents[1] / "sgimd_torch" / "data"
-SIDE = 0.15  # m, of a tile
-SHAKE = 0.05  # of a torque's half range, standard deviation of the hand
+SIDE = 0.15  # side of a tile (m)
+SHAKE = 0.05  # standard deviation of the hand, relative to half the range of a torque
 
 
 def wave(rng: np.random.Generator, times: Array) -> Array:
-    """``(n_times, 2)`` torques: both joints alike, the second a quarter of a period before or after the first."""
+    """Torques ``(n_times, 2)``: both joints alike, the second a quarter of a period before or after the first."""
     strength, frequency, steer = rng.uniform(0.2, 1.0), rng.uniform(0.3, 1.2), rng.uniform(-0.4, 0.4)
     lag, start = rng.choice([-0.25, 0.25]), rng.random()
     phases = frequency * times[:, None] + start + np.array([0.0, lag])
@@ -41,11 +41,11 @@ def wave(rng: np.random.Generator, times: Array) -> Array:
 def main() -> None:
     """Write both files."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=Path, default=DATA, help="folder of the two files (default: the shipped ones)")
-    parser.add_argument("--movements", type=PositiveInt, default=2500, help="random ones (default: %(default)s)")
+    parser.add_argument("--out", type=Path, default=DATA, help="folder of both files (default: the shipped ones)")
+    parser.add_argument("--movements", type=PositiveInt, default=2500, help="random movements (default: %(default)s)")
     parser.add_argument("--candidates", type=PositiveInt, default=600, help="recordings (default: %(default)s)")
     parser.add_argument("--n", type=PositiveInt, default=100, help="demonstrations (default: %(default)s)")
-    parser.add_argument("--seed", type=NonNegativeInt, default=2015, help="(default: %(default)s)")
+    parser.add_argument("--seed", type=NonNegativeInt, default=2015, help="seed of all draws (default: %(default)s)")
     options = parser.parse_args()
     if options.n > options.candidates:
         parser.error(f"--n must be at most --candidates, {options.candidates}, got {options.n}")

@@ -1,20 +1,18 @@
 """Make the shipped demonstrations of demonstrators 1 and 2: robots that learnt alone, by SAGG-RIAC, and now teach.
 
-Section 5.3 of the paper. Several SAGG-RIAC learners are run on the fishing rod, and their memories are put together.
-Demonstrator 1 is naive: its demonstrations are exemplars drawn at random. Demonstrator 2 is careful: its demonstrations
-are spread evenly over what was reached; each is the exemplar, of some that landed on the same tile, that lands most
-reliably when it is executed again. The recordings are joint trajectories, as for demonstrator 3, so the learner
-has to find theta_d by itself.
+Section 5.3 of the paper. The script runs several SAGG-RIAC learners on the fishing rod and puts their memories
+together. Demonstrator 1 is naive: it shows random exemplars. Demonstrator 2 is careful: it shows one exemplar for each
+of some tiles that spread evenly; of several exemplars on a tile it takes the one that lands most reliably when executed
+again. Recordings are joint trajectories, as for demonstrator 3, so the learner has to find theta_d by itself.
 """
 
 from __future__ import annotations
 
 import argparse
-import os
 from pathlib import Path
 
 import numpy as np
-from jsonargparse.typing import NonNegativeInt, PositiveInt
+from jsonargparse.typing import NonNegativeInt, Path_dw, PositiveInt
 
 from make_benchmark import pooled
 from make_demonstrations import farthest_points
@@ -23,38 +21,38 @@ from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.environments.protocol import execute_many
 from sgimd_torch.spaces import Array, Demonstration, stream
 
-CANDIDATES = 10  # the most exemplars that demonstrator 2 compares on a tile
-EXECUTIONS = 10  # of each of them
+CANDIDATES = 10  # exemplars that demonstrator 2 compares on a tile, at most
+EXECUTIONS = 10  # executions of each exemplar
 
 
 def demonstrate(rod: FishingRod, theta: Array, outcome: Array) -> Demonstration:
-    """The commanded trajectory of ``theta``, recorded at 50 Hz, and the remembered landing point."""
+    """A demonstration: the commanded trajectory of ``theta`` at 50 Hz, and the landing in memory, ``outcome``."""
     return Demonstration(np.zeros(0), *rod.primitive.trajectory(theta), outcome)
 
 
 def on_tiles(outcomes: Array, n: int) -> list[np.ndarray]:
-    """Rows of the ``outcomes`` ``(m, 2)`` m, tile by tile; tiles are so large that about 1.1 n are not empty."""
+    """Rows of ``outcomes`` ``(m, 2)`` m, tile by tile; the side is chosen so that about 1.1 n tiles are not empty."""
     side = min(np.linspace(0.05, 0.4, 141), key=lambda side: abs(len(np.unique(outcomes // side, axis=0)) - 1.1 * n))
     _, tile_of = np.unique(outcomes // side, axis=0, return_inverse=True)
     return [np.flatnonzero(tile_of == tile) for tile in range(tile_of.max() + 1)]
 
 
 def execute_again(rod: FishingRod, thetas: Array, rng: np.random.Generator) -> Array:
-    """``(EXECUTIONS, n, 2)`` m, where each of ``(n, theta_dim)`` lands, each time with different motor noise."""
+    """Landings ``(EXECUTIONS, n, 2)`` m of ``thetas`` ``(n, theta_dim)``, each time with different motor noise."""
     copies = np.tile(thetas, (EXECUTIONS, 1))
     rngs = [stream(int(rng.integers(2**32)), "re-execution", k) for k in range(len(copies))]
     return execute_many(rod, np.zeros((len(copies), 0)), copies, rngs).reshape(EXECUTIONS, len(thetas), 2)
 
 
 def most_reliable(landed: Array) -> tuple[int, Array]:
-    """The column of ``(n_executions, n, 2)`` m that varies least, and the most typical of its landing points."""
+    """Column of ``landed`` ``(n_executions, n, 2)`` m that varies least, and its most typical landing."""
     best = int(landed.var(axis=0).sum(axis=1).argmin())
     typical = np.linalg.norm(landed[:, best] - landed[:, best].mean(axis=0), axis=1).argmin()
     return best, landed[typical, best]
 
 
 def careful(rod: FishingRod, thetas: Array, outcomes: Array, n: int, rng: np.random.Generator) -> list[Demonstration]:
-    """From each of ``n`` evenly spread tiles, the most reliable of some exemplars that landed there.
+    """Demonstrations on ``n`` evenly spread tiles: the most reliable of several exemplars on each tile.
 
     Raises:
         ValueError: too few tiles were reached.
@@ -73,29 +71,22 @@ def careful(rod: FishingRod, thetas: Array, outcomes: Array, n: int, rng: np.ran
 
 
 def main() -> None:
-    """Run the learners, then choose what each demonstrator shows."""
+    """Run the learners, then choose the demonstrations of both demonstrators."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument(
-        "--out",
-        type=Path,
-        default=SHIPPED.parent,
-        help="folder for demonstrator_1.npz and _2.npz (default: the shipped)",
-    )
+    parser.add_argument("--out", type=Path_dw, default=SHIPPED.parent, help="folder of both files (default: shipped)")
     parser.add_argument("--n", type=PositiveInt, default=127, help="demonstrations of each (default: %(default)s)")
     parser.add_argument("--runs", type=PositiveInt, default=4, help="SAGG-RIAC learners (default: %(default)s)")
-    parser.add_argument("--movements", type=PositiveInt, default=5000, help="of each learner (default: %(default)s)")
-    parser.add_argument("--seed", type=NonNegativeInt, default=4000, help="of the first learner (default: %(default)s)")
-    parser.add_argument("--processes", type=PositiveInt, default=2, help="(default: %(default)s)")
+    parser.add_argument("--movements", type=PositiveInt, default=5000, help="length of a run (default: %(default)s)")
+    parser.add_argument("--seed", type=NonNegativeInt, default=4000, help="first seed (default: %(default)s)")
+    parser.add_argument("--processes", type=PositiveInt, default=2, help="runs at a time (default: %(default)s)")
     options = parser.parse_args()
-    if not options.out.is_dir() or not os.access(options.out, os.W_OK):
-        parser.error(f"--out must be a folder that exists and may be written, got {options.out}")
     learners = [("sagg-riac", options.seed + k) for k in range(options.runs)]
     thetas, outcomes = pooled(learners, options.movements, options.processes)
     rod = FishingRod()
     inside = rod.outcomes.contains(outcomes)
     thetas, outcomes = thetas[inside], outcomes[inside]
     if len(thetas) < options.n:
-        parser.error(f"only {len(thetas)} movements landed inside T, too few for --n {options.n}; more --movements?")
+        parser.error(f"only {len(thetas)} movements landed inside T, fewer than --n {options.n}; more --movements?")
     rows = stream(options.seed, "demonstrator 1").choice(len(thetas), options.n, replace=False)
     naive = [demonstrate(rod, thetas[row], outcomes[row]) for row in rows]
     try:
@@ -103,7 +94,7 @@ def main() -> None:
     except ValueError as error:
         parser.error(str(error))
     for number, demonstrations in shown.items():
-        path = options.out / f"demonstrator_{number}.npz"
+        path = Path(options.out) / f"demonstrator_{number}.npz"
         save_demonstrations(path, demonstrations)
         print(f"{len(demonstrations)} demonstrations: {path}")
 

@@ -126,8 +126,7 @@ def evaluate(
     Two inverse models evaluated with equal ``seed`` and ``step`` get equal noise, goal by goal.
 
     Args:
-        inverse: (context, goal) -> estimate; its memory must not be empty. A method ``many``, (context, goals) ->
-            estimates, is used instead if there is one.
+        inverse: inverse model, whose ``answer_many`` is called; its memory must not be empty.
         environment: environment of the movements; a `BatchEnvironment` executes them together.
         goals: ``(n, outcome_dim)`` m.
         seed, step: numbers of the random streams; each evaluation of a run has its own step, such as the number of

@@ -11,7 +11,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Generator, Sequence
 from copy import copy
-from typing import Any, ClassVar, Final, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
@@ -20,7 +20,6 @@ from sgimd_torch.environments.protocol import Environment, check_robot
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, AskingAttempt, Attempt, Demonstration, Estimate, stream
 
-LEAST_TOLERANCE: Final = 0.02  # m
 Made = TypeVar("Made")
 
 
@@ -31,7 +30,7 @@ class Problem:
         environment: robot and world; its boxes, rest and noise are read, it is not executed.
         seed: number from which all random streams of the learner come, at least 0.
         memory: exemplars to start from, which are copied; None for none.
-        inverse: constructor of the inverse model; None for a learner that is given one later.
+        inverse: constructor of the inverse model.
 
     Attributes:
         contexts, policies, outcomes: boxes C, Pi and T.
@@ -44,11 +43,9 @@ class Problem:
         autonomous: strategy of the learner's own, made before the answer to demonstrations.
 
     Raises:
-        ValueError: ``rest`` outside T, a noise that is negative or not finite, or exemplars that this robot cannot
-            have: other dimensions, thetas outside Pi.
+        ValueError: a robot that `check_robot` refuses; exemplars of other dimensions, or with thetas outside Pi.
     """
 
-    inverse: Inverse
     autonomous: Strategy
 
     def __init__(
@@ -57,19 +54,17 @@ class Problem:
         seed: int,
         memory: Memory | None = None,
         *,
-        inverse: Callable[[Problem], Inverse] | None = None,
+        inverse: Callable[[Problem], Inverse],
     ) -> None:
         check_robot(environment)
         self.contexts, self.policies, self.outcomes = environment.contexts, environment.policies, environment.outcomes
         self.rest, self.outcome_noise, self.seed = environment.rest, environment.outcome_noise, seed
-        self.tolerance = max(environment.outcome_noise, LEAST_TOLERANCE)
-        self._streams: dict[str, np.random.Generator] = {}
-        self._shared: dict[type, Any] = {}
+        self.tolerance = max(environment.outcome_noise, 0.02)
+        self._shared: dict[object, Any] = {}
         self.memory = Memory(*self.dims) if memory is None else memory.copy_for(self.dims)
         self.policies.check("thetas of a memory to start from", self.memory.thetas, "of another robot?")
         self.remarks: list[str] = []
-        if inverse is not None:
-            self.inverse = Inverse.of(inverse, self)
+        self.inverse = Inverse.of(inverse, self)
 
     @property
     def dims(self) -> tuple[int, int, int]:
@@ -78,16 +73,13 @@ class Problem:
 
     def stream(self, name: str) -> np.random.Generator:
         """The random stream of a name; the same name gives the same stream."""
-        if name not in self._streams:
-            self._streams[name] = stream(self.seed, name)
-        return self._streams[name]
+        return self.shared(name, lambda: stream(self.seed, name))
 
-    def shared(self, kind: type[Made], make: Callable[[], Made] | None = None) -> Made:
-        """The one object of this ``kind``, for all parts that ask; made at the first call."""
-        if kind not in self._shared:
-            self._shared[kind] = kind() if make is None else make()
-        found: Made = self._shared[kind]
-        return found
+    def shared(self, key: object, make: Callable[[], Made]) -> Made:
+        """The one object of this ``key``, for all parts that ask; made at the first call."""
+        if key not in self._shared:
+            self._shared[key] = make()
+        return self._shared[key]
 
     def over(self, memory: Memory) -> Problem:
         """This problem with another memory, for a part that looks at some exemplars only."""
@@ -102,20 +94,17 @@ class Problem:
 
 
 class Part(Built):
-    """A part of a learner."""
+    """A part of a learner. One that draws has ``rng`` for it, the random stream ``draws_from`` of the problem."""
+
+    draws_from: str = ""
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
 
-
-class RandomPart(Part):
-    """A part that draws, from ``rng`` alone: the stream ``draws_from`` of the problem."""
-
-    draws_from: ClassVar[str]
-
-    def __init__(self, problem: Problem) -> None:
-        super().__init__(problem)
-        self.rng = problem.stream(self.draws_from)
+    @property
+    def rng(self) -> np.random.Generator:
+        """Random stream of this part."""
+        return self.problem.stream(self.draws_from)
 
 
 class Trained(ABC):
@@ -130,7 +119,7 @@ class Trained(ABC):
         """A `runs.listeners.Listener` that does so in this `runs.run.Life`."""
 
 
-class Goals(RandomPart):
+class Goals(Part):
     """Goal model: which goal next, given what came of earlier ones (section 3.2). `goals.checks` has its checks."""
 
     draws_from = "goals"
@@ -186,7 +175,7 @@ class Inverse(Part):
         return None
 
 
-class Search(RandomPart):
+class Search(Part):
     """Search: movement by movement from an estimate towards a goal (section 4.4.2)."""
 
     draws_from = "search"
@@ -196,7 +185,7 @@ class Search(RandomPart):
         """Yield thetas ``(theta_dim,)`` in Pi to execute; each is sent its outcome ``(outcome_dim,)``."""
 
 
-class Explore(RandomPart):
+class Explore(Part):
     """Global exploration: movements where the inverse model knows nothing (section 4.4.1)."""
 
     draws_from = "look"

@@ -18,16 +18,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sgimd_torch.environments.protocol import FAILURES, Environment, SimulationError, check_instance
-from sgimd_torch.learner import Learner, ReplayError
-from sgimd_torch.learner.replay import BeforeMovement, replay
+from sgimd_torch.learner import Learner
+from sgimd_torch.learner.events import BeforeMovement
 from sgimd_torch.parts import Teacher
 from sgimd_torch.spaces import Array, Demonstration, Episode, Request, check_count, check_point, read_only, stream
-from sgimd_torch.teachers import Demonstrator
 
 if TYPE_CHECKING:
+    from sgimd_torch.learner.requests import Demonstrator
     from sgimd_torch.record import Record
-
-__all__ = ["Execute", "NoOutcomeError", "ReplayError", "live", "run"]
 
 Execute = Callable[[int, Array, Array], Array]
 """(index, context, theta) -> outcome of movement ``index``."""
@@ -80,9 +78,9 @@ def run(
         NoOutcomeError: ``failures`` movements in a row have failed. They are made; a `run` may go on after them.
     """
     check_count("failures", failures, 1)
-    check_instance(environment)
     if not isinstance(learner, Learner):
         raise ValueError(f"learner must be a Learner, got a {type(learner).__name__}; sagg_riac(environment, seed)?")
+    check_instance(environment)
     if teacher is not None and not isinstance(teacher, Teacher):
         raise ValueError(f"teacher must be a Teacher, got a {type(teacher).__name__}; PeriodicTeacher(shown, rng)?")
     made = learner.movements
@@ -94,6 +92,8 @@ def run(
     before = BeforeMovement()
     with ExitStack() as until_the_end:
         if record is not None:
+            from sgimd_torch.record.replay import replay  # most programs keep no record
+
             before = yield from replay(learner, record.events(), teacher=teacher)
             learner.listeners.append(record.add)
             until_the_end.callback(learner.listeners.remove, record.add)

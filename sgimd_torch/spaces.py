@@ -1,7 +1,7 @@
 """Spaces, episodes and random streams: the vocabulary of all other modules.
 
 Section 2.1 of Nguyen & Oudeyer (2014): contexts c in C, policies theta in Pi, outcomes tau in T, and a
-learning episode [context][policy][outcome]. This module needs numpy only, no learning and no physics.
+learning episode (context, policy, outcome). This module needs numpy only, no learning and no physics.
 """
 
 from __future__ import annotations
@@ -301,7 +301,7 @@ class Lesson(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Episode:
-    """A learning episode [context][policy][outcome] and its causes; arrays are read-only copies.
+    """A learning episode (context, policy, outcome) and its causes; arrays are read-only copies.
 
     Args:
         index: number of the movement, from 0.

@@ -9,24 +9,24 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
 from sgimd_torch.competence import Competence
 from sgimd_torch.explore.anywhere import Anywhere
-from sgimd_torch.goals.interest_map import InterestMap
-from sgimd_torch.goals.regions import Region
 from sgimd_torch.parts import Explore, Goals, Judge, Problem, Search, Social, Strategy
-from sgimd_torch.searches.simplex import NelderMead
 from sgimd_torch.spaces import Array, Attempt, Demonstration, Move, check_count
 
 
 class Babble(Strategy):
     """Random exploration of the policy space: one uniform theta."""
 
+    draws_from = "babble"
+
     def attempt(self, context: Array) -> Attempt:
         """One movement."""
-        yield Move(self.problem.policies.sample(self.problem.stream("babble")), None, "babble")
+        yield Move(self.problem.policies.sample(self.rng), None, "babble")
 
 
 class Rest(Strategy):
@@ -62,12 +62,14 @@ class GoalBabbling(Strategy):
         ValueError: a number out of its range, or a part of another kind.
     """
 
+    draws_from = "regime"
+
     def __init__(
         self,
         problem: Problem,
         *,
-        goals: Callable[[Problem], Goals] = InterestMap,
-        search: Callable[[Problem], Search] = NelderMead,
+        goals: Callable[[Problem], Goals],
+        search: Callable[[Problem], Search],
         explore: Callable[[Problem], Explore] = Anywhere,
         judge: Callable[[Problem], Judge] = Competence,
         budget: int = 15,
@@ -83,7 +85,7 @@ class GoalBabbling(Strategy):
             raise ValueError(f"global_range must be two probabilities, the least first, got {global_range}")
         if not give_up <= 0:
             raise ValueError(f"give_up must be a competence, 0 at most, got {give_up}")
-        self.memory, self.inverse, self.rng = problem.memory, problem.inverse, problem.stream("regime")
+        self.memory, self.inverse = problem.memory, problem.inverse
         self.competence = Competence(problem)
         self.explore = Explore.of(explore, problem)
         self.goals = Goals.of(goals, problem)
@@ -93,7 +95,7 @@ class GoalBabbling(Strategy):
         self.tolerance, self.global_range, self.give_up = tolerance, global_range, give_up
 
     @property
-    def regions(self) -> Sequence[Region]:
+    def regions(self) -> Sequence[Any]:
         """Regions of its goal model."""
         return self.goals.regions
 
@@ -190,7 +192,7 @@ class Mimic(Social):
         if not 0 <= epsilon < np.inf:
             raise ValueError(f"epsilon must be a bound of variations, finite and >= 0, got {epsilon}")
         self.repeats = repeats if repeats is None else check_count("repeats", repeats, 1)
-        self.epsilon, self.rng = epsilon, problem.stream(draws_from)
+        self.epsilon, self.draws_from = epsilon, draws_from
 
     def attempt(self, context: Array, theta_d: Array, demonstration: Demonstration) -> Attempt:
         """theta_d, then its variations."""

@@ -9,14 +9,12 @@ import pytest
 from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
 from sgimd_torch.evaluation import Benchmark, load_benchmark, save_benchmark
 from sgimd_torch.files import read_npz, write_npz
-from sgimd_torch.forward_model.model import ForwardModel, load_forward_model
 from sgimd_torch.spaces import Demonstration
 
 LESSON = Demonstration(np.zeros(0), np.arange(3.0), np.ones((3, 2)), np.zeros(2))
 LOADERS = {
     "benchmark": (lambda path: save_benchmark(path, Benchmark("PlanarArm", np.ones((3, 2)), 0.1)), load_benchmark),
     "demonstrations": (lambda path: save_demonstrations(path, [LESSON, LESSON]), load_demonstrations),
-    "forward model": (ForwardModel(0, 3, 2, members=1, hidden=(3,)).save, load_forward_model),
 }
 
 
@@ -79,7 +77,7 @@ def test_a_file_cut_short_anywhere_is_refused_by_name(tmp_path, name):
     path = tmp_path / "saved"
     save(path)
     whole = path.read_bytes()
-    for length in [*range(0, len(whole), 23), len(whole) - 1]:
+    for length in [*range(0, len(whole), 1 + len(whole) // 60), len(whole) - 1]:
         path.write_bytes(whole[:length])
         with pytest.raises(ValueError, match="saved is no"):
             load(path)

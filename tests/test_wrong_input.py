@@ -8,7 +8,7 @@ import pytest
 
 import sgimd_torch as s
 from sgimd_torch.__main__ import _call
-from sgimd_torch.algorithms import sgim_d
+from sgimd_torch.algorithms.paper import sgim_d
 from sgimd_torch.environments.protocol import execute_many
 from sgimd_torch.evaluation import evaluate
 from sgimd_torch.runs.process import command
@@ -62,12 +62,12 @@ COMMANDS = {
     "run --environment toss:Tos": "toss has no Tos; did you mean Toss?",
     "run --environment tos:make": "environment tos:make: the module tos cannot be imported: ModuleNotFoundError: No ",
     "run --environment broken:make": "No module named 'nothing_of_that_name'; is it installed, or in ",
-    "run --environment toss:number": "must be called as .* but it is a int",
-    "run --environment toss:Half": "gave a Half without contexts, rest, .* execute; wanted .* which has contexts",
-    "run --goals toss:Toss": r"goals toss:Toss cannot be called as \(contexts, .* a goal model: too many",
-    "run --algorithm toss:shown": "algorithm toss:shown cannot be called as .*environment, seed",
+    "run --environment toss:number": "toss:number must be something to call, but it is a int",
+    "run --environment toss:Half": "Half has no contexts, rest, .* execute; an environment has contexts, policies, ",
+    "run --goals toss:Toss": "Toss must derive from Goals of sgimd_torch.parts",
+    "run --algorithm toss:shown": "algorithm toss:shown cannot be called as others of its kind are: too many",
     "run --search nelder": r"unknown search 'nelder'; did you mean nelder-mead\? Known are nelder-mead, .*package",
-    "run --environment toss:Toss --algorithm sgim-d": "Toss comes without demonstrations, .* --algorithm practice",
+    "run --environment toss:Toss --algorithm sgim-d": "Toss has no demonstrations, .* --algorithm practice",
     "run --algorithm random --environment toss:Toss --environment.noise 1": "environment toss:Toss has no such option",
     "run --demonstrations nothing.npz": "nothing.npz cannot be read or written: No such file",
     "run --demonstrations shown.csv": "shown.csv is no demonstration file: .* sgimd demonstrations import",
@@ -86,7 +86,8 @@ COMMANDS = {
     "suite --environment toss": "--environment cannot be given here: each task has its own",
     "run --algorithm random --budget 5": "--budget: algorithm random has .* sagg-riac, practice, .* have it",
     "run --algorithm random --teacher.every 5": "--teacher.every: algorithm random .* sgim-d.* have it",
-    "run --model.members 5": "--model.members: .*search gradient, gauss-newton and inverse model, model-alone",
+    "run --model.members 5": r"--model.members: .* inverse model, .*\(--inverse.members\) have it",
+    "run --inverse.members 5": "--inverse.members: inverse among-effects .* inverse model, model-alone have it",
     "run --search nelder-mead-exact --search.noise 0.1": "search nelder-mead-exact has no such option; .*nelder-mead",
     "run --algorithm map-elites --epsilon 0.1": "--epsilon: algorithm map-elites .* map-elites-taught",
     "run --teachers al --algorithm sgim-im": "unknown teachers 'al'; did you mean all",
@@ -121,13 +122,13 @@ COMMANDS = {
     "sweep --vary out=a,b": "--out",
     "sweep --seed 3": "--seed .*--seeds",
     "sweep --name=mine": "--name",
-    "sweep --vary goals=grid --vary goals=uniform": "--goals is there twice",
-    "sweep --vary budget=1,2 --budget 3": "--budget is there twice",
+    "sweep --vary goals=grid --vary goals=uniform": "--goals is given twice",
+    "sweep --vary budget=1,2 --budget 3": "--budget is given twice",
     "sweep --gaols uniform": "--gaols",
     "sweep stray": "'stray'",
     "suite --environment.task_space=2": "--environment cannot be given here",
     "suite --vary environment=toss,crawler": "--environment cannot be given here",
-    "suite --tasks toss --vary seed=1,2": "--seed cannot be given here: --seeds takes them",
+    "suite --tasks toss --vary seed=1,2": "--seed cannot be given here: use --seeds",
     "demo --seed -1": "seed must be",
     "demo --movements 0": "movements must be",
     "demo --evaluate_at []": "--evaluate-at",
@@ -152,7 +153,7 @@ MANY_RUNS = {  # what these say is longer: their usage, or the list of runs, com
     "sweep --demonstrations nowhere.npz": "nowhere.npz",
     "sweep --out shown.csv": "shown.csv cannot be made",
     "suite --tasks tos": "invalid choice: 'tos'",
-    "suite --tasks crawler --algorithm imitation": "comes without demonstrations",
+    "suite --tasks crawler --algorithm imitation": "has no demonstrations",
 }
 
 
@@ -194,13 +195,7 @@ class Silent(s.PlanarArm):
 
 
 CALLS = {
-    "a word for a part": (lambda: learner(goals="uniform"), "from sgimd_torch.goals.uniform import UniformGoals"),
-    "a wrong word": (lambda: learner(search="nelder-meat"), "unknown search 'nelder-meat'; did you mean nelder-mead?"),
-    "a part made already": (
-        lambda: learner(goals=s.UniformGoals(ARM.contexts, ARM.outcomes, stream(0, "goals"))),
-        r"goals must be a constructor, \(contexts, outcomes, rng\) -> a goal model, got a UniformGoals",
-    ),
-    "no inverse": (lambda: learner(inverse=None), "inverse must be a constructor, .* got a NoneType"),
+    "no inverse": (lambda: learner(inverse=None), "Inverse must be given as its constructor, got a NoneType"),
     "a budget of nothing": (lambda: learner(budget=0), "budget must be a whole number >= 1, got 0"),
     "a generator for a seed": (lambda: s.sagg_riac(ARM, stream(0, "a")), "seed must be a whole number >= 0"),
     "a class for an environment": (lambda: s.sagg_riac(s.PlanarArm, 0), r"got the class PlanarArm .* PlanarArm\(\)"),
@@ -213,7 +208,7 @@ CALLS = {
     "a builder": (lambda: next(s.run(s.sagg_riac, ARM, 0, movements=3)), "learner must be a Learner, got a function"),
     "a list for a teacher": (
         lambda: next(s.run(learner(), ARM, 0, movements=3, teacher=[SHOWN])),
-        r"teacher must have offer\(\), got a list; PeriodicTeacher",
+        "teacher must be a Teacher, got a list; PeriodicTeacher",
     ),
     "failures that are none": (
         lambda: next(s.run(learner(), ARM, 0, movements=3, failures=1.5)),

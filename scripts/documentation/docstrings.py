@@ -1,60 +1,33 @@
-"""Docstrings of the library as Markdown: what mkdocstrings reads before it makes the API pages.
-
-A griffe extension, named in `zensical.toml`. The docstrings stay as they are in an editor; here `Tiling` and
-:class:`Tiling` become links if the library has one thing of that name, and lines that are indented are shown as code.
-"""
-
-from __future__ import annotations
+"""A griffe extension, named in `zensical.toml`: in the API pages a name in backticks becomes a link to its meaning in
+that module, and the lines of a module's docstring that show its use become code."""
 
 import re
 from typing import Any
 
 import griffe
 
-ROLE = re.compile(r":(?:class|func|meth|mod|attr):(`[^`]+`)")
-NAME = re.compile(r"(?<!`)`([A-Za-z_][\w.]*)`(?!`)")
-LISTED = re.compile(r"\](?=\[)")  # [context][policy] is a list of words, which Markdown takes for a link
-
 
 class Docstrings(griffe.Extension):  # type: ignore[misc]
-    """Changes every docstring of a package once it is loaded."""
+    """Changes each docstring once a package is loaded."""
 
-    def on_package(self, *, pkg: griffe.Module, **more: Any) -> None:
+    def on_object(self, *, obj: griffe.Object, **more: Any) -> None:
         """Called by griffe."""
-        self.places: dict[str, list[str]] = {}
-        for each in self._objects(pkg):
-            each.members = {name: member for name, member in each.members.items() if not self._is_inner(member)}
-        objects = list(self._objects(pkg))
-        for each in objects:
-            self.places.setdefault(each.name, []).append(each.path)
-            self.places.setdefault(each.path, []).append(each.path)
-        for each in objects:
-            if each.docstring is not None:
-                each.docstring.value = self._markdown(each.docstring.value, of_module=each.is_module)
+        for name, member in [*obj.members.items()]:
+            inner = isinstance(member, griffe.Attribute) and member.labels == {"instance-attribute"} and member.value
+            if inner and not member.docstring:  # a constructor keeps it for the methods
+                del obj.members[name]
+        if obj.docstring:
+            text = re.sub(r"(?:\B:\w+:)?(?<!`)`(\w+)`(?!`)", lambda found: link(obj, found[1]), obj.docstring.value)
+            if obj.is_module:  # its use is indented, or stands behind a sentence and some spaces
+                text = re.sub(r"^(\S.*?\S) {3,4}(?=\S)", r"\1\n    ", text, flags=re.MULTILINE)
+                text = re.sub(r"^(\S.*)\n(?=    )", r"\1\n\n", text, flags=re.MULTILINE)
+            obj.docstring.value = text
 
-    def _is_inner(self, member: Any) -> bool:
-        """Whether it is only what a constructor keeps: not declared as a field, and without a docstring."""
-        return (
-            isinstance(member, griffe.Attribute)
-            and member.labels == {"instance-attribute"}
-            and member.value is not None
-            and member.docstring is None
-        )
 
-    def _objects(self, owner: griffe.Object) -> Any:
-        yield owner
-        for member in owner.members.values():
-            if isinstance(member, griffe.Object) and not member.name.startswith("_"):
-                yield from self._objects(member)
-
-    def _markdown(self, text: str, of_module: bool) -> str:
-        text = NAME.sub(self._link, ROLE.sub(r"\1", LISTED.sub(r"]\\", text)))
-        if not of_module:
-            return text
-        # A module shows its use at the end of a line, after some spaces, or in lines that are indented.
-        text = re.sub(r"^(\S.*?\S) {3,4}(?=\S)", r"\1\n    ", text, flags=re.MULTILINE)
-        return re.sub(r"^(\S.*)\n(?=    )", r"\1\n\n", text, flags=re.MULTILINE)
-
-    def _link(self, found: re.Match[str]) -> str:
-        places = self.places.get(found[1], [])
-        return f"[`{found[1]}`][{places[0]}]" if len(places) == 1 else found[0]
+def link(obj: griffe.Object, name: str) -> str:
+    """A link to the public thing of the library that has this name in an object's scope."""
+    try:
+        place = obj.resolve(name)
+    except griffe.NameResolutionError:
+        place = ""
+    return f"[`{name}`][{place}]" if re.fullmatch(r"sgimd_torch(\.[a-zA-Z]\w*)+", place) else f"`{name}`"

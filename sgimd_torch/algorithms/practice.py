@@ -7,18 +7,21 @@ nothing, it first looks for some that have an effect, and learns from those alon
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import Any, Final
 
-from sgimd_torch.algorithms import sagg_riac, sgim_d
+from sgimd_torch.algorithms import MakeInverse
 from sgimd_torch.catalogue.options import hands_on
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.explore.returning import Returning
 from sgimd_torch.goals.within_reach import WithinReach
 from sgimd_torch.inverses.among_effects import AmongEffects
 from sgimd_torch.learner import Correspondence, Learner
+from sgimd_torch.memory import Memory
+from sgimd_torch.parts import Problem, Social
 from sgimd_torch.searches.perturb import Vary
-from sgimd_torch.strategies import Imitate
+from sgimd_torch.strategies import GoalBabbling, Imitate
 
 PRACTICE: Final[dict[str, Any]] = {
     "goals": WithinReach,
@@ -28,17 +31,38 @@ PRACTICE: Final[dict[str, Any]] = {
     "global_range": (0.02, 0.3),
 }
 """Parts and options of `GoalBabbling` that make it practice."""
+ONCE: Final = partial(Imitate, repeats=1)
 
 
-@hands_on(sagg_riac, **PRACTICE, inverse=AmongEffects)
-def practice(environment: Environment, seed: int, **parts: Any) -> Learner:
+@hands_on(GoalBabbling, **PRACTICE)
+def practice(
+    environment: Environment,
+    seed: int,
+    *,
+    inverse: MakeInverse = AmongEffects,
+    memory: Memory | None = None,
+    **parts: Any,
+) -> Learner:
     """One movement at each goal within reach, by a local process; no teacher."""
-    return sagg_riac(environment, seed, **parts)
+    problem = Problem(environment, seed, memory, inverse=inverse)
+    return Learner(problem, GoalBabbling(problem, **parts))
 
 
-@hands_on(sgim_d, **PRACTICE, inverse=AmongEffects, social=partial(Imitate, repeats=1))
-def practice_taught(environment: Environment, seed: int, *, correspondence: Correspondence, **parts: Any) -> Learner:
+@hands_on(GoalBabbling, **PRACTICE)
+def practice_taught(
+    environment: Environment,
+    seed: int,
+    *,
+    correspondence: Correspondence,
+    social: Callable[[Problem], Social] = ONCE,
+    inverse: MakeInverse = AmongEffects,
+    memory: Memory | None = None,
+    **parts: Any,
+) -> Learner:
     """Practice that executes each demonstration once, exactly.
 
-    Best when all demonstrations come at the start."""
-    return sgim_d(environment, seed, correspondence=correspondence, **parts)
+    Best when all demonstrations come at the start.
+    """
+    problem = Problem(environment, seed, memory, inverse=inverse)
+    problem.autonomous = GoalBabbling(problem, **parts)
+    return Learner(problem, problem.autonomous, social=Social.of(social, problem), correspondence=correspondence)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, ABCMeta
 from typing import Any, Self
 
-from sgimd_torch.catalogue import function_of, place_of
+from sgimd_torch.catalogue import called, function_of, place_of
 
 
 class Built(ABC):  # noqa: B024
@@ -16,19 +16,23 @@ class Built(ABC):  # noqa: B024
         """The thing of this class that a constructor builds from what it is ``given``.
 
         Raises:
-            ValueError: no constructor, an abstract method is missing, or what was built is of another class.
+            ValueError: no constructor, one that takes something else, an abstract method is missing, or what was built
+                is of another class.
         """
         kind = cls.__name__
         if isinstance(make, str):
             module, _, name = place_of(kind.lower(), make).partition(":")
-            raise ValueError(f"a {kind} is given as its constructor, got {make!r}; from {module} import {name}")
+            raise ValueError(f"{kind} must be given as its constructor, got {make!r}; from {module} import {name}")
         if isinstance(make, cls) or not callable(make):
-            raise ValueError(f"a {kind} is given as its constructor, got a {type(make).__name__} that is made already")
+            made_already = " that is made already" if isinstance(make, cls) else ""
+            raise ValueError(f"{kind} must be given as its constructor, got a {type(make).__name__}{made_already}")
         found = function_of(make)
+        if isinstance(found, type) and not issubclass(found, cls):
+            raise ValueError(f"{found.__name__} must derive from {kind} of sgimd_torch.parts")
         if isinstance(found, ABCMeta) and found.__abstractmethods__:
             missing = ", ".join(sorted(found.__abstractmethods__))
             raise ValueError(f"{found.__name__} has no {missing}, which {kind} demands; see sgimd_torch.parts")
-        made: Any = make(*given)
+        made: Any = called(f"{kind} {found.__name__}", make, *given)
         if not isinstance(made, cls):
-            raise ValueError(f"{found.__name__} must derive from {kind} of sgimd_torch.parts, or give one")
+            raise ValueError(f"{found.__name__} must give a thing of class {kind}, gave a {type(made).__name__}")
         return made

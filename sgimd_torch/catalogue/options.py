@@ -65,7 +65,7 @@ def hands_on(target: Callable[..., Any], *names: str, **changed: Any) -> Callabl
     def decorate(function: F) -> F:
         own = [each for each in inspect.signature(function).parameters.values() if each.kind is not each.VAR_KEYWORD]
         mine = {each.name for each in own}
-        theirs = [each for each in parameters_of(target).values() if each.default is not _EMPTY]
+        theirs = [each for each in parameters_of(target).values() if each.default is not _EMPTY or each.name in changed]
         wanted = [each for each in theirs if each.name not in mine and (not names or each.name in names)]
         handed = [each.replace(kind=each.KEYWORD_ONLY) for each in wanted]
         every = [each.replace(default=changed.get(each.name, each.default)) for each in (*own, *handed)]

@@ -16,7 +16,7 @@ def misfit_of(environment: Environment, theta: Array, shown: Demonstration) -> f
 
     Args:
         environment: robot that plays theta; the misfit is NaN if it has no primitive.
-        theta: ``(theta_dim,)`` that the recording was translated to.
+        theta: ``(theta_dim,)`` policy of the recording, by the correspondence.
         shown: the recording.
     """
     played = primitive_of(environment).at(theta, shown.times - shown.times[0])

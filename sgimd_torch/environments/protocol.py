@@ -16,6 +16,8 @@ from numpy.typing import ArrayLike
 
 from sgimd_torch.spaces import Array, Box, check_point, check_vector, first_entry, read_only
 
+MEMBERS: Final = ("contexts", "policies", "outcomes", "rest", "outcome_noise", "observe", "execute")
+
 
 class Environment(Protocol):
     """A robot and its world. No state carries over from one movement to the next."""
@@ -283,22 +285,24 @@ def check_instance(environment: object) -> None:
     """Refuse a class, or another object, in place of an environment.
 
     Raises:
-        ValueError: ``environment`` is a class, or lacks ``policies``.
+        ValueError: ``environment`` is a class, or lacks a member.
     """
     if isinstance(environment, type):
         name = environment.__name__
         raise ValueError(f"an environment is wanted, got the class {name} itself; write {name}()")
-    if not hasattr(environment, "policies"):
-        raise ValueError(
-            f"an environment is wanted, got a {type(environment).__name__}; is the order of arguments right?"
-        )
+    name, missing = type(environment).__name__, [each for each in MEMBERS if not hasattr(environment, each)]
+    if len(missing) == len(MEMBERS):
+        raise ValueError(f"an environment is wanted, got a {name}; is the order of arguments right?")
+    if missing:
+        raise ValueError(f"{name} has no {', '.join(missing)}; an environment has {', '.join(MEMBERS)}")
 
 
 def check_robot(environment: Environment) -> None:
-    """Refuse an environment whose rest or noise makes no sense, before a learner is built for it.
+    """Refuse an environment that lacks a member or whose rest or noise makes no sense, before a learner is built.
 
     Raises:
-        ValueError: a class, a rest that is not one point of T, or a noise that is negative or not finite.
+        ValueError: a class, a missing member, a rest that is not one point of T, or a noise that is negative or not
+            finite.
     """
     check_instance(environment)
     if environment.outcomes.check("rest of the environment", environment.rest, "is it a theta?").ndim != 1:

@@ -35,7 +35,7 @@ class Returning(Explore):
 
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem)
-        self.width, self._widening = problem.shared(Width), Widening(problem)
+        self.width, self._widening = problem.shared(Width, Width), Widening(problem)
         self._varied: Array | None = None  # the last variation
         inverse = type(problem.inverse)
         if inverse.effects is Inverse.effects:

@@ -42,7 +42,7 @@ class Widening(Explore):
 
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem)
-        self.width = problem.shared(Width)
+        self.width = problem.shared(Width, Width)
         self._expected: tuple[int, Array] | None = None  # of the last movement: its row in memory, its outcome
         inverse = type(problem.inverse)
         if inverse.predict is Inverse.predict:

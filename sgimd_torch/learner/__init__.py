@@ -16,11 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sgimd_torch.learner.events import Event, Kind
-from sgimd_torch.learner.replay import ReplayError
 from sgimd_torch.parts import Inverse, Problem, Social, Strategy
 from sgimd_torch.spaces import Array, AskingAttempt, Demonstration, Lesson, Move, Request, check_point, read_only
-
-__all__ = ["Correspondence", "Learner", "ReplayError"]
 
 Correspondence = Callable[[Array, Array], Array]
 """Function from times ``(n_times,)`` and trajectory ``(n_times, n_joints)`` to theta_d ``(theta_dim,)``, eq. (6)."""
@@ -202,7 +199,8 @@ class Learner:
 
         Args:
             demonstration: demonstration that is shown.
-            who: name of the teacher of a `run` who offers it, see ``lesson_waits``; None outside of a run.
+            who: name of the teacher who offers it, if one is asked before each movement, as in a `run`; see
+                ``lesson_waits``. None for a lesson besides.
 
         Raises:
             RuntimeError: this learner has no social strategy, or the last movement's outcome was not told.

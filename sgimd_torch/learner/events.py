@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import StrEnum
 from typing import Final, NamedTuple
 
-from sgimd_torch.spaces import Array, Demonstration
+from sgimd_torch.spaces import Array, Demonstration, Request
 
 TEACHER: Final = "teacher"
 """``who`` of a demonstration that the teacher of a run offered."""
@@ -35,3 +35,11 @@ class Event(NamedTuple):
     who: str | None = None
     strategy: str | None = None
     reply: str | None = None
+
+
+class BeforeMovement(NamedTuple):
+    """Events since the last movement: a demonstration, a request and the reply to it, as in an `Episode`."""
+
+    demonstration: Demonstration | None = None
+    request: Request | None = None
+    reply: str = ""

@@ -1,18 +1,19 @@
-"""The record of a life: one SQLite file that says what happened, row by row, and notices whatever was changed in it.
+"""The record of a life: one SQLite file of all events, which detects every change made to it afterwards.
 
     with Record.make(path, dims, settings) as record: record.add(event); record.commit()  # the only writer
-    with Record(path) as record: list(record.events()); record.rows("evaluations")  # readers, also beside it
+    with Record(path) as record: list(record.events()); record.rows("evaluations")  # any number of readers
 
 Tables (``docs/runs.md`` explains each column):
-    about            what made the run, and its seconds so far, as json
-    events           moved, rested, shown, asked, failed, interrupted, in the order in which they came
-    demonstrations   what was shown, each movement once
-    goals, evaluations, errors, regions     of each evaluation
-    predictions, refreshes                  of a forward model
-    seals            of each table: how many rows it has, and the seal of its last row
+    about            settings, versions and seconds of the run, as json
+    events           moved, rested, shown, asked, failed, interrupted, in order
+    demonstrations   each demonstration that was shown, once
+    goals            goals of evaluation
+    evaluations, errors, regions     rows of each evaluation
+    predictions, refreshes           rows of a forward model
+    seals            the number of rows of each table, and the seal of its last row
 
-Every row ends in a seal, a checksum of the row, of all rows before it, of its table and of the run. So a row that was
-changed, lost, doubled, moved or taken from another run is noticed by whoever reads it.
+Every row ends in a seal: a checksum of the row, of all rows before it, of its table and of the run. Reading a row that
+was changed, lost, doubled, moved or taken from another run therefore raises an error.
 """
 
 from __future__ import annotations
@@ -23,7 +24,6 @@ import sqlite3
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from itertools import takewhile
 from pathlib import Path
 from typing import Any, Final, Self
 
@@ -43,7 +43,6 @@ from sgimd_torch.record.layout import (
     event_reader,
     event_row,
     layout,
-    lesson_of,
     movements_after,
     plain,
     read_demonstration,
@@ -55,31 +54,32 @@ from sgimd_torch.spaces import Demonstration
 
 __all__ = ["DERIVED", "Dims", "InUseError", "Record", "RunError", "layout"]
 
-_PATIENCE: Final = 60.0  # s, that a commit waits for readers
-_AT_ONCE: Final = 4096  # rows that are read together
+_PATIENCE: Final = 60.0  # s, the longest that a commit waits for readers
+_AT_ONCE: Final = 4096  # rows read by one query
 
 
 class Record:
-    """A record that is there already, for reading, or for writing too; a context manager.
+    """An existing record, open for reading, or also for writing; a context manager.
 
     Args:
-        path: of the file.
-        write: also write. Until it is closed nobody else can; others may read.
+        path: the file.
+        write: whether to write, too. Until it is closed no other process can write; others may read.
 
     Attributes:
-        about: what made the run, see ``settle``.
-        dims: of context, theta and outcome.
-        failed: whether something could not be written; then nothing more is.
+        about: settings, versions and so on, by name; see ``settle``.
+        dims: dimensions of context, theta and outcome.
+        failed: whether a write has failed; nothing is written after that.
 
     Raises:
-        RunError: there is no record at ``path``, it is damaged where all reading begins, or another process writes it.
+        RunError: there is no record at ``path``, its header is damaged, or another process writes it.
     """
 
     def __init__(self, path: str | os.PathLike[str], *, write: bool = False) -> None:
         self.path = Path(path)
         self._waiting: dict[str, list[Row]] = {}
-        self._seals: dict[str, tuple[int, int]] = {}  # of each table: how many rows, the seal of the last
+        self._seals: dict[str, tuple[int, int]] = {}  # by table: number of rows, seal of the last
         self._written: dict[str, tuple[int, int]] = {}
+        self._version: Any = None  # of the file at the last lock, which a writer changes
         self._movements = 0
         self._shown: dict[bytes, int] = {}
         self.failed = False
@@ -94,7 +94,7 @@ class Record:
 
     @classmethod
     def make(cls, path: str | os.PathLike[str], dims: Dims, about: Mapping[str, Any]) -> Self:
-        """A new record, open for writing; ``about`` is anything that json can hold.
+        """A new record, open for writing; ``about`` holds values that json can express.
 
         Raises:
             OSError: it cannot be written.
@@ -126,24 +126,25 @@ class Record:
         self.close()
 
     def close(self) -> None:
-        """What was not committed is lost."""
+        """Close the file; uncommitted rows are lost."""
         self._connection.close()
 
     @property
     def movements(self) -> int:
-        """How many movements it holds, rests included, committed or not."""
+        """Number of movements in it, rests included, committed or not."""
         return self._movements
 
     def rows(self, table: str) -> Iterator[Row]:
         """The rows of a table, in order, without their seals.
 
         Raises:
-            RunError: one of them is not what was written, or there are more or fewer; those before it were yielded.
+            RunError: a row differs from what was written, or rows are missing or added; the rows before it were
+                yielded.
         """
         if self._waiting:
             self._write()
         n, seal, last = 0, self._root(table), -(2**63)
-        # No cursor stays open from one yield to the next: it would keep a lock on the file, also after an error.
+        # No cursor stays open between yields: it would keep a lock on the file, even after an error.
         next_rows = f"SELECT rowid, * FROM {table} WHERE rowid > ? ORDER BY rowid LIMIT {_AT_ONCE}"
         with self._told():
             while rows := self._connection.execute(next_rows, (last,)).fetchall():
@@ -158,7 +159,7 @@ class Record:
             raise RunError(f"{self.path}: {table} has {n} rows, {self._written[table][0]} were written; {HINT}")
 
     def events(self) -> Iterator[Event]:
-        """What happened, in order.
+        """All events, in order.
 
         Raises:
             RunError: see ``rows``.
@@ -166,21 +167,21 @@ class Record:
         yield from map(event_reader(self.dims, self.demonstrations()), self.rows("events"))
 
     def demonstrations(self) -> list[Demonstration]:
-        """What was shown, each once, in the order in which it was shown first."""
+        """Each demonstration that was shown, once, in the order of first showing."""
         return [read_demonstration(row, self.dims) for row in self.rows("demonstrations")]
 
     def add(self, event: Event) -> None:
-        """Write down what happened; ``commit`` brings it to the disk."""
+        """Append an event; ``commit`` brings it to the disk."""
         lesson = None if event.lesson is None else self._demonstration(event.lesson)
         self._append("events", [event_row(event, self._movements, lesson, self.dims)])
         self._movements = movements_after(self._movements, event.kind)
 
     def add_rows(self, table: str, rows: Iterable[Sequence[Any]]) -> None:
-        """More rows of one of the ``DERIVED`` tables; NaN becomes NULL."""
+        """Append rows to one of the ``DERIVED`` tables; NaN becomes NULL."""
         self._append(table, [plain(row) for row in rows])
 
     def replace_rows(self, table: str, rows: Iterable[Sequence[Any]]) -> None:
-        """Other rows in the place of all rows of a table."""
+        """Replace all rows of a table."""
         with self._told(writing=True):
             self._connection.execute(f"DELETE FROM {table}")
         self._waiting[table] = []
@@ -189,15 +190,15 @@ class Record:
         self._write()
 
     def settle(self, **about: Any) -> None:
-        """Say more about the run, or something else than before; anything that json can hold."""
+        """Add or replace entries of ``about``, values that json can express."""
         self.about |= about
         self.replace_rows("about", about_rows(self.about))
 
     def commit(self) -> None:
-        """Bring all of it to the disk, or none of it.
+        """Bring all new rows to the disk, or none of them.
 
         Raises:
-            OSError: the disk is full, or cannot be written; what was committed before is still there.
+            OSError: the disk is full or cannot be written; earlier commits remain.
             RunError: another process has written in the meantime.
         """
         self._write()
@@ -206,7 +207,7 @@ class Record:
             self._lock()
 
     def check(self) -> dict[str, str]:
-        """What is wrong with which table; {} if all of it is what was written."""
+        """The damage of each damaged table, as a sentence; {} if there is none."""
         wrong = {}
         for table in layout(self.dims):
             try:
@@ -217,39 +218,30 @@ class Record:
         return wrong
 
     def rewrite(self) -> Record:
-        """Replace the file by one with the events up to the first that is damaged, and close this one.
+        """Replace the file by one with the events before the first damaged row, and close this record.
 
         Returns:
-            The new one, open for writing; what a replay makes again is not in it.
+            The new record, open for writing, without ``DERIVED`` tables: a replay makes them again.
 
         Raises:
             OSError: it cannot be written.
         """
         about = {name: value for name, value in self.about.items() if name not in ("run", "dims")}
+        shown = list[Demonstration]()
         with replacing(self.path) as partial:
             with Record.make(partial, self.dims, about) as new:
-                shown = new._take("demonstrations", self.rows("demonstrations"))
-
-                def has_lesson(row: Row) -> bool:
-                    lesson = lesson_of(row)
-                    return lesson is None or lesson < shown
-
-                new._take("events", takewhile(has_lesson, self.rows("events")))
+                with suppress(RunError):
+                    for row in self.rows("demonstrations"):
+                        shown.append(read_demonstration(row, self.dims))
+                with suppress(RunError, IndexError):  # an event may refer to a demonstration that is lost
+                    for event in map(event_reader(self.dims, shown), self.rows("events")):
+                        new.add(event)
                 new.commit()
             self.close()
         return Record(self.path, write=True)
 
-    def _take(self, table: str, rows: Iterable[Row]) -> int:
-        """Copy rows of another record, up to the first that is damaged; how many."""
-        n = 0
-        with suppress(RunError):
-            for row in rows:
-                self._append(table, [row])
-                n += 1
-        return n
-
     def _demonstration(self, shown: Demonstration) -> int:
-        """The row of a demonstration; a new one is added."""
+        """The row number of a demonstration; a new one is appended."""
         row = demonstration_row(shown, self.dims)
         if not self._shown:
             self._shown = {row_bytes(each): k for k, each in enumerate(self.rows("demonstrations"))}
@@ -267,7 +259,7 @@ class Record:
             self._seals[table] = n + len(new), new[-1][-1]
 
     def _write(self) -> None:
-        """Hand waiting rows to SQLite."""
+        """Pass waiting rows to SQLite."""
         with self._told(writing=True):
             for table, rows in self._waiting.items():
                 marks = ", ".join("?" * len(layout(self.dims)[table]))
@@ -283,7 +275,7 @@ class Record:
     def _open(self) -> None:
         found = dict(self._connection.execute("SELECT name, sql FROM sqlite_schema").fetchall())
         if not found:
-            raise RunError("it holds nothing yet")
+            raise RunError("it is still empty")
         self._written = {name: (n, seal) for name, n, seal in self._connection.execute("SELECT * FROM seals")}
         self._seals = dict(self._written)
         self.about: dict[str, Any] = {name: json.loads(value) for name, value in self.rows("about")}
@@ -295,8 +287,8 @@ class Record:
         self._movements = 0 if last is None else movements_after(*last)
 
     def _lock(self) -> None:
-        """Keep other writers away until this one is closed; readers are let in."""
-        before = getattr(self, "_version", None)
+        """Lock out other writers until this one is closed; readers may enter."""
+        before = self._version
         self._connection.execute("BEGIN IMMEDIATE")
         self._version = self._connection.execute("PRAGMA data_version").fetchone()
         if before not in (None, self._version):
@@ -305,9 +297,9 @@ class Record:
 
     @contextmanager
     def _told(self, *, writing: bool = False) -> Iterator[None]:
-        """Errors of SQLite, and of what it gives, as ours, with the path."""
+        """Turn errors of SQLite, and of unexpected values in the file, into ours, with the path."""
         if self.failed:
-            raise OSError(f"{self.path} could not be written; what came since the last commit is lost")
+            raise OSError(f"{self.path} could not be written; all rows since the last commit are lost")
         try:
             yield
         except RunError as error:
@@ -323,21 +315,21 @@ class Record:
             raise RunError(f"{self.path} cannot be read as a record: {error}; {HINT}") from error
 
     def _fail(self, writing: bool) -> None:
-        """Rows that could not be written are missing, so none may come after them."""
+        """After a failed write stop writing: rows are missing, and none may follow them."""
         if writing:
             self.failed = True
             self._connection.close()
 
 
 def _connect(path: Path, write: bool) -> sqlite3.Connection:
-    # Nothing here may open the file: to close it again would give up the locks that this process has on it.
+    # Nothing here may open the file: closing it again would give up the locks that this process holds on it.
     if not path.is_file():
         raise RunError(f"there is no record {path}")
     if not path.stat().st_size:
-        raise RunError(f"{path} holds nothing yet")
+        raise RunError(f"{path} is still empty")
     try:
-        # Readers, too, may have to clean up after a writer that was killed; of a file that may not be written, SQLite
-        # reads alone. One thread opens a run that is taught, and another one then lives it; never two at a time.
+        # Readers write, too: they clean up after a killed writer. SQLite falls back to reading a read-only file.
+        # One thread opens a run that is taught by hand, another one continues it; never two at a time.
         place, patience = f"{path.resolve().as_uri()}?mode=rw", 0.5 if write else 10.0
         return sqlite3.connect(place, uri=True, isolation_level=None, timeout=patience, check_same_thread=False)
     except (sqlite3.Error, OSError) as error:

@@ -1,4 +1,4 @@
-"""How a record is laid out: the columns of every table, cells of vectors, and seals of rows."""
+"""The layout of a record: columns of every table, cells of vectors, seals of rows."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ import numpy as np
 from sgimd_torch.learner.events import Event, Kind
 from sgimd_torch.spaces import Array, Demonstration
 
-DERIVED: Final = ("goals", "evaluations", "errors", "regions", "predictions", "refreshes")  # a replay makes them again
-SEALS: Final = ["name TEXT", "n_rows INTEGER", "seal INTEGER"]  # columns of the table of seals
+DERIVED: Final = ("goals", "evaluations", "errors", "regions", "predictions", "refreshes")  # a replay makes these again
+SEALS: Final = ["name TEXT", "n_rows INTEGER", "seal INTEGER"]  # columns of the table ``seals``
 HINT: Final = "was it damaged or edited?"
 
 Dims = tuple[int, int, int]
-"""Of context, theta and outcome."""
+"""Dimensions of context, theta and outcome."""
 
 Row = tuple[Any, ...]
 
 
 class RunError(ValueError):
-    """A record cannot be used: it is damaged, of another run, in use, or there is none."""
+    """A record cannot be used: it is missing, damaged, in use, or belongs to another run."""
 
 
 class InUseError(RunError):
-    """Another process writes it."""
+    """Another process is writing the record."""
 
 
 _COUNTED: Final = (Kind.MOVED, Kind.RESTED, Kind.FAILED)
@@ -37,7 +37,7 @@ _IN_CONTEXT: Final = (*_COUNTED, Kind.ASKED, Kind.INTERRUPTED)
 
 
 def layout(dims: Dims) -> dict[str, list[str]]:
-    """The columns of every table, as SQL declares them. SQLite has at most 2,000 of them in a table."""
+    """The columns of every table, as SQL declares them. SQLite allows at most 2,000 in a table."""
     c, p, t = dims
     context, theta, goal, outcome = (
         _vector(name, dim) for name, dim in (("context", c), ("theta", p), ("goal", t), ("outcome", t))
@@ -64,7 +64,7 @@ def layout(dims: Dims) -> dict[str, list[str]]:
 
 
 def event_row(event: Event, movement: int, lesson: int | None, dims: Dims) -> Row:
-    """An event before the ``movement``-th movement; ``lesson`` is the row of its demonstration."""
+    """The row of an event after ``movement`` movements; ``lesson`` is the row number of its demonstration."""
     c, p, t = dims
     vectors = (
         *_cells(event.context, c),
@@ -75,14 +75,8 @@ def event_row(event: Event, movement: int, lesson: int | None, dims: Dims) -> Ro
     return movement, str(event.kind), event.origin, *vectors, lesson, event.who, event.strategy, event.reply
 
 
-def lesson_of(row: Row) -> int | None:
-    """The row of the demonstration of such an event."""
-    found: int | None = row[-4]
-    return found
-
-
 def event_reader(dims: Dims, shown: Sequence[Demonstration]) -> Callable[[Row], Event]:
-    """What makes an event of such a row, ``shown`` being the demonstrations."""
+    """A function from such a row to its event; ``shown`` are the demonstrations by row number."""
     every = (*dims, dims[2])
     parts = [slice(*ends) for ends in pairwise(accumulate(every, initial=3))]
 
@@ -99,12 +93,12 @@ def event_reader(dims: Dims, shown: Sequence[Demonstration]) -> Callable[[Row], 
 
 
 def movements_after(movement: int, kind: str) -> int:
-    """How many movements were made once an event has come, rests included."""
+    """Number of movements after an event of this kind, rests included."""
     return movement + (kind in _COUNTED)
 
 
 def demonstration_row(shown: Demonstration, dims: Dims) -> Row:
-    """A demonstration."""
+    """The row of a demonstration."""
     times, trajectory = (np.asarray(each, dtype=np.float64).tobytes() for each in (shown.times, shown.trajectory))
     vectors = *_cells(shown.context, dims[0]), *_cells(shown.outcome, dims[2])
     return *vectors, shown.trajectory.shape[1], times, trajectory
@@ -133,7 +127,7 @@ def about_rows(about: Mapping[str, Any]) -> list[Row]:
 
 
 def row_bytes(row: Sequence[Any]) -> bytes:
-    """Of a row, for its seal: floats in binary, so this takes a fifth of the time of their text."""
+    """A row as bytes, for its seal; floats in binary take a fifth of the time of text."""
     return marshal.dumps(tuple(row), 2)
 
 
@@ -156,11 +150,11 @@ def _cells(values: Array | None, dim: int) -> list[Any]:
 
 
 def _array(cells: Row) -> Array | None:
-    """The vector in these cells, None where they are NULL."""
+    """The vector in these cells, None if one is NULL."""
     return None if None in cells else np.array(cells, dtype=np.float64)
 
 
 def plain(row: Sequence[Any]) -> Row:
-    """As SQLite gives it back: NaN is NULL, numbers of numpy are Python's."""
+    """A row as SQLite returns it: NaN becomes NULL, numpy's numbers become Python's."""
     values = (value.item() if isinstance(value, np.generic) else value for value in row)
     return tuple((None if value != value else value + 0.0) if isinstance(value, float) else value for value in values)

@@ -6,10 +6,10 @@ import os
 from collections.abc import Callable
 
 from sgimd_torch.files import replacing
-from sgimd_torch.learner import Learner, ReplayError
-from sgimd_torch.learner.replay import replay
+from sgimd_torch.learner import Learner
 from sgimd_torch.parts import Teacher
 from sgimd_torch.record import Record, RunError
+from sgimd_torch.record.replay import ReplayError, replay
 from sgimd_torch.spaces import Move
 
 

@@ -14,11 +14,11 @@ from sgimd_torch.catalogue import called, function_of, load_word
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.learner import Learner
+from sgimd_torch.learner.requests import Demonstrator
 from sgimd_torch.parts import Inverse, Teacher
 from sgimd_torch.runs.config import ALGORITHM, OWN, Config, part_of
 from sgimd_torch.runs.tasks import Task, benchmark_of, correspondence_of, demonstrations_of
 from sgimd_torch.spaces import Demonstration, stream
-from sgimd_torch.teachers import Demonstrator
 
 
 @dataclass(frozen=True, eq=False)

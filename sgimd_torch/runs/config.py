@@ -191,7 +191,8 @@ class Config:
         """The error for a name that is none of this run, with the parts that have it."""
         owner, _, last = name.rpartition(".")
         if owner not in self.chosen:  # what it belongs to is no part of this run, either
-            owner, last = ALGORITHM, owner.partition(".")[0]
+            head = owner.partition(".")[0]
+            owner, last = ALGORITHM, head if any(_with(kind, head) for kind in WORDS) else last
         part, having = self.chosen[owner], []
         for kind in (part.kind,) if owner != ALGORITHM or _with(part.kind, last) else WORDS:
             if words := ", ".join(_with(kind, last)):

@@ -1,12 +1,13 @@
-"""What all commands share: signals, standard streams, exit codes, messages, progress.
+"""Shared by all commands: signals, standard streams, exit codes, messages, progress.
 
-    sys.exit(command(main))    # main(argv) returns the exit code; what it raises becomes one line and an exit code
+    sys.exit(command(main))    # main(argv) returns the exit code; an exception becomes one line and an exit code
 
-Exit codes: 0 done, 1 it failed while running, 2 the request is wrong, 130 stopped by Ctrl-C, 143 stopped by SIGTERM.
+Exit codes: 0 done, 1 failed while running, 2 the request is wrong, 130 stopped by Ctrl-C, 143 stopped by SIGTERM.
 """
 
 from __future__ import annotations
 
+import io
 import os
 import signal
 import sys
@@ -15,14 +16,14 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from types import FrameType
-from typing import Any, Final, Self
+from typing import Any, Final, Self, TextIO
 
-REPORT_EVERY: Final = 10.0  # s, from one line of progress to the next where there is no terminal
+REPORT_EVERY: Final = 10.0  # s between two lines of progress if stderr is no terminal
 SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
 
 
 class Stopped(KeyboardInterrupt):
-    """A signal asked the command to stop."""
+    """A signal has stopped the command."""
 
     def __init__(self, signum: int = signal.SIGINT) -> None:
         super().__init__(signum)
@@ -30,19 +31,19 @@ class Stopped(KeyboardInterrupt):
 
 
 class Failed(RuntimeError):
-    """The request was right, but it failed while running: exit code 1."""
+    """A correct request failed while running: exit code 1."""
 
 
 def command(main: Callable[[Sequence[str]], int], argv: Sequence[str] | None = None) -> int:
-    """Run ``main`` on the words of the command line, and handle signals, errors and closed standard streams.
+    """Run ``main`` on the words of the command line; handle signals, exceptions and closed standard streams.
 
     Returns:
-        The exit code. A ``ValueError``, an error of a file and a missing package are the request's fault.
+        The exit code; 2, a wrong request, for a ``ValueError``, an error of a file and a missing package.
     """
-    for name in ("stdout", "stderr"):
-        if getattr(sys, name) is None:  # it was closed
-            setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_WRONLY), "w"))
-        getattr(sys, name).reconfigure(errors="backslashreplace")  # a name that the locale cannot write
+    sys.stdout, sys.stderr = sys.stdout or _sink(), sys.stderr or _sink()  # Python's is None if it was closed
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")  # for names that the locale cannot write
     code, lost = 0, None
     with _on_signals(_stop):
         try:
@@ -52,7 +53,7 @@ def command(main: Callable[[Sequence[str]], int], argv: Sequence[str] | None = N
             if code and not isinstance(end.code, int):
                 say(f"error: {end.code}")
         except KeyboardInterrupt as stop:
-            code = getattr(stop, "exit_code", 130)
+            code = stop.exit_code if isinstance(stop, Stopped) else 130
         except Failed as error:
             say(f"error: {error}")
             code = 1
@@ -63,15 +64,15 @@ def command(main: Callable[[Sequence[str]], int], argv: Sequence[str] | None = N
             code = 2
             if error.filename is not None:
                 say(f"error: {error.filename} cannot be read or written: {error.strerror}")
-            elif error.errno is None:  # raised by us, with a complete message
+            elif error.errno is None:  # ours, with a complete message
                 say(f"error: {error}")
-            else:  # of stdout, or the disk
+            else:  # from stdout, or from the disk
                 lost = error
     for stream in (sys.stdout, sys.stderr):
         try:
             stream.flush()
         except OSError as error:
-            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())  # else the interpreter would complain
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())  # else the interpreter complains when it exits
             lost = error if stream is sys.stdout else lost
     if lost is not None:
         if isinstance(lost, BrokenPipeError):
@@ -81,14 +82,18 @@ def command(main: Callable[[Sequence[str]], int], argv: Sequence[str] | None = N
     return code
 
 
+def _sink() -> TextIO:
+    return os.fdopen(os.open(os.devnull, os.O_WRONLY), "w")
+
+
 def loading() -> AbstractContextManager[None]:
-    """A block that imports libraries. An import cannot be interrupted cleanly, so a signal ends the process."""
+    """A block that imports libraries; a signal in it ends the process, as imports cannot be interrupted cleanly."""
     return _on_signals(_end)
 
 
 @contextmanager
 def _on_signals(handler: Callable[[int, FrameType | None], object]) -> Iterator[None]:
-    """In this block, SIGINT and SIGTERM go to ``handler``; threads leave them to the main thread."""
+    """In this block ``handler`` gets SIGINT and SIGTERM; only the main thread may set it, other threads do nothing."""
     heard = SIGNALS if threading.current_thread() is threading.main_thread() else ()
     before = {signum: signal.signal(signum, handler) for signum in heard}
     try:
@@ -107,11 +112,10 @@ def _stop(signum: int, frame: FrameType | None) -> None:
 
 
 class Stopping:
-    """In this block, the first SIGINT or SIGTERM is ``heard``; the second raises ``Stopped`` wherever it comes. A
-    context manager.
+    """In this block the first SIGINT or SIGTERM is only noted; the second raises ``Stopped``. A context manager.
 
     Attributes:
-        heard: the number of the first signal, 0 before it.
+        heard: number of the first signal, 0 before it.
     """
 
     def __init__(self) -> None:
@@ -129,17 +133,17 @@ class Stopping:
         if self.heard:
             raise Stopped(signum)
         self.heard = signum
-        with suppress(OSError):  # not by say(): a print may be under way
-            os.write(2, b"\nstops after the movement under way; once more stops at once\n")
+        with suppress(OSError):  # without say(): the signal may have interrupted a print
+            os.write(2, b"\nstopping after this movement; Ctrl-C once more stops at once\n")
 
 
 class Progress:
-    """A bar with an estimate of the time left on a terminal; elsewhere a plain line now and then. A context manager.
+    """A progress bar on a terminal, a plain line now and then elsewhere; a context manager.
 
     Args:
-        title: what is going on.
-        total: how much there is to do; it may change on the way.
-        done: how much of it was done before; it does not count for the speed.
+        title: name of the work in progress.
+        total: number of movements in all; the attribute may be changed later.
+        done: number of movements made earlier; they do not count for the speed.
         every: seconds between two plain lines.
     """
 
@@ -155,7 +159,7 @@ class Progress:
         self._bar.close()
 
     def begin(self, title: str, total: int, done: int = 0) -> None:
-        """Another part begins, with a speed of its own."""
+        """Begin another part, with its own speed."""
         from tqdm import tqdm  # after --help
 
         if self._bar is not None:
@@ -166,7 +170,7 @@ class Progress:
         self._begun = self._reported = time.monotonic()
 
     def show(self, done: int, note: str = "") -> None:
-        """Show how much is ``done``, including what was done before."""
+        """Show that ``done`` movements are made, earlier ones included."""
         self._bar.total = self.total
         self._bar.set_postfix_str(note, refresh=False)
         self._bar.update(done - self._bar.n)
@@ -181,7 +185,7 @@ class Progress:
 
 
 def say(*messages: str) -> None:
-    """Print on stderr, above a progress bar if there is one; a stderr that cannot be written is no error."""
+    """Print on stderr, above a progress bar if there is one; ignore a stderr that cannot be written."""
     bars = sys.modules.get("tqdm")
     write: Any = print if bars is None else bars.tqdm.write
     with suppress(OSError):
@@ -190,5 +194,5 @@ def say(*messages: str) -> None:
 
 
 def printable(text: str) -> str:
-    """Without what a terminal would execute, such as escape codes in a name."""
+    """``text`` without control characters, such as terminal escape codes in a name."""
     return "".join(sign if sign.isprintable() or sign in "\n\t" else "\N{REPLACEMENT CHARACTER}" for sign in text)

@@ -1,4 +1,4 @@
-"""Reading runs: everything that a run has recorded, as arrays. Figures, reports and tables are made from this alone.
+"""Read runs: the whole record of a run as arrays, the only source of figures, reports and tables.
 
 run = read_run("runs/sgim-d/seed-003"); run.outcomes, run.evaluation["mean_error"]    # docs/runs.md explains the tables
 """
@@ -23,23 +23,32 @@ from sgimd_torch.runs.directory import FILE
 from sgimd_torch.spaces import Array, Box, Demonstration
 
 Columns = dict[str, np.ndarray]
-"""By name; an entry for each row."""
+"""Columns of a table by name, with an entry for each row."""
 
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """A run as it was recorded so far: finished, stopped or under way.
+    """The record of a run so far: finished, stopped or running.
 
-    ``index`` ``(n,)``, ``origin`` ``(n,)`` names, "" at rest, ``demonstration`` ``(n,)`` which of ``demonstrations``
-    came just before, -1 if there was none; ``contexts``, ``thetas``, ``goals`` and ``outcomes`` ``(n, dim)``, NaN where
-    there was none: a movement that failed has a theta and no outcome. ``answers`` has, for each answer, the columns of
-    its evaluations; ``errors`` those of every goal at every evaluation, ``benchmark`` ``(n_goals, outcome_dim)`` the
-    goals; ``regions`` those of the goal model at every evaluation, None for a goal model without regions;
-    ``predictions`` and ``refreshes`` those of a forward model, None without one; ``requests`` what was asked for, None
-    if nothing was: ``index`` of the next movement, ``teacher``, ``strategy``, ``reply``, ``shown`` (row of the
-    demonstration, -1 for none) and ``wanted_0`` and so on, a point of C x T. ``config``: all options by name;
-    ``robot``: the class of the environment; ``spaces``: its contexts, policies and outcomes; ``summary``: movements,
-    how many ``failed``, whether it is finished, and seconds.
+    Attributes:
+        path: directory of the run.
+        config: options by name.
+        versions, files, words: entries of the table ``about``, see docs/runs.md.
+        robot: class of the environment.
+        spaces: "contexts", "policies" and "outcomes".
+        summary: "movements", how many "failed", whether it is "finished", and seconds.
+        index: ``(n,)`` numbers of the movements.
+        origin: ``(n,)`` proposer of each movement, such as "local"; "" at rest.
+        demonstration: ``(n,)`` row in ``demonstrations`` of the one shown just before each movement, -1 for none.
+        contexts, thetas, goals, outcomes: ``(n, dim)``, NaN for none; a failed movement has a theta and no outcome.
+        answers: columns of the evaluations of each inverse model, by its word.
+        errors: columns of all goals at all evaluations.
+        benchmark: ``(n_goals, outcome_dim)`` goals of evaluation.
+        demonstrations: each demonstration that was shown, once.
+        regions: columns of the goal model's regions at all evaluations, None for a goal model without regions.
+        predictions, refreshes: columns of a forward model, None without one.
+        requests: columns of the requests to teachers, None without any: ``index`` of the next movement, ``teacher``,
+            ``strategy``, ``reply``, ``shown`` (row of the demonstration, -1 for none), ``wanted_0`` ... (in C x T).
     """
 
     path: Path
@@ -68,11 +77,11 @@ class Run:
 
     @property
     def evaluation(self) -> dict[str, Array]:
-        """The evaluations of the run's own answers."""
+        """Columns of the evaluations of the run's own inverse model."""
         return self.answers[OWN]
 
     def at(self, movements: int, column: str = "mean_error", answer: str = OWN) -> float:
-        """An entry of an evaluation, NaN if there is none."""
+        """One number of an evaluation, NaN if there is none."""
         evaluation = self.answers.get(answer)
         if evaluation is None:
             return float("nan")
@@ -80,24 +89,26 @@ class Run:
         return float(found[0]) if len(found) else float("nan")
 
     def missed_by(self, movements: int, answer: str = OWN) -> tuple[Array, Array]:
-        """The errors ``(n_goals,)`` of ``benchmark`` at an evaluation, and the contexts ``(n_goals, context_dim)``."""
+        """Errors ``(n_goals,)`` of an evaluation, and the contexts ``(n_goals, context_dim)`` of its goals."""
         now = (self.errors["movements"] == movements) & (self.errors["answer"] == answer)
         contexts = [self.errors[f"context_{k}"][now] for k in range(self.spaces["contexts"].dim)]
         return self.errors["error"][now], np.array(contexts).T.reshape(int(now.sum()), -1)
 
     def chosen_goals(self) -> Array:
-        """``(n, outcome_dim)``, the goals that the learner chose itself, in order, each once even if it took several
-        movements. The goals of imitation are the teacher's, so they are left out."""
+        """``(n, outcome_dim)`` goals that the learner chose, in order, once each even if pursued by several movements.
+
+        Goals of imitation are left out, as the teacher chose them.
+        """
         own = self.goals[np.isfinite(self.goals).all(axis=1) & (self.origin != "imitate")]
         new = (np.diff(own, axis=0, prepend=np.nan) != 0).any(axis=1)
         return own[new]
 
 
 def read_run(path: str | os.PathLike[str]) -> Run:
-    """What a run has recorded so far.
+    """The record of a run so far.
 
     Args:
-        path: of the run's folder.
+        path: directory of the run.
 
     Raises:
         RunError: there is no run at ``path``, or it is damaged.
@@ -118,7 +129,7 @@ def read_run(path: str | os.PathLike[str]) -> Run:
         found: dict[str, Columns] = {table: _columns(record, table) for table in DERIVED}
         n = record.movements
     evaluated = found["evaluations"]["movements"]
-    nothing = not shown and not np.isfinite(arrays["outcomes"]).any()  # to infer a movement from
+    nothing = not shown and not np.isfinite(arrays["outcomes"]).any()  # in memory, so that no evaluation is possible
     finished = n == settings["movements"] and (settings["evaluate_at"] == [] or n in evaluated or nothing)
     return Run(
         path=path,
@@ -146,7 +157,7 @@ def _if_any(columns: Columns) -> Columns | None:
 
 
 def _lived(record: Record) -> tuple[dict[str, Any], Columns | None, int]:
-    """The movements as arrays; requests, None if there was none; how many movements have failed."""
+    """Movements as arrays; requests, None if there were none; number of failed movements."""
     c, p, t = record.dims
     origins, shown, cells, requests = list[str](), array("q"), array("d"), list[dict[str, Any]]()
     last, failed = -1, 0
@@ -182,18 +193,20 @@ _KINDS: Final = {"TEXT": np.str_, "INTEGER": np.int64, "REAL": np.float64}  # NU
 
 
 def config_of(run: Run, *, trust: bool = False) -> Config:
-    """What made a run, to build its parts again.
+    """The configuration of a run, to build its parts again.
 
     Args:
-        run: as read.
-        trust: whether code that its settings name, ``package.module:attribute``, may be imported and executed.
+        run: result of ``read_run``.
+        trust: whether the user's code that its settings name, ``package.module:attribute``, may be executed.
 
     Raises:
         RunError: its settings name such code and are not trusted, or do not describe a run of this version.
     """
     code = [] if trust else code_of(run.config)
     if code:
-        raise RunError(f"{run.path} names code of its own, {', '.join(code)}; look at it, then execute it with --trust")
+        raise RunError(
+            f"{run.path} names code outside this library, {', '.join(code)}; read it, then execute it with --trust"
+        )
     try:
         return Config.from_settings(run.config)
     except (TypeError, ValueError) as error:
@@ -201,42 +214,39 @@ def config_of(run: Run, *, trust: bool = False) -> Config:
 
 
 def find_runs(place: str | os.PathLike[str]) -> dict[str, list[Path]]:
-    """The runs of a run directory, of a variant's folder, or of a folder of variants, by variant, seeds in order.
+    """Run directories by name of their variant, seeds in order.
+
+    Args:
+        place: directory of a run, folder of a variant, or folder of variants.
 
     Raises:
-        RunError: there is none, or no such folder.
+        RunError: there are no runs, or no such folder.
     """
     place, found = Path(place), dict[str, list[Path]]()
     for pattern in ("", "seed-*/", "*/seed-*/"):
-        for config in sorted(place.glob(f"{pattern}run.sqlite")):
-            found.setdefault(variant_of(config.parent), []).append(config.parent)
+        for file in sorted(place.glob(pattern + FILE)):
+            found.setdefault(Path(os.path.abspath(file)).parent.parent.name, []).append(file.parent)
     if not found:
         why = "holds no runs" if place.is_dir() else "is a file, not a folder" if place.exists() else "does not exist"
         raise RunError(f"{place} {why}; runs are in OUT/NAME/seed-000")
     return found
 
 
-def variant_of(path: Path) -> str:
-    """The name of the folder that the run directory at ``path`` lies in."""
-    return Path(os.path.abspath(path)).parent.name
-
-
 def finished(config: Config) -> bool:
-    """Whether this run is on disk with these options, whole, to its last movement and its last evaluation."""
+    """Whether this run is on disk, undamaged, with these options, and complete with its last evaluation."""
     try:
         run = read_run(config.directory)
         found, wanted = run.config, config.settings
         same = all(found.get(name) == wanted.get(name) for name in found.keys() | wanted.keys() if name not in PLACE)
-        files = [(name, getattr(config, name)) for name in FILES]
         return bool(run.summary["finished"] and same) and all(
-            file is None or run.files.get(f"{name}_crc32") in (None, checksum(file)) for name, file in files
+            config[name] is None or run.files.get(f"{name}_crc32") in (None, checksum(config[name])) for name in FILES
         )
-    except (ValueError, OSError):  # of another version, or unreadable: the run says so when it is resumed
+    except (ValueError, OSError):  # another version, or unreadable: resuming the run gives the reason
         return False
 
 
 def movements_on_disk(path: Path) -> int:
-    """How many movements the record of a run directory holds."""
+    """Number of movements in the record of a run directory."""
     try:
         with Record(path / FILE) as record:
             return record.movements
@@ -245,7 +255,7 @@ def movements_on_disk(path: Path) -> int:
 
 
 def _by_answer(columns: Columns) -> dict[str, Columns]:
-    """The evaluations, apart for each answer; the run's own answers are always there."""
+    """The evaluations of each inverse model, by its word; the run's own is always there."""
     words = columns["answer"]
     return {
         word: {name: values[words == word] for name, values in columns.items() if name != "answer"}

@@ -15,12 +15,13 @@ from typing import Final, Self
 
 from sgimd_torch.environments.protocol import FAILURES, SimulationError
 from sgimd_torch.record import RunError
+from sgimd_torch.record.replay import ReplayError
 from sgimd_torch.runs.build import RunParts
 from sgimd_torch.runs.directory import open_run
 from sgimd_torch.runs.evaluations import Evaluations
 from sgimd_torch.runs.listeners import Listener, Seconds
 from sgimd_torch.runs.process import Failed, Progress, Stopped, Stopping, say
-from sgimd_torch.session import NoOutcomeError, ReplayError, live, reason_of, run
+from sgimd_torch.session import NoOutcomeError, live, reason_of, run
 from sgimd_torch.spaces import Episode
 
 TOLD: Final = 3  # failed movements that are told one by one; later ones, if they fail in another way

@@ -1,18 +1,18 @@
-"""Run many runs: options of sgimd run, crossed with each other and with seeds, some at a time.
+"""Make many runs, several at a time: every combination of the varied options, with every seed.
 
-Each --vary is one option with its values. The runs of a variant go to OUT/NAME/seed-003 and so on; NAME says what is
-varied: sgim-d,goals=uniform if algorithm and goals are. All other options of sgimd run apply to every run.
+Each --vary names one option of sgimd run and its values. All other options of sgimd run apply to every run. The run
+of a variant with seed 3 goes to OUT/NAME/seed-003. NAME lists the varied values, such as sgim-d,goals=uniform.
 
   sgimd sweep --seeds 0-9                                                  ten runs with the defaults
-  sgimd sweep --vary goals=interest-map,uniform --seeds 0-19 --out study   is the interest map worth it?
+  sgimd sweep --vary goals=interest-map,uniform --seeds 0-19 --out study   compare two goal models
   sgimd sweep --vary algorithm=sagg-riac,sgim-d --vary budget=5,15 --seeds 0-4 --movements 2000 --out study
-  sgimd sweep --vary environment.noise=0,0.03 --seeds 0,3,7-9 --out study --dry-run    what is still to be done
-  sgimd sweep --vary goals=interest-map,uniform --seeds 0-19 --shard 2/4   the second quarter of them, see --dry-run
+  sgimd sweep --vary environment.noise=0,0.03 --seeds 0,3,7-9 --out study --dry-run    list unfinished runs
+  sgimd sweep --vary goals=interest-map,uniform --seeds 0-19 --shard 2/4   the second quarter of the list of runs
   sgimd sweep --vary goals=interest-map,uniform --seeds 0-999 --engine ray --address auto        on a cluster
-  sgimd table study                                                        their results
+  sgimd table study                                                        show the results
 
-Start the same command again after Ctrl-C or a power cut, or with more seeds: finished runs stay as they are, the
-others go on. If a run fails, the others go on, too; it is named at the end, and its output is in OUT/NAME/seed-003.log.
+Repeat the command after Ctrl-C or a power cut, or with more seeds: finished runs are kept, unfinished ones continue.
+A failed run does not stop the others. It is named at the end, and its output is in OUT/NAME/seed-003.log.
 
 Exit code: 0 all runs are finished, 1 some failed, 2 the request is wrong, 130 or 143 stopped by Ctrl-C or SIGTERM.
 """
@@ -23,6 +23,7 @@ import argparse
 import itertools
 import os
 import re
+import sys
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from dataclasses import replace
@@ -38,8 +39,8 @@ from sgimd_torch.runs.read import finished, movements_on_disk
 
 Item = TypeVar("Item")
 NOT_VARIED: Final = {
-    "seed": "--seeds takes them, such as 5, 0-19 or 0,3,7-9",
-    "name": "a sweep names its variants by what is varied",
+    "seed": "use --seeds, such as 5, 0-19 or 0,3,7-9",
+    "name": "a sweep names each variant after its varied values",
     "out": "all runs of a sweep go to one --out",
 }
 
@@ -60,7 +61,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Carry out all runs that are not finished; 1 where runs failed."""
+    """Carry out all unfinished runs; the exit code, 1 if runs failed."""
     options, rest = parser().parse_known_args(argv)
     variants, flags = variants_of(options.vary, rest)
     configs = [replace(variant, seed=seed) for seed in options.seeds for variant in variants]
@@ -68,13 +69,13 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def carry_out(whole: Sequence[Config], options: argparse.Namespace, flags: Sequence[str], out: Path) -> int:
-    """Carry out those of the runs that are not finished, or list them; 1 where runs failed.
+    """Carry out the unfinished runs of a study, or list them; the exit code, 1 if runs failed.
 
     Args:
-        whole: all runs of a study.
-        options: see ``add_options`` and ``add_engines``.
-        flags: of ``sgimd run``, for all of them, besides --resume.
-        out: the folder of the study.
+        whole: all runs of the study.
+        options: parsed options of ``add_options`` and ``add_engines``.
+        flags: flags of ``sgimd run`` for all runs, besides --resume.
+        out: folder of the study.
 
     Raises:
         ValueError, OSError, ImportError: the request is wrong; nothing was started.
@@ -90,7 +91,7 @@ def carry_out(whole: Sequence[Config], options: argparse.Namespace, flags: Seque
     with loading():
         from sgimd_torch.runs.build import build  # after --help
     for config in {each.directory.parent: each for each in left}.values():
-        build(config)  # a wrong option is refused before anything starts
+        build(config)  # refuses wrong options before any run starts
     with engine_of(options, left) as submit:
         make_folder(out)
         failures = sweep(left, submit, flags=flags)
@@ -99,69 +100,74 @@ def carry_out(whole: Sequence[Config], options: argparse.Namespace, flags: Seque
 
 
 def add_vary(parser: argparse.ArgumentParser) -> None:
-    """The option --vary, for ``variants_of``."""
+    """Add --vary, for ``variants_of``."""
     parser.add_argument(
         "--vary",
         action="append",
         default=[],
         metavar="OPTION=VALUE,VALUE",
-        help="one option of sgimd run and its values; a list is one value in brackets: floor-at=[1000],[1000,5000]",
+        help="option of sgimd run and its values; brackets make a list one value: floor-at=[1000],[1000,5000]",
     )
 
 
 def add_options(parser: argparse.ArgumentParser, *, seeds: str | None, default: str = "%(default)s") -> None:
-    """Options of every command with many runs: --seeds, with that default, --processes and --dry-run."""
+    """Add the options of every command with many runs: --seeds, --processes and --dry-run.
+
+    Args:
+        parser: parser to extend.
+        seeds: seeds if --seeds is not given, or None.
+        default: words for these seeds in the help text.
+    """
     parser.add_argument("--seeds", type=_seeds, default=seeds, help=f"5, 0-19 or 0,3,7-9 (default: {default})")
-    parser.add_argument("--processes", type=_count, help="runs at a time (default: one for each core)")
-    parser.add_argument("--dry-run", action="store_true", help="only list what is still to be done")
+    parser.add_argument("--processes", type=_count, help="number of runs at a time (default: one for each core)")
+    parser.add_argument("--dry-run", action="store_true", help="list unfinished runs without starting them")
 
 
 def add_engines(parser: argparse.ArgumentParser) -> None:
-    """Options of where runs are carried out: --shard, --engine and --address."""
+    """Add the options that say where runs are carried out: --shard, --engine and --address."""
     parser.add_argument(
         "--shard",
         type=_shard,
         default="1/1",
         metavar="K/N",
-        help="only the K-th of N equal parts of the list of runs, for a job array",
+        help="part K of N equal parts of the list of runs, for a job array (default: %(default)s)",
     )
     parser.add_argument(
         "--engine",
         choices=("local", "ray"),
         default="local",
-        help="processes of this machine, or tasks of a Ray cluster, extra ray (default: %(default)s)",
+        help="local: processes of this machine; ray: tasks of a Ray cluster, needs extra ray (default: %(default)s)",
     )
     parser.add_argument(
         "--address",
         metavar="HOST:PORT",
-        help="of a running Ray cluster to which this machine belongs, or auto; without it, Ray starts one here",
+        help="Ray cluster that this machine belongs to, or auto (default: start one here)",
     )
 
 
 def engine_of(options: argparse.Namespace, configs: Sequence[Config]) -> AbstractContextManager[Submit]:
-    """What the options of ``add_options`` and ``add_engines`` ask for, for these runs; its block starts it.
+    """The engine that parsed options of ``add_options`` and ``add_engines`` choose for these runs, not yet started.
 
     Raises:
-        ValueError: they contradict each other.
+        ValueError: the options contradict each other.
         ImportError: Ray is not installed.
     """
     if options.engine == "local" and options.address is not None:
-        raise ValueError(f"--address {options.address} is of a Ray cluster; it needs --engine ray")
+        raise ValueError(f"--address {options.address} names a Ray cluster; add --engine ray")
     if options.address is not None and options.processes is not None:
-        raise ValueError("--processes cannot be given with --address: a cluster runs as many as it has cores")
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1  # we may use
-    processes = options.processes or cores
-    if options.engine == "local" or not configs:  # nothing to do needs no cluster
+        raise ValueError("--processes cannot be combined with --address: a cluster uses all of its cores")
+    processes = options.processes or (len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1)
+    if options.engine == "local" or not configs:  # an empty list needs no cluster
         return local(processes)
     for config in configs:
         if config.board:
-            raise ValueError("--board true cannot be given with --engine ray: a run returns without its event files")
-        for path in (getattr(config, option) for option in FILES):
+            raise ValueError("--board true cannot be combined with --engine ray, which returns no event files")
+        for path in (config[name] for name in FILES):
             if path is not None and (path.is_absolute() or ".." in path.parts):
-                raise ValueError(f"--engine ray sends files of the working directory only, not {path}; copy it there")
+                raise ValueError(f"--engine ray sends only files of the working directory; copy {path} there")
     try:
         with loading():
-            from sgimd_torch.runs.engines.on_ray import on_ray  # takes longer than all else to import
+            from sgimd_torch.runs.engines.on_ray import on_ray  # slow to import
     except ModuleNotFoundError as error:
         hint = "pip install 'sgimd-torch[ray]' installs it"
         raise ImportError(f"--engine ray needs {error.name}, which is not installed; {hint}") from error
@@ -171,9 +177,9 @@ def engine_of(options: argparse.Namespace, configs: Sequence[Config]) -> Abstrac
 
 
 class Shard(NamedTuple):
-    """The ``k``-th of ``n`` parts of a list, 1 the first: consecutive runs, so that each part has nearly all variants.
+    """Part ``k`` of ``n`` of a list, counted from 1; a part is consecutive, so it has nearly all variants.
 
-    Which runs they are depends on the list alone, not on what is finished. Sizes differ by 1 at most.
+    It depends on the list alone, not on which runs are finished. Sizes differ by at most 1.
     """
 
     k: int
@@ -184,31 +190,31 @@ class Shard(NamedTuple):
         return whole[(self.k - 1) * len(whole) // self.n : self.k * len(whole) // self.n]
 
     def note(self, whole: Sequence[Item]) -> str:
-        """For a message; nothing if it is the whole list."""
+        """Words for a message; "" for the whole list."""
         return f", shard {self.k}/{self.n} of {len(whole)} runs" if self.n > 1 else ""
 
 
 def variants_of(varied: Sequence[str], options: Sequence[str]) -> tuple[list[Config], list[str]]:
-    """Every combination of the values, as a run that is named after it, and the flags among the ``options``.
+    """A run for every combination of varied values, named after them, and the flags among ``options``.
 
     Args:
-        varied: such as ``["goals=interest-map,uniform", "budget=5,15"]``.
-        options: of ``sgimd run``, for all of them.
+        varied: values of --vary, such as ``["goals=interest-map,uniform", "budget=5,15"]``.
+        options: options of ``sgimd run`` for all runs.
 
     Raises:
         ValueError: an option cannot be varied, or is given twice.
-        SystemExit: ``sgimd run`` would refuse an option; it has said why.
+        SystemExit: ``sgimd run`` refused an option and printed the reason.
     """
     given = [dashed(word.partition("=")[0].removeprefix("--")) for word in options if word.startswith("--")]
     values: dict[str, list[str]] = {}
     for word in varied:
         name, _, listed = word.removeprefix("--").partition("=")
         option = dashed(name)
-        choices = re.split(r",(?![^[]*\])", listed)  # not at the commas in brackets
+        choices = re.split(r",(?![^[]*\])", listed)  # except at commas in brackets
         if not all([option, *choices]):
             raise ValueError(f"--vary must be like goals=interest-map,uniform, got {word!r}")
         if option in [*values, *given]:
-            raise ValueError(f"--{option} is there twice; put all its values in one --vary")
+            raise ValueError(f"--{option} is given twice; put all its values into one --vary")
         values[option] = list(dict.fromkeys(choices))
     for option, instead in NOT_VARIED.items():
         if option in values or (option in given and option != "out"):
@@ -223,7 +229,7 @@ def variants_of(varied: Sequence[str], options: Sequence[str]) -> tuple[list[Con
 
 
 def _in_name(option: str, value: str) -> str:
-    """A choice in the name of a variant; a path is shortened to the name of its file."""
+    """A varied value in the name of a variant; a path is shortened to its file name."""
     return value if option == "algorithm" else f"{option}={Path(value).name if os.sep in value else value}"
 
 

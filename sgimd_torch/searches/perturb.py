@@ -71,7 +71,7 @@ class Vary(Search):
 
     def __init__(self, problem: Problem, *, sd: float = 0.02) -> None:
         super().__init__(problem)
-        self.sd, self.width = _positive(sd), problem.shared(Width)
+        self.sd, self.width = _positive(sd), problem.shared(Width, Width)
 
     def __call__(self, start: Estimate, goal: Array) -> Generator[Array, Array, None]:
         """Movements around theta_g of ``start``."""

@@ -20,11 +20,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from sgimd_torch.record.replay import ReplayError
 from sgimd_torch.runs.command_line import parse
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.process import Failed, loading, say
 from sgimd_torch.runs.read import config_of, read_run
-from sgimd_torch.session import NoOutcomeError, ReplayError
+from sgimd_torch.session import NoOutcomeError
 from sgimd_torch.teach.by_hand import BY_HAND
 
 if TYPE_CHECKING:

@@ -51,7 +51,7 @@ class Leading:
         led: the robot.
 
     Attributes:
-        arm: its geometry and limits, in the posture of now.
+        arm: geometry and limits of the arm, in the present posture.
 
     Raises:
         ValueError: the robot does not fit its model, see `Arm`.
@@ -145,7 +145,7 @@ class Leading:
             self._advance()
 
     def begin_recording(self) -> None:
-        """Begin a recording with the posture of now.
+        """Begin a recording with the present posture.
 
         Raises:
             RuntimeError: a recording is under way.

@@ -33,7 +33,7 @@ class HandLesson:
 
     Attributes:
         demonstration: the recording, with the outcome of ``theta_d`` executed once.
-        theta_d: ``(theta_dim,)`` in Pi that the recording was translated to.
+        theta_d: ``(theta_dim,)`` policy of the recording, by the correspondence.
         misfit: distance between recording and movement (rad), see `misfit_of`.
         remarks: a sentence for each thing that the robot cannot follow.
     """

@@ -37,8 +37,8 @@ SEEN: Final = (
     "The orange ball is the hand of the robot. Small dots are goals of the benchmark."
 )
 _STATUS: Final = (
-    '<div style="padding:0 .6em;line-height:1.5"><b style="font-size:1.1em">{0}</b><br>{1} of {2} movements, '
-    "{3} lessons by hand<br>predicted error <b>{4}</b><br>{5} of {6} goals within reach</div>"
+    '<div style="padding:0 .6em;line-height:1.5"><b style="font-size:1.1em">{0}</b><br>{1} of {2} movements<br>'
+    "lessons by hand: {3}<br>predicted error <b>{4}</b><br>{5} of {6} goals within reach</div>"
     '<div style="color:#a33;padding:0 .6em">{7}</div>'
     '<div style="padding:0 .6em;font-size:.85em;line-height:1.5"><b style="color:#f0781e">●</b> you &nbsp; '
     '<b style="color:#3c46be">●</b> where the learner landed<br><b style="color:#0a6e32">●</b> goals within '
@@ -55,7 +55,7 @@ class Panel:
 
     Args:
         server: web server of the page.
-        act: called when a button is pressed.
+        act: function to call when a button is pressed.
         space: T.
         total: movements of the whole run.
         cannot: reason why the learner cannot be taught, "" if it can.

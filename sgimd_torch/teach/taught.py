@@ -124,7 +124,7 @@ class TaughtRun:
         return lesson_by_hand(times, joints, self.parts.task, stream(self.config.seed, "lessons", self._lessons))
 
     def status(self) -> Status:
-        """The status of now."""
+        """The present status."""
         robot, memory = self.parts.environment, self.parts.learner.memory
         landed = np.array(self._landed).reshape(-1, robot.outcomes.dim)
         chart = chart_of(robot, memory, self.parts.benchmark)

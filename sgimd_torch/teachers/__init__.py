@@ -7,34 +7,17 @@ movements, demonstrates something from a tile chosen at random among those the l
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Final
 
 import numpy as np
 
-from sgimd_torch.catalogue.built import Built
 from sgimd_torch.memory import Memory
 from sgimd_torch.parts import Teacher
 from sgimd_torch.spaces import Array, Demonstration, check_count, check_rng, check_vector
 
 _STALLED: Final = 0.01  # share by which distances fall at least while a learner progresses
-
-
-class Demonstrator(Built):
-    """Teacher who is asked for a demonstration of a goal. Built from ``(demonstrations, rng)`` and options.
-
-    Attributes:
-        takes: movements at which the learner rests until a reply has come.
-    """
-
-    takes: int = 0
-
-    @abstractmethod
-    def demonstrate(self, context: Array, goal: Array, memory: Memory) -> Demonstration | None:
-        """A demonstration of ``goal`` ``(outcome_dim,)`` in ``context`` ``(context_dim,)``, or None. A replay asks
-        again, so what is drawn may depend on the seed and on the arguments only."""
 
 
 Choose = Callable[[Sequence[Demonstration], Memory, np.random.Generator], Demonstration]

@@ -1,20 +1,19 @@
-"""Goals of evaluation, made from runs: one goal in each tile of T that they reached, as in section 5.2 of the paper.
+"""Make goals of evaluation from runs: one random goal in each tile of T that they reached (section 5.2 of the paper).
 
-T is cut into tiles. A tile counts as reachable if at least two movements of all runs together landed in it, and a goal
-is drawn in it at random. So a goal is near what some learner has reached. Take several learners and seeds, or the goals
-favour the one that made them, and seeds that no comparison uses later.
+T is cut into tiles. A tile counts as reached if at least two movements of all runs landed in it. Use several learners,
+as goals made from a single one favour it, and seeds that no comparison uses.
 
   sgimd sweep --environment mypackage.toss:make --vary algorithm=random,sagg-riac --seeds 2000-2003 --out pool
   sgimd benchmark pool --out goals.npz
   sgimd run --environment mypackage.toss:make --algorithm sagg-riac --benchmark goals.npz
 
-  sgimd benchmark pool --out goals.npz --tiles 100      fewer goals: an evaluation takes as long as they are many
+  sgimd benchmark pool --out goals.npz --tiles 100      fewer goals: faster evaluations
   sgimd benchmark pool/random/seed-2000 more --out goals.npz
 
-The side of a tile is chosen so that there are about --tiles goals: a fortieth to a tenth of T's sides in the plane.
-The file names the class of the environment: a run of another one refuses it.
+The side of the tiles gives about --tiles goals: in the plane, a fortieth to a tenth of the sides of T. The file names
+the class of the environment; a run of another class refuses it.
 
-Exit code: 0 the file was written, 2 the request is wrong; nothing is written then.
+Exit code: 0 the file was written, 2 the request is wrong and nothing was written.
 """
 
 from __future__ import annotations
@@ -35,7 +34,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Write the goals; the exit code, 0.
 
     Raises:
-        ValueError: no runs, runs of several environments, or no tile was reached.
+        ValueError: there are no runs, runs of several environments, or no reached tile.
         OSError: a file cannot be read or written.
     """
     options = _options(argv)
@@ -49,14 +48,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     if not len(goals):
         inside = int(box.contains(outcomes).sum())
         raise ValueError(
-            f"no tile of {tile} was reached twice: {inside} of {len(outcomes)} movements ended in T; longer runs, "
-            "or fewer --tiles?"
+            f"no tile of {tile} was reached twice: {inside} of {len(outcomes)} movements ended in T; make longer runs, "
+            "or choose fewer --tiles"
         )
     save_benchmark(options.out, Benchmark(name, goals, side))
     n, made = len(goals), f"{len(outcomes)} movements of {len(runs)} run{'s' * (len(runs) > 1)}"
     print(f"{n} goals, on tiles of {tile} reached by {made}: {options.out}")
     if n < options.tiles / 2:
-        say(f"{n} goals are few, {options.tiles} were wanted; longer runs give more")
+        say(f"only {n} goals, {options.tiles} were requested; longer runs give more")
     return 0
 
 
@@ -64,7 +63,7 @@ def _reached_by(runs: Sequence[Run]) -> tuple[str, Box]:
     """The class of the environment of all runs, and its T.
 
     Raises:
-        ValueError: they have different ones.
+        ValueError: the runs have different environments.
     """
     found: dict[str, Run] = {}
     for run in runs:
@@ -82,11 +81,11 @@ def parser() -> argparse.ArgumentParser:
         prog="sgimd benchmark", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument(
-        "runs", type=Path, nargs="+", metavar="RUN", help="a run's directory, a variant's folder, or an --out of runs"
+        "runs", type=Path, nargs="+", metavar="RUNS", help="folder of a run, of a variant or of variants"
     )
-    parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="the goals, .npz")
-    parser.add_argument("--tiles", type=int, default=TILES, help="about how many goals (default: %(default)s)")
-    parser.add_argument("--seed", type=int, default=0, help="of the draw within tiles (default: %(default)s)")
+    parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="file of goals to write, .npz")
+    parser.add_argument("--tiles", type=int, default=TILES, help="approximate number of goals (default: %(default)s)")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the goals within tiles (default: %(default)s)")
     return parser
 
 

@@ -1,24 +1,23 @@
-"""Does an environment keep every promise? Each broken one is named, with what was found and the likely cause.
+"""Check an environment against every rule of its protocol. Each violation is named, with the likely cause.
 
-An environment is named as for sgimd run --environment: a word of the catalogue, or package.module:attribute for one of
-your own, a class or a function that returns an environment or a Task; packages of the working directory are found.
-Tried are some random movements and two corners of Pi (policies):
+ENVIRONMENT is a word of the catalogue, or package.module:attribute: a class, or a function that returns an environment
+or a Task. Packages of the working directory are found. The check executes random movements and two corners of Pi:
 
   contexts, policies, outcomes    are Boxes, and rest lies in outcomes
-  observe, execute                give float64 arrays of the right shape, draw from their rng alone, and change nothing
-                                  that they were given or gave before
-  nothing carries over            the same movement with an equal stream ends in the same place, whatever came before
-  outcome_noise                   is 0 if and only if outcomes never scatter, and not ten times too large or small
-  execute_many                    if there is one: each row equals execute to the last bit
-  what is no movement             is refused with a ValueError
-  record                          if there is one: its outcome is that of execute with an equal stream
+  observe, execute                return float64 arrays of the right shape, draw from their rng alone, and change no
+                                  argument and no earlier result
+  no state carries over           a repeated movement with an equal stream has the same outcome
+  outcome_noise                   is 0 if and only if outcomes never scatter, and right within a factor of ten
+  execute_many (optional)         each row equals execute to the last bit
+  invalid movements               are refused with a ValueError
+  record (optional)               its outcome equals that of execute with an equal stream
   a Task                          its goals lie in T, and its demonstrations can be translated
 
 Examples:
   sgimd check mypackage.toss:make
   sgimd check fishing-rod --movements 20
 
-Exit code: 0 it keeps them all, 2 it does not.
+Exit code: 0 the environment keeps every rule, 2 it does not.
 """
 
 from __future__ import annotations
@@ -36,8 +35,8 @@ from sgimd_torch.runs.tasks import Task, benchmark_of, demonstrations_of
 from sgimd_torch.spaces import check_count, stream
 from sgimd_torch.views.demonstrations import check
 
-TRIED = 20  # movements
-NARROW = 0.03  # of the volume of T; where random movements span less, most goals may be out of reach
+TRIED = 20  # random movements that measure the reached part of T
+NARROW = 0.03  # of the volume of T; if random movements span less, most goals may be out of reach
 
 
 def parser() -> argparse.ArgumentParser:
@@ -46,15 +45,15 @@ def parser() -> argparse.ArgumentParser:
         prog="sgimd check", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("environment", metavar="ENVIRONMENT", help="fishing-rod, or mypackage.toss:make")
-    parser.add_argument("--movements", type=int, default=3, metavar="N", help="random movements to try (default: 3)")
+    parser.add_argument("--movements", type=int, default=3, metavar="N", help="random movements (default: %(default)s)")
     return parser
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Print what was tried; the exit code, 0.
+    """Print the findings; the exit code, 0.
 
     Raises:
-        ValueError: there is no such environment, or it breaks a promise.
+        ValueError: there is no such environment, or it violates a rule.
     """
     options = parser().parse_args(argv)
     check_count("--movements", options.movements, 1)
@@ -63,7 +62,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         task = task_of(config)
     except (ValueError, OSError):
         raise
-    except (Exception, SystemExit) as error:  # whatever the user's code does
+    except (Exception, SystemExit) as error:  # the user's code may raise anything
         why = f"{type(error).__name__}: {error}"
         raise ValueError(f"environment {options.environment} cannot be made: {why}") from error
     name = type(task.environment).__name__
@@ -71,7 +70,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         check_environment(task.environment, movements=options.movements)
         _check_picture(task)
         found = [f"{name} keeps every promise", *_goals(task), *_lessons(task)]
-    except SystemExit as end:  # as in record(); with code 0 it would look like success
+    except SystemExit as end:  # exit(0) would look like success
         raise ValueError(f"{name} calls exit({end}); raise an exception where a movement fails") from end
     print("\n".join(found))
     return 0
@@ -104,7 +103,7 @@ def _goals(task: Task) -> list[str]:
 
 
 def _narrow(robot: Environment) -> list[str]:
-    """A note if random movements end outside T, or span little of it."""
+    """A note if random movements end outside T, or span a small part of it."""
     space, rngs = robot.outcomes, [stream(k, "check") for k in range(TRIED)]
     contexts, thetas = [robot.observe(rng) for rng in rngs], [robot.policies.sample(rng) for rng in rngs]
     outcomes = execute_many(robot, contexts, thetas, rngs)
@@ -112,12 +111,12 @@ def _narrow(robot: Environment) -> list[str]:
     share = float(np.prod((high - low) / space.sides))
     spans = " x ".join(f"[{a:.3g}, {b:.3g}]" for a, b in zip(low, high, strict=True))
     if not space.contains(outcomes).any():
-        return [f"0 of {TRIED} random movements ended in T, they span {spans}; are T and outcomes in one unit?"]
+        return [f"0 of {TRIED} random movements ended in T, they span {spans}; are T and outcomes in the same unit?"]
     if share >= NARROW:
         return []
     return [
-        f"{TRIED} random movements span only {100 * share:.2g} % of T, {spans}; if nothing gets much farther, make T "
-        "smaller: learners draw goals from all of it"
+        f"{TRIED} random movements span only {100 * share:.2g} % of T, {spans}; if no movement gets much farther, make "
+        "T smaller: learners draw goals from all of it"
     ]
 
 
@@ -130,5 +129,8 @@ def _lessons(task: Task) -> list[str]:
     apart, spread = np.median([each.apart for each in tried]), np.linalg.norm(places.std(axis=0))
     if not apart < max(spread / 2, 3 * task.environment.outcome_noise):
         amount = task.environment.outcomes.amount(float(apart))
-        notes = [*notes, f"executed, they land {amount} from where they say (median); are joints, units, times right?"]
+        notes = [
+            *notes,
+            f"executed, they land {amount} from their outcomes (median); are joints, units and times right?",
+        ]
     return [f"  demonstrations: {len(shown)}", *(f"  {note}" for note in notes)]

@@ -1,17 +1,17 @@
-"""Three learners learn to fish, then one figure and one table show the results.
+"""Three learners learn to fish; a figure and a table show their results.
 
-Three runs with the same seed, two at a time. All move the same simulated arm with the same motor noise. One moves at
-random. SGIM-D has curiosity and a teacher. The third, practice-taught, is this library's best: it is shown everything
-at the start, then it practises, one movement for each goal. They write to --out (default: runs/demo):
+Three runs with the same seed, two at a time. All move the same simulated arm with the same motor noise. random moves
+at random. sgim-d has curiosity and a teacher. practice-taught, the best of this library, executes all demonstrations
+once, then makes one movement for each goal. The command writes to --out (default: runs/demo):
 
-  random/seed-000/ and so on   everything that happened (docs/runs.md explains the files)
-  demo.png                     how the error falls
+  random/seed-000/ and so on   the record of each run (docs/runs.md explains the files)
+  demo.png                     error against movements
 
-Start it again after Ctrl-C or a power cut, and it goes on where it stopped; finished runs are used as they are. Options
-of sgimd run apply to all three; sgimd run --help lists them.
+The same command continues after Ctrl-C or a power cut; finished runs stay as they are. Options of sgimd run apply to
+all three learners; sgimd run --help lists them.
 
   sgimd demo                                       the paper's 5000 movements, seed 0
-  sgimd demo --movements 1000                      a first look, in less than a minute
+  sgimd demo --movements 1000                      a first look, in half a minute
   sgimd demo --seed 1                              another seed
   sgimd demo --out runs/quiet --environment.noise 0     without motor noise
 
@@ -37,8 +37,8 @@ from sgimd_torch.runs.read import finished, read_run
 
 LEARNERS: Final = {
     "random": "moves at random",
-    "sgim-d": "chooses goals where its competence changes, and is shown a movement now and then",
-    "practice-taught": "is shown all movements at the start, then practises, one movement for each goal",
+    "sgim-d": "chooses goals where its competence changes, and gets a demonstration every 30 movements",
+    "practice-taught": "executes all demonstrations once, then makes one movement for each goal",
 }
 
 
@@ -72,8 +72,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     print("\nMean distance to the benchmark goals after so many movements, and what a movement costs\n")
     table.main([str(base.out)])
     print(f"\nFigure  {figure}\nRuns    {base.out}\nTime    {time.monotonic() - began:.0f} s\n\nNext, try")
-    print(f"  sgimd film {base.directory}    # a film of what SGIM-D has learnt")
-    print(f"  sgimd report {base.out}    # one page: curves, maps, where it is curious")
+    print(f"  sgimd report {base.out}    # one page: curves, maps, interest")
+    print(f"  sgimd film {base.directory}    # SGIM-D casts at goals; needs the extra film")
     return 0
 
 
@@ -81,10 +81,10 @@ def configs_of(rest: Sequence[str]) -> dict[str, Config]:
     """The run of each learner.
 
     Args:
-        rest: options of ``sgimd run``, for all of them.
+        rest: options of ``sgimd run`` for all learners.
 
     Raises:
-        ValueError: an option that the demo decides, or that leaves nothing to draw.
+        ValueError: the demo decides an option itself, or has nothing to draw with it.
     """
     given = {word.partition("=")[0].lstrip("-") for word in rest}
     for name in ("algorithm", "name", "environment"):

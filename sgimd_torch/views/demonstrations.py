@@ -50,7 +50,7 @@ class Checked:
         lands: ``(outcome_dim,)`` outcome on the robot, None if there is none.
         misfit: distance to the movement that the robot plays, NaN if unknown; see `misfit_of`.
         remarks: a sentence for each limit that the recording leaves.
-        refused: reason why there is no outcome, "" if there is one.
+        refused: reason for a missing outcome, "" if there is one.
     """
 
     shown: Demonstration

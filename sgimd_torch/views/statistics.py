@@ -1,8 +1,8 @@
-"""Statistics over seeds: interquartile means, bootstrap intervals, improvement, Holm.
+"""Statistics over seeds: interquartile means, bootstrap intervals, probability of improvement, Holm's method.
 
-After Agarwal et al. (2021), "Deep reinforcement learning at the edge of the statistical precipice": few seeds, so every
-number comes with an interval. ``errors`` are mean benchmark errors (m), one for each seed; smaller is better.
-    found = iqm_interval(errors, rng=rng()); show(iqm_interval(errors, rng=rng()))
+Agarwal et al. (2021), "Deep reinforcement learning at the edge of the statistical precipice": seeds are few, so every
+number has an interval. ``errors`` are mean benchmark errors (m), one for each seed; smaller is better.
+    found = iqm_interval(errors, rng=rng()); show(found)
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from sgimd_torch.spaces import Array
 Key = TypeVar("Key", bound=Hashable)
 LEVEL = 0.95
 RESAMPLES = 9999
-LEAST_SEEDS: Final = 5  # with fewer there are points: no interval, no verdict
-SEED: Final = 2014  # of the bootstrap: each number draws from its own default_rng(SEED)
+LEAST_SEEDS: Final = 5  # fewer seeds give points, without interval and verdict
+SEED: Final = 2014  # of the bootstrap; each number draws from its own default_rng(SEED)
 
 
 class Interval(NamedTuple):
-    """A statistic of the data, and its interval from ``low`` to ``high``, of 95 % unless said; NaN for few seeds."""
+    """A statistic and its interval from ``low`` to ``high``, 95 % by default; the ends are NaN for few seeds."""
 
     value: float
     low: float
@@ -36,20 +36,20 @@ def rng() -> np.random.Generator:
 
 
 def show(found: Interval, form: str = ".2f", unit: str = "") -> str:
-    """``0.48 [0.45, 0.52]``, followed by a unit; without brackets for few seeds. A minus is a hyphen, for programs."""
+    """``0.48 [0.45, 0.52] m``; few seeds have no brackets. A minus is a hyphen, so that programs can read it."""
     between = "" if np.isnan(found.low) else f" [{found.low:{form}}, {found.high:{form}}]"
     return f"{found.value:{form}}{between}{f' {unit}' if unit else ''}"
 
 
 def metres(found: Interval, form: str = "+.4f") -> str:
-    """A difference in metres, sign shown: ``−0.0103 [−0.0162, −0.0074] m``."""
+    """A difference in metres with its sign: ``−0.0103 [−0.0162, −0.0074] m``."""
     return show(found, form, "m").replace("-", "−")
 
 
 def interquartile_mean(values: Array) -> Array:
-    """Mean of the middle half: a quarter of the ``(..., n_seeds)`` values, rounded down, is cut at either end.
+    """Mean of the middle half of ``(..., n_seeds)`` values: a quarter, rounded down, is cut at either end.
 
-    With 2 or 3 seeds nothing is cut and it is the mean; of 10 it is the mean of the middle 6.
+    2 or 3 values are not cut; of 10, the middle 6 count.
     """
     means: Array = stats.trim_mean(values, 0.25, axis=-1)
     return means
@@ -62,21 +62,21 @@ def interval(
     paired: bool = False,
     level: float = LEVEL,
 ) -> Interval:
-    """Percentile bootstrap: the statistic of seeds drawn again with replacement, 9999 times; its middle 95 %.
+    """Percentile bootstrap: the middle 95 % of the statistic over 9999 draws of seeds with replacement.
 
-    Stratified: seeds are drawn from each sample by itself, as many as it has. If errors are normal, the interval holds
-    the true interquartile mean 94 % of the time with 10 or 20 seeds, but 90 % with 5: there it is too narrow. With
-    fewer than ``LEAST_SEEDS`` in a sample there is only a `point`.
+    The bootstrap is stratified: each sample draws its own seeds, as many as it has. For normal errors the interval
+    holds the true interquartile mean in 94 % of cases with 10 or 20 seeds, but in 90 % with 5, where it is too narrow.
+    A sample of fewer than ``LEAST_SEEDS`` seeds gives a `point`.
 
     Args:
-        statistic: of arrays ``(..., n_seeds, *rest)``, one for each sample; returns ``(...)``.
-        samples: ``(n_seeds, *rest)`` each.
-        rng: draws the seeds.
-        paired: all samples are of the same seeds in the same order, which are drawn together.
-        level: confidence, .95 or another one; see `holm`.
+        statistic: (arrays ``(..., n_seeds, *rest)``, one for each sample) -> ``(...)``.
+        samples: arrays ``(n_seeds, *rest)``.
+        rng: stream of the bootstrap.
+        paired: whether all samples have the same seeds in the same order; then seeds are drawn jointly.
+        level: confidence level; see `holm`.
 
     Raises:
-        ValueError: a sample of fewer than 2 seeds, one that is not finite, or paired ones of unequal length.
+        ValueError: a sample has fewer than 2 seeds or is not finite, or paired samples differ in length.
     """
     samples = tuple(np.asarray(sample, dtype=np.float64) for sample in samples)
     for sample in samples:
@@ -108,7 +108,7 @@ def interval(
 
 
 def iqm_interval(*strata: Array, rng: np.random.Generator, level: float = LEVEL) -> Interval:
-    """Interquartile mean of all values together; seeds are drawn within each stratum ``(n_seeds,)``.
+    """Interquartile mean of all values of all strata ``(n_seeds,)``; seeds are drawn within each stratum.
 
     Raises:
         ValueError: see ``interval``.
@@ -117,21 +117,21 @@ def iqm_interval(*strata: Array, rng: np.random.Generator, level: float = LEVEL)
 
 
 def point(value: float) -> Interval:
-    """A statistic of too few seeds for an interval."""
+    """An interval without ends, for too few seeds."""
     return Interval(value, np.nan, np.nan)
 
 
 def over_seeds(values: Array) -> Interval | None:
-    """Interquartile mean of ``(n_seeds,)``; its interval with ``LEAST_SEEDS`` or more; None if a value is missing."""
+    """Interquartile mean of ``(n_seeds,)``, from ``LEAST_SEEDS`` on with an interval; None if a value is missing."""
     if not len(values) or not np.isfinite(values).all():
         return None
     return point(float(values[0])) if len(values) == 1 else iqm_interval(values, rng=rng())
 
 
 def improvement(ours: Array, theirs: Array) -> Array:
-    """P(X < Y): how often ours ``(..., n)`` have a smaller error than theirs ``(..., m)``; a tie counts half.
+    """Probability of improvement: share of pairs in which ours ``(..., n)`` err less than theirs ``(..., m)``.
 
-    The Mann-Whitney statistic over n m; Agarwal et al. (2021) call it the probability of improvement.
+    A tie counts half. It is the Mann-Whitney statistic over n m; see Agarwal et al. (2021).
     """
     x, y = np.asarray(ours)[..., :, None], np.asarray(theirs)[..., None, :]
     shares: Array = np.mean((x < y) + 0.5 * (x == y), axis=(-2, -1))
@@ -139,16 +139,15 @@ def improvement(ours: Array, theirs: Array) -> Array:
 
 
 def improvement_interval(ours: Array, theirs: Array, *, level: float = LEVEL) -> Interval:
-    """``improvement`` of ``(n,)`` over ``(m,)``, with a score interval, which few seeds keep wide.
+    """``improvement`` of ours ``(n,)`` over theirs ``(m,)``, with a score interval, which stays wide for few seeds.
 
-    Wilson's interval for this statistic: all probabilities that are not rejected by what was seen (Newcombe 2006,
-    Statistics in Medicine 25:559, method 5). A bootstrap would give [1, 1] whenever all of ours are below all of
-    theirs, even with two seeds; this gives [.80, 1] with ten and [.90, 1] with twenty. Of normal errors it holds the
-    truth in 95 to 98 % of cases, with 5, 10 or 20 seeds. With fewer than ``LEAST_SEEDS`` on a side there is only a
-    `point`.
+    Wilson's interval for this statistic holds all probabilities that the data do not reject (Newcombe 2006, Statistics
+    in Medicine 25:559, method 5). If all of ours lie below all of theirs, it is [.80, 1] with ten seeds and [.90, 1]
+    with twenty; a bootstrap would give [1, 1] even with two. For normal errors it holds the truth in 95 to 98 % of
+    cases, with 5, 10 or 20 seeds. Fewer than ``LEAST_SEEDS`` on a side give a `point`.
 
     Raises:
-        ValueError: fewer than 2 seeds on a side, or errors that are not finite.
+        ValueError: a side has fewer than 2 seeds, or an error is not finite.
     """
     for sample in (ours, theirs):
         if len(sample) < 2 or not np.isfinite(sample).all():
@@ -159,7 +158,7 @@ def improvement_interval(ours: Array, theirs: Array, *, level: float = LEVEL) ->
     z = float(stats.norm.isf((1 - level) / 2))
 
     def excess(p: float) -> float:
-        """Above 0 where p is rejected: squared distance to what was found, less z^2 times the variance under p."""
+        """Above 0 where p is rejected: squared distance to the statistic, minus z^2 times the variance under p."""
         variance = p * (1 - p) * (1 + ((n + m) / 2 - 1) * ((1 - p) / (2 - p) + p / (1 + p))) / (n * m)
         return (found - p) ** 2 - z * z * variance
 
@@ -170,13 +169,13 @@ def improvement_interval(ours: Array, theirs: Array, *, level: float = LEVEL) ->
 
 
 def holm(claims: Iterable[Key], rejects: Callable[[Key, float], bool]) -> set[Key]:
-    """Which of several claims stand together: the chance that any of them is wrong is at most 5 %.
+    """The claims that stand jointly: the probability that any of them is wrong is at most 5 %.
 
-    Holm's method (1979) by intervals: all are asked at the level that Bonferroni's method gives for their number; what
-    stands is set aside, and the others are asked again at the level for the number that is left.
+    Holm's method (1979) by intervals: all claims are tested at Bonferroni's level for their number. Those that stand
+    are set aside, and the others are tested again at the level for the number left.
 
     Args:
-        claims: all of them, also those that stand no chance.
+        claims: all claims that were considered, even hopeless ones.
         rejects: (claim, level) -> whether an interval of this confidence decides the claim.
     """
     left = list(dict.fromkeys(claims))
@@ -191,58 +190,10 @@ def holm(claims: Iterable[Key], rejects: Callable[[Key, float], bool]) -> set[Ke
     return standing
 
 
-def paired_differences(ours: Mapping[int, float], theirs: Mapping[int, float]) -> Array:
-    """``(n_seeds,)`` ours - theirs, seed by seed: runs of one seed have the same motor noise, which cancels.
-
-    Args:
-        ours, theirs: seed -> error (m).
-
-    Raises:
-        ValueError: they are not of the same seeds.
-    """
-    if ours.keys() != theirs.keys():
-        alone = sorted(ours.keys() ^ theirs.keys())
-        raise ValueError(f"pairs need the same seeds on both sides, but only one side has {alone}")
-    return np.array([ours[seed] - theirs[seed] for seed in sorted(ours)])
-
-
 def common_differences(ours: Mapping[int, float], theirs: Mapping[int, float]) -> Array:
-    """The same, of the seeds that both have."""
-    both = ours.keys() & theirs.keys()
-    return paired_differences({seed: ours[seed] for seed in both}, {seed: theirs[seed] for seed in both})
-
-
-def movements_to_reach(movements: Array, errors: Array, level: Array | float) -> Array:
-    """After how many movements the error first falls to a level; straight lines between evaluations.
+    """``(n_seeds,)`` ours - theirs, for each common seed, in order; the motor noise of a seed cancels.
 
     Args:
-        movements: ``(n,)``, increasing, 2 or more.
-        errors: ``(..., n)`` m.
-        level: ``(...)`` m.
-
-    Returns:
-        ``(...)``, the first evaluation at the earliest, inf if the level is never reached.
-
-    Raises:
-        ValueError: ``movements`` do not increase, or values do not match them or are not finite.
+        ours, theirs: errors (m) by seed.
     """
-    movements, errors = _checked_curves(movements, errors)
-    level = np.asarray(level, dtype=np.float64)[..., None]
-    reached = errors <= level
-    after = np.clip(reached.argmax(axis=-1, keepdims=True), 1, None)
-    high, low = (np.take_along_axis(errors, after - step, axis=-1) for step in (1, 0))
-    fall = np.where(high > low, high - low, 1.0)
-    share = np.clip((high - level) / fall, 0, 1)  # 0 where the first evaluation is low enough already
-    found = movements[after - 1] + share * (movements[after] - movements[after - 1])
-    return np.where(reached.any(axis=-1), found[..., 0], np.inf)
-
-
-def _checked_curves(movements: Array, errors: Array) -> tuple[Array, Array]:
-    movements, errors = np.asarray(movements, dtype=np.float64), np.asarray(errors, dtype=np.float64)
-    if movements.ndim != 1 or len(movements) < 2 or not (np.diff(movements) > 0).all():
-        raise ValueError(f"a curve needs 2 or more increasing numbers of movements, got {movements.tolist()}")
-    if errors.shape[-1:] != movements.shape:
-        raise ValueError(f"errors must have shape (..., {len(movements)}), got {errors.shape}")
-    if not np.isfinite(errors).all():
-        raise ValueError("errors of a curve must be finite; is an evaluation missing?")
-    return movements, errors
+    return np.array([ours[seed] - theirs[seed] for seed in sorted(ours.keys() & theirs.keys())])

@@ -1,18 +1,17 @@
-"""One learner on many robots: is it better than movements at random, on robots that it was not tuned for, too?
+"""Test a learner on many robots, against two references: random movements, and uniform goals.
 
-Each task is run with the learner of your choice and with two others that it has to beat: random movements, and goals
-drawn anywhere, each with one movement: the nearest so far plus noise. Both answer with the nearest neighbour. Each task
-has a table in its own unit, that of sgimd table: in the last column, errors minus those of random movements. Options
-of sgimd run choose the learner; --vary, as in sgimd sweep, compares several. Defaults of this library are chosen on
-half of the tasks only; the others are marked "new".
+A uniform goal gets one movement: the nearest exemplar plus noise. Both references infer movements by the nearest
+neighbour. Options of sgimd run choose the learner; --vary, as in sgimd sweep, compares several. Each task has a table,
+as in sgimd table, in its own unit; the last column is the error minus that of random movements. This library chose
+its defaults on half of the tasks; the other tasks are marked "new".
 
-  sgimd suite                                             the default learner on the tasks that need no physics
+  sgimd suite                                             the default learner on the tasks without physics
   sgimd suite --seeds 0-9 --movements 2000 --out study    runs go to study/TASK/NAME/seed-000
-  sgimd suite --vary inverse=linear,process --seeds 0-4   which inverse model?
-  sgimd suite --tasks all                                 with fishing rod and swimmer (extra gym): minutes a run
+  sgimd suite --vary inverse=linear,process --seeds 0-4   compare two inverse models
+  sgimd suite --tasks all                                 also fishing rod and swimmer (extra gym): minutes a run
   sgimd suite --tasks toss crawler --algorithm sagg-riac --budget 4
 
-Start the same command again after Ctrl-C or a power cut, or with more seeds: finished runs stay as they are.
+Repeat the command after Ctrl-C or a power cut, or with more seeds: finished runs are kept.
 
 Exit code: 0 all runs are finished, 1 some failed, 2 the request is wrong, 130 or 143 stopped by Ctrl-C or SIGTERM.
 """
@@ -32,8 +31,13 @@ from sgimd_torch.runs.sweep import add_engines, add_options, add_vary, carry_out
 
 @dataclass(frozen=True)
 class Suited:
-    """A task of the suite: ``options`` of a run that make it; whether it is ``new``, never used to choose a default;
-    whether it is ``quick``, without physics."""
+    """A task of the suite.
+
+    Args:
+        options: options of a run that choose the task.
+        new: whether it was never used to choose a default.
+        quick: whether it needs no physics.
+    """
 
     options: Mapping[str, Any] = field(default_factory=dict)
     new: bool = False
@@ -72,15 +76,16 @@ DEFAULTS: Final = {
     "evaluated-by": "own",
     "out": "runs/suite",
 }
-OWN: Final = ("environment", "benchmark", "demonstrations", "name")
+OWN: Final = ("environment", "benchmark", "demonstrations", "name")  # options that a task decides
+SHARED: Final = ("movements", "evaluate_at", "evaluated_by", "repeats", "floor_at", "out")  # by learner and references
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run what is not finished, print a table for each task; 1 where runs failed."""
+    """Carry out unfinished runs and print a table for each task; the exit code, 1 if runs failed."""
     options, rest = _options(argv)
     configs, flags = runs_of(options, rest)
     code = carry_out(configs, options, flags, configs[0].out.parent)
-    from sgimd_torch.views import table  # scipy's statistics take long to import
+    from sgimd_torch.views import table  # slow: it imports scipy's statistics
 
     for place in [] if options.dry_run else dict.fromkeys(config.out for config in configs if finished(config)):
         print(f"\n{titled(place.name)}")
@@ -92,21 +97,19 @@ def runs_of(options: argparse.Namespace, rest: Sequence[str]) -> tuple[list[Conf
     """All runs, task by task within a seed, and the flags of ``sgimd run``.
 
     Args:
-        options: ``tasks``, ``seeds`` and ``vary``.
+        options: parsed ``tasks``, ``seeds`` and ``vary``.
         rest: options of ``sgimd run``.
 
     Raises:
-        ValueError: an option that a task decides, or that cannot be varied.
+        ValueError: a task decides this option, or it cannot be varied.
     """
     given = {word.partition("=")[0].lstrip("-").replace("_", "-") for word in [*rest, *options.vary]}
     for name in OWN:
         if name in {word.partition(".")[0] for word in given}:
-            raise ValueError(f"--{name} cannot be given here: each task has its own; --tasks chooses tasks")
+            raise ValueError(f"--{name} cannot be given here: each task has its own; choose tasks with --tasks")
     words = [*(f"--{name}={value}" for name, value in DEFAULTS.items() if name not in given), *rest]
     learners, flags = variants_of(options.vary, words)
-    first = learners[0]
-    same = ("movements", "evaluate_at", "evaluated_by", "repeats", "floor_at", "out")
-    shared = {name: getattr(first, name) for name in same}
+    shared = {name: learners[0][name] for name in SHARED}
     others = [Config.from_settings({"name": name, **line, **shared}) for name, line in REFERENCES.items()]
     configs = [
         replace(
@@ -124,7 +127,7 @@ def runs_of(options: argparse.Namespace, rest: Sequence[str]) -> tuple[list[Conf
 
 
 def titled(task: str) -> str:
-    """The name of a task, marked if it is new."""
+    """The name of a task, with a mark if it is new."""
     return task + " (new)" * TASKS[task].new
 
 
@@ -144,7 +147,7 @@ def parser() -> argparse.ArgumentParser:
         default=["quick"],
         choices=[*TASKS, "quick", "all"],
         metavar="TASK",
-        help="which; quick: those without physics; all (default: quick)",
+        help="names of tasks, quick for those without physics, or all (default: quick)",
     )
     add_vary(parser)
     add_options(parser, seeds="0")

@@ -1,6 +1,6 @@
-"""Tables of text on stdout, the same in every command.
+"""Tables of text on stdout, for all commands.
 
-print_table([("variant", "error (m)"), ("sgim-d", "0.123"), ("random", "0.456")])    # the first row names the columns
+print_table([("variant", "error (m)"), ("sgim-d", "0.123"), ("random", "0.456")])    # the first row is the head
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ from sgimd_torch.runs.process import printable
 
 
 def print_table(rows: Sequence[Sequence[str]]) -> None:
-    """Print rows of equally many cells in aligned columns, two spaces apart.
+    """Print rows of equal length in aligned columns, two spaces apart.
 
-    Each row is flushed, so that a reader such as ``head`` may close the pipe.
+    Each row is flushed, as a reader such as ``head`` may close the pipe.
     """
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for row in rows:

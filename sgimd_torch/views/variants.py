@@ -1,46 +1,52 @@
-"""Variants of a study: the runs of each over its seeds, and statistics over them. Reports and tables show these.
+"""Variants of a study, their statistics over seeds, and their comparison: the numbers of tables and reports.
 
-variants = read(Path("runs")); variants[0].last_error    # interquartile mean and interval (m)
+variants = best_first(Variant(name, runs) for name, runs in read(Path("study")).items())
+chosen = baseline_of(variants, "random"); [(row.variant.label, row.verdict) for row in compare(variants, chosen)]
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from sgimd_torch.catalogue import unknown
 from sgimd_torch.figures.names import label
 from sgimd_torch.runs.read import Run, find_runs, read_run
 from sgimd_torch.spaces import Array
-from sgimd_torch.views.statistics import LEAST_SEEDS, Interval, over_seeds
+from sgimd_torch.views.statistics import LEAST_SEEDS, Interval, common_differences, over_seeds
+
+EARLY: Final = 1000  # movements, for an error besides the last one
+USUAL: Final = "sgim-d"  # the default baseline
 
 
 def read(place: Path) -> dict[str, list[Run]]:
-    """All runs at a place by variant, without their thetas.
+    """All runs below a folder, by variant, without their thetas.
 
     Raises:
-        RunError: there is none, or a run is damaged.
+        RunError: there are no runs, or one is damaged.
     """
     runs: dict[str, list[Run]] = {}
     found = [(name, path) for name, paths in find_runs(place).items() for path in paths]
     for name, path in tqdm(found, "reading", unit="", delay=1.0, disable=None):
-        run = replace(read_run(path), thetas=np.empty((0, 0)))  # they would fill the memory, and are not shown
+        run = replace(read_run(path), thetas=np.empty((0, 0)))  # they take memory, and no view shows them
         runs.setdefault(name, []).append(run)
     return runs
 
 
 def best_first(variants: Iterable[Variant]) -> list[Variant]:
-    """By their last error; those without one come last."""
+    """Variants by last error; those without one come last."""
     return sorted(variants, key=lambda v: (v.last_error.value if v.last_error else np.inf, v.name))
 
 
 def unit_of(variants: Sequence[Variant]) -> Callable[[str], str]:
-    """Names a quantity, with the unit of their outcomes if all have the same."""
+    """A function that names a quantity with the unit of T, if all variants have the same unit."""
     first = variants[0].space
     same = all(variant.space.unit == first.unit for variant in variants)
     return first.in_unit if same else lambda quantity: f"{quantity} (unit of T)"
@@ -49,14 +55,13 @@ def unit_of(variants: Sequence[Variant]) -> Callable[[str], str]:
 class Variant:
     """The runs of one variant, one for each seed.
 
-    Errors are of the finished runs, at the evaluations that all of them have; if none is finished yet, of all that
-    were evaluated.
+    Errors count the finished runs, at the evaluations common to them; if no run is finished, all evaluated runs.
 
     Args:
-        name: of its folder.
-        runs: one or more.
-        at: the movements after which it is compared, and errors are of all runs that were evaluated there; None for
-            the last evaluation.
+        name: name of the variant's folder.
+        runs: runs of the variant, at least one.
+        at: number of movements at which variants are compared, counting all runs evaluated there; None for the last
+            common evaluation.
     """
 
     def __init__(self, name: str, runs: Sequence[Run], at: int | None = None) -> None:
@@ -71,19 +76,19 @@ class Variant:
             self.used = [run for run in evaluated if at in run.answers["own"]["movements"]]
         moments = [run.answers["own"]["movements"] for run in self.used]
         self.evaluated: NDArray[np.int64] = reduce(np.intersect1d, moments or [np.empty(0)]).astype(np.int64)
-        self.last = at or (int(self.evaluated[-1]) if len(self.evaluated) else 0)  # movements before the last one
+        self.last = at or (int(self.evaluated[-1]) if len(self.evaluated) else 0)  # number of movements
 
     def values(self, movements: int, column: str = "mean_error", answer: str = "own") -> Array:
-        """``(n_seeds,)`` a column of the evaluations; NaN where there is none."""
+        """``(n_seeds,)`` values of a column after so many movements; NaN for none."""
         return np.array([run.at(movements, column, answer) for run in self.used], dtype=np.float64)
 
     def at(self, movements: int, column: str = "mean_error", answer: str = "own") -> Interval | None:
-        """The same over its seeds; None where one of them has no value."""
+        """Interquartile mean of ``values`` with its interval; None if a value is missing."""
         return over_seeds(self.values(movements, column, answer))
 
     @property
     def few(self) -> bool:
-        """Whether there are too few seeds for intervals."""
+        """Whether it has too few seeds for intervals."""
         return len(self.used) < LEAST_SEEDS
 
     @cached_property
@@ -93,51 +98,100 @@ class Variant:
 
     @cached_property
     def floors(self) -> Array:
-        """``(n_seeds, n)`` m the noise floors, at ``evaluated``; NaN where they were not measured."""
+        """``(n_seeds, n)`` m, noise floors at ``evaluated``; NaN where they were not measured."""
         return self._over_time("noise_floor")
 
     @cached_property
     def curve(self) -> Array:
-        """``(3, n)`` m: interquartile mean over seeds at each of ``evaluated``, ends of its interval."""
+        """``(3, n)`` m: interquartile mean over seeds at each of ``evaluated``, and both ends of its interval."""
         found = [over_seeds(column) or (np.nan,) * 3 for column in self.errors.T]
         return np.array(found, dtype=np.float64).reshape(-1, 3).T
 
     @cached_property
     def last_error(self) -> Interval | None:
-        """The error (m) at the last evaluation that all have."""
+        """The error (m) at the last common evaluation."""
         return self.at(self.last)
 
     @cached_property
     def landed(self) -> Array:
-        """``(n, outcome_dim)`` m where movements of all its runs ended."""
+        """``(n, outcome_dim)`` m, outcomes of the movements of all its runs."""
         outcomes = np.concatenate([run.outcomes for run in self.runs])
         return outcomes[np.isfinite(outcomes).all(axis=1)]
 
     @cached_property
     def demonstrated(self) -> Array:
-        """``(n, outcome_dim)`` m the outcomes of what its runs were shown."""
+        """``(n, outcome_dim)`` m, outcomes of the demonstrations shown in its runs."""
         shown = [each.outcome for run in self.runs for each in run.demonstrations]
         return np.array(shown, dtype=np.float64).reshape(len(shown), self.landed.shape[1])
 
     @cached_property
     def misses(self) -> tuple[Array, Array]:
-        """Goals ``(n, outcome_dim)`` of the last evaluation, and their errors ``(n,)``, means over the seeds that have
-        the same goals."""
+        """Goals ``(n, outcome_dim)`` of the last evaluation, and ``(n,)`` errors, means over seeds with equal goals."""
         goals = self.typical.benchmark
         errors = [run.missed_by(self.last)[0] for run in self.used if np.array_equal(run.benchmark, goals)]
         return goals, np.mean(errors, axis=0)
 
     @property
     def typical(self) -> Run:
-        """The run with the median last error (the better of two); maps show this one."""
+        """The run with the median last error, the better of two; maps of one run show this run."""
         if not self.last:
             return max(self.runs, key=lambda run: len(run.index))
         return sorted(self.used, key=lambda run: run.at(self.last))[(len(self.used) - 1) // 2]
 
     def seconds(self, part: str) -> float:
-        """Mean over its runs of what was spent on "physics", "learner" or "evaluation"."""
+        """Mean over its runs of the seconds spent on "physics", "learner" or "evaluation"."""
         return float(np.mean([run.summary[f"seconds_{part}"] for run in self.used or self.runs]))
 
     def _over_time(self, column: str) -> Array:
         columns = [self.values(movements, column) for movements in self.evaluated.tolist()]
         return np.array(columns, dtype=np.float64).reshape(len(self.evaluated), len(self.used)).T
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """The last error of a variant minus that of the baseline.
+
+    Args:
+        variant: variant that is compared.
+        seeds: ``(n_seeds,)`` m, differences at the common seeds.
+        found: interquartile mean of ``seeds`` (m) with its interval.
+    """
+
+    variant: Variant
+    seeds: Array
+    found: Interval
+
+    @property
+    def verdict(self) -> str:
+        """A word for the position of the interval relative to 0; with few seeds their number instead."""
+        if len(self.seeds) < LEAST_SEEDS:
+            return f"fewer than {LEAST_SEEDS} common seeds"
+        return "better" if self.found.high < 0 else "worse" if self.found.low > 0 else "not told apart"
+
+
+def baseline_of(variants: Sequence[Variant], name: str | None = None) -> Variant | None:
+    """The variant called ``name``; without a name SGIM-D, else the first with errors; None if there is none.
+
+    Raises:
+        ValueError: no variant with errors has this name.
+    """
+    evaluated = {variant.name: variant for variant in variants if variant.last_error}
+    if name is None:
+        return evaluated.get(USUAL) or next(iter(evaluated.values()), None)
+    if name not in evaluated:
+        raise unknown("--baseline, a variant with errors to compare,", name, sorted(evaluated))
+    return evaluated[name]
+
+
+def compare(variants: Sequence[Variant], baseline: Variant | None) -> list[Comparison]:
+    """The comparisons of all variants that share seeds and the number of movements with the baseline."""
+    if baseline is None:
+        return []
+    theirs = _last_errors(baseline)
+    others = [variant for variant in variants if variant is not baseline and variant.last == baseline.last]
+    differences = [(variant, common_differences(_last_errors(variant), theirs)) for variant in others]
+    return [Comparison(variant, seeds, found) for variant, seeds in differences if (found := over_seeds(seeds))]
+
+
+def _last_errors(variant: Variant) -> dict[int, float]:
+    return {int(run.config["seed"]): run.at(variant.last) for run in variant.used}

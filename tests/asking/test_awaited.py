@@ -12,7 +12,7 @@ from sgimd_torch.runs.read import read_run
 
 STUCK = '''
 import os, signal, threading
-from sgimd_torch import AnsweringTeacher
+from sgimd_torch.asking.teachers import AnsweringTeacher
 
 class Busy(AnsweringTeacher):
     """Notes every request; from the fourth one on it is too busy, unless there is a file "awake"."""

@@ -28,6 +28,7 @@ from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.spaces import Box, Demonstration, Episode, Move, Request
+from worlds import problem
 
 PLANE = Box.cube(-1.0, 1.0, 2, names=("x", "y"), unit="m")
 GOAL, NEAR, FAR = np.array([0.5, 0.5]), np.array([0.5, 0.51]), np.array([0.5, 0.9])  # near: within the tolerance
@@ -46,7 +47,7 @@ def evaluation(errors):
 
 
 def interest_map(n=400):
-    goals = InterestMap(Box.cube(0, 1, 0), PLANE, stream(0, "goals"))
+    goals = InterestMap(problem(outcomes=PLANE))
     rng = stream(0, "competence")
     for _ in range(n):
         goal = goals.sample([])
@@ -290,16 +291,21 @@ def test_outcomes_of_any_dimension_have_curves_and_pictures(own, robot):
 
 HALVES = '''
 import numpy as np
-from sgimd_torch import InterestMap
+from sgimd_torch import Goals, InterestMap
 
-class Halves:
+class Halves(Goals):
     """A user's goal model; a run knows only its two regions."""
 
-    def __init__(self, contexts, outcomes, rng):
-        whole = InterestMap(contexts, outcomes, rng)
-        self.sample, self._add = whole.sample, whole.add
-        (region,) = whole.regions
+    regions = ()
+
+    def __init__(self, problem):
+        super().__init__(problem)
+        self._whole = InterestMap(problem)
+        (region,) = self._whole.regions
         self.regions = region.split(0, 0.5)
+
+    def sample(self, context):
+        return self._whole.sample(context)
 
     def add(self, context, goal, competence, strategy="autonomous", gain=0.0):
         self.regions = [self.regions[0].extend(np.array(goal), competence, gain, strategy), self.regions[1]]

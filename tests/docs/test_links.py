@@ -7,9 +7,10 @@ import tomllib
 from collections import Counter
 
 import pytest
-from make_site import HERE, ROOT, rooms, sources
+from make_site import COPIED, HERE, ROOT
 
-PAGES = [*sources(), "experiments/README.md"]
+COPIES = sorted({path.relative_to(ROOT).as_posix() for pattern in COPIED for path in ROOT.glob(pattern)})
+PAGES = [*(name for name in COPIES if name.endswith(".md")), "experiments/README.md"]
 LINK = re.compile(r"(?<!`)\[[^\]]*\]\(([^)\s]*)\)")
 FENCED = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
 QUOTE = re.compile(r"^```py (\S+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
@@ -63,7 +64,8 @@ def test_the_navigation_has_every_page_once():
         return [page for each in (entry.values() if isinstance(entry, dict) else entry) for page in pages(each)]
 
     listed = pages(tomllib.loads((HERE / "zensical.toml").read_text(encoding="utf-8"))["project"]["nav"])
-    assert sorted(listed) == sorted(["docs/notebooks/", *sources(), *(f"api/{room}.md" for room in rooms())])
+    shown = [re.sub(r"\.ipynb$", ".md", name) for name in COPIES if name.endswith((".md", ".ipynb"))]
+    assert sorted(listed) == sorted([*shown, "names.md"])
 
 
 @pytest.mark.parametrize("page", [page for page in PAGES if QUOTE.search(text_of(page))])

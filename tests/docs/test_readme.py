@@ -22,7 +22,8 @@ import pytest
 
 import sgimd_torch
 from own import MODULE
-from sgimd_torch.__main__ import COMMANDS, _call
+from sgimd_torch.__main__ import _call
+from sgimd_torch.catalogue import WORDS
 from sgimd_torch.runs.command_line import parse
 from sgimd_torch.runs.process import command
 
@@ -165,12 +166,12 @@ def understand(name, words):
     elif name in ("sweep", "suite"):
         assert command(_call, [name, *words, "--dry-run"]) == 0
     elif name == "teach" and not (words and words[0].startswith("runs/")):  # it would serve until Ctrl-C
-        importlib.import_module(f"sgimd_torch.{COMMANDS[name].module}").options_of(words)
+        importlib.import_module(f"sgimd_torch.{WORDS['command'][name]}").options_of(words)
     elif name == "check":
         assert command(_call, [name, *words]) == 0
     else:  # a parser that refuses words raises SystemExit
         with pytest.raises((ValueError, OSError), match=r"does not exist|there is no|holds no (run|board)|No such"):
-            importlib.import_module(f"sgimd_torch.{COMMANDS[name].module}").main(words)
+            importlib.import_module(f"sgimd_torch.{WORDS['command'][name]}").main(words)
 
 
 def test_the_readme_and_its_example_are_short_enough_to_read():

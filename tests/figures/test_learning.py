@@ -16,6 +16,7 @@ from sgimd_torch.figures.learning import (
 from sgimd_torch.figures.sections import sections
 from sgimd_torch.goals.interest_map import InterestMap
 from sgimd_torch.spaces import Box, stream
+from worlds import problem
 
 T = Box.cube(-1.0, 1.0, 2, names=("x", "y"), unit="m")
 (PLANE,) = sections(T)
@@ -68,7 +69,7 @@ def test_limits_of_few_points_hold_all_of_them(points):
 
 
 def test_the_rectangles_of_an_interest_map_are_its_regions_and_tile_the_task_space(ax):
-    goals, rng = InterestMap(Box.cube(0, 1, 0), T, stream(0, "goals")), stream(0, "test")
+    goals, rng = InterestMap(problem(outcomes=T)), stream(0, "test")
     for _ in range(400):
         goal = T.sample(rng)
         goals.add([], goal, -rng.random() if goal[0] > 0 else -1.0)

@@ -8,6 +8,7 @@ from sgimd_torch.figures.learning import competence_map, interest_map, landing_p
 from sgimd_torch.figures.sections import of_regions, sections
 from sgimd_torch.goals.interest_map import InterestMap
 from sgimd_torch.spaces import Box, stream
+from worlds import problem
 
 
 @pytest.fixture
@@ -68,7 +69,7 @@ def test_regions_are_cut_at_the_middle_of_what_is_not_shown():
 @pytest.mark.parametrize(("context_dim", "dim"), [(0, 1), (1, 2), (2, 3)])
 def test_a_cut_tiles_each_picture_of_a_map_that_has_split(context_dim, dim):
     contexts, space, rng = Box.cube(0, 1, context_dim), Box.cube(-1, 1, dim), stream(0, "test")
-    goals = InterestMap(contexts, space, stream(0, "goals"))
+    goals = InterestMap(problem(contexts=contexts, outcomes=space))
     for _ in range(300):
         goal = space.sample(rng)
         goals.add(contexts.sample(rng), goal, -rng.random() if goal[0] > 0 else -1.0)

@@ -2,12 +2,11 @@
 
 import pytest
 
-from sgimd_torch.environments.planar_arm import PlanarArm
+from models import ARM
+from sgimd_torch.forward_model import anchored
 from sgimd_torch.forward_model.model import ForwardModel
 from sgimd_torch.spaces import stream
 from worlds import executed
-
-ARM = PlanarArm(7)
 
 
 @pytest.fixture(scope="module")
@@ -26,3 +25,14 @@ def model(memory):
 @pytest.fixture(scope="module")
 def goals():
     return executed(ARM, stream(1, "goals").random((30, 7))).outcomes
+
+
+@pytest.fixture
+def fixed(monkeypatch):
+    """Sets other constants of anchored predictions: ``reach``, ``share`` or ``caution``."""
+
+    def fixed(**values):
+        for name, value in values.items():
+            monkeypatch.setattr(anchored, f"_{name.upper()}", value)
+
+    return fixed

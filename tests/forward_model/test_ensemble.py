@@ -10,11 +10,11 @@ from scipy.stats import norm
 from sgimd_torch.forward_model.ensemble import Ensemble, nll
 from sgimd_torch.spaces import stream
 
-MEMBERS, HIDDEN = 3, (8, 5)
+MEMBERS = 3
 
 
 def ensemble(seed=0, **options):
-    return Ensemble(4, 2, torch.Generator().manual_seed(seed), MEMBERS, HIDDEN, **options)
+    return Ensemble(4, 2, torch.Generator().manual_seed(seed), MEMBERS, **options)
 
 
 def alone(networks, member):

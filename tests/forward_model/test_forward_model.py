@@ -116,29 +116,14 @@ def test_a_refresh_waits_for_enough_new_exemplars():
     assert torch.equal(weights(model), before)
 
 
-def test_with_a_focus_a_small_network_learns_best_what_lands_near_the_goal(unseen):
-    memory = remembered(1000)
-    goal = memory.outcomes[0]
-    near = np.linalg.norm(unseen.outcomes - goal, axis=1) < 0.2
-    errors = {}
-    for name, focus, told in (("all", 0.0, goal), ("near", 0.75, goal), ("no goal", 0.75, None)):
-        model = ForwardModel(0, 3, 2, rate=0.3, hidden=(3,), focus=focus)
-        model.refresh(memory, told)
-        errors[name] = np.linalg.norm(model.predict(NO_CONTEXT, unseen.thetas).mean - unseen.outcomes, axis=1)
-    assert errors["near"][near].mean() < 0.8 * errors["all"][near].mean()
-    assert errors["near"][~near].mean() > 1.2 * errors["all"][~near].mean()
-    np.testing.assert_array_equal(errors["no goal"], errors["all"])
-
-
-@pytest.mark.parametrize("options", [{}, {"focus": 0.75}])
-def test_what_is_held_out_is_looked_at_but_never_learnt_from(options):
+def test_what_is_held_out_is_looked_at_but_never_learnt_from():
     memory, rows = remembered(200), np.arange(200)
     held_out = (rows >= 100) & (rows % 10 == 9)
     other = remember(memory.thetas + 0.05 * held_out[:, None], memory.outcomes)
-    models = [ForwardModel(0, 3, 2, every=100, **options) for _ in range(2)]
+    models = [ForwardModel(0, 3, 2, every=100) for _ in range(2)]
     for model, second in zip(models, (memory, other), strict=True):
         model.refresh(remembered(100))  # the same hundred
-        model.refresh(second, memory.outcomes[0])
+        model.refresh(second)
     assert torch.equal(*map(weights, models))
     assert models[0].relative_error != models[1].relative_error
 
@@ -224,7 +209,7 @@ def test_a_copy_for_another_process_predicts_the_same_and_learns_on(model, unsee
 
 @pytest.mark.parametrize("noise_heads", [True, False])
 def test_a_saved_model_predicts_the_same_and_keeps_its_relative_error(tmp_path, unseen, noise_heads):
-    model = taught(remembered(100), noise_heads=noise_heads, members=2, hidden=(8,))
+    model = taught(remembered(100), noise_heads=noise_heads, members=2)
     model.save(tmp_path / "model.safetensors")
     loaded = load_forward_model(tmp_path / "model.safetensors")
     for saved, read in zip(
@@ -241,6 +226,25 @@ def test_weights_of_something_else_are_refused_by_name(tmp_path, model, header):
     save_file(model.state_dict(), path, header)
     with pytest.raises(ValueError, match=r"model\.safetensors is no forward model"):
         load_forward_model(path)
+
+
+def test_a_file_cut_short_anywhere_is_refused_by_name(tmp_path, model):
+    path = tmp_path / "saved"
+    model.save(path)
+    whole = path.read_bytes()
+    for length in [*range(0, len(whole), len(whole) // 50), len(whole) - 1]:
+        path.write_bytes(whole[:length])
+        with pytest.raises(ValueError, match="saved is no"):
+            load_forward_model(path)
+
+
+def test_a_missing_file_and_a_folder_are_called_so(tmp_path, model):
+    with pytest.raises(FileNotFoundError, match="nothing"):
+        load_forward_model(tmp_path / "nothing")
+    for use in (model.save, load_forward_model):
+        with pytest.raises(IsADirectoryError, match="directory"):
+            use(tmp_path)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_misspelt_option_of_a_model_to_be_loaded_is_not_blamed_on_the_file(tmp_path, model):
@@ -275,20 +279,21 @@ def test_another_robots_memory_or_another_runs_is_refused():
 @pytest.mark.parametrize(
     "options",
     [
-        {"members": 0},
-        {"hidden": ()},
-        {"hidden": (0,)},
-        {"every": 0},
-        {"rate": 0.0},
-        {"focus": -0.1},
-        {"focus": 0.8},  # with the quarter that is recent more than a batch
-        {"every": 2.5},
-        {"hidden": 64},
+        *({"members": 0}, {"every": 0}, {"every": 2.5}),
+        *({name: value} for name in ("rate", "trust") for value in (0.0, np.nan, np.inf)),
     ],
 )
 def test_numbers_out_of_their_range_are_refused(options):
     with pytest.raises(ValueError, match=next(iter(options))):
         ForwardModel(0, 3, 2, **options)
+
+
+def test_it_is_trusted_up_to_the_relative_error_that_is_named(model):
+    for times, trusted in ((0.99, False), (1.01, True)):
+        twin = ForwardModel(0, 3, 2, trust=times * model.relative_error)
+        assert not twin.trusted
+        twin.load_state_dict(model.state_dict())
+        assert twin.trusted == trusted
 
 
 def test_other_scales_leave_what_is_predicted_as_it_is():

@@ -1,11 +1,13 @@
 """Events: told in order, after they have happened, and enough to make the same learner again, whatever has happened."""
 
+from contextlib import suppress
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sgimd_torch.algorithms import observation, sgim_d
+from sgimd_torch.algorithms.paper import observation, sgim_d
 from sgimd_torch.asking.algorithms import SEARCHING, sgim_acts
 from sgimd_torch.asking.teachers import AnsweringTeacher
 from sgimd_torch.environments.planar_arm import PlanarArm
@@ -15,6 +17,8 @@ from sgimd_torch.record import Record
 from sgimd_torch.record.lives import load_life, save_life
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Demonstration, stream
+from sgimd_torch.teach.by_hand import ByHand
+from sgimd_torch.teachers import AskedTeacher, PeriodicTeacher
 from worlds import demonstrate, last_posture
 
 ARM = PlanarArm(3, noise=0.02, context=True)
@@ -130,6 +134,62 @@ def test_events_are_told_in_order_and_after_they_have_happened_and_a_record_keep
         again = LEARNERS[name]()
         load_life(again, folder / path)
         assert state(again) == state(learner)
+
+
+class Broken(PlanarArm):
+    """Somebody presses Ctrl-C in the movement after so many."""
+
+    left = 1000
+
+    def execute(self, context, theta, rng):
+        self.left -= 1
+        if self.left < 0:
+            raise KeyboardInterrupt
+        return super().execute(context, theta, rng)
+
+
+TEACHERS = {
+    "periodic": lambda: PeriodicTeacher(LESSONS, stream(0, "teacher"), every=2),
+    "asked": lambda: AskedTeacher(LESSONS, stream(0, "teacher"), patience=2),
+    "by hand": lambda: ByHand(teacher=PeriodicTeacher(LESSONS, stream(0, "teacher"), every=3)),
+}
+RUNS = st.lists(st.tuples(st.sampled_from(["run", "break", "show", "interrupt"]), st.integers(1, 4)), max_size=8)
+
+
+@pytest.mark.parametrize("name", ["taught", "watching"])
+@pytest.mark.parametrize("by", TEACHERS)
+@settings(max_examples=60, deadline=None)
+@given(runs=RUNS)
+def test_runs_that_were_broken_off_with_lessons_between_them_are_loaded_with_their_teacher(
+    tmp_path_factory, name, by, runs
+):
+    (whole, teacher), (again, later) = ((LEARNERS[name](), TEACHERS[by]()) for _ in range(2))
+    arm, path = Broken(3, noise=0.02, context=True), tmp_path_factory.mktemp("life") / "life.sqlite"
+
+    def go_on(learner, teacher, n):
+        return list(run(learner, arm, 0, movements=learner.movements + n, teacher=teacher))
+
+    for what, k in runs:
+        if what == "show" and by == "by hand":
+            teacher.give(LESSONS[k])
+            go_on(whole, teacher, k)
+        elif what == "show":
+            whole.watch(LESSONS[k])
+        elif what == "run":
+            go_on(whole, teacher, k)
+        else:
+            with suppress(KeyboardInterrupt):
+                if what == "break":
+                    arm.left = k
+                    go_on(whole, teacher, 20)
+            arm.left = 1000
+            whole.interrupt()
+    save_life(whole, path)
+    load_life(again, path, teacher=later)
+    assert state(again) == state(whole)
+    for each in ((whole, teacher), (again, later)):
+        go_on(*each, 12)
+    assert state(again) == state(whole)
 
 
 def lived(path, movements, events=()):

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import ArrayLike
 
 from runs import content_of, end, stopped_at
-from sgimd_torch.algorithms import sgim_d
+from sgimd_torch.algorithms.paper import sgim_d
 from sgimd_torch.algorithms.practice import practice
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.environments.protocol import SimulationError

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sgimd_torch.algorithms import sagg_riac
+from sgimd_torch.algorithms.paper import sagg_riac
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.inverses.nearest import NearestNeighbour
 from sgimd_torch.learner import Learner

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from runs import edit
-from sgimd_torch.algorithms import observation, random_exploration, sagg_riac, sgim_d
+from sgimd_torch.algorithms.paper import observation, random_exploration, sagg_riac, sgim_d
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import evaluate
 from sgimd_torch.inverses.local_process import LocalProcess
-from sgimd_torch.learner import ReplayError
 from sgimd_torch.learner.events import Kind
 from sgimd_torch.memory import Memory
 from sgimd_torch.record import Record, RunError
 from sgimd_torch.record.lives import load_life, save_life
+from sgimd_torch.record.replay import ReplayError
 from sgimd_torch.rivals.alp_gmm import AlpGmm
 from sgimd_torch.rivals.cma_es import CmaEs
 from sgimd_torch.rivals.quality_diversity import cma_mae, cma_me, isoline, map_elites

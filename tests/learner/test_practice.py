@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from sgimd_torch.algorithms import sagg_riac
+from sgimd_torch.algorithms.paper import sagg_riac
 from sgimd_torch.algorithms.practice import practice, practice_taught
 from sgimd_torch.environments.toys import toss, two_elbows
 from sgimd_torch.evaluation import evaluate
 from sgimd_torch.goals.uniform import UniformGoals
 from sgimd_torch.inverses.nearest import NearestNeighbour
 from sgimd_torch.learner import Learner
-from sgimd_torch.runs.tasks.robots import toy_benchmark
+from sgimd_torch.runs.tasks.toys import toy_benchmark
 from sgimd_torch.searches.perturb import Perturb
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Demonstration

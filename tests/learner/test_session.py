@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
-from sgimd_torch.algorithms import sagg_riac, sgim_d
+from sgimd_torch.algorithms.paper import sagg_riac, sgim_d
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import evaluate
 from sgimd_torch.inverses.local import LocalInverse

@@ -10,6 +10,7 @@ import pytest
 
 from sgimd_torch.competence import AttemptCompetence, performance
 from sgimd_torch.environments.planar_arm import PlanarArm
+from sgimd_torch.goals.interest_map import InterestMap
 from sgimd_torch.inverses.nearest import NearestNeighbour
 from sgimd_torch.memory import Memory
 from sgimd_torch.parts import Goals, Problem, Search, Social
@@ -53,7 +54,7 @@ def babbling(memory: Memory, *, goal: Array = FAR, seed: int = 0, **options) -> 
     given = problem(ARM, memory=memory, inverse=NearestNeighbour, seed=seed)
     usual = {"search": Perturb, "budget": 12, "tolerance": 1e-9, "global_range": (0.0, 0.0), "give_up": -1.0}
     parts = {"goals": partial(Diary, goal=goal), "judge": AttemptCompetence, **usual, **options}
-    given.autonomous = GoalBabbling(given, **parts)
+    given.autonomous = GoalBabbling(given, **{"goals": InterestMap, "search": NelderMead, **parts})
     return given.autonomous
 
 

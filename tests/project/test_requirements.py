@@ -63,6 +63,33 @@ def test_every_requirement_says_its_lowest_version():
         assert len([part for part in each.specifier if part.operator == ">="]) == 1, each
 
 
+ABSENT = """import importlib.abc, sys
+class Absent(importlib.abc.MetaPathFinder):
+    def find_spec(self, name, path=None, target=None):
+        if name in {names}:
+            raise ModuleNotFoundError("No module named " + repr(name), name=name)
+sys.meta_path.insert(0, Absent())
+"""
+
+
+@pytest.mark.slow
+def test_the_demo_needs_no_more_than_its_setup_installs(tmp_path):
+    extras = re.search(r'^demo\) extras="(.*?)"', (ROOT / "scripts/setup").read_text(), re.MULTILINE)[1].split(",")
+    needed = closure(required(*extras))
+    assert not needed & {"torch", "ray", "playwright", "viser"}
+    absent = {
+        module
+        for module, names in importlib.metadata.packages_distributions().items()
+        if not needed & {canonicalize_name(name) for name in names} and module != "sgimd_torch"
+    }
+    (tmp_path / "sitecustomize.py").write_text(ABSENT.format(names=absent))
+    words = f"-m sgimd_torch demo --movements 20 --evaluate-at 10 --repeats 0 --out {tmp_path}/out".split()
+    environment = {**os.environ, "PYTHONPATH": f"{tmp_path}:{ROOT}"}
+    done = subprocess.run([sys.executable, *words], env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "out/demo.png").exists()
+
+
 def lowest(requirement):
     """``name==version`` of the lowest version that it allows."""
     ((version,),) = [[part.version for part in requirement.specifier if part.operator == ">="]]

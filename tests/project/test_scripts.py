@@ -1,6 +1,9 @@
-"""The scripts that make the shipped data: what the robots that teach show, and what makes no sense is refused."""
+"""The scripts: what setup installs and when, what the robots that teach show; wrong options are refused."""
 
+import os
 import shlex
+import shutil
+import subprocess
 import sys
 
 import numpy as np
@@ -11,7 +14,7 @@ import check_physics
 import make_benchmark
 import make_demonstrations
 import make_teachers
-from sgimd_torch.algorithms import random_exploration, sagg_riac, sgim_d
+from sgimd_torch.algorithms.paper import random_exploration, sagg_riac, sgim_d
 from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.evaluation import load_benchmark, tile_goals
@@ -154,12 +157,73 @@ def test_a_pool_on_too_few_tiles_is_refused(pool):
         make_teachers.careful(FishingRod(), thetas[[0, 0, 0]], outcomes[[0, 0, 0]], 3, stream(0, "test"))
 
 
-def test_the_bench_compares_two_checkouts_side_by_side(capsys, monkeypatch):
-    monkeypatch.setitem(bench.PARTS, "movement", bench.PARTS["movement"][:2])  # two learners are enough here
-    assert go(bench, f"--only movement life --rounds 1 --movements 40 --against '{bench.HERE}'") == 0
+INTERPRETER = """#!/usr/bin/env bash
+# A Python whose venv is one file, and whose pip takes a moment and notes what it was asked for.
+case "$1 $2" in
+"-m venv") rm -rf "$4" && mkdir -p "$4/bin" && cp "$0" "$4/bin/python" && echo "venv" >>"$NOTES" ;;
+"-m pip") sleep 0.3 && echo "${@: -3:1}" >>"$NOTES" && exit "${PIP_FAILS:-0}" ;;
+*) exec PYTHON "$@" ;;
+esac
+"""
+
+
+@pytest.fixture
+def setup(tmp_path):
+    """Starts scripts/setup in a checkout of its own; what was installed by all of them so far."""
+    root, notes, python = tmp_path / "a checkout", tmp_path / "notes", tmp_path / "python"
+    (root / "scripts").mkdir(parents=True)
+    for name in ("scripts/setup", "pyproject.toml", "constraints.txt"):
+        shutil.copy(bench.HERE / name, root / name)
+    python.write_text(INTERPRETER.replace("PYTHON", sys.executable))
+    python.chmod(0o755)
+    notes.touch()
+
+    def start(*wishes, wanted=0, **environment):
+        environment = {**os.environ, "PYTHON": str(python), "NOTES": str(notes), **environment}
+        command = [str(root / "scripts/setup")]
+        started = [subprocess.Popen([*command, *wish.split()], env=environment) for wish in wishes]
+        assert [each.wait() for each in started] == [wanted] * len(wishes)
+        return notes.read_text().split()
+
+    start.stamp = root / ".venv/setup-stamp"
+    return start
+
+
+def test_setup_installs_what_is_missing_and_everything_serves_the_demo(setup):
+    assert setup("demo") == ["venv", ".[plot,report]"]
+    assert setup("demo") == ["venv", ".[plot,report]"]
+    assert setup("") == ["venv", ".[plot,report]", ".[all,dev]"]
+    assert setup("demo") == setup("") == ["venv", ".[plot,report]", ".[all,dev]"]
+
+
+def test_of_several_setups_at_once_one_installs(setup):
+    assert setup("demo", "demo", "demo") == ["venv", ".[plot,report]"]
+
+
+def test_an_installation_cut_short_starts_afresh_and_one_that_failed_goes_on(setup):
+    assert setup("demo", wanted=3, PIP_FAILS="3") == ["venv", ".[plot,report]"]
+    assert setup("demo") == ["venv", ".[plot,report]", ".[plot,report]"]
+    setup.stamp.write_text(setup.stamp.read_text().splitlines()[0] + "\ninstalling\n")
+    assert setup("demo")[3:] == ["venv", ".[plot,report]"]
+
+
+def test_a_changed_list_of_requirements_is_installed(setup):
+    setup("")
+    (setup.stamp.parents[1] / "constraints.txt").write_text("numpy==2.0\n")
+    assert setup("") == ["venv", ".[all,dev]", ".[all,dev]"]
+
+
+def test_setup_refuses_another_word(setup):
+    assert setup("demos", wanted=2) == []
+
+
+def test_the_bench_compares_two_commits_side_by_side(capsys, monkeypatch):
+    measurements, movements = bench.PARTS["learning"]
+    monkeypatch.setitem(bench.PARTS, "learning", (measurements[1:3], movements))  # two lives are enough here
+    assert go(bench, "--only learning life --rounds 1 --movements 40 --against HEAD") == 0
     head, *lines = capsys.readouterr().out.splitlines()
     assert head.split() == ["here", "there", "here/there"]
-    assert len(lines) == 2 * 2 + 3
+    assert len(lines) == 2 * 3 + 3
     for line in lines:
         if "checksum" in line:
             assert line.endswith(" equal")

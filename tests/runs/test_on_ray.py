@@ -113,6 +113,6 @@ def test_when_a_task_dies_it_is_started_again_with_the_same_results(odd, monkeyp
 @pytest.mark.slow
 def test_stopped_it_goes_on_as_if_nothing_had_happened(odd, monkeypatch):
     said = said_by(far(odd, monkeypatch, "stopped", "stops the sweep far away"), 130)
-    assert "stopping all runs; the same command goes on from here" in said
+    assert "stopping all runs; the same command continues them" in said
     assert "2 runs ended well, 0 failed" in said_by(far(odd, monkeypatch, "stopped", ""), 0)
     assert as_alone(odd, odd / "stopped", (0, 1))

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from runs import edit, settle
-from sgimd_torch.algorithms import random_exploration
+from sgimd_torch.algorithms.paper import random_exploration
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.learner.events import Kind
 from sgimd_torch.record import DERIVED, Record, RunError
 from sgimd_torch.record.lives import save_life
 from sgimd_torch.runs.command_line import parse
 from sgimd_torch.runs.directory import FILE
-from sgimd_torch.runs.read import config_of, find_runs, finished, movements_on_disk, read_run, variant_of
+from sgimd_torch.runs.read import config_of, find_runs, finished, movements_on_disk, read_run
 
 SHORT = "--algorithm random --environment planar-arm-7 --movements 8 --evaluate_at 5 --repeats 0 --seed 3"
 
@@ -126,4 +126,3 @@ def test_runs_are_found_by_name_and_seed(tmp_path):
     assert [path.name for path in found["b"]] == ["seed-002", "seed-010"]
     assert find_runs(tmp_path / "b") == {"b": found["b"]}
     assert find_runs(found["b"][1]) == {"b": [found["b"][1]]}
-    assert variant_of(found["b"][1]) == "b"

@@ -118,7 +118,7 @@ def test_a_run_made_longer_executes_nothing_again_for_its_evaluations(tmp_path, 
     monkeypatch.setattr(evaluations, "evaluate", evaluate_and_note)
     assert go(tmp_path, "--resume") == 0
     assert evaluated == {60, 90}
-    assert "evaluations after 50 movements are left out" in capsys.readouterr().err
+    assert "evaluations after 50 movements are dropped" in capsys.readouterr().err
     assert content_of(tmp_path / "sgim-d" / "seed-003") == reference
 
 
@@ -173,20 +173,6 @@ def copy(tmp_path, undisturbed):
     return shutil.copytree(undisturbed, tmp_path / "sgim-d" / "seed-003")
 
 
-@pytest.mark.parametrize("table", ["goals", "evaluations", "errors", "regions"])
-@pytest.mark.parametrize("what", ["UPDATE {} SET seal = 0 WHERE rowid = 1", "DELETE FROM {} WHERE rowid = 1"])
-def test_a_damaged_table_that_a_replay_makes_again_is_told_and_made_again(
-    tmp_path, copy, go, reference, capsys, table, what
-):
-    edit(copy / FILE, what.format(table))
-    assert go(tmp_path, "--resume") == 0
-    assert f"row 1 of {table} is not what was written; was it damaged or edited?; it is made again" in (
-        capsys.readouterr().err
-    )
-    assert content_of(copy) == reference
-    assert [path.name for path in copy.iterdir()] == [FILE]
-
-
 def rows_of_movements(content):
     """The row, from 1, of each movement among the events."""
     return [row for row, (_, kind, *_) in enumerate(content["events"], 1) if kind in (Kind.MOVED, Kind.RESTED)]
@@ -203,9 +189,11 @@ def rows_of_movements(content):
         ("INSERT INTO events SELECT * FROM events WHERE movement = 89 AND kind = 'moved'", 90),
         ("UPDATE demonstrations SET outcome_0 = 0.5 WHERE rowid = 2", 60),
         ("DELETE FROM demonstrations", 30),
+        *((f"UPDATE {table} SET seal = 0 WHERE rowid = 1", 90) for table in ("goals", "evaluations", "errors")),
+        ("DELETE FROM regions WHERE rowid = 1", 90),
     ],
 )
-def test_damaged_movements_are_made_again_only_if_the_loss_is_accepted(
+def test_what_is_damaged_is_made_again_only_if_the_loss_is_accepted(
     tmp_path, copy, go, reference, capsys, damage, kept
 ):
     edit(copy / FILE, damage)
@@ -224,17 +212,20 @@ def test_damaged_movements_are_made_again_only_if_the_loss_is_accepted(
 
 
 @pytest.mark.parametrize("content", [b"index,origin\n" * 300, bytes(8192)])
-def test_of_a_file_that_cannot_be_read_at_all_every_movement_is_made_again(
-    tmp_path, copy, go, reference, capsys, content
-):
+def test_a_file_of_which_nothing_can_be_read_is_refused_and_kept(tmp_path, copy, go, capsys, content):
     (copy / FILE).write_bytes(content)
+    for options in ((), ("--accept-loss",)):
+        assert go(tmp_path, "--resume", *options) == 2
+        assert "cannot be read as a record" in capsys.readouterr().err
+    assert files_of(copy) == {FILE: content}
+
+
+def test_an_earlier_copy_of_a_damaged_record_is_not_overwritten(tmp_path, copy, go):
+    edit(copy / FILE, "DELETE FROM events WHERE movement >= 70")
     (copy / "run.lost-0.sqlite").write_text("an earlier loss")
-    assert go(tmp_path, "--resume") == 2
-    assert "nothing of it can be read" in capsys.readouterr().err
     assert go(tmp_path, "--resume", "--accept-loss") == 0
-    assert content_of(copy) == reference
-    assert (copy / "run.lost-0.sqlite").read_text() == "an earlier loss"  # no copy is overwritten
-    assert (copy / "run.lost-1.sqlite").read_bytes() == content
+    assert (copy / "run.lost-0.sqlite").read_text() == "an earlier loss"
+    assert (copy / "run.lost-1.sqlite").exists()
 
 
 def rewritten(path, change):
@@ -276,7 +267,7 @@ def test_another_configuration_a_shorter_one_and_what_is_no_run_are_refused(tmp_
     before = files_of(copy)
     for options, messages in (
         (("--budget", 7, "--goals", "uniform"), ("goals was interest-map, now uniform", "budget was", "now 7")),
-        (("--movements", 89), ("90 movements already, 89 were asked for",)),
+        (("--movements", 89), ("90 movements already, 89 were requested",)),
     ):
         assert go(tmp_path, "--resume", *options) == 2
         said = capsys.readouterr().err

@@ -53,7 +53,7 @@ def test_a_robot_that_has_become_another_one_is_refused(own, capsys):
     (own / "sliders.py").write_text(text.replace("dim, context_dim = 1, 0", "dim, context_dim = 2, 0"))
     sys.modules.pop("sliders")
     assert command(main, [*OWN, "--movements", "60", "--resume"]) == 2
-    assert "has the robot become another one?" in capsys.readouterr().err
+    assert "is this another robot?" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("what", ["sweep", "views.suite"])

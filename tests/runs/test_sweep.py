@@ -170,14 +170,14 @@ def test_two_runs_with_one_directory_are_refused(tmp_path):
         (2, "reading\nerror: no such goal\nmore on it\n", ValueError, "no such goal\nmore on it"),
         (1, "error: earlier\nerror: the arm broke", Failed, "the arm broke"),
         (1, "a traceback\nMemoryError", Failed, "MemoryError"),
-        (3, "", Failed, "it said nothing"),
-        (-9, "error: earlier", Failed, "stopped by SIGKILL; the same command goes on with it"),
+        (3, "", Failed, "it printed nothing"),
+        (-9, "error: earlier", Failed, "stopped by SIGKILL; the same command continues it"),
     ],
 )
 def test_a_run_that_ends_badly_is_told_by_its_last_words(tmp_path, code, said, error, words):
     with pytest.raises(error) as caught:
         loop.check_end(short(tmp_path), code, said.encode())
-    assert str(caught.value) == f"{words}\nIts whole log: {tmp_path}/random/seed-000.log"
+    assert str(caught.value) == f"{words}\nFull log: {tmp_path}/random/seed-000.log"
     loop.check_end(short(tmp_path), 0, said.encode())
 
 
@@ -206,9 +206,9 @@ def test_a_run_that_is_killed_is_named_and_goes_on_next_time(odd, begun, tmp_pat
     options = ["--seeds", "0-1", "--processes", 1]
     said = said_by(begun(SWEEP, *options, at_20="dies"), 1)
     assert "0 runs ended well, 2 failed" in said
-    assert "random seed 0 failed: stopped by SIGKILL; the same command goes on with it" in said
+    assert "random seed 0 failed: stopped by SIGKILL; the same command continues it" in said
     assert re.search(r"random seed 1 failed: \S*seed-001/run.sqlite cannot be read as a record", said)
-    assert f"Its whole log: {tmp_path / 'random/seed-001.log'}" in said
+    assert f"Full log: {tmp_path / 'random/seed-001.log'}" in said
     assert foreign.read_text() == "not a run"
     shutil.rmtree(foreign.parent)
     said_by(begun(SWEEP, *options), 0)
@@ -221,7 +221,7 @@ def test_stopped_it_stops_its_runs_and_goes_on_as_if_nothing_had_happened(
 ):
     monkeypatch.setenv("SIGNAL", str(int(signum)))
     options = ["--seeds", "0-1", "--processes", 1]
-    assert "stopping all runs; the same command goes on" in said_by(
+    assert "stopping all runs; the same command continues them" in said_by(
         begun(SWEEP, *options, at_20="stops the sweep"), code
     )
     assert "stopped after 20 movements" in (tmp_path / "random/seed-000.log").read_text()

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sgimd_torch.algorithms import observation
+from sgimd_torch.algorithms.paper import observation
 from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
 from sgimd_torch.demonstrations.fit import misfit_of
 from sgimd_torch.environments.fishing_rod import FishingRod

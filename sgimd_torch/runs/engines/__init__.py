@@ -1,1 +1,1 @@
-"""Where a list of runs is carried out: in processes of this machine, or on a cluster; ``loop`` is the same for both."""
+"""Engines carry out a list of runs, in processes of this machine or on a cluster; both share ``loop``."""

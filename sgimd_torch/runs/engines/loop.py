@@ -1,10 +1,10 @@
-"""Carry out a list of runs on any engine: start them, show how far they are, name the failures.
+"""Carry out a list of runs on any engine: start them, show progress, name failures.
 
 with local(processes=4) as submit: failures = sweep([Config(seed=seed) for seed in range(20)], submit)
 
-An engine is a context manager that gives ``submit(config, flags)``. It starts runs in the order in which they come, as
-many at a time as it has room for, and stops those that have not ended when its block is left. ``local`` is the engine
-of one machine: a process for each run.
+An engine is a context manager that gives ``submit(config, flags)``. It starts runs in order, as many at a time as it
+has room for. Leaving its block stops the runs that have not ended. ``local`` is the engine of one machine, with a
+process for each run.
 """
 
 from __future__ import annotations
@@ -26,12 +26,14 @@ from sgimd_torch.runs.config import Config, words
 from sgimd_torch.runs.process import Failed, Progress, say
 from sgimd_torch.runs.read import movements_on_disk
 
-REFRESH: Final = 1.0  # s, from one look at the movements on disk to the next; the end of a run is shown at once
-PATIENCE: Final = 20.0  # s, for stopped runs to write what they have; then they are killed and lose a second at most
+REFRESH: Final = 1.0  # s between two looks at the movements on disk; the end of a run shows at once
+PATIENCE: Final = (
+    20.0  # s that stopped runs have to save their movements; then they are killed, and lose a second at most
+)
 
 Submit = Callable[[Config, Sequence[str]], Future[None]]
-"""Starts a run with these flags of ``sgimd run``, or goes on with it; the future ends with the run. It raises what
-``check_end`` raises, and OSError where files cannot be written or no process starts."""
+"""(config, flags of ``sgimd run``) -> a future that ends with the run, which is started or resumed. The future raises
+the errors of ``check_end``, and OSError if a file cannot be written or a process cannot start."""
 
 
 def sweep(
@@ -41,19 +43,19 @@ def sweep(
     flags: Sequence[str] = (),
     on_end: Callable[[Config], None] | None = None,
 ) -> list[str]:
-    """Run them, in this order, and show how far they are. If a run fails, the others go on.
+    """Carry out runs in this order and show progress; a failed run does not stop the others.
 
     Args:
-        configs: the runs, each with a directory of its own.
-        submit: of the engine where they run.
-        flags: of ``sgimd run``, for all of them, besides --resume.
-        on_end: called with each run that ended well, in this thread; its ValueError or OSError counts as a failure.
+        configs: the runs, each with its own directory.
+        submit: submission function of an engine.
+        flags: flags of ``sgimd run`` for all runs, besides --resume.
+        on_end: function to call in this thread with each run that ended well; its ValueError or OSError is a failure.
 
     Returns:
-        The failures: which run, the last words of its log, and where the log is.
+        The failures, a sentence each: name of the run, last line of its log, path of the log.
 
     Raises:
-        ValueError: two runs have one directory.
+        ValueError: two runs have the same directory.
         KeyboardInterrupt: a signal came.
     """
     twice = [path for path, n in Counter(config.directory for config in configs).items() if n > 1]
@@ -74,21 +76,21 @@ def sweep(
                             on_end(config)
                     except (Failed, ValueError, OSError) as error:
                         failures[config] = f"{config.title} failed: {error}"
-                        progress.total -= config.movements - done[config]  # the rest will not be run
+                        progress.total -= config.movements - done[config]  # the rest is not made
                 done |= {config: _on_disk(config) for future, config in pending.items() if future.running()}
                 ended = f"{len(configs) - len(pending) - len(failures)} of {len(configs)} runs"
                 progress.show(sum(done.values()), ended + (f", {len(failures)} failed" if failures else ""))
     except KeyboardInterrupt:
-        say("stopping all runs; the same command goes on from here")
+        say("stopping all runs; the same command continues them")
         raise
     return [failures[config] for config in configs if config in failures]
 
 
 @contextmanager
 def local(processes: int) -> Iterator[Submit]:
-    """An engine: so many processes of this machine at a time."""
+    """An engine: at most ``processes`` processes of this machine at a time."""
     running, stopped = set[subprocess.Popen[bytes]](), False
-    starting = Lock()  # no run starts after all have been stopped
+    starting = Lock()  # so that no run starts after all were stopped
 
     def carry_out(config: Config, flags: Sequence[str]) -> None:
         make_folder(config.directory.parent)
@@ -98,15 +100,14 @@ def local(processes: int) -> Iterator[Submit]:
             with starting:
                 if stopped:
                     return
-                # In a group of its own: only we get Ctrl-C, and pass it on.
+                # In its own process group: only this process gets Ctrl-C, and passes it on.
                 process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log, stderr=log, process_group=0)
                 running.add(process)
             code = process.wait()
         running.discard(process)
         check_end(config, code, log_of(config).read_bytes()[before:])
 
-    # Threads that each wait for a process of their own: a pool of processes would break, for all runs, when the system
-    # kills one of its processes.
+    # Each thread waits for one process. A pool of processes would fail for all runs if one of them were killed.
     pool = ThreadPoolExecutor(processes)
     try:
         yield lambda config, flags: pool.submit(carry_out, config, flags)
@@ -125,35 +126,35 @@ def local(processes: int) -> Iterator[Submit]:
 
 
 def run_words(config: Config, flags: Sequence[str]) -> list[str]:
-    """The command line of a run after ``sgimd``."""
+    """The command line of a run, without ``sgimd``."""
     return ["run", "--resume", *flags, *words(config)]
 
 
 def log_of(config: Config) -> Path:
-    """The file of a run's output, next to its directory."""
+    """The log of a run's output, next to its directory."""
     return config.directory.with_suffix(".log")
 
 
 def check_end(config: Config, code: int, said: bytes) -> None:
-    """Raise what is wrong, if anything, with the last words of a run.
+    """Raise an error with the last line of the output if a run did not end well.
 
     Args:
-        config: of the run.
-        code: exit code of its process; negative: the signal that killed it.
-        said: its output.
+        config: configuration of the run.
+        code: exit code of its process; if negative, the signal that killed it.
+        said: output of its process.
 
     Raises:
         ValueError: the run refused its request.
-        Failed: it failed under way.
+        Failed: the run failed after it started.
     """
     if code == 0:
         return
     _, mark, last = ("\n" + said.decode(errors="replace").rstrip()).rpartition("\nerror: ")
     if code < 0:
-        last = f"stopped by {signal.Signals(-code).name}; the same command goes on with it"
+        last = f"stopped by {signal.Signals(-code).name}; the same command continues it"
     elif not mark:
-        last = last.rpartition("\n")[2] or "it said nothing"
-    raise (ValueError if code == 2 else Failed)(f"{last}\nIts whole log: {log_of(config)}")
+        last = last.rpartition("\n")[2] or "it printed nothing"
+    raise (ValueError if code == 2 else Failed)(f"{last}\nFull log: {log_of(config)}")
 
 
 def _on_disk(config: Config) -> int:

@@ -1,7 +1,7 @@
-"""The engine of a cluster: each run is a task of Ray, on one core, that returns the run as one file.
+"""The engine of a cluster: each run is a Ray task on one core, which returns the record of the run.
 
-No folder has to be shared. A task works in a temporary folder of its node: it begins with what home has of the run and
-returns all of it at the end. When a node dies, Ray starts its tasks on others, from the same beginning.
+No shared folder is needed. A task works in a temporary folder of its node. It receives the record made so far and
+returns the new one. If a node dies, Ray repeats its tasks on other nodes, with the same records.
     with on_ray("auto") as submit: failures = sweep(configs, submit)
 """
 
@@ -33,9 +33,9 @@ from sgimd_torch.runs.directory import FILE
 from sgimd_torch.runs.engines.loop import Submit, check_end, log_of, run_words
 from sgimd_torch.runs.process import SIGNALS, Failed
 
-ANSWER_WITHIN: Final = 10.0  # s, for a cluster
-STORE: Final = 100 * 2**20  # bytes, for what is on its way; Ray would take a third of the memory
-# A process whose task was killed must not go on alone: prctl(PR_SET_PDEATHSIG, SIGKILL).
+CONNECT_WITHIN: Final = 10.0  # s
+STORE: Final = 100 * 2**20  # bytes of Ray's object store; its default is a third of the memory
+# A process must not outlive its killed task: prctl(PR_SET_PDEATHSIG, SIGKILL).
 PROGRAM: Final = (
     ("-c", "import ctypes, runpy; ctypes.CDLL(None).prctl(1, 9); runpy.run_module('sgimd_torch', run_name='__main__')")
     if sys.platform == "linux"
@@ -44,7 +44,7 @@ PROGRAM: Final = (
 
 
 Ended = tuple[int, bytes, bytes | None]
-"""What a task returns: the exit code of its process, its output, and the record of the run, None without one."""
+"""The result of a task: exit code and output of its process, and the record of the run, None if there is none."""
 
 
 @contextmanager
@@ -53,29 +53,28 @@ def on_ray(address: str | None, processes: int = 1, *, ships: bool = False, out:
 
     Args:
         address: ``host:port`` of a cluster that this machine belongs to, or ``auto``; None starts one on this machine.
-        processes: how many run at a time, of a cluster that is started here.
-        ships: send a copy of the working directory along, which the runs import from.
-        out: a folder that is not sent; neither is what .gitignore names.
+        processes: number of runs at a time in a cluster that is started here.
+        ships: whether to send a copy of the working directory, for runs that import the user's code from it.
+        out: folder that is not sent; files that .gitignore names are not sent, either.
 
     Raises:
-        ValueError: the cluster cannot be used; or the working directory is to be sent, and the path of Python has a
-            space: Ray would wait for ever.
+        ValueError: the cluster cannot be used; or ``ships``, and the path of Python has a space: Ray would hang.
     """
     options: dict[str, Any] = {}
     if ships:
         if " " in sys.executable:
             raise ValueError(
-                f"Ray cannot start Python from a path with a space, {sys.executable}, for runs with parts of your own; "
-                "put the virtual environment elsewhere, or leave --engine ray out"
+                f"Ray cannot start Python from a path with a space, {sys.executable}, for runs with your own parts; "
+                "move the virtual environment, or omit --engine ray"
             )
         options["runtime_env"] = {"working_dir": os.getcwd(), "excludes": [f"/{os.path.relpath(out)}"]}
     heard = {signum: signal.getsignal(signum) for signum in SIGNALS}
     try:
         _connect(address, processes, options)
     finally:
-        for signum, handler in heard.items():  # Ray has its own
+        for signum, handler in heard.items():  # Ray installs its own
             signal.signal(signum, handler)
-    # Only the death of a node, or of the task's own process, starts a task again. A run that fails ends its task.
+    # Ray repeats a task only if its node or its worker process dies. A run that fails ends its task.
     task: Any = ray.remote(num_cpus=1, max_retries=-1)(carry_out)
 
     def submit(config: Config, flags: Sequence[str]) -> Future[None]:
@@ -85,7 +84,7 @@ def on_ray(address: str | None, processes: int = 1, *, ships: bool = False, out:
             try:
                 _keep(config, returned.result())
             except RayError as lost:
-                future.set_exception(Failed(f"Ray has lost it: {_in_one_line(lost)}"))
+                future.set_exception(Failed(f"Ray lost the run: {_in_one_line(lost)}"))
             except (Failed, ValueError, OSError) as error:
                 future.set_exception(error)
             else:
@@ -93,13 +92,12 @@ def on_ray(address: str | None, processes: int = 1, *, ships: bool = False, out:
 
         away = replace(config, out=Path("runs"))
         record = f"{away.directory}/{FILE}"
-        named = [path for path in (getattr(config, option) for option in FILES) if path is not None]
         try:
-            files = {str(path): path.read_bytes() for path in named}
+            files = {str(config[name]): config[name].read_bytes() for name in FILES if config[name] is not None}
             if (config.directory / FILE).exists():
                 files[record] = _snapshot(config.directory / FILE)
         except (OSError, sqlite3.Error) as error:
-            future.set_exception(ValueError(f"it cannot be sent: {error}"))
+            future.set_exception(ValueError(f"its files cannot be sent: {error}"))
         else:
             task.remote(run_words(away, flags), record, files).future().add_done_callback(end)
         return future
@@ -107,16 +105,16 @@ def on_ray(address: str | None, processes: int = 1, *, ships: bool = False, out:
     try:
         yield submit
     finally:
-        ray.shutdown()  # this kills tasks, too
+        ray.shutdown()  # it kills tasks, too
 
 
 def carry_out(words: Sequence[str], record: str, files: Mapping[str, bytes]) -> Ended:
     """The task: a run in a temporary folder of this node.
 
     Args:
-        words: the command line after ``sgimd``.
-        record: where the run is written, a path in this folder.
-        files: what is there before, by paths in this folder.
+        words: command line of the run, without ``sgimd``.
+        record: path of the record within the folder.
+        files: contents of the files to put there first, by path within the folder.
     """
     with TemporaryDirectory(prefix="sgimd-") as folder:
         for name, content in files.items():
@@ -132,7 +130,7 @@ def carry_out(words: Sequence[str], record: str, files: Mapping[str, bytes]) -> 
 
 
 def _keep(config: Config, ended: Ended) -> None:
-    """Write what a task has returned; raise what went wrong, see ``check_end``."""
+    """Write the log and the record that a task returned; raise the errors of ``check_end``."""
     code, said, record = ended
     make_folder(config.directory)
     with log_of(config).open("ab") as log:
@@ -143,16 +141,16 @@ def _keep(config: Config, ended: Ended) -> None:
 
 
 def _snapshot(path: Path) -> bytes:
-    """The content of a record as of its last commit, also where a process was killed before the next."""
+    """The content of a record as of its last commit, even if its process was killed before the next one."""
     with closing(sqlite3.connect(path)) as connection:
         return connection.serialize()
 
 
 def _connect(address: str | None, processes: int, options: Mapping[str, Any]) -> None:
-    """To the cluster at ``address``, or to one that is started here.
+    """Connect to the cluster at ``address``, or start one here.
 
     Raises:
-        ValueError: there is none, or it cannot be used.
+        ValueError: there is no cluster, or it cannot be used.
     """
     logging.getLogger("ray").setLevel(logging.ERROR)
     if address is None:
@@ -160,7 +158,9 @@ def _connect(address: str | None, processes: int, options: Mapping[str, Any]) ->
     elif address != "auto":
         host, _, port = address.rpartition(":")
         try:
-            socket.create_connection((host, int(port)), ANSWER_WITHIN).close()  # Ray would try for minutes, then abort
+            socket.create_connection(
+                (host, int(port)), CONNECT_WITHIN
+            ).close()  # Ray itself would try for minutes, then abort
         except (OSError, OverflowError, ValueError) as error:
             hint = "--address is host:port of its head, or auto, on a node of it; is it running?"
             raise ValueError(f"no Ray cluster answers at {address}: {error}; {hint}") from error

@@ -1,6 +1,6 @@
-"""Tasks: an environment with what a study of it needs: benchmark goals, demonstrations, their correspondence.
+"""Tasks: an environment with benchmark goals, demonstrations and their correspondence.
 
-Those of the catalogue are in ``rods.py`` and ``robots.py``. One of your own may come alone, or as a ``Task``:
+The tasks of the catalogue are in ``rods.py`` and ``robots.py``. Your own function may return an environment or a Task:
     def make(): return Task(Toss(), benchmark=my_goals, demonstrations=Path("shown.npz"), correspondence=translate)
 """
 
@@ -10,33 +10,51 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import Final, Protocol, runtime_checkable
 
 import numpy as np
 
-from sgimd_torch.environments.protocol import Environment, Tracer, check_instance, primitive_of, traced
+from sgimd_torch.environments.protocol import Environment, Trace, Tracer, check_instance, primitive_of, traced
 from sgimd_torch.evaluation import Benchmark, load_benchmark
 from sgimd_torch.files import checksum
 from sgimd_torch.learner import Correspondence
-from sgimd_torch.spaces import Demonstration
+from sgimd_torch.spaces import Array, Demonstration
 
-MOST_GOALS: Final = 500  # of a task that has none
-FASTER: Final = 3.0  # than the shortest movement, and more: such a recording has wrong times
-TOO_FAR: Final = 0.25  # of a joint's range: a robot that misses a demonstration by more cannot make that movement
+MOST_GOALS: Final = 500  # goals made for a task that has none
+FASTER: Final = 3.0  # a recording this many times faster than the shortest movement has wrong times
+TOO_FAR: Final = 0.25  # of a joint's range; a larger misfit means that the robot cannot play the recording
+
+
+@runtime_checkable
+class Drawn(Protocol):
+    """Optional for an environment: movements that can be filmed."""
+
+    def trace(self, context: Array, theta: Array, rng: np.random.Generator) -> Trace:
+        """The movement; its outcome equals that of ``execute`` with an equal stream."""
+        ...
+
+
+@runtime_checkable
+class Translating(Protocol):
+    """Optional for an environment: demonstrations that can be translated."""
+
+    def correspondence(self, times: Array, trajectory: Array) -> Array:
+        """``(theta_dim,)`` theta_d of a recording, eq. (6): ``(n_times,)`` s, ``(n_times, n_joints)``."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """What can be learnt, and how it is judged.
+    """An environment, its goals of evaluation and its demonstrations.
 
     Args:
-        environment: the robot and its world.
-        benchmark: goals of evaluation: a file, or a function that makes them; None for goals all over T.
-        demonstrations: what a teacher has to show: a file, or a function that makes it; None for no teacher.
-        correspondence: (times, trajectory) -> theta_d, eq. (6); None for the environment's own, if it has one.
+        environment: robot and world.
+        benchmark: goals of evaluation, a file or a function that makes them; None for goals all over T.
+        demonstrations: demonstrations of a teacher, a file or a function that makes them; None for no teacher.
+        correspondence: (times, trajectory) -> theta_d, eq. (6); None for that of a `Translating` environment.
 
     Raises:
-        ValueError: a class in the place of an environment.
+        ValueError: a class was given instead of an environment.
     """
 
     environment: Environment
@@ -49,34 +67,34 @@ class Task:
 
     @property
     def picture(self) -> Tracer | None:
-        """The environment's ``trace``, which gives a movement to film, checked; None if it has none."""
-        found = getattr(self.environment, "trace", None)
-        return partial(traced, self.environment, found) if callable(found) else None
+        """The ``trace`` of a `Drawn` environment, its result checked; None for any other environment."""
+        robot = self.environment
+        return partial(traced, robot, robot.trace) if isinstance(robot, Drawn) else None
 
 
 def goals_all_over(environment: Environment) -> Benchmark:
-    """At most 500 goals over T, for a task that has none: a grid in one or two dimensions, Sobol points above."""
+    """At most 500 goals all over T: a grid in one or two dimensions, Sobol points in more."""
     box = environment.outcomes
     per_side = int(MOST_GOALS ** (1 / box.dim))
     if box.dim <= 2:
         steps = (np.arange(per_side) + 0.5) / per_side
         points = np.stack(np.meshgrid(*[steps] * box.dim), axis=-1).reshape(-1, box.dim)
     else:
-        from scipy.stats import qmc  # takes longer to import than this whole library
+        from scipy.stats import qmc  # slower to import than this whole library
 
         points = qmc.Sobol(box.dim, scramble=False).random_base2(int(np.log2(MOST_GOALS)))[1:]
     return Benchmark(type(environment).__name__, box.low + points * box.sides, float(box.sides.max()) / per_side)
 
 
 def benchmark_of(task: Task, file: Path | None) -> tuple[Benchmark, list[str], str | None]:
-    """The goals of a run, messages on them, and the checksum of their file, None of goals that are made.
+    """Goals of evaluation, messages about them, and the checksum of their file, None without a file.
 
     Args:
-        task: has the goals if there is no file.
-        file: replaces them.
+        task: task of the run; its goals are used if ``file`` is None.
+        file: file of other goals, or None.
 
     Raises:
-        ValueError: they do not fit the environment, or the file is damaged.
+        ValueError: the goals do not fit the environment, or the file is damaged.
         OSError: there is no such file.
     """
     source, robot, notes, crc32 = file or task.benchmark, task.environment, list[str](), None
@@ -89,28 +107,28 @@ def benchmark_of(task: Task, file: Path | None) -> tuple[Benchmark, list[str], s
         benchmark = goals_all_over(robot)
         notes.append(
             f"{type(robot).__name__} has no benchmark goals: evaluations use {len(benchmark.goals)} points all over T, "
-            "also where it cannot reach; sgimd benchmark makes goals from runs for --benchmark; a Task may have its own"
+            "reachable or not; sgimd benchmark makes goals from runs, for --benchmark or for a Task"
         )
     benchmark.check(robot)
     return benchmark, notes, crc32
 
 
 def demonstrations_of(task: Task, file: Path | None) -> tuple[Sequence[Demonstration], list[str], str | None]:
-    """What a teacher can show, messages on it, and the checksum of the file.
+    """Demonstrations of a teacher, messages about them, and the checksum of their file, None without a file.
 
     Args:
-        task: has the demonstrations if there is no file.
-        file: replaces them.
+        task: task of the run; its demonstrations are used if ``file`` is None.
+        file: file of other demonstrations, or None.
 
     Raises:
-        ValueError: there are none, or one cannot be translated, or the file is damaged.
+        ValueError: there are none, one cannot be translated, or the file is damaged.
         OSError: there is no such file.
     """
     source, robot = file or task.demonstrations, task.environment
     if source is None:
         raise ValueError(
-            f"{type(robot).__name__} comes without demonstrations, and this algorithm needs a teacher; "
-            "give --demonstrations FILE, or choose one that learns alone: --algorithm practice"
+            f"{type(robot).__name__} has no demonstrations, but this algorithm needs a teacher; give --demonstrations "
+            "FILE, or choose an algorithm that learns alone: --algorithm practice"
         )
     shown: Sequence[Demonstration]
     crc32: str | None = None
@@ -125,12 +143,12 @@ def demonstrations_of(task: Task, file: Path | None) -> tuple[Sequence[Demonstra
         for row, each in enumerate(shown):
             try:
                 if (lasts := each.times[-1] - each.times[0]) < shortest / FASTER:
-                    raise ValueError(f"movements last {shortest:g} s at least, it {lasts:g} s; is it in milliseconds?")
+                    raise ValueError(f"it lasts {lasts:g} s, movements at least {shortest:g} s; is it in milliseconds?")
                 misfit = misfit_of(robot, translate(each.times, each.trajectory), each)
                 if ranges is not None and misfit > TOO_FAR * ranges.sides.mean():
                     raise ValueError(
-                        f"it is {misfit:.2f} (root mean square) away from anything that the robot can play; was it "
-                        "recorded in degrees, or with the joints in another order?"
+                        f"the nearest movement of the robot misses it by {misfit:.2f} (root mean square); is it in "
+                        "degrees, or with the joints in another order?"
                     )
             except ValueError as error:
                 raise ValueError(f"{source}: recording {row} cannot be translated: {error}") from error
@@ -146,15 +164,16 @@ def demonstrations_of(task: Task, file: Path | None) -> tuple[Sequence[Demonstra
 
 
 def correspondence_of(task: Task) -> Correspondence:
-    """From a demonstrated trajectory to theta.
+    """The function (times, trajectory) -> theta_d of a task.
 
     Raises:
         ValueError: neither the task nor its environment has one.
     """
-    found = task.correspondence or getattr(task.environment, "correspondence", None)
-    if found is None:
-        raise ValueError(
-            f"{type(task.environment).__name__} has no correspondence, so demonstrations cannot be translated; give it "
-            "a method correspondence(times, trajectory) -> theta, or return Task(environment, correspondence=...)"
-        )
-    return found
+    if task.correspondence is not None:
+        return task.correspondence
+    if isinstance(task.environment, Translating):
+        return task.environment.correspondence
+    raise ValueError(
+        f"{type(task.environment).__name__} has no correspondence, so demonstrations cannot be translated; give it "
+        "a method correspondence(times, trajectory) -> theta, or return Task(environment, correspondence=...)"
+    )

@@ -1,4 +1,4 @@
-"""Other robots as tasks: what they are judged by and what they are shown is made here, the same for every seed."""
+"""Other robots as tasks; their benchmark goals and demonstrations are made here, equal for every seed."""
 
 from __future__ import annotations
 
@@ -7,19 +7,16 @@ from typing import Final
 
 import numpy as np
 
-from sgimd_torch.environments import objects, toys
 from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.environments.toys import Toy
 from sgimd_torch.evaluation import SHIPPED as SHIPPED_BENCHMARK
 from sgimd_torch.evaluation import Benchmark, tile_goals
 from sgimd_torch.runs.tasks import Task
 from sgimd_torch.spaces import Array, Box, Demonstration, stream
 
 DATA: Final = SHIPPED_BENCHMARK.parent
-SIDE: Final = 0.1  # m, of a benchmark tile; it leaves 311 goals in the disc of radius 1 m that these arms reach
+SIDE: Final = 0.1  # m, side of a benchmark tile; 311 goals lie in the disc of radius 1 m that these arms reach
 SHOWN: Final = 127  # demonstrations, as many as each shipped demonstrator recorded
-SAMPLES: Final = 5  # of each of them
-REACHING: Final = 20_000  # uniform movements that show what a toy can reach
+SAMPLES: Final = 5  # rows of the trajectory of each demonstration
 
 
 def planar_arm(*, n_joints: int) -> Task:
@@ -47,86 +44,23 @@ def half_reached() -> Task:
     return Task(arm, partial(arm_benchmark, arm))
 
 
-def toy(robot: Toy, side: float, *, taught: bool = False) -> Task:
-    """A toy robot; its goals lie on tiles of ``side``, in the unit of T. ``taught``: it has a teacher, too."""
-    shown = partial(toy_demonstrations, robot) if taught else None
-    return Task(robot, partial(toy_benchmark, robot, side), shown, last_row if taught else None)
-
-
-def toss() -> Task:
-    """A ball thrown in the wind, which is the context."""
-    return toy(toys.toss(), 0.4, taught=True)
-
-
-def crawler() -> Task:
-    """Four legs, whose phases are periodic parameters."""
-    return toy(toys.crawler(), 0.1)
-
-
-def two_elbows() -> Task:
-    """An arm with two separate families of postures."""
-    return toy(toys.two_elbows(), 0.1)
-
-
-def spatial_arm() -> Task:
-    """An arm with six joints and three outcomes, in cm."""
-    return toy(toys.spatial_arm(), 25.0)
-
-
-def puck() -> Task:
-    """A puck that has to be hit; where it lies is the context."""
-    return toy(objects.puck(), 0.1)
-
-
-def fetch() -> Task:
-    """A ball that has to be grasped."""
-    return toy(objects.fetch(), 0.1)
-
-
-def toy_benchmark(robot: Toy, side: float) -> Benchmark:
-    """One random goal in each tile that uniform movements reach, in the middle of C; always the same ones."""
-    rng = stream(0, "goals for a toy")
-    thetas = robot.policies.low + robot.policies.sides * rng.random((REACHING, robot.policies.dim))
-    context = (robot.contexts.low + robot.contexts.high) / 2
-    reached = robot.effect(np.tile(context, (REACHING, 1)), thetas)
-    return Benchmark(type(robot).__name__, tile_goals(reached, robot.outcomes, side, rng), side)
-
-
-def last_row(times: Array, trajectory: Array) -> Array:
-    """The correspondence of a toy: a demonstration of it is theta itself."""
-    return trajectory[-1]
-
-
-def toy_demonstrations(robot: Toy) -> list[Demonstration]:
-    """Movements in contexts all over C, each to another place that uniform movements reach; always the same ones."""
-    rng = stream(0, "demonstrations by a toy")
-    thetas = robot.policies.low + robot.policies.sides * rng.random((REACHING, robot.policies.dim))
-    found = []
-    for place in rng.integers(REACHING, size=SHOWN):
-        context = robot.contexts.sample(rng)
-        outcomes = robot.effect(np.tile(context, (REACHING, 1)), thetas)
-        if robot.outcomes.contains(outcomes[place]):
-            found.append(Demonstration(context, np.array([0.0, 1.0]), np.tile(thetas[place], (2, 1)), outcomes[place]))
-    return found
-
-
 def arm_benchmark(arm: PlanarArm) -> Benchmark:
-    """One random goal in each tile of T, without those that the arm cannot reach; always the same ones."""
+    """One random goal in each tile of T that the arm can reach; equal in every run."""
     box = arm.outcomes
     goals = tile_goals(np.tile(_grid(box, SIDE), (2, 1)), box, SIDE, stream(0, "goals for an arm"))
     return Benchmark(type(arm).__name__, goals[arm.reachable(goals)], SIDE)
 
 
 def arm_demonstrations(arm: PlanarArm) -> list[Demonstration]:
-    """Movements from rest to postures with all bends equal; their end positions are spread evenly within reach."""
-    shares = (np.arange(SHOWN) + 0.5) / SHOWN  # of the area within reach: a sunflower's spiral
+    """Movements from rest to postures with equal joint angles; their ends spread evenly over the reachable disc."""
+    shares = (np.arange(SHOWN) + 0.5) / SHOWN  # of the disc's area, along a sunflower spiral
     turns = np.pi * (3 - np.sqrt(5)) * np.arange(SHOWN)
     ends = np.sqrt(shares)[:, None] * np.stack([np.cos(turns), np.sin(turns)], axis=1)
     return [_led_to(arm, end) for end in ends]
 
 
 def _grid(box: Box, side: float) -> Array:
-    """``(n, dim)``, the middles of tiles."""
+    """``(n, dim)`` centres of tiles."""
     middles = [np.arange(low + side / 2, high, side) for low, high in zip(box.low, box.high, strict=True)]
     return np.stack(np.meshgrid(*middles), axis=-1).reshape(-1, box.dim)
 

@@ -1,4 +1,4 @@
-"""The fishing rod as a task: its benchmark and its demonstrations are shipped files."""
+"""The fishing rod as a task, with the shipped benchmark and demonstrations."""
 
 from __future__ import annotations
 

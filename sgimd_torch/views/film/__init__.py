@@ -1,1 +1,1 @@
-"""Films of what a run has learnt. Needs MuJoCo and a way to draw."""
+"""Films of what a run has learnt, drawn by MuJoCo or in the plane."""

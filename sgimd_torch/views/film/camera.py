@@ -1,11 +1,10 @@
 """Films of the fishing rod: the arm casts, the line swings, the float lands near its goal.
 
-Section 4 of Nguyen & Oudeyer (2014). A film shows what ``FishingRod.trace`` has simulated, in real time. Line and
-float are drawn thicker than they are, so that they can be seen. Light, shadow and reflection are those of
-``fishing_rod.xml``.
-    with Camera(rod.model) as camera: write_film(Path("film.mp4"), shoot(camera.frame, [Shot(recording, goal)]))
+Section 4 of Nguyen & Oudeyer (2014). A film shows a movement that ``FishingRod.trace`` has simulated, in real time.
+Line and float are drawn too thick, to be visible. ``fishing_rod.xml`` defines light, shadow and reflection.
+    with Camera(rod.model) as camera: write_film(Path("film.mp4"), shoot(camera, [Shot(recording, goal)]))
 
-Needs the extra ``film``, and OpenGL: without a display, set MUJOCO_GL=egl before anything imports mujoco.
+Needs the extra ``film`` and OpenGL: without a display, set MUJOCO_GL=egl before the first import of mujoco.
 """
 
 from __future__ import annotations
@@ -25,39 +24,35 @@ from sgimd_torch.environments.rod_physics import RodTrace
 from sgimd_torch.spaces import Array
 from sgimd_torch.views.film.reel import HEIGHT, WIDTH, Shot
 
-MOST_PAST: Final = 250  # landings that are drawn: this many take as much time as all the rest
+MOST_PAST: Final = 250  # past landings that are drawn; drawing them doubles the time of a frame
 
 _Colour = tuple[float, float, float, float]
 _INK, _FLOAT, _GOAL, _PATH = (0.06, 0.06, 0.08, 1), (0.92, 0.24, 0.02, 1), (0.94, 0.89, 0.26, 1), (0.6, 0.28, 0.12, 1)
 _PAST, _RING = (0.92, 0.96, 1, 0.7), (0.85, 0.93, 0.97, 0.45)
 
 
-class NoGraphics(ImportError):
-    """MuJoCo finds no OpenGL to draw with."""
-
-
 class Camera:
-    """Draws shots as images, without a window; a context manager.
+    """Draws shots of the rod without a window; a context manager, and a `Painter`.
 
     Args:
-        model: of the rod, left as it is.
+        model: MuJoCo model of the rod; it is not changed.
 
     Raises:
-        NoGraphics: there is no OpenGL, or not the kind that MUJOCO_GL names.
+        ImportError: there is no OpenGL, or not the kind that MUJOCO_GL names.
     """
 
     def __init__(self, model: mujoco.MjModel) -> None:
         self._model = copy.copy(model)
-        for name in ("line", "float"):  # frame draws them
+        for name in ("line", "float"):  # ``frame`` draws these
             self._model.material(name).rgba[3] = 0.0
         self._data = mujoco.MjData(self._model)
         self._tip = self._model.site("tip").id
         self._line = [self._model.body(f"line_{k:02}").id for k in range(2, 31)]
         try:
             self._renderer = mujoco.Renderer(self._model, HEIGHT, WIDTH)
-        # Each kind of OpenGL fails in its own way.
+        # Each OpenGL library fails in a different way.
         except (mujoco.FatalError, AttributeError, RuntimeError, ImportError) as error:
-            raise NoGraphics(
+            raise ImportError(
                 f"MuJoCo finds no OpenGL to draw with (MUJOCO_GL={os.environ.get('MUJOCO_GL', '')}: {error}); without "
                 "a display set MUJOCO_GL=egl and install libegl1 (Debian, Ubuntu), or MUJOCO_GL=osmesa and libosmesa6"
             ) from error
@@ -69,10 +64,12 @@ class Camera:
         self._renderer.close()
 
     def frame(self, shot: Shot, time: float) -> Image.Image:
-        """The scene at ``time`` (s); from the landing on, the landing: line, float, and where the float has been; on
-        the water circles of half a metre and of a metre around the arm, past landings, the goal."""
-        recording = shot.recording
-        assert isinstance(recording, RodTrace)
+        """The scene at ``time`` (s), after the landing that of the landing.
+
+        It shows arm, line, float and the float's path. On the water it shows the goal, past landings, and circles with
+        radii of 0.5 m and 1 m around the arm.
+        """
+        recording = _trace(shot)
         time = min(time, recording.landed)
         row = min(round(time / recording.step), len(recording.states) - 1)
         mujoco.mj_setState(self._model, self._data, recording.states[row], mujoco.mjtState.mjSTATE_FULLPHYSICS)
@@ -93,6 +90,17 @@ class Camera:
             _draw_chain(scene, [np.append(shot.goal, 0.006), np.append(recording.outcome, 0.006)], 0.005, _GOAL)
         return Image.fromarray(self._renderer.render())
 
+    @staticmethod
+    def note(shot: Shot, time: float) -> str:
+        """ "line let out" once it is."""
+        let_out = _trace(shot).let_out
+        return "line let out" if let_out is not None and time > let_out else ""
+
+
+def _trace(shot: Shot) -> RodTrace:
+    assert isinstance(shot.recording, RodTrace)
+    return shot.recording
+
 
 def _circle(centre: Array, radius: float) -> Array:
     angles = np.linspace(0, 2 * np.pi, 60)
@@ -100,14 +108,14 @@ def _circle(centre: Array, radius: float) -> Array:
 
 
 def _draw_chain(scene: mujoco.MjvScene, points: Sequence[Array] | Array, radius: float, colour: _Colour) -> None:
-    """Rods from point to point, of a ``radius`` in m; 0 draws lines, which is quicker."""
+    """Join points by rods of a ``radius`` (m); 0 draws lines, which is faster."""
     kind, width = (mujoco.mjtGeom.mjGEOM_CAPSULE, radius) if radius else (mujoco.mjtGeom.mjGEOM_LINE, 2)  # 2 pixels
     for start, stop in pairwise(points):
         mujoco.mjv_connector(_draw(scene, kind, (width, 0, 0), start, colour), kind, width, start, stop)
 
 
 def _draw(scene: mujoco.MjvScene, kind: int, size: Sequence[float], place: Array, colour: _Colour) -> Any:
-    """Add a body to the scene; ``size`` in m, as MuJoCo defines it for this ``kind``."""
+    """Add a geom to the scene; ``size`` (m) as MuJoCo defines it for this ``kind``."""
     geom = scene.geoms[scene.ngeom]
     mujoco.mjv_initGeom(geom, kind, np.array(size), place, np.eye(3).ravel(), np.array(colour, np.float32))
     scene.ngeom += 1

@@ -1,11 +1,12 @@
-"""Film what a run has learnt: the robot moves for chosen goals, with the movements that the run's own memory infers.
+"""Film what a run has learnt: the robot executes the movements that the run infers for chosen goals.
 
-Each goal is answered by the run's inverse model, its memory rebuilt from the record, and executed once with noise;
-where there are contexts, in the middle of their range. A yellow ring is the goal, white dots are past landings; of the
-rod, circles are half a metre and a metre around the base. If the float has not met the water after the movement, the
-line is let out and the float falls; the film says so. Beside it: each goal of the benchmark, coloured by how far its
-answer misses it, and how the mean error has fallen. Planar arms, and environments of your own with
-trace(context, theta, rng) -> Sketch, are drawn in the plane; a red cross is the outcome, in the plane of the goals.
+The memory is rebuilt from the record. The inverse model of the run infers a movement for each goal, and the robot
+executes it once, with noise, in the middle of C. The yellow ring is the goal, dots are past outcomes, and a red cross
+is the outcome. A panel shows the goals of the benchmark, coloured by error, and the curve of the mean error.
+
+The fishing rod is drawn by MuJoCo, with circles at 0.5 m and 1 m around its base. If the float is still in the air
+after the movement, the line is let out and the float falls; the caption says so. Planar arms, and your own
+environments with a method trace(context, theta, rng) -> Sketch, are drawn in the plane.
 """
 
 from __future__ import annotations
@@ -31,30 +32,31 @@ from sgimd_torch.runs.read import Run, config_of, read_run
 from sgimd_torch.spaces import Array, stream
 from sgimd_torch.strategies import Remember
 from sgimd_torch.views.film.panel import panel
-from sgimd_torch.views.film.reel import RATES, Shot, shoot, write_film
+from sgimd_torch.views.film.reel import RATES, Painter, Shot, shoot, write_film
 from sgimd_torch.views.film.sketch import Sketchbook
 
 EXAMPLES = """examples:
   sgimd film runs/sgim-d/seed-003                               six goals, into runs/sgim-d/seed-003.mp4
-  sgimd film runs/sgim-d/seed-003 --goals 0.3,0.6 -0.5,0.4      these two
-  sgimd film runs/sgim-d/seed-003 --after 30 300 3000           how it learns: two goals, early and late
-  sgimd film runs/sgim-d/seed-003 --out film.webp               a moving picture, for a page
+  sgimd film runs/sgim-d/seed-003 --goals 0.3,0.6 -0.5,0.4      two chosen goals
+  sgimd film runs/sgim-d/seed-003 --after 30 300 3000           two goals, early and late in learning
+  sgimd film runs/sgim-d/seed-003 --out film.webp               an animated picture, for a page
 """
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Make the film; returns 0.
+    """Make the film; the exit code, 0.
 
     Raises:
-        ValueError, OSError, ImportError: the request is wrong, or there is nothing to draw with.
+        ValueError, OSError: the request is wrong.
+        ImportError: a library to draw with is missing.
     """
     options = _options(argv)
     run = read_run(options.run)
     parts = _parts(run, trust=options.trust)
     if parts.task.picture is None:
         raise ValueError(
-            f"{run.path} is of {run.config['environment']}, which cannot be filmed: it brings no picture of its "
-            "movements, a method trace(context, theta, rng) -> Sketch"
+            f"{run.path} is of {run.config['environment']}, which cannot be filmed: it needs a method trace(context, "
+            "theta, rng) -> Sketch"
         )
     if options.goals is None:
         known = np.unique(parts.benchmark.goals, axis=0)
@@ -64,10 +66,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         goals = np.stack([parts.environment.outcomes.check("--goals", goal, hint) for goal in options.goals])
     stages = _stages(run, options)
     shots = _cast(run, parts, goals, stages)
-    with _camera(parts.environment, shots) as camera:
+    with _painter(parts.environment, shots) as painter:
         rate = RATES[options.out.suffix]
         n = sum(len(shot.moments(rate)) for shot in shots)
-        write_film(options.out, tqdm(shoot(camera.frame, shots, rate), "filming", n, unit=" frames", delay=1.0))
+        write_film(options.out, tqdm(shoot(painter, shots, rate), "filming", n, unit=" frames", delay=1.0))
     amount, missed = parts.environment.outcomes.amount, np.reshape([shot.missed for shot in shots], (len(stages), -1))
     for movements, each in zip(stages, missed, strict=True):
         mean, most = amount(each.mean()), amount(each.max())
@@ -77,20 +79,20 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _parts(run: Run, *, trust: bool) -> RunParts:
-    """What made the run. MuJoCo chooses how to draw when it is imported, and may fail then; arms do without it."""
+    """The parts of the run. For the rod this imports MuJoCo, which chooses then how to draw, and may fail."""
     if sys.platform == "linux":
-        os.environ.setdefault("MUJOCO_GL", "egl")  # draws without a display
+        os.environ.setdefault("MUJOCO_GL", "egl")  # works without a display
     try:
         return build(config_of(run, trust=trust))
-    except (AttributeError, RuntimeError) as error:  # each kind of OpenGL fails in its own way
+    except (AttributeError, RuntimeError) as error:  # each OpenGL library fails in a different way
         if "mujoco" in sys.modules:
             raise
         asked = os.environ.get("MUJOCO_GL")
         raise ImportError(f"MUJOCO_GL={asked} does not work ({error}); set MUJOCO_GL=egl, or unset it") from error
 
 
-def _camera(robot: Any, shots: Sequence[Shot]) -> AbstractContextManager[Any]:
-    """What draws these shots."""
+def _painter(robot: Any, shots: Sequence[Shot]) -> AbstractContextManager[Painter]:
+    """The painter of these shots."""
     if isinstance(shots[0].recording, Sketch):
         return nullcontext(Sketchbook(robot.outcomes, shots))
     from sgimd_torch.views.film.camera import Camera  # only the rod needs OpenGL
@@ -99,9 +101,11 @@ def _camera(robot: Any, shots: Sequence[Shot]) -> AbstractContextManager[Any]:
 
 
 def _cast(run: Run, parts: RunParts, goals: Array, stages: Sequence[int]) -> list[Shot]:
-    """For each stage the run's answer to each goal, which has the same motor noise at every stage. Beside it: how far
-    the goals of the benchmark are missed in the same context, and the curve of the mean error over the stages; in a
-    film of one stage, that of the run's own evaluations."""
+    """The shots: at each stage, the movement inferred for each goal, with the same motor noise at all stages.
+
+    The panel beside them has the errors of the benchmark goals in the same context, and the curve of the mean error
+    over the stages; a film of one stage shows the curve of the run's evaluations.
+    """
     picture = parts.task.picture
     assert picture is not None
     robot, seed = parts.environment, run.config["seed"]
@@ -111,7 +115,7 @@ def _cast(run: Run, parts: RunParts, goals: Array, stages: Sequence[int]) -> lis
     for before, movements in zip((0, *stages), stages, strict=False):
         remember(run, parts, before, movements)
         if not len(parts.learner.memory):
-            raise ValueError(f"{run.path} remembers nothing after {movements} movements, so it infers no movement")
+            raise ValueError(f"{run.path} has an empty memory after {movements} movements, so it infers no movement")
         past = run.outcomes[:movements]
         past = past[np.isfinite(past[:, 0])]
         title = f"{who}, seed {seed}, after {movements} movements"
@@ -131,8 +135,7 @@ def _cast(run: Run, parts: RunParts, goals: Array, stages: Sequence[int]) -> lis
 
 
 def remember(run: Run, parts: RunParts, start: int, stop: int) -> None:
-    """Add to the memory of ``parts`` what the learner remembered in movements ``start`` to ``stop``, in the same order,
-    and train a forward model on it as in the run."""
+    """Repeat what the learner remembered in movements ``start`` to ``stop``, in order, and train its forward model."""
     memory, correspondence = parts.learner.memory, parts.learner.correspondence
     by_observation = isinstance(parts.learner.social, Remember)  # other learners remember only their own movements
     for row in range(start, min(stop, len(run.index))):
@@ -147,10 +150,10 @@ def remember(run: Run, parts: RunParts, start: int, stop: int) -> None:
 
 
 def _stages(run: Run, options: argparse.Namespace) -> list[int]:
-    """After how many movements to film."""
+    """The numbers of movements after which to film."""
     lived = len(run.index)
     if not lived:
-        raise ValueError(f"{run.path} has no movements yet; --resume goes on with it")
+        raise ValueError(f"{run.path} has no movements yet; continue it with --resume")
     if options.after is None:
         return [lived]
     if not 1 <= min(options.after) <= max(options.after) <= lived:
@@ -166,13 +169,15 @@ def parser() -> argparse.ArgumentParser:
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("run", type=Path, help="a run's directory: OUT/NAME/seed-003")
-    goals = "in the task space; without it, six of the benchmark's, or two with --after"
+    parser.add_argument("run", type=Path, help="directory of a run: OUT/NAME/seed-003")
+    goals = "points of T (default: six of the benchmark, or two with --after)"
     parser.add_argument("--goals", type=numbers, nargs="+", metavar="X,Y", help=goals)
-    after = "movements; the goals again and again (default: once, after all movements)"
+    after = "numbers of movements after which to film all goals (default: all movements)"
     parser.add_argument("--after", type=int, nargs="+", metavar="N", help=after)
-    parser.add_argument("--trust", action="store_true", help="execute code that the run's settings name")
-    parser.add_argument("--out", type=Path, help="the film, .mp4 or .webp (default: .mp4 next to the run's directory)")
+    parser.add_argument(
+        "--trust", action="store_true", help="execute the user's code that the settings of the run name"
+    )
+    parser.add_argument("--out", type=Path, help="film to write, .mp4 or .webp (default: .mp4 next to the run)")
     return parser
 
 
@@ -188,5 +193,5 @@ def _options(argv: Sequence[str] | None) -> argparse.Namespace:
 
 
 def numbers(text: str) -> list[float]:
-    """A goal of the command line, such as "0.3,0.6"; argparse names this function where it fails."""
+    """A goal of the command line, such as "0.3,0.6"; argparse shows the name of this function if it fails."""
     return [float(word) for word in text.split(",")]

@@ -1,8 +1,7 @@
-"""Beside a film: which goals of the benchmark the learner meets already, and how its error falls.
+"""The panel beside a film: a map of the benchmark goals by error, and the curve of the mean error.
 
     picture = panel(space, goals, errors, 500, (movements, mean_errors), colour)
-The map shows each goal in the first two dimensions of T, coloured by how far its answer misses it. Needs the extra
-``film``.
+The map shows the first two dimensions of T. Needs the extra ``film``.
 """
 
 from __future__ import annotations
@@ -30,11 +29,12 @@ def panel(space: Box, goals: Array, errors: Array, now: int, curve: tuple[Array,
     """Map and curve after ``now`` movements.
 
     Args:
-        space: T, which gives names and unit.
-        goals: ``(n, outcome_dim)`` of the benchmark, which are missed by ``errors`` ``(n,)``.
-        now: movements of the learner.
-        curve: numbers of movements and the mean error after each of them, ``(m,)`` both; drawn up to ``now``.
-        colour: of the curve.
+        space: T, with names and unit.
+        goals: ``(n, outcome_dim)`` goals of the benchmark.
+        errors: ``(n,)`` errors of these goals, in the unit of T.
+        now: number of movements of the learner.
+        curve: ``(m,)`` numbers of movements and ``(m,)`` mean errors after them; drawn up to ``now``.
+        colour: colour of the curve.
     """
     shown, near = limits(goals, space), rounded(float(np.ptp(goals, axis=0).max() or 1.0) / 50)
     margin = shown.sides / 20
@@ -53,12 +53,12 @@ def panel(space: Box, goals: Array, errors: Array, now: int, curve: tuple[Array,
 
 
 def blank(width: float, **options: Any) -> Figure:
-    """A figure of so many pixels, as high as the film; ``options`` are matplotlib's."""
+    """A figure with a width in pixels and the height of the film; ``options`` go to matplotlib."""
     return Figure(figsize=(width / _DPI, HEIGHT / _DPI), dpi=_DPI, **options)
 
 
 def pixels(figure: Figure) -> Frame:
-    """What is drawn on a figure."""
+    """The drawing of a figure as a frame."""
     canvas: Any = FigureCanvasAgg(figure)
     canvas.draw()
     return np.array(canvas.buffer_rgba())[..., :3]

@@ -1,8 +1,7 @@
-"""What every film is made of: shots one after the other, frame by frame, captions, a file.
+"""The parts of every film: shots, frames, captions, and the file.
 
-``camera.py`` draws frames of the rod in MuJoCo, ``sketch.py`` those of robots in the plane, ``panel.py`` what stands
-beside them.
-    write_film(Path("film.mp4"), shoot(camera.frame, [Shot(recording, goal)]))
+``camera.py`` draws the rod in MuJoCo, ``sketch.py`` robots in the plane, ``panel.py`` the map and curve beside them.
+    write_film(Path("film.mp4"), shoot(camera, [Shot(recording, goal)]))
 
 Needs the extra ``film``.
 """
@@ -10,12 +9,12 @@ Needs the extra ``film``.
 from __future__ import annotations
 
 import subprocess
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import chain
 from pathlib import Path
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 from imageio_ffmpeg import get_ffmpeg_exe
@@ -28,11 +27,11 @@ from sgimd_torch.spaces import Array
 
 Frame = NDArray[np.uint8]  # (height, width, 3)
 
-WIDTH: Final = 640  # pixels, of the robot's picture
+WIDTH: Final = 640  # pixels, of the picture of the robot
 HEIGHT: Final = 480
-PAUSE: Final = 0.8  # s, the landing is shown
+PAUSE: Final = 0.8  # s, for which the end of a movement is shown
 RATES: Final = {".mp4": 25.0, ".webp": 12.5}
-"""Frames a second of each kind of film: every player opens the first, every browser shows the second in a page."""
+"""Frames per second of each kind of film: .mp4 for every player, .webp for a page in every browser."""
 
 _CODECS: Final = {
     ".mp4": ["-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "23", "-movflags", "+faststart", "-f", "mp4"],
@@ -42,8 +41,16 @@ _CODECS: Final = {
 
 @dataclass(frozen=True, eq=False)
 class Shot:
-    """One movement to film: the ``goal`` ``(outcome_dim,)`` that it is for, a ``title``, the ``unit`` of T, ``past``
-    outcomes ``(n, outcome_dim)``, and a picture to stand ``beside`` it."""
+    """One movement to film.
+
+    Args:
+        recording: movement to show.
+        goal: ``(outcome_dim,)`` in T.
+        title: text at the upper edge, "" for none.
+        unit: unit of T.
+        past: ``(n, outcome_dim)`` earlier outcomes.
+        beside: picture to the right of the movement, None for none.
+    """
 
     recording: Trace
     goal: Array
@@ -58,32 +65,39 @@ class Shot:
         return float(np.linalg.norm(self.recording.outcome - self.goal))
 
     def moments(self, rate: float) -> list[float]:
-        """At which times (s) of the movement it is shown, ``rate`` of them a second."""
+        """Times (s) of the frames, ``rate`` per second."""
         return list(np.arange(0.0, self.recording.landed + PAUSE, 1 / rate).tolist())
 
-    def caption(self, time: float) -> str:
-        """The text below the picture at ``time`` (s)."""
+    def caption(self, time: float, note: str = "") -> str:
+        """The text below the picture at ``time`` (s): the goal, and a ``note`` or, at the end, the outcome."""
         goal = f"goal {_place(self.goal)}"
         if time >= self.recording.landed:
             return f"{goal}, reached {_place(self.recording.outcome)}: missed by {self.missed:.2g} {self.unit}".rstrip()
-        let_out = getattr(self.recording, "let_out", None)  # of the rod
-        return f"{goal}   {time:.2f} s{'   line let out' if let_out is not None and time > let_out else ''}"
+        return f"{goal}   {time:.2f} s   {note}".rstrip()
 
 
-Draw = Callable[[Shot, float], Image.Image]
-"""(shot, time) -> the scene at ``time`` (s); from its end on, how it ended."""
+class Painter(Protocol):
+    """Draws the frames of shots."""
+
+    def frame(self, shot: Shot, time: float) -> Image.Image:
+        """The scene at ``time`` (s); after the end of the movement, its end."""
+        ...
+
+    def note(self, shot: Shot, time: float) -> str:
+        """Words for the caption at ``time`` (s), "" for none."""
+        ...
 
 
-def shoot(draw: Draw, shots: Iterable[Shot], rate: float = RATES[".mp4"]) -> Iterator[Frame]:
-    """The frames of a film: of each shot the movement, and its end for a moment."""
+def shoot(painter: Painter, shots: Iterable[Shot], rate: float = RATES[".mp4"]) -> Iterator[Frame]:
+    """The frames of a film, ``rate`` per second: each shot's movement, then its end for a moment."""
     for shot in shots:
         for time in shot.moments(rate):
-            frame = captioned(draw(shot, time), shot.title, shot.caption(time))
+            frame = captioned(painter.frame(shot, time), shot.title, shot.caption(time, painter.note(shot, time)))
             yield frame if shot.beside is None else np.concatenate([frame, shot.beside], axis=1)
 
 
 def captioned(image: Image.Image, title: str, caption: str) -> Frame:
-    """A picture with text at its upper and lower edge, "" for none."""
+    """A picture with a title at its upper edge and a caption at its lower edge, "" for none."""
     font = ImageFont.load_default(image.height / 24)
     pen, margin = ImageDraw.Draw(image, "RGBA"), image.height // 48
     for text, anchor, y in ((title, "la", margin), (caption, "ld", image.height - margin)):
@@ -95,11 +109,11 @@ def captioned(image: Image.Image, title: str, caption: str) -> Frame:
 
 
 def write_film(path: Path, frames: Iterable[Frame]) -> None:
-    """A film, which appears whole or not at all: H.264 in an mp4 file, or a moving picture for a page.
+    """Write a film, whole or not at all: H.264 in an mp4 file, or an animated webp picture.
 
     Args:
-        path: its ending is one of ``RATES``, which says how fast it plays.
-        frames: one or more, all of one size, even in height and width.
+        path: file with an ending in ``RATES``.
+        frames: one frame or more, all of one size, with even height and width.
 
     Raises:
         OSError: ``path`` cannot be written, or the encoder fails.
@@ -113,7 +127,7 @@ def write_film(path: Path, frames: Iterable[Frame]) -> None:
         command = [get_ffmpeg_exe(), "-v", "error", *given, *_CODECS[kind], "-y", str(partial)]
         with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as encoder:
             assert encoder.stdin is not None
-            with suppress(BrokenPipeError):  # it failed, and its error output says why
+            with suppress(BrokenPipeError):  # the encoder failed, and says why below
                 for frame in chain([first], frames):
                     encoder.stdin.write(frame.tobytes())
             _, said = encoder.communicate()

@@ -1,8 +1,8 @@
-"""Films of robots in the plane: what their ``trace`` gives, drawn as a chain of links, without OpenGL.
+"""Films of robots in the plane: the chains of links of a ``Sketch``, drawn without OpenGL.
 
-    write_film(Path("film.mp4"), shoot(Sketchbook(arm.outcomes, shots).frame, shots))
+    write_film(Path("film.mp4"), shoot(Sketchbook(arm.outcomes, shots), shots))
 The goal is a ring, past outcomes are dots, the outcome is a cross, the end of the chain leaves a path. The first two
-dimensions of the outcome are x and y of the picture; an outcome of one dimension lies on y = 0.
+dimensions of an outcome are x and y of the picture; with only one, y is 0.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from sgimd_torch.spaces import Array, Box
 from sgimd_torch.views.film.panel import blank, pixels
 from sgimd_torch.views.film.reel import HEIGHT, WIDTH, Shot
 
-MARGINS: Final = (0.06, 0.11)  # of width and height of the picture, around all that happens
+MARGINS: Final = (0.06, 0.11)  # shares of width and height of the picture
 _PAPER, _FRAME, _LINK = "#f7f5f0", "#c9c4b8", "#2b3a4a"
 _PATH, _END, _PAST = "#e08a55", "#d1341f", "#9db4c8"
 
 
 class Sketchbook:
-    """Draws shots whose recordings are ``Sketch``es.
+    """Draws shots whose movements are ``Sketch``es; a `Painter`.
 
     Args:
-        space: T, whose frame is drawn.
-        shots: all that will be drawn, so that pictures have one scale; they show what happens, not all of T.
+        space: T, drawn as a frame.
+        shots: all shots of the film; the scale of the pictures fits them, not all of T.
     """
 
     def __init__(self, space: Box, shots: Sequence[Shot]) -> None:
@@ -45,7 +45,7 @@ class Sketchbook:
         self._ax = self._figure.add_axes((0, 0, 1, 1))
 
     def frame(self, shot: Shot, time: float) -> Image.Image:
-        """The robot at ``time`` (s); from its end on, where it ended."""
+        """The robot at ``time`` (s); after the end of the movement, its end and the outcome."""
         sketch, chains, ax = shot.recording, _chains(shot), self._ax
         assert isinstance(sketch, Sketch)
         chain = chains[: min(round(time / sketch.step), len(chains) - 1) + 1]
@@ -63,9 +63,13 @@ class Sketchbook:
             ax.plot(*in_picture(sketch.outcome[None]).T, "x", color=_END, ms=12, mew=2)
         return Image.fromarray(pixels(self._figure))
 
+    def note(self, shot: Shot, time: float) -> str:
+        """Always ""."""
+        return ""
+
 
 def in_picture(points: Array) -> Array:
-    """``(n, 2)`` where outcomes ``(n, outcome_dim)`` lie in the picture."""
+    """``(n, 2)`` places of outcomes ``(n, outcome_dim)`` in the picture."""
     return points[:, :2] if points.shape[1] > 1 else np.column_stack([points, np.zeros(len(points))])
 
 

@@ -1,7 +1,7 @@
-"""One page about one run, or comparing many: a single file that opens from disk, without network.
+"""Write one page about one run, or about many side by side: a single file that opens without network.
 
-It shows error curves with intervals over seeds, where movements landed and how competent the learner is there. It has
-tables of results, settings and versions, and the commands that repeat each run. Runs that are not finished are marked.
+It shows error curves with intervals over seeds, landing points, errors by goal and the interest map. It has tables of
+results, settings and versions, and the commands that repeat each run. It names unfinished runs.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ EXAMPLES = """examples:
   sgimd report runs/sgim-d/seed-003               one run, into runs/sgim-d/seed-003/report.html
   sgimd report runs/sgim-d                        all seeds of a variant
   sgimd report runs --out paper.html              every variant in runs, compared
-  sgimd report runs --baseline sagg-riac          the same; differences are those to sagg-riac
+  sgimd report runs --baseline sagg-riac          differences from sagg-riac
 """
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Write the page and print its path; returns 0.
+    """Write the page and print its path; the exit code, 0.
 
     Raises:
-        ValueError: there is nothing to report, or a run is damaged.
+        ValueError: there are no runs, or one is damaged.
         OSError: a file cannot be read or written.
     """
     options = parser().parse_args(argv)
@@ -48,7 +48,7 @@ def parser() -> argparse.ArgumentParser:
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("runs", type=Path, help="a run's directory, a variant's folder, or the --out of sgimd run")
-    parser.add_argument("--out", type=Path, metavar="FILE", help="the page (default: RUNS/report.html)")
-    parser.add_argument("--baseline", metavar="NAME", help="variant that the others are compared with, seed by seed")
+    parser.add_argument("runs", type=Path, help="folder of a run, of a variant or of variants")
+    parser.add_argument("--out", type=Path, metavar="FILE", help="page to write (default: RUNS/report.html)")
+    parser.add_argument("--baseline", metavar="NAME", help="variant to compare the others with, seed by seed")
     return parser

@@ -1,6 +1,6 @@
-"""The figures of a report, as small images that are readable 400 pixels wide.
+"""The figures of a report: small images, readable at a width of 400 pixels.
 
-source = curves(variants)    # each function gives the address of a png, for the src of an img
+source = curves(variants, colours_of(variants))    # the data address of a png, for the src of an img
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sgimd_torch.figures.axes import LEGEND, alike, limits, over_movements, rounded
-from sgimd_torch.figures.learning import COLOURS, competence_map, interest_map, landing_points, map_after
+from sgimd_torch.figures.learning import COLOURS, interest_map, landing_points, map_after
 from sgimd_torch.figures.learning import misses as draw_misses
 from sgimd_torch.figures.sections import Section, of_regions, sections
 from sgimd_torch.runs.read import Run
@@ -26,11 +26,11 @@ from sgimd_torch.spaces import Array, Box
 from sgimd_torch.views.variants import Variant
 
 P = ParamSpec("P")
-TILES: Final = 50  # along the longer side of a map, at most
-GOALS: Final = 100  # the last ones are shown
-MOST_CURVES: Final = 8
-WIDE: Final = 4.3  # inches, of the axes of a map; beside them is the colour bar
-MARGIN: Final = 1.2  # inches, above and below them
+TILES: Final = 50  # largest number along the longer side of a map
+GOALS: Final = 100  # latest goals drawn on an interest map
+MOST_CURVES: Final = 8  # in one figure
+WIDE: Final = 4.3  # inches, width of the axes of a map, without colour bar
+MARGIN: Final = 1.2  # inches, height above and below the axes
 STYLE: Final[Any] = {
     "font.size": 11,
     "axes.titlesize": 11,
@@ -40,12 +40,12 @@ STYLE: Final[Any] = {
     "lines.linewidth": 2,
     "legend.fontsize": 10,
 }
-# Of further variants of an algorithm: after Okabe & Ito and P. Tol, none that an algorithm of the paper has.
+# For further variants of an algorithm: colours of Okabe & Ito and P. Tol that no algorithm of the paper has.
 _FURTHER: Final = ("#e69f00", "#56b4e9", "#000000", "#882255", "#999933", "#aa4499", "#44aa99", "#661100")
 
 
 def png(draw: Callable[Concatenate[Figure, P], None]) -> Callable[P, str]:
-    """A function that gives what ``draw`` draws as the address of a png, with enough pixels for dense screens."""
+    """Turn a function that draws into one that returns a png as a data address, with pixels for dense screens."""
 
     @wraps(draw)
     def address(*args: P.args, **kwargs: P.kwargs) -> str:
@@ -60,9 +60,9 @@ def png(draw: Callable[Concatenate[Figure, P], None]) -> Callable[P, str]:
 
 
 def colours_of(variants: Sequence[Variant]) -> dict[str, str]:
-    """A colour for each variant, by name: the first of each algorithm has the algorithm's, the others one of their own.
+    """A colour for each variant, by name: the algorithm's for its first variant, further colours for the others.
 
-    The first is the one with the algorithm's name, else the first by name: so the colours do not depend on results.
+    The first is the variant named like the algorithm, else the first by name, so colours do not depend on results.
     """
     ordered = sorted(variants, key=lambda variant: (variant.name != variant.algorithm, variant.name))
     firsts = {variant.algorithm: variant.name for variant in reversed(ordered)}
@@ -73,9 +73,9 @@ def colours_of(variants: Sequence[Variant]) -> dict[str, str]:
 
 
 def error_curves(figure: Figure, variants: Sequence[Variant], colours: Mapping[str, str]) -> None:
-    """Error against movements: interquartile means over seeds with their intervals, points where there are few seeds.
+    """Error against movements: interquartile means over seeds, with intervals, or with points if seeds are few.
 
-    A single variant is shown with its seeds, thin, and its noise floor.
+    A single variant also shows the curve of each seed, thin, and its noise floor.
     """
     if len(variants) > 1:
         figure.set_size_inches(6.8, 4.5)
@@ -104,14 +104,14 @@ curves = png(error_curves)
 
 
 def figure_of_curves(variants: Sequence[Variant]) -> Figure:
-    """Their error curves, as a figure."""
+    """A figure of the error curves of all variants."""
     figure = Figure(layout="constrained")
     error_curves(figure, variants, colours_of(variants))
     return figure
 
 
 def planes_of(variants: Sequence[Variant]) -> dict[str, Box]:
-    """For each environment the part of T that maps show: where movements of all variants landed."""
+    """The part of T that maps show, by environment: the landing points of all its variants."""
     found: dict[str, list[Array]] = {}
     for variant in variants:
         if len(variant.landed):
@@ -126,7 +126,7 @@ def planes_of(variants: Sequence[Variant]) -> dict[str, Box]:
 
 @png
 def landing(figure: Figure, variant: Variant, plane: Box) -> None:
-    """Where movements landed, and the demonstrated outcomes, on a part of T; the rest is marked at its edge."""
+    """Landing points and demonstrated outcomes on a part of T; points outside are marked at its edge."""
     panels, shown = sections(plane), variant.demonstrated
     for ax, section in zip(_panels(figure, panels), panels, strict=True):
         sides = section.box.sides
@@ -137,7 +137,7 @@ def landing(figure: Figure, variant: Variant, plane: Box) -> None:
 
 @png
 def misses(figure: Figure, variant: Variant) -> None:
-    """Where is it bad? Each goal of the last evaluation, coloured by its error."""
+    """Goals of the last evaluation, coloured by their errors."""
     goals, errors = variant.misses
     panels = sections(variant.space)
     most = max(float(np.quantile(errors, 0.95)), 1e-12)
@@ -146,33 +146,29 @@ def misses(figure: Figure, variant: Variant) -> None:
 
 
 def has_regions(run: Run) -> bool:
-    """Whether there is a map to draw: of outcomes, or of contexts and outcomes."""
+    """Whether the goal model of the run has regions to draw."""
     return run.regions is not None and len(run.regions["movements"]) > 0
 
 
 @png
 def regions(figure: Figure, run: Run) -> None:
-    """The regions of T at the last evaluation, by competence and by interest, with the goals chosen last."""
+    """The regions of T at the last evaluation, coloured by interest, with the goals chosen last."""
     assert run.regions is not None
-    now = run.regions["movements"].max()
-    lows, highs, interests = map_after(run.regions, now)
-    competences = run.regions["competence"][run.regions["movements"] == now]
+    lows, highs, interests = map_after(run.regions, run.regions["movements"].max())
     panels = of_regions(lows, highs, run.spaces["outcomes"])
-    axes = _panels(figure, [*panels, *panels])
-    for above, below, section in zip(axes, axes[len(panels) :], panels, strict=False):
-        competence_map(above, lows, highs, competences, section)
-        interest_map(below, lows, highs, interests, section, goals=run.chosen_goals()[-GOALS:])
+    for ax, section in zip(_panels(figure, panels), panels, strict=True):
+        interest_map(ax, lows, highs, interests, section, goals=run.chosen_goals()[-GOALS:])
 
 
 def _panels(figure: Figure, shown: Sequence[Section]) -> list[Axes]:
-    """Axes below each other, which their sections fill."""
+    """Axes below each other, one for each section, in its shape."""
     heights = [section.height(WIDE) for section in shown]
     figure.set_size_inches(6, sum(heights) + MARGIN * len(shown))
     return list(figure.subplots(len(shown), 1, squeeze=False, height_ratios=heights).flat)
 
 
 def _plain(name: str) -> str:
-    """A name as a label: not a formula, not hidden, not too long."""
+    """A name as a label of matplotlib: no formula, not hidden, not too long."""
     short = name if len(name) <= 32 else f"{name[:30]}…"
     return f"{' ' * short.startswith('_')}{short}".replace("$", r"\$")
 

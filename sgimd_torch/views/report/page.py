@@ -1,37 +1,33 @@
-"""The page of a report: figures and numbers of each variant go into template.html.j2, as one file.
+"""The page of a report: ``template.html.j2`` filled with figures and numbers of each variant, as one file.
 
-html = page(Path("runs"), variants)    # from data.read; strings from runs are escaped
+html = page(Path("runs"), variants)    # best_first of variants.py; text from runs is escaped
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from sgimd_torch.views import comparison
-from sgimd_torch.views.report import figures, record
+from sgimd_torch.views.report import figures, provenance
 from sgimd_torch.views.statistics import LEAST_SEEDS, Interval, show
-from sgimd_torch.views.variants import Variant, unit_of
-
-EARLY: Final = 1000  # movements, for the column next to the last error
+from sgimd_torch.views.variants import EARLY, Variant, baseline_of, compare, unit_of
 
 
 def page(place: Path, variants: Sequence[Variant], baseline: str | None = None) -> str:
-    """The page.
+    """The page as HTML.
 
     Args:
-        place: where the runs were found.
-        variants: the best first, not empty.
-        baseline: name of the variant that the others are compared with; see `comparison.baseline_of`.
+        place: folder of the runs.
+        variants: variants in the order of the page, at least one.
+        baseline: name of the variant to compare the others with; None for the default of `baseline_of`.
 
     Raises:
-        ValueError: the baseline is no variant with errors.
+        ValueError: no variant with errors is called ``baseline``.
     """
-    reference = comparison.baseline_of(variants, baseline)
+    reference = baseline_of(variants, baseline)
     runs = [run for variant in variants for run in variant.runs]
     jinja = Environment(
         loader=FileSystemLoader(Path(__file__).parent), autoescape=True, undefined=StrictUndefined, trim_blocks=True
@@ -45,20 +41,20 @@ def page(place: Path, variants: Sequence[Variant], baseline: str | None = None) 
         variants=variants,
         single=runs[0] if len(runs) == 1 else None,
         n_runs=len(runs),
-        warnings=list(record.doubts(variants)),
+        warnings=list(provenance.doubts(variants)),
         baseline=reference,
-        compared=comparison.compare(variants, reference),
+        compared=compare(variants, reference),
         colours=figures.colours_of(variants),
         planes=figures.planes_of(variants),
         early=EARLY,
         least_seeds=LEAST_SEEDS,
         figures=figures,
-        record=record,
+        provenance=provenance,
         unit=unit_of(variants),
     )
-    return html.encode(errors="backslashreplace").decode()  # a name may not be valid text
+    return html.encode(errors="backslashreplace").decode()  # a name may hold invalid characters
 
 
 def _interval(found: Interval | None, form: str = ".3f") -> str:
-    """``0.060 [0.058, 0.062]``, a dash for nothing."""
+    """``0.060 [0.058, 0.062]``, or a dash for None."""
     return "–" if found is None else show(found, form)

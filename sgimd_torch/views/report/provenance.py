@@ -1,4 +1,4 @@
-"""What made the runs of a report: doubts, what differs between settings, versions, and how to repeat the runs.
+"""Provenance of the runs of a report: doubts, differing settings, versions, commands that repeat the runs.
 
 doubts(variants)    # ["1 run not finished: ..."];   commands(variant.runs)    # ["sgimd run --algorithm=sgim-d ..."]
 """
@@ -15,11 +15,11 @@ from sgimd_torch.runs.read import Run
 from sgimd_torch.views.statistics import LEAST_SEEDS
 from sgimd_torch.views.variants import Variant
 
-AGAIN: Final = "runs/again"  # a folder that holds no run yet
+AGAIN: Final = "runs/again"  # folder for the repeated runs
 
 
 def doubts(variants: Sequence[Variant]) -> Iterator[str]:
-    """What a reader should know before comparing these runs, a sentence each."""
+    """Sentences that a reader should know before comparing these runs."""
     every = [run for variant in variants for run in variant.runs]
     few = [f"{variant.label} ({len(variant.used)})" for variant in variants if 0 < len(variant.used) < LEAST_SEEDS]
     if few and len(every) > 1:
@@ -30,7 +30,7 @@ def doubts(variants: Sequence[Variant]) -> Iterator[str]:
         if len(values) > 1 and name != "platform":
             yield f"The runs were made with different versions of {name}: {', '.join(values)}."
     if dirty := sum(str(run.versions.get("commit")).endswith("-dirty") for run in every):
-        yield f"{_count(dirty)} came from a checkout with uncommitted changes; the commit does not show them."
+        yield f"{_count(dirty)} came from a checkout with uncommitted changes, which the commit does not hold."
     for variant in variants:
         if own := differing([variant]):
             yield f"The seeds of {variant.label} have different settings: they differ in {', '.join(own)}."
@@ -44,7 +44,7 @@ def doubts(variants: Sequence[Variant]) -> Iterator[str]:
 
 
 def versions(variants: Sequence[Variant]) -> dict[str, dict[str, None]]:
-    """Of each library and of this one, the commit first; also those with which a run was made before it was resumed."""
+    """Versions by name, the commit first; versions of earlier parts of a resumed run count, too."""
     found: dict[str, dict[str, None]] = {"commit": {}}
     for run in [run for variant in variants for run in variant.runs]:
         for made_by in (run.versions, *run.versions.get("before", ())):
@@ -55,7 +55,7 @@ def versions(variants: Sequence[Variant]) -> dict[str, dict[str, None]]:
 
 
 def commands(runs: Sequence[Run]) -> list[str]:
-    """A line of shell for all runs of the same settings, defaults left out."""
+    """Shell commands that repeat the runs, one for all seeds of equal settings; defaults are left out."""
     groups: dict[str, list[int]] = {}
     for run in runs:
         own = [word for word in run.words if word.partition("=")[0] not in ("--seed", "--out", "--board")]
@@ -68,7 +68,7 @@ def commands(runs: Sequence[Run]) -> list[str]:
 
 
 def differing(variants: Sequence[Variant]) -> dict[str, list[str]]:
-    """Setting -> for each variant its values as text, for settings in which runs differ, without seed and place."""
+    """Settings in which runs differ, except seed and place: setting -> values of each variant, as text."""
     found = {}
     for name in dict.fromkeys(name for variant in variants for run in variant.runs for name in run.config):
         values = [dict.fromkeys(shown(run.config.get(name)) for run in variant.runs) for variant in variants]
@@ -82,4 +82,5 @@ def _count(n: int) -> str:
 
 
 def shown(value: Any) -> str:
+    """A value of a setting or version as text, a dash for None."""
     return "–" if value is None else value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)

@@ -1,18 +1,19 @@
 """Replaying a life: a learner of the same parts that lives through the same events becomes the same learner.
 
 It draws the same numbers again, so its goals, its searches and its memory come out the same, in the middle of an
-attempt, too. So nothing but events has to be kept, as `sgimd_torch.record` does.
+attempt, too. So a record keeps nothing but events.
     for episode in replay(learner, record.events(), teacher=teacher): ...
 """
 
 from __future__ import annotations
 
 from collections.abc import Generator, Iterable
-from typing import Any, Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
-from sgimd_torch.learner.events import TEACHER, Event, Kind
+from sgimd_torch.learner import Learner
+from sgimd_torch.learner.events import TEACHER, BeforeMovement, Event, Kind
 from sgimd_torch.parts import Teacher
 from sgimd_torch.spaces import Array, Demonstration, Episode, Request
 
@@ -23,24 +24,17 @@ class ReplayError(RuntimeError):
     """The learner does not repeat what was recorded: another library version, processor or configuration."""
 
 
-class BeforeMovement(NamedTuple):
-    """What came since the last movement: a demonstration, a request and the reply to it, as in an `Episode`."""
-
-    demonstration: Demonstration | None = None
-    request: Request | None = None
-    reply: str = ""
-
-
 def replay(
-    learner: Any, events: Iterable[Event], *, teacher: Teacher | None = None
+    learner: Learner, events: Iterable[Event], *, teacher: Teacher | None = None
 ) -> Generator[Episode, None, BeforeMovement]:
     """Let ``learner`` live through ``events``. Nothing is executed and nobody is asked for a demonstration.
 
     Args:
-        learner: `Learner` freshly built; its file imports this one.
+        learner: learner freshly built.
         events: events of the record.
         teacher: teacher freshly built, too: it is asked before each movement what it offers, so that its draws go on as
-            they would have. None for what was recorded alone.
+            they would have. Lessons that nobody had offered (``who`` None) come besides. None for what was recorded
+            alone.
 
     Yields:
         The episodes, as `run` has yielded them.
@@ -56,7 +50,8 @@ def replay(
     before = BeforeMovement()
     for event in events:
         index = learner.movements
-        between = event.kind == Kind.INTERRUPTED and event.theta is None  # two movements
+        # Between two runs the caller may show something, begin an attempt or end one; no teacher is asked before that.
+        between = event.kind in (Kind.SHOWN, Kind.ASKED, Kind.INTERRUPTED) and event.who is None and event.theta is None
         if teacher is not None and asked_at < index and not between:
             asked_at, offered = index, teacher.offer(index, learner.memory)
         match event.kind:
@@ -66,8 +61,10 @@ def replay(
                 if learner.social is None and not learner.waits_for_answer:
                     found = f"before movement {index} it asked for a demonstration, the learner now does not"
                     raise ReplayError(f"{found}; is it built in the same way, with the same seed?")
+                assert event.lesson is not None
                 learner.watch(event.lesson, who=event.who)
-                offered, before = None, before._replace(demonstration=event.lesson)
+                if not between:
+                    offered, before = None, before._replace(demonstration=event.lesson)
             case Kind.ASKED:
                 assert event.context is not None
                 learner.request(event.context)
@@ -78,6 +75,7 @@ def replay(
                         learner.go_on_alone(event.reply or "")
             case Kind.INTERRUPTED if between:
                 learner.interrupt()
+                asked_at = -1  # the run that went on asked its teacher once more
             case Kind.FAILED if event.theta is None:
                 learner.fail(event.reply or "")
                 yield Episode(

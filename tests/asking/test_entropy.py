@@ -1,17 +1,13 @@
-"""Learners that ask where they expect to lose most doubt: doubts by hand, the choice of mode and goal, a whole life."""
+"""Learners that ask where they expect to lose most doubt: doubts by hand, and the choice of mode and goal."""
 
 import numpy as np
 import pytest
 
-from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.goals.strategic import AUTONOMOUS
-from sgimd_torch.rivals.entropy import EntropyGoals, doubt
-from sgimd_torch.spaces import Box, stream
-from worlds import NO_CONTEXT, demonstrations, remember
+from sgimd_torch.asking.entropy import EntropyGoals, doubt
+from sgimd_torch.asking.interest import AUTONOMOUS
+from sgimd_torch.spaces import stream
+from worlds import NO_CONTEXT, problem, remember
 
-ARM = PlanarArm(4, noise=0.02)
-SHOWN = demonstrations(PlanarArm(4))
-SQUARE = Box.cube(-1, 1, 2)
 IMITATE = "imitate all"
 SHARED = 0.5240  # (1 + sqrt(5) + 5/3) e^-sqrt(5)
 COSTS = {AUTONOMOUS: 1.0, IMITATE: 1.0}
@@ -52,7 +48,7 @@ def test_covariances_are_symmetric_and_no_variance_is_negative_or_above_one():
 def goals_with(outcomes):
     """A choice of a learner whose memory has these outcomes."""
     memory = remember(np.zeros((len(outcomes), 1)), np.reshape(outcomes, (-1, 2)))
-    return EntropyGoals(Box.cube(0, 1, 0), SQUARE, stream(0, "goals"), memory=memory), memory
+    return EntropyGoals(problem(memory=memory)), memory
 
 
 def test_it_asks_for_a_goal_far_from_what_is_known():

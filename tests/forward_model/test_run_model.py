@@ -4,13 +4,13 @@ import re
 
 import numpy as np
 import pytest
-from sgimd_torch.runs.model_listener import ModelListener
 
 from boards import curves_of
 from runs import LIVE, RUN, content_of, end, start, stopped_at
 from sgimd_torch.board.legend import LEGEND
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import Benchmark, save_benchmark
+from sgimd_torch.forward_model.listener import ModelListener
 from sgimd_torch.forward_model.model import ForwardModel
 from sgimd_torch.memory import Memory
 from sgimd_torch.record import Record, layout
@@ -24,7 +24,7 @@ from sgimd_torch.runs.read import read_run
 from sgimd_torch.spaces import Episode, Move, stream
 
 MOVEMENTS = 170
-MODEL = ("--inverse", "model-alone", "--search", "gradient", "--model.rate", 2)
+MODEL = ("--inverse", "model-alone", "--search", "gradient", "--inverse.rate", 2)
 TAGS = {tag for tag in LEGEND if tag.startswith("model/")}
 NO_CONTEXT = np.empty(0)
 
@@ -150,7 +150,7 @@ def test_a_model_that_is_asked_is_announced_once(tmp_path, live, capsys):
     ("options", "why", "rows"),
     [
         (("--movements", 40), "there were too few exemplars to train it", 0),
-        (("--movements", 60, "--model.rate", 0.02), r"its relative error is \d\.\d+, it is trusted up to 0\.25", 1),
+        (("--movements", 60, "--inverse.rate", 0.02), r"its relative error is \d\.\d+, it is trusted up to 0\.25", 1),
     ],
 )
 def test_a_model_that_was_never_asked_is_reported(tmp_path, live, capsys, options, why, rows):
@@ -180,14 +180,14 @@ def record(tmp_path):
 
 def test_a_divergence_is_told_and_recorded(record, capsys):
     model, memory = ForwardModel(0, 7, 2, rate=1.0), Memory(0, 7, 2)
-    listener = ModelListener(record, model, 1.0, None, memory, Seconds({}))
+    listener = ModelListener(record, model, lambda: model.trusted, memory, Seconds({}))
     for episode in remember(memory, 150):
         if episode.index == 99:
             model.lr, model._online.optimizer = 1e30, None
         if episode.index == 149:
             model.lr = 1e-2
         listener.episode(episode, replayed=False)
-        assert bool(listener.new_curves()) == ((episode.index + 1) % 50 == 0)
+        assert bool(listener.curves()) == ((episode.index + 1) % 50 == 0)
     said = capsys.readouterr().err
     assert said.count("movement 100: training diverged; the forward model keeps its last good weights") == 1
     assert [row[-1] for row in record.rows("refreshes")] == [0, 1, 0]
@@ -195,14 +195,14 @@ def test_a_divergence_is_told_and_recorded(record, capsys):
 
 def test_the_curves_are_those_of_the_newest_refresh(record):
     model, memory = ForwardModel(0, 7, 2, rate=1.0), Memory(0, 7, 2)
-    listener = ModelListener(record, model, 1.0, None, memory, Seconds({}))
+    listener = ModelListener(record, model, lambda: model.trusted, memory, Seconds({}))
     episodes = list(remember(Memory(0, 7, 2), 100))
     for episode in episodes:
         memory.add(NO_CONTEXT, episode.move.theta, episode.outcome)
         listener.episode(episode, replayed=False)
         if episode.index == 49:
-            assert listener.new_curves().keys() == TAGS - {"model/error", "model/coverage"}
-    curves = listener.new_curves()
+            assert listener.curves().keys() == TAGS - {"model/error", "model/coverage"}
+    curves = listener.curves()
     assert curves.keys() == TAGS
     assert curves["model/relative_error"] == model.relative_error
     predictions = np.array(list(record.rows("predictions")))
@@ -212,23 +212,25 @@ def test_the_curves_are_those_of_the_newest_refresh(record):
     assert curves["model/coverage"] == (squared < -2 * np.log(0.2)).mean()  # chi-squared, two dimensions
 
 
-@pytest.mark.parametrize("search", ["gradient", "gauss-newton"])
-def test_a_search_through_the_model_makes_one_of_the_size_of_its_robot(search):
+def test_a_run_through_the_model_makes_one_of_the_size_of_its_robot():
     environments = {"planar-arm-50": 50, "fishing-rod": 25}
-    networks = {"model.members": 2, "model.rate": 1.5, "model.noise_heads": False}
+    networks = {"inverse.members": 2, "inverse.rate": 1.5, "inverse.noise_heads": False, "inverse.trust": 0.2}
     for environment, theta_dim in environments.items():
-        parts = build(Config(parts={"search": search, "environment": environment, **networks}))
-        assert parts.model.sizes == {"context_dim": 0, "theta_dim": theta_dim, "outcome_dim": 2}
-        assert (parts.model.members, parts.model.rate, parts.model.noise_heads) == (2, 1.5, False)
-        assert parts.trust.anchors
-    assert build(Config(parts={"search": "nelder-mead"})).model is None
+        parts = {"search": "gradient", "inverse": "model", "environment": environment, **networks}
+        learner = build(Config(algorithm="sagg-riac", parts=parts)).learner
+        (shared,) = learner.problem.trained
+        model = shared.model
+        assert model is learner.inverse.model
+        assert model.sizes == {"context_dim": 0, "theta_dim": theta_dim, "outcome_dim": 2}
+        assert (model.members, model.rate, model.noise_heads, model.trust) == (2, 1.5, False, 0.2)
+    assert build(Config(parts={"search": "nelder-mead"})).learner.problem.trained == []
 
 
 @pytest.mark.parametrize(
     "option",
     [
-        *(("--model.members", 1), ("--model.noise_heads", "false"), ("--model.focus", 0.5)),
-        *(("--trust.anchors", "false"), ("--search", "gauss-newton"), ("--search", "nelder-mead")),
+        *(("--inverse.members", 1), ("--inverse.noise_heads", "false")),
+        *(("--inverse.trust", 0.01), ("--search", "nelder-mead")),
     ],
 )
 def test_an_option_of_the_model_changes_the_run(tmp_path, live, reference, option):
@@ -246,9 +248,9 @@ def test_the_board_shows_how_the_model_does_and_explains_it(reference):
 
 
 def test_a_run_that_learns_a_model_but_answers_without_it_is_evaluated_by_both(tmp_path, live):
-    options = (*MODEL, "--inverse", "linear", "--evaluated-by", "own,nearest,linear,model")
+    options = ("--search", "gradient", "--inverse", "linear", "--evaluated-by", "own,nearest,linear,model-alone")
     assert live(tmp_path, *options) == 0
     answers = read_run(tmp_path / "sgim-d" / "seed-003").answers
-    assert list(answers) == ["own", "nearest", "linear", "model"]
+    assert list(answers) == ["own", "nearest", "linear", "model-alone"]
     errors = {answer: each["mean_error"].tolist() for answer, each in answers.items()}
-    assert errors["own"] == errors["linear"] != errors["model"]
+    assert errors["own"] == errors["linear"] != errors["model-alone"]

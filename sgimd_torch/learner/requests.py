@@ -1,0 +1,24 @@
+"""Who is asked for a demonstration: a learner that asks gives a `Request`, a `Demonstrator` replies."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+
+from sgimd_torch.catalogue.built import Built
+from sgimd_torch.memory import Memory
+from sgimd_torch.spaces import Array, Demonstration
+
+
+class Demonstrator(Built):
+    """Teacher who is asked for a demonstration of a goal. Built from ``(demonstrations, rng)`` and options.
+
+    Attributes:
+        takes: movements at which the learner rests until a reply has come.
+    """
+
+    takes: int = 0
+
+    @abstractmethod
+    def demonstrate(self, context: Array, goal: Array, memory: Memory) -> Demonstration | None:
+        """A demonstration of ``goal`` ``(outcome_dim,)`` in ``context`` ``(context_dim,)``, or None. A replay asks
+        again, so what is drawn may depend on the seed and on the arguments only."""

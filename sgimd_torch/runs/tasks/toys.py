@@ -1,0 +1,80 @@
+"""Toy robots as tasks: goals and demonstrations are made here, equal for every seed."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Final
+
+import numpy as np
+
+from sgimd_torch.environments import objects, toys
+from sgimd_torch.environments.toys import Toy
+from sgimd_torch.evaluation import Benchmark, tile_goals
+from sgimd_torch.runs.tasks import Task
+from sgimd_torch.spaces import Array, Demonstration, stream
+
+SHOWN: Final = 127  # demonstrations, as many as each shipped demonstrator recorded
+REACHING: Final = 20_000  # uniform movements that find the outcomes a toy can reach
+
+
+def toy(robot: Toy, side: float, *, taught: bool = False) -> Task:
+    """A toy robot; its goals lie on tiles of ``side``, in the unit of T. ``taught``: it has a teacher, too."""
+    shown = partial(toy_demonstrations, robot) if taught else None
+    return Task(robot, partial(toy_benchmark, robot, side), shown, last_row if taught else None)
+
+
+def toss() -> Task:
+    """A ball thrown in the wind, which is the context."""
+    return toy(toys.toss(), 0.4, taught=True)
+
+
+def crawler() -> Task:
+    """Four legs, whose phases are periodic parameters."""
+    return toy(toys.crawler(), 0.1)
+
+
+def two_elbows() -> Task:
+    """An arm with two separate families of postures."""
+    return toy(toys.two_elbows(), 0.1)
+
+
+def spatial_arm() -> Task:
+    """An arm with six joints and three outcomes, in cm."""
+    return toy(toys.spatial_arm(), 25.0)
+
+
+def puck() -> Task:
+    """A puck that has to be hit; where it lies is the context."""
+    return toy(objects.puck(), 0.1)
+
+
+def fetch() -> Task:
+    """A ball that has to be grasped."""
+    return toy(objects.fetch(), 0.1)
+
+
+def toy_benchmark(robot: Toy, side: float) -> Benchmark:
+    """One random goal in each tile that uniform movements reach in the middle of C; equal in every run."""
+    rng = stream(0, "goals for a toy")
+    thetas = robot.policies.low + robot.policies.sides * rng.random((REACHING, robot.policies.dim))
+    context = (robot.contexts.low + robot.contexts.high) / 2
+    reached = robot.effect(np.tile(context, (REACHING, 1)), thetas)
+    return Benchmark(type(robot).__name__, tile_goals(reached, robot.outcomes, side, rng), side)
+
+
+def last_row(times: Array, trajectory: Array) -> Array:
+    """The correspondence of a toy: each row of its demonstrations is theta itself."""
+    return trajectory[-1]
+
+
+def toy_demonstrations(robot: Toy) -> list[Demonstration]:
+    """Movements in contexts all over C, to different outcomes of uniform movements; equal in every run."""
+    rng = stream(0, "demonstrations by a toy")
+    thetas = robot.policies.low + robot.policies.sides * rng.random((REACHING, robot.policies.dim))
+    found = []
+    for place in rng.integers(REACHING, size=SHOWN):
+        context = robot.contexts.sample(rng)
+        outcomes = robot.effect(np.tile(context, (REACHING, 1)), thetas)
+        if robot.outcomes.contains(outcomes[place]):
+            found.append(Demonstration(context, np.array([0.0, 1.0]), np.tile(thetas[place], (2, 1)), outcomes[place]))
+    return found

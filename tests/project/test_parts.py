@@ -1,0 +1,147 @@
+"""Contracts between parts: what each kind is given and can do stands in one file, and nothing is found by its name."""
+
+import ast
+import inspect
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+import sgimd_torch
+from sgimd_torch import parts
+from sgimd_torch.catalogue import WORDS, function_of
+from sgimd_torch.environments.planar_arm import PlanarArm
+from sgimd_torch.goals.uniform import UniformGoals
+from sgimd_torch.inverses.nearest import NearestNeighbour
+from sgimd_torch.parts import Goals
+from sgimd_torch.searches.simplex import NelderMead
+from sgimd_torch.strategies import GoalBabbling
+from worlds import part, problem
+
+PACKAGE = Path(sgimd_torch.__path__[0])
+KINDS = {
+    "goals": parts.Goals,
+    "search": parts.Search,
+    "explore": parts.Explore,
+    "inverse": parts.Inverse,
+    "judge": parts.Judge,
+    "social": parts.Social,
+}
+LEARNING = (
+    *("parts", "strategies", "algorithms", "learner", "session", "goals", "inverses", "searches", "explore", "asking"),
+    *("rivals", "teachers", "forward_model", "competence", "evaluation", "runs/build", "runs/run"),
+)
+BY_NAME = {"getattr", "hasattr", "attrgetter"}
+FIELDS = {  # file and definition that go through the fields of a class: why
+    ("goals/regions", "Region"): "hands out its own arrays read-only",
+    ("record/replay", "_check_lesson"): "compares two demonstrations field by field",
+    ("forward_model/model", "ForwardModel"): "compares its sizes with those of a memory",
+}
+SIGNATURES = {"signature", "Signature", "getfullargspec", "parameters_of", "__code__", "__defaults__", "__kwdefaults__"}
+OPTIONS = {  # file and definition that read the parameters of a function: why
+    ("catalogue/options", None): "the signature is the option",
+    ("runs/config", None): "options of the parts that a run has chosen",
+    ("catalogue/__init__", "called"): "refuses what a user's own function does not take",
+}
+
+
+def uses(names: set[str], package: Path) -> set[tuple[str, str | None]]:
+    """Files and their definitions that use one of these names; None for a file outside its definitions."""
+    found = set()
+    for path in sorted(package.rglob("*.py")):
+        place = path.relative_to(package).with_suffix("").as_posix()
+        for top in ast.parse(path.read_text(encoding="utf-8")).body:
+            inside = {each.id for each in ast.walk(top) if isinstance(each, ast.Name)}
+            inside |= {each.attr for each in ast.walk(top) if isinstance(each, ast.Attribute)}
+            if names & inside:
+                found.add((place, top.name if isinstance(top, ast.FunctionDef | ast.ClassDef) else None))
+    return found
+
+
+def test_no_part_is_asked_by_name_what_it_can_do():
+    found = {(place, name) for place, name in uses(BY_NAME, PACKAGE) if place.startswith(LEARNING)}
+    assert found - FIELDS.keys() == set()
+
+
+def test_no_part_is_given_things_by_the_names_of_its_parameters():
+    found = uses(SIGNATURES, PACKAGE)
+    assert {(place, name) for place, name in found if not {(place, name), (place, None)} & OPTIONS.keys()} == set()
+
+
+def test_a_use_by_name_is_found(tmp_path):
+    (tmp_path / "searches.py").write_text(
+        "import inspect\ndef wired(part):\n    return inspect.signature(part), getattr(part, 'many', None)\n"
+        "class Wired:\n    many = hasattr(int, 'many')\n"
+    )
+    assert uses(BY_NAME, tmp_path) == {("searches", "wired"), ("searches", "Wired")}
+    assert uses(SIGNATURES, tmp_path) == {("searches", "wired")}
+
+
+@pytest.fixture
+def given():
+    """The problem of a small arm, with an inverse model and goal babbling."""
+    made = problem(PlanarArm(3), inverse=NearestNeighbour)
+    made.autonomous = GoalBabbling(made, goals=UniformGoals, search=NelderMead)
+    return made
+
+
+@pytest.mark.parametrize(("kind", "word"), [(kind, word) for kind in KINDS for word in WORDS[kind]])
+def test_every_part_is_built_from_the_problem_and_keywords_with_defaults(kind, word, given):
+    make = part(kind, word)
+    first, *others = inspect.signature(function_of(make)).parameters.values()
+    assert first.name == "problem"
+    assert {each.kind for each in others} <= {inspect.Parameter.KEYWORD_ONLY}
+    assert [each.name for each in others if each.default is inspect.Parameter.empty] == []
+    assert isinstance(KINDS[kind].of(make, given), KINDS[kind])
+
+
+def test_an_inverse_model_is_added_by_whoever_has_read_the_base_classes_and_one_example():
+    lines = {each: len((PACKAGE / each).read_text().splitlines()) for each in ("parts.py", "inverses/nearest.py")}
+    assert {kind.__module__ for kind in (*KINDS.values(), parts.Teacher, parts.Problem)} == {parts.__name__}
+    assert lines["parts.py"] <= 250
+    assert sum(lines.values()) <= 350
+
+
+class Halfway(Goals):
+    """Goals that are never told how it went."""
+
+    def sample(self, context):
+        return context
+
+
+class Unasked(UniformGoals):
+    """Goals that take no problem."""
+
+    def __init__(self):
+        pass
+
+
+class Alien:
+    """What could be goals but is not."""
+
+    def __init__(self, problem):
+        pass
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (Halfway, "Halfway has no add, which Goals demands"),
+        (partial(Goals), "Goals has no add, sample, which Goals demands"),
+        ("grid", "given as its constructor, got 'grid'; from sgimd_torch.goals.progress_grid import ProgressGrid"),
+        ("gird", "unknown goals 'gird'; did you mean grid?"),
+        (UniformGoals(problem()), "given as its constructor, got a UniformGoals that is made already"),
+        (Unasked, "Goals Unasked cannot be called as others of its kind are: too many positional arguments"),
+        (NelderMead, "NelderMead must derive from Goals"),
+        (Alien, "Alien must derive from Goals"),
+    ],
+)
+def test_what_is_no_constructor_of_its_kind_is_refused_when_it_is_built(make, message):
+    with pytest.raises(ValueError, match=message):
+        GoalBabbling(problem(inverse=NearestNeighbour), goals=make)
+
+
+@pytest.mark.parametrize("kind", [*KINDS.values(), parts.Teacher])
+def test_the_base_class_of_each_kind_demands_something(kind, given):
+    with pytest.raises(ValueError, match=f"{kind.__name__} has no .*, which {kind.__name__} demands"):
+        kind.of(kind, given)
