@@ -1,4 +1,4 @@
-"""What is claimed on each page of results, each claim with its bar: first the paper's claims, then ours.
+"""The claims of each page of results, each with its bar: first the paper's, then ours.
 
 for verdict in judge(paper(found, letter=True)): print(verdict.claim, verdict.verdict)
 """
@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
+import pandas as pd
 
 from evidence import LAST, Evidence, Level, shared
 from judging import Claim, Part, at_least, at_most
@@ -22,18 +23,18 @@ EVERY, COST = 30, 10  # movements from one demonstration to the next of SGIM-D; 
 
 
 def less(found: Evidence, ours: str, theirs: str, *times: int, name: str = "") -> list[Part]:
-    """The parts that our error is smaller than theirs at each time."""
+    """Parts for each time: our error is smaller than theirs."""
     names = {at: f"{name} at {at}".strip() if len(times) > 1 else name for at in times or (LAST,)}
     return [at_most(0.0, found.difference, ours, theirs, at, name=each, form="+.4f") for at, each in names.items()]
 
 
 def times_as_much(found: Evidence, bar: float, ours: str, theirs: str, *times: int) -> list[Part]:
-    """The parts that our error is at most ``bar`` times theirs at each time."""
+    """Parts for each time: our error is at most ``bar`` times theirs."""
     return [at_most(bar, found.ratio, ours, theirs, at, name=f"at {at}") for at in times]
 
 
 def paper(found: Evidence, *, letter: bool) -> list[Claim]:
-    """The claims of section 6 of the paper, of its letter, answered by its eq. (9), or of our SGIM-D.
+    """Section 6 of the paper, for learners of its letter, whose eq. (9) answers, or for ours.
 
     After 5000 movements, with demonstrator 3, one demonstration every 30 movements, unless a claim says otherwise.
     """
@@ -108,7 +109,7 @@ def paper(found: Evidence, *, letter: bool) -> list[Claim]:
 
 
 def learning(found: Evidence) -> list[Claim]:
-    """Few movements, on the rod; then on the suite."""
+    """Learning from few movements, on the rod, then on the suite."""
     taught, alone, uniform = "practice-taught.rod", "practice.rod", "practice-uniform.rod"
     rivals = ("sgim-d", "cma-mae-taught", "map-elites-taught", "uniform-nearest-taught")
     early_and_late = (250, 500, 1000, LAST)
@@ -166,7 +167,7 @@ def learning(found: Evidence) -> list[Claim]:
 
 
 def answers(found: Evidence) -> list[Claim]:
-    """Who answers best on the memories of the suite, those of SUITED, 250 to 2000."""
+    """Inverse models on the memories of the suite and of the learners SUITED on the rod, 250 to 2000 movements."""
     memories = [*EXPERIMENTS["suite"], *(f"{name}.rod" for name in SUITED)]
 
     def proved(other: str) -> list[Part]:
@@ -184,7 +185,7 @@ def answers(found: Evidence) -> list[Claim]:
 
 
 def curiosity(found: Evidence) -> list[Claim]:
-    """Does choosing goals pay, and does choosing them by interest?"""
+    """The gain from choosing goals, and from choosing them by interest."""
     return [
         Claim("Goals in the place of movements: SAGG-RIAC − Random < 0",
               less(found, "sagg-riac.rod", "random-nearest.rod")),
@@ -202,8 +203,7 @@ def curiosity(found: Evidence) -> list[Claim]:
 
 
 def model(found: Evidence) -> list[Claim]:
-    """What a forward model has to show beside SGIM-D, answered by `process`: one that has to prove itself, and one that
-    is always asked."""
+    """Forward models against SGIM-D answered by `process`: a model that has to prove itself, and one always asked."""
     proved, always, plain = "sgim-d-model.rod by model", "gradient by model-alone", "sgim-d"
     on_arms = [
         at_most(1.03, found.ratio, f"sgim-d-model.{arm} by model", f"sgim-d{arm.removeprefix('planar')}", at,
@@ -229,10 +229,10 @@ def model(found: Evidence) -> list[Claim]:
 
 
 def asking(found: Evidence) -> list[Claim]:
-    """When to ask, how much, whom, where, at which cost."""
+    """Learners that ask: when, how much, whom, where, at which cost."""
     im, dear, sgim_d, toss = "sgim-im", "sgim-im-cost-10", "taught-every-30", "sgim-im-toss"
 
-    def asked(name: str, what: str, teachers: Sequence[str] = ()) -> dict[int, float]:
+    def asked(name: str, what: str, teachers: Sequence[str] = ()) -> pd.Series:
         return found.counts("asked", name, what, teachers)
 
     def late(name: str, what: str, of: Sequence[str], among: Sequence[str], *, level: Level = LEVEL) -> Interval:
@@ -242,16 +242,12 @@ def asking(found: Evidence) -> list[Claim]:
         return found.less(asked(name, what), asked(other, than), level=level)
 
     def at_equal_cost(*, level: Level = LEVEL) -> Interval:
-        """SGIM-D when it has cost as much, on straight lines between its evaluations."""
-        movements, curves = found.curve(sgim_d)
+        """Compared with SGIM-D at equal cost, on straight lines between its evaluations."""
         ours, shown = shared(found.at(dear), asked(dear, "shown"))
-        seeds = [*found.at(sgim_d)]
-        costs = {seed: (LAST + COST * shown[seed]) / (1 + COST / EVERY) for seed in shown}
-        theirs = {
-            seed: float(np.interp(costs[seed], movements, curve))
-            for seed, curve in zip(seeds, curves, strict=True)
-            if seed in costs
-        }
+        costs = (LAST + COST * shown) / (1 + COST / EVERY)
+        curve = found.curve(sgim_d)
+        both = costs.index.intersection(curve.index)
+        theirs = pd.Series({seed: np.interp(costs[seed], curve.columns, curve.loc[seed]) for seed in both})
         return found.less(ours, theirs, level=level)
 
     return [

@@ -1,8 +1,8 @@
 """The pages in results/ and the README's section of results: templates with tables and numbers made from the rows.
 
-Each page is a template in experiments/pages/, which has the text. Change the template, not the page. The rows are those
-of results.csv in --results, which compare.py writes, and of the small tables beside it. Intervals are bootstrapped with
-a fixed seed, so the same rows give the same pages. What a page lacks is named.
+Each page is a template in experiments/pages/, which has the text. Change the template, not the page. The rows are in
+results.csv and in the small tables beside it, which compare.py writes to --results. Intervals are bootstrapped with a
+fixed seed, so the same rows give the same pages. Missing rows are named.
 
 Examples:
   python experiments/claims.py                                  all pages, and the README
@@ -25,7 +25,7 @@ with loading():  # Ctrl-C shows no traceback
 
     import claimed
     from evidence import Evidence
-    from page_tables import Prose, Tables
+    from page_tables import Page
     from sgimd_torch.files import make_folder, write_text
     from table import ResultsError
 
@@ -36,20 +36,19 @@ MADE: Final = "<!-- Made by experiments/claims.py"
 BEGIN, END = "<!-- results: made by experiments/claims.py from experiments/pages/README.md.j2 -->", "<!-- end -->"
 
 
-def filled(name: str, found: Evidence, folder: Path) -> tuple[str, Tables]:
-    """The text of a template with its tables and numbers, and the tables, which know what is missing."""
+def filled(name: str, found: Evidence, folder: Path) -> tuple[str, Page]:
+    """The text of a template with its tables and numbers, and the page that has made them."""
     loader = jinja2.FileSystemLoader(TEMPLATES)
     environment = jinja2.Environment(loader=loader, undefined=jinja2.StrictUndefined, keep_trailing_newline=True)
-    tables = Tables(found, folder)
-    template = environment.get_template(f"{name}.md.j2")
-    return template.render(tables=tables, the=Prose(found), claimed=claimed), tables
+    page = Page(found, folder)
+    return environment.get_template(f"{name}.md.j2").render(page=page, claimed=claimed), page
 
 
 def into_readme(text: str, section: str) -> str:
     """A README with its section of results made again.
 
     Raises:
-        ResultsError: it has no such section.
+        ResultsError: the README has no such section.
     """
     before, begin, rest = text.partition(BEGIN)
     _, end, after = rest.partition(END)
@@ -59,7 +58,7 @@ def into_readme(text: str, section: str) -> str:
 
 
 def _check_place(path: Path) -> None:
-    """Raises ResultsError if a file that is not one of our pages would be overwritten."""
+    """Refuse to overwrite a file that is not one of our pages, by a ResultsError."""
     if path.is_file() and not path.read_bytes().startswith(MADE.encode()):
         raise ResultsError(
             f"{path} was not made by claims.py and is left as it is; move it away, or name another --out"
@@ -71,31 +70,28 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     results = Path("results")
     parser.add_argument("--results", type=Path, default=results, help="folder of the rows (default: %(default)s)")
-    parser.add_argument("--out", type=Path, default=results, help="folder of the pages (default: %(default)s)")
-    parser.add_argument("--only", choices=PAGES, help="only this page")
-    readme = "whose section of results is made again (default: README.md, with the pages in results/)"
-    parser.add_argument("--readme", type=Path, help=readme)
+    where = "folder of the pages; the README is made with the pages in %(default)s (default: %(default)s)"
+    parser.add_argument("--out", type=Path, default=results, help=where)
+    parser.add_argument("--only", choices=PAGES, help="page to make (default: all)")
     options = parser.parse_args(argv)
-    if options.readme is None and options.out == results:
-        options.readme = Path("README.md")
-    names = [name for name in PAGES if options.only in (None, name) and (name != README or options.readme)]
-    paths = {name: options.readme if name == README else options.out / f"{name}.md" for name in names}
+    names = [name for name in PAGES if options.only in (None, name) and (name != README or options.out == results)]
+    paths = {name: Path("README.md") if name == README else options.out / f"{name}.md" for name in names}
     for name in {*names} - {README}:
         _check_place(paths[name])
     found, texts = Evidence.of(options.results), dict[Path, str]()
     for name in names:
-        text, tables = filled(name, found, options.results)
+        text, page = filled(name, found, options.results)
         if name == README:
-            text = into_readme(options.readme.read_text(encoding="utf-8"), text)
+            text = into_readme(paths[name].read_text(encoding="utf-8"), text)
         else:
             text = f"{MADE} from experiments/pages/{name}.md.j2; change that file, not this one. -->\n\n{text}"
         texts[paths[name]] = text
-        verdicts = [each.verdict for each in tables.verdicts]
+        verdicts = [each.verdict for each in page.verdicts]
         print(
             f"{name}: {', '.join(f'{verdicts.count(each)} {each}' for each in dict.fromkeys(verdicts)) or 'no claims'}"
         )
-        if tables.missing:
-            say(f"{name}: not run: {'; '.join(dict.fromkeys(tables.missing))}")
+        if page.missing:
+            say(f"{name}: not run: {'; '.join(dict.fromkeys(page.missing))}")
     make_folder(options.out)
     for path, text in texts.items():
         write_text(path, text)

@@ -1,12 +1,11 @@
 """Run the experiments, every variant with several seeds, and collect the results in tables.
 
-variants.py says which variants there are. A run goes to OUT/VARIANT/seed-003. When it ends, each of its evaluations
-becomes rows of results.csv in RESULTS, one for each answer that a page reads. Requests of learners that ask are in
-asked.csv; tiles reached and goals chosen in explored.csv. A variant in two experiments is run once,
-and has rows for each.
+variants.py lists the variants. A run goes to OUT/VARIANT/seed-003. When it ends, each of its evaluations becomes rows
+of results.csv in RESULTS, one for each inverse model that a page reads. Requests of learners that ask are in asked.csv;
+tiles reached and goals chosen are in explored.csv. A variant in two experiments is run once and has rows for each.
 
-Start the same command again after Ctrl-C or a power cut, or with more seeds: what is in the tables is not run again,
-and a run that was stopped goes on. If a run fails, the others go on.
+Start the same command again after Ctrl-C or a power cut, or with more seeds: runs in the tables are not repeated, and a
+run that was stopped goes on. If a run fails, the others go on.
 """
 
 from __future__ import annotations
@@ -33,21 +32,21 @@ with loading():  # Ctrl-C shows no traceback
     from sgimd_torch.runs.read import finished, read_run
     from sgimd_torch.runs.sweep import add_engines, add_options, engine_of
     from table import FILE, ROWS, Row, answers_of, merge, own_answer, read_table, result_rows
-    from variants import ALIKE, ANSWERS, EXPERIMENTS, MADE, SEEDS, Variant, make_subsets, seeds_of, small_tables
+    from variants import ALIKE, ANSWERS, EXPERIMENTS, MADE, SEEDS, SMALL_TABLES, Variant, make_subsets, seeds_of
 
 EXAMPLES: Final = f"""experiments: {", ".join(EXPERIMENTS)}
 
 examples:
-  python experiments/compare.py --dry-run                         what the pages still lack
-  python experiments/compare.py                                   run it: each experiment with the seeds of its page
+  python experiments/compare.py --dry-run                         runs that the pages still lack
+  python experiments/compare.py                                   do them: each experiment with the seeds of its page
   python experiments/compare.py learners large-space --seeds 0-2 --results mine
   python experiments/compare.py ablations --only uniform-goals grid --results mine   all their rows, into mine/
   python experiments/compare.py --shard 3/20                      a part of the runs, see docs/clusters.md
-  python experiments/compare.py --verify 10 --lot 7               ten rows of the tables, drawn by lot, made again
+  python experiments/compare.py --verify 10 --lot 7               ten rows of the tables, drawn at random, made again
 
 Exit code: 0 all runs are in the tables, 1 some failed, 2 the request is wrong, 130 or 143 stopped by a signal.
 """
-# These measure the noise floor, which takes as long as everything else.
+# Experiments that measure the noise floor, which takes as long as everything else.
 FLOORS: Final = ("learners", "letter", "forward-model")
 FLOOR_AT: Final = 5000
 RUN: Final = ["experiment", "variant", "seed", "movements", "answer"]
@@ -57,10 +56,10 @@ Wanted = tuple[str, Config]  # a run, and the experiment that its rows are for
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run what is missing in the tables, and collect the results.
+    """Carry out the runs that the tables lack, and collect the results.
 
     Returns:
-        The exit code, 1 where runs failed.
+        The exit code, 1 if runs failed.
     """
     options = _options(argv)
     whole = runs_of(options.experiments, options.only, options.seeds, options.out)
@@ -95,12 +94,12 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def verify(wanted: Sequence[Wanted], table: pd.DataFrame, options: argparse.Namespace) -> int:
-    """Draw rows of the table by lot, make each again by a run of its own, and compare.
+    """Draw rows of the table at random, make each again by a run of its own, and compare.
 
-    Such a run has as many movements as its row says and is evaluated only at the end, which does not change it.
+    The run has as many movements as its row and is evaluated only at the end, which changes nothing about learning.
 
     Returns:
-        0 if all are equal, except for rounding, else 1.
+        0 if all are equal except for rounding, else 1.
     """
     configs = {(name, config.variant, config.seed): config for name, config in wanted}
     rows = [row for row in table.to_dict("records") if (row["experiment"], row["variant"], row["seed"]) in configs]
@@ -127,12 +126,10 @@ def verify(wanted: Sequence[Wanted], table: pd.DataFrame, options: argparse.Name
 
 
 def compared(shipped: Row, now: Row) -> str:
-    """Compare two rows: "equal", "rounding" if only that differs (it grows while a learner learns), or "DIFFERS"."""
+    """Compare two rows: "equal", "rounding" if they differ by rounding errors alone, or "DIFFERS"."""
     if {name: shipped[name] for name in RUN} != {name: now.get(name) for name in RUN}:
         return "DIFFERS"
-    then, found = (
-        np.array([row[name] for name in NUMBERS], dtype=np.float64) for row in (_plain(shipped), _plain(now))
-    )
+    then, found = (np.array([row[name] for name in NUMBERS], dtype=np.float64) for row in (shipped, now))
     if np.array_equal(then, found, equal_nan=True):
         return "equal"
     return "rounding" if np.allclose(found, then, rtol=ROUNDING, atol=0, equal_nan=True) else "DIFFERS"
@@ -143,9 +140,9 @@ def runs_of(experiments: Sequence[str], only: Sequence[str], seeds: Sequence[int
 
     Args:
         experiments: names in ``EXPERIMENTS``.
-        only: only these of their variants; empty for all.
-        seeds: of each; None for those that its page stands on.
-        out: where runs go; the subsets of ``make_subsets`` are in ``out/demonstrations``.
+        only: names of variants, the others are left out; empty for all.
+        seeds: seeds of each variant; None for those of its page.
+        out: folder of the runs; the subsets of ``make_subsets`` are in ``out/demonstrations``.
     """
     found = []
     for seed in sorted({*chain(*SEEDS.values())}) if seeds is None else seeds:
@@ -154,13 +151,7 @@ def runs_of(experiments: Sequence[str], only: Sequence[str], seeds: Sequence[int
             for variant, line in EXPERIMENTS[experiment].items():
                 if (only and variant not in only) or (seeds is None and seed not in seeds_of(experiment, variant)):
                     continue
-                run: Variant = {
-                    "seed": seed,
-                    "out": out,
-                    "name": variant,
-                    "floor_at": floors,
-                    **line,
-                }
+                run: Variant = {"seed": seed, "out": out, "name": variant, "floor_at": floors, **line}
                 if run.get("demonstrations") in MADE:
                     run["demonstrations"] = out / "demonstrations" / run["demonstrations"]
                 config = Config.from_settings(run)
@@ -169,7 +160,7 @@ def runs_of(experiments: Sequence[str], only: Sequence[str], seeds: Sequence[int
 
 
 def last_rows(experiment: str, config: Config) -> set[tuple[Any, ...]]:
-    """Keys of the rows of a run's last evaluation; if they are in the table, so are the others."""
+    """Keys of the rows of a run's last evaluation; if the table has them, it has the earlier ones, too."""
     answers = {own_answer(config) if answer == OWN else answer for answer in config.evaluated_by}
     answers.intersection_update(ANSWERS.get(experiment, ALIKE))
     return {(experiment, config.variant, config.seed, config.movements, answer) for answer in answers}
@@ -179,27 +170,23 @@ def collect(experiment: str, config: Config, results: Path) -> None:
     """Merge the rows of a finished run, read from its directory, into the tables of its experiment.
 
     Raises:
-        RunError: it is damaged, or it was not evaluated at its end.
+        RunError: the run is damaged, or was not evaluated at its end.
         ResultsError, OSError: a table cannot be read or written.
     """
     run = read_run(config.directory)
     rows = result_rows(experiment, config, run)
     if config.movements not in {row["movements"] for row in rows}:
         raise RunError(f"{run.path} has no evaluation after {config.movements} movements, though it ended")
-    for name in small_tables(experiment):
+    if name := SMALL_TABLES.get(experiment):
         merge(results, name, ROWS[name](config, run))
     merge(results, FILE, rows)  # last: now the run counts as done
 
 
 def _run(configs: Sequence[Config], options: argparse.Namespace, on_end: Any = None) -> list[str]:
-    """The failures."""
+    """Carry out runs; returns a message for each failure."""
     make_subsets(options.out / "demonstrations", by_hand="by-hand" in options.experiments)
     with engine_of(options, configs) as engine:
         return sweep(configs, engine, on_end=on_end)
-
-
-def _plain(row: Row) -> dict[str, Any]:
-    return {name: np.nan if pd.isna(value) else value for name, value in row.items()}
 
 
 def _in_words(row: Row) -> str:
@@ -214,16 +201,18 @@ def _options(argv: Sequence[str] | None) -> argparse.Namespace:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     results = "folder of the tables (default: %(default)s)"
-    parser.add_argument("experiments", nargs="*", metavar="EXPERIMENT", help="which; all if none is named")
-    parser.add_argument("--only", nargs="+", default=[], metavar="VARIANT", help="only these of their variants")
-    add_options(parser, seeds=None, default="those of the page of each experiment")
+    parser.add_argument("experiments", nargs="*", metavar="EXPERIMENT", help="experiments to run (default: all)")
+    parser.add_argument(
+        "--only", nargs="+", default=[], metavar="VARIANT", help="variants to run (default: all of them)"
+    )
+    add_options(parser, seeds=None, default="seeds of the page of each experiment")
     add_engines(parser)
-    parser.add_argument("--out", type=Path, default=Path("runs"), help="where the runs go (default: %(default)s)")
+    parser.add_argument("--out", type=Path, default=Path("runs"), help="folder of the runs (default: %(default)s)")
     parser.add_argument("--results", type=Path, default=Path("results"), help=results)
     parser.add_argument(
-        "--verify", type=int, default=0, metavar="N", help="make N rows again, in a folder of their own"
+        "--verify", type=int, default=0, metavar="N", help="number of rows to make again, in a folder of their own"
     )
-    parser.add_argument("--lot", type=int, default=0, help="seed for drawing them (default: %(default)s)")
+    parser.add_argument("--lot", type=int, default=0, help="seed of the draw of --verify (default: %(default)s)")
     options = parser.parse_args(argv)
     options.experiments = list(dict.fromkeys(options.experiments)) or list(EXPERIMENTS)
     for name in options.experiments:

@@ -1,19 +1,20 @@
-"""The rows as evidence: errors by seed, and the statistics over seeds that claims, tables, figures and prose read.
+"""The rows as evidence: errors by seed, and the statistics over seeds that claims, tables and figures read.
 
     found = Evidence.of(Path("results")); show(found.ratio("sgim-d", "random"))
 A name is that of a variant, answered by `process`; "sgim-d-letter by paper" is answered by another inverse model. Two
-names are compared on their common seeds, or, without any, as independent samples.
+names are compared on their common seeds, or as independent samples if they have none.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
 
 from sgimd_torch.spaces import Array
 from sgimd_torch.views.statistics import (
@@ -29,21 +30,20 @@ from table import read_table
 
 LAST: Final = 5000  # movements in the life of a learner of the paper
 Level = float | None  # confidence of an interval; None for the number alone, which costs much less
-Measure = Callable[..., Interval]  # takes the ``level``
-BySeed = Mapping[int, float]
+Statistic = Callable[..., Interval]  # with a keyword ``level``
 
 
 class NotRun(LookupError):
-    """What is asked for needs runs or evaluations that are not there; the message names them."""
+    """Runs or evaluations are missing; the message names them."""
 
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """The rows of all experiments. Every method raises `NotRun` where fewer than two seeds have what it needs.
+    """The rows of all experiments. Every method raises `NotRun` if fewer than two seeds have the rows that it needs.
 
     Args:
         rows: error and floor by answer, variant, movements and seed.
-        explored, asked: the small tables, by variant and seed.
+        explored, asked: small tables, by variant and seed.
     """
 
     rows: pd.DataFrame
@@ -52,7 +52,7 @@ class Evidence:
 
     @classmethod
     def of(cls, folder: Path) -> Evidence:
-        """From the tables of a folder.
+        """The tables of a folder.
 
         Raises:
             ResultsError: a table makes no sense.
@@ -62,28 +62,31 @@ class Evidence:
         explored, asked = (read_table(folder, name).set_index("variant") for name in ("explored.csv", "asked.csv"))
         return cls(rows, explored, asked)
 
-    def at(self, name: str, movements: int = LAST, column: str = "error") -> dict[int, float]:
-        """Seed -> error (m), or its noise floor."""
+    def at(self, name: str, movements: int = LAST, column: str = "error") -> pd.Series:
+        """Errors (m) by seed; with the column "floor" their noise floors."""
         variant, _, answer = name.partition(" by ")
         place = (answer or "process", variant, movements)
         found = self.rows.loc[place, column].dropna() if place in self.rows.index else pd.Series(dtype=float)
         return _two_or_more(found, f"{name} at {movements}")
 
-    def errors(self, name: str, movements: int = LAST) -> Array:
-        """``(n_seeds,)`` m."""
-        return _array(self.at(name, movements))
-
-    def curve(self, name: str) -> tuple[Array, Array]:
-        """``(n,)`` movements and ``(n_seeds, n)`` errors (m), of the seeds that were evaluated at each of them."""
+    def curve(self, name: str) -> pd.DataFrame:
+        """Errors (m) by seed and movements, of the seeds that were evaluated at each number of movements."""
         variant, _, answer = name.partition(" by ")
         if (answer or "process", variant) not in self.rows.index:
             raise NotRun(name)
-        table = self.rows["error"].loc[answer or "process", variant].unstack("movements").dropna()
-        return table.columns.to_numpy(np.float64), table.to_numpy()
+        return self.rows["error"].loc[answer or "process", variant].unstack("movements").dropna()
+
+    def counts(self, table: str, name: str, column: str, teachers: Sequence[str] = ()) -> pd.Series:
+        """A column of a small table by seed, summed over these ``teachers``, all of them unless given."""
+        rows: pd.DataFrame = getattr(self, table)
+        variant = name.partition(" by ")[0]
+        mine = rows[rows.index == variant].dropna(subset=column)
+        mine = mine[mine["teacher"].isin(teachers)] if teachers else mine
+        return _two_or_more(mine.groupby("seed")[column].sum(), f"{column} of {variant}")
 
     def error(self, name: str, at: int = LAST, *, level: Level = LEVEL) -> Interval:
         """The interquartile mean of the error (m)."""
-        return _found(interquartile_mean, self.errors(name, at), level=level)
+        return _found(interquartile_mean, self.at(name, at), level=level)
 
     def difference(self, ours: str, theirs: str, at: int = LAST, *, level: Level = LEVEL) -> Interval:
         """Our error less theirs (m)."""
@@ -94,7 +97,7 @@ class Evidence:
         return self.over(self.at(ours, at), self.at(theirs, at), level=level)
 
     def growth(self, name: str, late: int, early: int, *, level: Level = LEVEL) -> Interval:
-        """The error late over that early."""
+        """The late error over the early one."""
         return self.over(self.at(name, late), self.at(name, early), level=level)
 
     def over_floor(self, ours: str, theirs: str, *, level: Level = LEVEL) -> Interval:
@@ -103,7 +106,8 @@ class Evidence:
 
     def improvement(self, ours: str, theirs: str, *, level: Level = LEVEL) -> Interval:
         """The probability that a run of ours has a smaller error than one of theirs at the end."""
-        return improvement_interval(self.errors(ours), self.errors(theirs), level=LEVEL if level is None else level)
+        errors = self.at(ours).to_numpy(), self.at(theirs).to_numpy()
+        return improvement_interval(*errors, level=LEVEL if level is None else level)
 
     def variance_ratio(self, ours: str, theirs: str, *, level: Level = LEVEL) -> Interval:
         """The variance over seeds of our error at the end over that of theirs."""
@@ -111,50 +115,53 @@ class Evidence:
         def ratio(x: Array, y: Array) -> Array:
             return np.asarray(x.var(axis=-1, ddof=1) / y.var(axis=-1, ddof=1))
 
-        return _found(ratio, self.errors(ours), self.errors(theirs), level=level)
+        return _found(ratio, self.at(ours), self.at(theirs), level=level)
 
     def growth_ratio(self, ours: Sequence[str], theirs: Sequence[str], *, level: Level = LEVEL) -> Interval:
-        """How many times more our error grows than theirs, from the first to the second name of each."""
+        """The growth of our error over that of theirs; errors grow from the first to the second name of each."""
 
         def times(*errors: Array) -> Array:
             small, large, their_small, their_large = map(interquartile_mean, errors)
             return (large / small) / (their_large / their_small)
 
-        return _found(times, *map(self.errors, (*ours, *theirs)), level=level)
+        return _found(times, *map(self.at, (*ours, *theirs)), level=level)
 
     def over_tasks(self, ours: Sequence[str], theirs: Sequence[str], at: int, *, level: Level = LEVEL) -> Interval:
         """The interquartile mean over tasks of our error over theirs; a name for each task on either side."""
-        samples = [self.errors(name, at) for name in (*ours, *theirs)]
 
         def mean(*drawn: Array) -> Array:
             pairs = zip(drawn[: len(ours)], drawn[len(ours) :], strict=True)
-            ratios = [interquartile_mean(x) / interquartile_mean(y) for x, y in pairs]
-            return interquartile_mean(np.stack(ratios, axis=-1))
+            return interquartile_mean(np.stack([_ratio(x, y) for x, y in pairs], axis=-1))
 
-        return _found(mean, *samples, level=level)
+        return _found(mean, *(self.at(name, at) for name in (*ours, *theirs)), level=level)
 
     def time_to_reach(self, ours: str, theirs: str, *, level: Level = LEVEL) -> Interval:
-        """After how many movements our mean error falls to theirs at the end; twice a life if it never does."""
-        movements, curves = self.curve(ours)
+        """Movements until our mean error falls to theirs at the end; twice a life if it never does."""
+        curve = self.curve(ours)
+        movements = curve.columns.to_numpy(np.float64)
 
         def time(curves: Array, errors: Array) -> Array:
             means = interquartile_mean(np.swapaxes(curves, -1, -2))
             return np.minimum(movements_to_reach(movements, means, interquartile_mean(errors)), 2 * LAST)
 
-        return _found(time, curves, self.errors(theirs), level=level)
+        return _found(time, curve, self.at(theirs), level=level)
 
-    def tiles(self, name: str, *, level: Level = LEVEL) -> Interval:
-        """How many tiles of the benchmark were reached in a life."""
-        return _found(interquartile_mean, _array(self.counts("explored", name, "tiles")), level=level)
+    def count(self, table: str, name: str, column: str, *, level: Level = LEVEL) -> Interval:
+        """The interquartile mean of a column of a small table."""
+        return _found(interquartile_mean, self.counts(table, name, column), level=level)
 
     def more_tiles(self, ours: str, theirs: str, *, level: Level = LEVEL) -> Interval:
-        """How many more tiles we have reached."""
+        """The number of tiles of the benchmark that we reached in a life, less theirs."""
         return self.less(*(self.counts("explored", name, "tiles") for name in (ours, theirs)), level=level)
 
-    def near_goals(self, name: str) -> Array:
-        """``(n_seeds, 2)``: how many goals a learner chose, and how many of them can be reached."""
-        found = [self.counts("explored", name, column) for column in ("goals", "near")]
-        return np.array([[*each.values()] for each in found]).T
+    def near_goals(self, name: str) -> pd.DataFrame:
+        """The number of ``goals`` that a learner chose, and of those ``near``, which can be reached, by seed."""
+        return pd.DataFrame({column: self.counts("explored", name, column) for column in ("goals", "near")})
+
+    def near_share(self, name: str, *, level: Level = LEVEL) -> Interval:
+        """The share of goals that can be reached, all seeds together."""
+        found = self.near_goals(name)
+        return self.share(found["near"], found["goals"], level=level)
 
     def near_ratio(self, ours: str, theirs: str, *, level: Level = LEVEL) -> Interval:
         """Our share of goals that can be reached over theirs, all seeds together.
@@ -168,59 +175,45 @@ class Evidence:
 
         return _found(times, self.near_goals(ours), self.near_goals(theirs), level=level)
 
-    def counts(self, table: str, name: str, column: str, teachers: Sequence[str] = ()) -> dict[int, float]:
-        """Seed -> a column of a small table, summed over these ``teachers``, all of them unless given."""
-        rows: pd.DataFrame = getattr(self, table)
-        variant = name.partition(" by ")[0]
-        mine = rows.loc[[variant]] if variant in rows.index else rows.iloc[:0]
-        mine = mine[mine["teacher"].isin(teachers)] if teachers else mine
-        return _two_or_more(mine.dropna(subset=column).groupby("seed")[column].sum(), f"{column} of {variant}")
-
-    def less(self, ours: BySeed, theirs: BySeed, *, level: Level = LEVEL) -> Interval:
-        """Ours less theirs."""
-        x, y, paired = _samples(ours, theirs)
-        if paired:
-            return _found(interquartile_mean, x - y, level=level)
+    def less(self, ours: pd.Series, theirs: pd.Series, *, level: Level = LEVEL) -> Interval:
+        """Ours less theirs, both by seed."""
+        ours, theirs, paired = _matched(ours, theirs)
 
         def difference(x: Array, y: Array) -> Array:
-            return interquartile_mean(x) - interquartile_mean(y)
+            return interquartile_mean(x - y) if paired else interquartile_mean(x) - interquartile_mean(y)
 
-        return _found(difference, x, y, level=level)
+        return _found(difference, ours, theirs, paired=paired, level=level)
 
-    def over(self, ours: BySeed, theirs: BySeed, *, level: Level = LEVEL) -> Interval:
-        """Ours over theirs."""
+    def over(self, ours: pd.Series, theirs: pd.Series, *, level: Level = LEVEL) -> Interval:
+        """Ours over theirs, both by seed."""
+        ours, theirs, paired = _matched(ours, theirs)
+        return _found(_ratio, ours, theirs, paired=paired, level=level)
 
-        def ratio(x: Array, y: Array) -> Array:
-            return interquartile_mean(x) / interquartile_mean(y)
-
-        x, y, paired = _samples(ours, theirs)
-        return _found(ratio, x, y, paired=paired, level=level)
-
-    def share(self, parts: BySeed, wholes: BySeed, *, level: Level = LEVEL) -> Interval:
+    def share(self, parts: pd.Series, wholes: pd.Series, *, level: Level = LEVEL) -> Interval:
         """All ``parts`` over all ``wholes``, the seeds of both drawn together.
 
         Raises:
-            NotRun: there are none.
+            NotRun: all wholes are 0.
         """
-        if not sum(wholes.values()):
+        if not wholes.sum():
             raise NotRun("nothing to count")
 
         def ratio(part: Array, whole: Array) -> Array:
             return np.asarray(part.sum(axis=-1) / np.maximum(whole.sum(axis=-1), 1))
 
-        return _found(ratio, _array(parts), _array(wholes), paired=True, level=level)
+        return _found(ratio, parts, wholes, paired=True, level=level)
 
 
-def shared(ours: BySeed, theirs: BySeed) -> tuple[dict[int, float], dict[int, float]]:
+def shared(ours: pd.Series, theirs: pd.Series) -> tuple[pd.Series, pd.Series]:
     """Both, restricted to common seeds.
 
     Raises:
         NotRun: fewer than two.
     """
-    seeds = [seed for seed in ours if seed in theirs]
+    seeds = ours.index.intersection(theirs.index)
     if len(seeds) < 2:
         raise NotRun("fewer than two seeds in common")
-    return {seed: ours[seed] for seed in seeds}, {seed: theirs[seed] for seed in seeds}
+    return ours[seeds], theirs[seeds]
 
 
 def movements_to_reach(movements: Array, errors: Array, level: Array | float) -> Array:
@@ -244,25 +237,24 @@ def movements_to_reach(movements: Array, errors: Array, level: Array | float) ->
     return np.where(reached.any(axis=-1), found[..., 0], np.inf)
 
 
-def _samples(ours: BySeed, theirs: BySeed) -> tuple[Array, Array, bool]:
-    """Errors of both, and whether they are paired: on common seeds, or independent where there are none."""
-    paired = bool(ours.keys() & theirs.keys())
-    if paired:
-        ours, theirs = shared(ours, theirs)
-    return _array(ours), _array(theirs), paired
+def _matched(ours: pd.Series, theirs: pd.Series) -> tuple[pd.Series, pd.Series, bool]:
+    """Both, and whether they are paired: on common seeds, or independent if there are none."""
+    paired = not ours.index.intersection(theirs.index).empty
+    return *(shared(ours, theirs) if paired else (ours, theirs)), paired
 
 
-def _found(statistic: Callable[..., Array], *samples: Array, level: Level, paired: bool = False) -> Interval:
+def _ratio(x: Array, y: Array) -> Array:
+    return interquartile_mean(x) / interquartile_mean(y)
+
+
+def _found(statistic: Callable[..., Array], *of: ArrayLike, level: Level, paired: bool = False) -> Interval:
+    samples = [np.asarray(each, dtype=np.float64) for each in of]
     if level is None:
         return point(float(statistic(*samples)))
     return interval(statistic, *samples, rng=rng(), paired=paired, level=level)
 
 
-def _array(values: BySeed) -> Array:
-    return np.array([*values.values()])
-
-
-def _two_or_more(found: pd.Series, what: str) -> dict[int, float]:
+def _two_or_more(found: pd.Series, what: str) -> pd.Series:
     if len(found) < 2:
         raise NotRun(what)
-    return {int(seed): float(value) for seed, value in found.items()}
+    return found

@@ -5,7 +5,8 @@
   gain        what each step from random movements to practice brings               (GAIN)
   curiosity   interest against uniform goals, where it was tried                    (CURIOSITY)
 
-Lines are interquartile means over seeds, bands and bars their 95 % intervals. What was not run is left out and named.
+Lines are interquartile means over seeds, bands and bars their 95 % intervals. Figures without rows are left out and
+named.
 
 Example:
   python experiments/figures.py
@@ -27,6 +28,7 @@ with loading():  # Ctrl-C shows no traceback
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from claimed import WHOLE
     from evidence import LAST, Evidence, NotRun
     from page_tables import GAIN, SETTINGS, TAUGHT
     from sgimd_torch.figures.learning import COLOURS, NAMES
@@ -36,7 +38,6 @@ with loading():  # Ctrl-C shows no traceback
     from variants import EXPERIMENTS
 
 KIND: Final = "svg"
-TIMES: Final = (250, 500, 1000, 2000, LAST)
 ERROR: Final = "mean distance to the goals (m)"
 LEARNERS: Final = ("random", "sagg-riac", "observation", "imitation", "sgim-d")  # the paper's
 
@@ -51,7 +52,7 @@ def learning(found: Evidence) -> Figure:
 
 
 def paper(found: Evidence) -> Figure:
-    """The paper's five learners; SAGG-RIAC, SGIM-D and the random one in the larger space, too."""
+    """Error against movements of the paper's five learners, and of three of them in the larger space."""
     figure = Figure(figsize=(10, 4.2), layout="constrained")
     small, large = figure.subplots(1, 2, sharey=True)
     curves(small, found, {name: name for name in LEARNERS})
@@ -97,21 +98,22 @@ FIGURES: Final[dict[str, Callable[[Evidence], Figure]]] = {
 
 
 def curves(ax: Axes, found: Evidence, shown: Mapping[str, str]) -> None:
-    """The errors of learners, each an algorithm and its variant: with intervals as bands, and names at their ends.
+    """Draw errors against movements, for the variant that is ``shown`` of each algorithm, with intervals as bands.
 
-    Movements are on a logarithmic axis, since learners are told apart early.
+    Movements are on a logarithmic axis, because learners differ most early.
     """
     ends: dict[str, float] = {}
     for algorithm, name in shown.items():
-        movements, errors = found.curve(name)
-        centre, low, high = np.array([iqm_interval(each, rng=rng()) for each in errors.T]).T
+        curve = found.curve(name)
+        movements = curve.columns
+        centre, low, high = np.array([iqm_interval(curve[at], rng=rng()) for at in movements]).T
         ax.fill_between(movements, low, high, color=COLOURS[algorithm], alpha=0.2, linewidth=0)
         ax.plot(movements, centre, "o-", color=COLOURS[algorithm], markersize=4, label=NAMES[algorithm])
         ends[algorithm] = centre[-1]
     ax.set(xscale="log", xlabel="movements executed", ylabel=ERROR)
     ax.set_xlim(right=3.2 * LAST)
     ax.set_ylim(bottom=0)
-    ax.set_xticks(TIMES, map(str, TIMES))
+    ax.set_xticks(WHOLE, map(str, WHOLE))
     ax.set_xticks([], minor=True)
     ax.grid(alpha=0.3)
     height, gap = -np.inf, 0.06 * ax.get_ylim()[1]
@@ -121,7 +123,7 @@ def curves(ax: Axes, found: Evidence, shown: Mapping[str, str]) -> None:
 
 
 def _rows(numbers: Mapping[str, Callable[[], Interval]], label: str, form: str = ".3f") -> Figure:
-    """A row for each number that was run, from the top, as a point with its interval."""
+    """A figure with a row for each number that was run, from the top: a point with its interval."""
     shown: dict[str, Interval] = {}
     for name, number in numbers.items():
         try:
@@ -145,11 +147,13 @@ def _rows(numbers: Mapping[str, Callable[[], Interval]], label: str, form: str =
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Draw what can be drawn; the exit code is 2 if the rows make no sense."""
+    """Draw the figures that have rows; the exit code is 2 if the rows make no sense."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--results", type=Path, default=Path("results"), help="folder of tables (default: %(default)s)")
-    parser.add_argument("--out", type=Path, default=Path("results/figures"), help="default: %(default)s")
-    parser.add_argument("--only", choices=FIGURES, help="only this figure")
+    parser.add_argument(
+        "--out", type=Path, default=Path("results/figures"), help="folder of the figures (default: %(default)s)"
+    )
+    parser.add_argument("--only", choices=FIGURES, help="figure to draw (default: all)")
     options = parser.parse_args(argv)
     found = Evidence.of(options.results)
     make_folder(options.out)

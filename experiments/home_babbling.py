@@ -1,10 +1,10 @@
 """Goal babbling from a home posture, a rival: Rolf, Steil & Gienger (2010), "Goal babbling permits direct learning of
 inverse kinematics", IEEE Transactions on Autonomous Mental Development 2(3).
 
-It knows one movement at first, home, the middle of Pi. Goals lie on straight ways through T. For each it makes the
-movement that its inverse estimate gives, and a variation that is affine in the goal and stays the same along a way. The
-estimate learns from these movements alone, most from those that led towards the goal and far for their size: of the
-many movements that reach a place they show one family.
+The learner knows one movement at first, home, the middle of Pi. Goals lie on straight paths through T. For each of them
+it makes the movement of its inverse estimate plus a variation, which is affine in the goal and constant along a path.
+The estimate learns from these movements alone. A movement counts more if it led towards the goal, and far for its
+size. So the estimate learns one family of the many movements that reach a place.
     sgimd run --algorithm experiments.home_babbling:home_babbling
 Deviation: the estimate is a local affine regression, not a global one; a posture is a movement here.
 """
@@ -21,19 +21,19 @@ from sgimd_torch.learner import Learner
 from sgimd_torch.parts import Problem, Strategy
 from sgimd_torch.spaces import Array, Attempt, Move
 
-HOMEWARD: Final = 0.1  # of ways begin with the movement home
-NEAREST: Final = 20  # outcomes around a goal that the estimate is made from
-RIDGE: Final = 0.1  # exemplars of mean weight at home that the estimate counts besides
+HOMEWARD: Final = 0.1  # share of paths that begin with the movement home
+NEAREST: Final = 20  # outcomes around a goal that enter the estimate
+RIDGE: Final = 0.1  # number of further exemplars, at home and of mean weight, that enter the estimate
 ORIGIN: Final = "home-babbling"
 TINY: Final = np.finfo(float).tiny
 
 
 class HomeBabbling(Strategy):
-    """A way of goals each attempt.
+    """A path of goals in each attempt.
 
     Args:
-        problem: what has to be learnt; its memory began empty.
-        steps: movements on a way.
+        problem: learning problem; its memory is empty at the start.
+        steps: movements on a path.
         sd: standard deviation of the variations, in sides of Pi.
     """
 
@@ -44,11 +44,11 @@ class HomeBabbling(Strategy):
         self.policies, self.outcomes, self.memory = problem.policies, problem.outcomes, problem.memory
         self.steps, self.sd = steps, sd
         self.home = (self.policies.low + self.policies.high) / 2
-        self._from: Array | None = None  # where the last way ended; None: at home
+        self._from: Array | None = None  # the last goal; None at home
         self._weights: list[float] = []  # of each exemplar
 
     def attempt(self, context: Array) -> Attempt:
-        """Home, now and then, and a way from there or from the last goal to a new one."""
+        """Follow a path to a new goal, from the last goal or now and then from home."""
         if self._from is None or self.rng.random() < HOMEWARD:
             self._from = self.outcomes.clip((yield Move(self.home, None, ORIGIN)))
             self._weights.append(1.0)
@@ -67,7 +67,7 @@ class HomeBabbling(Strategy):
             last = now
 
     def _estimate(self, context: Array, goal: Array) -> Array:
-        """``(theta_dim,)`` for a goal: an affine regression of theta on the outcomes nearest to it, drawn home."""
+        """``(theta_dim,)`` for a goal: affine regression of theta on outcomes near it, with a ridge towards home."""
         rows = self.memory.near_outcomes(context, goal, NEAREST)
         weights = np.array([self._weights[row] for row in rows])
         off = (self.memory.outcomes[rows] - goal) / self.outcomes.sides
@@ -79,24 +79,27 @@ class HomeBabbling(Strategy):
 
 
 def _weight(goal: Array, outcome: Array, theta: Array) -> float:
-    """Of a movement, by the steps of goal, outcome and theta that led to it: how straight to the goal times how far for
-    its size."""
+    """Weight of a movement: directness times distance over size.
+
+    Args:
+        goal, outcome, theta: steps from the movement before to this one.
+    """
     length, size = np.linalg.norm(outcome), np.linalg.norm(theta)
     straight = goal @ outcome / max(np.linalg.norm(goal) * length, TINY)
     return float((1 + straight) / 2 * length / max(size, TINY))
 
 
 def home_babbling(environment: Environment, seed: int, *, steps: int = 10, sd: float = 0.1) -> Learner:
-    """Goal babbling from home; the learner answers by `LocalProcess`, as others do.
+    """Goal babbling from home; `LocalProcess` answers, as for other learners.
 
     Args:
         environment: robot, which is not executed here.
         seed: number from which the random stream of the learner comes.
-        steps: movements on a way.
+        steps: movements on a path.
         sd: standard deviation of the variations, in sides of Pi.
 
     Raises:
-        ValueError: an environment with contexts, between which a way cannot go.
+        ValueError: an environment with contexts; a path cannot lead from one context to another.
     """
     if environment.contexts.dim:
         raise ValueError(f"home babbling knows one context only, got contexts of dim {environment.contexts.dim}")

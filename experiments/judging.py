@@ -1,4 +1,4 @@
-"""How claims are judged: parts with bars, and one loop for all claims of a page.
+"""Verdicts on claims: parts with bars, and one correction for all claims of a page.
 
     judge([Claim("SGIM-D halves Random's error", [at_most(0.5, found.ratio, "sgim-d", "random")])])
 A part clears its bar only if its whole interval does. A claim of several parts holds if each of them does, which
@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from functools import cache, partial
 from typing import Final, NamedTuple
 
-from evidence import Level, Measure, NotRun
+from evidence import Level, NotRun, Statistic
 from sgimd_torch.views.statistics import LEVEL, holm, show
 
 HOLDS: Final = "holds"
@@ -23,11 +23,16 @@ MISSING: Final = "not run"
 class Part(NamedTuple):
     """A number with a bar.
 
-    ``measured`` gives it at a confidence ``level``. It should be at most the ``bar``, or at least, if ``least``; its
-    interval may reach ``margin`` beyond. ``name``: what it is of, where a claim has several; ``form``: of the number.
+    Args:
+        measured: the number with its interval at a confidence ``level``.
+        bar: upper bound of the number, a lower bound if ``least``.
+        least: true if the number should be at least the bar.
+        margin: length of the interval that may lie beyond the bar.
+        name: name of the part, if a claim has several.
+        form: format of the number.
     """
 
-    measured: Measure
+    measured: Statistic
     bar: float
     least: bool = False
     margin: float = 0.0
@@ -36,11 +41,11 @@ class Part(NamedTuple):
 
     @property
     def above(self) -> float:
-        """How far the number lies on the wrong side of the bar."""
+        """The distance of the number to the bar, positive on the wrong side."""
         return _above(self, None)[0]
 
     def holds(self, level: float) -> bool:
-        """Whether the number clears the bar, and its interval, too, but for the margin."""
+        """Whether the number clears the bar, and so does its interval except for the margin."""
         return self.above <= 0 and _above(self, level)[2] <= self.margin
 
     def fails(self, level: float) -> bool:
@@ -49,7 +54,7 @@ class Part(NamedTuple):
 
 
 class Claim(NamedTuple):
-    """What is claimed, with its schedules and its bar in words; its parts; a sentence on what came of it."""
+    """A claim in words, with its schedules and its bar; its parts, which must all hold; a sentence on the result."""
 
     text: str
     parts: Sequence[Part]
@@ -57,7 +62,7 @@ class Claim(NamedTuple):
 
 
 class Verdict(NamedTuple):
-    """``number``: of the part that is farthest on the wrong side, with its interval of 95 %."""
+    """A verdict; ``number`` is that of the worst part, farthest on the wrong side, with its interval of 95 %."""
 
     claim: str
     number: str
@@ -65,15 +70,15 @@ class Verdict(NamedTuple):
 
 
 def judge(claims: Sequence[Claim]) -> list[Verdict]:
-    """All claims in order, corrected together by Holm's method: the chance that any verdict is wrong is 5 % at most.
+    """Verdicts on claims, corrected together by Holm's method: the chance that any of them is wrong is 5 % at most.
 
     Intervals of few seeds are too narrow: where n paired differences all have one sign, their bootstrap interval
     excludes 0 at any level, and by chance alone they have one sign with probability 2^(1 - n).
 
     Raises:
-        ValueError: errors that have no ratio, such as 0.
+        ValueError: errors without a ratio, such as 0.
     """
-    run = {number: claim for number, claim in enumerate(claims) if not _missing(claim)}
+    run = {number: claim for number, claim in enumerate(claims) if _was_run(claim)}
     standing = holm(run, lambda number, level: _verdict(run[number], level) != OPEN)
     return [
         Verdict(claim.text, _number(claim), _verdict(claim, LEVEL) if number in standing else OPEN)
@@ -83,14 +88,18 @@ def judge(claims: Sequence[Claim]) -> list[Verdict]:
     ]
 
 
-def at_most(bar: float, measure: Measure, *of: object, margin: float = 0.0, name: str = "", form: str = ".2f") -> Part:
-    """The part that ``measure(*of)`` is at most the bar."""
-    return Part(partial(measure, *of), bar, False, margin, name, form)
+def at_most(
+    bar: float, statistic: Statistic, *of: object, margin: float = 0.0, name: str = "", form: str = ".2f"
+) -> Part:
+    """A part: ``statistic(*of)`` is at most the bar."""
+    return Part(partial(statistic, *of), bar, False, margin, name, form)
 
 
-def at_least(bar: float, measure: Measure, *of: object, margin: float = 0.0, name: str = "", form: str = ".2f") -> Part:
-    """The part that ``measure(*of)`` is at least the bar."""
-    return Part(partial(measure, *of), bar, True, margin, name, form)
+def at_least(
+    bar: float, statistic: Statistic, *of: object, margin: float = 0.0, name: str = "", form: str = ".2f"
+) -> Part:
+    """A part: ``statistic(*of)`` is at least the bar."""
+    return Part(partial(statistic, *of), bar, True, margin, name, form)
 
 
 @cache
@@ -113,11 +122,10 @@ def _number(claim: Claim) -> str:
     return show(part.measured(), part.form).replace("-", "−") + (f" ({part.name})" if part.name else "")
 
 
-def _missing(claim: Claim) -> list[str]:
-    missing = list[str]()
-    for part in claim.parts:
-        try:
+def _was_run(claim: Claim) -> bool:
+    try:
+        for part in claim.parts:
             part.measured(level=None)
-        except NotRun as error:
-            missing.append(str(error))
-    return missing
+    except NotRun:
+        return False
+    return True

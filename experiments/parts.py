@@ -1,7 +1,6 @@
-"""Parts that experiments need and the library lacks: rivals with tuned settings, and a toss without a context.
+"""Parts that experiments need and the library lacks: MAP-Elites that begins in the middle, a toss without a context.
 
-Each rival has the one setting that a search on tuning seeds found better than its default, see results/RIVALS.md:
-    sgimd run --algorithm experiments.parts:cma_me         in the folder above
+sgimd run --algorithm experiments.parts:map_elites_middle         in the folder above
 """
 
 from __future__ import annotations
@@ -15,21 +14,15 @@ from ribs.emitters import GaussianEmitter
 
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.environments.toys import toss
-from sgimd_torch.learner import Correspondence, Learner
-from sgimd_torch.memory import Memory
+from sgimd_torch.learner import Learner
 from sgimd_torch.rivals import quality_diversity
 from sgimd_torch.runs.tasks import Task
 from sgimd_torch.runs.tasks.toys import toy_benchmark
 from sgimd_torch.spaces import Array, Box
 
 
-def map_elites(environment: Environment, seed: int, *, memory: Memory | None = None) -> Learner:
-    """MAP-Elites with cells of twice the side."""
-    return quality_diversity.map_elites(environment, seed, cells=10, memory=memory)
-
-
-def map_elites_middle(environment: Environment, seed: int, *, memory: Memory | None = None) -> Learner:
-    """The same, with first movements around the middle of Pi, and wider variations."""
+def map_elites_middle(environment: Environment, seed: int) -> Learner:
+    """MAP-Elites with first movements around the middle of Pi, wider variations, and cells of twice the side."""
 
     def emitters(archive: GridArchive, rng: np.random.Generator) -> list[GaussianEmitter]:
         dim = environment.policies.dim
@@ -38,26 +31,7 @@ def map_elites_middle(environment: Environment, seed: int, *, memory: Memory | N
         drawn = int(rng.integers(2**32))
         return [GaussianEmitter(archive, sigma=0.1, initial_solutions=first, batch_size=10, seed=drawn, **bounds)]
 
-    return quality_diversity.quality_diversity(environment, seed, "map-elites", emitters, cells=10, memory=memory)
-
-
-def cma_me(environment: Environment, seed: int, *, memory: Memory | None = None) -> Learner:
-    """CMA-ME with a smaller first step."""
-    return quality_diversity.cma_me(environment, seed, sd=0.05, memory=memory)
-
-
-def cma_mae_taught(
-    environment: Environment,
-    seed: int,
-    *,
-    correspondence: Correspondence,
-    imitations: int = 10,
-    epsilon: float = 0.05,
-    memory: Memory | None = None,
-) -> Learner:
-    """CMA-MAE with a smaller first step, and shown the same as SGIM-D."""
-    taught = {"correspondence": correspondence, "imitations": imitations, "epsilon": epsilon}
-    return quality_diversity.cma_mae(environment, seed, sd=0.05, memory=memory, **taught)  # type: ignore[arg-type]
+    return quality_diversity.quality_diversity(environment, seed, "map-elites", emitters, cells=10)
 
 
 class BlindToss:
@@ -70,7 +44,7 @@ class BlindToss:
         self.outcome_noise = self._toss.outcome_noise
 
     def observe(self, rng: np.random.Generator) -> Array:
-        """``(0,)``: nothing."""
+        """``(0,)``, an empty context."""
         return np.zeros(0)
 
     def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
@@ -79,6 +53,6 @@ class BlindToss:
 
 
 def blind_toss() -> Task:
-    """With the goals of the toss: what is a context worth to a learner that feels the wind?"""
+    """A toss whose wind is not felt, with the goals of the toss; it shows the worth of a context."""
     goals = toy_benchmark(toss(), 0.4)
     return Task(BlindToss(), lambda: replace(goals, environment=BlindToss.__name__))

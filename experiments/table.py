@@ -28,21 +28,21 @@ from variants import ALIKE, ANSWERS
 Row = dict[str, Any]
 FILE: Final = "results.csv"
 _ASKED: Final = ("requests", "shown", "late", "late_own", "strong", "weak")
-# The columns of each table, and how many of them make its key, which no two rows share.
+# The size of the key of each table, and its columns, the key first. No two rows share a key.
 TABLES: Final[dict[str, tuple[int, tuple[str, ...]]]] = {
     FILE: (6, ("experiment", "variant", "task", "seed", "movements", "answer", "error", "floor")),
     "explored.csv": (2, ("variant", "seed", "tiles", "goals", "near")),
     "asked.csv": (3, ("variant", "seed", "teacher", *_ASKED)),
     "rivals.csv": (4, ("rival", "setting", "seed", "movements", "linear", "process")),
 }
-TYPES: Final = {  # of columns, in every table; all others have numbers, whose empty fields are NaN
+TYPES: Final = {  # of columns in every table; all others have floats, whose empty fields are NaN
     **dict.fromkeys(("experiment", "variant", "task", "answer", "teacher", "rival", "setting"), "str"),
     **dict.fromkeys(("seed", "movements", "tiles", *_ASKED), "int64"),
     **dict.fromkeys(("goals", "near"), "Int64"),  # may be empty
 }
-LATE: Final = 1000  # movements; from then on a learner should know whom to ask
-CORNER: Final = -1.0  # m, where the tiles of the rod's benchmark begin in x and y
-NEAR: Final = 1.5  # m from the base: goals farther away cannot be reached
+LATE: Final = 1000  # movements after which a learner should know whom to ask
+CORNER: Final = -1.0  # m, least x and y of the tiles of the rod's benchmark
+NEAR: Final = 1.5  # m from the base; goals farther away cannot be reached
 
 
 class ResultsError(ValueError):
@@ -53,16 +53,15 @@ def read_table(folder: Path, name: str = FILE) -> pd.DataFrame:
     """A table of the folder; empty without a file.
 
     Raises:
-        ResultsError: it is another table, or a row of it makes no sense.
-        OSError: it cannot be read.
+        ResultsError: the file is another table, or one of its rows makes no sense.
+        OSError: the file cannot be read.
     """
     path, (n_key, columns) = folder / name, TABLES[name]
     types = {column: TYPES.get(column, "float64") for column in columns}
     if not path.exists():
         return pd.DataFrame({column: pd.Series(dtype=kind) for column, kind in types.items()})
-    exact = {
-        column: lambda text: float(text or "nan") for column, kind in types.items() if kind in ("float64", "Int64")
-    }
+    # Read by Python: another parser may change the last digit.
+    exact = {column: _number for column, kind in types.items() if kind in ("float64", "Int64")}
     others = {column: kind for column, kind in types.items() if column not in exact}
     try:
         if (header := path.read_text(encoding="utf-8").partition("\n")[0]) != ",".join(columns):
@@ -79,16 +78,16 @@ def read_table(folder: Path, name: str = FILE) -> pd.DataFrame:
 
 
 def merge(folder: Path, name: str, rows: Sequence[Row]) -> None:
-    """Add rows to a table, or put them in the place of those with the same key; then all are sorted by their keys.
+    """Add rows to a table in the order of their keys; they replace rows with the same key.
 
     Raises:
         ResultsError: see ``read_table``.
-        OSError: it cannot be written; then it is unchanged.
+        OSError: the table cannot be written; then it is unchanged.
     """
     make_folder(folder)
     n_key, columns = TABLES[name]
     with open(folder / ".lock", "w") as held:
-        fcntl.flock(held, fcntl.LOCK_EX)  # until no other process changes a table of this folder
+        fcntl.flock(held, fcntl.LOCK_EX)  # waits until no other process changes a table of this folder
         table = read_table(folder, name)
         if rows:
             table = pd.concat([table, pd.DataFrame(rows, columns=[*columns]).astype(table.dtypes.to_dict())])
@@ -102,46 +101,37 @@ def write_table(folder: Path, name: str, table: pd.DataFrame) -> None:
 
 
 def result_rows(experiment: str, config: Config, run: Run) -> list[Row]:
-    """A row of results.csv for each evaluation of a finished run by each of the answers that pages read.
+    """Rows of results.csv: one for each evaluation of a finished run by each inverse model that pages read.
 
-    The answer of the learner's own inverse model goes by the name of that model.
+    The learner's own inverse model has its word as ``answer``.
     """
     rows: list[Row] = []
+    key = {"experiment": experiment, "variant": config.variant, "task": task_name(config), "seed": config.seed}
     for answer, found in run.answers.items():
         name = own_answer(config) if answer == OWN else answer
         if name in ANSWERS.get(experiment, ALIKE):
             evaluations = (found[column].tolist() for column in ("movements", "mean_error", "noise_floor"))
             for movements, error, floor in zip(*evaluations, strict=True):
-                values = (
-                    experiment,
-                    config.variant,
-                    task_name(config),
-                    config.seed,
-                    int(movements),
-                    name,
-                    error,
-                    floor,
-                )
-                rows.append(dict(zip(TABLES[FILE][1], values, strict=True)))
+                rows.append({**key, "movements": movements, "answer": name, "error": error, "floor": floor})
     return rows
 
 
 def own_answer(config: Config) -> str:
-    """The name of the inverse model by which a learner answers; that of practice is `process`, of its effects alone."""
+    """The word of a learner's inverse model; `process` for practice, too, where it is fitted to effective movements."""
     return str(config.values.get("inverse", "process")).replace("among-effects", "process")
 
 
 def answers_of(experiment: str, config: Config) -> tuple[str, ...]:
-    """Who answers in the evaluations of a run: its own inverse model first, then the others that pages read.
+    """The inverse models that answer in the evaluations of a run: its own first, then others that pages read.
 
-    A forward model and eq. (9) answer only for the learners that learn with them.
+    A forward model and eq. (9) answer only for learners that learn with them.
     """
     others = {"process", "linear", "nearest"}.intersection(ANSWERS.get(experiment, ALIKE)) - {own_answer(config)}
     return (OWN, *sorted(others))
 
 
 def task_name(config: Config) -> str:
-    """The robot's word, and what is not as usual about it: ``fishing-rod task_space=100``."""
+    """The robot's word and its options that differ from their defaults: ``fishing-rod task_space=100``."""
     usual = Config.from_settings({"environment": config["environment"]}).values
     options = {name.removeprefix("environment."): value for name, value in config.values.items()
                if name.startswith("environment.") and value != usual[name]}  # fmt: skip
@@ -149,8 +139,8 @@ def task_name(config: Config) -> str:
 
 
 def explored_rows(config: Config, run: Run) -> list[Row]:
-    """The row of explored.csv: tiles of the benchmark that were reached, the goals that a learner chose for itself, and
-    how many of them can be reached."""
+    """The row of explored.csv: tiles of the benchmark that were reached, goals that the learner chose itself, and how
+    many of them can be reached."""
     goals = run.chosen_goals()
     benchmark = benchmark_of(task_of(Config()), config.benchmark)[0]
     tiles, near = tiles_reached(run.outcomes, benchmark), int((np.linalg.norm(goals, axis=1) <= NEAR).sum())
@@ -158,39 +148,52 @@ def explored_rows(config: Config, run: Run) -> list[Row]:
 
 
 def asked_rows(config: Config, run: Run) -> list[Row]:
-    """A row for each teacher that could be asked: how often, and where; none for a learner that does not ask.
+    """Rows of asked.csv: requests to each teacher that could be asked; none for a learner that does not ask.
 
-    ``late``: from movement 1000 on, ``late_own``: of these in the teacher's half (if teachers have one); ``strong`` and
-    ``weak``: where the first context is in the outer and in the inner third of its range.
+    ``late`` counts from movement 1000 on, ``late_own`` those of them in the teacher's half of T; ``strong`` and
+    ``weak`` count requests with the first context in the outer and in the inner third of its range.
     """
     if config.teaching != "teachers":
         return []
     task = task_of(config)
-    dim, contexts = task.environment.contexts.dim, task.environment.contexts
+    contexts = task.environment.contexts
+    dim = contexts.dim
     nothing: Any = dict.fromkeys(("index", "reply", "teacher", "wanted_0", f"wanted_{dim}"), ())
     asked = pd.DataFrame(run.requests or nothing)
-    low_half = asked[f"wanted_{dim}"] < middle(demonstrations_of(task, config.demonstrations)[0])
-    border = (2 * (asked["wanted_0"] - contexts.low[0]) / contexts.sides[0] - 1).abs() if dim else 0 * asked["index"]
     late = asked["index"] >= LATE
-    rows: list[Row] = []
-    for teacher in config.teachers or ("all",):
-        own = low_half if teacher == "low-half" else ~low_half
-        mine, shown, near = asked["teacher"] == teacher, asked["reply"] == "shown", (border < 1 / 3) & bool(dim)
-        counted = (mine, mine & shown, mine & late, mine & late & own, mine & (border > 2 / 3), mine & near)
-        values = (config.variant, config.seed, teacher, *(int(each.sum()) for each in counted))
-        rows.append(dict(zip(TABLES["asked.csv"][1], values, strict=True)))
-    return rows
+    low_half = asked[f"wanted_{dim}"] < middle(demonstrations_of(task, config.demonstrations)[0])
+    outwards = (
+        (2 * (asked["wanted_0"] - contexts.low[0]) / contexts.sides[0] - 1).abs() if dim else asked["index"] * np.nan
+    )
+    counted = pd.DataFrame(
+        {
+            "requests": asked["index"] >= 0,
+            "shown": asked["reply"] == "shown",
+            "late": late,
+            "late_own": late & (low_half == (asked["teacher"] == "low-half")),
+            "strong": outwards > 2 / 3,
+            "weak": outwards < 1 / 3,
+        }
+    )
+    teachers = config.teachers or ("all",)
+    counts = counted.groupby(asked["teacher"]).sum().reindex(teachers, fill_value=0).astype(int)
+    key = {"variant": config.variant, "seed": config.seed}
+    return [{**key, "teacher": teacher, **row} for teacher, row in counts.to_dict("index").items()]
 
 
 ROWS: Final = {"explored.csv": explored_rows, "asked.csv": asked_rows}
 
 
+def _number(text: str) -> float:
+    return float(text or "nan")
+
+
 def tiles_reached(outcomes: Array, benchmark: Benchmark) -> int:
-    """How many of the benchmark's tiles, one for each of its goals, hold one or more of the ``outcomes``.
+    """The number of the benchmark's tiles, one for each of its goals, with one or more of the ``outcomes``.
 
     Args:
-        outcomes: ``(n, 2)`` m, NaN where the robot was at rest.
-        benchmark: the rod's; its tiles were laid out from ``CORNER``, whatever its T.
+        outcomes: ``(n, 2)`` m, NaN if the robot was at rest.
+        benchmark: benchmark of the rod, whose tiles begin at ``CORNER`` in every T.
     """
     landed = outcomes[np.isfinite(outcomes).all(axis=1)]
     reached, wanted = (

@@ -1,6 +1,6 @@
 """Every experiment as data: its variants, each a line with the differences from the defaults of ``sgimd run``.
 
-Section 6 of Nguyen & Oudeyer (2014) first, then what the paper lacks. A variant of SGIM-D changes one option.
+Section 6 of Nguyen & Oudeyer (2014) first, then further experiments. A variant of SGIM-D changes one option.
     EXPERIMENTS["ablations"]["uniform-goals"]        # {"algorithm": "sgim-d", "goals": "uniform"}
 A variant in two experiments has the same line in both; it is run once, and has its rows for each.
 """
@@ -24,7 +24,7 @@ ARMS: Final = ("planar-arm-7", "planar-arm-50")
 SWIMMERS: Final = ("random", "sagg-riac", "sgim-d")
 SGIM_D: Final[Variant] = {"algorithm": "sgim-d"}
 SAGG_RIAC: Final[Variant] = {"algorithm": "sagg-riac"}
-# `practice` before it looked for goals within reach and for effects. On the rod, taught, it lives the same life.
+# Practice with goals anywhere in T and without a search for effects. On the rod, taught, `practice` learns alike.
 UNIFORM_PRACTICE: Final[Variant] = {
     "algorithm": "practice",
     "goals": "uniform",
@@ -33,8 +33,8 @@ UNIFORM_PRACTICE: Final[Variant] = {
 }
 SPARSE: Final = ("puck", "fetch")  # tasks where most movements do nothing
 SUITE: Final = {task: suited for task, suited in TASKS.items() if task not in SPARSE}
-# From the paper to our defaults, one change at a time: what each step is called, what it was and what it becomes. The
-# paper gives no number for the budget and for g_max: 60 movements are more than come between two demonstrations.
+# From the paper to our defaults, one change at a time: the name of each step, its options before and after. The paper
+# gives no number for the budget and for g_max: 60 movements are more than fit between two demonstrations.
 STEPS: Final[tuple[tuple[str, Variant, Variant], ...]] = (
     ("inverse", {"inverse": "paper"}, {"inverse": "linear"}),
     ("simplex", {"search": "nelder-mead-complete"}, {"search": "nelder-mead-exact"}),
@@ -47,9 +47,9 @@ STEPS: Final[tuple[tuple[str, Variant, Variant], ...]] = (
     ("proof", {"inverse": "linear"}, {"inverse": "process"}),  # the last one: our defaults
 )
 LETTER: Final[Variant] = {option: value for _, was, _ in reversed(STEPS) for option, value in was.items()}
-INVERSE: Final[Variant] = {"inverse": "paper"}  # all that the letter changes in a learner without goals
-# The answers whose rows a page reads. Every learner is answered by `process`. Some are answered by others, too: the
-# paper's letter by eq. (9), a step of the ladder by what it learns with, a learner with a forward model by that model.
+INVERSE: Final[Variant] = {"inverse": "paper"}  # the letter of a learner without goals
+# The inverse models whose answers a page reads. `process` answers for every learner. Others answer for some learners,
+# too: eq. (9) for the paper's letter, `linear` for a step of the ladder, a forward model for those that learn with it.
 ALIKE: Final = ("process",)
 ANSWERS: Final[dict[str, tuple[str, ...]]] = {
     **dict.fromkeys(("letter", "large-space"), (*ALIKE, "paper")),
@@ -60,39 +60,36 @@ ANSWERS: Final[dict[str, tuple[str, ...]]] = {
     "learning": (*ALIKE, "linear", "nearest", "model"),
     "suite": (*ALIKE, "linear", "nearest"),
 }
+# The table besides results.csv that gets rows from the runs of an experiment.
+SMALL_TABLES: Final = {"asking": "asked.csv", **dict.fromkeys(("learners", "letter", "large-space"), "explored.csv")}
 LARGE: Final[Variant] = {"environment.task_space": 100.0}
 BASELINE: Final[Variant] = {"goals": "uniform", "inverse": "nearest", "search": "perturb"}  # the field's standard one
 SCHOOL: Final = ("map-elites", "isoline", "cma-me", "cma-mae")  # quality diversity
-# Made by ``make_subsets``: from the shipped demonstrations, and lessons by hand.
+SHORT: Final[Variant] = {"movements": 2000, "evaluate_at": (250, 500, 1000)}  # and at the end
+# Files that ``make_subsets`` makes.
 FEW, MANY, HALF, CORNER, SHUFFLED, TEN, HAND = MADE = tuple(
     Path(f"{name}.npz") for name in ("few", "many", "half", "corner", "shuffled", "ten", "hand")
 )
-# Ways to refine a movement for a goal, and to answer in evaluations. Each line is a variant on the rod and, with a
-# longer name, on every arm.
+# Ways to refine a movement for a goal and to answer in evaluations. Each line is a variant on the rod, and on every arm
+# with a longer name.
 MODEL: Final[Variant] = {**SGIM_D, "inverse": "model-alone"}
 REFINING: Final[dict[str, Variant]] = {
     "sgim-d": SGIM_D,
     "model": MODEL,
     "gradient": {**MODEL, "search": "gradient"},
 }
-# A robot that nobody here wrote.
-SWIMMER: Final[Variant] = {
-    "environment": "swimmer",
-    "movements": 2000,
-    "evaluate_at": (250, 500, 1000),  # and at the end
-}
-# What a learner of the suite has to beat, and the rivals there.
+SWIMMER: Final[Variant] = {"environment": "swimmer", **SHORT}  # a robot that nobody here wrote
+# Learners of the suite besides `practice`.
 SUITED: Final[dict[str, Variant]] = {
     **REFERENCES,
     "practice-uniform": UNIFORM_PRACTICE,
     "cma-mae": {"algorithm": "cma-mae"},
     "map-elites": {"algorithm": "map-elites"},
 }
-IN_SUITE: Final[Variant] = {"movements": 2000, "evaluate_at": (250, 500, 1000)}
 ON_ROD: Final[Variant] = {"evaluate_at": (250, 500, 1000, 2000), "floor_at": (5000,)}
 ONCE: Final[Variant] = {"teacher": "initial", "teacher.every": 1}  # all at the start, one for each movement
 TAUGHT: Final[Variant] = {**UNIFORM_PRACTICE, "algorithm": "practice-taught", **ONCE}
-# The rod, by the inverse model whose answers prove themselves; rivals with and without the demonstrations.
+# Learners on the rod; rivals with and without the demonstrations.
 LEARNING: Final[dict[str, Variant]] = {
     f"{name}.rod": {**line, **ON_ROD}
     for name, line in {
@@ -110,8 +107,7 @@ LEARNING: Final[dict[str, Variant]] = {
         "imitation": {"algorithm": "imitation", "inverse": "model"},
     }.items()
 }
-# What the gain of practice is made of: the steps from the standard baseline to it that are no learner of LEARNING, and
-# learners taught by the schedule of the other one.
+# Steps from the standard baseline to `practice` that are not in LEARNING, and learners with another teaching schedule.
 MIDDLE: Final[Variant] = {**REFERENCES[UNIFORM], "explore": "widening", "global_range": (0.02, 0.3)}
 BEGUN: Final[dict[str, Variant]] = {"middle": MIDDLE, "middle-process": {**MIDDLE, "inverse": "process"}}
 STEPS_OF_GAIN: Final[dict[str, Variant]] = {
@@ -122,29 +118,22 @@ STEPS_OF_GAIN: Final[dict[str, Variant]] = {
     "practice-interest": {**UNIFORM_PRACTICE, "goals": "interest-map"},
 }
 SCHEDULES: Final[dict[str, Variant]] = {
-    "practice-taught-every-30": {
-        **UNIFORM_PRACTICE,
-        "algorithm": "practice-taught",
-        "teacher": "periodic",
-        "social.repeats": 10,
-    },
+    "practice-taught-every-30": {**TAUGHT, "teacher": "periodic", "teacher.every": 30, "social.repeats": 10},
     "sgim-d-once": {**SGIM_D, **ONCE, "social.repeats": 1},
     "uniform-nearest-taught-once": {**SGIM_D, **BASELINE, **ONCE, "social.repeats": 1},
     "map-elites-taught-once": {"algorithm": "map-elites-taught", "imitations": 1, **ONCE},
 }
-# Ten lessons, as a person gives them in a session: all of them early, in a short life.
+# Ten lessons as a person would give them, all of them early in a short life.
 SESSION: Final[Variant] = {"movements": 1000, "evaluate_at": (300, 500)}  # and at the end
 SHOWN: Final[dict[str, Variant]] = {"goals": {**SGIM_D, "teacher": "initial"}, "practice": TAUGHT}
-# Movements of an arm take no time, so training may take more.
-ON_ARMS: Final[Variant] = {"movements": 2000, "evaluate_at": (250, 500, 1000)}  # and at the end
-LONGER: Final[Variant] = {"inverse.rate": 2.0}
+LONGER: Final[Variant] = {"inverse.rate": 2.0}  # movements of an arm take no time, so training may take more
 
-# Learners that ask. All are answered by ``process``, too, the answer of those that practise.
+# Learners that ask.
 IM: Final[Variant] = {"algorithm": "sgim-im"}
 ACTS: Final[Variant] = {"algorithm": "sgim-acts"}
 FOUR: Final = ("demonstrator-1", "demonstrator-2", "demonstrator-3", "mislabelling")
 HALVES: Final = ("low-half", "high-half")
-TOSS: Final[Variant] = {"environment": "toss", "movements": 2000, "evaluate_at": (250, 500, 1000)}
+TOSS: Final[Variant] = {"environment": "toss", **SHORT}
 ASKING: Final[dict[str, Variant]] = {
     "taught-every-30": SGIM_D,
     "taught-at-start": {**SGIM_D, "teacher": "initial"},
@@ -164,8 +153,8 @@ ASKING: Final[dict[str, Variant]] = {
     "sgim-im-toss": {**IM, **TOSS},
 }
 
-# Beyond the one setting that defaults were tuned on: what a setting changes, and who is tried in it. Its learners have
-# a name of their own in each: sgim-d@noise-twice.
+# Settings that no default was tuned on, each with its changes. A learner has a name of its own in each:
+# sgim-d@noise-twice.
 ROBOTS: Final[dict[str, Variant]] = {
     "as-it-is": {},
     "noise-none": {"environment.noise": 0.0},
@@ -179,7 +168,7 @@ TEACHERS: Final[dict[str, Variant]] = {
     "shuffled": {"demonstrations": SHUFFLED},
 }
 PRACTICE: Final[Variant] = {"algorithm": "practice"}
-PROVED_MODEL: Final[Variant] = {"inverse": "model"}  # it answers once it predicts as well as `process`
+PROVED_MODEL: Final[Variant] = {"inverse": "model"}  # a model that answers once it predicts as well as `process`
 BY_PROOF: Final[Variant] = {**SGIM_D, **PROVED_MODEL, "search": "gradient"}
 UNTAUGHT: Final[dict[str, Variant]] = {
     "random": {"algorithm": "random"},
@@ -199,18 +188,13 @@ TAUGHT_ALIKE: Final[dict[str, Variant]] = {
 EVERYWHERE: Final[Variant] = {"movements": 2000, "evaluate_at": (500,)}
 
 
-def shipped(teacher: int) -> Path:
-    """The demonstrations of demonstrator 1, 2 or 3 of section 5.3."""
-    return SHIPPED.with_name(f"demonstrator_{teacher}.npz")
-
-
 def _of_teacher(teacher: int, ending: str = "") -> dict[str, Variant]:
-    """Learners that demonstrator 1 or 2 teaches; ``ending`` "-letter" for those of the paper's letter."""
+    """Learners taught by demonstrator 1 or 2; with the ending "-letter" those of the paper's letter."""
     letter = {"sgim-d": LETTER, "imitation": INVERSE, "observation": INVERSE}
     return {
         f"{algorithm}{ending}-teacher-{teacher}": {
             "algorithm": algorithm,
-            "demonstrations": shipped(teacher),
+            "demonstrations": SHIPPED.with_name(f"demonstrator_{teacher}.npz"),
             **(options if ending else {}),
         }
         for algorithm, options in letter.items()
@@ -224,16 +208,16 @@ def _on_arm(arm: str) -> dict[str, Variant]:
             **(LONGER if "inverse" in line else {}),
             **line,
             "environment": arm,
-            **ON_ARMS,
+            **SHORT,
         }
         for name, line in REFINING.items()
     }
 
 
 def _on_suite(learners: dict[str, Variant], tasks: Iterable[str] = SUITE) -> dict[str, Variant]:
-    """Each on all tasks but the rod, whose runs are longer; quality diversity knows one context only, so no toss."""
+    """Each learner on all tasks except the rod, whose runs are longer, and the toss if it cannot have contexts."""
     return {
-        f"{name}.{task}": {**line, **TASKS[task].options, **IN_SUITE}
+        f"{name}.{task}": {**line, **TASKS[task].options, **SHORT}
         for task in tasks
         for name, line in learners.items()
         if task != "rod" and not (name in SCHOOL and task == "toss")
@@ -241,16 +225,11 @@ def _on_suite(learners: dict[str, Variant], tasks: Iterable[str] = SUITE) -> dic
 
 
 def _ladder(ending: str, where: Variant) -> dict[str, Variant]:
-    """SGIM-D between the letter, ``sgim-d-letter``, and our defaults, ``sgim-d``, which the last step leads to."""
+    """The steps between the letter, ``sgim-d-letter``, and our defaults, ``sgim-d``."""
     found, line = {}, {**SGIM_D, **LETTER, **where}
     for number, (step, _, becomes) in enumerate(STEPS[:-1], 1):
         found[f"ladder-{number}-{step}{ending}"] = line = {**line, **becomes}
     return found
-
-
-def ladder(ending: str = "") -> list[str]:
-    """The names of its variants, from the letter to our defaults; ``ending`` "-large" for those in the large space."""
-    return [f"sgim-d-letter{ending}", *EXPERIMENTS[f"ladder{ending}"], f"sgim-d{ending}"]
 
 
 EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
@@ -283,13 +262,14 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
         "search-perturb": {**SGIM_D, "search": "perturb"},
         "search-cma-es": {**SGIM_D, "search": "cma-es"},
     },
-    "baselines": {  # those that are not among LEARNING's
+    "baselines": {  # baselines that are not in LEARNING
         "demonstrations-noise": {"algorithm": "imitation", "teacher.choose": "random"},
         **{name: {"algorithm": name} for name in ("isoline", "cma-me")},
         **{f"{name}-demonstrations": {"algorithm": f"{name}-taught"} for name in ("isoline", "cma-me")},
-        "map-elites-tuned": {"algorithm": "experiments.parts:map_elites"},
-        "cma-me-tuned": {"algorithm": "experiments.parts:cma_me"},
-        "cma-mae-demonstrations-tuned": {"algorithm": "experiments.parts:cma_mae_taught"},
+        # With the setting that a search on tuning seeds found better than the default, see results/RIVALS.md.
+        "map-elites-tuned": {"algorithm": "map-elites", "cells": 10},
+        "cma-me-tuned": {"algorithm": "cma-me", "sd": 0.05},
+        "cma-mae-demonstrations-tuned": {"algorithm": "cma-mae-taught", "sd": 0.05},
     },
     "teaching": {
         "every-10": {**SGIM_D, "teacher.every": 10},
@@ -332,7 +312,7 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
 }
 
 
-# The seeds of each page: used once, with frozen defaults.
+# Seeds of each page, which were used once, with frozen defaults.
 SEEDS: Final[dict[str, range]] = {
     **dict.fromkeys(("learners", "large-space", "letter", "ladder", "ladder-large", "baselines"), range(100, 120)),
     **dict.fromkeys(("teachers", "letter-teachers", "ablations", "teaching"), range(100, 110)),
@@ -348,24 +328,18 @@ SEEDS: Final[dict[str, range]] = {
 
 
 def seeds_of(experiment: str, variant: str) -> range:
-    """The seeds that the page of a variant stands on."""
+    """The seeds of a variant on its page."""
     return SEEDS["learners" if (experiment, variant) == ("forward-model", "sgim-d") else experiment]
 
 
-def small_tables(experiment: str) -> list[str]:
-    """The tables besides results.csv that its runs write rows to."""
-    if experiment == "asking":
-        return ["asked.csv"]
-    return ["explored.csv"] if experiment in ("learners", "letter", "large-space") else []
-
-
 def make_subsets(folder: Path, *, by_hand: bool = False) -> None:
-    """Write what is made of the demonstrations: a few, 13 of 127, many, 83, and ten; those in the right half of the
-    plane; the 20 nearest to one corner; all with their outcomes dealt out anew, so that what is shown is not what is
-    said. And, if asked, ten lessons by hand.
+    """Write subsets of the shipped demonstrations, and ten lessons ``by_hand`` if wanted.
+
+    The subsets: the first 13, 83 and 10 of 127; those in the right half of the plane; the 20 nearest to one corner; all
+    with permuted outcomes, so that recordings and outcomes do not match.
 
     Raises:
-        RunError, OSError: it cannot be written.
+        OSError: a file cannot be written.
     """
     everything = load_demonstrations()
     outcomes = np.array([each.outcome for each in everything])
@@ -374,7 +348,7 @@ def make_subsets(folder: Path, *, by_hand: bool = False) -> None:
     dealt = stream(0, "shuffled").permutation(outcomes)
     shuffled = [replace(each, outcome=outcome) for each, outcome in zip(everything, dealt, strict=True)]
     make_folder(folder)
-    # The shipped ones are ordered so that the first ones are spread.
+    # The first of the shipped demonstrations are spread over the plane.
     first = ((FEW, everything[:13]), (MANY, everything[:83]), (TEN, everything[:10]))
     for name, chosen in (*first, (HALF, right), (CORNER, corner), (SHUFFLED, shuffled)):
         save_demonstrations(folder / name, chosen)

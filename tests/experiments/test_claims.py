@@ -157,6 +157,6 @@ def test_a_run_that_is_under_way_is_counted_where_it_was_evaluated(tmp_path):
     ]
     write_rows(tmp_path)
     found = Evidence.of(write(tmp_path, rows))
-    assert {*found.at("sgim-d")} == {*range(1, SEEDS)}
-    assert {*found.at("sgim-d", 1000)} == {*range(SEEDS)}
-    assert found.curve("sgim-d")[1].shape == (SEEDS - 1, len(MOVEMENTS))
+    assert {*found.at("sgim-d").index} == {*range(1, SEEDS)}
+    assert {*found.at("sgim-d", 1000).index} == {*range(SEEDS)}
+    assert found.curve("sgim-d").shape == (SEEDS - 1, len(MOVEMENTS))

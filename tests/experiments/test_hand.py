@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.environments.fishing_rod import JOINT_RANGES
-from sgimd_torch.spaces import Demonstration, stream
+from sgimd_torch.spaces import stream
 
 pytest.importorskip("sgimd_torch.teach", reason="needs the room teach, which was left out")
 
@@ -44,18 +43,7 @@ def test_lessons_land_on_all_sides_and_none_twice_in_one_place(lessons):
     assert (landed.min(axis=0) < -0.3).all()
 
 
-def test_the_same_lessons_are_made_again(lessons, tmp_path, capsys):
-    hand.main(["--out", str(tmp_path / "again.npz")])
-    for lesson, again in zip(lessons, load_demonstrations(tmp_path / "again.npz"), strict=True):
-        np.testing.assert_array_equal(again.trajectory, lesson.demonstration.trajectory)
-        np.testing.assert_array_equal(again.outcome, lesson.demonstration.outcome)
-    said = capsys.readouterr().out.splitlines()
-    assert len(said) == 10 + 2
-    assert said[-1].startswith("jerk, shipped: ")
-
-
-def test_jerk_is_that_of_a_cubic():
-    """The third derivative of 2 t^3 is 12; of two joints one does not move."""
-    times = np.arange(51) / 50
-    cubic = Demonstration(np.zeros(0), times, np.stack([2 * times**3, 0 * times], axis=1), np.zeros(2))
-    assert hand.jerk(cubic) == pytest.approx(12 / np.sqrt(2))
+def test_the_same_lessons_are_made_again(lessons):
+    for lesson, again in zip(lessons, hand.lessons_of_a_script(), strict=True):
+        np.testing.assert_array_equal(again.demonstration.trajectory, lesson.demonstration.trajectory)
+        np.testing.assert_array_equal(again.demonstration.outcome, lesson.demonstration.outcome)
