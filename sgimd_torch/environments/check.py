@@ -70,12 +70,13 @@ def _spaces(environment: Environment, _: Movements) -> Iterator[str]:
         if not callable(getattr(environment, name, None)):
             yield f"{name} must be a method, got {type(getattr(environment, name, None)).__name__}"
     noise: Any = getattr(environment, "outcome_noise", None)
-    if not isinstance(noise, int | float | np.number) or isinstance(noise, bool) or not 0 <= noise < np.inf:
+    measured = isinstance(noise, int | float | np.number) and not isinstance(noise, bool) and 0 <= noise < np.inf
+    if not measured:
         yield f"outcome_noise must be a number >= 0, got {noise!r}; it is the standard deviation of the outcomes"
     rest: Any = getattr(environment, "rest", None)
     if not isinstance(rest, np.ndarray):
         yield f"rest must be an array, the outcome of not moving, got {type(rest).__name__}; np.zeros(2), for example"
-    elif isinstance(getattr(environment, "outcomes", None), Box):
+    elif measured and isinstance(getattr(environment, "outcomes", None), Box):
         try:
             check_robot(environment)
         except ValueError as error:

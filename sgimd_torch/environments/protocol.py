@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from numbers import Real
 from typing import Any, Final, Protocol, runtime_checkable
 
 import numpy as np
@@ -307,6 +308,7 @@ def check_robot(environment: Environment) -> None:
     check_instance(environment)
     if environment.outcomes.check("rest of the environment", environment.rest, "is it a theta?").ndim != 1:
         raise ValueError(f"rest of the environment must be one outcome, got shape {np.shape(environment.rest)}")
-    if not 0 <= environment.outcome_noise < np.inf:
+    noise = environment.outcome_noise
+    if not isinstance(noise, Real) or not 0 <= noise < np.inf:
         wanted = "a standard deviation, finite and >= 0"
-        raise ValueError(f"outcome_noise of the environment must be {wanted}, got {environment.outcome_noise}")
+        raise ValueError(f"outcome_noise of the environment must be {wanted}, got {noise!r}")

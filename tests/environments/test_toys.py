@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sgimd_torch.catalogue import CATALOGUE
+from sgimd_torch.catalogue import WORDS
 from sgimd_torch.environments.check import check_environment
 from sgimd_torch.environments.objects import fetch, puck
 from sgimd_torch.environments.toys import GRAVITY, Toy, crawler, spatial_arm, toss, two_elbows
@@ -78,7 +78,7 @@ def test_the_stretched_spatial_arm_reaches_a_metre_ahead_in_cm():
 
 @pytest.mark.parametrize("word", ["half-reached", "toss", "crawler", "two-elbows", "spatial-arm", "puck", "fetch"])
 def test_a_toy_comes_with_goals_of_which_each_can_be_reached(word):
-    assert word in CATALOGUE["environment"]
+    assert word in WORDS["environment"]
     task = task_of(Config(algorithm="random", parts={"environment": word}))
     benchmark, *_ = benchmark_of(task, None)
     assert 100 <= len(benchmark.goals) <= 400

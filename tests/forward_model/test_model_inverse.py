@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from models import ARM, Boxes, problem_of
-from sgimd_torch.algorithms import sagg_riac
+from sgimd_torch.algorithms.paper import sagg_riac
 from sgimd_torch.catalogue.options import help_of, options_of
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.forward_model import inverse as module

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from runs import content_of, start
-from sgimd_torch.__main__ import COMMANDS
+from sgimd_torch.catalogue import WORDS
 from sgimd_torch.evaluation import Benchmark, save_benchmark
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
@@ -52,7 +52,7 @@ def test_the_demo_ends_well_with_all_runs_a_figure_and_a_table(shown, runs):
     assert len(commands) == 2
     for line in commands:
         program, name, *words = shlex.split(line, comments=True)
-        assert (program, name in COMMANDS) == ("sgimd", True)
+        assert (program, name in WORDS["command"]) == ("sgimd", True)
         assert any(Path(word).exists() for word in words)
 
 

@@ -340,7 +340,7 @@ def test_the_check_of_an_environment_looks_at_its_picture(own, capsys, word, cod
 @pytest.mark.parametrize(
     ("word", "message"),
     [
-        ("sliders:NoPicture", "sliders:NoPicture, which cannot be filmed: it needs a method record("),
+        ("sliders:NoPicture", "sliders:NoPicture, which cannot be filmed: it needs a method trace("),
         ("sliders:WrongPicture", "WrongPicture must give a Sketch with an outcome of 1 dimension, got list"),
     ],
 )

@@ -2,7 +2,7 @@
 
 import pytest
 
-from sgimd_torch.catalogue import CATALOGUE
+from sgimd_torch.catalogue import WORDS
 from sgimd_torch.runs.build import task_of
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.process import command
@@ -25,7 +25,7 @@ def configs_of(*words):
 
 def test_half_of_the_tasks_and_no_more_are_used_to_choose_defaults():
     assert sum(task.new for task in TASKS.values()) >= len(TASKS) // 2
-    assert all(task.options["environment"] in CATALOGUE["environment"] for task in TASKS.values())
+    assert all(task.options["environment"] in WORDS["environment"] for task in TASKS.values())
 
 
 @pytest.mark.parametrize("name", [name for name, task in TASKS.items() if task.quick])
