@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from numbers import Real
 from typing import Any, Final, Protocol, runtime_checkable
 
 import numpy as np
@@ -308,7 +307,7 @@ def check_robot(environment: Environment) -> None:
     check_instance(environment)
     if environment.outcomes.check("rest of the environment", environment.rest, "is it a theta?").ndim != 1:
         raise ValueError(f"rest of the environment must be one outcome, got shape {np.shape(environment.rest)}")
-    noise = environment.outcome_noise
-    if not isinstance(noise, Real) or not 0 <= noise < np.inf:
+    noise: Any = environment.outcome_noise
+    if not isinstance(noise, int | float | np.number) or not 0 <= noise < np.inf:
         wanted = "a standard deviation, finite and >= 0"
         raise ValueError(f"outcome_noise of the environment must be {wanted}, got {noise!r}")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from models import ARM, Boxes, problem_of
+from models import ARM, boxes, problem_of
 from sgimd_torch.algorithms.paper import sagg_riac
 from sgimd_torch.catalogue.options import help_of, options_of
 from sgimd_torch.environments.planar_arm import PlanarArm
@@ -57,7 +57,7 @@ def test_of_two_ways_to_a_goal_the_reliable_one_wins():
     memory, rng = Memory(0, 2, 2), stream(0, "exemplars")
     for theta in rng.random((1500, 2)):  # theta_1 moves nothing, but the larger, the noisier
         memory.add(NO_CONTEXT, theta, np.array([theta[0], 0.0]) + 0.3 * theta[1] * rng.standard_normal(2))
-    problem = problem_of(memory, environment=Boxes(Box.cube(0.0, 1.0, 2)))
+    problem = problem_of(memory, environment=boxes(Box.cube(0.0, 1.0, 2)))
     inverse = ModelInverse(problem, rate=0.4, trust=1.0)
     inverse.model.refresh(memory)
     goals = np.array([[goal, 0.0] for goal in (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8)])
@@ -148,7 +148,7 @@ def test_the_options_of_the_model_are_options_of_the_inverse_and_explained(kind)
         name: defaults[name].default for name in options
     }
     assert all(help_of(kind)[name] == help_of(ForwardModel)[name] for name in options)
-    model = kind(Problem(ARM, 3), **options).model
+    model = kind(Problem(ARM, 3, inverse=NearestNeighbour), **options).model
     assert {
         name: getattr(model, name) for name in ("members", "rate", "noise_heads", "trust")
     }.items() < options.items()
@@ -174,7 +174,7 @@ def test_a_loop_that_trains_what_a_learner_shares_teaches_its_inverse():
 
 def lived(outcome_of, n, scale=1.0, noise=0.1, **options):
     """``n`` random movements, of which a model and a `ProvedModel` were told after each 50."""
-    problem, rng = Problem(Boxes(Box.cube(0.0, 1.0, 3), scale * noise), 0), stream(0, "lived")
+    problem, rng = Problem(boxes(Box.cube(0.0, 1.0, 3), scale * noise), 0, inverse=NearestNeighbour), stream(0, "lived")
     proved = ProvedModel(problem, **options)
     for theta in rng.random((n, 3)):
         problem.memory.add(NO_CONTEXT, theta, scale * outcome_of(theta, rng))

@@ -1,7 +1,5 @@
 """What the tests of the forward model share: problems over given exemplars, and a model that was taught before."""
 
-from dataclasses import dataclass, field
-
 import numpy as np
 
 from sgimd_torch.environments.planar_arm import PlanarArm
@@ -9,20 +7,15 @@ from sgimd_torch.forward_model.model import TRUSTED_UP_TO
 from sgimd_torch.forward_model.shared import model_of
 from sgimd_torch.inverses.locally_linear import LocallyLinear
 from sgimd_torch.parts import Problem
-from sgimd_torch.spaces import Array, Box
+from sgimd_torch.spaces import Box
+from worlds import Boxes
 
 ARM = PlanarArm(7)
 
 
-@dataclass
-class Boxes:
-    """A robot of which only its boxes and its noise matter."""
-
-    policies: Box
-    outcome_noise: float = 0.0
-    contexts: Box = field(default_factory=lambda: Box.cube(0.0, 1.0, 0))
-    outcomes: Box = field(default_factory=lambda: Box.cube(-1e4, 1e4, 2))
-    rest: Array = field(default_factory=lambda: np.zeros(2))
+def boxes(policies: Box, noise: float = 0.0) -> Boxes:
+    """A robot of which only Pi and the noise matter; its T is wide."""
+    return Boxes(Box.cube(0.0, 1.0, 0), policies, Box.cube(-1e4, 1e4, 2), np.zeros(2), noise)
 
 
 def problem_of(memory, model=None, *, environment=ARM, seed=0, inverse=LocallyLinear, trust=TRUSTED_UP_TO):
