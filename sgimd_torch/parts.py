@@ -3,7 +3,8 @@
 A part derives from the class of its kind and is built from one `Problem`. Its options are keywords with a default, and
 also options of ``sgimd run``. A part must define the abstract methods; all other methods have a default.
     class Mine(Goals): ...
-    learner = sagg_riac(environment, seed, goals=Mine)       # sgimd run --goals mine:Mine --goals.candidates 5
+    learner = sagg_riac(environment, seed, goals=partial(Mine, candidates=5))
+    # sgimd run --goals mine:Mine --goals.candidates 5, where mine.py is in the working directory
 """
 
 from __future__ import annotations
@@ -153,7 +154,8 @@ class Inverse(Part):
 
     @abstractmethod
     def __call__(self, context: Array, goal: Array) -> Estimate:
-        """Estimate of the movement for a ``goal`` ``(outcome_dim,)`` in a ``context`` ``(context_dim,)``.
+        """Estimate for a ``goal`` ``(outcome_dim,)`` in a ``context`` ``(context_dim,)``: a theta in Pi, and at least one
+        exemplar, nearest first, at which a search may begin.
 
         Raises:
             RuntimeError: the memory is empty.

@@ -9,7 +9,7 @@ import numpy as np
 
 from sgimd_torch.memory import Memory, Rows
 from sgimd_torch.parts import Inverse, Problem
-from sgimd_torch.spaces import Array, Estimate
+from sgimd_torch.spaces import Array, Estimate, check_count
 
 
 class NearestNeighbour(Inverse):
@@ -17,19 +17,22 @@ class NearestNeighbour(Inverse):
 
     Args:
         problem: problem to learn.
-        k: number of exemplars in the estimate.
+        k: number of exemplars that the estimate hands to a search, at least 1.
+
+    Raises:
+        ValueError: ``k`` is no such number.
     """
 
     def __init__(self, problem: Problem, *, k: int = 10) -> None:
         super().__init__(problem)
-        self.k = k
+        self.k = check_count("k", k, 1)
 
     def __call__(self, context: Array, goal: Array) -> Estimate:
         """theta of the nearest outcome, and the ``k`` exemplars of the nearest outcomes, nearest first."""
         memory = self.problem.memory
         rows = near_goal(memory, context, goal, self.k)
         thetas = memory.thetas[rows]
-        return Estimate(thetas[0], thetas, memory.outcomes[rows], context)
+        return Estimate(theta=thetas[0], thetas=thetas, outcomes=memory.outcomes[rows], context=context)
 
 
 def near_goal(memory: Memory, context: Array, goal: Array, k: int) -> Rows:

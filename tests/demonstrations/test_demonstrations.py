@@ -179,7 +179,7 @@ def test_no_recording_is_exactly_a_motor_primitive() -> None:
 
 def test_a_run_refuses_recordings_in_degrees(tmp_path: Path) -> None:
     save_demonstrations(tmp_path / "deg.npz", [replace(RECORDINGS[0], trajectory=np.rad2deg(RECORDINGS[0].trajectory))])
-    with pytest.raises(ValueError, match=r"deg\.npz: recording 0 cannot be translated: .* recorded in degrees"):
+    with pytest.raises(ValueError, match=r"deg\.npz: recording 0 cannot be translated: .* is it in degrees"):
         demonstrations_of(fishing_rod(), tmp_path / "deg.npz")
 
 
