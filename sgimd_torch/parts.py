@@ -154,7 +154,7 @@ class Inverse(Part):
 
     @abstractmethod
     def __call__(self, context: Array, goal: Array) -> Estimate:
-        """Estimate for a ``goal`` ``(outcome_dim,)`` in a ``context`` ``(context_dim,)``: a theta in Pi, and one or more
+        """Estimate for a ``goal`` ``(outcome_dim,)`` in a ``context`` ``(context_dim,)``: a theta in Pi and one or more
         exemplars, nearest first, at which a search may begin.
 
         Raises:
