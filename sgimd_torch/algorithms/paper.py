@@ -1,6 +1,6 @@
 """The five learners of the paper, each built from an autonomous and a social strategy.
 
-Section 5.1 of Nguyen & Oudeyer (2014). Every part is a keyword, so an ablation changes one word:
+Section 5.1 of Nguyen & Oudeyer (2014). Every part is a keyword, so an ablation changes one argument:
     learner = sgim_d(environment, seed, correspondence=environment.primitive.correspondence, goals=UniformGoals)
 A part is given as its constructor; `sgimd_torch.parts` describes each kind of part.
 
