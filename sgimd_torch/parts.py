@@ -63,7 +63,7 @@ class Problem:
         self.tolerance = max(environment.outcome_noise, 0.02)
         self._shared: dict[object, Any] = {}
         self.memory = Memory(*self.dims) if memory is None else memory.copy_for(self.dims)
-        self.policies.check("thetas of a memory to start from", self.memory.thetas, "of another robot?")
+        self.policies.check("thetas of a memory to start from", self.memory.thetas, "is it another robot's?")
         self.remarks: list[str] = []
         self.inverse = Inverse.of(inverse, self)
 

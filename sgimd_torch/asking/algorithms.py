@@ -1,7 +1,7 @@
 """Learners that ask for demonstrations: SGIM-IM chooses when to ask, SGIM-ACTS also chooses teacher, goal and strategy.
 
 learner = sgim_acts(environment, seed, correspondence=..., teachers={"ann": ann, "ben": ben}, cost=3)
-learner = sgim_im(environment, seed, correspondence=..., teachers={"ann": ann}, **SEARCHING)     # as in the papers
+learner = sgim_im(environment, seed, correspondence=..., teachers={"ann": ann}, **SEARCHING)     # options of the papers
 learner = sgim_im(environment, seed, correspondence=..., teachers={"ann": ann}, goals=EntropyGoals)
 """
 

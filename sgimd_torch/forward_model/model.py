@@ -224,7 +224,7 @@ class ForwardModel(Ensemble):
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write a safetensors file, whole or not at all; its header has the sizes of the model.
 
-        The moments of the optimiser are not saved: a loaded model predicts the same, and its training has new moments.
+        The moments of the optimiser are not saved: a loaded model predicts as before, and trains with new moments.
 
         Raises:
             OSError: ``path`` is a directory, or cannot be written.

@@ -21,7 +21,7 @@ from sgimd_torch.spaces import Array, Estimate
 
 _CANDIDATES: Final = 5  # number of remembered movements to start from
 _STEPS, _STEP = 5, 0.03  # number of steps of a descent, and their size relative to the sides of Pi
-_RADIUS: Final = 0.15  # first radius of the trust region, in sides of Pi, root mean square over the parameters
+_RADIUS: Final = 0.15  # first radius of the trust region, relative to the sides of Pi (root mean square)
 _RADII: Final = (0.02, 0.3)  # bounds of the radius: less is below the noise, more leaves the neighbourhood
 
 

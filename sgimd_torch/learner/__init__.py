@@ -29,12 +29,12 @@ class Learner:
     Args:
         problem: problem to learn; its memory gets an exemplar for every outcome that is told.
         autonomous: autonomous strategy.
-        social: social strategy, which uses demonstrations; None for a learner that cannot be taught.
+        social: social strategy, which uses demonstrations; None: the learner cannot be taught.
         correspondence: function from times and trajectory to theta_d, eq. (6); needed with ``social``.
 
     Attributes:
         memory: exemplars, the memory of the problem.
-        inverse: inverse model; it may be replaced by another one of this problem.
+        inverse: inverse model; another inverse model of this problem may replace it.
         listeners: functions that are called with each `Event`, after it has happened.
         begun: number of exemplars at the start.
         movements: number of movements, rests and failed movements included.
@@ -109,7 +109,7 @@ class Learner:
             yield self._begun_event
 
     def ask(self, context: ArrayLike) -> Move | None:
-        """The next movement; None for a rest, which has no outcome to tell.
+        """The next movement, or None, which is a rest: there is no outcome to tell.
 
         Args:
             context: ``(context_dim,)``, the context of the movement. An attempt keeps its context until the learner is

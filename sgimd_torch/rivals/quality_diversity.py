@@ -136,7 +136,7 @@ def isoline(
     batch: int = 10,
     **options: Any,
 ) -> Learner:
-    """MAP-Elites along lines, with a teacher: an elite, a step towards another one, and a little noise.
+    """MAP-Elites along lines, with a teacher: an elite, a step towards another elite, and a little noise.
 
     Args:
         environment, seed, first, batch, options: arguments of `map_elites`.

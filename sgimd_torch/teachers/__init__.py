@@ -46,7 +46,7 @@ def least_explored(
         ValueError: demonstrated outcomes and the memory have different dimensions.
     """
     shown = [demonstration.outcome for demonstration in demonstrations]
-    demonstrated = check_vector("outcomes of the demonstrations", shown, memory.outcome_dim, "of another robot?")
+    demonstrated = check_vector("outcomes of the demonstrations", shown, memory.outcome_dim, "is it another robot's?")
     low, high = demonstrated.min(axis=0), demonstrated.max(axis=0)
     side = np.maximum(high - low, 1e-9) / tiles  # sizes above 0, even for demonstrations on a line
 
@@ -182,5 +182,5 @@ def check_demonstrations(demonstrations: Sequence[Demonstration]) -> Sequence[De
     shapes = {(np.shape(shown.context), np.shape(shown.outcome)) for shown in demonstrations}
     if len(shapes) > 1 or any(len(shape) != 1 for pair in shapes for shape in pair):
         wanted = "contexts (context_dim,) and outcomes (outcome_dim,), all alike"
-        raise ValueError(f"demonstrations must have {wanted}, got {sorted(shapes)}; of two robots?")
+        raise ValueError(f"demonstrations must have {wanted}, got {sorted(shapes)}; are they of two robots?")
     return demonstrations
