@@ -1,7 +1,7 @@
 """Performance J rates an outcome for a goal; competence gamma is the best performance so far.
 
 Section 4.3 and eqs. (2) and (7) of Nguyen & Oudeyer (2014).
-    competence = Competence(problem); competence(context, goal)   # -1 never came near ... 0 reached
+    competence = Competence(problem); competence(context, goal)   # values from -1 (never near) to 0 (reached)
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def performance(goal: Array, outcome: Array, rest: Array, d_min: float) -> Array
             are judged as if they were ``d_min`` away.
 
     Returns:
-        ``(...)`` in [-1, 0].
+        Performance ``(...)`` in [-1, 0].
 
     Raises:
         ValueError: ``d_min`` is not positive.
@@ -39,9 +39,9 @@ def performance(goal: Array, outcome: Array, rest: Array, d_min: float) -> Array
 class Competence(Judge):
     """Competence by the best outcome ever remembered, as in the paper.
 
-    gamma of eq. (2), the `memory` reading. In one context it never falls.
+    It is gamma of eq. (2), over the whole memory. In one context it never falls.
 
-    Deviation: the paper prints the minimum over memory, but J is negative, so the best is the maximum. J falls with
+    Deviation: the paper prints the minimum over memory, but J is negative, so the best J is the maximum. J falls with
     distance, so the nearest outcome is the best. Deviation: eq. (2) demands an equal context, but contexts drawn from a
     continuum never recur; the nearest exemplar in (context, outcome) is used instead.
     """
@@ -69,7 +69,7 @@ class Competence(Judge):
 class AttemptCompetence(Judge):
     """Competence by the best outcome of the attempt alone.
 
-    SAGG-RIAC's own. It falls when a movement stops working, so interest responds to the change.
+    This is the competence of SAGG-RIAC. It falls when a movement stops working, so interest responds to the change.
     """
 
     def __call__(self, context: Array, goal: Array, outcomes: Array) -> float:

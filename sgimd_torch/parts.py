@@ -25,12 +25,12 @@ Made = TypeVar("Made")
 
 
 class Problem:
-    """Problem to learn: spaces, noise, memory and random streams, which every part is built from.
+    """Problem to learn: spaces, noise, memory and random streams, from which every part is built.
 
     Args:
         environment: robot and world; boxes, rest and noise are read, and nothing is executed.
         seed: number from which all random streams of the learner come, at least 0.
-        memory: exemplars to start from; they are copied. None for none.
+        memory: exemplars to start from; they are copied. None: no exemplars.
         inverse: constructor of the inverse model.
 
     Attributes:
@@ -63,7 +63,7 @@ class Problem:
         self.tolerance = max(environment.outcome_noise, 0.02)
         self._shared: dict[object, Any] = {}
         self.memory = Memory(*self.dims) if memory is None else memory.copy_for(self.dims)
-        self.policies.check("thetas of a memory to start from", self.memory.thetas, "of another robot?")
+        self.policies.check("thetas of a memory to start from", self.memory.thetas, "is it another robot's?")
         self.remarks: list[str] = []
         self.inverse = Inverse.of(inverse, self)
 
@@ -140,7 +140,8 @@ class Goals(Part):
             goal: ``(outcome_dim,)`` in T.
             competence: competence at this goal now, in [-1, 0].
             strategy: name of the strategy that had chosen the goal.
-            gain: rise of the competence at this goal; without one, that of the attempt alone minus that before it.
+            gain: rise of the competence at this goal; without a rise, competence of the attempt alone minus competence
+                before it.
         """
 
     @property
@@ -170,8 +171,8 @@ class Inverse(Part):
         return None
 
     def effects(self) -> Memory | None:
-        """Exemplars with an effect, for a robot most of whose movements have none; None, the default, if all have
-        one."""
+        """Exemplars with an effect, for a robot most of whose movements have no effect. Default: None, which means
+        that all movements have an effect."""
         return None
 
 
@@ -201,7 +202,7 @@ class Explore(Part):
 
 
 class Judge(Part):
-    """Judge: measures the competence of an attempt, which the goal model is told at its end (eq. 2)."""
+    """Judge: measures the competence of an attempt, of which the goal model is told when it ends (eq. 2)."""
 
     @abstractmethod
     def __call__(self, context: Array, goal: Array, outcomes: Array) -> float:
@@ -213,8 +214,8 @@ class Strategy(Part):
 
     @abstractmethod
     def attempt(self, context: Array) -> AskingAttempt:
-        """Yield the movements of an attempt in one context. It must contain a movement or a rest, even without a
-        reply."""
+        """Yield the movements of an attempt in one context. The attempt must contain a movement or a rest, even
+        if a request has no reply."""
 
     @property
     def regions(self) -> Sequence[Any]:
@@ -246,5 +247,4 @@ class Teacher(Built):
 
     @abstractmethod
     def offer(self, index: int, memory: Memory) -> Demonstration | None:
-        """The demonstration before movement ``index`` (0, 1, ...) of the learner with this ``memory``; None for
-        none."""
+        """The demonstration before movement ``index`` (0, 1, ...) of the learner with this ``memory``, or None."""

@@ -1,7 +1,7 @@
 """Strategies of exploration: the next movement, autonomous or after a demonstration.
 
 Sections 3.1, 4.2 and 4.4 of Nguyen & Oudeyer (2014). An attempt is a generator: it yields a movement, and the learner
-sends the outcome. So it reads like the paper's pseudo-code, and a demonstration can interrupt it at any movement.
+sends the outcome. So the code reads like the paper's, and a demonstration can interrupt it at any movement.
     autonomous: Babble, Rest, GoalBabbling          social: Mimic, Imitate, Emulate, Remember
 """
 
@@ -30,7 +30,7 @@ class Babble(Strategy):
 
 
 class Rest(Strategy):
-    """Rest for one movement: observation learner, or imitation learner before the first demonstration."""
+    """Rest for one movement, as an observation learner does, or an imitation learner before the first demonstration."""
 
     def attempt(self, context: Array) -> Attempt:
         """No movement."""
@@ -45,12 +45,12 @@ class GoalBabbling(Strategy):
     Args:
         problem: problem to learn; its inverse model is used.
         goals: goal model.
-        search: search, which refines the estimate of the inverse model.
-        explore: explorer, which makes the global movements.
-        judge: judge, which measures the competence of an attempt for the goal model.
+        search: part that refines the estimate of the inverse model by movements.
+        explore: part that makes the global movements.
+        judge: part that measures the competence of an attempt for the goal model.
         budget: largest number of movements for one goal. Deviation: the paper has no such number. With a complete
-            simplex of 26 movements a goal would take about 60, and a learner with the rod could try only a hundred
-            goals.
+            simplex of 26 movements a goal would take about 60 movements, and a learner with the rod could try only a
+            hundred goals.
         tolerance: distance, in the unit of outcomes, at which a goal counts as reached; None for the outcome noise, but
             at least .02.
         global_range: least and greatest probability of a global movement instead of a movement of the search.
@@ -119,19 +119,19 @@ class GoalBabbling(Strategy):
                 if best <= last and best < self.give_up:
                     return
                 move = moves.send(outcome)
-        finally:  # also when a demonstration interrupts
+        finally:  # interruption by a demonstration included
             self.conclude(context, goal, outcomes, before, strategy)
 
     def conclude(self, context: Array, goal: Array, outcomes: list[Array], before: float, strategy: str) -> None:
-        """Tell the goal model the result of an attempt with these ``outcomes``; nothing if it made no movement.
+        """Tell the goal model the result of an attempt with these ``outcomes``, if it made a movement.
 
         Args:
             before: competence at the goal when the attempt began.
-            strategy: name of the strategy that chose the goal: "autonomous", "social" or another one.
+            strategy: name of the strategy that chose the goal: "autonomous", "social" or another name.
         """
         if outcomes:
             judged, after = self.judge(context, goal, np.stack(outcomes)), self.competence(context, goal)
-            # A new exemplar nearer in (context, outcome) may be farther in outcome alone. That is no loss.
+            # A new exemplar that is nearer in (context, outcome) may be farther in outcome alone; this is no loss.
             gain = max(0.0, after - before)
             if gain == 0 and judged != after:  # the judge saw the attempt alone, which may be worse than the memory
                 gain = min(0.0, judged - before)
@@ -172,7 +172,7 @@ class Mimic(Social):
 
     Args:
         problem: problem to learn.
-        repeats: number of movements for one demonstration; None for all until the next demonstration.
+        repeats: number of movements for one demonstration; None: keep imitating until the next demonstration.
         epsilon: largest variation of each parameter, in the unit of the parameter.
         draws_from: name of the random stream of the variations.
 
@@ -201,7 +201,7 @@ class Mimic(Social):
     def repeat(self, theta_d: Array, goal: Array, outcomes: list[Array]) -> Attempt:
         """The movements of an imitation; their outcomes are appended to ``outcomes``."""
         for repeat in range(self.repeats) if self.repeats is not None else itertools.count():
-            # Deviation: the paper varies all repeats; the exact one shows what theta_d itself leads to.
+            # Deviation: the paper varies all repeats. Here the first is exact and shows the outcome of theta_d itself.
             theta = theta_d if repeat == 0 else self._vary(theta_d)
             outcomes.append((yield Move(theta, goal, "imitate")))
 
@@ -216,7 +216,7 @@ class Imitate(Mimic):
 
     Args:
         problem: problem to learn, with the goal babbling of the learner.
-        repeats: number of movements for one demonstration; None for all until the next demonstration.
+        repeats: number of movements for one demonstration; None: keep imitating until the next demonstration.
         epsilon: largest variation of each parameter, in the unit of the parameter.
     """
 
@@ -234,7 +234,7 @@ class Imitate(Mimic):
         before = self.babbling.competence(context, goal)
         try:
             yield from self.repeat(theta_d, goal, outcomes)
-        finally:  # also when the next demonstration interrupts
+        finally:  # interruption by the next demonstration included
             self.babbling.conclude(context, goal, outcomes, before, "social")
 
 
@@ -266,7 +266,7 @@ class Remember(Social):
 
 
 def _babbling(problem: Problem) -> GoalBabbling:
-    """Goal babbling of the learner, which demonstrated goals are added to."""
+    """Goal babbling of the learner, to which demonstrated goals are added."""
     if not isinstance(problem.autonomous, GoalBabbling):
         raise ValueError(f"a demonstrated goal needs goal babbling, got a {type(problem.autonomous).__name__}")
     return problem.autonomous

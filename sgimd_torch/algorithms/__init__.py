@@ -1,4 +1,4 @@
-"""Learners, a few lines each: the paper's five in ``paper``, ours in ``practice``."""
+"""Learners in a few lines each: the five of the paper in ``paper``, our own in ``practice``."""
 
 from collections.abc import Callable
 from typing import TypeAlias

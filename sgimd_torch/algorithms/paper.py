@@ -1,6 +1,6 @@
 """The five learners of the paper, each built from an autonomous and a social strategy.
 
-Section 5.1 of Nguyen & Oudeyer (2014). Every part is a keyword, so an ablation changes one word:
+Section 5.1 of Nguyen & Oudeyer (2014). Every part is a keyword, so an ablation changes one argument:
     learner = sgim_d(environment, seed, correspondence=environment.primitive.correspondence, goals=UniformGoals)
 A part is given as its constructor; `sgimd_torch.parts` describes each kind of part.
 
@@ -65,7 +65,7 @@ def imitation(
         correspondence: function from times and trajectory to theta_d, eq. (6).
         epsilon: largest variation of each parameter, in the unit of the parameter.
         inverse: inverse model.
-        memory: exemplars to start from; None for none.
+        memory: exemplars to start from; None: the memory starts empty.
     """
     problem = Problem(environment, seed, memory, inverse=inverse)
     mimic = Mimic(problem, repeats=None, epsilon=epsilon)
@@ -87,7 +87,7 @@ def sagg_riac(
         environment: robot and world; nothing is executed here.
         seed: number from which all random streams of the learner come.
         inverse: inverse model; searches begin at its answer.
-        memory: exemplars to start from; None for none.
+        memory: exemplars to start from; None: the memory starts empty.
         parts: parts and options of `GoalBabbling`.
     """
     problem = Problem(environment, seed, memory, inverse=inverse)
@@ -113,7 +113,7 @@ def sgim_d(
         correspondence: function from times and trajectory to theta_d, eq. (6).
         social: social strategy, which uses the demonstrations.
         inverse: inverse model; searches begin at its answer.
-        memory: exemplars to start from; None for none.
+        memory: exemplars to start from; None: the memory starts empty.
         parts: parts and options of `GoalBabbling`.
     """
     problem = Problem(environment, seed, memory, inverse=inverse)

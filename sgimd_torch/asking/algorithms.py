@@ -1,7 +1,7 @@
-"""Learners that ask for demonstrations: SGIM-IM chooses when, SGIM-ACTS also the teacher, the goal and the strategy.
+"""Learners that ask for demonstrations: SGIM-IM chooses when to ask, SGIM-ACTS also chooses teacher, goal and strategy.
 
 learner = sgim_acts(environment, seed, correspondence=..., teachers={"ann": ann, "ben": ben}, cost=3)
-learner = sgim_im(environment, seed, correspondence=..., teachers={"ann": ann}, **SEARCHING)     # as in the papers
+learner = sgim_im(environment, seed, correspondence=..., teachers={"ann": ann}, **SEARCHING)     # options of the papers
 learner = sgim_im(environment, seed, correspondence=..., teachers={"ann": ann}, goals=EntropyGoals)
 """
 
@@ -58,15 +58,15 @@ def _asking(
     """A learner that asks for demonstrations. By default it practises and executes each demonstration once.
 
     Args:
-        cost: cost of a demonstration; an attempt of the learner alone costs 1.
+        cost: cost of a demonstration; an autonomous attempt costs 1.
         repeats: number of movements for one demonstration.
-        epsilon: largest variation of each parameter, in the unit of the parameter.        inverse: inverse model;
-            searches begin at its answer.
-        memory: exemplars to start from; None for none.
+        epsilon: largest variation of each parameter, in the unit of the parameter.
+        inverse: inverse model; searches begin at its answer.
+        memory: exemplars to start from; None: the memory starts empty.
     """
     problem = Problem(environment, seed, memory, inverse=inverse)
     problem.autonomous = babbling = GoalBabbling(problem, **parts)
-    emulates = babbling.budget > 1 and not imitates_only  # emulation by one movement would be an attempt of its own
+    emulates = babbling.budget > 1 and not imitates_only  # emulation by one movement would be an autonomous attempt
     asking = dict[str, Asking]()
     for teacher, demonstrator in teachers.items():
         name = f"imitate {teacher}"
@@ -92,9 +92,9 @@ def sgim_acts(
     Args:
         environment: robot and world; nothing is executed here.
         seed: number from which all random streams of the learner come.
-        correspondence: function from times and trajectory to theta_d, eq. (6).        teachers: teachers by name, as
-            they are given to ``run``.
-        options: ``cost``, ``repeats``, ``epsilon``, ``inverse``, ``memory``, and options of `GoalBabbling`; its goal
+        correspondence: function from times and trajectory to theta_d, eq. (6).
+        teachers: mapping from names to teachers, as for ``run``.
+        options: ``cost``, ``repeats``, ``epsilon``, ``inverse``, ``memory``, and options of `GoalBabbling`; the goal
             model must be a `StrategicGoals`.
     """
     return _asking(environment, seed, False, correspondence=correspondence, teachers=teachers, **options)
@@ -114,12 +114,12 @@ def sgim_im(
     Args:
         environment: robot and world; nothing is executed here.
         seed: number from which all random streams of the learner come.
-        correspondence: function from times and trajectory to theta_d, eq. (6).        teachers: mapping with one
-            teacher, by name.
+        correspondence: function from times and trajectory to theta_d, eq. (6).
+        teachers: mapping from one name to one teacher.
         options: options of `sgim_acts`.
 
     Raises:
-        ValueError: not exactly one teacher.
+        ValueError: there is not exactly one teacher.
     """
     if len(teachers) != 1:
         raise ValueError(f"sgim_im asks one teacher, got {len(teachers)}; is sgim_acts meant?")
@@ -131,4 +131,4 @@ sgim_acts_search = partial(sgim_acts, **SEARCHING)
 sgim_im_search = partial(sgim_im, **SEARCHING)
 """SGIM-IM, as published: a search at each goal instead of practice."""
 sgim_eer = partial(sgim_im, goals=EntropyGoals)
-"""SGIM-IM; asks when a demonstration should reduce entropy more than a movement of its own."""
+"""SGIM-IM; asks when a demonstration is expected to reduce entropy more than a movement of its own."""

@@ -1,11 +1,11 @@
-"""A rival that compares entropies: it asks when a demonstration should reduce entropy more than its own movement.
+"""Rival by entropy: it asks when a demonstration is expected to reduce entropy more than its own movement.
 
 After Kulak & Calinon (2023), "Combining social and intrinsically-motivated learning for multi-task robot skill
-acquisition". They compute the expected epistemic entropy over goals, and how much each mode should reduce it. The
+acquisition". They compute the expected epistemic entropy over goals, and its expected reduction by each mode. The
 learner asks for a demonstration of the goal with the greatest epistemic entropy.
     learner = sgim_im(environment, seed, correspondence=..., teachers={"ann": ann}, goals=EntropyGoals)
-Ours: the policy for a goal is modelled as linear in features of the goal, so that reductions have a closed form. The
-nearest earlier attempt predicts where a movement of the learner's own would land.
+Here the policy for a goal is modelled as linear in features of the goal, so that reductions have a closed form. The
+nearest earlier attempt predicts where a movement of the learner itself would land.
 """
 
 from __future__ import annotations
@@ -22,21 +22,22 @@ from sgimd_torch.inverses.gaussian_process import Kernel, one_thread, squared_di
 from sgimd_torch.parts import Problem
 from sgimd_torch.spaces import Array, Box
 
-_GOALS: Final = 30  # goals that the expected entropy is averaged over
-_KNOWN: Final = 400  # exemplars that the Gaussian process is fitted to, spread over the memory
+_GOALS: Final = 30  # number of goals over which the expected entropy is a mean
+_KNOWN: Final = 400  # largest number of exemplars, spread over the memory, to which the Gaussian process is fitted
 _NOISE: Final = 0.1  # variance of the noise of one exemplar, in units of the prior variance
-_LENGTH: Final = 0.1  # length scale of the kernel, in sides of C x T
+_LENGTH: Final = 0.1  # length scale of the kernel, relative to the sides of C x T
 _KERNEL: Final = Kernel(1 / _LENGTH, 1.0, 0.0, _NOISE)
 
 
 @one_thread
 def doubt(known: Array, points: Array) -> Array:
-    """Posterior covariance of the policies for points, by a Gaussian process from outcomes to policies.
+    """Posterior covariance of the policies for ``points``, by a Gaussian process from outcomes to policies.
 
     Deviation: Kulak & Calinon take a Bayesian mixture of Gaussians.
 
     Args:
-        known: ``(n, dim)`` exemplars, in sides of C x T.        points: ``(m, dim)``, in sides of C x T.
+        known: ``(n, dim)`` exemplars, relative to the sides of C x T.
+        points: ``(m, dim)`` points, relative to the sides of C x T.
 
     Returns:
         ``(m, m)`` covariances, given the exemplars; 1 on the diagonal where nothing is known.
@@ -59,11 +60,11 @@ class EntropyGoals(StrategicGoals):
         super().__init__(problem)
         self.memory, contexts, outcomes = problem.memory, problem.contexts, problem.outcomes
         self._box = Box(np.concatenate((contexts.low, outcomes.low)), np.concatenate((contexts.high, outcomes.high)))
-        self._tried: dict[str, list[tuple[Array, Array]]] = {}  # by strategy: goals, and outcomes minus goals, in sides
+        self._tried: dict[str, list[tuple[Array, Array]]] = {}  # goal, outcome minus goal, relative to the sides
 
     def choose(self, context: ArrayLike, costs: Mapping[str, float]) -> tuple[str, Array]:
-        """The strategy with the greatest expected reduction of entropy for its cost, and a goal ``(outcome_dim,)`` for
-        it.
+        """The strategy whose expected reduction of entropy, divided by its cost, is greatest, and a goal
+        ``(outcome_dim,)`` for this strategy.
 
         Raises:
             ValueError: ``context`` is not one point of C.
@@ -78,7 +79,7 @@ class EntropyGoals(StrategicGoals):
         doubtful = int(entropies.argmax())
         found = dict[str, float]()
         for number, (name, cost) in enumerate(costs.items(), 1):
-            aimed = range(_GOALS) if name == AUTONOMOUS else [doubtful]  # alone, the goal is any of them
+            aimed = range(_GOALS) if name == AUTONOMOUS else [doubtful]  # an autonomous attempt may have any goal
             reductions = [_reduction(covariance, entropies, number * _GOALS + goal) for goal in aimed]
             found[name] = float(np.mean(reductions)) / cost
         name = max(found, key=lambda each: found[each])
@@ -87,7 +88,7 @@ class EntropyGoals(StrategicGoals):
     def add(
         self, context: ArrayLike, goal: ArrayLike, competence: float, strategy: str = AUTONOMOUS, gain: float = 0.0
     ) -> None:
-        """Remember where an attempt at a goal has landed; its outcome is the last one in memory.
+        """Remember where an attempt at a goal has landed; the outcome of this attempt is the last one in memory.
 
         Raises:
             ValueError: see `Goals.add`.
@@ -96,13 +97,13 @@ class EntropyGoals(StrategicGoals):
         goals, last = (
             (point - self._box.low) / self._box.sides,
             self._scaled(self.memory.contexts, self.memory.outcomes),
-        )  # Without a reply nothing is learnt, as if the attempt had landed on an outcome that is known already.
+        )  # A request without a reply teaches nothing, as if the attempt had landed on an outcome that is known.
         missed = np.full(len(point), np.nan) if gain == -1.0 else last[-1] - goals
         self._tried.setdefault(strategy, []).append((goals, missed))
 
     def _landing(self, points: Array, strategy: str) -> Array:
-        """Expected outcomes of attempts at ``points``: each misses as the nearest earlier attempt did, the first not at
-        all."""
+        """Expected outcomes of attempts at ``points``: each misses its goal by as much as the nearest
+        earlier attempt of the strategy; before its first attempt, the strategy is expected to meet each goal."""
         tried = self._tried.get(strategy)
         if not tried:
             return points
@@ -127,7 +128,7 @@ def _entropy(variances: Array) -> Array:
 
 
 def _reduction(covariance: Array, entropies: Array, place: int) -> float:
-    """Reduction of the mean entropy of the goals, the first points, by one more exemplar at point ``place``."""
+    """Reduction of the mean entropy of the goals (the first points) by one more exemplar at point number ``place``."""
     n, variances = len(entropies), np.diag(covariance)
     after = variances[:n] - covariance[:n, place] ** 2 / (variances[place] + _NOISE)
     return float((entropies - _entropy(after)).mean())

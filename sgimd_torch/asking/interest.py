@@ -1,11 +1,11 @@
-"""Progress of each strategy in each region of C x T: from it, a strategy and its goal are drawn together.
+"""Progress of each strategy in each region of C x T, by which a strategy and its goal are drawn together.
 
 SGIM-ACTS: Nguyen & Oudeyer (2012), "Active choice of teachers, learning strategies and goals for a socially guided
 intrinsic motivation learner". The measure of progress follows later work of that group: Duminy, Nguyen & Duhaut (2019),
 "Learning a set of interrelated tasks by using a succession of motor policies for a socially guided intrinsically
 motivated learner".
     goals = StrategicInterest(problem)
-    strategy, goal = goals.choose(context, {"autonomous": 1.0, "imitate left": 2.0})      # name: cost
+    strategy, goal = goals.choose(context, {"autonomous": 1.0, "imitate left": 2.0})      # names and costs
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ from sgimd_torch.parts import Goals, Problem
 from sgimd_torch.spaces import Array
 
 AUTONOMOUS: Final = "autonomous"
-_FEWEST, _LAST = 4, 10  # least number of attempts for a measure of progress, and the most that it uses
-# Share of the choices that first draw a goal from all of T, and then a strategy by its interest there.
+_FEWEST, _LAST = 4, 10  # least and greatest number of attempts that a measure of progress uses
+# Share of the choices that first draw a goal from all of T, and then a strategy by its interest at this goal.
 _ANYWHERE: Final = 0.5
-_GREATEST: Final = 10  # pairs (region, strategy) of the greatest interest; one of them is drawn
+_GREATEST: Final = 10  # number of pairs (region, strategy) with the greatest interest, of which one is drawn
 _TEMPERATURE: Final = 0.03  # rise of progress that makes interest e times as large
 _UNTRIED: Final = 1.0  # progress of an untried strategy, the greatest possible
 
@@ -38,13 +38,13 @@ def progresses(competences: Array, gains: Array) -> Array:
     1].
 
     Deviation: ``after`` is the competence of the attempt itself. So progress is negative if the attempt is worse than
-    the memory. Only this distinguishes a mislabelling teacher from one with nothing new.
+    the memory. Only negative progress tells a mislabelling teacher from a teacher with nothing new.
     """
     return gains * (1 + competences + np.maximum(-gains, 0)) ** 2
 
 
 def strategic_progress(points: Array, competences: Array, gains: Array) -> float:
-    """Mean progress, trimmed by the least and the greatest value, so one lucky exemplar cannot dominate a small
+    """Mean progress without the least and the greatest value, so that one lucky exemplar cannot dominate a small
     region."""
     return float(np.sort(progresses(competences, gains))[1:-1].mean())
 
@@ -63,7 +63,7 @@ class StrategicGoals(Goals):
 
     @abstractmethod
     def choose(self, context: ArrayLike, costs: Mapping[str, float]) -> tuple[str, Array]:
-        """One of the strategies in ``costs``, and a goal ``(outcome_dim,)`` for it in this context."""
+        """One of the strategies in ``costs``, and a goal ``(outcome_dim,)`` for this strategy in this context."""
 
     def sample(self, context: ArrayLike) -> Array:
         """A goal for a learner that has only the autonomous strategy."""
@@ -73,16 +73,16 @@ class StrategicGoals(Goals):
 class StrategicInterest(StrategicGoals):
     """Goals and strategies of most progress for their cost, for learners that ask teachers.
 
-    The interest of a pair (region, strategy) is e^(progress / temperature), divided by the cost of the strategy. If its
-    progress exceeds that of the cheapest strategy there, the excess is divided by the cost, too.
+    The interest of a pair (region, strategy) is e^(progress / temperature), divided by the cost of the strategy. If the
+    strategy has more progress there than the cheapest strategy, the difference is divided by the cost, too.
 
-    Ours: the papers draw in proportion to progress, and try untried strategies by chance. Here progress can be
-    negative, hence the exponential. A strategy with few attempts in a region has the progress of its nearest attempts,
-    so that no choice is spent on a random strategy.
+    The papers draw in proportion to progress, and try new strategies by chance. Here progress can be
+    negative, so interest is an exponential. If a strategy has few attempts in a region, it has the progress of its
+    nearest attempts, so that no choice is spent on a random strategy.
 
     Args:
         problem: problem to learn.
-        make: constructor of the map of regions; interest is its progress.
+        make: constructor of the map of regions, which also has the measure of progress.
     """
 
     def __init__(self, problem: Problem, *, make: Callable[[Problem], InterestMap] = BY_STRATEGY) -> None:
@@ -96,8 +96,8 @@ class StrategicInterest(StrategicGoals):
         return self._map.regions
 
     def progress(self, region: Region, strategy: str) -> float:
-        """Progress of a strategy in a region, over its last ten attempts there. With fewer than 4 attempts there: over
-        the ten nearest to the middle of the region. With fewer than 4 in all: 1, the greatest possible."""
+        """Progress of a strategy in a region, over its last ten attempts there. If there are fewer than 4, the ten
+        attempts nearest to the middle of the region count. With fewer than 4 in all, progress is 1, the greatest."""
         tried = self._tried.get(strategy)
         if tried is None or len(tried.points) < _FEWEST:
             return _UNTRIED
@@ -114,7 +114,7 @@ class StrategicInterest(StrategicGoals):
         return found
 
     def choose(self, context: ArrayLike, costs: Mapping[str, float]) -> tuple[str, Array]:
-        """One of the strategies in ``costs``, and a goal ``(outcome_dim,)`` for it.
+        """One of the strategies in ``costs``, and a goal ``(outcome_dim,)`` for this strategy.
 
         Raises:
             ValueError: ``context`` is not one point of C.
@@ -150,8 +150,8 @@ class StrategicInterest(StrategicGoals):
 
 
 class _Tried(NamedTuple):
-    """All attempts of a strategy. ``known`` caches by path of a region: the region, the number of attempts, the
-    progress."""
+    """All attempts of a strategy. For the path of each region, ``known`` caches the region, the number of
+    attempts and the progress."""
 
     points: Array
     competences: Array
@@ -159,11 +159,11 @@ class _Tried(NamedTuple):
     known: dict[str, tuple[Region, int, float]]
 
     def extend(self, point: Array, competence: float, gain: float) -> _Tried:
-        """These with one more attempt."""
+        """All attempts and one more."""
         competences, gains = np.append(self.competences, competence), np.append(self.gains, gain)
         return _Tried(np.vstack((self.points, point)), competences, gains, self.known)
 
     def progress_near(self, point: Array, sides: Array) -> float:
-        """Progress over the ten attempts nearest to a point of C x T; distances are in ``sides``."""
+        """Progress over the ten attempts nearest to a point of C x T; distances are relative to ``sides``."""
         nearest = np.argsort(np.square((self.points - point) / sides).sum(axis=1), kind="stable")[:_LAST]
         return strategic_progress(self.points[nearest], self.competences[nearest], self.gains[nearest])

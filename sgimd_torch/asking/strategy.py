@@ -2,8 +2,8 @@
 
 SGIM-IM and SGIM-ACTS, Nguyen & Oudeyer (2012): "Interactive learning gives the tempo to an intrinsically motivated
 robot learner", and "Active choice of teachers, learning strategies and goals for a socially guided intrinsic motivation
-learner". An attempt chooses a strategy and a goal together. If the strategy needs one, it asks for a demonstration of
-the goal. At its end it tells the goal model the competence at the goal and at the demonstrated outcome.
+learner". An attempt chooses a strategy and a goal together. If the strategy is to ask, the attempt requests a
+demonstration of the goal. At its end the goal model is told the competence at the goal and at the shown outcome.
     StrategicBabbling(problem, babbling, {"imitate left": Asking("left", Mimic(problem), cost=2.0)})
 """
 
@@ -23,8 +23,7 @@ from sgimd_torch.strategies import GoalBabbling
 
 class Asking(NamedTuple):
     """Strategy that asks: name of the teacher, social strategy for the demonstration, cost of a demonstration, and
-    number
-    of movements that the learner rests until the reply comes."""
+    number of movements for which the learner rests until the reply comes."""
 
     teacher: str
     answer: Social
@@ -33,12 +32,12 @@ class Asking(NamedTuple):
 
 
 class StrategicBabbling(Strategy):
-    """Goal babbling, or asking a teacher: the goal model chooses by progress and cost.
+    """Goal babbling, or a request to a teacher; the goal model chooses between them by progress and cost.
 
     Args:
         problem: problem to learn.
         babbling: autonomous strategy; its goal model chooses among all strategies.
-        asking: strategies that ask a teacher, by name.
+        asking: mapping from names to strategies that ask a teacher.
 
     Raises:
         ValueError: a cost is not positive, or the goal model is no `StrategicGoals`.
@@ -58,11 +57,11 @@ class StrategicBabbling(Strategy):
 
     @property
     def regions(self) -> Sequence[Region]:
-        """Regions of its goal model."""
+        """Regions of the goal model."""
         return self.goals.regions
 
     def attempt(self, context: Array) -> AskingAttempt:
-        """Movements by one strategy for one goal; autonomous ones if the teacher has no reply.
+        """Movements by one strategy for one goal; if the teacher has no reply, the movements are autonomous.
 
         Deviation: competence is measured at the goal and at the demonstrated outcome, not at all outcomes on the way.
         A mislabelling teacher shows good movements, but not for the goal of the request.
@@ -85,7 +84,7 @@ class StrategicBabbling(Strategy):
         there = self.babbling.competence(context, shown)
         try:
             yield from answer.attempt(context, *lesson)
-        finally:  # also when another demonstration interrupts
+        finally:  # interruption by another demonstration included
             outcomes = list(memory.outcomes[first:])
             self.babbling.conclude(context, goal, outcomes, before, strategy)
             if self.problem.outcomes.contains(shown):

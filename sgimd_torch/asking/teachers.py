@@ -1,7 +1,7 @@
-"""Teachers who are asked for a demonstration of a goal, and reply with the nearest one that they have, or with nothing.
+"""Teachers who are asked for a demonstration of a goal; they reply with their nearest demonstration, or not at all.
 
 Nguyen & Oudeyer (2012), "Active choice of teachers, learning strategies and goals for a socially guided intrinsic
-motivation learner". The learner asks, see `sgimd_torch.asking`; `run` hands its requests to the teachers.
+motivation learner". A learner of `sgimd_torch.asking` asks; `run` hands its requests to the teachers.
     teachers = {"left": AnsweringTeacher(shown, stream(seed, "left"), knows=low_half)}
     teachers["left"].demonstrate(context, goal, memory)
 """
@@ -40,7 +40,7 @@ def high_half(demonstrations: Sequence[Demonstration], rng: np.random.Generator)
 
 
 def mislabelled(demonstrations: Sequence[Demonstration], rng: np.random.Generator) -> Sequence[Demonstration]:
-    """All demonstrations, each with the outcome of another one, so that every stated outcome is wrong."""
+    """All demonstrations, each with the outcome of another demonstration, so that every stated outcome is wrong."""
     shift = 1 + int(rng.integers(max(1, len(demonstrations) - 1)))
     order = rng.permutation(len(demonstrations))
     labels = {int(row): demonstrations[label].outcome for row, label in zip(order, np.roll(order, shift), strict=True)}
@@ -58,18 +58,18 @@ def _recorded(number: int, demonstrations: Sequence[Demonstration], rng: np.rand
 class AnsweringTeacher(Demonstrator):
     """Has all demonstrations; shows the one nearest to the goal.
 
-    If several are equally near, it shows the first.
+    If several demonstrations are equally near, the teacher shows the first.
 
     Args:
         demonstrations: demonstrations to choose from.
         rng: random stream of ``knows``; nothing is drawn later.
-        knows: choice of the demonstrations that this teacher has: `everything`, `low_half`, `high_half`, `mislabelled`
-            or your own.
-        within: distance in C x T beyond which there is no reply.        takes: number of movements that the learner
-            rests until the reply has come.
+        knows: function that chooses the demonstrations of this teacher: `everything`, `low_half`, `high_half`,
+            `mislabelled`, or a function of your own.
+        within: distance in C x T beyond which there is no reply.
+        takes: number of movements for which the learner rests until the reply has come.
 
     Raises:
-        ValueError: no demonstration, or a number out of its range.
+        ValueError: there is no demonstration, or a number is out of its range.
     """
 
     def __init__(

@@ -15,5 +15,5 @@ class Anywhere(Explore):
     draws_from = "regime"
 
     def __call__(self, context: Array) -> Array:
-        """``(theta_dim,)`` uniform in Pi."""
+        """A movement ``(theta_dim,)``, uniform in Pi."""
         return self.problem.policies.sample(self.rng)

@@ -1,8 +1,8 @@
-"""Effects: the movements that changed anything, for robots most of whose movements change nothing.
+"""Effects: the movements that changed something, for robots with many movements that change nothing.
 
-Our addition. A movement that misses an object leaves it where it lies. So the outcomes of all movements without an
+Our addition. A movement that misses an object leaves it as it was. So the outcomes of all movements without an
 effect lie on one plateau: they depend on the context alone. The plateau is found by RANSAC (Fischler & Bolles 1981), as
-an affine map of the context. It goes through few exemplars and fits as many others as possible within the noise.
+an affine map of the context. It goes through few exemplars, and it fits as many other exemplars as possible.
     effects = Effects(memory, problem.outcome_noise); acted = effects()
 """
 
@@ -16,14 +16,14 @@ from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, stream
 
 _FIRST, _GROWTH = 16, 1.5  # exemplars at the first look for a plateau, and the growth factor from look to look
-_GUESSES: Final = 50  # maps through few exemplars
-_GUESSED_ON: Final = 300  # exemplars, drawn from all
-_REFINED: Final = 5  # fits of the best map by least squares
-_NEAR, _WITHIN = 2.0, 4.0  # noise deviations from a plateau: most of its points are near, all are within
+_GUESSES: Final = 50  # number of candidate maps, each through few exemplars
+_GUESSED_ON: Final = 300  # number of exemplars, drawn from all, that the candidates are compared on
+_REFINED: Final = 5  # number of fits of the best map by least squares
+_NEAR, _WITHIN = 2.0, 4.0  # distances, in standard deviations of the noise, of most points of a plateau and of all
 _ROUNDING: Final = 1e-9  # noise of an environment without noise, relative to the spread of outcomes
 _LEAST, _SHARE = 16, 0.1  # least number of exemplars on a plateau, and their least share of all
 _DENSE: Final = (
-    0.9  # least share within 2 sd, of the points within 4 sd of a plateau; without a plateau it is about half
+    0.9  # least share of the points within 4 sd of a plateau that lie within 2 sd; about half if there is no plateau
 )
 
 
@@ -43,8 +43,8 @@ class Effects:
         self._seen = 0
 
     def __call__(self) -> Memory | None:
-        """Memory with copies of the exemplars with an effect, perhaps empty; a new object when the plateau has changed.
-        None without a plateau: then every movement has an effect."""
+        """Memory with copies of the exemplars with an effect; perhaps empty, and a new object when the plateau changed.
+        If there is no plateau, None, because then every movement has an effect."""
         n, size = len(self.memory), float(_FIRST)
         while size * _GROWTH <= n:
             size *= _GROWTH
@@ -61,7 +61,7 @@ class Effects:
         return self._acted
 
     def _look(self) -> Array | None:
-        """The plateau of the first ``_looked`` exemplars, None for none."""
+        """The plateau of the first ``_looked`` exemplars; None if they have no plateau."""
         n = self._looked
         outcomes = self.memory.outcomes[:n]
         self._scale = max(self.noise, _ROUNDING * float(np.sqrt(outcomes.var(axis=0).sum())))

@@ -1,8 +1,8 @@
 """Global exploration where most movements do nothing: find movements with an effect, and vary them.
 
 Our addition. Forestier et al. (2022) reach goals for an object by variations of movements that had moved it. Go-Explore
-(Ecoffet et al. 2021) returns to a state before it explores. The width of variations follows the share of them that keep
-the effect, like the success rule of evolution strategies (Rechenberg 1973).
+(Ecoffet et al. 2021) returns to a state before it explores. The width of variations follows the share of variations
+that keep the effect, like the success rule of evolution strategies (Rechenberg 1973).
     explore = Returning(problem); theta = explore(context)
 """
 
@@ -16,20 +16,20 @@ from sgimd_torch.explore.widening import Widening, Width
 from sgimd_torch.parts import Explore, Inverse, Problem
 from sgimd_torch.spaces import Array
 
-_ENOUGH: Final = 16  # effects from which an inverse model can learn
+_ENOUGH: Final = 16  # least number of effects from which an inverse model can learn
 _SHARE: Final = 0.1  # share of global movements once there are enough effects; more would blur the inverse model
 _ANYWHERE: Final = 0.5  # share of the global movements that look anywhere in Pi for other effects
-_NEAREST: Final = 10  # movements with an effect in the most similar contexts; one of them is varied
+_NEAREST: Final = 10  # number of movements with an effect in the most similar contexts; one of these is varied
 
 
 class Returning(Explore):
-    """Widening movements around the middle of Pi; where effects are rare, variations of movements that had one.
+    """Widening movements around the middle of Pi; where effects are rare, variations of movements that had an effect.
 
-    It is `Widening` while every movement has an effect. Otherwise it makes uniform movements in Pi. Once a movement had
-    an effect, every other movement is a variation of one with an effect in a similar context.
+    While every movement has an effect, it explores as `Widening`. Otherwise it makes uniform movements in Pi. Once a
+    movement had an effect, half of the movements are variations of a movement that had an effect in a similar context.
 
     Args:
-        problem: problem to learn. An inverse model without ``effects``, unlike `AmongEffects`, makes this `Widening`.
+        problem: problem to learn. With an inverse model that reports no ``effects``, it always explores as `Widening`.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -42,7 +42,7 @@ class Returning(Explore):
 
     @property
     def share(self) -> float | None:
-        """Share of global movements: 1 until enough had an effect, then a tenth. None if all movements have an
+        """Share of global movements: 1 until enough of them had an effect, then a tenth. None if all movements have an
         effect."""
         acted = self.problem.inverse.effects()
         return None if acted is None else _SHARE if len(acted) >= _ENOUGH else 1.0

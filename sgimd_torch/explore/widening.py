@@ -1,8 +1,8 @@
-"""Global exploration around the middle of Pi, whose width grows while its outcomes are predicted well.
+"""Global exploration around the middle of Pi; its width grows while outcomes are predicted well.
 
 Our addition. Rolf, Steil & Gienger (2010) begin goal babbling at one posture and widen from there, so that all
-movements belong to one family. The right width depends on the robot. With the fishing rod, one of 25 dimensions, a
-movement drawn anywhere teaches nothing about others; with an arm of three joints it teaches nearly everything.
+movements belong to one family. The right width depends on the robot. With the fishing rod (25 dimensions), a
+movement drawn anywhere teaches nothing about other movements; with an arm of three joints, nearly everything.
     explore = Widening(problem); theta = explore(context)
 All parts of a learner share one `Width`; the search `Vary` uses half of it around a copied movement.
 """
@@ -16,20 +16,20 @@ import numpy as np
 from sgimd_torch.parts import Explore, Inverse, Problem
 from sgimd_torch.spaces import Array
 
-_FIRST, _NARROWEST, _WIDEST = 0.1, 0.03, 0.3  # standard deviations, in sides of Pi
+_FIRST, _NARROWEST, _WIDEST = 0.1, 0.03, 0.3  # standard deviations, relative to the sides of Pi
 _FACTOR: Final = 1.15  # ratio of one width to the next
 _WELL: Final = 0.1  # largest squared error of a good prediction, relative to the variance of the outcomes
-_LOOKED_AT: Final = 1000  # largest number of exemplars for this variance
+_LOOKED_AT: Final = 1000  # largest number of exemplars from which the variance of the outcomes is computed
 
 
 class Width:
-    """Standard deviation of exploration, in sides of Pi: it grows while outcomes are predicted well."""
+    """Standard deviation of exploration, relative to the sides of Pi; it grows while outcomes are predicted well."""
 
     def __init__(self) -> None:
         self.sd = _FIRST
 
     def update(self, well: bool) -> None:
-        """Widen after a good prediction, narrow after a bad one."""
+        """Increase the width after a good prediction, and reduce it after a bad one."""
         self.sd = float(np.clip(self.sd * (_FACTOR if well else 1 / _FACTOR), _NARROWEST, _WIDEST))
 
 

@@ -1,7 +1,7 @@
 """Anchored predictions of the forward model, corrected by its errors at similar executed movements, the anchors.
 
-Not in Nguyen & Oudeyer (2014). With one anchor k the prediction is tau_k + L(theta) - L(theta_k). With many, the
-correction is a Gaussian process of the network's errors at the anchors, and its variance grows away from them. A
+Not in Nguyen & Oudeyer (2014). With one anchor k the prediction is tau_k + L(theta) - L(theta_k). With many
+anchors, the correction is a Gaussian process of the network's errors there; its variance grows far from anchors. A
 network is wrong where few movements were executed, and without this variance a search ends at just those places.
     near = Anchored(model, policies, context, ...); theta = near.descend(candidates, goals, steps=40, step=0.005)
 """
@@ -16,15 +16,15 @@ from sgimd_torch.forward_model.model import ForwardModel
 from sgimd_torch.spaces import Array, Box
 
 # All numbers are without a unit: lengths come from the data, so the unit of T does not matter.
-_REACH: Final = 0.08  # length scale of a correction, in sides of Pi, times the square root of the number of parameters
+_REACH: Final = 0.08  # length scale of a correction, relative to the sides of Pi and to the square root of theta_dim
 # Weight of the model's predicted variances, of noise and of disagreement. A network that has not learnt enough takes
-# its own errors for noise (twice the true deviation late in a run on the fishing rod, and more early). With the whole
-# variance the anchors would not correct it.
+# its own errors for noise (late in a run on the fishing rod twice the true deviation, earlier even more). With the
+# whole variance the anchors would not correct the network.
 _SHARE: Final = 0.1
-# Weight of the correction's variance against the squared distance. 1 would be the expectation, but the minimum over
+# Weight of the correction's variance against the squared distance. The expectation has weight 1, but the minimum over
 # many candidates selects those whose prediction error is favourable.
 _CAUTION: Final = 10.0
-_LEAST_NOISE: Final = 0.003  # in spreads of the outcomes; with less, the covariance of coincident anchors is singular
+_LEAST_NOISE: Final = 0.003  # fraction of the spread of outcomes; below, the covariance of equal anchors is singular
 
 
 class Anchored:
@@ -32,8 +32,8 @@ class Anchored:
 
     Args:
         model: forward model, trained.
-        policies: Pi; distances between movements are in its sides.
-        context: ``(context_dim,)``, context of all candidates, or ``(n, context_dim)``, one for each.
+        policies: Pi; distances between movements are relative to its sides.
+        context: ``(context_dim,)``, context of all candidates, or ``(n, context_dim)``, one for each candidate.
         contexts: ``(n, m, context_dim)``, contexts of the anchors.
         thetas: ``(n, m, theta_dim)``, m anchors for each candidate; with n = 1, all candidates share them.
         outcomes: ``(n, m, outcome_dim)``, outcomes of the anchors.
@@ -95,10 +95,10 @@ class Anchored:
 
         Args:
             theta: ``(n, theta_dim)`` candidates at the start.
-            goals: ``(n, outcome_dim)``, or one for all candidates.
+            goals: ``(n, outcome_dim)``, or one goal for all candidates.
             steps: number of steps.
-            step: length of a step in each parameter, in sides of Pi, about.
-            radius: largest distance from the start, root mean square over the parameters, in sides; None for any.
+            step: approximate length of a step in each parameter, relative to the sides of Pi.
+            radius: largest distance from the start, root mean square over the parameters, in sides; None: no limit.
         """
         start = theta
         mean, square = torch.zeros_like(theta), torch.zeros_like(theta)

@@ -13,10 +13,10 @@ from sgimd_torch.spaces import Array
 
 
 def coverage(observed: Array, mean: Array, spread: Array, level: float) -> float:
-    """Share of the outcomes inside the regions that should contain the share ``level``.
+    """Share of the outcomes inside the regions that are expected to contain the share ``level``.
 
     The regions are ellipsoids along the axes, of a Gaussian with independent dimensions. A share below the level means
-    that the model is overconfident; above it, too cautious.
+    that the model is overconfident, a share above the level that the model is too cautious.
 
     Args:
         observed: ``(n, outcome_dim)`` outcomes, n >= 1.

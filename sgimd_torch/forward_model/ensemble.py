@@ -15,7 +15,7 @@ import torch
 from lightning import LightningModule
 
 _HIDDEN: Final = (64, 64)  # units of each hidden layer
-_LOG_VARIANCES: Final = (-9.0, 3.0)  # of standardised outcomes: a noise of 1 % to 450 % of their spread
+_LOG_VARIANCES: Final = (-9.0, 3.0)  # bounds for standardised outcomes: noise of 1 % to 450 % of their spread
 
 
 class Ensemble(LightningModule):
@@ -26,10 +26,10 @@ class Ensemble(LightningModule):
         n_outputs: dimension of the outputs.
         generator: random stream of the weights.
         members: number of networks, which differ in their first weights.
-        noise_heads: true for a predicted noise that depends on the input, false for one number for each output.
+        noise_heads: true: the predicted noise depends on the input; false: it is one number for each output.
         lr: learning rate of Adam.
-        beta: exponent of the noise variance in the weights of the loss: 0 is the likelihood itself; with .5 outputs of
-            noisy inputs are learnt, too (Seitzer et al., ICLR 2022).
+        beta: exponent of the noise variance in the weights of the loss. With 0 the loss is the likelihood; with .5
+            outputs of noisy inputs are learnt, too (Seitzer et al., ICLR 2022).
     """
 
     def __init__(
@@ -68,7 +68,7 @@ class Ensemble(LightningModule):
         return (loss * (self.beta * log_variance).exp().detach()).mean()
 
     def configure_optimizers(self) -> torch.optim.Optimizer:
-        """Adam, with one kernel for all weights."""
+        """Adam, which updates all weights in one kernel."""
         return torch.optim.Adam(self.parameters(), lr=self.lr, fused=True)
 
 

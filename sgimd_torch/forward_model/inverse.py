@@ -19,16 +19,17 @@ from sgimd_torch.inverses.locally_linear import LocallyLinear
 from sgimd_torch.parts import Problem
 from sgimd_torch.spaces import Array, Estimate
 
-_NEAREST: Final = 10  # candidates beside the first estimate: the remembered movements nearest to the goal
-_ANCHORS: Final = 40  # neighbours in policy space that correct the predictions for a candidate
-# Number and size of the steps of the descent, in sides of Pi. Many small steps end nearer to the start than few large.
+_NEAREST: Final = 10  # number of candidates beside the first estimate: the remembered movements nearest to the goal
+_ANCHORS: Final = 40  # number of neighbours in policy space that correct the predictions for a candidate
+# Number of steps, and their size relative to the sides of Pi. Many small steps end nearer to the start than few large
+# steps.
 _STEPS, _STEP = 40, 0.005
-_GOALS_PER_BATCH: Final = 64  # about 50 MB
+_GOALS_PER_BATCH: Final = 64  # memory of about 50 MB
 
 
 class ModelInverse(ThroughModel):
-    """Best end of descents through the model, from the estimate of `LocallyLinear` and the nearest remembered
-    movements.
+    """Best end of descents through the model, which begin at the estimate of `LocallyLinear` and at the nearest
+    remembered movements.
 
     It never trains the model, so that an evaluation changes nothing: call ``model.refresh(memory)`` in the loop that
     adds to the memory. Until the model is trusted, the answer is that of `LocallyLinear`.
@@ -47,7 +48,7 @@ class ModelInverse(ThroughModel):
         return self.answer_many(context[None], goal[None])[0]
 
     def answer_many(self, contexts: Array, goals: Array) -> list[Estimate]:
-        """Estimates for ``goals`` ``(n, outcome_dim)``; in one context, several times faster than single calls."""
+        """Estimates for ``goals`` ``(n, outcome_dim)``; in one context several times faster than one by one."""
         estimates = [self.start(*each) for each in zip(contexts, goals, strict=True)]
         if not self.trusted:
             return estimates

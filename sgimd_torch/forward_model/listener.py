@@ -1,6 +1,6 @@
 """The forward model in a run: training, a record of its predictions, and messages about its use.
 
-A replay makes its tables again, so those of a resumed run are complete.
+A replay writes the tables again, so the tables of a resumed run are complete.
     listener = ModelListener(record, model, asked, learner.memory, seconds); listener.episode(episode, replayed=False)
 """
 
@@ -19,12 +19,12 @@ from sgimd_torch.runs.listeners import Listener, Seconds
 from sgimd_torch.runs.process import say
 from sgimd_torch.spaces import Array, Episode
 
-LEVEL: Final = 0.8  # share of outcomes that the predicted regions should contain, for the coverage on the board
+LEVEL: Final = 0.8  # share of outcomes expected in the predicted regions, for the coverage on the board
 NOT_ASKED: Final = "the forward model is not used, the learner goes on without it"
 
 
 class ModelListener(Listener):
-    """Refreshes the model after every movement and records what it predicts.
+    """Refreshes the model after every movement and records its predictions.
 
     Args:
         record: record of the run.

@@ -25,12 +25,12 @@ from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, check_count, check_vector, stream
 
 TRUSTED_UP_TO: Final = 0.25  # relative error
-_FEWEST_EXEMPLARS: Final = 50  # least number for the first refresh
-_DIVERGED_ABOVE: Final = 2.0  # relative error, twice that of predicting the mean
+_FEWEST_EXEMPLARS: Final = 50  # least number of exemplars for the first refresh
+_DIVERGED_ABOVE: Final = 2.0  # relative error of a diverged model: twice the error of predicting the mean
 
 
 class Prediction(NamedTuple):
-    """Prediction of outcomes; all are ``(..., outcome_dim)``, in the unit of T.
+    """Prediction of outcomes; all arrays are ``(..., outcome_dim)``, in the unit of T.
 
     Attributes:
         mean: expected outcomes.
@@ -72,10 +72,10 @@ class ForwardModel(Ensemble):
         seed: number from which weights and batches come; torch's global generator is not used.
         members: number of networks; their disagreement shows what more data would improve.
         every: number of new exemplars between two refreshes.
-        rate: steps of the optimiser for each new exemplar; .3 steps take a fifth of the time of a movement of the
-            fishing rod, 2 steps as long as a movement.
-        noise_heads: true for a predicted noise that depends on the movement, false for one noise for all movements.
-        accelerator: name of the device for training, as in Lightning: cpu, the fastest for these sizes, auto or cuda.
+        rate: number of steps of the optimiser for each new exemplar; .3 steps take a fifth of the time of a movement of
+            the fishing rod, 2 steps take as long as such a movement.
+        noise_heads: true: the predicted noise depends on the movement; false: it is the same for all movements.
+        accelerator: Lightning's name of the device for training: cpu (the fastest for these sizes), auto or cuda.
         trust: relative error above which the forward model is not used.
 
     Attributes:
@@ -90,9 +90,9 @@ class ForwardModel(Ensemble):
     input_scale: torch.Tensor
     outcome_mean: torch.Tensor  # (outcome_dim,)
     outcome_scale: torch.Tensor
-    n_seen: torch.Tensor  # exemplars trained on
-    n_scaled: torch.Tensor  # exemplars that the scales were taken from
-    missed: torch.Tensor  # ``relative_error``
+    n_seen: torch.Tensor  # number of exemplars that were learnt from
+    n_scaled: torch.Tensor  # number of exemplars from which the scales were computed
+    missed: torch.Tensor  # value of ``relative_error``
 
     def __init__(
         self,
@@ -133,9 +133,9 @@ class ForwardModel(Ensemble):
 
     @property
     def relative_error(self) -> float:
-        """Error of predictions for the held-out exemplars, divided by the error of always predicting their mean. 0 is
-        perfect, 1 no better than the mean; it is infinite before the first refresh. It is too low for a learner that
-        repeats few movements with small variations, as the held-out exemplars then have near copies in training."""
+        """Error of predictions for the held-out exemplars, divided by the error of always predicting their mean. With 0
+        the model is perfect, with 1 no better than the mean; before the first refresh it is infinite. If a learner
+        repeats few movements with small variations, it is too low, as held-out exemplars have copies in training."""
         return float(self.missed) if self.trained else math.inf
 
     @property
@@ -147,7 +147,7 @@ class ForwardModel(Ensemble):
         """Mean and noise variance of outcomes by each member, ``(members, ..., outcome_dim)`` each; differentiable.
 
         Args:
-            context: ``(..., context_dim)``, or one for all thetas.
+            context: ``(..., context_dim)``, or one context for all thetas.
             theta: ``(..., theta_dim)``.
         """
         inputs = torch.cat([context.expand(*theta.shape[:-1], context.shape[-1]), theta], dim=-1)
@@ -160,7 +160,7 @@ class ForwardModel(Ensemble):
         """Prediction of the outcomes of movements.
 
         Args:
-            contexts: ``(..., context_dim)``, or one for all thetas.
+            contexts: ``(..., context_dim)``, or one context for all thetas.
             thetas: ``(..., theta_dim)``.
 
         Raises:
@@ -177,12 +177,12 @@ class ForwardModel(Ensemble):
         return Prediction(means.mean(axis=0), means.std(axis=0), np.sqrt(variances.mean(axis=0)))
 
     def refresh(self, memory: Memory) -> Refresh | None:
-        """Learn from new and old exemplars in ``memory``; None if fewer than ``every`` are new, or all outcomes are
-        equal.
+        """Learn from new and old exemplars in ``memory``; None if fewer than ``every`` exemplars are new, or all
+        outcomes are equal.
 
-        It ends early when predictions for the held-out exemplars (one in ten, never trained on) do not improve. The
-        earlier weights are restored if the loss is not finite, if the error is twice that of predicting the mean, or if
-        training is interrupted.
+        Training ends early when predictions for the held-out exemplars (one in ten, never trained on) do not improve.
+        The earlier weights are restored if the loss is not finite, if the error is twice that of predicting the mean,
+        or if training is interrupted.
 
         Args:
             memory: memory of the learner; it is only read.
@@ -224,7 +224,7 @@ class ForwardModel(Ensemble):
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write a safetensors file, whole or not at all; its header has the sizes of the model.
 
-        The moments of the optimiser are not saved: a loaded model predicts the same, and trains with new moments.
+        The moments of the optimiser are not saved: a loaded model predicts as before, and trains with new moments.
 
         Raises:
             OSError: ``path`` is a directory, or cannot be written.

@@ -2,8 +2,8 @@
 
 Our addition, not in the paper. Before the model learns from new movements, model and process predict their outcomes,
 each from all earlier movements (prequential analysis: Dawid, J. R. Stat. Soc. A 147, 1984). The two are compared on the
-movements that the process was surest of, as answers are like them. So neither tests its own answers, and the test needs
-no movements.
+movements of which the process was surest, as answers are like these. So neither of the two tests its own answers, and
+the test needs no movements.
     inverse = ProvedModel(problem); inverse.trusted
 """
 
@@ -23,12 +23,12 @@ from sgimd_torch.parts import Inverse, Problem
 from sgimd_torch.spaces import Array, Estimate
 
 _FEWEST: Final = 200  # least number of recent movements for a test
-_SUREST: Final = 10  # one in ten recent movements is compared, those that the process was surest of
-# With noise, a model that predicts a tenth worse answers as well, because lucky outcomes mislead the process. Without
+_SUREST: Final = 10  # one in ten recent movements is compared: those of which the process was surest
+# With noise, a model with errors a tenth larger answers as well, because lucky outcomes mislead the process. Without
 # noise the model has to predict a tenth better. Measured on five tasks.
 _NEARLY: Final = 1.1
 _TINY: Final = np.finfo(float).tiny
-_MOST: Final = 10.0  # error ratios are clipped to [1/10, 10]
+_MOST: Final = 10.0  # largest ratio of errors; ratios are clipped to [1/10, 10]
 
 
 class ProvedModel(ThroughModel):
@@ -76,7 +76,7 @@ class ProvedModel(ThroughModel):
         return self.through_model if self.trusted else self.process
 
     def _test(self, memory: Memory, learnt: int) -> None:
-        """Test both on the movements that are new to the model; they predict from the ``learnt`` ones before."""
+        """Test model and process on the movements that are new to the model; both predict from the first ``learnt``."""
         for row in range(len(self._told), learnt):
             self._told.add(memory.contexts[row], memory.thetas[row], memory.outcomes[row])
         process, through_model = self._rivals
@@ -91,7 +91,7 @@ class ProvedModel(ThroughModel):
         self._proved = self._is_nearly_as_good(len(memory))
 
     def _is_nearly_as_good(self, n: int) -> bool:
-        """Whether the model predicted as well, on the newer movements that the process was surest of."""
+        """Whether the model predicted as well as the process, on newer movements of which the process was surest."""
         recent = np.array([test for row, *test in self._tests if row >= n / 2])
         if len(recent) < _FEWEST:
             return False

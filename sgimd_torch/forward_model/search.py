@@ -19,9 +19,9 @@ from sgimd_torch.parts import Problem, Search
 from sgimd_torch.searches.simplex import NelderMead
 from sgimd_torch.spaces import Array, Estimate
 
-_CANDIDATES: Final = 5  # remembered movements to start from
-_STEPS, _STEP = 5, 0.03  # number and size of the steps of a descent, in sides of Pi
-_RADIUS: Final = 0.15  # first radius of the trust region, in sides of Pi, root mean square over the parameters
+_CANDIDATES: Final = 5  # number of remembered movements to start from
+_STEPS, _STEP = 5, 0.03  # number of steps of a descent, and their size relative to the sides of Pi
+_RADIUS: Final = 0.15  # first radius of the trust region, relative to the sides of Pi (root mean square)
 _RADII: Final = (0.02, 0.3)  # bounds of the radius: less is below the noise, more leaves the neighbourhood
 
 
@@ -29,9 +29,9 @@ class GradientSearch(Search):
     """Gradient of a forward model; until the model is trusted, the simplex (extra forward).
 
     A descent from theta_g and from the movements that landed nearest plans every movement; the search never ends.
-    Anchors of the predictions are the exemplars of the estimate and each new outcome, so the model's errors here
-    correct the next prediction. A plan stays in a trust region, which grows when the outcome changes as predicted, and
-    shrinks when it does not.
+    The anchors of predictions are the exemplars of the estimate and each new outcome. So the model's errors near the
+    goal correct the next prediction. A plan stays in a trust region, which grows when the outcome changes as predicted,
+    and shrinks when it does not.
 
     Args:
         problem: problem to learn.
@@ -59,7 +59,7 @@ class GradientSearch(Search):
         while True:
             nearest = np.linalg.norm(outcomes - goal, axis=1).argsort(kind="stable")[:_CANDIDATES]
             contexts = np.broadcast_to(start.context, (1, len(thetas), len(start.context)))
-            # All candidates share these anchors; they count as executed in this context.
+            # All candidates share these anchors, which count as executed in this context.
             anchored = Anchored(self.model, policies, start.context, contexts, thetas[None], outcomes[None])
             theta = _best(anchored, np.vstack([first, thetas[nearest]]), goal, radius)
             theta = policies.clip(self.rng.normal(theta, self.noise * policies.sides) if self.noise else theta)

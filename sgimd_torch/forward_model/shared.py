@@ -28,7 +28,7 @@ class SharedModel(Trained):
         self.model = ForwardModel(*problem.dims, seed=problem.seed, **options)
 
     def refresh(self, memory: Memory, goal: Array | None = None) -> Refresh | None:
-        """`ForwardModel.refresh`, whatever the ``goal``."""
+        """Result of `ForwardModel.refresh`; the ``goal`` does not matter."""
         return self.model.refresh(memory)
 
     def listener(self, life: Any) -> ModelListener:
@@ -45,7 +45,7 @@ def model_of(problem: Problem, **options: Any) -> ForwardModel:
 
 
 class ThroughModel(Inverse):
-    """Inverse model that uses the forward model of its problem when it can be trusted.
+    """Inverse model that uses the forward model of its problem when this model can be trusted.
 
     Attributes:
         model: forward model.
@@ -63,5 +63,5 @@ class ThroughModel(Inverse):
 
 
 def is_asked(inverse: Inverse, model: ForwardModel) -> bool:
-    """Whether a learner with this ``inverse`` uses the ``model`` now; an inverse model through the model decides."""
+    """Whether a learner with this ``inverse`` uses the ``model`` now; an inverse that is a `ThroughModel` decides."""
     return inverse.trusted if isinstance(inverse, ThroughModel) else model.trusted

@@ -1,6 +1,6 @@
 """Online training: repeated fits of an ensemble to a growing set of exemplars; a fit that diverges is undone.
 
-By Lightning Fabric, with one optimiser for all fits, so that Adam's moments last from one fit to the next.
+It uses Lightning Fabric, with one optimiser for all fits, so that Adam's moments last from one fit to the next.
     trainer.prepare(); fit = trainer.fit(x, y, scale, steps=15, give_up=2.0)
 """
 
@@ -16,10 +16,10 @@ from lightning import Fabric
 from sgimd_torch.forward_model.ensemble import Ensemble, nll
 
 _RECENT: Final = 0.25  # share of every batch that is drawn from the newest exemplars
-_BATCH: Final = 128  # exemplars per step, for each member
+_BATCH: Final = 128  # number of exemplars in a step, for each member
 _HELD_OUT_EVERY: Final = 10  # every tenth exemplar is held out, that is, never trained on
 _STEPS_PER_LOOK: Final = 20  # steps of the optimiser between two looks at the held-out exemplars
-_PATIENCE: Final = 5  # looks without improvement that end a fit
+_PATIENCE: Final = 5  # number of looks without improvement after which a fit ends
 
 
 class Fit(NamedTuple):
@@ -103,8 +103,7 @@ class OnlineTrainer:
 
     def judge(self, x: torch.Tensor, y: torch.Tensor, scale: torch.Tensor) -> tuple[float, float]:
         """Negative log likelihood without ``beta``, mean over the members; and the error of their mean prediction,
-        divided
-        by the error of always predicting the mean of ``y``."""
+        divided by the error of always predicting the mean of ``y``."""
         with torch.no_grad():
             mean, log_variance = self.ensemble(x)
             length = scale * torch.stack([mean.mean(dim=0) - y, y.mean(dim=0) - y])
@@ -116,7 +115,7 @@ class OnlineTrainer:
         return {**self.__dict__, "fabric": None, "optimizer": None}
 
     def _draw(self, rows: torch.Tensor) -> torch.Tensor:
-        """Random rows ``(members, batch)``; the first of each batch are among the newest."""
+        """Random rows ``(members, batch)``; the first rows of each batch are among the newest."""
         members, recent, n_recent = self.ensemble.members, rows[-self.newest :], round(_RECENT * _BATCH)
         picked = rows[torch.randint(len(rows), (members, _BATCH), generator=self.generator)]
         picked[:, :n_recent] = recent[torch.randint(len(recent), (members, n_recent), generator=self.generator)]

@@ -33,7 +33,7 @@ def check_attempt(problem: Problem, context: ArrayLike, goal: ArrayLike, compete
     """
     point = check_in(problem.contexts, "context", context)
     goal = check_in(problem.outcomes, "goal", goal, "is it a demonstrated outcome? Check it by outcomes.contains first")
-    if not -1 <= competence <= 0:  # NaN too
+    if not -1 <= competence <= 0:  # NaN is refused, too
         raise ValueError(f"competence must lie in [-1, 0], got {competence}; was a distance passed instead?")
     if not -1 <= gain <= 1:
         raise ValueError(f"gain must lie in [-1, 1], got {gain}; it is a difference of two competences")

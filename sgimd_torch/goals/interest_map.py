@@ -29,16 +29,16 @@ class InterestMap(Goals):
 
     Args:
         problem: problem to learn.
-        g_max: largest number of goals in a region; one more cuts the region in two.
+        g_max: largest number of goals in a region; one more goal cuts the region in two.
         window: number of recent competences in eq. (3), the paper's zeta; even, at least 4, at most ``g_max``.
         cuts: number of candidate cuts of a region in each dimension.
-        near: largest distance of goals near a region's worst goal, as a fraction of the region's sides.
-        max_aspect: ratio of two sides of a region, relative to those of C x T, beyond which the shorter one is not cut.
+        near: largest distance between a region's worst goal and goals drawn near it, relative to the region's sides.
+        max_aspect: ratio of two sides of a region, relative to C x T, beyond which the shorter side is not cut.
             Deviation: the paper has no such rule (inf). Its regions become slivers when goals crowd in a small part of
             a large space.
         progress: measure of progress: `gained_progress`; `absolute_progress`, which is eq. (3); `paired_progress`; or a
             function of your own.
-        contrast: function of a region and of the goals below a cut: difference between the two sides.
+        contrast: function (region, mask of the goals below a cut) -> difference between the two sides of the cut.
 
     Raises:
         ValueError: a number is out of its range.
@@ -66,7 +66,7 @@ class InterestMap(Goals):
 
     @property
     def regions(self) -> list[Region]:
-        """The leaves, which tile C x T, in the order of the tree: the halves of a region take its place."""
+        """The leaves, which tile C x T, in the order of the tree: the halves of a cut region stand in its place."""
         return list(self._tiling.regions)
 
     @property
@@ -75,8 +75,8 @@ class InterestMap(Goals):
         return self._tiling.box.sides
 
     def regions_at(self, point: Array) -> list[Region]:
-        """Regions that contain a context ``(context_dim,)``, all without contexts; or the region of a point of C x
-        T."""
+        """Regions that contain a context ``(context_dim,)`` (all regions if there are no contexts), or the region that
+        contains a point of C x T."""
         return [self._tiling.regions[index] for index in np.flatnonzero(self._tiling.containing(point))]
 
     def sample(self, context: ArrayLike) -> Array:
@@ -90,7 +90,7 @@ class InterestMap(Goals):
     def add(
         self, context: ArrayLike, goal: ArrayLike, competence: float, strategy: str = "autonomous", gain: float = 0.0
     ) -> None:
-        """Goal interest mapping, section 3.2.1: learn the competence at a goal, attempted or emulated.
+        """Goal interest mapping, section 3.2.1: learn the competence at a goal that was attempted or emulated.
 
         Raises:
             ValueError: see `Goals.add`.

@@ -1,7 +1,7 @@
 """A fixed grid with the interest and the choice of goals of the interest map, to measure the value of splitting.
 
-It differs from section 3.2.1 of Nguyen & Oudeyer (2014) only in that cells never split. A grid may be as good in few
-dimensions, when all of the task space can be reached.
+It differs from section 3.2.1 of Nguyen & Oudeyer (2014) only in that cells never split. A grid may be as good if there
+are few dimensions and all of the task space can be reached.
     goals = ProgressGrid(problem)
 """
 
@@ -19,7 +19,7 @@ from sgimd_torch.parts import Goals, Problem
 from sgimd_torch.spaces import Array
 
 _DEFAULT_CELLS = 100  # a cell needs four goals before its progress is known, and a run has about 500 goals
-_MAX_CELLS = 100_000  # more than any run has goals
+_MAX_CELLS = 100_000  # number above the number of goals of any run
 
 
 class ProgressGrid(Goals):
@@ -27,9 +27,9 @@ class ProgressGrid(Goals):
 
     Args:
         problem: problem to learn.
-        cells: number of cells in each dimension of C x T; None for about 100 in all, but at least 2 in each dimension.
+        cells: number of cells in each dimension of C x T; None: about 100 in all, but at least 2 in each dimension.
         window: number of recent goals that a cell remembers; even, at least 4.
-        near: largest distance of goals near a cell's worst goal, as a fraction of the cell's sides.
+        near: largest distance between a cell's worst goal and goals drawn near it, relative to the cell's sides.
         progress: measure of progress, as in `InterestMap`.
 
     Raises:

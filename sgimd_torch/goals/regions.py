@@ -17,7 +17,7 @@ from sgimd_torch.spaces import Array
 
 Progress = Callable[[Array, Array, Array], float]
 """Function (points, competences, gains) of a window of n >= 4 goals, oldest first -> progress. Points ``(n, dim)`` lie
-in C x T. Competences ``(n,)`` were measured there when the attempts ended. Gains ``(n,)`` are those of `Goals.add`."""
+in C x T. Competences ``(n,)`` were measured there when attempts ended. Gains ``(n,)`` are those of `Goals.add`."""
 
 
 def gained_progress(points: Array, competences: Array, gains: Array) -> float:
@@ -32,7 +32,7 @@ def gained_progress(points: Array, competences: Array, gains: Array) -> float:
 def absolute_progress(points: Array, competences: Array, gains: Array) -> float:
     """Difference between the newer and the older half of the competences, the paper's eq. (3).
 
-    |sum of newer - sum of older| over the number of values; of an odd number, the oldest value is left out."""
+    |sum of newer - sum of older| over the number of values. If this number is odd, the oldest value is left out."""
     # Deviation: the paper's two sums share their middle term; these halves are disjoint and of equal length.
     half = len(competences) // 2
     newer, older = competences[-half:], competences[-2 * half : -half]
@@ -40,7 +40,7 @@ def absolute_progress(points: Array, competences: Array, gains: Array) -> float:
 
 
 def paired_progress(points: Array, competences: Array, gains: Array) -> float:
-    """Mean difference between the competence at a goal and at the nearest earlier goal.
+    """Mean difference between the competence at a goal and the competence at the nearest earlier goal.
 
     Forestier et al. (2017) and Portelas et al. (2019) measure progress in this way. It separates change in time from
     differences between places, but does not average out the noise of single goals. Of equally near goals the latest
@@ -72,10 +72,10 @@ def between_interests(region: Region, below: NDArray[np.bool_]) -> float:
 class Region:
     """R_i, a leaf of the tree. It never changes: a later goal makes a new Region.
 
-    ``path`` leads from the root: "R", then "R0" below and "R1" above its cut, "R01" ... Paths keep their meaning.
-    ``low`` and ``high`` are the corners in C x T. In order of time: ``points`` ``(n, context_dim + outcome_dim)``,
-    ``competences`` and ``gains`` ``(n,)``, ``strategies`` ``(n,)`` names. ``attempts`` counts all goals in the region,
-    also forgotten ones, but not those that a parent had forgotten before it was cut. Arrays are read-only.
+    ``path`` leads from the root "R" to "R0", its half below the cut, or "R1", its half above; "R01" is the upper half
+    of "R0". A path never changes its meaning. ``low`` and ``high`` are the corners in C x T. Arrays in order of time:
+    ``points`` ``(n, context_dim + outcome_dim)``, ``competences``, ``gains`` and names of ``strategies`` ``(n,)``.
+    ``attempts`` also counts goals that the region forgot, but not goals that its parent forgot. Arrays are read-only.
     """
 
     path: str
@@ -106,7 +106,7 @@ class Region:
         return self.points[:, self.context_dim :]
 
     def interest(self, strategy: str | None = None) -> float:
-        """Local competence progress, eq. (3); with a ``strategy``, over its goals alone."""
+        """Local competence progress, eq. (3); with a ``strategy``, over the goals of this strategy alone."""
         return self._interest if strategy is None else self.interest_among(self.strategies == strategy)
 
     def interest_among(self, rows: NDArray[np.bool_] | slice) -> float:

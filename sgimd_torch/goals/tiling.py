@@ -1,4 +1,4 @@
-"""Regions that tile C x T, and the choice of a goal from them; the interest map and the progress grid use it.
+"""Regions that tile C x T, and the choice of a goal from them; the interest map and the progress grid use both.
 
 Section 3.2.2 and eq. (4) of Nguyen & Oudeyer (2014). A map cuts C x T into regions and gives them to a `Tiling`.
     tiling.plant(regions); goal = tiling.sample(context); index = tiling.add(context, goal, competence, strategy, gain)
@@ -16,16 +16,16 @@ from sgimd_torch.goals.regions import Progress, Region
 from sgimd_torch.parts import Problem
 from sgimd_torch.spaces import Array, Box
 
-_MODES: Final = (0.7, 0.2, 0.1)  # probabilities of a goal where interest is high, anywhere, near a region's worst goal
+_MODES: Final = (0.7, 0.2, 0.1)  # modes: probability of a goal where interest is high, anywhere, near a worst goal
 
 
 class Tiling:
-    """Regions that tile C x T; at first, one region is all of it.
+    """Regions that tile C x T; at first, one region covers C x T.
 
     Args:
         problem: problem to learn.
-        progress: function for the interest of a region, from points, competences and gains.
-        near: largest distance from the worst goal in mode 3, as a fraction of the region's sides.
+        progress: function (points, competences, gains) -> interest of a region.
+        near: largest distance from the worst goal in mode 3 (near a worst goal), relative to the region's sides.
 
     Raises:
         ValueError: a number is out of its range.
@@ -49,7 +49,7 @@ class Tiling:
         self.regions = regions
         self._lows = np.stack([region.low for region in regions])
         self._highs = np.stack([region.high for region in regions])
-        # Regions are half open, [low, high), but closed at the border of C x T: each point is in exactly one.
+        # Regions are half open, [low, high), but closed at the border of C x T: each point is in exactly one region.
         self._ends = np.where(self._highs == self.box.high, np.inf, self._highs)
 
     def add(self, context: ArrayLike, goal: ArrayLike, competence: float, strategy: str, gain: float) -> int:
@@ -60,7 +60,7 @@ class Tiling:
         return index
 
     def sample(self, context: ArrayLike) -> Array:
-        """Decide a goal, section 3.2.2: a mode, a region that contains the context, a goal in it."""
+        """Decide a goal, section 3.2.2: choose a mode, a region that contains the context, and a goal in it."""
         context = check_in(self.problem.contexts, "context", context)
         mode = 1 + self._rng.choice(3, p=_MODES)
         if mode == 2:
@@ -83,7 +83,7 @@ class Tiling:
         return contain
 
     def _choose(self, context: Array) -> Region:
-        """A region with the probability of eq. (4), among those that contain the context."""
+        """A region that contains the context, drawn with the probabilities of eq. (4)."""
         here = np.flatnonzero(self.containing(context))
         interests = np.array([self.regions[index].interest() for index in here])
         weights = interests - interests.min()  # eq. (4)

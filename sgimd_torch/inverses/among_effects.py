@@ -1,7 +1,8 @@
 """Local process fitted to effective movements alone, for robots most of whose movements have no effect.
 
-Our addition, not in the paper. If a movement touches an object, the outcome changes smoothly with the movement; if not,
-it stays the same. One process for both kinds would predict both badly, and most exemplars would carry no information.
+Our addition, not in the paper. If a movement touches an object, the outcome changes smoothly with the movement;
+otherwise the outcome stays the same. One process for both kinds would predict both badly, and most exemplars would
+carry no information.
     inverse = AmongEffects(problem); estimate = inverse(context, goal)
 """
 
@@ -15,9 +16,9 @@ from sgimd_torch.spaces import Array, Estimate
 
 
 class AmongEffects(Inverse):
-    """Local Gaussian process; where most movements have no effect, fitted to effective ones alone.
+    """Local Gaussian process; if most movements have no effect, it is fitted to effective movements alone.
 
-    It is `LocalProcess` while every movement has an effect, or none has had one yet.
+    It equals `LocalProcess` while every movement has an effect, or while no movement has had an effect yet.
 
     Args:
         problem: problem to learn.

@@ -23,7 +23,7 @@ from sgimd_torch.spaces import Array
 
 _BLAS: Final = ThreadpoolController()
 _ROOT5: Final = np.sqrt(5)
-_LEAST: Final = 1e-6  # least noise variance, relative to the kernel's; less makes the matrix singular
+_LEAST: Final = 1e-6  # least noise variance, relative to the kernel's; with less noise the matrix would be singular
 _TINY: Final = 1e-300
 _NOISES: Final = (_LEAST, 1e-4, 1e-3, 1e-2, 0.03, 0.1, 0.3, 1.0, 3.0)
 _SCALES: Final = (0.5, 1.0, 2.0)
@@ -44,8 +44,7 @@ def one_thread(function: Callable[Inputs, Output]) -> Callable[Inputs, Output]:
 
 class Kernel(NamedTuple):
     """Kernel of variance 1. ``scale`` multiplies all inputs. The rough part has the ``share`` of the variance, and a
-    length
-    scale that is ``finer`` times shorter. ``noise`` is a variance, relative to the kernel's."""
+    length scale that is ``finer`` times shorter. ``noise`` is a variance, relative to the kernel's."""
 
     scale: float
     finer: float
@@ -70,7 +69,7 @@ class Process:
     Args:
         inputs: ``(n, dim)``, theta and context in lengths.
         outcomes: ``(n, outcome_dim)``.
-        kernel: kernel; the process multiplies it by the most likely variance.
+        kernel: kernel of variance 1; the process multiplies it by the most likely variance.
     """
 
     def __init__(self, inputs: Array, outcomes: Array, kernel: Kernel) -> None:
@@ -79,10 +78,10 @@ class Process:
         n, dim = outcomes.shape
         try:
             lower = self._factor(inputs, origin=np.zeros(inputs.shape[1]))
-        except np.linalg.LinAlgError:  # far from 0, rounding of squares hides small differences
+        except np.linalg.LinAlgError:  # inputs far from 0, where rounding of squares hides small differences
             lower = self._factor(inputs, origin=inputs.mean(axis=0))
         root = solve_triangular(lower, np.eye(n), lower=True)
-        self._root = root.T  # times its transpose it is the inverse of the covariance
+        self._root = root.T  # root of the inverse covariance: root times transpose is the inverse
         self._weights = self._root @ (root @ (outcomes - self.mean))  # (n, outcome_dim)
         self._precisions = (root * root).sum(axis=0)
         self.variance = max(float(((outcomes - self.mean) * self._weights).sum()) / (n * dim), _TINY)
@@ -100,8 +99,7 @@ class Process:
 
     def predict(self, inputs: Array) -> tuple[Array, Array]:
         """Expected outcomes ``(m, outcome_dim)`` of new inputs ``(m, dim)``, and the variance ``(m,)`` of each
-        dimension,
-        without noise."""
+        dimension, without noise."""
         across = self._covariances(inputs)
         known = across @ self._root
         return across @ self._weights + self.mean, self.variance * np.maximum(1 - (known * known).sum(axis=1), 0)
@@ -112,14 +110,14 @@ class Process:
         return expected
 
     def without_noise(self, rows: Rows) -> tuple[Array, Array]:
-        """Expected outcomes of the movements in ``rows`` without their noise, and variances, as in `predict`."""
+        """Expected outcomes of the movements in ``rows`` without their noise, and their variances, as in `predict`."""
         noise = self.kernel.noise
         variances = self.variance * noise * np.maximum(1 - noise * self._precisions[rows], 0)
         return self.outcomes[rows] - noise * self._weights[rows], variances
 
     def surprise(self, rows: Rows) -> float:
-        """Mean squared error of predicting each of ``rows`` from all others, relative to the expected one; 1 if the
-        variances of the process are right."""
+        """Mean squared error of predicting each of ``rows`` from all other rows, divided by the expected squared error;
+        1 if the variances of the process are right."""
         squared = (self._weights[rows] ** 2).mean(axis=1)
         return float((squared / self._precisions[rows]).mean()) / self.variance
 
@@ -132,7 +130,7 @@ class Process:
 
 
 def fit_lengths(inputs: Array, outcomes: Array) -> Array:
-    """Most likely length scale ``(dim,)`` of each input, in its standard deviations.
+    """Most likely length scale ``(dim,)`` of each input, relative to its standard deviation.
 
     Type II maximum likelihood by L-BFGS, with a weak prior. A length is at most twice the first guess, because few
     movements cannot show that an input has no effect.
@@ -173,9 +171,9 @@ def choose_kernel(groups: Sequence[tuple[Array, Array]], noise: float) -> Kernel
     """The most likely kernel of a grid, over all groups of neighbours together.
 
     Args:
-        groups: inputs ``(n, dim)`` in lengths, and outcomes ``(n, outcome_dim)``, not all the same.
+        groups: pairs of inputs ``(n, dim)``, in lengths, and outcomes ``(n, outcome_dim)``, not all the same.
         noise: standard deviation of each outcome dimension, as the environment states it. Near some movements it may be
-            twice or half as large, so other values are only less likely. But 0 means no noise.
+            twice or half as large, so other values are less likely, but possible. With 0 there is no noise.
     """
     noises = np.array(_NOISES if noise > 0 else [_LEAST])
     scores: dict[tuple[float, float, float], Array] = {}

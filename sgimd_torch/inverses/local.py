@@ -22,11 +22,11 @@ class LocalInverse(Inverse):
         problem: problem to learn.
         h_max: number of nearest outcomes that are compared, eq. (8).
         k_max: largest number of exemplars in a neighbourhood.
-        dist_n: radius of a neighbourhood in Pi, the paper's distN; None for 0.6 in 25 dimensions, and proportional to
-            the square root of their number in others.
+        dist_n: radius of a neighbourhood in Pi, the paper's distN; None: 0.6 for 25 dimensions of Pi; otherwise it
+            is proportional to the square root of the number of dimensions.
         alpha: weight of the spread of a neighbourhood's outcomes, against their distance from the goal.
         width: width of the Gaussian of eq. (9), relative to the mean distance of the neighbourhood's outcomes from the
-            goal. A wide one averages the neighbourhood; a narrow one follows the exemplar nearest to the goal.
+            goal. A wide Gaussian averages the neighbourhood; a narrow one follows the exemplar nearest to the goal.
 
     Raises:
         ValueError: ``width`` is not positive.
@@ -43,7 +43,7 @@ class LocalInverse(Inverse):
         width: float = 0.25,
     ) -> None:
         if not width > 0:
-            raise ValueError(f"width must be positive, got {width}; it is in mean distances to the goal")
+            raise ValueError(f"width must be positive, got {width}; it is relative to the mean distance to the goal")
         super().__init__(problem)
         self.memory = problem.memory
         self.h_max, self.k_max, self.alpha, self.width = h_max, k_max, alpha, width
@@ -76,16 +76,16 @@ def gaussian_weights(goal: Array, outcomes: Array, width: float) -> Array:
     """
     distances = distances_to(outcomes, goal)
     scaled = distances / max(np.finfo(float).tiny, width * distances.mean())
-    weights = np.exp(0.5 * (scaled.min() ** 2 - scaled**2))  # the nearest has 1, so the sum cannot be 0
+    weights = np.exp(0.5 * (scaled.min() ** 2 - scaled**2))  # weight 1 for the nearest outcome, so the sum cannot be 0
     return weights / weights.sum()
 
 
 def _spreads(outcomes: Array, neighbourhoods: list[Rows]) -> Array:
     """Standard deviations ``(h,)`` of the outcomes within each neighbourhood.
 
-    Deviation: the paper takes the variance, which is no distance, and too small to matter beside one. A movement
-    without neighbours has no deviation and gets the median of the others. If none has neighbours, all get 0, and the
-    movement nearest to the goal is chosen.
+    Deviation: the paper takes the variance, which is no distance, and too small to matter beside a distance. A
+    movement without neighbours has no deviation and gets the median of the other deviations. If no movement has
+    neighbours, all deviations are 0, and the movement nearest to the goal is chosen.
     """
     spreads = np.array([_standard_deviation(outcomes[rows]) for rows in neighbourhoods])
     known = ~np.isnan(spreads)
@@ -97,4 +97,4 @@ def _standard_deviation(outcomes: Array) -> float:
     if n < 2:
         return np.nan
     deviations = outcomes - outcomes.sum(axis=0) / n
-    return float(np.sqrt((deviations * deviations).sum() / (n - 1)))  # n would favour small neighbourhoods
+    return float(np.sqrt((deviations * deviations).sum() / (n - 1)))  # division by n would favour small neighbourhoods

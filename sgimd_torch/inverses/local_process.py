@@ -1,9 +1,9 @@
 """Local Gaussian process as inverse model; the answer is the nearest exemplar, unless the process is clearly better.
 
-Our addition, not in the paper. The process is fitted to the movements near the goal and to similar ones. Candidates are
-the ends of Gauss-Newton steps from the nearest exemplars, and the answer of `LocallyLinear`. Each has an expected
-squared error, variance included. Where the process predicted exemplars near the goal badly, its variance is inflated.
-If no candidate is clearly better, the answer is the nearest exemplar.
+Our addition, not in the paper. The process is fitted to movements near the goal and to movements like them. Candidates
+are the ends of Gauss-Newton steps from the nearest exemplars, and the answer of `LocallyLinear`. Each candidate has an
+expected squared error, variance included. Where the process predicted exemplars near the goal badly, its variance is
+inflated. If no candidate is clearly better, the answer is the nearest exemplar.
     inverse = LocalProcess(problem); estimate = inverse(context, goal)
 """
 
@@ -20,23 +20,23 @@ from sgimd_torch.memory.neighbours import PolicyNeighbours, Rows, Table
 from sgimd_torch.parts import Inverse, Problem
 from sgimd_torch.spaces import Array, Estimate, stream
 
-_FIRST, _GROWTH = 16, 1.5  # exemplars at the first fit, and the growth factor from fit to fit
-_FITTED: Final = 300  # exemplars, drawn from all, that lengths are fitted to
-_GROUPS, _GROUP = 8, 60  # groups of neighbours that determine the kernel, and exemplars in each
-_NEAR: Final = 20  # outcomes near the goal: the process is fitted to them, and its surprise is measured on them
-_LEARNT: Final = 100  # exemplars that the process is fitted to
-_STARTS, _STEPS = 3, 4  # exemplars where steps begin, and steps from each
+_FIRST, _GROWTH = 16, 1.5  # number of exemplars at the first fit, and its growth factor from fit to fit
+_FITTED: Final = 300  # number of exemplars, drawn from all, to which lengths are fitted
+_GROUPS, _GROUP = 8, 60  # number of groups of neighbours that determine the kernel, and of exemplars in each
+_NEAR: Final = 20  # number of outcomes near the goal, to which the process is fitted, and which give its surprise
+_LEARNT: Final = 100  # number of exemplars to which the process is fitted
+_STARTS, _STEPS = 3, 4  # number of exemplars where steps begin, and of steps from each
 _DAMPINGS: Final = np.array([1e-3, 0.1, 1.0, 10.0])
-_FAR: Final = 1e3  # spreads from 0; rounding of squares hides differences of inputs farther out
-_CLEARLY: Final = 0.8  # error below which a candidate is clearly better, relative to the nearest exemplar's
+_FAR: Final = 1e3  # distance from 0 in spreads; farther out, rounding of squares hides differences of inputs
+_CLEARLY: Final = 0.8  # error, relative to that of the nearest exemplar, below which a candidate is clearly better
 
 
 class LocalProcess(Inverse):
     """Local Gaussian process; the nearest exemplar, unless the process is clearly better.
 
-    It depends on the memory alone. Lengths and kernel are refitted when the memory has 1.5 times its size at the last
-    fit; other calls use neighbours only. Units do not matter. The answer is clipped to the box around all executed
-    thetas.
+    The answer depends on the memory alone. Lengths and kernel are refitted when the memory has 1.5 times its size at
+    the last fit; other calls use neighbours only. Units do not matter. The answer is clipped to the box around all
+    executed thetas.
 
     Args:
         problem: problem to learn.
@@ -72,8 +72,8 @@ class LocalProcess(Inverse):
         return estimate._replace(theta=candidates[chosen_one]) if clearly else estimate
 
     def predict(self, context: Array, theta: Array) -> Array | None:
-        """Expected outcome ``(outcome_dim,)`` of ``theta``, from similar movements. While all outcomes are equal: that
-        outcome. None while there are too few exemplars."""
+        """Expected outcome ``(outcome_dim,)`` of ``theta``, from similar movements. While all outcomes are equal, the
+        prediction is that outcome. While there are too few exemplars, it is None."""
         found = self.predict_variance(context, theta)
         return None if found is None else found[0]
 
@@ -90,9 +90,8 @@ class LocalProcess(Inverse):
         return expected, float(variance)
 
     def _learn_near(self, context: Array, goal: Array) -> tuple[Process, Rows, float] | None:
-        """The process of the movements near the goal, the rows of the nearest outcomes (its first ones), and the
-        variance
-        inflation factor; None before the first fit."""
+        """The process of the movements near the goal, the rows of the nearest outcomes (its first rows), and the
+        factor that inflates the variance; None before the first fit."""
         self._catch_up()
         if self._kernel is None:
             return None
@@ -108,9 +107,8 @@ class LocalProcess(Inverse):
         self, process: Process, context: Array, goal: Array, doubt: float, starts: Array
     ) -> tuple[Array, Array]:
         """Least expected squared errors ``(m,)``, and their thetas, after damped Gauss-Newton steps from each of
-        ``starts``
-        ``(m, theta_dim)``; steps end when they do not help. Each is as short as possible, so unimportant parameters
-        hardly change."""
+        ``starts`` ``(m, theta_dim)``; steps end when they do not help. Each step is as short as possible, so
+        unimportant parameters hardly change."""
         least, found = np.full(len(starts), np.inf), starts.copy()
         going = np.arange(len(starts))
         dim, spreads, lengths = starts.shape[1], self._spreads[: starts.shape[1]], self._lengths[: starts.shape[1]]
@@ -141,7 +139,7 @@ class LocalProcess(Inverse):
         return errors
 
     def _neighbours(self, near: Rows) -> Rows:
-        """Rows to fit the process to: first those ``near`` the goal, then those most similar to the first of these."""
+        """Rows to fit the process to: first the rows ``near`` the goal, then rows most similar to the first of them."""
         keys = self._inputs.keys.rows[near[:_STARTS]]
         alike = self._inputs.nearest(keys, min(_LEARNT, len(self.memory)))
         rows = np.concatenate((near, np.stack(alike, axis=1).ravel()))
@@ -161,10 +159,10 @@ class LocalProcess(Inverse):
             self._inputs.keys.append(self._scaled(len(self._inputs.keys)))
 
     def _fit(self, n: int) -> None:
-        """Fit lengths and kernel to the first ``n`` exemplars; later ones do not count."""
+        """Fit lengths and kernel to the first ``n`` exemplars; later exemplars do not count."""
         try:
             self._fit_to(n, _FAR)
-        except np.linalg.LinAlgError:  # inputs nearly coincide: measure them from one of them
+        except np.linalg.LinAlgError:  # inputs that nearly coincide are measured from one of them
             self._fit_to(n, 0.0)
 
     def _fit_to(self, n: int, far: float) -> None:
@@ -199,6 +197,6 @@ class LocalProcess(Inverse):
 
 
 def _spreads(inputs: Array) -> Array:
-    """Standard deviations ``(dim,)`` of ``inputs``; 1 for constant ones."""
+    """Standard deviations ``(dim,)`` of ``inputs``; 1 for constant inputs."""
     found = inputs.std(axis=0)
     return np.where(found > 0, found, 1.0)

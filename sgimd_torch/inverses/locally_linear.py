@@ -12,21 +12,21 @@ from sgimd_torch.inverses.local import LocalInverse, gaussian_weights
 from sgimd_torch.parts import Inverse, Problem
 from sgimd_torch.spaces import Array, Estimate
 
-# More exemplars in a neighbourhood, and a wider Gaussian, than `LocalInverse` averages: a slope needs them.
+# A slope needs more exemplars in a neighbourhood, and a wider Gaussian, than the mean of `LocalInverse`.
 _K_MAX, _WIDTH = 20, 1.0
-# Ridge, relative to the variance of the outcomes; the larger, the closer to `LocalInverse`. It also makes the
-# regression unique when outcomes lie on a line, or are fewer than the slopes.
+# Ridge, relative to the variance of the outcomes; with a larger ridge the answer is nearer to `LocalInverse`. The ridge
+# also makes the regression unique when outcomes lie on a line, or are fewer than the slopes.
 _RIDGE = 1e-3
-_COINCIDENT = 1e-12  # outcomes that spread less, relative to their size, count as one outcome, which has no slope
+_COINCIDENT = 1e-12  # least spread of outcomes relative to their size; below it, they count as one, without a slope
 
 
 class LocallyLinear(Inverse):
     """Mean of the most reliable neighbourhood, eq. (9), corrected to first order.
 
-    The mean theta should land on the weighted mean of the outcomes; a weighted ridge regression of theta on outcome
-    corrects it from there to the goal.
+    The mean theta is expected to land on the weighted mean of the outcomes; a weighted ridge regression of theta on
+    outcome corrects the theta from this mean to the goal.
 
-    The answer is clipped to the box around all executed thetas, because far goals extrapolate far.
+    The answer is clipped to the box around all executed thetas, because the regression extrapolates to far goals.
 
     Args:
         problem: problem to learn.

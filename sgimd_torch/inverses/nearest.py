@@ -20,7 +20,7 @@ class NearestNeighbour(Inverse):
         k: number of exemplars that the estimate hands to a search, at least 1.
 
     Raises:
-        ValueError: ``k`` is no such number.
+        ValueError: ``k`` is not a whole number, or below 1.
     """
 
     def __init__(self, problem: Problem, *, k: int = 10) -> None:

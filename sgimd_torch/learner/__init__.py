@@ -29,12 +29,12 @@ class Learner:
     Args:
         problem: problem to learn; its memory gets an exemplar for every outcome that is told.
         autonomous: autonomous strategy.
-        social: social strategy, which uses demonstrations; None for a learner that cannot be taught.
+        social: social strategy, which uses demonstrations; None: the learner cannot be taught.
         correspondence: function from times and trajectory to theta_d, eq. (6); needed with ``social``.
 
     Attributes:
         memory: exemplars, the memory of the problem.
-        inverse: inverse model; it may be replaced by another one of this problem.
+        inverse: inverse model; another inverse model of this problem may replace it.
         listeners: functions that are called with each `Event`, after it has happened.
         begun: number of exemplars at the start.
         movements: number of movements, rests and failed movements included.
@@ -58,10 +58,10 @@ class Learner:
         self.inverse: Inverse = problem.inverse
         self.listeners: list[Callable[[Event], object]] = []
         self.begun, self.movements = len(self.memory), 0
-        self._life: list[int | Event] = []  # of a movement, its row in memory
+        self._life: list[int | Event] = []  # events; for a movement, its row in memory
         self._attempt: AskingAttempt | None = None
         self._context: Array = np.zeros(0)
-        self._next: Move | Request | None = None  # yielded by the attempt, without outcome or reply so far
+        self._next: Move | Request | None = None  # last yield of the attempt, without outcome or reply so far
         self._asked = False
         self._untold = False  # whether `request` began an attempt that no event has reported yet
         self._lessons: set[tuple[bytes, bytes]] = set()
@@ -74,7 +74,7 @@ class Learner:
 
     @property
     def lesson_waits(self) -> bool:
-        """Whether an offered demonstration is still unanswered; a `run` that continues then asks for no other."""
+        """Whether an offered demonstration is still unanswered; a continued `run` then asks for no other one."""
         return self._offered_at == self.movements
 
     @property
@@ -109,14 +109,14 @@ class Learner:
             yield self._begun_event
 
     def ask(self, context: ArrayLike) -> Move | None:
-        """The next movement; None for a rest, which has no outcome to tell.
+        """The next movement, or None, which is a rest: there is no outcome to tell.
 
         Args:
             context: ``(context_dim,)``, the context of the movement. An attempt keeps its context until the learner is
                 ``idle``.
 
         Raises:
-            RuntimeError: the outcome of the last movement was not told, or the context changed while not ``idle``.
+            RuntimeError: the outcome of the last movement was not told, or the context changed during an attempt.
             ValueError: the context has another shape, or is not finite.
         """
         context = check_point("context", context, self.memory.context_dim)
@@ -141,8 +141,8 @@ class Learner:
         return self._next
 
     def request(self, context: ArrayLike) -> Request | None:
-        """The request to a teacher before the next movement; None for none. `watch` replies with a demonstration;
-        `go_on_alone`, or `ask` at once, leaves the request without one.
+        """The request to a teacher before the next movement, or None. `watch` replies with a demonstration; after
+        `go_on_alone`, or after `ask` at once, the request stays without a demonstration.
 
         Args:
             context: ``(context_dim,)``, the context of a new attempt if none is under way.
@@ -194,14 +194,13 @@ class Learner:
         self._publish(Event(Kind.MOVED, context, move.theta, move.goal, reached, move.origin), row=row)
 
     def watch(self, demonstration: Demonstration, *, who: str | None = None) -> None:
-        """Watch a demonstration. A requested one goes to the attempt that had requested it. Any other one ends the
-        attempt
-        under way, and the social strategy begins with the next ``ask``.
+        """Watch a demonstration. A requested demonstration goes to the attempt that requested it. Any other
+        demonstration ends the attempt under way, and the social strategy begins with the next ``ask``.
 
         Args:
             demonstration: demonstration that is shown.
-            who: name of the teacher whose offers a `run` checks before each movement, see ``lesson_waits``; None for
-                a demonstration from anybody else.
+            who: name of the teacher whose offers a `run` checks before each movement, see ``lesson_waits``; None:
+                the demonstration comes from somebody else.
 
         Raises:
             RuntimeError: this learner has no social strategy, or the outcome of the last movement was not told.
@@ -252,9 +251,8 @@ class Learner:
         return _lesson(demonstration, self.translate(demonstration)) in self._lessons
 
     def fail(self, reason: str) -> None:
-        """Tell the learner that a movement has failed and has no outcome. It counts as a movement, nothing is
-        remembered,
-        and the attempt ends as by `interrupt`.
+        """Tell the learner that a movement has failed and has no outcome. The movement counts, nothing is
+        remembered, and the attempt ends as by `interrupt`.
 
         Args:
             reason: reason of the failure, for the record.
@@ -295,7 +293,7 @@ class Learner:
 
     @property
     def _begun_event(self) -> Event:
-        """Event of an attempt without movements so far; a replay needs it if the attempt ends before its first one."""
+        """Event of an attempt without movements so far; replays need it if the attempt ends before a movement."""
         return Event(Kind.ASKED, self._context)
 
     def _tell_begun(self) -> None:

@@ -1,4 +1,4 @@
-"""Events of a learner. The learner alone makes them; its listeners, such as a record, are told each."""
+"""Events of a learner. Only the learner makes them, and it tells each to its listeners, such as a record."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ class Kind(StrEnum):
     RESTED = "rested"
     SHOWN = "shown"
     ASKED = "asked"  # request; ``reply`` is its result, and after "shown" the next event is the demonstration
-    FAILED = "failed"  # movement without an outcome, ``reply`` is the reason; without theta, no context was observed
-    INTERRUPTED = "interrupted"  # by the caller; with theta, before the outcome of this movement was told
+    FAILED = "failed"  # movement without an outcome, for the reason ``reply``; if theta is None, no context was seen
+    INTERRUPTED = "interrupted"  # interruption by the caller; if there is a theta, its outcome was not told
 
 
 class Event(NamedTuple):

@@ -1,4 +1,4 @@
-"""Who is asked for a demonstration: a learner that asks gives a `Request`, a `Demonstrator` replies."""
+"""Teachers who are asked for a demonstration: the learner makes a `Request`, and a `Demonstrator` replies."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ class Demonstrator(Built):
     """Teacher who is asked for a demonstration of a goal. Built from ``(demonstrations, rng)`` and options.
 
     Attributes:
-        takes: movements at which the learner rests until a reply has come.
+        takes: number of movements for which the learner rests until a reply has come.
     """
 
     takes: int = 0
@@ -21,4 +21,4 @@ class Demonstrator(Built):
     @abstractmethod
     def demonstrate(self, context: Array, goal: Array, memory: Memory) -> Demonstration | None:
         """A demonstration of ``goal`` ``(outcome_dim,)`` in ``context`` ``(context_dim,)``, or None. A replay asks
-        again, so what is drawn may depend on the seed and on the arguments only."""
+        again, so random draws may depend on the seed and on the arguments only."""

@@ -1,7 +1,7 @@
 """Memory: all exemplars (c, theta, tau) of a learner, and the nearest neighbours among them.
 
 Sections 3.2 and 4.4 of Nguyen & Oudeyer (2014): the set M. The outcome side finds movements that landed near a point (H
-of eq. 8), the policy side finds movements similar to one (K_h of eq. 8).
+of eq. 8), the policy side finds movements similar to a given one (K_h of eq. 8).
     memory.add(context, theta, outcome); rows = memory.near_outcomes(context, goal, k=10); memory.thetas[rows]
 """
 
@@ -26,7 +26,7 @@ class Memory:
     In distances, a unit of context counts as much as a unit of outcome or theta.
 
     Args:
-        context_dim: dimension of C; 0 without contexts, as in the fishing task.
+        context_dim: dimension of C; 0 if there are no contexts, as in the fishing task.
         theta_dim, outcome_dim: dimensions of Pi and T, at least 1.
 
     Raises:
@@ -77,7 +77,7 @@ class Memory:
         """Remember one exemplar: ``(context_dim,)``, ``(theta_dim,)``, ``(outcome_dim,)``.
 
         Raises:
-            ValueError: a wrong shape, or a value that is not finite or beyond 1e100; nothing is remembered then.
+            ValueError: a shape is wrong, or a value is not finite or is beyond 1e100; then nothing is remembered.
         """
         context = check_point("context", context, self.context_dim, _NO_CONTEXT)
         theta = check_point("theta", theta, self.theta_dim, "was a goal passed instead?")
@@ -88,9 +88,8 @@ class Memory:
         self._append(context[None], theta[None], outcome[None])
 
     def near_outcomes(self, context: ArrayLike, goal: ArrayLike, k: int) -> Rows:
-        """Rows ``(min(k, n),)`` whose outcomes lie nearest to ``goal`` ``(outcome_dim,)``, nearest first; of equally
-        near
-        ones, the oldest first."""
+        """Rows ``(min(k, n),)`` whose outcomes lie nearest to ``goal`` ``(outcome_dim,)``, nearest first; of
+        equally near rows, the oldest first."""
         goal = check_point("goal", goal, self.outcome_dim, "was a theta passed instead?")
         return self._outcome_side.nearest(self._key(context, goal), k)
 
@@ -102,7 +101,7 @@ class Memory:
     def near_policies(self, context: ArrayLike, theta: ArrayLike, k: int, within: float = np.inf) -> Rows:
         """At most ``k`` rows whose thetas lie nearest to ``theta`` ``(theta_dim,)``, not farther than ``within``.
 
-        The result is exact for up to ``EXACT_UP_TO`` exemplars, see `PolicyNeighbours`; later some rows may be missing.
+        The result is exact for up to ``EXACT_UP_TO`` exemplars, see `PolicyNeighbours`; with more, rows may be missing.
         """
         theta = check_point("theta", theta, self.theta_dim, "was a goal passed instead?")
         return self._policy_side.nearest(self._key(context, theta)[None], k, within)[0]
@@ -123,7 +122,7 @@ class Memory:
         return self.copy()
 
     def copy(self) -> Memory:
-        """The same exemplars, in a memory that grows on its own."""
+        """A memory with copies of the exemplars."""
         same = Memory(self.context_dim, self.theta_dim, self.outcome_dim)
         same._append(self.contexts, self.thetas, self.outcomes)
         return same

@@ -1,7 +1,7 @@
 """Nearest rows of a growing table: by a tree, by comparing all rows, or, for very many rows, by cells.
 
 The memory uses it to find outcomes near a goal (section 4.4.2 of Nguyen & Oudeyer, 2014: H of eq. 8) and movements
-similar to one (K_h). scipy or faiss proposes rows, and float64 distances decide; of equal ones, the older row is first.
+like a given one (K_h). scipy or faiss proposes rows, and float64 distances decide; equally near rows keep their order.
     side = TreeNeighbours(Table(2)); side.keys.append(keys); rows = side.nearest(query, k=10)
 Results depend on the rows alone, not on earlier queries. A query first adds new rows to the tree or the index.
 """
@@ -20,11 +20,11 @@ from sgimd_torch.spaces import Array
 
 Rows = NDArray[np.int64]
 
-EXACT_UP_TO: Final = 2**15  # rows that `PolicyNeighbours` compares one by one; for more rows it is approximate
-_SPARE: Final = 8  # proposals beyond k, so that the last one nearly always lies clearly beyond the k-th
+EXACT_UP_TO: Final = 2**15  # largest number of rows for which `PolicyNeighbours` is exact; for more it is approximate
+_SPARE: Final = 8  # number of proposals beyond k, so that the last is nearly always clearly farther than the k-th
 _EPSILON32: Final = float(np.finfo(np.float32).eps)
 _LARGEST32: Final = float(np.finfo(np.float32).max)  # distance that faiss reports where float32 overflows
-_ROUNDING: Final = 1e-9  # relative; far above the rounding of float64 distances
+_ROUNDING: Final = 1e-9  # relative error far above the rounding of float64 distances
 
 faiss.omp_set_num_threads(1)  # queries last microseconds, and waking threads costs more than it saves
 # Above this threshold faiss computes |a|^2 + |b|^2 - 2ab, whose cancellation would break `_surely_proposed`.
@@ -69,7 +69,7 @@ class Table:
 class TreeNeighbours:
     """Exact neighbours in few dimensions: a tree of all rows but the newest, which are compared one by one."""
 
-    _NEWEST: Final = 1024  # rows without a tree, or a thirty-second of all if these are more
+    _NEWEST: Final = 1024  # most rows outside the tree, or a thirty-second of the tree if that is more
 
     def __init__(self, keys: Table) -> None:
         self.keys = keys
@@ -85,14 +85,14 @@ class TreeNeighbours:
         _check_k(k)
         keys, n = self.keys.rows, len(self.keys)
         if n - self._n_in_tree > max(self._NEWEST, self._n_in_tree // 32):
-            # The two options do not change results; without them the tree is built twice as fast.
+            # The two options do not change results; while they are off, the tree is built twice as fast.
             self._tree, self._n_in_tree = cKDTree(keys, balanced_tree=False, compact_nodes=False), n
         newest = np.arange(self._n_in_tree, n)
         if self._tree is None:
             return _nearest_of(keys, query, newest, k)[0]
         n_proposed = min(k + _SPARE, self._tree.n)
         distances, proposed = self._tree.query(query, n_proposed)
-        beyond = distances[-1] if n_proposed < self._tree.n else np.inf  # no other row of the tree is nearer
+        beyond = distances[-1] if n_proposed < self._tree.n else np.inf  # least distance of the other rows of the tree
         rows, squared = _nearest_of(keys, query, np.concatenate((np.sort(proposed), newest)), k)
         reach = math.sqrt(squared[-1]) * (1 + _ROUNDING)
         if reach < beyond:
@@ -104,7 +104,7 @@ class TreeNeighbours:
 class PolicyNeighbours:
     """Neighbours in many dimensions: exact for up to ``EXACT_UP_TO`` rows; for more rows, nearly all are found.
 
-    The rows then lie in cells around some of the first rows, and only the cells nearest to a query are searched.
+    If there are more, rows lie in cells around some of the first rows; only the cells nearest to a query are searched.
     """
 
     def __init__(self, keys: Table) -> None:
@@ -134,7 +134,7 @@ class PolicyNeighbours:
             if self._exact:
                 enough = _surely_proposed(query, min(math.sqrt(squared[-1]), within), beyond)
             else:
-                enough = squared[-1] < np.inf  # false if cells are nearly empty, or the query overflows float32
+                enough = squared[-1] < np.inf  # False if cells are nearly empty, or the query overflows float32
             found.append(rows[squared <= within * within] if enough else _rank(keys, query, k, within))
         return found
 
@@ -145,8 +145,8 @@ def _in_cells(rows32: NDArray[np.float32]) -> faiss.IndexIVFFlat:
     centres = faiss.IndexFlatL2(rows32.shape[1])
     centres.add(rows32[:: len(rows32) // n_cells][:n_cells])
     index = faiss.IndexIVFFlat(centres, rows32.shape[1], n_cells)
-    index.is_trained = True  # nothing is left to learn: the centres are given
-    index.nprobe = 16  # cells that are searched for a query
+    index.is_trained = True  # centres are given, so nothing is left to learn
+    index.nprobe = 16  # number of cells that are searched for a query
     return index
 
 
@@ -159,16 +159,16 @@ def _float32(array: Array) -> NDArray[np.float32]:
     """The ``array`` as float32; values that are too large become infinite.
 
     ``np.errstate`` would be unsafe here, because it sets a context variable. In Python 3.11 the garbage collector may
-    run meanwhile and end the attempt of a dropped learner, which queries a memory, too. Setting the variable twice at
-    once is a crash.
+    run meanwhile and end the attempt of a dropped learner, which queries a memory, too. If the variable is set twice at
+    once, the program crashes.
     """
     large = np.abs(array) > _LARGEST32
     return np.where(large, np.copysign(np.inf, array), array).astype(np.float32)
 
 
 def _surely_proposed(query: Array, reach: float, beyond: float) -> bool:
-    """Whether all rows within ``reach`` of ``query`` were proposed, if all others have a squared float32 distance of at
-    least ``beyond``.
+    """Whether all rows within ``reach`` of ``query`` were proposed, if all other rows have a squared float32 distance
+    of at least ``beyond``.
 
     Rounding a key, the query, their difference and the sum to float32 changes a distance of ``reach`` by at most
     ``error``.
@@ -179,7 +179,7 @@ def _surely_proposed(query: Array, reach: float, beyond: float) -> bool:
 
 def _decide(keys: Array, queries: Array, proposed: Rows, k: int) -> tuple[Rows, Array]:
     """The ``k`` nearest of the rows ``proposed`` ``(m, n)`` for each query, nearest first, and their squared distances;
-    infinite for row -1."""
+    the distance is infinite for row -1."""
     proposed.sort(axis=1)  # the stable sort below then leaves ties in order of row number
     squared = squared_distances(keys[proposed], queries[:, None])
     squared[proposed < 0] = np.inf
@@ -196,7 +196,7 @@ def _nearest_of(keys: Array, query: Array, rows: Rows, k: int) -> tuple[Rows, Ar
     """The ``k`` nearest of the increasing ``rows``, and their squared distances."""
     squared = squared_distances(keys[rows], query)
     if k < len(rows):
-        near = squared <= np.partition(squared, k - 1)[k - 1]  # ties included; the sort below keeps the older ones
+        near = squared <= np.partition(squared, k - 1)[k - 1]  # equal distances included; the sort keeps older rows
         rows, squared = rows[near], squared[near]
     order = squared.argsort(kind="stable")[:k]
     return rows[order], squared[order]

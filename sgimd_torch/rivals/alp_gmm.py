@@ -23,23 +23,23 @@ try:
 except ImportError as error:
     raise ImportError(f"ALP-GMM needs scikit-learn: pip install 'sgimd-torch[rivals]' ({error})") from error
 
-_DRAWS = 20  # draws from a Gaussian; the first that lies in T is the goal
-# Goals between two fits; before the first fit, goals are uniform. Deviation: the publication waits for 250 goals, half
-# of those in a run on the rod.
+_DRAWS = 20  # number of draws from a Gaussian; the first that lies in T is the goal
+# Goals between two fits; before the first fit, goals are uniform. Deviation: the publication waits for 250 goals, which
+# are half of the goals of a run on the rod.
 _REFIT = 50
-_COMPONENTS = 10  # largest number of Gaussians; Akaike's criterion chooses one from 2 to this
+_COMPONENTS = 10  # largest number of Gaussians; Akaike's criterion chooses the number, at least 2
 
 
 class AlpGmm(Goals):
     """Goals from Gaussians of high absolute learning progress.
 
-    Without contexts a Gaussian is chosen in proportion to its mean progress, and a goal is drawn from it. In a context
-    it is chosen in proportion to its mean progress times its density there, and the goal is drawn from the Gaussian
-    given this context. A goal outside T is drawn again, and clipped after 20 draws. Distances are in sides of C x T.
+    Without contexts a Gaussian is chosen in proportion to its mean progress, and a goal is drawn from it. With
+    contexts, the mean progress is multiplied by the density at the context, and the goal is drawn from the Gaussian
+    given this context. A goal outside T is drawn again, and clipped after 20 draws. The sides of C x T are the units.
 
     Args:
         problem: problem to learn.
-        memory: number of last goals that the mixture is fitted to; progress at a goal uses all earlier goals.
+        memory: number of last goals to which the mixture is fitted; progress at a goal uses all earlier goals.
         uniform: probability of a goal anywhere in T.
 
     Raises:
@@ -61,10 +61,10 @@ class AlpGmm(Goals):
         self.contexts, self.outcomes = contexts, outcomes = problem.contexts, problem.outcomes
         self._low = np.concatenate((contexts.low, outcomes.low))
         self._sides = np.concatenate((contexts.sides, outcomes.sides))
-        self._points = np.empty((0, len(self._low)))  # in sides of C x T
+        self._points = np.empty((0, len(self._low)))  # relative to the sides of C x T
         self._competences = np.empty(0)
         self._progress = np.empty(0)
-        self._fitted = 0  # goals known at the last fit
+        self._fitted = 0  # number of goals at the last fit
         self._mixture: GaussianMixture | None = None
 
     def sample(self, context: ArrayLike) -> Array:
@@ -83,8 +83,8 @@ class AlpGmm(Goals):
     def add(
         self, context: ArrayLike, goal: ArrayLike, competence: float, strategy: str = "autonomous", gain: float = 0.0
     ) -> None:
-        """Learn the competence at a goal; progress is its difference from the nearest earlier goal, the latest of
-        equals.
+        """Learn the competence at a goal; progress is the change from the competence at the nearest earlier goal. If
+        several goals are equally near, the latest counts.
 
         Raises:
             ValueError: see `Goals.add`.
@@ -110,7 +110,7 @@ class AlpGmm(Goals):
         return min(mixtures, key=lambda mixture: mixture.aic(rows))
 
     def _draw(self, mixture: GaussianMixture, context: Array) -> Array:
-        """A goal from one of the Gaussians, given the context in sides of C."""
+        """A goal from one of the Gaussians, given the context, relative to the sides of C."""
         c, g = slice(self.contexts.dim), slice(self.contexts.dim, -1)
         means, covariances = mixture.means_, mixture.covariances_
         away = context - means[:, c]  # (components, context_dim)

@@ -1,6 +1,7 @@
 """CMA-ES, the usual evolution strategy, as a search instead of Nelder-Mead.
 
-Hansen & Ostermeier (2001), by Hansen's own package ``cma``; a rival of section 4.4.2 of Nguyen & Oudeyer (2014).
+Hansen & Ostermeier (2001), by Hansen's own package ``cma``; a rival of the search in section 4.4.2 of Nguyen & Oudeyer
+(2014).
     learner = sgim_d(environment, seed, correspondence=..., search=CmaEs)
 """
 
@@ -29,9 +30,9 @@ class CmaEs(Search):
     Args:
         problem: problem to learn.
         sd: standard deviation of the first generation, as a fraction of each parameter's range in Pi.
-        population: number of movements in a generation, at least 3; None for cma's own, 4 + 3 ln(theta_dim). Deviation:
-            cma's own number is 13 for the rod, so the first generation would use up nearly all of a goal's 15
-            movements. With 4 (two mirrored pairs) there are three generations.
+        population: number of movements in a generation, at least 3; None: number of the package, 4 + 3 ln(theta_dim).
+            Deviation: the package's number is 13 for the rod, so the first generation would use up nearly all of a
+            goal's 15 movements. With 4 (two mirrored pairs) there are three generations.
 
     Raises:
         ValueError: a number is out of its range, or Pi has one dimension.
@@ -49,9 +50,9 @@ class CmaEs(Search):
         self._options = {
             "bounds": [0, 1],
             "randn": lambda *shape: self.rng.standard_normal(shape),
-            "seed": math.nan,  # otherwise the package seeds numpy's global stream
-            "verb_log": 0,  # writes no files
-            "verbose": -10,  # prints nothing, reads no file of signals
+            "seed": math.nan,  # any number would seed numpy's global stream
+            "verb_log": 0,  # no written files
+            "verbose": -10,  # no printed text, and no file of signals
             **({} if population is None else {"popsize": population}),
         }
 
@@ -60,7 +61,7 @@ class CmaEs(Search):
         policies = self.problem.policies
         theta = policies.check("theta of the estimate", start.theta)
         yield theta
-        # CMA-ES works in sides of Pi, so that the units of Pi do not matter.
+        # CMA-ES works relative to the sides of Pi, so that the units of Pi do not matter.
         centre = np.clip((theta - policies.low) / policies.sides, 0, 1)
         strategy = CMAEvolutionStrategy(centre, self.sd, self._options)
         while not strategy.stop():

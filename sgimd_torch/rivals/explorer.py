@@ -18,19 +18,20 @@ if TYPE_CHECKING:
 
 
 class QualityDiversity(Strategy):
-    """Movements of a scheduler, batch after batch; the scheduler is told a batch when all of it was executed.
+    """Movements of a scheduler, batch after batch; when all of a batch was executed, the scheduler is told.
 
-    The objective, which decides between elites of one cell, is little effort: minus the mean square of a movement's
-    distance from the middle of Pi, in sides. Outcomes outside T count for the nearest cell of its border. If T is far
-    larger than the reachable part, nearly all outcomes share a few cells, and few elites are left to vary.
+    The objective decides between elites of one cell and prefers little effort: it is minus the mean square distance of
+    a movement from the middle of Pi, in sides of Pi. Outcomes outside T count for the nearest border cell of T. If T is
+    far larger than the reachable part, nearly all outcomes share a few cells, and few elites are left to vary.
 
-    Each attempt is one movement. If it is interrupted before its outcome is told, it is proposed again.
+    Each attempt is one movement. If it is interrupted before its outcome is told, the movement is proposed again.
 
     Args:
         problem: problem to learn; exemplars of its memory are in the archive from the start.
-        scheduler: scheduler of ribs, with an archive over T, of movements in sides of Pi. Deviation: a movement outside
-            Pi is clipped for execution, but told as proposed, and its effort counts. CMA-ES itself would draw again,
-            and never end once its mean lies in a corner of many dimensions.
+        scheduler: scheduler of ribs, with an archive over T; its movements are relative to the sides of Pi. Deviation:
+            a movement outside Pi is clipped for execution, but the scheduler is told the effort of the proposed
+            movement. CMA-ES itself would draw again, which never ends once its mean lies in a corner of many
+            dimensions.
         origin: origin of the movements, for the record.
     """
 
@@ -88,12 +89,12 @@ class Shown(Social):
                     move = moves.send(outcome)
                 except StopIteration:
                     return
-        finally:  # also when the next demonstration interrupts
+        finally:  # interruption by the next demonstration included
             if outcomes:
                 self.explorer.add(np.stack(thetas), np.stack(outcomes))
 
 
 def objectives_of(batch: Array) -> Array:
-    """Little effort: minus the mean square distance of each movement from the middle of Pi, in sides."""
+    """Objectives: minus the mean square distance of each movement from the middle of Pi, relative to its sides."""
     objectives: Array = -np.square(batch - 0.5).mean(axis=1)
     return objectives

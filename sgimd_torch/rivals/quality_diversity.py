@@ -1,8 +1,8 @@
 """Quality diversity: learners that fill an archive over T with movements for its cells.
 
 MAP-Elites (Mouret & Clune 2015), its line operator (Vassiliades & Mouret 2018), CMA-ME (Fontaine et al. 2020) and
-CMA-MAE (Fontaine & Nikolaidis 2023), by the package ``ribs``. They also find a movement for every outcome that they
-reach. But they have no goals: they vary movements with new outcomes.
+CMA-MAE (Fontaine & Nikolaidis 2023), by the package ``ribs``. Like goal babbling they find a movement for every
+outcome that they reach. But they have no goals: they vary movements that had new outcomes.
     learner = map_elites(environment, seed)        learner = cma_mae(environment, seed, correspondence=translate)
 """
 
@@ -32,8 +32,8 @@ try:
 except ImportError as error:
     raise ImportError(f"quality diversity needs ribs: pip install 'sgimd-torch[rivals]' ({error})") from error
 
-_DEFAULT_CELLS = 400  # 20 x 20, of .1 m in the fishing task, like the tiles of its benchmark
-_MAX_CELLS = 1_000_000  # ribs keeps an array of all of them
+_DEFAULT_CELLS = 400  # 20 x 20 cells of .1 m in the fishing task, like the tiles of its benchmark
+_MAX_CELLS = 1_000_000  # limit, because ribs keeps an array of all cells
 _LEAST_OBJECTIVE = -0.35  # first threshold of CMA-MAE's cells: below the objective of the corners of Pi, -.25
 _SHARED = ("cells", "correspondence", "imitations", "epsilon", "inverse", "memory")
 MakeEmitters = Callable[[GridArchive, np.random.Generator], Sequence[EmitterBase]]
@@ -61,12 +61,12 @@ def quality_diversity(
         origin: name of this stream, and origin of the movements in the record.
         emitters: function (archive, rng) -> emitters, which propose movements.
         annealed: keywords of the archive of CMA-MAE.
-        cells: number of cells in each dimension of T; None for about 400 in all.
-        correspondence: function from times and trajectory to theta_d, eq. (6); None for a learner without teacher.
+        cells: number of cells in each dimension of T; None: about 400 cells in all.
+        correspondence: function from times and trajectory to theta_d, eq. (6); None: the learner has no teacher.
         imitations: number of movements that imitate a demonstration.
         epsilon: largest variation of each parameter in an imitation, in the unit of the parameter.
         inverse: constructor of the inverse model.
-        memory: exemplars to start from, which enter the archive; None for none.
+        memory: exemplars to start from, which enter the archive; None: the archive starts empty.
 
     Raises:
         ValueError: a number is out of its range, or the environment has contexts.
@@ -136,7 +136,7 @@ def isoline(
     batch: int = 10,
     **options: Any,
 ) -> Learner:
-    """MAP-Elites along lines, with a teacher: an elite, a step towards another one, and a little noise.
+    """MAP-Elites along lines, with a teacher: an elite, a step towards another elite, and a little noise.
 
     Args:
         environment, seed, first, batch, options: arguments of `map_elites`.
@@ -169,11 +169,11 @@ def cma_me(
 
     Args:
         environment, seed, options: arguments of `map_elites`.
-        emitters: number of improvement emitters, which start at the centre of Pi. Deviation: Fontaine et al. have 15;
-            each would get only some 25 generations in a run on the rod.
+        emitters: number of improvement emitters, which start at the centre of Pi. Deviation: Fontaine et al. have 15,
+            of which each would get only about 25 generations in a run on the rod.
         sd: standard deviation at the start and after a restart, as a fraction of each parameter's range in Pi.
-            Deviation: pyribs' examples start wider, but in a box of many dimensions this leads into the corners.
-        batch: number of movements in a generation of each emitter, at least 2; None for 4 + 3 ln(theta_dim).
+            Deviation: pyribs' examples start wider, but in many dimensions a wide start leads into the corners of Pi.
+        batch: number of movements in a generation of each emitter, at least 2; None: 4 + 3 ln(theta_dim).
 
     Raises:
         ValueError: see `map_elites`.

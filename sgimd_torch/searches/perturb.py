@@ -18,8 +18,8 @@ from sgimd_torch.spaces import Array, Estimate
 class Perturb(Search):
     """Best movement so far plus Gaussian noise.
 
-    The best theta is a remembered one or one executed here. Movements are clipped to Pi; the search never ends. It
-    executes theta_g first, unless this is a copy of a remembered theta, whose outcome is known.
+    The best theta was remembered or executed by this search. Movements are clipped to Pi; the search never ends. It
+    executes theta_g first, unless theta_g is a copy of a remembered theta, whose outcome is known.
 
     Args:
         problem: problem to learn.
@@ -53,7 +53,7 @@ class Perturb(Search):
 class Vary(Search):
     """Answer of the inverse model plus a little Gaussian noise.
 
-    All movements vary theta_g, whatever their outcomes. They are clipped to Pi; the search never ends.
+    All movements vary theta_g, whatever the outcomes. The movements are clipped to Pi; the search never ends.
 
     The outcomes correct the inverse model, and show how the outcome changes with theta. The search is meant for an
     inverse model that is nearly right, and for one or two movements at each goal. If theta_g is a copy of a remembered

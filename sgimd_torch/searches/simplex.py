@@ -23,28 +23,27 @@ class NelderMead(Search):
     It minimises the distance to the goal, from theta_g and its neighbours.
 
     The first movement is theta_g, with noise. Neighbours become vertices with their remembered outcomes, which costs no
-    movement (but takes outcomes in nearby contexts for outcomes in this one). A neighbour on a line, plane ... through
-    better vertices is left out, as a flat simplex cannot turn.
+    movement (but takes outcomes in nearby contexts for outcomes in this context). A neighbour on a line, plane ...
+    through better vertices is left out, because a flat simplex cannot turn.
 
     Args:
         problem: problem to learn.
         noise: standard deviation of the noise of every movement, as a fraction of each parameter's range in Pi; the
-            vertex is the noisy movement. Deviation: the paper adds none. But a simplex searches the flat through its
-            vertices,
-            and neighbours from memory span the same flat again and again. Without new directions the learner soon
-            repeats itself, and its inverse model cannot tell noise from the effect of theta.
+            vertex is the noisy movement. Deviation: the paper adds no noise. But a simplex searches the flat through
+            its vertices, and neighbours from memory span the same flat again and again. Without new directions the
+            learner soon repeats itself, and its inverse model cannot tell noise from the effect of theta.
         step: size of the steps that replace missing neighbours, as a fraction of the ranges in Pi (root mean square).
             Deviation: the usual first simplex steps along one coordinate at a time, but one knot of one joint often
             hardly moves the float. These steps go in random directions, and no noise is added to them.
-        complete: true fills the simplex up to theta_dim + 1 vertices, the paper's 26, by one movement each; false only
-            up to outcome_dim + 1, so neighbours often suffice. The search then stays in the flat through the vertices,
-            which usually contains a solution, as theta is redundant. Deviation: False is the default, because 25 steps
-            would be the whole budget of a goal.
-        xatol: size of the simplex, in the unit of theta, at which the search ends, if it is within fatol, too. Below
+        complete: true fills the simplex up to theta_dim + 1 vertices, the paper's 26, by one movement each; false
+            fills it up to outcome_dim + 1, so neighbours often suffice. The search then stays in the flat through the
+            vertices, which usually contains a solution, as theta is redundant. Deviation: False is the default, because
+            25 steps would be the whole budget of a goal.
+        xatol: size of the simplex, in the unit of theta, at which the search ends, if fatol holds, too. Below
             the noise of the outcomes a simplex cannot tell better from worse, so by default the search ends early.
             Deviation: the paper names no such end.
         fatol: difference of the vertices' distances from the goal, in the unit of outcomes, at which the search ends,
-            if it is within xatol, too.
+            if xatol holds, too.
 
     Raises:
         ValueError: ``step`` is not in (0, 0.5], or ``noise`` is not in [0, 0.5].
@@ -114,16 +113,16 @@ def simplex_descent(
     bit. (Of equal values the newest ranks last, as Lagarias et al. demand; in scipy an unstable sort decides.)
 
     Args:
-        vertices: ``(n + 1, dim)``. With n < dim the search stays in the n-dimensional flat through them, unless
-            ``place`` leads out of it.
+        vertices: ``(n + 1, dim)``. With n < dim the search stays in the n-dimensional flat through the vertices,
+            unless ``place`` leads out of it.
         values: ``(n + 1,)``.
-        place: function that moves a point to an allowed one, for example into a box; None for no change. (If it only
-            clips, a simplex with all vertices on one face of the box cannot leave this face.)
+        place: function that moves a point to an allowed one, for example into a box; None: no change. (If ``place``
+            only clips, a simplex with all vertices on one face of the box cannot leave this face.)
         xatol: distance between vertices in every coordinate at which the descent ends, if ``fatol`` holds, too.
         fatol: difference of the values at which the descent ends, if ``xatol`` holds, too.
 
     Raises:
-        ValueError: there are fewer than two vertices, or not one value for each.
+        ValueError: there are fewer than two vertices, or vertices and values differ in number.
     """
     if len(vertices) < 2 or len(values) != len(vertices):
         raise ValueError(
@@ -134,7 +133,7 @@ def simplex_descent(
     n = len(vertices) - 1
 
     def beyond(centre: Array, distance: float) -> Array:
-        """A point on the line from the worst vertex (-1) through the ``centre`` of the others (0)."""
+        """The point at ``distance`` on the line from the worst vertex (-1) through the ``centre`` of the others (0)."""
         point = (1 + distance) * centre - distance * vertices[-1]
         return point if place is None else place(point)
 
@@ -188,7 +187,7 @@ class _Flat:
         self._add(across, _length(across))
 
     def widen_if_lacking(self, point: Array) -> bool:
-        """Add ``point`` as a vertex if it is far enough outside, and return whether it was."""
+        """Add ``point`` as a vertex if it is far enough outside, and return whether it was added."""
         edge = point - self._origin
         across = self._across(edge)
         outside = _length(across)
@@ -214,14 +213,14 @@ class _Flat:
 
 
 def _length(vector: Array) -> float:
-    return math.sqrt(vector.dot(vector))  # np.linalg.norm, bit for bit, without its options
+    return math.sqrt(vector.dot(vector))  # value of np.linalg.norm, bit for bit, in less time
 
 
 def _step_out(policies: Box, theta: Array, flat: _Flat, rng: np.random.Generator, step: float) -> Array:
     """A random step from ``theta`` that leads out of the flat and stays in the box.
 
     A coordinate that would leave the box steps the other way, because clipping would flatten the simplex. In a corner
-    of a box of few dimensions this step may flatten it, too; then random directions are tried.
+    of a box of few dimensions this step may flatten the simplex, too; then random directions are tried.
     """
     direction = flat.direction_out(rng)
     for _ in range(100):  # a step no longer than xatol never suffices

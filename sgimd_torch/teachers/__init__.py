@@ -1,7 +1,7 @@
-"""Teachers: they choose demonstrations, and the movements before which they show them.
+"""Teachers, who choose demonstrations and the times at which they show them.
 
 Sections 2.3 and 5.3 of Nguyen & Oudeyer (2014). The paper's teacher watches what the learner has reached and, every 30
-movements, demonstrates something from a tile chosen at random among those the learner has reached least.
+movements, demonstrates something from a tile chosen at random among those that the learner has reached least.
     teacher = PeriodicTeacher(load_demonstrations(), stream(seed, "teacher")); teacher.offer(index, memory)
 """
 
@@ -17,7 +17,7 @@ from sgimd_torch.memory import Memory
 from sgimd_torch.parts import Teacher
 from sgimd_torch.spaces import Array, Demonstration, check_count, check_rng, check_vector
 
-_STALLED: Final = 0.01  # least relative fall of the mean distance from one look to the next while a learner progresses
+_STALLED: Final = 0.01  # relative fall of the mean distance between two looks, below which a learner has stalled
 
 
 Choose = Callable[[Sequence[Demonstration], Memory, np.random.Generator], Demonstration]
@@ -34,7 +34,7 @@ def least_explored(
 ) -> Demonstration:
     """Demonstration from the tile of outcomes that the learner has reached least.
 
-    Only tiles with demonstrations count. Of several equal ones, one is drawn.
+    Only tiles with demonstrations count. If several tiles are equal, one of them is drawn.
 
     Args:
         demonstrations: demonstrations to choose from.
@@ -46,9 +46,9 @@ def least_explored(
         ValueError: demonstrated outcomes and the memory have different dimensions.
     """
     shown = [demonstration.outcome for demonstration in demonstrations]
-    demonstrated = check_vector("outcomes of the demonstrations", shown, memory.outcome_dim, "of another robot?")
+    demonstrated = check_vector("outcomes of the demonstrations", shown, memory.outcome_dim, "is it another robot's?")
     low, high = demonstrated.min(axis=0), demonstrated.max(axis=0)
-    side = np.maximum(high - low, 1e-9) / tiles  # above 0 even for demonstrations on a line
+    side = np.maximum(high - low, 1e-9) / tiles  # sizes above 0, even for demonstrations on a line
 
     def cells(outcomes: Array) -> Array:
         # The upper border belongs to the last tile; otherwise the farthest demonstrations would have their own tile.
@@ -127,7 +127,8 @@ class AskedTeacher(Teacher):
     """Demonstrates when the learner's competence stalls.
 
     Every ``patience`` movements the teacher measures the distance of the learner's nearest outcome from each
-    demonstrated outcome. If the mean distance fell by less than a hundredth since the last look, it demonstrates.
+    demonstrated outcome. If the mean distance fell by less than a hundredth since the last look, the teacher
+    demonstrates.
 
     Args:
         demonstrations: demonstrations to choose from.
@@ -181,5 +182,5 @@ def check_demonstrations(demonstrations: Sequence[Demonstration]) -> Sequence[De
     shapes = {(np.shape(shown.context), np.shape(shown.outcome)) for shown in demonstrations}
     if len(shapes) > 1 or any(len(shape) != 1 for pair in shapes for shape in pair):
         wanted = "contexts (context_dim,) and outcomes (outcome_dim,), all alike"
-        raise ValueError(f"demonstrations must have {wanted}, got {sorted(shapes)}; of two robots?")
+        raise ValueError(f"demonstrations must have {wanted}, got {sorted(shapes)}; are they of two robots?")
     return demonstrations
