@@ -1,4 +1,4 @@
-"""Evaluation: the mean distance between goals spread over the reachable space and the outcomes of the answers.
+"""Evaluation: the mean distance from goals, spread over the reachable space, to the outcomes of the answers to them.
 
 Section 5.2 and eq. (10) of Nguyen & Oudeyer (2014). An evaluation does not change the learner: it executes movements
 without learning or remembering, with random streams of its own.
@@ -22,8 +22,8 @@ from sgimd_torch.parts import Inverse
 from sgimd_torch.spaces import Array, Box, check_count, check_vector, first_entry, stream
 
 SHIPPED = Path(__file__).with_name("data") / "benchmark.npz"
-TILES: Final = 358  # goals in the paper's benchmark
-SIDES: Final = np.linspace(0.025, 0.1, 301)  # sides of a tile over T's in the plane: 1600 to 100 tiles
+TILES: Final = 358  # number of goals in the paper's benchmark
+SIDES: Final = np.linspace(0.025, 0.1, 301)  # sides of a tile relative to T's side, for 1600 to 100 tiles in the plane
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,8 +69,8 @@ class Evaluation:
         errors: ``(n,)`` m; the distance from ``rest`` to the goal if the movement failed.
         thetas: ``(n, theta_dim)``, the movements executed.
         outcomes: ``(n, outcome_dim)``; NaN if the movement failed.
-        scatter: ``(n,)`` m, estimated mean distance of the repeated outcomes of a theta to their true mean; NaN without
-            repeats.
+        scatter: ``(n,)`` m, estimated mean distance from the repeated outcomes of a theta to their true mean; NaN if
+            there are no repeats.
         contexts: ``(n, context_dim)``, the contexts of the movements.
         failed: ``(n,)``, whether the movement failed.
     """
@@ -104,7 +104,7 @@ class Evaluation:
 
 
 def contexts_of_goals(environment: Environment, n: int) -> Array:
-    """``(n, context_dim)``, a context observed for each goal; equal in all evaluations, so comparisons are paired."""
+    """``(n, context_dim)``, an observed context for each goal; evaluations share them, so comparisons are paired."""
     if environment.contexts.dim == 0:
         return np.zeros((n, 0))
     drawn = [environment.observe(stream(0, "contexts of evaluation", goal)) for goal in range(n)]
@@ -132,12 +132,12 @@ def evaluate(
         seed, step: numbers of the random streams; each evaluation of a run has its own step, such as the number of
             movements so far.
         context: ``(context_dim,)`` for all goals, or ``(n, context_dim)``; None for `contexts_of_goals`.
-        repeats: number k of repetitions of each movement, 2 or more; 0 does not measure the noise. Outcomes lie nearer
-            to their own mean than to the true one, so the scatter is multiplied by sqrt(k / (k - 1)): for Gaussian
-            noise its mean is then equal for all k.
+        repeats: number k of repetitions of each movement, 2 or more; 0 to leave the noise unmeasured. Outcomes lie
+            nearer to their own mean than to the true mean, so the scatter is multiplied by sqrt(k / (k - 1)): for
+            Gaussian noise the mean scatter is then equal for all k.
 
     Raises:
-        ValueError: no goals, of another dimension, or not finite; repeats or step out of range.
+        ValueError: there are no goals, goals of another dimension or not finite, or repeats or step are out of range.
         RuntimeError: the memory behind ``inverse`` is empty.
     """
     goals = check_vector("goals", goals, environment.outcomes.dim)
@@ -152,7 +152,7 @@ def evaluate(
         given = environment.contexts.check("context", context)
         contexts = np.broadcast_to(given, (len(goals), environment.contexts.dim))
     thetas = np.stack([estimate.theta for estimate in inverse.answer_many(contexts, goals)])
-    copies = np.tile(thetas, (1 + repeats, 1))  # all goals once, then again, so that errors do not depend on repeats
+    copies = np.tile(thetas, (1 + repeats, 1))  # all goals once, then all repeats, so that errors do not depend on them
     landed = _landed(environment, np.tile(contexts, (1 + repeats, 1)), copies, seed, f"evaluation {step}")
     landed = landed.reshape(1 + repeats, *goals.shape)
     outcomes, again = landed[0], landed[1:]
@@ -169,7 +169,7 @@ def _landed(environment: Environment, contexts: Array, thetas: Array, seed: int,
     """``(n, outcome_dim)``, NaN for a failed movement; movement i has stream i of this ``name``."""
     rows = range(len(thetas))
     if isinstance(environment, BatchEnvironment):
-        with suppress(Exception, SystemExit):  # one of them failed; the loop below finds it
+        with suppress(Exception, SystemExit):  # a movement failed; the loop below finds it
             return execute_many(environment, contexts, thetas, [stream(seed, name, row) for row in rows])
     landed = np.full((len(thetas), environment.outcomes.dim), np.nan)
     for row in rows:
@@ -197,8 +197,8 @@ def tile_goals(outcomes: Array, box: Box, side: float, rng: np.random.Generator)
 def tile_side(outcomes: Array, box: Box, tiles: int = TILES) -> float:
     """The side (m) that gives about ``tiles`` reachable tiles; other arguments as for `tile_goals`.
 
-    In the plane the side is a fortieth to a tenth of T's; in other dimensions T has as many tiles as in the plane. If
-    outcomes span less than a tenth of a side of T, their span counts instead of that side.
+    In the plane the side is a fortieth to a tenth of T's side; a T of other dimensions has as many tiles as a T in the
+    plane. If outcomes span less than a tenth of a side of T, their span counts instead of that side.
     """
     inside = outcomes[box.contains(outcomes)]
     reached = np.ptp(inside, axis=0) if len(inside) else box.sides
@@ -208,7 +208,7 @@ def tile_side(outcomes: Array, box: Box, tiles: int = TILES) -> float:
 
 
 def _reached(outcomes: Array, box: Box, side: float) -> Array:
-    """``(n_tiles, dim)``, the tiles of T with two outcomes or more, counted from its lower corner, in order."""
+    """``(n_tiles, dim)``, the tiles of T with two outcomes or more, counted from T's lower corner, in order."""
     inside = outcomes[box.contains(outcomes)]
     tiles = np.floor((inside - box.low) / side)
     per_side = np.floor(box.sides / side) + 1
@@ -237,7 +237,7 @@ def load_benchmark(path: str | os.PathLike[str] = SHIPPED) -> Benchmark:
     """Read a benchmark; by default the shipped one of ``FishingRod``.
 
     Raises:
-        ValueError: the file is no benchmark, is damaged, has no goals, or numbers that are not finite.
+        ValueError: the file is no benchmark, is damaged, has no goals, or has numbers that are not finite.
         OSError: there is no file, or ``path`` is a directory.
     """
     arrays = read_npz(path, "benchmark", "sgimd benchmark", ("environment", "goals", "side"))

@@ -1,7 +1,7 @@
 """Spaces, episodes and random streams: the vocabulary of all other modules.
 
 Section 2.1 of Nguyen & Oudeyer (2014): contexts c in C, policies theta in Pi, outcomes tau in T, and a
-learning episode (context, policy, outcome). This module needs numpy only, no learning and no physics.
+learning episode (context, policy, outcome). This module needs only numpy; it knows no learning and no physics.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ _LARGEST: Final = 1e100  # squared distances between numbers up to this size do 
 
 
 def stream(seed: int, name: str, index: int | None = None) -> np.random.Generator:
-    """A separate random stream for each use, so that removing one part does not change the draws of the others.
+    """A separate random stream for each use, so that removing one part does not change the draws of other parts.
 
     Args:
         seed: seed of the run, >= 0.
         name: use of the draws, such as ``"environment"``, ``"goals"``, ``"search"`` or ``"teacher"``.
-        index: number of the stream among several of this name, such as that of the movement; None for a single one.
+        index: number of the stream if several have this name, such as that of the movement; None for a single stream.
 
     Raises:
         ValueError: the seed or the index is not a whole number >= 0.
@@ -41,7 +41,7 @@ def stream(seed: int, name: str, index: int | None = None) -> np.random.Generato
 
 @lru_cache
 def _words_of_name(seed: int, name: str) -> NDArray[np.uint32]:
-    """The words that ``SeedSequence(seed, spawn_key=name.encode())`` mixes; an array is several times faster."""
+    """The words that ``SeedSequence(seed, spawn_key=name.encode())`` mixes; mixing an array is several times faster."""
     words = _words(seed)
     return np.array([*words, *[0] * (4 - len(words)), *name.encode()], dtype=np.uint32)
 
@@ -60,7 +60,7 @@ def check_vector(name: str, value: ArrayLike, dim: int, hint: str = "") -> Array
         ValueError: anything but real numbers (complex numbers, text, True and False, dates, masked arrays), another
             last axis, or an entry that is NaN, infinite or so large that squared distances may overflow.
     """
-    # Nearly all calls end here: with a number above 1e100, infinite or NaN the sum of squares is larger, or NaN.
+    # Nearly all calls end here. If a number is above 1e100, infinite or NaN, the sum of squares is larger, or NaN.
     if type(value) is np.ndarray and value.dtype == np.float64 and value.shape[-1:] == (dim,):
         with_itself = np.vdot(value, value)
         if with_itself < 1e199:
@@ -77,7 +77,7 @@ def check_vector(name: str, value: ArrayLike, dim: int, hint: str = "") -> Array
     if array.ndim == 0 or array.shape[-1] != dim:
         raise ValueError(f"{name} must have shape (..., {dim}), got {array.shape}{hint}")
     array = array.astype(np.float64, copy=False)
-    usable = np.abs(array) <= _LARGEST  # NaN is not
+    usable = np.abs(array) <= _LARGEST  # False for NaN
     if not usable.all():
         raise ValueError(f"{name} must be finite and within +-{_LARGEST:g}, but {first_entry(array, ~usable)}{hint}")
     return array
@@ -87,7 +87,7 @@ def check_point(name: str, value: ArrayLike, dim: int, hint: str = "") -> Array:
     """``value`` as float64 of shape ``(dim,)``: one context, theta, goal or outcome.
 
     Raises:
-        ValueError: see `check_vector`; or several points.
+        ValueError: as `check_vector`, or ``value`` holds several points.
     """
     array = check_vector(name, value, dim, hint)
     if array.ndim != 1:
@@ -96,7 +96,7 @@ def check_point(name: str, value: ArrayLike, dim: int, hint: str = "") -> Array:
 
 
 def check_count(name: str, value: object, least: int) -> int:
-    """``value`` as int, a whole number of at least ``least``, of Python or numpy.
+    """``value``, a whole number of Python or numpy that is ``least`` or more, as int.
 
     Raises:
         ValueError: any other value, True and False included.
@@ -118,7 +118,7 @@ def check_rng(rng: object) -> None:
 
 
 def first_entry(array: Array, wrong: NDArray[np.bool_]) -> str:
-    """The first ``wrong`` entry of ``array`` and the number of others, for an error message of one line."""
+    """The first ``wrong`` entry of ``array`` and the number of other wrong ones, for an error message of one line."""
     entries = np.argwhere(wrong)
     more = f" (and {len(entries) - 1} more)" if len(entries) > 1 else ""
     return f"entry {entries[0].tolist()} is {array[tuple(entries[0])]}{more}"
@@ -139,7 +139,7 @@ class Box:
         unit: unit of all dimensions, such as "m"; "" for none.
 
     Raises:
-        ValueError: corners of different shapes, not finite or not in order, or another number of names.
+        ValueError: corners of different shapes, not finite or not in order, or a wrong number of names.
     """
 
     low: Array
@@ -179,15 +179,15 @@ class Box:
         return self.high - self.low
 
     def axis(self, k: int, kind: str = "outcome") -> str:
-        """The name of dimension ``k``: "x (m)", or "outcome 0" without names."""
+        """The name of dimension ``k``: "x (m)", or "outcome 0" if there are no names."""
         return self.in_unit(self.names[k] if self.names else f"{kind} {k}")
 
     def in_unit(self, quantity: str) -> str:
-        """The quantity with its unit: "error (m)", or "error" without unit."""
+        """The quantity with its unit: "error (m)", or "error" if there is no unit."""
         return f"{quantity} ({self.unit})" if self.unit else quantity
 
     def amount(self, value: float, form: str = ".3g") -> str:
-        """The value with its unit: "0.12 m", or "0.12" without unit."""
+        """The value with its unit: "0.12 m", or "0.12" if there is no unit."""
         return f"{value:{form}} {self.unit}".rstrip()
 
     def sample(self, rng: np.random.Generator) -> Array:
@@ -220,7 +220,7 @@ class Box:
 
 @dataclass(frozen=True, eq=False)
 class Move:
-    """A proposed movement: ``theta`` ``(theta_dim,)`` for ``goal`` ``(outcome_dim,)``, None when babbling.
+    """A proposed movement ``theta`` ``(theta_dim,)`` for a ``goal`` ``(outcome_dim,)``, which is None when babbling.
 
     ``origin`` names the regime ("babble", "global", "local", "imitate"), for analysis only. Arrays are read-only
     copies.
@@ -236,7 +236,7 @@ class Move:
 
 class Estimate(NamedTuple):
     """The answer of an inverse model to a goal: ``theta`` ``(theta_dim,)``, and the exemplars behind it, ``thetas``
-    ``(k, theta_dim)`` with their ``outcomes`` ``(k, outcome_dim)``. ``context`` ``(context_dim,)`` is that of the goal.
+    ``(k, theta_dim)`` with their ``outcomes`` ``(k, outcome_dim)``. ``context`` ``(context_dim,)`` belongs to the goal.
     """
 
     theta: Array
@@ -269,7 +269,7 @@ class Demonstration:
         if len(shape) != 2 or np.shape(self.times) != shape[:1]:
             raise ValueError(
                 "a demonstration needs times (n_times,) and a trajectory (n_times, n_joints), got shapes "
-                f"{np.shape(self.times)} and {shape}; is one row missing, or transposed?"
+                f"{np.shape(self.times)} and {shape}; is a row missing, or the trajectory transposed?"
             )
         for name in ("context", "times", "trajectory", "outcome"):
             value = np.atleast_1d(getattr(self, name))
@@ -282,7 +282,7 @@ class Demonstration:
 @dataclass(frozen=True, eq=False)
 class Request:
     """A learner's request to the ``teacher`` of this name for a demonstration of ``goal`` ``(outcome_dim,)``, kept as a
-    read-only copy. ``strategy`` names the strategy that would use it, for analysis only."""
+    read-only copy. ``strategy`` names the strategy that would use the demonstration, for analysis only."""
 
     teacher: str
     goal: Array
@@ -308,8 +308,8 @@ class Episode:
         context: ``(context_dim,)``.
         move: movement of the learner; None if it rested.
         outcome: ``(outcome_dim,)``; None if the learner rested or the movement failed.
-        demonstration: demonstration just before the movement; None without one.
-        request: request just before the movement; None without one.
+        demonstration: demonstration just before the movement; None if there was none.
+        request: request just before the movement; None if there was none.
         reply: reply to the request: "shown", "nothing", "again" (shown before), "failed" or "timed out".
         failed: reason why the movement failed; "" if it did not.
     """
@@ -328,7 +328,7 @@ class Episode:
 
 
 def _own(new: Move | Demonstration | Request | Episode, *names: str) -> None:
-    """Replace arrays of a new object by read-only copies, so that later changes elsewhere do not reach it."""
+    """Replace arrays of a new object by read-only copies, so that later changes elsewhere do not change it."""
     for name in names:
         value = getattr(new, name)
         if value is not None:
@@ -347,7 +347,7 @@ Attempt = Generator[Move | None, Array, None]
 it."""
 
 AskingAttempt = Generator[Move | Request | None, Any, None]
-"""An attempt that may also yield a `Request`; it is then sent a `Lesson`, or None without a demonstration."""
+"""An attempt that may also yield a `Request`; it is then sent a `Lesson`, or None if no demonstration was given."""
 
 Search = Callable[[Estimate, Array], Generator[Array, Array, None]]
 """(start, goal) -> a generator of thetas that is sent their outcomes ``(outcome_dim,)``."""

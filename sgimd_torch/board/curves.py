@@ -1,4 +1,4 @@
-"""The curves of a board: numbers by tag, counted from episodes, evaluations and regions.
+"""The curves of a board: numbers with a tag each, computed from episodes, evaluations and regions.
 
 Interest and competence by region are those of section 3.2.1 of Nguyen & Oudeyer (2014).
     behaviour = Behaviour(0.02); behaviour.episode(episode); behaviour.curves(); of_regions(interest_map.regions)
@@ -17,9 +17,9 @@ from sgimd_torch.evaluation import Evaluation
 from sgimd_torch.goals.regions import Region
 from sgimd_torch.spaces import Array, Box, Episode
 
-DEPTH: Final = 3  # levels of the tree of regions, below the root, that have curves: 15 curves at most
-PLACES: Final = 4  # places that have a curve, at most: 2 x 2 in the plane
-_RECENT: Final = 50  # goals
+DEPTH: Final = 3  # number of levels below the root of the tree of regions that have curves, so at most 15 curves
+PLACES: Final = 4  # largest number of places that have a curve; 2 x 2 in the plane
+_RECENT: Final = 50  # number of last goals that count
 
 
 class Behaviour:
@@ -31,7 +31,7 @@ class Behaviour:
 
     def __init__(self, tolerance: float) -> None:
         self.tolerance = tolerance
-        self._since: Counter[str] = Counter()  # movements by regime and by strategy since the last point, by tag
+        self._since: Counter[str] = Counter()  # tag of a regime or strategy -> movements since the last point
         self._imitated: list[float] = []  # distances of imitations since the last point
         self._goal: Array | None = None
         self._missed_by: deque[float] = deque(maxlen=_RECENT)  # smallest distance for each goal
@@ -59,7 +59,7 @@ class Behaviour:
             self._missed_by[-1] = min(distance, self._missed_by[-1])
 
     def curves(self) -> dict[str, float]:
-        """Shares and means since the last call, counts since the first movement."""
+        """Shares and means since the last call, and counts since the first movement."""
         total = sum(n for tag, n in self._since.items() if tag.startswith("regime/"))
         values = {tag: n / total for tag, n in self._since.items()}
         self._since = Counter(dict.fromkeys(self._since, 0))  # a regime that was seen once keeps its curve
@@ -82,7 +82,7 @@ def of_evaluation(found: Evaluation, near: float, places: Mapping[str, NDArray[n
     Args:
         found: errors for n goals.
         near: distance, in the unit of T, at which a goal counts as met.
-        places: ``(n,)`` which goals lie in a place, by the name of the place.
+        places: mask ``(n,)`` of the goals that lie in each place, by the name of the place.
     """
     met = found.errors <= near
     return {
@@ -97,7 +97,7 @@ def of_evaluation(found: Evaluation, near: float, places: Mapping[str, NDArray[n
 
 
 def places_of(space: Box, goals: Array) -> dict[str, NDArray[np.bool_]]:
-    """The part of T where the goals of a benchmark lie, rounded outwards and cut into cells of equal size.
+    """Cells of equal size that divide the part of T where the goals of a benchmark lie, after rounding it outwards.
 
     So runs on one benchmark have the same places, however large their T is.
 
@@ -106,8 +106,8 @@ def places_of(space: Box, goals: Array) -> dict[str, NDArray[np.bool_]]:
         goals: ``(n, outcome_dim)``, in T.
 
     Returns:
-        ``(n,)`` which goals lie in a cell, by the name of the cell, such as "x -1..0 y 0..1"; cells without goals are
-        left out. A dimension without a name is "t0", "t1" and so on. No cells if T has three dimensions or more.
+        Mask ``(n,)`` of the goals in each cell, by the name of the cell, such as "x -1..0 y 0..1". Cells without goals
+        are left out; a T of three dimensions or more has no cells. Dimensions without names are called "t0", "t1", ...
     """
     per_side = int(PLACES ** (1 / space.dim))
     if per_side == 1:
@@ -129,7 +129,7 @@ def places_of(space: Box, goals: Array) -> dict[str, NDArray[np.bool_]]:
 
 
 def of_regions(regions: Sequence[Region]) -> dict[str, float]:
-    """Mean competence and mean interest over the goals that a region remembers, for each node of the tree of regions.
+    """Mean competence and mean interest of each node of the tree of regions, over the goals that its regions remember.
 
     The ``regions`` are the leaves of the tree. A node without goals has no curve.
     """
@@ -143,7 +143,7 @@ def of_regions(regions: Sequence[Region]) -> dict[str, float]:
 
 
 def branches(regions: Sequence[Region]) -> Mapping[str, list[Region]]:
-    """The leaves below each node of the tree of regions, by the path of the node, sorted; ``DEPTH`` levels.
+    """The leaves below each node of the tree of regions, down to level ``DEPTH``, by the node's path; paths are sorted.
 
     The cells of a `ProgressGrid`, such as "R.3.7", lie below "R" alone.
     """

@@ -2,8 +2,8 @@
 
     file = EventFile(folder); file.add(50, summary.scalar("error/mean", 0.2)); file.begin(); file.close()
 
-``summary`` is ``tensorboardX.summary``. The library's `SummaryWriter` writes in a thread, where a full disk would not
-stop the run, so this file uses the `EventsWriter` below it.
+``summary`` is ``tensorboardX.summary``. Its `SummaryWriter` writes in a thread, where a full disk would not stop
+the run, so this module uses the `EventsWriter` on which `SummaryWriter` is built.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from tensorboardX.proto.summary_pb2 import Summary
 
 
 class EventFile:
-    """Summaries wait in memory until ``begin``, which replaces the earlier event files of the ``folder``."""
+    """An event file: summaries wait in memory until ``begin``, which replaces earlier event files of the ``folder``."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -26,7 +26,7 @@ class EventFile:
         self._writer: EventsWriter | None = None
 
     def begin(self) -> None:
-        """Write what waits into a new file, then remove the earlier ones.
+        """Write the waiting summaries into a new file, then remove the earlier files.
 
         The new file has a name of its own, because a TensorBoard that is open does not read a known name again.
 
@@ -56,6 +56,6 @@ class EventFile:
             self._writer.flush()
 
     def close(self) -> None:
-        """Flush and close; if the replay was not over, the earlier event files stay."""
+        """Flush and close the file; if ``begin`` was not called, the earlier event files stay."""
         if self._writer is not None:
             self._writer.close()

@@ -23,8 +23,8 @@ from sgimd_torch.board.pictures import draw
 from sgimd_torch.evaluation import Benchmark, Evaluation
 from sgimd_torch.spaces import Box, Episode
 
-EVERY: Final = 50  # movements from one point of a curve to the next
-METRIC: Final = "error/mean"  # on TensorBoard's page of hyperparameters
+EVERY: Final = 50  # number of movements from one point of a curve to the next
+METRIC: Final = "error/mean"  # tag of the result on TensorBoard's page of hyperparameters
 
 
 class BoardListener(EventFile):
@@ -32,7 +32,7 @@ class BoardListener(EventFile):
 
     Args:
         folder: folder of the run; its event files stay as they are until ``begin``, the end of a replay.
-        parts: parts of the run; read are config, environment, learner and benchmark.
+        parts: parts of the run, of which config, environment, learner and benchmark are used.
         seconds: function that returns the seconds spent so far, by part of the run.
         curves: function that returns new numbers of other listeners, by tag.
     """
@@ -52,12 +52,12 @@ class BoardListener(EventFile):
         self._behaviour = Behaviour(parts.learner.problem.tolerance)
         self._movements = self._drawn_at = 0
         self._explained: set[str] = set()
-        for each in summary.hparams(hparams_of(parts.config), {METRIC: math.nan})[:2]:  # the last tells how it ended
+        for each in summary.hparams(hparams_of(parts.config), {METRIC: math.nan})[:2]:  # the third reports the end
             self.add(0, each)
         self.add(0, summary.text("about/legend", page(self._space.unit)))
 
     def episode(self, episode: Episode, replayed: bool) -> None:
-        """Count a movement; every 50th gives the curves a point. Replayed movements have no times."""
+        """Count a movement; every 50th movement gives the curves a point. Replayed movements have no times."""
         self._movements = episode.index + 1
         self._behaviour.episode(episode)
         if self._movements % EVERY == 0:
@@ -67,7 +67,7 @@ class BoardListener(EventFile):
         self._scalars(self._curves())
 
     def evaluated(self, movements: int, found: Mapping[str, Evaluation]) -> None:
-        """Show an evaluation; of inverse models other than the run's own, only the mean error.
+        """Show an evaluation; for inverse models other than the run's own, show only the mean error.
 
         Pictures take as long as 100 movements, so they are drawn when the number of movements has doubled, and at the
         end.
@@ -81,7 +81,7 @@ class BoardListener(EventFile):
                 self._show(tag, summary.image(tag, picture, dataformats="HWC"), "images")
 
     def curves(self) -> Mapping[str, float]:
-        """Nothing: the board draws what others tell."""
+        """Nothing, because the board draws the numbers of other listeners."""
         return {}
 
     def _scalars(self, values: Mapping[str, float]) -> None:
@@ -91,7 +91,7 @@ class BoardListener(EventFile):
                 self._show(tag, summary.scalar(tag, value), "scalars")
 
     def _show(self, tag: str, made: Any, plugin: str) -> None:
-        """Add what tensorboardX has ``made`` for a page of TensorBoard, ``plugin``; the first explains its tag."""
+        """Add a summary ``made`` for TensorBoard's page ``plugin``; the first summary of a tag explains the tag."""
         if tag not in self._explained:
             self._explained.add(tag)
             made.value[0].metadata.summary_description = sentence(tag, self._space.unit)
@@ -103,7 +103,7 @@ def hparams_of(config: Any) -> dict[str, bool | float | str]:
     """Options that tell a run from others, for TensorBoard's page of hyperparameters, by their names on a command line.
 
     These are algorithm, environment, seed, options of parts that differ from their defaults, and options in the name of
-    a variant, such as "sgim-d,budget=5": so each run of a sweep has all options that the sweep varies.
+    a variant, such as "sgim-d,budget=5". So each run of a sweep has all options that the sweep varies.
     """
     varied = re.findall(r"(?:^|,)([\w.-]+)=", config.variant)
     typed = {name.replace("_", "-"): value for name, value in config.settings.items()}

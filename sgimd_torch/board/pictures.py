@@ -22,20 +22,20 @@ from sgimd_torch.figures.sections import Section, sections
 from sgimd_torch.goals.regions import Region
 from sgimd_torch.spaces import Array, Box
 
-SHARE: Final = 0.15  # of the longest side of T: the error at the end of the colours, the same for all runs
-NARROW: Final = 0.2  # of the side of the picture; the name of a narrower region stands upright
-WIDE: Final = 2.5  # inches, of the axes of a picture; beside them is the colour bar
-MARGIN: Final = 0.7  # inches, above and below the axes together
-STYLE: Any = {"font.size": 10, "axes.titlesize": 10}  # readable in the small pictures of the page Time Series
+SHARE: Final = 0.15  # error at the end of the colours, as a share of T's longest side; it is the same for all runs
+NARROW: Final = 0.2  # share of the picture's side; the name of a narrower region is turned by 90 degrees
+WIDE: Final = 2.5  # width (inches) of the axes of a picture, without the colour bar
+MARGIN: Final = 0.7  # height (inches) of the space above and below the axes together
+STYLE: Any = {"font.size": 10, "axes.titlesize": 10}  # sizes that are readable on the page Time Series
 
 
 def draw(regions: Sequence[Region], space: Box, goals: Array, errors: Array) -> dict[str, NDArray[np.uint8]]:
-    """The pictures by tag, ``(height, width, 4)``; of a T of more than two dimensions, pairs side by side.
+    """The pictures ``(height, width, 4)`` by tag; if T has more than two dimensions, they show pairs side by side.
 
     Args:
-        regions: regions of the goal model; without any, there is no picture of them.
+        regions: regions of the goal model; without regions, there is no picture of them.
         space: T.
-        goals: ``(n, outcome_dim)`` of the benchmark.
+        goals: ``(n, outcome_dim)`` goals of the benchmark.
         errors: ``(n,)``, in the unit of T.
     """
     pictures: dict[str, Callable[[Axes, Section], object]] = {}
@@ -48,11 +48,11 @@ def draw(regions: Sequence[Region], space: Box, goals: Array, errors: Array) -> 
 def _errors(ax: Axes, goals: Array, errors: Array, space: Box, section: Section) -> None:
     ax.set_title(f"{len(errors)} benchmark goals, mean error {space.amount(float(errors.mean()), '.3f')}")
     misses(ax, goals, errors, space, section, SHARE * float(space.sides.max()))
-    ax.autoscale()  # where the goals are, even in a large space
+    ax.autoscale()  # limits around the goals, even in a large space
 
 
 def _competence(ax: Axes, regions: Sequence[Region], section: Section) -> None:
-    """The regions, coloured by competence; those that have curves are framed and named."""
+    """The regions, coloured by competence; regions that have curves are framed and named."""
     lows, highs = np.stack([region.low for region in regions]), np.stack([region.high for region in regions])
     means = [region.competences.mean() if len(region.goals) else np.nan for region in regions]
     competence_map(ax, lows, highs, np.array(means), section)
@@ -61,7 +61,7 @@ def _competence(ax: Axes, regions: Sequence[Region], section: Section) -> None:
     named, sides = branches(list(rows)), np.ptp([lows.min(axis=0), highs.max(axis=0)], axis=0)
     for path, leaves in named.items():
         if {f"{path}0", f"{path}1"} & named.keys():
-            continue  # its parts have names of their own
+            continue  # the parts of this region have names of their own
         among = [rows[region] for region in leaves]
         low, high = lows[among].min(axis=0), highs[among].max(axis=0)
         ax.add_patch(Rectangle((low[0], low[1]), *(high - low), fill=False, edgecolor="black", linewidth=1.6))
@@ -73,13 +73,13 @@ def _competence(ax: Axes, regions: Sequence[Region], section: Section) -> None:
 
 
 def _pixels(picture: Callable[[Axes, Section], object], shown: Sequence[Section]) -> NDArray[np.uint8]:
-    """A picture, as large as TensorBoard shows it; the sections side by side."""
+    """A picture with its sections side by side, as large as TensorBoard shows it."""
     size = (4.2 * len(shown), shown[0].height(WIDE) + MARGIN)
     with rc_context(STYLE):
         figure = Figure(size, dpi=120, layout="constrained")
         for ax, section in zip(figure.subplots(1, len(shown), squeeze=False).flat, shown, strict=True):
             picture(ax, section)
         canvas: Any = FigureCanvasAgg(figure)
-        figure.draw_without_rendering()  # the layout needs two passes, one cuts labels off
+        figure.draw_without_rendering()  # the layout needs two passes; a single pass cuts labels off
         canvas.draw()
         return np.asarray(canvas.buffer_rgba())

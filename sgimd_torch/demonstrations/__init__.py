@@ -1,6 +1,6 @@
 """Demonstrations on disk: recorded joint trajectories, their times and outcomes.
 
-They are one ``.npz`` file without pickle. The n recordings may differ in length, and are stored end to end:
+They lie in one ``.npz`` file without pickle. The n recordings may differ in length, and follow each other:
     version          ()                   1
     lengths          (n,) int             number of samples of each recording, at least 2
     times            (sum,) s             increasing within each recording
@@ -52,14 +52,14 @@ def load_demonstrations(
     outcome_dim: int | None = None,
     context_dim: int | None = None,
 ) -> list[Demonstration]:
-    """Read demonstrations; by default the shipped ones of the (simulated) human demonstrator 3.
+    """Read demonstrations; by default the shipped demonstrations of demonstrator 3, a (simulated) human.
 
     Args:
         path: ``.npz`` file in the format above.
-        n_joints, outcome_dim, context_dim: dimensions of the robot; None accepts any.
+        n_joints, outcome_dim, context_dim: dimensions of the robot; None accepts any number.
 
     Raises:
-        ValueError: the file is none of this format, is empty or truncated, has times that do not increase or numbers
+        ValueError: the file has another format, is empty or truncated, has times that do not increase or numbers
             that are not finite, or is for another robot; the message names the file and the recording.
         OSError: there is no file, or it is a directory.
     """
@@ -103,7 +103,7 @@ def _check(source: str, fields: dict[str, Array]) -> None:
     if not len(fields["outcomes"]) == len(fields["contexts"]) == n:
         rows = f"{len(fields['outcomes'])} outcomes, {len(fields['contexts'])} contexts"
         raise ValueError(f"{source}: {n} recordings, but {rows}")
-    total = sum(lengths.tolist())  # a sum of numpy may overflow to a small number
+    total = sum(lengths.tolist())  # numpy's sum may overflow to a small number
     if not len(fields["times"]) == len(fields["trajectories"]) == total:
         rows = f"{len(fields['times'])} times, {len(fields['trajectories'])} postures"
         raise ValueError(f"{source}: lengths add up to {total} samples, but there are {rows}; is it truncated?")

@@ -1,4 +1,4 @@
-"""Recordings from tables with a row for each sample, whose columns the user names.
+"""Recordings from tables: each row holds a sample, and the user names the columns.
 
     columns = Columns(joints=("shoulder", "elbow"), outcome=("x", "y"))
     shown = read_csv("recordings", columns)              # a folder with a file for each recording, or one long table
@@ -29,12 +29,12 @@ class Columns:
     """Names of the columns of a table.
 
     Args:
-        joints: joint angles (rad) or commands, in the order that the robot's correspondence expects.
-        outcome: outcome of a recording, in its last row.
-        context: context of a recording, in its first row; empty without contexts.
-        time: time (s); a recording may begin at any time.
-        recording: number or name of the recording that a row belongs to; None if a table is one recording.
-        degrees: whether joints are in degrees, to be converted to rad.
+        joints: columns of joint angles (rad) or commands, in the order that the robot's correspondence expects.
+        outcome: columns of the outcome, read in the last row of a recording.
+        context: columns of the context, read in the first row of a recording; () for a robot without contexts.
+        time: column of the time (s); a recording may begin at any time.
+        recording: column with the number or name of the recording of a row; None if a table is one recording.
+        degrees: whether the table has joints in degrees; they are then converted to rad.
     """
 
     joints: tuple[str, ...]
@@ -49,7 +49,7 @@ class Columns:
             raise ValueError("name at least one column for joints and one for outcome")
         for name in self.names:
             if _NAME.fullmatch(name) is None:
-                raise ValueError(f"{name!r} is no column: write state, state[2] or state[0:6]")
+                raise ValueError(f"{name!r} does not name a column; write, for example, state, state[2] or state[0:6]")
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -59,7 +59,7 @@ class Columns:
 
     @property
     def plain(self) -> list[str]:
-        """All columns without the entries of vectors, each once."""
+        """All columns, each once, without the entries in brackets."""
         return list(dict.fromkeys(name.partition("[")[0] for name in self.names))
 
 
@@ -89,8 +89,8 @@ def recordings(source: str, table: Mapping[str, np.ndarray], columns: Columns) -
         columns: meaning of the columns.
 
     Raises:
-        ValueError: a vector lacks an entry, or a recording has fewer than two samples, rows that are apart, or times
-            that do not increase.
+        ValueError: a vector lacks an entry, or a recording has fewer than two samples, rows that are not adjacent, or
+            times that do not increase.
     """
     times = _values(source, table, (columns.time,))
     if times.shape[1] != 1:
@@ -102,7 +102,7 @@ def recordings(source: str, table: Mapping[str, np.ndarray], columns: Columns) -
     for what, rows in _groups(source, table, columns.recording, len(times)):
         since = times[rows, 0] - times[rows.start, 0]
         if len(since) < 2:
-            raise ValueError(f"{what} has 1 sample, at least 2 are needed; does {columns.recording} name rows?")
+            raise ValueError(f"{what} has 1 sample, but needs 2 or more; does {columns.recording} number the rows?")
         if not (np.diff(since) > 0).all():
             raise ValueError(f"{what}: {columns.time} must increase from row to row; were the rows shuffled?")
         found.append(Demonstration(contexts[rows.start], since, joints[rows], outcomes[rows.stop - 1]))
@@ -123,7 +123,7 @@ def _table(file: Path, names: Sequence[str]) -> dict[str, np.ndarray]:
         raise ValueError(f"{file} has no rows below the names of its columns")
     for number, row in enumerate(rows, 1):
         if len(row) != len(heads):
-            raise ValueError(f"{file}: row {number} has {len(row)} fields, {len(heads)} were wanted; is it cut short?")
+            raise ValueError(f"{file}: row {number} has {len(row)} fields instead of {len(heads)}; is it cut short?")
     return {name: np.array([row[heads.index(name)] for row in rows]) for name in names}
 
 
@@ -142,14 +142,14 @@ def _values(source: str, table: Mapping[str, np.ndarray], names: Sequence[str]) 
             first = int(match["first"])
             end = first + 1 if match["slice"] is None else int(match["end"] or vectors.shape[1])
             if not first < end <= vectors.shape[1]:
-                raise ValueError(f"{source}: {written} is not there, {match['name']} has {vectors.shape[1]} entries")
+                raise ValueError(f"{source}: there is no {written}: {match['name']} has {vectors.shape[1]} entries")
             vectors = vectors[:, first:end]
         parts.append(check_vector(f"{source}: {written}", vectors, vectors.shape[1]))
     return np.concatenate(parts, axis=1)
 
 
 def _groups(source: str, table: Mapping[str, np.ndarray], recording: str | None, n: int) -> list[tuple[str, slice]]:
-    """The name in errors and the rows of each recording, in order."""
+    """For each recording, in order, its name for error messages and its rows."""
     if recording is None:
         return [(source, slice(0, n))]
     names = table[recording].tolist()
@@ -157,7 +157,7 @@ def _groups(source: str, table: Mapping[str, np.ndarray], recording: str | None,
     found = [names[row] for row in starts]
     if len(set(found)) < len(found):
         twice = next(name for name in found if found.count(name) > 1)
-        raise ValueError(f"{source}: the rows of recording {twice} are apart; sort them by {recording} and time")
+        raise ValueError(f"{source}: the rows of recording {twice} are not adjacent; sort them by {recording} and time")
     return [
         (f"{source}: recording {names[row]}", slice(row, end))
         for row, end in zip(starts, [*starts[1:], n], strict=True)

@@ -1,4 +1,4 @@
-"""Does a demonstration fit a robot? How far its movement is from the recording, and which limits the recording leaves.
+"""Whether a demonstration fits a robot: its distance from the played movement, and the limits that it exceeds.
 
 Eq. (6) of Nguyen & Oudeyer (2014).    misfit_of(rod, theta_d, shown); beyond_limits(rod, shown)
 """
@@ -12,11 +12,11 @@ from sgimd_torch.spaces import Array, Demonstration
 
 
 def misfit_of(environment: Environment, theta: Array, shown: Demonstration) -> float:
-    """d of eq. (6), root mean square over time and joints of the played minus the recorded angles (rad) or commands.
+    """d of eq. (6): root mean square difference, over time and joints, of played and recorded angles (rad) or commands.
 
     Args:
-        environment: robot that plays theta; the misfit is NaN if it has no primitive.
-        theta: ``(theta_dim,)`` policy of the recording, by the correspondence.
+        environment: robot that plays theta; the misfit is NaN if the robot has no primitive.
+        theta: ``(theta_dim,)`` policy that the correspondence gives for the recording.
         shown: the recording.
     """
     played = primitive_of(environment).at(theta, shown.times - shown.times[0])
@@ -26,7 +26,7 @@ def misfit_of(environment: Environment, theta: Array, shown: Demonstration) -> f
 
 
 def beyond_limits(environment: Environment, shown: Demonstration) -> list[str]:
-    """A sentence for each limit of the robot that a recording leaves, as far as the limits are known."""
+    """A sentence for each known limit of the robot that a recording exceeds."""
     remarks, primitive = list[str](), primitive_of(environment)
     box = primitive.ranges
     if box is not None and shown.trajectory.ndim == 2 and shown.trajectory.shape[1] == box.dim:
@@ -34,11 +34,11 @@ def beyond_limits(environment: Environment, shown: Demonstration) -> list[str]:
         for joint in np.flatnonzero(outside.any(axis=0)):
             sample = int(outside[:, joint].argmax())
             found = f"joint {joint} is {shown.trajectory[sample, joint]:.3g} at sample {sample}"
-            remarks.append(f"{found}, its range [{box.low[joint]:g}, {box.high[joint]:g}]")
+            remarks.append(f"{found}, outside its range [{box.low[joint]:g}, {box.high[joint]:g}]")
     shortest, longest = primitive.durations
     lasts = float(shown.times[-1] - shown.times[0])
     if not shortest * (1 - 1e-9) <= lasts <= longest * (1 + 1e-9):
         remarks.append(f"too {'fast' if lasts < shortest else 'long'}: movements last {shortest:g} to {longest:g} s")
     if shown.outcome.shape == (environment.outcomes.dim,) and not environment.outcomes.contains(shown.outcome):
-        remarks.append("its outcome is outside T: it is imitated, but never a goal")
+        remarks.append("its outcome is outside T: a learner imitates it, but never takes it as a goal")
     return remarks

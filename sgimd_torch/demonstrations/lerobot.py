@@ -31,7 +31,7 @@ def read_lerobot(root: str | os.PathLike[str], columns: Columns) -> list[Demonst
 
     Args:
         root: folder of the dataset, with ``meta`` and ``data``.
-        columns: names of the features; ``time`` is usually ``timestamp``, ``recording`` is ``episode_index``.
+        columns: names of the features; ``time`` is usually ``timestamp``, ``recording`` usually ``episode_index``.
 
     Raises:
         ValueError: no dataset, another version, a missing feature, another number of episodes or frames than
@@ -42,7 +42,7 @@ def read_lerobot(root: str | os.PathLike[str], columns: Columns) -> list[Demonst
     info = _info(root / "meta" / "info.json")
     version = str(info.get("codebase_version"))
     if not version.startswith("v3."):
-        raise ValueError(f"{root} has format {version[:20]}, this library reads v3; lerobot itself converts older ones")
+        raise ValueError(f"{root} has format {version[:20]}, this library reads v3; lerobot converts older formats")
     missing = [name for name in columns.plain if name not in info.get("features", ())]
     if missing:
         raise ValueError(f"{root} has no feature {', '.join(missing)}; it has {', '.join(info.get('features', ()))}")
@@ -55,7 +55,7 @@ def read_lerobot(root: str | os.PathLike[str], columns: Columns) -> list[Demonst
     rows = len(table[columns.time])
     for what, said, read in (("frames", "total_frames", rows), ("episodes", "total_episodes", len(found))):
         if info.get(said) != read:
-            raise ValueError(f"{root} says {info.get(said)} {what}, {read} were found; is a file missing?")
+            raise ValueError(f"{root} says {info.get(said)} {what}, but {read} were found; is a file missing?")
     return found
 
 
@@ -77,4 +77,4 @@ def _columns(file: Path, names: list[str]) -> dict[str, np.ndarray]:
         table = pyarrow.parquet.read_table(file, columns=names, page_checksum_verification=True)
         return {name: np.array(table.column(name).to_pylist()) for name in names}
     except (pyarrow.ArrowException, OSError, ValueError, KeyError) as error:  # ValueError: vectors differ in length
-        raise ValueError(f"{file} cannot be read: {str(error)[:200]}; is it whole, with all of {names}?") from error
+        raise ValueError(f"{file} cannot be read: {str(error)[:200]}; is it whole, with columns {names}?") from error

@@ -1,6 +1,6 @@
-"""A check of every promise of `Environment` on a real one; each broken promise is named with its likely cause.
+"""A check whether an environment keeps each promise of `Environment`; it names each broken promise and a likely cause.
 
-check_environment(Toss())        # ValueError with a line for each slip; ``sgimd check toss:Toss`` prints them
+check_environment(Toss())        # ValueError with a line for each broken promise; ``sgimd check toss:Toss`` prints it
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from sgimd_torch.environments.protocol import BatchEnvironment, Environment, check_instance, check_robot
 from sgimd_torch.spaces import Array, Box, check_count, stream
 
-_FACTOR: Final = 10.0  # largest ratio of the announced noise to the measured one; a wrong unit gives a larger one
+_FACTOR: Final = 10.0  # largest ratio between announced and measured noise; a wrong unit gives a larger ratio
 Movements = Sequence[tuple[Array, Array]]
 
 
@@ -26,8 +26,8 @@ def check_environment(environment: Environment, *, movements: int = 3) -> None:
         movements: number of random movements to try, besides two corners of Pi.
 
     Raises:
-        ValueError: a line for each slip: what was found, what was wanted, the likely cause. Promises that depend on
-            a broken one are not checked, so a second check may find more.
+        ValueError: a promise is broken; a line for each says what was found, what was expected, and the likely cause.
+            Promises that depend on a broken promise are not checked, so a second check may find more.
     """
     check_count("movements", movements, 1)
     if isinstance(environment, type):
@@ -49,7 +49,7 @@ def check_environment(environment: Environment, *, movements: int = 3) -> None:
 
 
 class _RaisedError(Exception):
-    """A member of the environment raised what it should not raise."""
+    """A member of the environment raised an error where none is allowed."""
 
 
 def _movements(environment: Environment, n: int) -> Movements:
@@ -109,7 +109,7 @@ def _outcomes(environment: Environment, tried: Movements) -> Iterator[str]:
             yield wrong
             return
         if not np.isfinite(outcome).all():
-            yield f"execute() gave {_text(outcome)} for theta {_text(theta)}; raise SimulationError where it diverges"
+            yield f"execute() gave {_text(outcome)} for theta {_text(theta)}; raise SimulationError if it diverges"
             return
         for name, given, now in zip(("context", "theta"), (context, theta), arguments, strict=True):
             if not np.array_equal(given, now):
@@ -122,7 +122,7 @@ def _repeats(environment: Environment, tried: Movements) -> Iterator[str]:
     context, theta = tried[0]
     before, rng = _global_streams(), stream(1, "execute")
     untouched = rng.bit_generator.state
-    _call(environment, "execute", context, theta, stream(1, "execute"))  # the next two then follow the same one
+    _call(environment, "execute", context, theta, stream(1, "execute"))  # the next two then follow an equal call
     first = _call(environment, "execute", context, theta, rng)
     kept, again = first.copy(), _call(environment, "execute", context, theta, stream(1, "execute")).copy()
     if _global_streams() != before:
@@ -150,11 +150,11 @@ def _noise(environment: Environment, tried: Movements) -> Iterator[str]:
     pairs = [[_call(environment, "execute", *each, stream(k, "execute")).copy() for k in (1, 2)] for each in tried]
     found = float(np.sqrt(np.mean([np.square(one - other) / 2 for one, other in pairs])))
     if not announced and found:
-        yield f"outcome_noise is 0, but outcomes of a movement scatter by about {found:.2g}; announce that"
+        yield f"outcome_noise is 0, but outcomes of a movement scatter by about {found:.2g}; announce this value"
     elif announced and not found:
         yield f"outcome_noise is {announced:g}, but no movement scatters; does execute() use its rng?"
     elif announced and not announced / _FACTOR <= found <= announced * _FACTOR:
-        yield f"outcome_noise is {announced:g}, but outcomes of a movement scatter by {found:.2g}; in other units?"
+        yield f"outcome_noise is {announced:g}, but outcomes of a movement scatter by {found:.2g}; a wrong unit?"
 
 
 def _batches(environment: Environment, tried: Movements) -> Iterator[str]:
@@ -182,7 +182,7 @@ def _batches(environment: Environment, tried: Movements) -> Iterator[str]:
     if not np.array_equal(together, kept):
         yield _used_twice("execute_many()")
     if not np.array_equal(last, kept[-1:]):
-        yield "a row of execute_many() depends on the others in its batch; must they be of one length?"
+        yield "a row of execute_many() depends on other rows of its batch; must all movements have one length?"
 
 
 def _refusals(environment: Environment, tried: Movements) -> Iterator[str]:
@@ -197,7 +197,7 @@ def _refusals(environment: Environment, tried: Movements) -> Iterator[str]:
                     continue
                 found = found.format("refused") + f" without naming it ({error})"
             except (Exception, SystemExit) as error:
-                found = found.format("failed at") + f" with {type(error).__name__}, a ValueError was wanted"
+                found = found.format("failed at") + f" with {type(error).__name__} instead of ValueError"
             else:
                 found = found.format("accepted")
             yield f"{found}; begin with context, theta = check_movement(self, context, theta)"
@@ -226,7 +226,7 @@ def _misshapen(what: str, value: Any, *shape: int) -> str | None:
         hint = "is its return missing?" if value is None else "np.array([x]) makes one"
         return f"{what} must give an array of shape {shape}, got {type(value).__name__}; {hint}"
     if value.shape != shape or value.dtype != np.float64:
-        hint = "is it called with one movement?" if value.ndim != len(shape) else "was an axis forgotten, or a dtype?"
+        hint = "is it called with one movement?" if value.ndim != len(shape) else "was an axis or a dtype forgotten?"
         return f"{what} must give float64 of shape {shape}, got {value.dtype} {value.shape}; {hint}"
     return None
 

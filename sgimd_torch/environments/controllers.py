@@ -1,7 +1,7 @@
-"""Controllers turn a theta into a sequence of commands; here, a sinusoid for each joint.
+"""Controllers turn a theta into a sequence of commands; the controller here plays a sinusoid for each command.
 
 A controller has ``policies``, its Pi, and ``at(theta, times)``, the commands. `GaussianPrimitive` has both, too, so it
-can replace `Sinusoids`. Both translate a recording by ``correspondence``, eq. (6) of Nguyen & Oudeyer (2014).
+can replace `Sinusoids`. Both classes translate a recording by ``correspondence``, eq. (6) of Nguyen & Oudeyer (2014).
     swim = Sinusoids(actions, frequencies=(0.2, 2.0)); commands = swim.at(theta, times)
 """
 
@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike
 from sgimd_torch.environments.protocol import Primitive, check_recording
 from sgimd_torch.spaces import Array, Box
 
-_GRID: Final = 200  # frequencies to try; the best one is then refined
-STEER: Final = 0.5  # largest offset, in half ranges of the command
+_GRID: Final = 200  # number of frequencies to try; the best frequency is then refined
+STEER: Final = 0.5  # largest offset, relative to half the range of the command
 
 
 class Controller(Protocol):
@@ -33,7 +33,7 @@ class Controller(Protocol):
 
 
 class Sinusoids(Primitive):
-    """One sinusoid for each command: amplitude, phase and offset; all share one frequency.
+    """One sinusoid for each command, with an amplitude, a phase and an offset; all sinusoids share one frequency.
 
     theta in [0, 1]^(3 n_commands + 1) holds amplitude, phase and offset command by command, then the frequency. An
     amplitude of 1 is half the range of the command; an offset moves the middle by at most a quarter of the range.
@@ -44,7 +44,7 @@ class Sinusoids(Primitive):
         frequencies: lowest and highest frequency (Hz).
 
     Raises:
-        ValueError: frequencies that are not 0 < lowest < highest.
+        ValueError: frequencies that do not satisfy 0 < lowest < highest.
     """
 
     def __init__(self, commands: Box, frequencies: tuple[float, float]) -> None:
@@ -65,8 +65,8 @@ class Sinusoids(Primitive):
     def correspondence(self, times: ArrayLike, trajectory: ArrayLike) -> Array:
         """theta_d, the policy whose commands come nearest to the recorded ones, eq. (6).
 
-        The frequency is the best of a grid, then refined; for a fixed frequency the fit is linear. It is exact if no
-        command was clipped.
+        The frequency is the best of a grid, then refined; for a fixed frequency the fit is linear. The fit is exact if
+        no command was clipped.
 
         Args:
             times: ``(n_times,)`` s, increasing.

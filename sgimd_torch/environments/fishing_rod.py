@@ -1,8 +1,8 @@
 """The fishing rod: a six-joint arm casts a float on the water, simulated by MuJoCo.
 
 Section 4 of Nguyen & Oudeyer (2014); the model is ``fishing_rod.xml``. A movement is open loop, so all its commands,
-noise included, are computed first and then simulated by ``rod_physics.py``. If the float has not met the water ``HOLD``
-seconds after the end of the movement, the line is let out.
+noise included, are computed first, and then ``rod_physics.py`` simulates them. If the float has not met the water
+``HOLD`` seconds after the end of the movement, the line is let out.
     outcome = FishingRod().execute(context, theta, rng)
 """
 
@@ -26,12 +26,12 @@ if TYPE_CHECKING:
 MODEL = Path(__file__).with_name("fishing_rod.xml")
 JOINTS = ("yaw", "shoulder", "elbow", "forearm_roll", "wrist_pitch", "wrist_yaw")
 JOINT_RANGES = Box(np.array([-1.6, 0.1, -1.2, -0.6, -0.4, -1.4]), np.array([1.6, 1.5, 0.8, 0.6, 1.4, 1.4]))  # rad
-DURATIONS = (0.8, 1.6)  # s, of a movement
-HOLD = 0.15  # s from the last posture to letting out the line
-CORRELATION = 0.96  # of the motor noise between two steps
+DURATIONS = (0.8, 1.6)  # s, shortest and longest movement
+HOLD = 0.15  # time (s) from the last posture until the line is let out
+CORRELATION = 0.96  # correlation of the motor noise between two steps
 LONGEST = 60.0  # s, the longest recording that can be replayed
 
-_BLOCK = 32  # movements side by side; small blocks need little memory, and Ctrl-C works between two blocks
+_BLOCK = 32  # number of movements side by side; small blocks need little memory, and Ctrl-C works between blocks
 
 
 class FishingRod:
@@ -43,9 +43,9 @@ class FishingRod:
     Args:
         noise: motor noise (s): standard deviation of the command (rad) for each rad/s of commanded speed; 0 for none.
         outcomes: T, the task space (m); [-1, 1]^2 in the paper, [-100, 100]^2 in its large-space experiment.
-        max_wind: largest force (N) of a side wind on the float, the context; 0 for no wind and no context. The float
-            weighs 0.2 N.
-        line: length of the line, in units of the paper's 0.42 m; above 0 and below 2.
+        max_wind: largest force (N) of a side wind on the float, which weighs 0.2 N; 0 for no wind. The force is the
+            context; without wind the context is empty.
+        line: length of the line, relative to the paper's 0.42 m; above 0 and below 2.
         threads: number of threads of ``execute_many``; None for one per core.
 
     Raises:
@@ -68,18 +68,18 @@ class FishingRod:
             if not (np.isfinite(value) and value >= 0):
                 raise ValueError(f"{name} must be finite and >= 0, got {value}")
         if not 0 < line < 2:
-            raise ValueError(f"line must be above 0 and below 2, got {line}; a longer one hangs in the water")
+            raise ValueError(f"line must be above 0 and below 2, got {line}; a longer line hangs in the water")
         self.noise = noise
         self.primitive = GaussianPrimitive(JOINT_RANGES, DURATIONS, sharpness=6.0)
         self.policies = self.primitive.policies
         self.outcomes = Box.cube(-1.0, 1.0, 2, names=("x", "y"), unit="m") if outcomes is None else outcomes
-        self.outcome_noise = 1.15 * noise  # m for each s, see scripts/check_physics.py
+        self.outcome_noise = 1.15 * noise  # 1.15 m for each s of motor noise, see scripts/check_physics.py
         windy = max_wind > 0
         self.contexts = Box.cube(-max_wind, max_wind, int(windy), names=("wind (N)",) * windy)
         threads = None if threads is None else check_count("threads", threads, 1)
         self._caster = Caster(MODEL, (JOINT_RANGES.low + JOINT_RANGES.high) / 2, threads, line=line)
         self.model = self._caster.model
-        self._draws = len(self._times(DURATIONS[1] + HOLD))  # of the motor noise per joint
+        self._draws = len(self._times(DURATIONS[1] + HOLD))  # number of draws of the motor noise per joint
         self.rest = self.outcomes.check("rest, below the hanging float,", self._caster.hanging[:2].copy(), "is T in m?")
         self.rest.flags.writeable = False
 
@@ -123,7 +123,7 @@ class FishingRod:
         return outcomes
 
     def trace(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> RodTrace:
-        """Run one movement and keep every step, for films; it takes twice as long as ``execute``."""
+        """Run one movement and keep every step, for films; this takes twice as long as ``execute``."""
         context, theta = check_movement(self, context, theta)
         commands, end = self._commands(theta, rng), self.primitive.duration(theta) + HOLD
         outcome = self._cast(context[None], theta[None], [commands], np.array([end]))[0]
@@ -169,7 +169,7 @@ class FishingRod:
         return landings
 
     def _times(self, end: float) -> Array:
-        """Times (s) of the commands up to ``end`` and of one more, as sensors show the state *before* each step."""
+        """Times (s) of all commands up to ``end`` and one more, as sensors show the state *before* each step."""
         step = self._caster.timestep
         return step * np.arange(math.ceil(end / step) + 1, dtype=np.float64)
 
@@ -180,7 +180,7 @@ class FishingRod:
         trajectory = self.primitive.at(theta, times)
         if not self.noise:
             return trajectory
-        from scipy.signal import lfilter  # takes longer to import than this whole library
+        from scipy.signal import lfilter  # its import takes longer than that of this whole library
 
         # Short and long movements draw equally often, so that the stream continues in the same way after both.
         draws = rng.standard_normal((self._draws, len(JOINTS)))[: len(times)]

@@ -1,4 +1,4 @@
-"""Gymnasium environments with continuous actions as environments of ours; a movement is an episode.
+"""Gymnasium environments with continuous actions as environments of this library; a movement is an episode.
 
 theta holds the parameters of a controller, which gives the actions; the outcome is a function of the observations.
     actions = Box(world.action_space.low, world.action_space.high)
@@ -26,10 +26,10 @@ except ImportError as error:
 
 
 class FromGymnasium:
-    """An environment of ours that plays episodes of a gymnasium environment.
+    """An environment of this library that plays episodes of a gymnasium environment.
 
     Each episode is reset with a seed drawn from ``rng``, so the randomness of the reset is the noise. Only one thread
-    at a time may use the environment. A warning of MuJoCo raises ``SimulationError``, as MuJoCo has reset its state.
+    at a time may use the environment. A warning of MuJoCo raises ``SimulationError``, as MuJoCo then resets its state.
 
     Args:
         world: gymnasium environment with a Box of actions, with or without wrappers.
@@ -39,7 +39,7 @@ class FromGymnasium:
         outcome_noise: standard deviation of the outcomes of one movement, per dimension; see `measured_noise`.
         steps: largest number of actions of an episode; the world may end it earlier.
         outcome: (observations of an episode, the first included) -> ``(outcome_dim,)``.
-        dt: time between two actions (s); None for ``dt`` of the world, which worlds of MuJoCo have.
+        dt: time between two actions (s); None for the ``dt`` of the world, if it has one, as in MuJoCo.
 
     Raises:
         ValueError: no Box of actions, no ``dt``, or ``rest`` outside T.
@@ -61,7 +61,7 @@ class FromGymnasium:
             raise ValueError(f"needs continuous actions, a gymnasium Box of one axis, got {world.action_space}")
         dt = getattr(world.unwrapped, "dt", None) if dt is None else dt
         if dt is None or not 0 < dt < np.inf:
-            raise ValueError(f"needs dt > 0, seconds between two actions, got {dt}; this world has none")
+            raise ValueError(f"needs dt > 0, the seconds between two actions, got {dt}; has the world no dt?")
         self.world, self.controller, self._actions = world, controller, world.action_space
         self.primitive = controller if isinstance(controller, Primitive) else Primitive()
         self.policies, self.outcomes = controller.policies, outcomes
@@ -75,7 +75,7 @@ class FromGymnasium:
         self._outcome = outcome
 
     def observe(self, rng: np.random.Generator) -> Array:
-        """``(0,)``, as the start of an episode is noise."""
+        """``(0,)``, an empty context, because the random start of an episode counts as noise."""
         return self.contexts.sample(rng)
 
     def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
@@ -100,7 +100,7 @@ class FromGymnasium:
         actions = check_vector("actions", actions, self._actions.shape[0])
         if actions.ndim != 2 or not 0 < len(actions) <= self.steps:
             raise ValueError(
-                f"needs 1 to {self.steps} actions in rows, got shape {actions.shape}; was it recorded longer?"
+                f"needs 1 to {self.steps} actions in rows, got shape {actions.shape}; was the recording longer?"
             )
         return self._play(actions, stream(0, "replay"), actions[-1])
 
@@ -124,7 +124,7 @@ class FromGymnasium:
 
 
 def measured_noise(environment: FromGymnasium, rng: np.random.Generator, *, movements: int = 20) -> float:
-    """The true ``outcome_noise``: root mean square over random movements, each executed three times."""
+    """The measured ``outcome_noise``: root mean square deviation over random movements, each executed three times."""
     variances = []
     for _ in range(movements):
         context, theta = environment.observe(rng), environment.policies.sample(rng)

@@ -1,8 +1,8 @@
 """Motor primitives and the correspondence problem: from theta to joint trajectories, and back.
 
-Section 4.1 of Nguyen & Oudeyer (2014). Each joint has four knots, its positions at 0, delta/3, 2 delta/3 and delta; a
-trajectory is their Gaussian distance weighting (eq. 5). A demonstrated trajectory is translated to the theta that
-reproduces it most closely (eq. 6).
+Section 4.1 of Nguyen & Oudeyer (2014). Each joint has four knots, its positions at 0, delta/3, 2 delta/3 and delta; the
+trajectory is a Gaussian distance weighting of the knots (eq. 5). A demonstrated trajectory is translated to the theta
+that reproduces it most closely (eq. 6).
     times, trajectory = primitive.trajectory(theta); theta_d = primitive.correspondence(times_d, trajectory_d)
 """
 
@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from sgimd_torch.environments.protocol import Primitive, check_recording
 from sgimd_torch.spaces import Array, Box
 
-KNOTS: Final = 4  # per joint
+KNOTS: Final = 4  # number of knots per joint
 
 
 class GaussianPrimitive(Primitive):
@@ -30,7 +30,7 @@ class GaussianPrimitive(Primitive):
         sharpness: factor s in sigma = s / delta^2. Below 5 the fit is ill-conditioned, above 12 movements are jerky.
 
     Raises:
-        ValueError: durations that are not 0 < shortest < longest, or sharpness not above 0.
+        ValueError: durations that do not satisfy 0 < shortest < longest, or a sharpness that is not above 0.
     """
 
     def __init__(self, joints: Box, durations: tuple[float, float], *, sharpness: float = 9.0) -> None:
@@ -42,7 +42,7 @@ class GaussianPrimitive(Primitive):
         self.durations = durations
         self.sharpness = sharpness
         self.policies = Box.cube(0.0, 1.0, joints.dim * KNOTS + 1)
-        self._centres = np.arange(KNOTS) / (KNOTS - 1)  # of the knots, as parts of the duration
+        self._centres = np.arange(KNOTS) / (KNOTS - 1)  # times of the knots, as shares of the duration
 
     def duration(self, theta: Array) -> float:
         """delta (s) of one ``(theta_dim,)`` theta."""
@@ -72,11 +72,11 @@ class GaussianPrimitive(Primitive):
     def fastest(self) -> tuple[Array, Array]:
         """``(n_joints,)`` rad/s and rad/s^2: the largest speeds and accelerations that any theta commands.
 
-        They occur at the shortest duration, with each knot at the end of its range that increases them.
+        They occur at the shortest duration, if each knot lies at that end of its range which increases them.
         """
         phases = np.linspace(0.0, 1.0, 1001)
         weights = self._weights(phases)
-        slopes = -2 * self.sharpness * (phases[:, None] - self._centres)  # of the logarithms of eq. (5)'s weights
+        slopes = -2 * self.sharpness * (phases[:, None] - self._centres)  # slopes of the logarithms of the weights
         apart = slopes - (weights * slopes).sum(axis=1, keepdims=True)
         first = weights * apart
         second = weights * (apart**2 - (first * slopes).sum(axis=1, keepdims=True))
@@ -90,7 +90,7 @@ class GaussianPrimitive(Primitive):
         delta is the demonstration's own duration. A demonstration shorter than ``durations`` allow is slowed down to
         the shortest duration; a longer one is refused, as playing it faster would make it another movement. For a fixed
         delta eq. (5) is linear in the knots, so each joint is one bounded linear least squares problem (trust-region
-        reflective, the paper's algorithm), exact up to its tolerance.
+        reflective, the paper's algorithm), exact up to the algorithm's tolerance.
 
         Args:
             times: ``(n_times,)`` s, increasing, at least 4 of them.
@@ -103,7 +103,7 @@ class GaussianPrimitive(Primitive):
             ValueError: shapes that do not fit, too few samples, values that are not finite, unsorted times, or a
                 recording longer than the longest movement.
         """
-        from scipy.optimize import lsq_linear  # takes longer to import than this whole library
+        from scipy.optimize import lsq_linear  # its import takes longer than that of this whole library
 
         times, trajectory = check_recording(
             times, trajectory, self.joints.dim, samples=KNOTS, longest=self.durations[1]

@@ -1,7 +1,7 @@
 """Toy robots that act on an object: most movements do not touch it and have no effect.
 
-The outcome is the final place of the object, not that of the hand. So a movement that misses does not tell by how
-much, and babbling learns from few of its movements.
+The outcome is the final place of the object, not that of the hand. So a movement that misses the object does
+not tell by how much it missed, and babbling learns from few of its movements.
     puck: a puck to hit; its place is the context        fetch: a ball to grasp and carry
     robot = puck(); outcome = robot.execute(robot.observe(rng), theta, rng)
 """
@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from sgimd_torch.environments.toys import GRAVITY, Toy
 from sgimd_torch.spaces import Array, Box
 
-_STEPS: Final = 50  # of a swing; the hand moves straight within each
-_FRICTION: Final = 0.3  # of the puck on the table
-_BOUNCE: Final = 0.5  # restitution of hand and puck
+_STEPS: Final = 50  # number of steps of a swing; the hand moves straight within a step
+_FRICTION: Final = 0.3  # coefficient of friction of the puck on the table
+_BOUNCE: Final = 0.5  # coefficient of restitution of hand and puck
 
 
 def puck(*, noise: float = 0.005) -> Toy:
@@ -26,15 +26,15 @@ def puck(*, noise: float = 0.005) -> Toy:
 
     theta: turn and reach of the arm at the start of its swing on the table, turn and reach at the end, and the speed.
     When the hand touches the puck, the puck leaves along the line from the hand, and the arm stops. A hand that is
-    lowered onto the puck holds it. Outcome: the place where the puck comes to rest (m).
+    lowered onto the puck holds it still. Outcome: the place where the puck comes to rest (m).
     """
     ranges = Box(np.array([-np.pi * 5 / 12, 0.3]), np.array([np.pi * 5 / 12, 0.9]))  # rad and m
     apart = 0.1  # m between the middles of hand and puck when they touch
-    shortest, longest = 0.5, 1.5  # s, of a swing
+    shortest, longest = 0.5, 1.5  # s, durations of a swing
     table = Box(np.array([0.0, -0.8]), np.array([1.2, 0.8]), ("x", "y"), "m")
     places = Box(np.array([0.35, 0.2]), np.array([0.65, 0.5]), ("puck x", "puck y"), "m")
     times = np.linspace(0, 1, _STEPS + 1)
-    course = (3 * times**2 - 2 * times**3)[:, None]  # begins and ends at rest
+    course = (3 * times**2 - 2 * times**3)[:, None]  # the course begins and ends at rest
 
     def rest(context: Array, theta: Array) -> Array:
         start, end = (ranges.low + theta[..., None, k : k + 2] * ranges.sides for k in (0, 2))
@@ -51,7 +51,7 @@ def puck(*, noise: float = 0.005) -> Toy:
         speed = (1 + _BOUNCE) * ((before - after) * ahead).sum(axis=-1, keepdims=True) * _STEPS / duration
         return np.where(hit, _reflected(context + ahead * speed**2 / (2 * _FRICTION * GRAVITY), table), context)
 
-    still = np.array([0.5, 1.0, 0.5, 1.0, 0.0])  # straight ahead, beside the puck
+    still = np.array([0.5, 1.0, 0.5, 1.0, 0.0])  # the arm points straight ahead, beside the puck
     return Toy(places, Box.cube(0, 1, 5), table, rest, still, noise)
 
 
@@ -89,6 +89,6 @@ def _until(distance: float, before: Array, step: Array) -> Array:
 
 
 def _reflected(places: Array, box: Box) -> Array:
-    """``places`` folded into ``box``: where an object comes to rest that the walls reflect without loss."""
+    """``places`` folded into ``box``: the places where an object comes to rest if walls reflect it without loss."""
     laps = (places - box.low) / box.sides % 2
     return box.low + box.sides * (1 - np.abs(1 - laps))

@@ -1,4 +1,4 @@
-"""A planar arm with exactly known reachable set and inverse, for tests, quick ablations and first steps.
+"""A planar arm whose reachable set and inverse are exactly known, for tests, quick ablations and first steps.
 
 arm = PlanarArm(); outcome = arm.execute(arm.observe(rng), theta, rng)
 """
@@ -11,20 +11,20 @@ from numpy.typing import ArrayLike, NDArray
 from sgimd_torch.environments.protocol import Sketch, check_movement, check_recording
 from sgimd_torch.spaces import Array, Box, check_count, check_rng, check_vector, first_entry
 
-_STEP = 0.04  # s between two drawings of a movement
-_STEPS = 26  # drawings, from rest to the last posture
+_STEP = 0.04  # time (s) between two drawings of a movement
+_STEPS = 26  # number of drawings, from rest to the last posture
 
 
 class PlanarArm:
     """An arm of equal links in the plane, 1 m long; the outcome is the position of its end.
 
-    ``theta`` in [0, 1]^n_joints is scaled to joint angles, .5 to the angle 0: the first joint turns in [-pi, pi], the
-    others bend by 2 pi / n_joints at most. So the arm reaches exactly the disc of radius 1 m.
+    ``theta`` in [0, 1]^n_joints is scaled to joint angles; .5 gives the angle 0. The first joint turns in [-pi, pi],
+    each other joint bends by 2 pi / n_joints at most. So the arm reaches exactly the disc of radius 1 m.
 
     Args:
         n_joints: number of joints, at least 2.
         noise: standard deviation of the noise on every joint angle (rad).
-        context: whether a context turns the whole arm, by an angle in [-pi/4, pi/4]; ``rest`` is in the context 0.
+        context: whether a context turns the whole arm, by an angle in [-pi/4, pi/4]; ``rest`` has the context 0.
         outcomes: T; None for the square around the disc.
 
     Raises:
@@ -48,7 +48,7 @@ class PlanarArm:
         self.rest = self.outcomes.check("rest, where the straight arm ends,", [1.0, 0.0], "T has 2 dimensions")
         self.rest.flags.writeable = False
         self.noise = noise
-        self._limits = np.array([np.pi] + [2 * np.pi / n_joints] * (n_joints - 1))  # the smallest that close a circle
+        self._limits = np.array([np.pi] + [2 * np.pi / n_joints] * (n_joints - 1))  # least bends that close a circle
         self.outcome_noise = self._mean_outcome_noise()
 
     def observe(self, rng: np.random.Generator) -> Array:
@@ -59,7 +59,7 @@ class PlanarArm:
         """``(2,)`` m, position of the end after one movement.
 
         Raises:
-            ValueError: ``context`` is not one point of C, or ``theta`` not one of Pi.
+            ValueError: ``context`` is not one point of C, or ``theta`` is not one point of Pi.
             TypeError: ``rng`` is not a Generator.
         """
         context, theta = check_movement(self, context, theta)
@@ -100,9 +100,9 @@ class PlanarArm:
         """
         _, trajectory = check_recording(times, trajectory, self.policies.dim, samples=1)
         turned = trajectory[-1] / self._limits
-        beyond = np.abs(turned) > 1 + 1e-12  # more than rounding
+        beyond = np.abs(turned) > 1 + 1e-12  # the tolerance allows for rounding
         if beyond.any():
-            limits = f"+-{self._limits[0]:.3f} rad, the others +-{self._limits[1]:.3f} rad"
+            limits = f"+-{self._limits[0]:.3f} rad, each other joint within +-{self._limits[1]:.3f} rad"
             entry = first_entry(trajectory[-1], beyond)
             raise ValueError(f"the first joint turns within {limits}, but in the last posture {entry}; is it in deg?")
         return self.policies.clip((turned + 1) / 2)
@@ -113,12 +113,12 @@ class PlanarArm:
         return is_reachable
 
     def solve(self, context: ArrayLike, goal: ArrayLike) -> Array:
-        """``(n_joints,)``, a theta that reaches ``goal`` without noise: the first joint turns, the others bend equally.
+        """``(n_joints,)``, a theta that reaches ``goal`` without noise: the first joint turns, all others bend equally.
 
         Raises:
-            ValueError: ``goal`` is not one reachable point ``(2,)``, or ``context`` not one of C.
+            ValueError: ``goal`` is not one reachable point ``(2,)``, or ``context`` is not one point of C.
         """
-        from scipy.optimize import root_scalar  # takes longer to import than this whole library
+        from scipy.optimize import root_scalar  # its import takes longer than that of this whole library
 
         context, _ = check_movement(self, context, np.full(self.policies.dim, 0.5))
         goal = check_vector("goal", goal, 2, "was theta passed instead?")
@@ -134,7 +134,7 @@ class PlanarArm:
     def _moved(self, theta: Array, rng: np.random.Generator) -> Array:
         """``(n_joints,)`` rad, the angles with noise."""
         check_rng(rng)
-        # Drawn even if the noise is 0, so that the stream continues in the same way.
+        # Noise is drawn even if its size is 0, so that the stream continues in the same way.
         return self.angles(theta) + self.noise * rng.standard_normal(len(theta))
 
     def _end(self, context: Array, angles: Array) -> Array:
@@ -142,7 +142,7 @@ class PlanarArm:
         return 1 / len(angles) * np.array([np.cos(directions).sum(), np.sin(directions).sum()])
 
     def _radius(self, bend: float) -> float:
-        """Distance of the end if all joints but the first have this bend: from 1 m down to 0 at a full turn."""
+        """Distance of the end if all joints but the first have this bend: 1 m without a bend, 0 at a full turn."""
         n = self.policies.dim
         return float(1 / n * np.cos((np.arange(n) - (n - 1) / 2) * bend).sum())
 

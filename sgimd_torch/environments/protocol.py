@@ -24,7 +24,7 @@ class Environment(Protocol):
 
     @property
     def contexts(self) -> Box:
-        """C; ``dim`` 0 if all movements start in the same way."""
+        """C; its ``dim`` is 0 if all movements start in the same way."""
         ...
 
     @property
@@ -34,7 +34,7 @@ class Environment(Protocol):
 
     @property
     def outcomes(self) -> Box:
-        """T, the space of goals. Outcomes may lie outside."""
+        """T, the space of goals. Outcomes may lie outside it."""
         ...
 
     @property
@@ -44,7 +44,7 @@ class Environment(Protocol):
 
     @property
     def outcome_noise(self) -> float:
-        """Typical standard deviation (m), per dimension, of the outcomes of one movement; 0 if they never differ."""
+        """Typical standard deviation (m), per dimension, of the outcomes of one movement; 0 if it has no noise."""
         ...
 
     def observe(self, rng: np.random.Generator) -> Array:
@@ -55,7 +55,7 @@ class Environment(Protocol):
         """``(outcome_dim,)``, the outcome of one movement, tau = M(c, theta); all noise comes from ``rng``.
 
         Raises:
-            ValueError: ``context`` is not one point of C or ``theta`` not one of Pi; see `check_movement`.
+            ValueError: ``context`` is not one point of C or ``theta`` is not one point of Pi; see `check_movement`.
             SimulationError: there is no finite outcome.
         """
         ...
@@ -73,8 +73,8 @@ class BatchEnvironment(Environment, Protocol):
 class Primitive:
     """How theta becomes joint angles (rad) or commands over time.
 
-    A robot that knows this offers it as its attribute ``primitive``, so that recordings can be compared with what the
-    robot plays. The defaults stand for what is unknown.
+    A robot whose primitive is known has it as attribute ``primitive``, so that recordings can be compared with what the
+    robot plays. The defaults mean that a value is unknown.
 
     Attributes:
         ranges: ``(n_joints,)`` box of the angles or commands.
@@ -95,18 +95,18 @@ class HasPrimitive(Protocol):
 
     @property
     def primitive(self) -> Primitive:
-        """Plays the movements of this robot."""
+        """The primitive that plays the movements of this robot."""
         ...
 
 
 def primitive_of(environment: Environment) -> Primitive:
-    """The primitive of an environment; one that knows nothing if it has none."""
+    """The primitive of an environment; a `Primitive` with the defaults if the environment has none."""
     found = environment.primitive if isinstance(environment, HasPrimitive) else None
     return found if isinstance(found, Primitive) else Primitive()
 
 
 class Trace(Protocol):
-    """A movement that can be filmed: a `Sketch`, or that of the rod in MuJoCo."""
+    """A movement that can be filmed: a `Sketch`, or the `RodTrace` of the fishing rod."""
 
     @property
     def outcome(self) -> Array:
@@ -126,7 +126,7 @@ class Sketch:
 
     Args:
         outcome: ``(outcome_dim,)``, equal to that of ``execute`` with an equal stream. The first two dimensions are
-            places in the drawing; with only one, y is 0.
+            places in the drawing; if T has only one, y is 0.
         step: time between two drawings (s).
         chains: ``(n_steps, n_points, 2)``, the robot as points joined by lines; a single point is a ball. The last
             point leaves a path.
@@ -179,10 +179,10 @@ def execute_many(
     """Execute many movements: together if the environment can, else one by one, with equal outcomes.
 
     Args:
-        environment: environment of the movements; a `BatchEnvironment` is called once for all.
+        environment: environment of the movements; a `BatchEnvironment` is called once for all movements.
         contexts: ``(n, context_dim)`` in C.
         thetas: ``(n, theta_dim)`` in Pi.
-        rngs: n streams, one for each movement, so that no outcome depends on the others in the batch.
+        rngs: n streams, one for each movement, so that no outcome depends on other movements of the batch.
 
     Returns:
         ``(n, outcome_dim)``, row i equal to ``environment.execute(contexts[i], thetas[i], rngs[i])`` bit for bit.
@@ -230,7 +230,7 @@ def traced(environment: Environment, trace: Tracer, context: Array, theta: Array
         found = trace(context, theta, rng)
     except Exception as error:  # code of the user may raise anything
         raise ValueError(f"trace() of {name} failed: {type(error).__name__}: {error}") from error
-    if hasattr(found, "states"):  # of the rod in MuJoCo
+    if hasattr(found, "states"):  # the RodTrace of the fishing rod
         return found
     if not isinstance(found, Sketch) or len(found.outcome) != dim:
         what = f"one of {len(found.outcome)}" if isinstance(found, Sketch) else type(found).__name__
@@ -240,7 +240,7 @@ def traced(environment: Environment, trace: Tracer, context: Array, theta: Array
 
 
 def check_movement(environment: Environment, context: ArrayLike, theta: ArrayLike) -> tuple[Array, Array]:
-    """One point of C and one of Pi, as float64; call it first in ``execute``.
+    """One point of C and one point of Pi, as float64; ``execute`` of an environment calls this function first.
 
     Raises:
         ValueError: another shape, NaN or infinity, or a point outside its box.
@@ -248,7 +248,7 @@ def check_movement(environment: Environment, context: ArrayLike, theta: ArrayLik
     context = environment.contexts.check("context", context, "was theta passed first?")
     theta = environment.policies.check("theta", theta, "was a goal passed instead?")
     if not context.ndim == theta.ndim == 1:
-        raise ValueError(f"execute() takes one movement, got {context.shape} and {theta.shape}; is it execute_many()?")
+        raise ValueError(f"execute() takes one movement, got {context.shape} and {theta.shape}; see execute_many()")
     return context, theta
 
 
@@ -275,8 +275,8 @@ def check_recording(
     lasts = times[-1] - times[0]
     if lasts > longest * (1 + 1e-9):
         raise ValueError(
-            f"a movement lasts {longest:g} s at most, the recording {lasts:g} s; is it in milliseconds? Multiply the "
-            "times of a slow recording to play it faster"
+            f"a movement lasts {longest:g} s at most, the recording {lasts:g} s; is it in milliseconds? To "
+            "play a slow recording faster, scale its times down"
         )
     return times, trajectory
 

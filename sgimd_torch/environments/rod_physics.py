@@ -1,7 +1,7 @@
 """Physics of the fishing rod: the arm follows commands in MuJoCo, the line swings, and the float lands on the water.
 
 Section 4 of Nguyen & Oudeyer (2014); ``fishing_rod.py`` computes the commands. All commands are known before a movement
-begins, so MuJoCo runs many movements side by side, in C.
+begins, so MuJoCo runs many movements side by side, outside Python.
     landings, diverged = Caster(path, posture).cast([commands], ends)
 
 The float lands at the first point where it meets the water (z = 0), interpolated between two steps. If it has not met
@@ -22,7 +22,7 @@ from mujoco import rollout
 
 from sgimd_torch.spaces import Array
 
-TOP_SPEED = 500.0  # rad/s; a diverging simulation exceeds it, 100,000 random movements stay far below
+TOP_SPEED = 500.0  # rad/s; a diverging simulation exceeds this speed, 100,000 random movements stay far below it
 
 _STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
 
@@ -38,9 +38,9 @@ class RodTrace:
         landed: time of landing (s).
         let_out: time when the line was let out (s); None if the float met the water before.
         step: time between two states (s).
-        states: ``(n_steps, n_state)``, MuJoCo's full physics states from 0 to ``landed`` or just beyond.
+        states: ``(n_steps, n_state)``, MuJoCo's full physics states from the time 0 to ``landed`` or just beyond.
         floats: ``(n_steps, 6)``, position (m) and velocity (m/s) of the float on its line in those states.
-        push: acceleration (m/s^2) of a freely flying float by the wind, along x.
+        push: acceleration (m/s^2) along x that the wind gives to a freely flying float.
         gravity: downward acceleration (m/s^2) of a freely flying float.
     """
 
@@ -90,7 +90,7 @@ class Caster:
         """The start configuration, a full physics state; and ``(6,)``, position (m) and velocity (m/s) of its float."""
 
     def cast(self, commands: list[Array], ends: Array, winds: Array) -> tuple[Array, np.ndarray]:
-        """Run movements side by side; each outcome is equal, bit for bit, to that of the movement alone.
+        """Run movements side by side; each outcome equals, bit for bit, the outcome of the movement alone.
 
         Args:
             commands: n arrays ``(n_steps, 6)`` rad, a row for each time step.
@@ -107,18 +107,18 @@ class Caster:
         for row, end in enumerate(ends):
             n_steps = len(commands[row])
             speed, track = run[row, :n_steps, speeds], seen[row, :n_steps]
-            wet = int((track[:, 2] <= 0).argmax())  # 0 if none is, as the float begins above the water
-            if not (speed.max() < TOP_SPEED and speed.min() > -TOP_SPEED):  # NaN too
+            wet = int((track[:, 2] <= 0).argmax())  # 0 if no step is wet, as the float begins above the water
+            if not (speed.max() < TOP_SPEED and speed.min() > -TOP_SPEED):  # NaN, too, is refused
                 diverged[row] = True
             elif wet:
                 landings[row] = _crossing(track[wet - 1], track[wet])
             else:
-                after = n_steps - 1 - end / self.timestep  # in steps
+                after = n_steps - 1 - end / self.timestep  # number of steps from end to the last state
                 landings[row] = self._let_out(track[-1] + after * (track[-2] - track[-1]), float(winds[row]))
         return landings, diverged
 
     def trace(self, outcome: Array, commands: Array, end: float, wind: float) -> RodTrace:
-        """The movement, step by step, whose float lands at ``outcome`` by ``cast``."""
+        """One movement, step by step; its float lands at ``outcome``, as ``cast`` found."""
         states, controls = self._begin([commands], np.array([wind]))
         run, seen = self._rollout(states, controls)
         states, floats, push = np.concatenate([states, run[0]]), seen[0].copy(), wind / self._float_mass
@@ -140,10 +140,10 @@ class Caster:
         return RodTrace(outcome, landed, let_out, self.timestep, *kept, push, self._gravity)
 
     def _settle(self, posture: Array) -> tuple[Array, Array]:
-        """c_org, the start configuration: the arm in its posture, the line hanging still; and its float."""
+        """c_org, the start configuration, with the arm in its posture and the line hanging still; and its float."""
         data = mujoco.MjData(self.model)
         data.qpos[:6] = posture
-        data.qpos[6] = -(posture[1] + posture[2] + posture[4])  # against the pitch of the rod: the line hangs plumb
+        data.qpos[6] = -(posture[1] + posture[2] + posture[4])  # opposite to the rod's pitch, so the line hangs plumb
         data.act[:6] = data.ctrl[:6] = posture
         mujoco.mj_step(self.model, data, nstep=1000)
         data.qvel[:] = 0
@@ -154,7 +154,7 @@ class Caster:
         return home, data.sensordata.copy()
 
     def _begin(self, commands: list[Array], winds: Array) -> tuple[Array, Array]:
-        """Start states ``(n, n_state)`` and controls ``(n, n_steps, 7)``; a movement holds its last commands."""
+        """Start states ``(n, n_state)`` and controls ``(n, n_steps, 7)``; short movements hold their last commands."""
         n = len(commands)
         controls = np.zeros((n, max(map(len, commands)), self.model.nu))
         for k, sequence in enumerate(commands):
@@ -175,9 +175,9 @@ class Caster:
         return (dz + math.sqrt(dz * dz + 2 * self._gravity * max(z, 0.0))) / self._gravity
 
     def _rollout(self, states: Array, controls: Array) -> tuple[Array, Array]:
-        """States after each step, and position and velocity of the float *before* it, as MuJoCo's sensors show them.
+        """States after each step, and position and velocity of the float *before* each step, as sensors show them.
 
-        The next call overwrites both: allocating new memory would take longer than the rest of this class.
+        The next call overwrites both arrays: allocating new memory would take longer than the rest of this class.
         """
         threads = self._threads if len(states) > 1 else 1
         if threads not in self._pools:

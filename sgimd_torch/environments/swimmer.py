@@ -16,7 +16,7 @@ from sgimd_torch.environments.controllers import Sinusoids
 from sgimd_torch.environments.from_gymnasium import FromGymnasium, gymnasium
 from sgimd_torch.spaces import Array, Box
 
-STEPS: Final = 150  # of .04 s each
+STEPS: Final = 150  # number of actions of a movement, .04 s each
 FREQUENCIES: Final = (0.2, 2.0)  # Hz
 START: Final = 0.02  # half range of positions (m, rad) and speeds at the start
 NOISE: Final = 0.015  # m, the result of measured_noise
@@ -35,7 +35,7 @@ class Swimmer(FromGymnasium):
                 "Swimmer-v5",
                 reset_noise_scale=start,
                 exclude_current_positions_from_observation=False,
-                disable_env_checker=True,  # it would check every step
+                disable_env_checker=True,  # the checker would check every step
             ),
             Sinusoids(Box.cube(-1.0, 1.0, 2), FREQUENCIES),
             outcomes=Box.cube(-1.5, 1.5, 2, names=("x", "y"), unit="m"),

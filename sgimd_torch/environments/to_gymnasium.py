@@ -1,4 +1,4 @@
-"""Our environments as goal environments of gymnasium: an episode is one movement, the action is theta.
+"""Environments of this library as goal environments of gymnasium: an episode is one movement, the action is theta.
 
 world = ToGymnasium(PlanarArm()); observation, _ = world.reset(seed=0); world.step(world.action_space.sample())
 """
@@ -26,7 +26,7 @@ class ToGymnasium(gymnasium.Env[Any, Any]):
 
     ``observation`` is the context, ``achieved_goal`` the outcome (``rest`` before the movement), ``desired_goal`` the
     goal. Goal and context are drawn, or given as ``reset(options={"goal": ..., "context": ...})``. The reward is minus
-    the distance between goal and outcome; ``is_success`` in ``info`` means at most the outcome noise or .02.
+    the distance between goal and outcome; ``is_success`` in ``info`` means at most .02, or the outcome noise if larger.
     """
 
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 - as gymnasium declares it

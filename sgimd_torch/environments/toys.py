@@ -1,4 +1,4 @@
-"""Toy robots, each hard to learn for another reason; a movement takes microseconds.
+"""Toy robots, each of which is hard to learn for a different reason; a movement takes microseconds.
 
 Each is a ``Toy``: boxes, and a function from a movement to its outcome, to which Gaussian noise is added.
     toss: the wind is the context                    crawler: parameters are phases, 0 equals 1
@@ -19,7 +19,7 @@ from sgimd_torch.environments.protocol import check_movement
 from sgimd_torch.spaces import Array, Box, check_rng
 
 GRAVITY: Final = 9.81  # m/s^2
-_STROKES: Final = 10  # of one movement of the crawler
+_STROKES: Final = 10  # number of strokes in one movement of the crawler
 _PLANE: Final = Box.cube(-1, 1, 2, names=("x", "y"), unit="m")
 
 
@@ -54,7 +54,7 @@ class Toy:
         """``(outcome_dim,)``, the outcome of one movement.
 
         Raises:
-            ValueError: ``context`` is not one point of C, or ``theta`` not one of Pi.
+            ValueError: ``context`` is not one point of C, or ``theta`` is not one point of Pi.
             TypeError: ``rng`` is not a Generator.
         """
         context, theta = check_movement(self, context, theta)
@@ -66,7 +66,7 @@ def toss(*, noise: float = 0.03) -> Toy:
     """An arm throws a ball on a floor; the context is the wind (m/s^2) from the left.
 
     theta: direction, elevation, speed, height of release. A high and a flat throw can land in the same place; the wind
-    blows a high one farther. Outcome: landing place, sideways and forwards (m).
+    blows a high throw farther. Outcome: landing place, sideways and forwards (m).
     """
     ranges = Box(np.array([-np.pi / 3, np.pi / 18, 1.0, 0.5]), np.array([np.pi / 3, np.pi * 8 / 18, 6.0, 1.5]))
 
@@ -105,8 +105,8 @@ def crawler(*, noise: float = 0.02) -> Toy:
 def two_elbows(*, noise: float = 0.01) -> Toy:
     """A planar arm of three links whose elbow bends to either side by 30 degrees or more: two families of postures.
 
-    theta: shoulder, elbow, wrist; below .5 the elbow bends to the right, above to the left. Both families reach nearly
-    every place; the mean of two postures of different families lands elsewhere. Outcome: place of the hand (m).
+    theta: shoulder, elbow, wrist; below .5 the elbow bends to the right, above .5 to the left. Each family reaches
+    nearly every place; the mean of two postures of different families lands elsewhere. Outcome: place of the hand (m).
     """
     lengths = np.array([0.5, 0.4, 0.1])
 

@@ -27,14 +27,14 @@ LEGEND: Final[dict[str, Any]] = {
 
 
 def limits(points: Array, space: Box) -> Box:
-    """The box around points, in round numbers. Far points do not count, so that one of them does not shrink a map.
+    """The box around points, in round numbers. Far points do not count, so that no single point shrinks the map.
 
     A point is far if, in a dimension, its distance from the middle half of the distinct points is more than 1.5 times
     the width of that half (Tukey's fence).
 
     Args:
         points: ``(n, dim)``, n >= 1, finite.
-        space: T, for its names and unit.
+        space: T, which has the names and the unit.
     """
     lower, upper = np.quantile(np.unique(points, axis=0), (0.25, 0.75), axis=0)
     fence = 1.5 * (upper - lower)
@@ -47,7 +47,7 @@ def limits(points: Array, space: Box) -> Box:
 
 
 def rounded(length: float) -> float:
-    """The next larger of 1, 2 and 5 times a power of ten."""
+    """``length`` rounded up to 1, 2 or 5 times a power of ten."""
     power = 10.0 ** np.floor(np.log10(length))
     return float(power * next(k for k in (1, 2, 5, 10) if power * k >= length))
 
@@ -58,14 +58,14 @@ def alike(sides: Array) -> bool:
 
 
 def over_movements(ax: Axes, label: str) -> None:
-    """Label the axes of a curve over movements: ``label`` is that of the y axis."""
+    """Label the axes of a curve over movements; ``label`` is the label of the y axis."""
     ax.set(xlabel="movements executed", ylabel=label)
     ax.set_xlim(left=0)
     ax.grid(alpha=0.3)
 
 
 def colour_bar(ax: Axes, drawn: ScalarMappable, label: str, *, extend: str = "neither") -> Colorbar:
-    """Add a colour bar for ``drawn``, as large as ``ax``; ``extend`` is matplotlib's: the ends with an arrow."""
+    """Add a colour bar for ``drawn``, as large as ``ax``; ``extend`` names the ends with an arrow."""
     figure = ax.get_figure()
     assert figure is not None
     return figure.colorbar(drawn, ax=ax, label=label, extend=extend)
@@ -78,6 +78,6 @@ def note(ax: Axes, text: str) -> None:
 
 
 def goal_rings(ax: Axes, points: ArrayLike, size: float) -> None:
-    """Draw yellow rings with a black edge at ``(n, 2)``, ``size`` points wide, for the goals of movements."""
+    """Draw yellow rings with a black edge at ``points`` ``(n, 2)``, ``size`` pt wide, for the goals of movements."""
     for edge, width in (("black", 4.5), ("#f0e442", 2.5)):
         ax.plot(*np.asarray(points).T, "o", mfc="none", mec=edge, ms=size, mew=width)

@@ -33,11 +33,11 @@ def landing_points(
     demonstrated: Array | None = None,
     side: float = 0.05,
 ) -> QuadMesh:
-    """Outcomes of movements: a histogram on a logarithmic scale, empty tiles white.
+    """Outcomes of movements: a histogram on a logarithmic scale, in which empty tiles are white.
 
     Args:
         ax: axes, which get a colour bar.
-        outcomes: ``(n, outcome_dim)``; outcomes outside ``box`` are squares at its edge, and a note has their number.
+        outcomes: ``(n, outcome_dim)``; squares at the edge of ``box`` are outcomes outside it, and a note counts them.
         box: part of T to show.
         section: dimensions to show.
         demonstrated: ``(n, outcome_dim)`` demonstrated outcomes, each drawn once as a cross.
@@ -51,7 +51,7 @@ def landing_points(
     counts, *edges = np.histogram2d(x, y, bins=n_tiles, range=np.stack((shown.low, shown.high), axis=1))
     tiles = np.ma.masked_equal(counts.T, 0)
     norm = LogNorm(1, max(2, float(tiles.filled(0).max())))
-    blues = ListedColormap(colormaps["Blues"](np.linspace(0.25, 1.0, 256)))  # a single point is visible on white
+    blues = ListedColormap(colormaps["Blues"](np.linspace(0.25, 1.0, 256)))  # even a single point is visible on white
     mesh = ax.pcolormesh(*edges, tiles, norm=norm, cmap=blues)
     same_scale = box.dim == 2 and alike(box.sides)
     label = f"movements on a tile of {box.amount(side)}" if same_scale else "movements on a tile"
@@ -85,7 +85,7 @@ def interest_map(
         goals: ``(n, outcome_dim)``.
 
     Returns:
-        One rectangle for each region that is shown, in the order of the regions; their array holds the interests.
+        One rectangle for each region that is shown, in the order of the regions, with the interests as array.
     """
     drawn = _regions_in(ax, lows, highs, interests, section, "Oranges", (0, max(float(interests.max()), 1e-6)))
     colour_bar(ax, drawn, "interest: recent change of competence")
@@ -97,7 +97,7 @@ def interest_map(
 def competence_map(ax: Axes, lows: Array, highs: Array, competences: Array, section: Section) -> PatchCollection:
     """Regions of the interest map, coloured by mean competence, eqs. (2) and (7): 0 met, -1 no better than rest.
 
-    The colours span the competences of these regions, in round numbers.
+    The colours span the range of these competences, rounded outwards.
 
     Args:
         ax, lows, highs, section: arguments of ``interest_map``.
@@ -115,7 +115,7 @@ def competence_map(ax: Axes, lows: Array, highs: Array, competences: Array, sect
 
 
 def misses(ax: Axes, goals: Array, errors: Array, space: Box, section: Section, most: float) -> None:
-    """Goals of an evaluation, coloured by their error; on a strip the error is the height.
+    """Goals of an evaluation, coloured by their error; if T has one dimension, the error is the height instead.
 
     Args:
         ax: axes, which get a colour bar.
@@ -141,7 +141,7 @@ def map_after(regions: Mapping[str, np.ndarray], movements: int) -> tuple[Array,
     """The interest map after so many movements, from the columns of the table ``regions`` of a record.
 
     Returns:
-        Corners, twice ``(n_regions, context_dim + outcome_dim)``, and interests ``(n_regions,)``.
+        Lower and upper corners, each ``(n_regions, context_dim + outcome_dim)``, and interests ``(n_regions,)``.
     """
     now = regions["movements"] == movements
     dims = range(sum(name.startswith("low_") for name in regions))

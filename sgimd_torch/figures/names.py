@@ -34,7 +34,7 @@ COLOURS: Final = {word: colour for word, (_, colour) in _DRAWN.items()}
 
 
 def label(algorithm: str) -> str:
-    """Name of an algorithm in figures; the word itself where it has no other name."""
+    """Name of an algorithm in figures; its name in the catalogue if it has no other."""
     return NAMES.get(algorithm, algorithm)
 
 

@@ -1,9 +1,9 @@
-"""Sections: pictures of T in two dimensions. T of one dimension is a strip, T of three and more has several pictures.
+"""Sections: pictures of T in the plane. A T of one dimension is a strip, a T of three or more has several pictures.
 
     for ax, section in zip(axes, sections(space), strict=True): ax.plot(*section.points(outcomes).T); section.frame(ax)
-Each pair of dimensions is a picture: the first with the second, the third with the fourth, and so on; an odd last one
-goes with the first. Points are projected. Regions would hide each other, so they are cut at the middle of the other
-dimensions, those of C included.
+Each pair of dimensions is a picture: the first with the second, the third with the fourth, and so on; an odd last
+dimension with the first. Points are projected. Projected regions would hide each other, so regions are cut at the
+middle of the dimensions that are not shown, those of C included.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from sgimd_torch.figures.axes import LEGEND, alike
 from sgimd_torch.spaces import Array, Box
 
-_MOST_NAMED: Final = 2  # dimensions in a note; more do not fit
+_MOST_NAMED: Final = 2  # largest number of dimensions in a note; more do not fit
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +28,7 @@ class Section:
 
     Args:
         space: T.
-        dims: dimensions of T along x and y; a single one is a strip along x.
+        dims: dimensions of T along x and y; a single dimension makes a strip along x.
     """
 
     space: Box
@@ -41,17 +41,17 @@ class Section:
 
     @property
     def box(self) -> Box:
-        """The part of T in the picture, of two dimensions; a strip has the height 1."""
+        """The part of T in the picture, as a box of two dimensions; a strip has the height 1."""
         names = tuple(self.space.axis(k) for k in self.dims)
         flat = self._flat(self.space.low, 0.0), self._flat(self.space.high, 1.0)
         return Box(*flat, (*names, "") if self.is_strip else names)
 
     def points(self, outcomes: Array) -> Array:
-        """``(n, 2)`` places of the outcomes ``(n, outcome_dim)`` in the picture; on a strip, at half its height."""
+        """``(n, 2)`` places of ``outcomes`` ``(n, outcome_dim)`` in the picture; in a strip, at half its height."""
         return self._flat(outcomes, 0.5)
 
     def tile(self, side: float) -> Array:
-        """``(2,)`` sides of a tile: ``side`` along x, and the same along y if the picture has one scale."""
+        """``(2,)`` sides of a tile: ``side`` along x, and the same along y if x and y have one scale."""
         sides = self.box.sides
         return np.array([side, 1.0 if self.is_strip else side if alike(sides) else side * sides[1] / sides[0]])
 
@@ -67,7 +67,7 @@ class Section:
             lows, highs: ``(n, context_dim + outcome_dim)`` corners of regions.
 
         Returns:
-            Corners in the picture of the regions that the cut meets, twice ``(n_met, 2)``, and ``(n,)`` which they are.
+            Lower and upper corners, each ``(n_met, 2)``, of the regions that the cut meets; and their mask ``(n,)``.
         """
         context_dim, middle = lows.shape[1] - self.space.dim, (lows.min(axis=0) + highs.max(axis=0)) / 2
         inside = (lows <= middle) & (middle < highs)
@@ -116,5 +116,5 @@ def sections(space: Box) -> list[Section]:
 
 
 def of_regions(lows: Array, highs: Array, space: Box) -> list[Section]:
-    """The pictures of the part of T, ``space``, in regions with the corners ``(n, context_dim + outcome_dim)``."""
+    """The pictures of the part of T (``space``) that regions with corners ``(n, context_dim + outcome_dim)`` cover."""
     return sections(replace(space, low=lows.min(axis=0)[-space.dim :], high=highs.max(axis=0)[-space.dim :]))

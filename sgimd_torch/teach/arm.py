@@ -1,4 +1,4 @@
-"""The geometry of an arm in MuJoCo: where its points are, and how its joints move them. No forces, no time.
+"""The geometry of an arm in MuJoCo: where points of the arm are, and how joints move them, without forces and time.
 
 arm = Arm(led); arm.pose(q); arm.where(*arm.place_of("hand")); arm.levers(body, point)
 """
@@ -15,19 +15,19 @@ from sgimd_torch.spaces import Array, Box, check_point, read_only
 from sgimd_torch.teach.led import HandLed
 
 TURN_OR_SLIDE: Final = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
-CROSSING: Final = 1.0  # s, in which a joint of unknown speed crosses its range
+CROSSING: Final = 1.0  # time (s) in which a joint of unknown speed crosses its range
 
 
 class Arm:
-    """The led joints of a model; everything else keeps its posture relative to the body that carries it.
+    """The led joints of a model; all other joints keep their positions.
 
     Args:
         led: the robot.
 
     Attributes:
-        data: MuJoCo's data of the posture, to be drawn.
-        links: names of the bodies that the led joints alone move, from the base on.
-        ranges: ``(n_joints,)`` box of the postures (rad, or m of a slide joint).
+        data: MuJoCo's data of the present posture, for drawing.
+        links: names of the bodies that led joints move and no other joints move, from the base outwards.
+        ranges: ``(n_joints,)`` box of the postures (rad; m for a slide joint).
         start: ``(n_joints,)`` posture in which movements start.
         speeds, accelerations: ``(n_joints,)`` limits (rad/s and rad/s^2).
 
@@ -62,10 +62,10 @@ class Arm:
         mujoco.mj_comPos(self._model, self.data)  # mj_jac needs it
 
     def place_of(self, name: str) -> tuple[int, Array]:
-        """The number of a link, and a place on it, ``(3,)`` m in its own frame: the origin of a body or a site.
+        """The number of the link with this body or site, and the origin of either, ``(3,)`` m in the frame of the link.
 
         Raises:
-            ValueError: the model has no such body or site, or other joints move it, or none.
+            ValueError: the model has no such body or site, no joint moves it, or joints that are not led move it.
         """
         body, place = mujoco.mj_name2id(self._model, mujoco.mjtObj.mjOBJ_BODY, name), np.zeros(3)
         if body < 0:
@@ -73,19 +73,19 @@ class Arm:
             body, place = int(self._model.site_bodyid[site]), self._model.site_pos[site].copy()
         trouble = self._trouble(body)
         if trouble:
-            raise ValueError(f"{name} cannot be grabbed, {trouble}; links that can are {', '.join(self.links)}")
+            raise ValueError(f"{name} cannot be grabbed: {trouble}; links to grab are {', '.join(self.links)}")
         return body, place
 
     def where(self, body: int, place: Array) -> Array:
-        """``(3,)`` m in the world, of a place on a link."""
+        """The position ``(3,)`` m in the world of a ``place`` on a link."""
         return np.asarray(self.data.xpos[body] + self.data.xmat[body].reshape(3, 3) @ place)
 
     def place_at(self, body: int, point: Array) -> Array:
-        """``(3,)`` m in the frame of a link, of a ``point`` of the world; the inverse of ``where``."""
+        """The place ``(3,)`` m, in the frame of a link, of a ``point`` of the world; the inverse of ``where``."""
         return np.asarray(self.data.xmat[body].reshape(3, 3).T @ (point - self.data.xpos[body]))
 
     def levers(self, body: int, point: Array) -> Array:
-        """``(3, n_joints)`` m/rad: the motion of a ``point`` of the world, carried by a link, for each joint."""
+        """``(3, n_joints)`` m/rad: how each joint moves a ``point`` of the world that a link carries."""
         jacobian = np.zeros((3, self._model.nv))
         mujoco.mj_jac(self._model, self.data, jacobian, None, point, body)
         return jacobian[:, self._speeds]
@@ -99,7 +99,7 @@ class Arm:
             above = int(self._model.body_parentid[above])
         if not moved_by:
             return "no joint moves it"
-        return "" if moved_by <= set(self._numbers) else "other joints move it, too"
+        return "" if moved_by <= set(self._numbers) else "joints not led move it, too"
 
     def _number(self, kind: mujoco.mjtObj, name: str, called: str) -> int:
         number = mujoco.mj_name2id(self._model, kind, name)

@@ -23,8 +23,8 @@ BY_HAND: Final = "by-hand"
 class ByHand(Teacher):
     """A person with sgimd teach; they give lessons at any time.
 
-    Another teacher may come with them. It is asked before each movement, even when the person gives a lesson, so that
-    its draws do not change.
+    A run may have another teacher as well. That teacher is asked before each movement, even when the person gives a
+    lesson, so that the draws of that teacher do not change.
 
     Args:
         demonstrations: not needed.

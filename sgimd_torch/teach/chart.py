@@ -19,11 +19,11 @@ from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, Box
 
-CELLS: Final = 60  # of the map, along each side
-FAR: Final = 0.25  # share of T's longer side: a larger predicted error has the darkest colour
+CELLS: Final = 60  # number of cells along each side of the map
+FAR: Final = 0.25  # predicted error of the darkest colour, as a share of T's longer side
 Colours = NDArray[np.uint8]
 
-# From out of reach to reached; dark to light, so that the colours differ in grey and with any colour vision.
+# Colours from out of reach to reached: from dark to light, so that they differ in grey and with any colour vision.
 SKILL: Final = np.array([[33, 60, 96], [40, 107, 142], [58, 154, 155], [135, 199, 132], [246, 232, 120]], float)
 
 
@@ -32,7 +32,7 @@ class Chart:
     """The skill of a learner.
 
     Attributes:
-        error: ``(CELLS, CELLS)`` predicted error (m), by row of y and column of x.
+        error: ``(CELLS, CELLS)`` predicted error (m), with a row for each y and a column for each x.
         mean_error: mean predicted error (m) at the goals of the benchmark.
         met: ``(n_goals,)`` whether the predicted error is at most half the side of a tile of the benchmark.
     """
@@ -46,9 +46,9 @@ def chart_of(robot: Environment, memory: Memory, benchmark: Benchmark) -> Chart:
     """The map of what a learner can do in the middle of C.
 
     Args:
-        robot: environment; the map shows the first two dimensions of its T, and the middle of the others.
+        robot: environment; the map spans the first two dimensions of its T, at the middle of its other dimensions.
         memory: memory of the learner; only read.
-        benchmark: goals of the mean, and the side of their tiles.
+        benchmark: goals over which the error is averaged, and the side of their tiles.
     """
     places = np.concatenate([_cells(robot.outcomes), benchmark.goals])
     if len(memory):
@@ -63,7 +63,7 @@ def chart_of(robot: Environment, memory: Memory, benchmark: Benchmark) -> Chart:
 
 
 def _cells(outcomes: Box) -> Array:
-    """``(CELLS**2, outcome_dim)``, the middles of the map's cells, row by row, y upwards."""
+    """``(CELLS**2, outcome_dim)``, the middles of the map's cells, row by row, with y increasing."""
     steps = (np.arange(CELLS) + 0.5) / CELLS
     shares = np.full((CELLS, CELLS, outcomes.dim), 0.5)
     shares[..., 0], shares[..., 1:2] = steps, steps[:, None, None]
@@ -71,7 +71,7 @@ def _cells(outcomes: Box) -> Array:
 
 
 def by_error(chart: Chart, outcomes: Box) -> Colours:
-    """``(CELLS, CELLS, 3)`` the predicted error as a picture with y upwards: light within reach, dark out of reach."""
+    """The predicted error as a picture ``(CELLS, CELLS, 3)`` with y upwards: light within reach, dark out of reach."""
     skill = np.clip(1 - chart.error[::-1] / (FAR * outcomes.sides[:2].max()), 0, 1)
     places = np.linspace(0, 1, len(SKILL))
     return np.stack([np.interp(skill, places, channel) for channel in SKILL.T], axis=-1).astype(np.uint8)

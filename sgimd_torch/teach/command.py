@@ -4,8 +4,8 @@ Lead the arm, show your movement to the learner, and see what it can do now. Onl
 
 Examples:
   sgimd teach                                           a new learner on the fishing rod, into runs/taught/seed-000
-  sgimd teach runs/taught/seed-000                      go on with an earlier run, taught or not
-  sgimd teach --environment planar-arm-7 --seed 3       with options of sgimd run
+  sgimd teach runs/taught/seed-000                      go on with an earlier run, whether taught or not
+  sgimd teach --environment planar-arm-7 --seed 3       a new learner, with options of sgimd run
 """
 
 from __future__ import annotations
@@ -31,15 +31,15 @@ from sgimd_torch.teach.by_hand import BY_HAND
 if TYPE_CHECKING:
     from viser import ViserServer
 
-NAME: Final = "taught"  # of a new run
+NAME: Final = "taught"  # name of a new run
 WHERE: Final = """
 Teach it here:  http://127.0.0.1:{port}/?token={token}   (Ctrl-C ends the session; {path} keeps everything)
-From another machine:  ssh -L {port}:127.0.0.1:{port} THIS-MACHINE   and open the address above there.
+From another machine:  ssh -L {port}:127.0.0.1:{port} THIS-MACHINE   and open the address above on that machine.
 """
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """The command ``sgimd teach``; it serves until Ctrl-C.
+    """The command ``sgimd teach``; it serves the page until Ctrl-C.
 
     Raises:
         ValueError: the request is wrong, or the robot cannot be led by the hand.
@@ -51,7 +51,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         from sgimd_torch.teach.led import hand_led_of
         from sgimd_torch.teach.page import Page
         from sgimd_torch.teach.taught import TaughtRun
-    hand_led_of(task_of(config))  # refused before anything is written
+    hand_led_of(task_of(config))  # refuses a robot that cannot be led, before anything is written
     taught = TaughtRun(config)
     with serving(port, token) as server:
         page = Page(server, taught)
@@ -68,10 +68,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 @contextlib.contextmanager
 def serving(port: int, token: str) -> Iterator[ViserServer]:
-    """A web server on 127.0.0.1 that answers requests with the ``token``, at the first free port from ``port`` on.
+    """A web server on 127.0.0.1, at the first free port from ``port`` on; it answers only requests with the ``token``.
 
     Raises:
-        ValueError: no such port, or none is free.
+        ValueError: ``port`` is not the number of a port, or no port from it on is free.
     """
     import viser  # loaded only when it is needed
 
@@ -96,7 +96,7 @@ def parser() -> argparse.ArgumentParser:
         allow_abbrev=False,
     )
     parser.add_argument("--port", type=int, default=8080, help="first port to try (default: 8080)")
-    parser.add_argument("--trust", action="store_true", help="allow code that the settings of RUN name to be executed")
+    parser.add_argument("--trust", action="store_true", help="permit executing code that the settings of RUN name")
     return parser
 
 

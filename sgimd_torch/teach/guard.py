@@ -1,8 +1,8 @@
-"""Access to the page: only requests that know its address, with the token in it, are answered.
+"""Access to the page: only requests that have the token, a part of the page's address, are answered.
 
     with guarded(token): server = viser.ViserServer(host="127.0.0.1", port=port)
 Any web page that is open in a browser can send requests to this machine. So a request needs the token, from the address
-or from the cookie that the address has set. Its Host and Origin must be this machine.
+or from the cookie that an earlier request got. The Host and Origin of the request must be this machine.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from websockets.http11 import Request, Response
 
 Process = Callable[[Any, Request], Response | None]
 OWN: Final = ("127.0.0.1", "localhost", "::1")
-LONGEST: Final = 200  # characters of an address; a file name has at most 255
+LONGEST: Final = 200  # most characters of an address, because a file name has at most 255
 
 
 @contextmanager
@@ -46,7 +46,7 @@ def guarded(token: str) -> Iterator[None]:
 
 
 def guard(token: str, process: Process) -> Process:
-    """``process`` for requests that have the token and come from pages of this machine; others are refused."""
+    """``process`` for requests that have the token and come from pages of this machine; other requests are refused."""
     name = f"teach-{hmac.digest(token.encode(), b'cookie', 'sha256').hex()[:8]}"
 
     def guarded(connection: Any, request: Request) -> Response | None:

@@ -19,11 +19,11 @@ from sgimd_torch.spaces import Array, check_point
 from sgimd_torch.teach.arm import Arm
 from sgimd_torch.teach.led import HandLed
 
-STEP: Final = 0.01  # s, from one posture of the arm to the next
-FOLLOW: Final = 15.0  # 1/s, rate at which a held point follows: nearly all of a jump within 5 / FOLLOW
-SUPPLE: Final = 0.03  # s, in which a joint takes up a speed, so that the arm does not tremble with the hand
-DAMPING: Final = 0.1  # of the least squares, relative to the levers: joints stay slow near a stretched posture
-BRAKES: Final = 0.88  # share of the acceleration that stops a joint at its range: the last step may take 9/8 of it
+STEP: Final = 0.01  # time (s) from one posture of the arm to the next
+FOLLOW: Final = 15.0  # 1/s, rate at which a held point follows; nearly all of a jump takes 5 / FOLLOW s
+SUPPLE: Final = 0.03  # time (s) in which a joint takes up a speed, so that the arm does not tremble with the hand
+DAMPING: Final = 0.1  # damping of the least squares relative to the levers; it slows joints near a stretched posture
+BRAKES: Final = 0.88  # share of the largest acceleration that braking aims at; its last step may take 9/8 of this share
 
 
 class _Hand:
@@ -38,14 +38,14 @@ class _Hand:
         self._wanted, self._pull = target, np.zeros(3)
 
     def follow(self, point: Array) -> Array:
-        """``(3,)`` m/s, the velocity that the held ``point`` should have in the next step."""
+        """``(3,)`` m/s, the wished velocity of the held ``point`` in the next step."""
         self._pull = self._pull + STEP * FOLLOW**2 * (self.target - self._wanted - 2 / FOLLOW * self._pull)
         self._wanted = self._wanted + STEP * self._pull
         return np.asarray(self._pull + FOLLOW * (self._wanted - point))
 
 
 class Leading:
-    """An arm that a hand leads. It never jumps: ``step`` moves it by what fits into that time.
+    """An arm that a hand leads. ``step`` moves it no farther than its limits allow in that time.
 
     Args:
         led: the robot.
@@ -71,7 +71,7 @@ class Leading:
 
     @property
     def point(self) -> Array:
-        """``(3,)`` m, the held point; the robot's own hand if nothing is held."""
+        """``(3,)`` m, the held point, or the robot's own hand if nothing is held."""
         return self.arm.where(*((self._held.body, self._held.place) if self._held else self._hand))
 
     @property
@@ -90,10 +90,10 @@ class Leading:
         return self._postures is not None
 
     def home(self) -> None:
-        """Release the arm, and put it at once where its movements start.
+        """Release the arm, and put it at once into the posture in which its movements start.
 
         Raises:
-            RuntimeError: a recording is under way, which must not jump.
+            RuntimeError: a recording is under way; a jump would spoil it.
         """
         if self.recording:
             raise RuntimeError("the arm cannot jump home during a recording; end_recording() comes first")
@@ -109,7 +109,7 @@ class Leading:
             point: ``(3,)`` m in the world, the touched point; None for the origin of ``body``.
 
         Raises:
-            ValueError: the model has no such body, or the led joints do not move it, or not they alone.
+            ValueError: the model has no such body, the led joints do not move it, or other joints move it, too.
         """
         number, place = self._hand if body is None else self.arm.place_of(body)
         if point is not None:
@@ -121,10 +121,10 @@ class Leading:
 
         Raises:
             RuntimeError: nothing is held.
-            ValueError: not one finite point.
+            ValueError: ``target`` is not one finite point.
         """
         if self._held is None:
-            raise RuntimeError("drag() needs a hand on the arm; grab() it first")
+            raise RuntimeError("drag() needs a hand on the arm; call grab() first")
         self._held.target = check_point("target", target, 3, "in m").copy()
 
     def release(self) -> None:
@@ -132,7 +132,7 @@ class Leading:
         self._held = None
 
     def step(self, dt: float) -> None:
-        """Let ``dt`` (s) pass, in steps of ``STEP``; the rest of it counts for the next call.
+        """Let ``dt`` (s) pass, in steps of ``STEP``; a remainder of ``dt`` counts for the next call.
 
         Raises:
             ValueError: ``dt`` is not a time of 0 s or more.
@@ -159,7 +159,7 @@ class Leading:
 
         Raises:
             RuntimeError: no recording is under way.
-            ValueError: no time has passed since it began; the recording is lost.
+            ValueError: no time has passed since the recording began; the recording is lost.
         """
         if self._postures is None:
             raise RuntimeError("nothing is being recorded; begin_recording() comes first")
@@ -172,7 +172,7 @@ class Leading:
         held = self._held
         wish = np.zeros(len(self._q)) if held is None else self._towards(held.follow(self.point), held.body)
         speed = self._within(wish)
-        q = self.arm.ranges.clip(self._q + speed * STEP)  # rounding
+        q = self.arm.ranges.clip(self._q + speed * STEP)  # the clip removes errors of rounding
         self._speed, self._q = (q - self._q) / STEP, q
         self.arm.pose(self._q)
         if self._postures is not None:
@@ -182,7 +182,7 @@ class Leading:
         """``(n_joints,)`` rad/s that move the held point with this ``velocity`` ``(3,)`` m/s, by damped least squares.
 
         If a joint would be too fast, all of them slow down, so that the direction stays. A joint that would leave its
-        range stops in time, and the others make up for it.
+        range stops in time, and the other joints make up for it.
         """
         levers = self.arm.levers(body, self.point)
         damping = (DAMPING**2 * np.square(levers).sum() / 3 + 1e-12) * np.eye(3)
@@ -207,7 +207,7 @@ class Leading:
         return min(1.0, float((self.arm.speeds / np.maximum(np.abs(wish), 1e-12)).min()))
 
     def _within(self, wish: Array) -> Array:
-        """``(n_joints,)`` rad/s of the next step: towards the wished speeds, in their direction, within all limits."""
+        """The speeds ``(n_joints,)`` rad/s of the next step: they approach the scaled ``wish`` within all limits."""
         change = (self._slower(wish) * wish - self._speed) * min(1.0, STEP / SUPPLE)
         most, fastest = self.arm.accelerations * STEP, self.arm.speeds
         low, high = self._brakes()

@@ -1,7 +1,7 @@
-"""Robots that a person can lead by the hand: which joints of which MuJoCo model, and how fast.
+"""Robots that a person can lead by the hand: a MuJoCo model, its joints that are led, and their limits.
 
     led = hand_led_of(task); led.joints
-The arm and the rod are known here. A robot of your own has an attribute ``hand_led``.
+The arm and the rod are known here. A robot of your own needs an attribute ``hand_led``.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ class HandLed:
     """A robot that a person can lead by the hand; `Arm` checks it.
 
     Args:
-        model: MuJoCo model in which the robot stands at its start, or can be put there by its joints.
+        model: MuJoCo model whose initial posture is the start of movements, or differs from it in led joints only.
         joints: names of the joints that a policy moves, in the order of a recording's columns.
         hand: name of the body or site by which the robot is led if nothing else is grabbed.
-        ranges: ``(n_joints,)`` rad, or m of a slide joint; None for those of the model.
-        start: ``(n_joints,)`` posture in which every movement starts; None for the model's own.
-        speeds: ``(n_joints,)`` rad/s, the largest of the robot's own movements; None to cross a range in about a
-            second. The hand cannot lead the arm faster, as the robot could not repeat it.
-        accelerations: ``(n_joints,)`` rad/s^2, likewise.
+        ranges: ``(n_joints,)`` ranges (rad; m for a slide joint); None for the ranges in the model.
+        start: ``(n_joints,)`` posture in which every movement starts; None for the initial posture of the model.
+        speeds: ``(n_joints,)`` rad/s, largest speeds of the robot's own movements; None for 1.5 ranges per s, so that a
+            range takes about a second. The hand cannot lead the arm faster, as the robot could not repeat that.
+        accelerations: ``(n_joints,)`` rad/s^2, largest accelerations of such movements; None for 6 ranges per s^2.
     """
 
     model: mujoco.MjModel
@@ -85,12 +85,12 @@ def arm_led(arm: PlanarArm) -> HandLed:
     """A planar arm, led by its end, no faster than in a smooth movement of 1 s."""
     n, limits = arm.policies.dim, arm.angles(np.ones(arm.policies.dim))
     names = tuple(f"joint_{k}" for k in range(n))
-    fastest = 1.5 * limits, 6 * limits  # of 3 t^2 - 2 t^3
+    fastest = 1.5 * limits, 6 * limits  # largest derivatives of 3 t^2 - 2 t^3
     return HandLed(planar_model([1 / n] * n), names, "end", Box(-limits, limits), np.zeros(n), *fastest)
 
 
 def planar_model(lengths: Sequence[float]) -> mujoco.MjModel:
-    """An arm in the plane z = 0 with a hinge before each link of ``lengths`` (m), along +x at zero angles."""
+    """An arm in the plane z = 0 with a hinge before each link of ``lengths`` (m); at zero angles it lies along +x."""
     thickness = 0.02 * sum(lengths)
     inner = f'<site name="end" pos="{lengths[-1]} 0 0"/>'
     for k in reversed(range(len(lengths))):

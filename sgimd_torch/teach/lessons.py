@@ -1,10 +1,10 @@
-"""Lessons by hand: what a recording of a led arm teaches, and what the robot cannot repeat of it.
+"""Lessons by hand: what a recording of a led arm teaches, and which part of it the robot cannot repeat.
 
 Section 4.1 of Nguyen & Oudeyer (2014): the correspondence, eqs. (5) and (6), turns a led trajectory into theta_d; the
-robot executes theta_d, and where it lands is the outcome of the lesson.
+robot executes theta_d, and the outcome of this movement is the outcome of the lesson.
     lesson = lesson_by_hand(*moving(*leading.end_recording()), task, stream(seed, "lessons", 0))
     save_demonstrations("mine.npz", [lesson.demonstration])
-The file holds everything that the learner is shown: a loaded lesson has an equal theta_d, bit for bit.
+The file holds everything that the learner is shown, so a loaded lesson has an equal theta_d, bit for bit.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from sgimd_torch.runs.tasks import Task, correspondence_of
 from sgimd_torch.spaces import Array, Demonstration, read_only
 from sgimd_torch.teach.led import HandLed, hand_led_of
 
-RATE: Final = 50.0  # Hz, of the shipped demonstrations and of motor primitives
-FASTER: Final = 1.02  # times the speed of the robot's own movements: a faster joint is remarked
-MOVES: Final = 0.02  # rad/s: an arm that was never faster did not move
-STILL: Final = 0.05  # share of the largest speed: the arm pauses while all joints are slower
-AWAY: Final = 0.05  # rad from where movements start: a start farther away is remarked
+RATE: Final = 50.0  # Hz, sampling rate of the shipped demonstrations and of motor primitives
+FASTER: Final = 1.02  # multiple of the largest speed of the robot's own movements, above which a joint gets a remark
+MOVES: Final = 0.02  # rad/s; an arm that was never faster counts as unmoved
+STILL: Final = 0.05  # share of the largest speed; while all joints are slower, the arm counts as pausing
+AWAY: Final = 0.05  # rad; a recording that starts farther from the start of movements gets a remark
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,8 +32,8 @@ class HandLesson:
     """A lesson for the learner, and how well the robot can follow it.
 
     Attributes:
-        demonstration: the recording, with the outcome of ``theta_d`` executed once.
-        theta_d: ``(theta_dim,)`` policy of the recording, by the correspondence.
+        demonstration: the recording, with the outcome of one execution of ``theta_d``.
+        theta_d: ``(theta_dim,)`` policy that the correspondence gives for the recording.
         misfit: distance between recording and movement (rad), see `misfit_of`.
         remarks: a sentence for each thing that the robot cannot follow.
     """
@@ -53,7 +53,7 @@ def lesson_by_hand(times: Array, joints: Array, task: Task, rng: np.random.Gener
         times: ``(n_times,)`` s, increasing from 0.
         joints: ``(n_times, n_joints)`` rad, postures of the led arm.
         task: task of the learner, whose robot was led.
-        rng: noise of the one movement, such as ``stream(seed, "lessons", number)``.
+        rng: random stream of the noise of this movement, such as ``stream(seed, "lessons", number)``.
 
     Raises:
         ValueError: the robot cannot be led, or its correspondence refuses the recording.
@@ -61,7 +61,7 @@ def lesson_by_hand(times: Array, joints: Array, task: Task, rng: np.random.Gener
     """
     robot, led = task.environment, hand_led_of(task)
     longest = primitive_of(robot).durations[1]
-    played = times / times[-1] * longest if times[-1] > longest else times  # ends exactly at longest
+    played = times / times[-1] * longest if times[-1] > longest else times  # the last time is exactly longest
     even, trajectory = resampled(played, joints)
     theta_d = robot.policies.check("theta_d", correspondence_of(task)(even, trajectory))
     context = robot.contexts.low + robot.contexts.sides / 2
@@ -85,7 +85,7 @@ def moving(times: Array, joints: Array) -> tuple[Array, Array]:
 
 
 def resampled(times: Array, joints: Array) -> tuple[Array, Array]:
-    """The recording at equal steps, at least ``RATE`` a second, both ends kept."""
+    """The recording at equal time steps, at least ``RATE`` a second; its first and last posture are kept."""
     even = np.linspace(0.0, times[-1], max(2, int(np.ceil(times[-1] * RATE - 1e-9)) + 1))
     return even, np.stack([np.interp(even, times, column) for column in joints.T], axis=1)
 
@@ -99,7 +99,7 @@ def _unlike_led(times: Array, played: Array, joints: Array, led: HandLed) -> lis
     speeds = np.abs(np.diff(joints, axis=0) / np.diff(played)[:, None]).max(axis=0)
     for name, speed, most in zip(led.joints, speeds, speeds if led.speeds is None else led.speeds, strict=True):
         if speed > most * FASTER:
-            remarks.append(f"{name} would turn at {speed:.2g} rad/s, its movements at {most:.2g} rad/s at most")
+            remarks.append(f"{name} would turn at {speed:.2g} rad/s, but movements reach {most:.2g} rad/s at most")
     away = 0.0 if led.start is None else float(np.abs(joints[0] - led.start).max())
     if away > AWAY:
         remarks.append(f"it starts {away:.2g} rad from where movements start, so the robot begins with a jerk")

@@ -1,7 +1,7 @@
-"""The page: a loop moves the led arm and shows the status; a thread beside it moves the learner.
+"""The page: a loop moves the led arm and shows the status; a second thread moves the learner.
 
     with serving(8080, token) as server: Page(server, TaughtRun(config)).run()
-What viewers do goes through a queue to the loop. All viewers see the same page, and each may use everything.
+The actions of viewers go through a queue to the loop. All viewers see the same page, and each may use all of it.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from sgimd_torch.teach.panel import Panel
 from sgimd_torch.teach.scene import Scene
 from sgimd_torch.teach.taught import Status, TaughtRun
 
-TICK: Final = 1 / 30  # s, from one picture to the next
-BLOCK: Final = 10  # movements of the learner between two updates
-FAREWELL: Final = 0.3  # s, in which the last message reaches the viewers
+TICK: Final = 1 / 30  # time (s) from one picture to the next
+BLOCK: Final = 10  # number of movements of the learner between two updates
+FAREWELL: Final = 0.3  # time (s) in which the last message reaches the viewers
 ENDED: Final = (
     '<div style="padding:0 .6em;color:#a33"><b>This session has ended.</b> '
     "Everything is kept; to go on: <code>sgimd teach {0}</code></div>"
@@ -39,7 +39,7 @@ class Page:
 
     Args:
         server: web server of the page.
-        taught: run that is taught; the page owns it until ``run`` ends, and closes it then.
+        taught: run that is taught; the method ``run`` of the page closes it at the end.
 
     Attributes:
         lesson: lesson of the last recording, None if there is none.
@@ -60,21 +60,21 @@ class Page:
         self.lesson: HandLesson | None = None
         self.status: Status | None = None
         self.running = False
-        self._before: Status | None = None  # from the giving of a lesson until its effect is shown
-        self._given = False  # a lesson that the learner has not begun to imitate
+        self._before: Status | None = None  # status before a given lesson, until the effect of the lesson is shown
+        self._given = False  # whether there is a lesson that the learner has not begun to imitate
         self._tasks: SimpleQueue[Callable[[], object]] = SimpleQueue()
         self._learner = ThreadPoolExecutor(1)
         self._moving: Future[Status] | None = self._learner.submit(taught.status)
         for body, handle in self.scene.grips:
             self._listen_to(body, handle)
 
-        # Callbacks are coroutines, here and below; viser calls other functions out of order.
+        # Callbacks are coroutines, here and below, because viser calls other functions out of order.
         @server.on_client_disconnect
         async def _(client: viser.ClientHandle) -> None:
             self._tasks.put(self._tab_closed)
 
     def run(self, stopped: Callable[[], bool] = lambda: False) -> None:
-        """Serve until ``stopped()``, or until the run fails; then tell viewers that the session has ended."""
+        """Serve until ``stopped()`` is true or the taught run fails; then tell viewers that the session has ended."""
         last = time.monotonic()
         try:
             while not stopped():
@@ -159,14 +159,14 @@ class Page:
             self.leading.drag(end + self._offset)
 
     def _tab_closed(self) -> None:
-        """Release the arm, and end a recording, as nobody may be left to do so."""
+        """Release the arm, and end a recording, because perhaps nobody is left to do so."""
         self.leading.release()
         if self.leading.recording:
             self.leading.end_recording()
             self.panel.show_recording(False)
 
     def _record(self, client: viser.ClientHandle) -> None:
-        """Begin a recording; or end the one under way, and make a lesson of it."""
+        """Begin a recording, or end the present recording and make a lesson of it."""
         self._set_lesson(None)
         self.panel.show_recording(not self.leading.recording)
         if not self.leading.recording:

@@ -51,7 +51,7 @@ _LEGEND: Final = (
 
 
 class Panel:
-    """The controls beside the scene; all viewers see the same.
+    """The controls beside the scene; all viewers see the same controls.
 
     Args:
         server: web server of the page.
@@ -105,7 +105,7 @@ class Panel:
         self.buttons["record"].label, self.buttons["record"].icon = STOP if recording else RECORD
 
     def show_lesson(self, lesson: HandLesson | None, problem: str = "") -> None:
-        """Describe the lesson of a recording, or the ``problem`` why there is none."""
+        """Describe the lesson of a recording, or the ``problem`` that prevents a lesson."""
         self.buttons["discard"].visible = lesson is not None or bool(problem)
         self.buttons["show"].disabled = lesson is None
         if lesson is None:

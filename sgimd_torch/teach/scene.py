@@ -1,7 +1,7 @@
 """The scene: the robot that a hand leads, and the map of T on the ground.
 
     scene = Scene(server, led, links, outcomes, goals); scene.draw_arm(leading.data, leading.hand)
-Places in T are places in the plane z = 0 of the model: a movement that lands there lands on the map.
+A place in T is drawn at this place in the plane z = 0 of the model, so movements are seen to land on the map.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from sgimd_torch.teach.chart import CELLS, SKILL, Chart, by_error
 from sgimd_torch.teach.led import HandLed
 
 HAND, LEARNER, MET, UNMET = (240, 120, 30), (60, 70, 190), (10, 110, 50), (120, 140, 160)
-ABOVE: Final = 0.002  # m, from one layer of the map to the next
-SEEN: Final = 1e-4  # share of the map's side: a robot that has moved less is not drawn again
+ABOVE: Final = 0.002  # distance from one layer of the map to the next, as a share of the map's longer side
+SEEN: Final = 1e-4  # share of the map's longer side; a robot that has moved less is not drawn again
 
 
 class Scene:
@@ -30,7 +30,7 @@ class Scene:
     Args:
         server: web server of the page.
         led: the robot.
-        links: names of the bodies that a hand leads; other bodies, such as a line, are not drawn.
+        links: names of the bodies that a hand leads; other bodies, such as the line of the rod, are not drawn.
         outcomes: T.
         goals: ``(n_goals, outcome_dim)`` goals of the benchmark.
 
@@ -60,14 +60,14 @@ class Scene:
         self._mark = self._scene.add_mesh_simple("/mark", ring.vertices, ring.faces, color=HAND, visible=False)
         names = [model.body(model.geom_bodyid[k]).name for k in shown]
         self.grips = [(led.hand, self._hand), *zip(names, self._geoms.values(), strict=True)]
-        # A browser without a GPU draws 25 pictures a second of this, but 2 with an environment map, shadows, or water.
+        # Without a GPU a browser draws this 25 times a second, but only twice with environment map, shadows or water.
         self._scene.configure_environment_map(None)
         self._scene.configure_default_lights(cast_shadow=False)
         self._scene.add_light_ambient("/light", intensity=0.6)
         self._look(server, middle)
 
     def ground(self, points: Array, layer: int = 0) -> Array:
-        """``(..., 3)`` m in the scene, of places ``(..., outcome_dim)`` of T; a higher ``layer`` lies above."""
+        """Points ``(..., 3)`` m of the scene for places ``(..., outcome_dim)`` of T; a higher ``layer`` lies higher."""
         points = np.asarray(points)
         flat = np.zeros((*points.shape[:-1], 3))
         flat[..., : min(2, points.shape[-1])] = points[..., :2]

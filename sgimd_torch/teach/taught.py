@@ -22,8 +22,8 @@ from sgimd_torch.teach.by_hand import BY_HAND, ByHand
 from sgimd_torch.teach.chart import Chart, chart_of
 from sgimd_torch.teach.lessons import HandLesson, lesson_by_hand
 
-LATEST: Final = 60  # landings that the page shows
-IMITATIONS: Final = 10  # movements that follow a lesson at once, at most
+LATEST: Final = 60  # number of landings that the page shows
+IMITATIONS: Final = 10  # largest number of movements that follow a lesson at once
 NO_MORE: Final = "the learner has made all its {0} movements; end this session, and go on with --movements {1}"
 ALONE: Final = "{0} cannot be shown a lesson by hand; sgim-d, practice-taught, imitation and observation can"
 
@@ -55,7 +55,7 @@ class TaughtRun:
 
     Attributes:
         parts: parts of the run; its teacher is `ByHand`.
-        cannot_be_taught: reason why the learner takes no lessons, "" if it does.
+        cannot_be_taught: reason why the learner takes no lessons, "" if it takes them.
 
     Raises:
         ValueError: the run cannot be made, or its directory belongs to another run.
@@ -74,7 +74,7 @@ class TaughtRun:
         self._landed: deque[Array] = deque(maxlen=LATEST)
 
     def go_on(self, movements: int, *, until_idle: bool = False) -> Status:
-        """Make so many movements more, fewer if the run ends.
+        """Make this number of further movements, or fewer if the run ends.
 
         Args:
             movements: number of movements.
@@ -96,7 +96,7 @@ class TaughtRun:
         """Offer a lesson before the next movement.
 
         Raises:
-            ValueError: the learner cannot be taught, or cannot use this lesson; nothing has changed then.
+            ValueError: the learner cannot be taught, or cannot use this lesson; in both cases nothing has changed.
         """
         total = self.config.movements
         if self.cannot_be_taught:

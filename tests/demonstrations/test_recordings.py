@@ -80,8 +80,8 @@ def test_a_file_of_a_spreadsheet_with_a_mark_of_bytes_and_spaces_is_read(tmp_pat
         (ONE.replace("0.3", "some"), "a must be numbers: .* 'some'"),
         (ONE.replace("0.3", "nan"), r"one\.csv: a must be finite .*, but entry \[1, 0\] is nan"),
         (ONE.replace("2.5", "1.5"), r"one\.csv: time must increase from row to row; were the rows shuffled"),
-        (ONE.replace(",9,9\n2.5", ",9,9,9\n2.5"), "row 1 has 6 fields, 5 were wanted"),
-        ("\n".join(ONE.splitlines()[:2]), "has 1 sample, at least 2"),
+        (ONE.replace(",9,9\n2.5", ",9,9,9\n2.5"), "row 1 has 6 fields instead of 5"),
+        ("\n".join(ONE.splitlines()[:2]), "has 1 sample, but needs 2 or more"),
     ],
 )
 def test_a_csv_file_that_is_no_recording_is_refused_by_its_name(tmp_path, text, message):
@@ -95,7 +95,7 @@ def test_rows_of_a_recording_that_are_apart_and_folders_without_files_are_refuse
         read_csv(tmp_path, NAMES)
     columns = Columns(joints=("a",), outcome=("x",), recording="run")
     shuffled = LONG + "one,9,9,9,9,9,9\n"
-    with pytest.raises(ValueError, match=r"long\.csv: the rows of recording one are apart"):
+    with pytest.raises(ValueError, match=r"long\.csv: the rows of recording one are not adjacent"):
         read_csv(write(tmp_path / "long.csv", shuffled), columns)
     with pytest.raises(FileNotFoundError):
         read_csv(tmp_path / "nothing.csv", columns)
@@ -104,7 +104,7 @@ def test_rows_of_a_recording_that_are_apart_and_folders_without_files_are_refuse
 def test_columns_are_checked_before_anything_is_read():
     with pytest.raises(ValueError, match="at least one column for joints"):
         Columns(joints=(), outcome=("x",))
-    with pytest.raises(ValueError, match=r"'state\[a\]' is no column"):
+    with pytest.raises(ValueError, match=r"'state\[a\]' does not name a column"):
         Columns(joints=("state[a]",), outcome=("x",))
 
 
@@ -155,8 +155,8 @@ def change(dataset, **changes):
             r"has format v2\.1, this library reads v3; lerobot",
         ),
         (lambda root: change(root, features={"action": {}}), r"has no feature observation\.state, .*; it has action"),
-        (lambda root: change(root, total_episodes=4), "says 4 episodes, 3 were found; is a file missing"),
-        (lambda root: (root / "data/chunk-000/file-001.parquet").unlink(), "says 15 frames, 10 were found"),
+        (lambda root: change(root, total_episodes=4), "says 4 episodes, but 3 were found; is a file missing"),
+        (lambda root: (root / "data/chunk-000/file-001.parquet").unlink(), "says 15 frames, but 10 were found"),
         (lambda root: (root / "meta/info.json").unlink(), r"is no LeRobot dataset: it has no meta/info\.json"),
         (lambda root: (root / "meta/info.json").write_text("{"), r"info\.json is no json"),
         (
@@ -178,7 +178,7 @@ def test_a_dataset_that_is_damaged_or_of_another_kind_is_refused(dataset, harm, 
 @pytest.mark.parametrize("entry", ["observation.state[2:4]", "observation.state[3]", "observation.state[2:2]"])
 def test_an_entry_that_a_vector_does_not_have_is_refused(dataset, entry):
     columns = Columns((entry,), ("observation.place",), time="timestamp", recording="episode_index")
-    with pytest.raises(ValueError, match=re.escape(f"{entry} is not there, observation.state has 3 entries")):
+    with pytest.raises(ValueError, match=re.escape(f"there is no {entry}: observation.state has 3 entries")):
         read_lerobot(dataset, columns)
 
 
@@ -267,8 +267,8 @@ def test_what_lies_outside_the_limits_of_speed_and_range_is_remarked(slow, tmp_p
     fine, fast, wide, far, _ = capsys.readouterr().out.splitlines()[1:]
     assert float(fine.split()[-1]) < 0.01  # the misfit, and no remark
     assert "too fast: movements last 0.8 to 1.6 s" in fast
-    assert re.search(r"joint 0 is 1.\d+ at sample 7, its range \[-1, 1\]", wide)
-    assert "its outcome is outside T: it is imitated, but never a goal" in far
+    assert re.search(r"joint 0 is 1.\d+ at sample 7, outside its range \[-1, 1\]", wide)
+    assert "its outcome is outside T: a learner imitates it, but never takes it as a goal" in far
     save_demonstrations(file, [recording(5.0, 0.5)])
     assert sgimd("check", file, "--task", slow) == 2
     assert "a movement lasts 1.6 s at most, the recording 5 s" in capsys.readouterr().out

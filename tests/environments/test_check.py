@@ -144,14 +144,14 @@ USED_TWICE = "changed an array that it gave before: one buffer is used twice"
             with_(execute=lambda own, context, theta, rng: own(context, theta, stream(0, "always the same"))),
             rf"outcome_noise is 0.1, but no movement scatters; does {EXECUTE} use its rng",
         ),
-        (with_(outcome_noise=10.0), "outcome_noise is 10, but outcomes of a movement scatter by 0.1.*; in other units"),
+        (with_(outcome_noise=10.0), "outcome_noise is 10, but outcomes of a movement scatter by 0.1.*; a wrong unit"),
         (
             with_(execute_many=lambda own, contexts, thetas, rngs: own(contexts, thetas, [rngs[0]] * len(rngs))),
             rf"row 1 of {MANY} is .*, {EXECUTE} gives .*its own rng",
         ),
         (
             with_(execute_many=lambda own, contexts, thetas, rngs: own() + 1e-12 * (len(thetas) == 1)),
-            f"a row of {MANY} depends on the others in its batch",
+            f"a row of {MANY} depends on other rows of its batch",
         ),
         (
             with_(execute_many=lambda own, *_: own().ravel()),

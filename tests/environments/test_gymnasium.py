@@ -91,7 +91,7 @@ def test_a_movement_is_an_episode_of_the_controllers_commands():
             lambda: sled(world=gymnasium.make("CartPole-v1")),
             r"needs continuous actions, .* Discrete\(2\)",
         ),
-        (lambda: sled(world=gymnasium.make("MountainCarContinuous-v0")), "needs dt > 0, .* this world has none"),
+        (lambda: sled(world=gymnasium.make("MountainCarContinuous-v0")), "needs dt > 0, .* has the world no dt"),
         (lambda: sled(steps=0), "steps must be a whole number >= 1"),
     ],
 )

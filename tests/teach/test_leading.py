@@ -179,7 +179,7 @@ def test_ranges_are_those_of_the_model_if_none_are_given():
     [
         ({"joints": ("yaw", "elbo")}, "no joint 'elbo'; is it spelt"),
         ({"hand": "hnad"}, "no body or site 'hnad'"),
-        ({"hand": "float"}, "float cannot be grabbed, other joints move it, too; links that can are base, upper_arm"),
+        ({"hand": "float"}, "float cannot be grabbed: joints not led move it, too; links to grab are base, upper_arm"),
         ({"ranges": None}, "joint yaw has no range in the model; give ranges"),
         ({"start": [9.0] * 6}, "start must lie in its box"),
         ({"speeds": [1, 1, 1, 1, 1, 0]}, "speeds must be above 0"),
@@ -197,7 +197,7 @@ def test_a_ball_joint_cannot_be_led():
 
 
 def test_what_is_out_of_order_is_refused(leading):
-    with pytest.raises(RuntimeError, match=r"grab\(\) it first"):
+    with pytest.raises(RuntimeError, match=r"call grab\(\) first"):
         leading.drag([0, 0, 0])
     with pytest.raises(RuntimeError, match=r"begin_recording\(\) comes first"):
         leading.end_recording()

@@ -95,7 +95,7 @@ def test_what_could_not_be_followed_is_told(rod):
     times = np.linspace(0, 1.0, 51)
     yaw = np.outer(np.clip(times / 0.1, 0, 1), [1.4, 0, 0, 0, 0, 0])  # 14 rad/s
     remarks = give(rod, led(times, start + yaw)).remarks
-    assert remarks == ("yaw would turn at 14 rad/s, its movements at 5.7 rad/s at most",)
+    assert remarks == ("yaw would turn at 14 rad/s, but movements reach 5.7 rad/s at most",)
     elsewhere = np.tile(start + np.array([0.5, 0, 0, 0, 0, 0]), (51, 1))
     (remark,) = give(rod, led(times, elsewhere)).remarks
     assert remark == "it starts 0.5 rad from where movements start, so the robot begins with a jerk"
