@@ -5,8 +5,7 @@
   gain        error after each step from random movements to practice               (GAIN)
   curiosity   interest against uniform goals, wherever both were tried              (CURIOSITY)
 
-Lines are interquartile means over seeds; bands and bars are 95 % intervals. The script leaves out figures without rows,
-and names them.
+Lines are interquartile means over seeds; bands and bars are 95 % intervals. Figures without rows are named, not drawn.
 
 Example:
   python experiments/figures.py
