@@ -88,7 +88,7 @@ def _parts(run: Run, *, trust: bool) -> RunParts:
         if "mujoco" in sys.modules:
             raise
         asked = os.environ.get("MUJOCO_GL")
-        raise ImportError(f"MUJOCO_GL={asked} does not work ({error}); set it to egl, or unset it") from error
+        raise ImportError(f"MUJOCO_GL={asked} does not work ({error}); set MUJOCO_GL=egl, or unset it") from error
 
 
 def _painter(robot: Any, shots: Sequence[Shot]) -> AbstractContextManager[Painter]:
