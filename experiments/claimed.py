@@ -19,24 +19,24 @@ from variants import ARMS, EXPERIMENTS, FOUR, HALVES, SPARSE, SUITE, SUITED
 
 TIMES: Final = (250, 500, 1000, 2000)
 WHOLE: Final = (*TIMES, LAST)
-EVERY, COST = 30, 10  # movements from one demonstration to the next of SGIM-D; what a demonstration costs
+EVERY, COST = 30, 10  # movements between two demonstrations of SGIM-D; cost of a demonstration (movements)
 
 
 def less(found: Evidence, ours: str, theirs: str, *times: int, name: str = "") -> list[Part]:
-    """Parts for each time: our error is smaller than theirs."""
+    """A part for each time, which says that our error is smaller than theirs."""
     names = {at: f"{name} at {at}".strip() if len(times) > 1 else name for at in times or (LAST,)}
     return [at_most(0.0, found.difference, ours, theirs, at, name=each, form="+.4f") for at, each in names.items()]
 
 
 def times_as_much(found: Evidence, bar: float, ours: str, theirs: str, *times: int) -> list[Part]:
-    """Parts for each time: our error is at most ``bar`` times theirs."""
+    """A part for each time, which says that our error is at most ``bar`` times theirs."""
     return [at_most(bar, found.ratio, ours, theirs, at, name=f"at {at}") for at in times]
 
 
 def paper(found: Evidence, *, letter: bool) -> list[Claim]:
-    """Section 6 of the paper, for learners of its letter, whose eq. (9) answers, or for ours.
+    """Claims of section 6 of the paper, on learners to the ``letter``, for which eq. (9) answers, or on our learners.
 
-    After 5000 movements, with demonstrator 3, one demonstration every 30 movements, unless a claim says otherwise.
+    If a claim says nothing else, it is about 5000 movements with a demonstration of demonstrator 3 every 30 movements.
     """
 
     def our(algorithm: str, where: str = "") -> str:
@@ -109,7 +109,7 @@ def paper(found: Evidence, *, letter: bool) -> list[Claim]:
 
 
 def learning(found: Evidence) -> list[Claim]:
-    """Learning from few movements, on the rod, then on the suite."""
+    """Claims on learning from few movements, first on the rod, then on the suite."""
     taught, alone, uniform = "practice-taught.rod", "practice.rod", "practice-uniform.rod"
     rivals = ("sgim-d", "cma-mae-taught", "map-elites-taught", "uniform-nearest-taught")
     early_and_late = (250, 500, 1000, LAST)
@@ -167,7 +167,7 @@ def learning(found: Evidence) -> list[Claim]:
 
 
 def answers(found: Evidence) -> list[Claim]:
-    """Inverse models on the memories of the suite and of the learners SUITED on the rod, 250 to 2000 movements."""
+    """Claims on inverse models, for memories of 250 to 2000 movements on the suite and of SUITED on the rod."""
     memories = [*EXPERIMENTS["suite"], *(f"{name}.rod" for name in SUITED)]
 
     def proved(other: str) -> list[Part]:
@@ -185,7 +185,7 @@ def answers(found: Evidence) -> list[Claim]:
 
 
 def curiosity(found: Evidence) -> list[Claim]:
-    """The gain from choosing goals, and from choosing them by interest."""
+    """Claims on the gain from choosing goals, and on the gain from choosing goals by interest."""
     return [
         Claim("Goals in the place of movements: SAGG-RIAC − Random < 0",
               less(found, "sagg-riac.rod", "random-nearest.rod")),
@@ -203,7 +203,7 @@ def curiosity(found: Evidence) -> list[Claim]:
 
 
 def model(found: Evidence) -> list[Claim]:
-    """Forward models against SGIM-D answered by `process`: a model that has to prove itself, and one always asked."""
+    """Claims on SGIM-D with a forward model instead of `process`: one that proves itself first, one always asked."""
     proved, always, plain = "sgim-d-model.rod by model", "gradient by model-alone", "sgim-d"
     on_arms = [
         at_most(1.03, found.ratio, f"sgim-d-model.{arm} by model", f"sgim-d{arm.removeprefix('planar')}", at,
@@ -229,7 +229,7 @@ def model(found: Evidence) -> list[Claim]:
 
 
 def asking(found: Evidence) -> list[Claim]:
-    """Learners that ask: when, how much, whom, where, at which cost."""
+    """Claims on learners that ask: when, how much, whom, where and at which cost they ask."""
     im, dear, sgim_d, toss = "sgim-im", "sgim-im-cost-10", "taught-every-30", "sgim-im-toss"
 
     def asked(name: str, what: str, teachers: Sequence[str] = ()) -> pd.Series:
@@ -242,7 +242,7 @@ def asking(found: Evidence) -> list[Claim]:
         return found.less(asked(name, what), asked(other, than), level=level)
 
     def at_equal_cost(*, level: Level = LEVEL) -> Interval:
-        """Compared with SGIM-D at equal cost, on straight lines between its evaluations."""
+        """Our error minus that of SGIM-D at equal cost, on straight lines between the evaluations of SGIM-D."""
         ours, shown = shared(found.at(dear), asked(dear, "shown"))
         costs = (LAST + COST * shown) / (1 + COST / EVERY)
         curve = found.curve(sgim_d)

@@ -1,13 +1,13 @@
-"""The pages in results/ and the README's section of results: templates with tables and numbers made from the rows.
+"""Make the pages in results/ and the README's section of results: fill templates with tables and numbers of the rows.
 
-Each page is a template in experiments/pages/, which has the text. Change the template, not the page. The rows are in
+The text of each page is a template in experiments/pages/. Change the template, not the page. The rows are in
 results.csv and in the small tables beside it, which compare.py writes to --results. Intervals are bootstrapped with a
-fixed seed, so the same rows give the same pages. Missing rows are named.
+fixed seed, so the same rows give the same pages. The script names missing rows.
 
 Examples:
   python experiments/claims.py                                  all pages, and the README
-  python experiments/claims.py --only RESULTS                   one of them
-  python experiments/claims.py --results mine --out mine        of rows of your own, into a folder of your own
+  python experiments/claims.py --only RESULTS                   one page
+  python experiments/claims.py --results mine --out mine        your own rows, into a folder of your own
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ def into_readme(text: str, section: str) -> str:
 
 
 def _check_place(path: Path) -> None:
-    """Refuse to overwrite a file that is not one of our pages, by a ResultsError."""
+    """Raise a ResultsError if the file at ``path`` is not one of our pages, so that it is not overwritten."""
     if path.is_file() and not path.read_bytes().startswith(MADE.encode()):
         raise ResultsError(
             f"{path} was not made by claims.py and is left as it is; move it away, or name another --out"
@@ -66,11 +66,11 @@ def _check_place(path: Path) -> None:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Make the pages; the exit code is 2, and no page is changed, if the rows make no sense."""
+    """Make the pages. If the rows make no sense, the exit code is 2 and no page is changed."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     results = Path("results")
     parser.add_argument("--results", type=Path, default=results, help="folder of the rows (default: %(default)s)")
-    where = "folder of the pages; the README is made with the pages in %(default)s (default: %(default)s)"
+    where = "folder of the pages; the README changes only if it is %(default)s (default: %(default)s)"
     parser.add_argument("--out", type=Path, default=results, help=where)
     parser.add_argument("--only", choices=PAGES, help="page to make (default: all)")
     options = parser.parse_args(argv)

@@ -1,8 +1,8 @@
 """Run the experiments, every variant with several seeds, and collect the results in tables.
 
 variants.py lists the variants. A run goes to OUT/VARIANT/seed-003. When it ends, each of its evaluations becomes rows
-of results.csv in RESULTS, one for each inverse model that a page reads. Requests of learners that ask are in asked.csv;
-tiles reached and goals chosen are in explored.csv. A variant in two experiments is run once and has rows for each.
+of results.csv in RESULTS, one for each inverse model that a page shows. Requests of learners that ask are in asked.csv;
+tiles reached and goals chosen are in explored.csv. A variant of two experiments is run once; both get rows.
 
 Start the same command again after Ctrl-C or a power cut, or with more seeds: runs in the tables are not repeated, and a
 run that was stopped goes on. If a run fails, the others go on.
@@ -37,12 +37,12 @@ with loading():  # Ctrl-C shows no traceback
 EXAMPLES: Final = f"""experiments: {", ".join(EXPERIMENTS)}
 
 examples:
-  python experiments/compare.py --dry-run                         runs that the pages still lack
-  python experiments/compare.py                                   do them: each experiment with the seeds of its page
+  python experiments/compare.py --dry-run                         list the runs that the pages still lack
+  python experiments/compare.py                                   make these runs, with the seeds of each page
   python experiments/compare.py learners large-space --seeds 0-2 --results mine
   python experiments/compare.py ablations --only uniform-goals grid --results mine   all their rows, into mine/
   python experiments/compare.py --shard 3/20                      a part of the runs, see docs/clusters.md
-  python experiments/compare.py --verify 10 --lot 7               ten rows of the tables, drawn at random, made again
+  python experiments/compare.py --verify 10 --lot 7               make ten rows again, drawn at random
 
 Exit code: 0 all runs are in the tables, 1 some failed, 2 the request is wrong, 130 or 143 stopped by a signal.
 """
@@ -51,15 +51,15 @@ FLOORS: Final = ("learners", "letter", "forward-model")
 FLOOR_AT: Final = 5000
 RUN: Final = ["experiment", "variant", "seed", "movements", "answer"]
 NUMBERS: Final = ["error", "floor"]
-ROUNDING: Final = 1e-5  # relative; another processor rounds differently, and errors grow over thousands of movements
-Wanted = tuple[str, Config]  # a run, and the experiment that its rows are for
+ROUNDING: Final = 1e-5  # relative; other processors round differently, and errors grow over thousands of movements
+Wanted = tuple[str, Config]  # an experiment, and a run whose rows it gets
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Carry out the runs that the tables lack, and collect the results.
 
     Returns:
-        The exit code, 1 if runs failed.
+        The exit code: 1 if runs failed, else 0.
     """
     options = _options(argv)
     whole = runs_of(options.experiments, options.only, options.seeds, options.out)
@@ -74,13 +74,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     where = options.results / FILE
     say(f"{len(wanted)} runs{options.shard.note(runs)}, {len(wanted) - len(left)} of them in {where} already")
     if wanted and not left:
-        say("nothing is left to run: --verify 10 makes ten of these rows again, --results FOLDER all of them")
+        say("nothing is left to run: --verify 10 makes ten of these rows again, --results FOLDER makes all again")
     if options.dry_run:
         print("".join(f"{name}: {config.title}\n" for name, config in left), end="")
     if options.dry_run or not left:
         return 0
     make_folder(options.results)
-    homes: dict[Config, list[str]] = {}  # the experiments that a run belongs to
+    homes: dict[Config, list[str]] = {}  # experiments of each run
     for name, config in left:
         homes.setdefault(config, []).append(name)
 
@@ -94,12 +94,12 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def verify(wanted: Sequence[Wanted], table: pd.DataFrame, options: argparse.Namespace) -> int:
-    """Draw rows of the table at random, make each again by a run of its own, and compare.
+    """Draw rows of the table at random, make each row again by a new run, and compare both rows.
 
-    The run has as many movements as its row and is evaluated only at the end, which changes nothing about learning.
+    The new run ends after the movements of the row and is evaluated only there, which changes nothing about learning.
 
     Returns:
-        0 if all are equal except for rounding, else 1.
+        0 if all rows are equal except for rounding, else 1.
     """
     configs = {(name, config.variant, config.seed): config for name, config in wanted}
     rows = [row for row in table.to_dict("records") if (row["experiment"], row["variant"], row["seed"]) in configs]
@@ -136,12 +136,12 @@ def compared(shipped: Row, now: Row) -> str:
 
 
 def runs_of(experiments: Sequence[str], only: Sequence[str], seeds: Sequence[int] | None, out: Path) -> list[Wanted]:
-    """All runs, each with its experiment, seed by seed, so that every variant gets its first seeds early.
+    """Pairs of experiment and run, seed by seed, so that every variant gets its first seeds early.
 
     Args:
         experiments: names in ``EXPERIMENTS``.
-        only: names of variants, the others are left out; empty for all.
-        seeds: seeds of each variant; None for those of its page.
+        only: names of the variants to run; empty for all variants of the experiments.
+        seeds: seeds of each variant; None for the seeds of its page.
         out: folder of the runs; the subsets of ``make_subsets`` are in ``out/demonstrations``.
     """
     found = []
@@ -160,7 +160,7 @@ def runs_of(experiments: Sequence[str], only: Sequence[str], seeds: Sequence[int
 
 
 def last_rows(experiment: str, config: Config) -> set[tuple[Any, ...]]:
-    """Keys of the rows of a run's last evaluation; if the table has them, it has the earlier ones, too."""
+    """Keys of the rows of a run's last evaluation; if the table has these rows, it has the earlier ones, too."""
     answers = {own_answer(config) if answer == OWN else answer for answer in config.evaluated_by}
     answers.intersection_update(ANSWERS.get(experiment, ALIKE))
     return {(experiment, config.variant, config.seed, config.movements, answer) for answer in answers}
@@ -179,7 +179,7 @@ def collect(experiment: str, config: Config, results: Path) -> None:
         raise RunError(f"{run.path} has no evaluation after {config.movements} movements, though it ended")
     if name := SMALL_TABLES.get(experiment):
         merge(results, name, ROWS[name](config, run))
-    merge(results, FILE, rows)  # last: now the run counts as done
+    merge(results, FILE, rows)  # this comes last, because from now on the run counts as done
 
 
 def _run(configs: Sequence[Config], options: argparse.Namespace, on_end: Any = None) -> list[str]:
@@ -210,7 +210,7 @@ def _options(argv: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--out", type=Path, default=Path("runs"), help="folder of the runs (default: %(default)s)")
     parser.add_argument("--results", type=Path, default=Path("results"), help=results)
     parser.add_argument(
-        "--verify", type=int, default=0, metavar="N", help="number of rows to make again, in a folder of their own"
+        "--verify", type=int, default=0, metavar="N", help="number of rows to draw at random and to make again"
     )
     parser.add_argument("--lot", type=int, default=0, help="seed of the draw of --verify (default: %(default)s)")
     options = parser.parse_args(argv)
@@ -228,7 +228,7 @@ def _check_known(what: str, name: str, known: Collection[str]) -> None:
     if homes := [experiment for experiment, variants in EXPERIMENTS.items() if name in variants]:
         raise ValueError(f"{name} is a variant of {' and '.join(homes)}; write {homes[0]} --only {name}")
     if name in EXPERIMENTS:
-        raise ValueError(f"{name} is an experiment, no variant; experiments go before --only")
+        raise ValueError(f"{name} is an experiment, not a variant; experiments go before --only")
     raise unknown(what, name, known)
 
 

@@ -1,8 +1,8 @@
 """The rows as evidence: errors by seed, and the statistics over seeds that claims, tables and figures read.
 
     found = Evidence.of(Path("results")); show(found.ratio("sgim-d", "random"))
-A name is that of a variant, answered by `process`; "sgim-d-letter by paper" is answered by another inverse model. Two
-names are compared on their common seeds, or as independent samples if they have none.
+The name of a variant means its errors if `process` answers; "sgim-d-letter by paper" names another inverse model. Two
+names are compared on their common seeds, or as independent samples if they have no seed in common.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ from sgimd_torch.views.statistics import (
 )
 from table import read_table
 
-LAST: Final = 5000  # movements in the life of a learner of the paper
-Level = float | None  # confidence of an interval; None for the number alone, which costs much less
-Statistic = Callable[..., Interval]  # with a keyword ``level``
+LAST: Final = 5000  # number of movements in the life of a learner, as in the paper
+Level = float | None  # confidence of an interval; None if only the number is needed, which costs much less
+Statistic = Callable[..., Interval]  # function with a keyword ``level``
 
 
 class NotRun(LookupError):
@@ -63,21 +63,21 @@ class Evidence:
         return cls(rows, explored, asked)
 
     def at(self, name: str, movements: int = LAST, column: str = "error") -> pd.Series:
-        """Errors (m) by seed; with the column "floor" their noise floors."""
+        """Errors (m) by seed; if the column is "floor", noise floors (m) by seed."""
         variant, _, answer = name.partition(" by ")
         place = (answer or "process", variant, movements)
         found = self.rows.loc[place, column].dropna() if place in self.rows.index else pd.Series(dtype=float)
         return _two_or_more(found, f"{name} at {movements}")
 
     def curve(self, name: str) -> pd.DataFrame:
-        """Errors (m) by seed and movements, of the seeds that were evaluated at each number of movements."""
+        """Errors (m) by seed and movements; a seed that lacks an evaluation of the others is left out."""
         variant, _, answer = name.partition(" by ")
         if (answer or "process", variant) not in self.rows.index:
             raise NotRun(name)
         return self.rows["error"].loc[answer or "process", variant].unstack("movements").dropna()
 
     def counts(self, table: str, name: str, column: str, teachers: Sequence[str] = ()) -> pd.Series:
-        """A column of a small table by seed, summed over these ``teachers``, all of them unless given."""
+        """A column of a small table by seed, summed over ``teachers``, or over all teachers if none is named."""
         rows: pd.DataFrame = getattr(self, table)
         variant = name.partition(" by ")[0]
         mine = rows[rows.index == variant].dropna(subset=column)
@@ -89,28 +89,28 @@ class Evidence:
         return _found(interquartile_mean, self.at(name, at), level=level)
 
     def difference(self, ours: str, theirs: str, at: int = LAST, *, level: Level = LEVEL) -> Interval:
-        """Our error less theirs (m)."""
+        """Our error minus theirs (m)."""
         return self.less(self.at(ours, at), self.at(theirs, at), level=level)
 
     def ratio(self, ours: str, theirs: str, at: int = LAST, *, level: Level = LEVEL) -> Interval:
-        """Our error over theirs."""
+        """Our error divided by theirs."""
         return self.over(self.at(ours, at), self.at(theirs, at), level=level)
 
     def growth(self, name: str, late: int, early: int, *, level: Level = LEVEL) -> Interval:
-        """The late error over the early one."""
+        """The error after ``late`` movements divided by the error after ``early`` movements."""
         return self.over(self.at(name, late), self.at(name, early), level=level)
 
     def over_floor(self, ours: str, theirs: str, *, level: Level = LEVEL) -> Interval:
-        """Our error at the end over their noise floor."""
+        """Our error at the end divided by their noise floor."""
         return self.over(self.at(ours), self.at(theirs, column="floor"), level=level)
 
     def improvement(self, ours: str, theirs: str, *, level: Level = LEVEL) -> Interval:
-        """The probability that a run of ours has a smaller error than one of theirs at the end."""
+        """The probability that a run of ours ends with a smaller error than a run of theirs."""
         errors = self.at(ours).to_numpy(), self.at(theirs).to_numpy()
         return improvement_interval(*errors, level=LEVEL if level is None else level)
 
     def variance_ratio(self, ours: str, theirs: str, *, level: Level = LEVEL) -> Interval:
-        """The variance over seeds of our error at the end over that of theirs."""
+        """The variance over seeds of our error at the end, divided by the variance of theirs."""
 
         def ratio(x: Array, y: Array) -> Array:
             return np.asarray(x.var(axis=-1, ddof=1) / y.var(axis=-1, ddof=1))
@@ -118,7 +118,7 @@ class Evidence:
         return _found(ratio, self.at(ours), self.at(theirs), level=level)
 
     def growth_ratio(self, ours: Sequence[str], theirs: Sequence[str], *, level: Level = LEVEL) -> Interval:
-        """The growth of our error over that of theirs; errors grow from the first to the second name of each."""
+        """The growth of our error, from the first to the second of our names, divided by the growth of theirs."""
 
         def times(*errors: Array) -> Array:
             small, large, their_small, their_large = map(interquartile_mean, errors)
@@ -127,7 +127,7 @@ class Evidence:
         return _found(times, *map(self.at, (*ours, *theirs)), level=level)
 
     def over_tasks(self, ours: Sequence[str], theirs: Sequence[str], at: int, *, level: Level = LEVEL) -> Interval:
-        """The interquartile mean over tasks of our error over theirs; a name for each task on either side."""
+        """Our error divided by theirs, as interquartile mean over tasks; both sides have a name for each task."""
 
         def mean(*drawn: Array) -> Array:
             pairs = zip(drawn[: len(ours)], drawn[len(ours) :], strict=True)
@@ -136,7 +136,7 @@ class Evidence:
         return _found(mean, *(self.at(name, at) for name in (*ours, *theirs)), level=level)
 
     def time_to_reach(self, ours: str, theirs: str, *, level: Level = LEVEL) -> Interval:
-        """Movements until our mean error falls to theirs at the end; twice a life if it never does."""
+        """Number of movements until our mean error falls to their last one; 2 ``LAST`` if it never does."""
         curve = self.curve(ours)
         movements = curve.columns.to_numpy(np.float64)
 
@@ -151,22 +151,22 @@ class Evidence:
         return _found(interquartile_mean, self.counts(table, name, column), level=level)
 
     def more_tiles(self, ours: str, theirs: str, *, level: Level = LEVEL) -> Interval:
-        """The number of tiles of the benchmark that we reached in a life, less theirs."""
+        """The number of tiles of the benchmark that we reached in a life, minus their number."""
         return self.less(*(self.counts("explored", name, "tiles") for name in (ours, theirs)), level=level)
 
     def near_goals(self, name: str) -> pd.DataFrame:
-        """The number of ``goals`` that a learner chose, and of those ``near``, which can be reached, by seed."""
+        """Two numbers by seed: ``goals`` that a learner chose, and goals among them that it can reach, ``near``."""
         return pd.DataFrame({column: self.counts("explored", name, column) for column in ("goals", "near")})
 
     def near_share(self, name: str, *, level: Level = LEVEL) -> Interval:
-        """The share of goals that can be reached, all seeds together."""
+        """The share of chosen goals that can be reached, all seeds together."""
         found = self.near_goals(name)
         return self.share(found["near"], found["goals"], level=level)
 
     def near_ratio(self, ours: str, theirs: str, *, level: Level = LEVEL) -> Interval:
-        """Our share of goals that can be reached over theirs, all seeds together.
+        """Our share of goals that can be reached divided by theirs, all seeds together.
 
-        Half a goal more is counted as theirs, which avoids a division by zero.
+        To avoid a division by zero, their learner gets one goal more, half of it within reach.
         """
 
         def times(ours: Array, theirs: Array) -> Array:
@@ -176,7 +176,7 @@ class Evidence:
         return _found(times, self.near_goals(ours), self.near_goals(theirs), level=level)
 
     def less(self, ours: pd.Series, theirs: pd.Series, *, level: Level = LEVEL) -> Interval:
-        """Ours less theirs, both by seed."""
+        """Our numbers minus theirs, both given by seed."""
         ours, theirs, paired = _matched(ours, theirs)
 
         def difference(x: Array, y: Array) -> Array:
@@ -185,15 +185,15 @@ class Evidence:
         return _found(difference, ours, theirs, paired=paired, level=level)
 
     def over(self, ours: pd.Series, theirs: pd.Series, *, level: Level = LEVEL) -> Interval:
-        """Ours over theirs, both by seed."""
+        """Our numbers divided by theirs, both given by seed."""
         ours, theirs, paired = _matched(ours, theirs)
         return _found(_ratio, ours, theirs, paired=paired, level=level)
 
     def share(self, parts: pd.Series, wholes: pd.Series, *, level: Level = LEVEL) -> Interval:
-        """All ``parts`` over all ``wholes``, the seeds of both drawn together.
+        """The sum of ``parts`` divided by the sum of ``wholes``; the bootstrap draws the same seeds for both.
 
         Raises:
-            NotRun: all wholes are 0.
+            NotRun: all ``wholes`` are 0.
         """
         if not wholes.sum():
             raise NotRun("nothing to count")
@@ -205,10 +205,10 @@ class Evidence:
 
 
 def shared(ours: pd.Series, theirs: pd.Series) -> tuple[pd.Series, pd.Series]:
-    """Both, restricted to common seeds.
+    """Both series, restricted to common seeds.
 
     Raises:
-        NotRun: fewer than two.
+        NotRun: fewer than two seeds are common.
     """
     seeds = ours.index.intersection(theirs.index)
     if len(seeds) < 2:
@@ -217,7 +217,7 @@ def shared(ours: pd.Series, theirs: pd.Series) -> tuple[pd.Series, pd.Series]:
 
 
 def movements_to_reach(movements: Array, errors: Array, level: Array | float) -> Array:
-    """Number of movements at which the error first falls to a level; straight lines between evaluations.
+    """Number of movements at which the error first falls to a level, on straight lines between evaluations.
 
     Args:
         movements: ``(n,)``, increasing.
@@ -238,7 +238,7 @@ def movements_to_reach(movements: Array, errors: Array, level: Array | float) ->
 
 
 def _matched(ours: pd.Series, theirs: pd.Series) -> tuple[pd.Series, pd.Series, bool]:
-    """Both, and whether they are paired: on common seeds, or independent if there are none."""
+    """Both series on their common seeds and True; if no seed is common, all of both series and False."""
     paired = not ours.index.intersection(theirs.index).empty
     return *(shared(ours, theirs) if paired else (ours, theirs)), paired
 

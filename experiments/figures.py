@@ -1,12 +1,11 @@
-"""The figures of the pages of results, made from results/results.csv alone. All are answered by `process`.
+"""Draw the figures of the pages of results from results/results.csv alone. In all of them `process` answers.
 
-  learning    error against movements: few movements, with a teacher and without   (README, LEARNING)
+  learning    error against movements, of learners with and without a teacher      (README, LEARNING)
   paper       the paper's five learners, in its task space and in the larger one    (RESULTS)
-  gain        what each step from random movements to practice brings               (GAIN)
-  curiosity   interest against uniform goals, where it was tried                    (CURIOSITY)
+  gain        error after each step from random movements to practice               (GAIN)
+  curiosity   interest against uniform goals, wherever both were tried              (CURIOSITY)
 
-Lines are interquartile means over seeds, bands and bars their 95 % intervals. Figures without rows are left out and
-named.
+Lines are interquartile means over seeds; bands and bars are 95 % intervals. Figures without rows are named, not drawn.
 
 Example:
   python experiments/figures.py
@@ -39,7 +38,7 @@ with loading():  # Ctrl-C shows no traceback
 
 KIND: Final = "svg"
 ERROR: Final = "mean distance to the goals (m)"
-LEARNERS: Final = ("random", "sagg-riac", "observation", "imitation", "sgim-d")  # the paper's
+LEARNERS: Final = ("random", "sagg-riac", "observation", "imitation", "sgim-d")  # learners of the paper
 
 
 def learning(found: Evidence) -> Figure:
@@ -63,13 +62,13 @@ def paper(found: Evidence) -> Figure:
 
 
 def gain(found: Evidence) -> Figure:
-    """The error after 1000 movements on the rod, each step added to the one before."""
+    """The error after 1000 movements on the rod, at each step of GAIN and TAUGHT."""
     steps = {**GAIN, **TAUGHT}
     return _rows({step: partial(found.error, f"{name}.rod", 1000) for step, name in steps.items()}, ERROR)
 
 
 def curiosity(found: Evidence) -> Figure:
-    """The error with interest over that with uniform goals."""
+    """The error with goals by interest divided by the error with uniform goals."""
     pairs = {
         "SGIM-D, T 10⁴ times larger, 5000": ("sgim-d-large", "sgim-d-uniform-large", LAST),
         "... by the paper's eq. (3), 5000": ("sgim-d-absolute-large", "sgim-d-uniform-large", LAST),
@@ -98,7 +97,7 @@ FIGURES: Final[dict[str, Callable[[Evidence], Figure]]] = {
 
 
 def curves(ax: Axes, found: Evidence, shown: Mapping[str, str]) -> None:
-    """Draw errors against movements, for the variant that is ``shown`` of each algorithm, with intervals as bands.
+    """Draw errors against movements, with intervals as bands; ``shown`` names one variant of each algorithm.
 
     Movements are on a logarithmic axis, because learners differ most early.
     """
@@ -118,12 +117,12 @@ def curves(ax: Axes, found: Evidence, shown: Mapping[str, str]) -> None:
     ax.grid(alpha=0.3)
     height, gap = -np.inf, 0.06 * ax.get_ylim()[1]
     for algorithm, end in sorted(ends.items(), key=lambda each: each[1]):
-        height = max(end, height + gap)  # names do not overlap
+        height = max(end, height + gap)  # names must not overlap
         ax.text(1.1 * LAST, height, NAMES[algorithm], color=COLOURS[algorithm], va="center")
 
 
 def _rows(numbers: Mapping[str, Callable[[], Interval]], label: str, form: str = ".3f") -> Figure:
-    """A figure with a row for each number that was run, from the top: a point with its interval."""
+    """A figure with a row for each number that has runs, from the top; a row is a point with its interval."""
     shown: dict[str, Interval] = {}
     for name, number in numbers.items():
         try:

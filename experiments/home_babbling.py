@@ -1,10 +1,10 @@
 """Goal babbling from a home posture, a rival: Rolf, Steil & Gienger (2010), "Goal babbling permits direct learning of
 inverse kinematics", IEEE Transactions on Autonomous Mental Development 2(3).
 
-The learner knows one movement at first, home, the middle of Pi. Goals lie on straight paths through T. For each of them
-it makes the movement of its inverse estimate plus a variation, which is affine in the goal and constant along a path.
-The estimate learns from these movements alone. A movement counts more if it led towards the goal, and far for its
-size. So the estimate learns one family of the many movements that reach a place.
+At first the learner knows one movement, home, which is the middle of Pi. Goals lie on straight paths through T. For
+each goal the learner makes the movement that its estimate gives, plus a variation, an affine function of the goal that
+stays the same along a path. The estimate learns from these movements alone. A movement counts more if it led towards
+the goal, and far for its size. So the estimate learns one family of the many movements that reach a place.
     sgimd run --algorithm experiments.home_babbling:home_babbling
 Deviation: the estimate is a local affine regression, not a global one; a posture is a movement here.
 """
@@ -23,7 +23,7 @@ from sgimd_torch.spaces import Array, Attempt, Move
 
 HOMEWARD: Final = 0.1  # share of paths that begin with the movement home
 NEAREST: Final = 20  # outcomes around a goal that enter the estimate
-RIDGE: Final = 0.1  # number of further exemplars, at home and of mean weight, that enter the estimate
+RIDGE: Final = 0.1  # number of further exemplars in the estimate, which are all home and have the mean weight
 ORIGIN: Final = "home-babbling"
 TINY: Final = np.finfo(float).tiny
 
@@ -33,8 +33,8 @@ class HomeBabbling(Strategy):
 
     Args:
         problem: learning problem; its memory is empty at the start.
-        steps: movements on a path.
-        sd: standard deviation of the variations, in sides of Pi.
+        steps: number of movements on a path.
+        sd: standard deviation of the variations, relative to the sides of Pi.
     """
 
     draws_from = ORIGIN
@@ -44,11 +44,11 @@ class HomeBabbling(Strategy):
         self.policies, self.outcomes, self.memory = problem.policies, problem.outcomes, problem.memory
         self.steps, self.sd = steps, sd
         self.home = (self.policies.low + self.policies.high) / 2
-        self._from: Array | None = None  # the last goal; None at home
-        self._weights: list[float] = []  # of each exemplar
+        self._from: Array | None = None  # the last goal; None if the next path begins at home
+        self._weights: list[float] = []  # weight of each exemplar
 
     def attempt(self, context: Array) -> Attempt:
-        """Follow a path to a new goal, from the last goal or now and then from home."""
+        """Follow a path to a new goal; it begins at the last goal, and now and then at home."""
         if self._from is None or self.rng.random() < HOMEWARD:
             self._from = self.outcomes.clip((yield Move(self.home, None, ORIGIN)))
             self._weights.append(1.0)
@@ -79,10 +79,10 @@ class HomeBabbling(Strategy):
 
 
 def _weight(goal: Array, outcome: Array, theta: Array) -> float:
-    """Weight of a movement: directness times distance over size.
+    """Weight of a movement: its directness times its distance, divided by its size.
 
     Args:
-        goal, outcome, theta: steps from the movement before to this one.
+        goal, outcome, theta: changes since the movement before, relative to the sides of T or Pi.
     """
     length, size = np.linalg.norm(outcome), np.linalg.norm(theta)
     straight = goal @ outcome / max(np.linalg.norm(goal) * length, TINY)
@@ -90,16 +90,16 @@ def _weight(goal: Array, outcome: Array, theta: Array) -> float:
 
 
 def home_babbling(environment: Environment, seed: int, *, steps: int = 10, sd: float = 0.1) -> Learner:
-    """Goal babbling from home; `LocalProcess` answers, as for other learners.
+    """Goal babbling from home. In evaluations `LocalProcess` answers, as for other learners.
 
     Args:
         environment: robot, which is not executed here.
         seed: number from which the random stream of the learner comes.
-        steps: movements on a path.
-        sd: standard deviation of the variations, in sides of Pi.
+        steps: number of movements on a path.
+        sd: standard deviation of the variations, relative to the sides of Pi.
 
     Raises:
-        ValueError: an environment with contexts; a path cannot lead from one context to another.
+        ValueError: the environment has contexts, and a path cannot lead from one context to another.
     """
     if environment.contexts.dim:
         raise ValueError(f"home babbling knows one context only, got contexts of dim {environment.contexts.dim}")

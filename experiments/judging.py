@@ -1,8 +1,8 @@
-"""Verdicts on claims: parts with bars, and one correction for all claims of a page.
+"""Verdicts on claims, which have parts with bars; one correction serves all claims of a page.
 
     judge([Claim("SGIM-D halves Random's error", [at_most(0.5, found.ratio, "sgim-d", "random")])])
-A part clears its bar only if its whole interval does. A claim of several parts holds if each of them does, which
-needs no correction. It fails if one of them does at a confidence corrected for their number. Else it is open.
+A part clears its bar only if its whole interval does. A claim of several parts holds if each part holds, which needs
+no correction. It fails if one part fails at a confidence corrected for the number of parts. Else the claim is open.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ class Part(NamedTuple):
     """A number with a bar.
 
     Args:
-        measured: the number with its interval at a confidence ``level``.
-        bar: upper bound of the number, a lower bound if ``least``.
-        least: true if the number should be at least the bar.
-        margin: length of the interval that may lie beyond the bar.
-        name: name of the part, if a claim has several.
+        measured: function of a confidence ``level`` that returns the number with its interval.
+        bar: upper bound of the number; lower bound if ``least`` is true.
+        least: true if the claim says that the number is at least the bar.
+        margin: length of the interval that may lie beyond the bar if the part holds.
+        name: name of the part, if a claim has several parts.
         form: format of the number.
     """
 
@@ -41,11 +41,11 @@ class Part(NamedTuple):
 
     @property
     def above(self) -> float:
-        """The distance of the number to the bar, positive on the wrong side."""
+        """The distance from the bar to the number, positive if the number is on the wrong side."""
         return _above(self, None)[0]
 
     def holds(self, level: float) -> bool:
-        """Whether the number clears the bar, and so does its interval except for the margin."""
+        """Whether the number clears the bar, and its interval clears the bar except for the margin."""
         return self.above <= 0 and _above(self, level)[2] <= self.margin
 
     def fails(self, level: float) -> bool:
@@ -54,7 +54,7 @@ class Part(NamedTuple):
 
 
 class Claim(NamedTuple):
-    """A claim in words, with its schedules and its bar; its parts, which must all hold; a sentence on the result."""
+    """A claim: ``text`` has its schedules and bar, all ``parts`` must hold, ``note`` is a sentence on the result."""
 
     text: str
     parts: Sequence[Part]
@@ -62,7 +62,7 @@ class Claim(NamedTuple):
 
 
 class Verdict(NamedTuple):
-    """A verdict; ``number`` is that of the worst part, farthest on the wrong side, with its interval of 95 %."""
+    """A verdict; ``number`` belongs to the worst part, farthest on the wrong side, and has a 95 % interval."""
 
     claim: str
     number: str
@@ -72,11 +72,11 @@ class Verdict(NamedTuple):
 def judge(claims: Sequence[Claim]) -> list[Verdict]:
     """Verdicts on claims, corrected together by Holm's method: the chance that any of them is wrong is 5 % at most.
 
-    Intervals of few seeds are too narrow: where n paired differences all have one sign, their bootstrap interval
-    excludes 0 at any level, and by chance alone they have one sign with probability 2^(1 - n).
+    Intervals of few seeds are too narrow. If n paired differences all have one sign, their bootstrap interval excludes
+    0 at any level. By chance alone they all have one sign with probability 2^(1 - n).
 
     Raises:
-        ValueError: errors without a ratio, such as 0.
+        ValueError: errors have no ratio, for example because they are 0.
     """
     run = {number: claim for number, claim in enumerate(claims) if _was_run(claim)}
     standing = holm(run, lambda number, level: _verdict(run[number], level) != OPEN)
@@ -104,13 +104,13 @@ def at_least(
 
 @cache
 def _above(part: Part, level: Level) -> tuple[float, float, float]:
-    """The number of a part and its interval, as distances to the bar: above 0 on the wrong side."""
+    """The number of a part and its interval, as distances from the bar; a distance above 0 is on the wrong side."""
     value, low, high = (each - part.bar for each in part.measured(level=level))
     return (-value, -high, -low) if part.least else (value, low, high)
 
 
 def _verdict(claim: Claim, level: float) -> str:
-    # The worst first: then a claim of many parts that does not hold costs few intervals.
+    # The worst part comes first, so that a claim of many parts that does not hold costs few intervals.
     worst = sorted(claim.parts, key=lambda part: -part.above)
     if all(part.holds(level) for part in worst):
         return HOLDS

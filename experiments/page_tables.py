@@ -22,7 +22,7 @@ from variants import ARMS, EXPERIMENTS, REFINING, ROBOTS, SPARSE, SUITE, TEACHER
 SETTINGS: Final = (*ROBOTS, *TEACHERS)
 VARIANTS: Final = {name for variants in EXPERIMENTS.values() for name in variants}
 MISSING_CELL: Final = "–"
-# Rivals by schedule: no teacher; one demonstration every 30 movements, ten imitations each; all at the start, once.
+# Variants of each rival: without a teacher, shown one demonstration every 30 movements, and shown all at the start.
 RIVALS: Final[Mapping[str, tuple[str, str, str]]] = {
     "practice": ("practice.rod", "practice-taught-every-30.rod", "practice-taught.rod"),
     "SAGG-RIAC; SGIM-D": ("sagg-riac.rod", "sgim-d.rod", "sgim-d-once.rod"),
@@ -39,7 +39,7 @@ RIVALS: Final[Mapping[str, tuple[str, str, str]]] = {
     "MAP-Elites, from the middle": ("middle-map-elites.rod", "", ""),
     "Goal babbling from home": ("home-babbling.rod", "", ""),
 }
-# From random movements to practice, each step added to the one before; then the same teacher for all.
+# Steps from random movements to practice, each added to the step before; then learners that have the same teacher.
 GAIN: Final[Mapping[str, str]] = {
     "random movements": RANDOM,
     "the standard baseline": UNIFORM,
@@ -57,7 +57,7 @@ TAUGHT: Final[Mapping[str, str]] = {
     "SGIM-D, at the start": "sgim-d-once",
     "`practice`, at the start": "practice-taught",
 }
-# Pairs of learners with and without an idea: untaught ones first, then taught ones.
+# Pairs of learners with and without an idea: untaught pairs first, then taught pairs.
 IDEAS: Final = {
     "interest in the place of uniform goals": (("sagg-riac", "sagg-riac-uniform"), ("sgim-d", "sgim-d-uniform")),
     "practice in the place of goal babbling": (("practice", "sagg-riac"), ("practice-taught", "sgim-d")),
@@ -82,13 +82,13 @@ def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 @dataclass
 class Page:
-    """The tables and numbers of one page. ``at`` is a number of movements; numbers that were not run are dashes.
+    """The tables and numbers of one page. ``at`` is a number of movements. A number without runs is a dash.
 
     Args:
         found: rows of the experiments.
         folder: folder of the tables.
-        missing: names of claims and numbers that were not run; they gather while the page is made.
-        verdicts: verdicts on the claims that were run; they gather, too.
+        missing: names of claims and numbers without runs; the list grows while the page is made.
+        verdicts: verdicts on the claims that have runs; this list grows, too.
     """
 
     found: Evidence
@@ -97,7 +97,7 @@ class Page:
     verdicts: list[Verdict] = field(default_factory=list)
 
     def error(self, name: str, at: int = LAST, form: str = ".3f", *, between: bool = False) -> str:
-        """The error (m), ``between`` its interval if wanted."""
+        """The error (m); if ``between``, its interval, too."""
         return self.cell(self.found.error, name, at, form=form, between=between)
 
     def errors(self, name: str, times: Sequence[int], form: str = ".3f", *, between: bool = False) -> list[str]:
@@ -105,11 +105,11 @@ class Page:
         return [self.error(name, at, form, between=between) for at in times]
 
     def less(self, ours: str, theirs: str, at: int = LAST, form: str = ".3f") -> str:
-        """Their error less ours (m), with its interval."""
+        """Their error minus ours (m), with the interval of this difference."""
         return self.cell(self.found.difference, theirs, ours, at, form=form, between=True)
 
     def ratio(self, ours: str, theirs: str, at: int = LAST) -> str:
-        """Our error over theirs, with its interval."""
+        """Our error divided by theirs, with the interval of this ratio."""
         return self.cell(self.found.ratio, ours, theirs, at, form=".2f", between=True)
 
     def near(self, name: str) -> str:
@@ -119,7 +119,7 @@ class Page:
     def cell(
         self, statistic: Statistic, *of: object, form: str = ".3f", between: bool = False, bold: bool = False
     ) -> str:
-        """A number, ``between`` its interval if wanted; ``bold`` marks one whose interval excludes 1."""
+        """A number; if ``between``, its interval, too. With ``bold``, a number whose interval excludes 1 is bold."""
         try:
             found = statistic(*of) if between else statistic(*of, level=None)
         except NotRun as missing:
@@ -129,13 +129,13 @@ class Page:
         return f"**{text}**" if bold and (found.low > 1 or found.high < 1) else text
 
     def claims(self, claims: Callable[[Evidence], Sequence[Claim]]) -> str:
-        """A row for each claim that was run."""
+        """A table with a row for each claim that has runs."""
         verdicts = [each for each in self.judged(claims(self.found)) if each.verdict != MISSING]
         rows = [(each.claim, each.number, f"**{each.verdict}**") for each in verdicts]
         return markdown(("claim", "number [95 %]", "verdict"), rows)
 
     def paper(self) -> str:
-        """A row for each of the paper's claims, to the letter and ours, all judged together."""
+        """A row for each of the paper's claims: verdicts on the paper's letter and on our learners, judged together."""
         letter, ours = paper(self.found, letter=True), paper(self.found, letter=False)
         verdicts = self.judged([*letter, *ours])
         cells = [
@@ -152,7 +152,7 @@ class Page:
         return verdicts
 
     def rivals(self) -> str:
-        """Errors at 1000 and 5000, each rival by each schedule."""
+        """Errors after 1000 and 5000 movements, of each rival with each schedule of its teacher."""
         rows = [
             [label, *(", ".join(self.errors(name, (1000, LAST))) if name else MISSING_CELL for name in names)]
             for label, names in RIVALS.items()
@@ -161,14 +161,14 @@ class Page:
         return markdown(head, rows)
 
     def answers(self) -> str:
-        """Errors at 5000 by three answers."""
+        """Errors after 5000 movements with the answers of three inverse models."""
         names = ("practice-taught", "practice-uniform", "sgim-d", "uniform-nearest-taught", "cma-mae", "cma-mae-taught")
         by = ("nearest", "linear", "process")
         rows = [[f"`{name}`", *(self.error(f"{name}.rod by {answer}") for answer in by)] for name in names]
         return markdown(("memory of", "nearest", "`LocallyLinear`", "`process`"), rows)
 
     def suite(self, at: int = 1000) -> str:
-        """Errors over those of random movements on each task, then their interquartile mean over tasks."""
+        """Errors divided by the error of random movements, on each task, then as interquartile mean over tasks."""
         learners, every = ("practice", UNIFORM, "map-elites"), (*SUITE, *SPARSE)
         known = {name: [task for task in every if f"{name}.{task}" in VARIANTS] for name in learners}
         rows = [
@@ -179,7 +179,7 @@ class Page:
         return markdown(("task", *learners), rows)
 
     def gain(self) -> str:
-        """The error at each step from random movements to practice, then those of learners with the same teacher."""
+        """Errors at each step from random movements to practice, then errors of learners with the same teacher."""
         rows = []
         for step, name in {**GAIN, **TAUGHT}.items():
             on_suite = all(f"{name}.{task}" in VARIANTS for task in SUITE)
@@ -189,7 +189,7 @@ class Page:
         return markdown(("step", "rod, 1000 (m)", "rod, 5000 (m)", "suite, 1000"), rows)
 
     def changes(self) -> str:
-        """The error that one change adds to that of SGIM-D, for each change."""
+        """The error that each change adds to the error of SGIM-D."""
         rows = [
             [f"`{name}`", self.cell(self.found.difference, name, "sgim-d", form="+.4f", between=True)]
             for experiment in ("ablations", "teaching")
@@ -198,7 +198,7 @@ class Page:
         return markdown(("change", "difference to SGIM-D at 5000 (m)"), rows)
 
     def steps(self) -> str:
-        """The ladder from the letter to our defaults, in the small and in the large T."""
+        """Errors at each step from the paper's letter to our defaults, in the small and in the large T."""
         rows = []
         both = [[f"sgim-d-letter{end}", *EXPERIMENTS[f"ladder{end}"], f"sgim-d{end}"] for end in ("", "-large")]
         for name, large in zip(*both, strict=True):
@@ -207,7 +207,7 @@ class Page:
         return markdown(("step", "T, by its own answer", "T, by `process`", "large T, by `process`"), rows)
 
     def models(self) -> str:
-        """Learners with and without a forward model: errors (m) by their own answer, at the end by `process`, too."""
+        """Errors (m) of learners with and without a forward model, by their own answers and, at the end, `process`."""
         ends = {"": (1000, LAST), **{f"-{arm.removeprefix('planar-')}": (2000,) for arm in ARMS}}
         rows = []
         for name, line in REFINING.items():
@@ -218,9 +218,9 @@ class Page:
         return markdown(head, rows)
 
     def asking(self) -> str:
-        """Errors on the rod of learners that ask and of others, the best first; demonstrations that were shown."""
+        """Errors on the rod, the best first, of learners that ask and of others; numbers of demonstrations shown."""
         names = [name for name in EXPERIMENTS["asking"] if "toss" not in name]
-        names.remove("sgim-acts-3")  # it is sgim-im
+        names.remove("sgim-acts-3")  # this name means the learner sgim-im
         rows = []
         for name in sorted(names, key=lambda name: self.error(name, LAST, ".9f")):
             shown = "0" if name == "alone" else "all"
@@ -230,9 +230,9 @@ class Page:
         return markdown(("learner", "1000", "5000", "shown"), rows)
 
     def settings(self, at: int = 2000) -> str:
-        """The error with an idea over that without it, in each setting; bold if its interval excludes 1.
+        """The error with an idea divided by that without the idea, in each setting; bold if the interval excludes 1.
 
-        A learner without a variant in a setting learns there as in the usual one.
+        If a learner has no variant in a setting, it learns there as in the setting "as-it-is".
         """
 
         def cell(setting: str, *pair: str) -> str:
@@ -259,7 +259,7 @@ class Page:
         return markdown((head, *map(str, times)), rows)
 
     def tuned(self) -> str:
-        """The default of each rival and its best setting in the first round: errors (m) of first and later seeds."""
+        """Errors (m) of each rival with its default and its best setting in the first round; first and later seeds."""
         table = read_table(self.folder, "rivals.csv")
         first, later = (
             half.groupby(["rival", "setting"])[["linear", "process"]].mean()

@@ -1,6 +1,6 @@
-"""Parts that experiments need and the library lacks: MAP-Elites that begins in the middle, a toss without a context.
+"""Parts that experiments need and the library lacks: MAP-Elites from the middle of Pi, and a toss without a context.
 
-sgimd run --algorithm experiments.parts:map_elites_middle         in the folder above
+sgimd run --algorithm experiments.parts:map_elites_middle         in the folder above this one
 """
 
 from __future__ import annotations
@@ -53,6 +53,6 @@ class BlindToss:
 
 
 def blind_toss() -> Task:
-    """A toss whose wind is not felt, with the goals of the toss; it shows the worth of a context."""
+    """The task of a toss whose wind is not felt, with the goals of the toss; it shows what a context is worth."""
     goals = toy_benchmark(toss(), 0.4)
     return Task(BlindToss(), lambda: replace(goals, environment=BlindToss.__name__))

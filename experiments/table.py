@@ -2,7 +2,7 @@
 
     table = read_table(Path("results")); table[table.experiment == "learners"]
     merge(Path("results"), "results.csv", result_rows("learners", config, run))
-A row made again from a run is the row that was there, byte for byte. Small tables beside it have the rest.
+If a row is made again from the same run, it equals the old one, byte for byte. Small tables hold further numbers.
 """
 
 from __future__ import annotations
@@ -28,21 +28,21 @@ from variants import ALIKE, ANSWERS
 Row = dict[str, Any]
 FILE: Final = "results.csv"
 _ASKED: Final = ("requests", "shown", "late", "late_own", "strong", "weak")
-# The size of the key of each table, and its columns, the key first. No two rows share a key.
+# Two facts of each table: how many columns are its key, and all columns, the key first. No two rows share a key.
 TABLES: Final[dict[str, tuple[int, tuple[str, ...]]]] = {
     FILE: (6, ("experiment", "variant", "task", "seed", "movements", "answer", "error", "floor")),
     "explored.csv": (2, ("variant", "seed", "tiles", "goals", "near")),
     "asked.csv": (3, ("variant", "seed", "teacher", *_ASKED)),
     "rivals.csv": (4, ("rival", "setting", "seed", "movements", "linear", "process")),
 }
-TYPES: Final = {  # of columns in every table; all others have floats, whose empty fields are NaN
+TYPES: Final = {  # types of columns; all other columns have floats, whose empty fields are NaN
     **dict.fromkeys(("experiment", "variant", "task", "answer", "teacher", "rival", "setting"), "str"),
     **dict.fromkeys(("seed", "movements", "tiles", *_ASKED), "int64"),
-    **dict.fromkeys(("goals", "near"), "Int64"),  # may be empty
+    **dict.fromkeys(("goals", "near"), "Int64"),  # fields may be empty
 }
-LATE: Final = 1000  # movements after which a learner should know whom to ask
+LATE: Final = 1000  # number of movements after which a learner is expected to know whom to ask
 CORNER: Final = -1.0  # m, least x and y of the tiles of the rod's benchmark
-NEAR: Final = 1.5  # m from the base; goals farther away cannot be reached
+NEAR: Final = 1.5  # m, distance from the base; goals farther away cannot be reached
 
 
 class ResultsError(ValueError):
@@ -50,7 +50,7 @@ class ResultsError(ValueError):
 
 
 def read_table(folder: Path, name: str = FILE) -> pd.DataFrame:
-    """A table of the folder; empty without a file.
+    """The table of this name in the folder; an empty table if there is no such file.
 
     Raises:
         ResultsError: the file is another table, or one of its rows makes no sense.
@@ -78,11 +78,11 @@ def read_table(folder: Path, name: str = FILE) -> pd.DataFrame:
 
 
 def merge(folder: Path, name: str, rows: Sequence[Row]) -> None:
-    """Add rows to a table in the order of their keys; they replace rows with the same key.
+    """Add rows to a table in the order of their keys; a new row replaces an old row with the same key.
 
     Raises:
         ResultsError: see ``read_table``.
-        OSError: the table cannot be written; then it is unchanged.
+        OSError: the table cannot be written and stays unchanged.
     """
     make_folder(folder)
     n_key, columns = TABLES[name]
@@ -101,9 +101,9 @@ def write_table(folder: Path, name: str, table: pd.DataFrame) -> None:
 
 
 def result_rows(experiment: str, config: Config, run: Run) -> list[Row]:
-    """Rows of results.csv: one for each evaluation of a finished run by each inverse model that pages read.
+    """Rows of results.csv: one for each evaluation of a finished run by each inverse model that pages show.
 
-    The learner's own inverse model has its word as ``answer``.
+    In rows of the learner's own inverse model, ``answer`` is the name of that model in the catalogue.
     """
     rows: list[Row] = []
     key = {"experiment": experiment, "variant": config.variant, "task": task_name(config), "seed": config.seed}
@@ -117,12 +117,12 @@ def result_rows(experiment: str, config: Config, run: Run) -> list[Row]:
 
 
 def own_answer(config: Config) -> str:
-    """The word of a learner's inverse model; `process` for practice, too, where it is fitted to effective movements."""
+    """The name of a learner's inverse model; for practice `process`, which it fits to effective movements."""
     return str(config.values.get("inverse", "process")).replace("among-effects", "process")
 
 
 def answers_of(experiment: str, config: Config) -> tuple[str, ...]:
-    """The inverse models that answer in the evaluations of a run: its own first, then others that pages read.
+    """The inverse models that answer in the evaluations of a run: first the run's own, then others that pages show.
 
     A forward model and eq. (9) answer only for learners that learn with them.
     """
@@ -131,7 +131,7 @@ def answers_of(experiment: str, config: Config) -> tuple[str, ...]:
 
 
 def task_name(config: Config) -> str:
-    """The robot's word and its options that differ from their defaults: ``fishing-rod task_space=100``."""
+    """The robot's name and its options that differ from their defaults: ``fishing-rod task_space=100``."""
     usual = Config.from_settings({"environment": config["environment"]}).values
     options = {name.removeprefix("environment."): value for name, value in config.values.items()
                if name.startswith("environment.") and value != usual[name]}  # fmt: skip
@@ -140,7 +140,7 @@ def task_name(config: Config) -> str:
 
 def explored_rows(config: Config, run: Run) -> list[Row]:
     """The row of explored.csv: tiles of the benchmark that were reached, goals that the learner chose itself, and how
-    many of them can be reached."""
+    many of these goals can be reached."""
     goals = run.chosen_goals()
     benchmark = benchmark_of(task_of(Config()), config.benchmark)[0]
     tiles, near = tiles_reached(run.outcomes, benchmark), int((np.linalg.norm(goals, axis=1) <= NEAR).sum())
@@ -150,8 +150,8 @@ def explored_rows(config: Config, run: Run) -> list[Row]:
 def asked_rows(config: Config, run: Run) -> list[Row]:
     """Rows of asked.csv: requests to each teacher that could be asked; none for a learner that does not ask.
 
-    ``late`` counts from movement 1000 on, ``late_own`` those of them in the teacher's half of T; ``strong`` and
-    ``weak`` count requests with the first context in the outer and in the inner third of its range.
+    ``late`` counts requests from movement 1000 on, ``late_own`` late requests in the teacher's half of T. ``strong``
+    counts requests whose first context is in the outer third of its range, ``weak`` those in the inner third.
     """
     if config.teaching != "teachers":
         return []
@@ -189,7 +189,7 @@ def _number(text: str) -> float:
 
 
 def tiles_reached(outcomes: Array, benchmark: Benchmark) -> int:
-    """The number of the benchmark's tiles, one for each of its goals, with one or more of the ``outcomes``.
+    """The number of tiles of the benchmark that hold one or more ``outcomes``; each goal has a tile.
 
     Args:
         outcomes: ``(n, 2)`` m, NaN if the robot was at rest.

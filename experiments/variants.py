@@ -1,8 +1,8 @@
-"""Every experiment as data: its variants, each a line with the differences from the defaults of ``sgimd run``.
+"""Every experiment as data: the line of each variant has its differences from the defaults of ``sgimd run``.
 
-Section 6 of Nguyen & Oudeyer (2014) first, then further experiments. A variant of SGIM-D changes one option.
+Section 6 of Nguyen & Oudeyer (2014) comes first, then further experiments. A variant of SGIM-D changes one option.
     EXPERIMENTS["ablations"]["uniform-goals"]        # {"algorithm": "sgim-d", "goals": "uniform"}
-A variant in two experiments has the same line in both; it is run once, and has its rows for each.
+A variant of two experiments has the same line in both. It is run once, and both experiments get its rows.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ ARMS: Final = ("planar-arm-7", "planar-arm-50")
 SWIMMERS: Final = ("random", "sagg-riac", "sgim-d")
 SGIM_D: Final[Variant] = {"algorithm": "sgim-d"}
 SAGG_RIAC: Final[Variant] = {"algorithm": "sagg-riac"}
-# Practice with goals anywhere in T and without a search for effects. On the rod, taught, `practice` learns alike.
+# Practice with goals anywhere in T and without a search for effects. On the rod a taught `practice` learns alike.
 UNIFORM_PRACTICE: Final[Variant] = {
     "algorithm": "practice",
     "goals": "uniform",
@@ -33,8 +33,8 @@ UNIFORM_PRACTICE: Final[Variant] = {
 }
 SPARSE: Final = ("puck", "fetch")  # tasks where most movements do nothing
 SUITE: Final = {task: suited for task, suited in TASKS.items() if task not in SPARSE}
-# From the paper to our defaults, one change at a time: the name of each step, its options before and after. The paper
-# gives no number for the budget and for g_max: 60 movements are more than fit between two demonstrations.
+# Steps from the paper to our defaults, one change at a time: name, options before, options after. The paper gives no
+# number for the budget and for g_max. A budget of 60 movements is more than fits between two demonstrations.
 STEPS: Final[tuple[tuple[str, Variant, Variant], ...]] = (
     ("inverse", {"inverse": "paper"}, {"inverse": "linear"}),
     ("simplex", {"search": "nelder-mead-complete"}, {"search": "nelder-mead-exact"}),
@@ -44,12 +44,12 @@ STEPS: Final[tuple[tuple[str, Variant, Variant], ...]] = (
     ("giving-up", {"give_up": -1.0}, {"give_up": -0.5}),
     ("regions", {"goals.g_max": 50}, {"goals.g_max": 30}),
     ("slivers", {"goals.max_aspect": 1e9}, {"goals.max_aspect": 5.0}),
-    ("proof", {"inverse": "linear"}, {"inverse": "process"}),  # the last one: our defaults
+    ("proof", {"inverse": "linear"}, {"inverse": "process"}),  # the last step leads to our defaults
 )
 LETTER: Final[Variant] = {option: value for _, was, _ in reversed(STEPS) for option, value in was.items()}
-INVERSE: Final[Variant] = {"inverse": "paper"}  # the letter of a learner without goals
-# The inverse models whose answers a page reads. `process` answers for every learner. Others answer for some learners,
-# too: eq. (9) for the paper's letter, `linear` for a step of the ladder, a forward model for those that learn with it.
+INVERSE: Final[Variant] = {"inverse": "paper"}  # the paper's letter for learners without goals
+# The inverse models whose answers a page shows. `process` answers for every learner. Others answer for some learners,
+# too: eq. (9) for the paper's letter, `linear` for a step of the ladder, a forward model for learners that train it.
 ALIKE: Final = ("process",)
 ANSWERS: Final[dict[str, tuple[str, ...]]] = {
     **dict.fromkeys(("letter", "large-space"), (*ALIKE, "paper")),
@@ -63,15 +63,15 @@ ANSWERS: Final[dict[str, tuple[str, ...]]] = {
 # The table besides results.csv that gets rows from the runs of an experiment.
 SMALL_TABLES: Final = {"asking": "asked.csv", **dict.fromkeys(("learners", "letter", "large-space"), "explored.csv")}
 LARGE: Final[Variant] = {"environment.task_space": 100.0}
-BASELINE: Final[Variant] = {"goals": "uniform", "inverse": "nearest", "search": "perturb"}  # the field's standard one
-SCHOOL: Final = ("map-elites", "isoline", "cma-me", "cma-mae")  # quality diversity
-SHORT: Final[Variant] = {"movements": 2000, "evaluate_at": (250, 500, 1000)}  # and at the end
+BASELINE: Final[Variant] = {"goals": "uniform", "inverse": "nearest", "search": "perturb"}  # the field's standard
+SCHOOL: Final = ("map-elites", "isoline", "cma-me", "cma-mae")  # algorithms of quality diversity
+SHORT: Final[Variant] = {"movements": 2000, "evaluate_at": (250, 500, 1000)}  # a run is also evaluated at its end
 # Files that ``make_subsets`` makes.
 FEW, MANY, HALF, CORNER, SHUFFLED, TEN, HAND = MADE = tuple(
     Path(f"{name}.npz") for name in ("few", "many", "half", "corner", "shuffled", "ten", "hand")
 )
-# Ways to refine a movement for a goal and to answer in evaluations. Each line is a variant on the rod, and on every arm
-# with a longer name.
+# Ways to refine a movement for a goal and to answer in evaluations. Each line is a variant on the rod; a longer
+# name means the same line on an arm.
 MODEL: Final[Variant] = {**SGIM_D, "inverse": "model-alone"}
 REFINING: Final[dict[str, Variant]] = {
     "sgim-d": SGIM_D,
@@ -87,7 +87,7 @@ SUITED: Final[dict[str, Variant]] = {
     "map-elites": {"algorithm": "map-elites"},
 }
 ON_ROD: Final[Variant] = {"evaluate_at": (250, 500, 1000, 2000), "floor_at": (5000,)}
-ONCE: Final[Variant] = {"teacher": "initial", "teacher.every": 1}  # all at the start, one for each movement
+ONCE: Final[Variant] = {"teacher": "initial", "teacher.every": 1}  # all demonstrations at the start, one for a movement
 TAUGHT: Final[Variant] = {**UNIFORM_PRACTICE, "algorithm": "practice-taught", **ONCE}
 # Learners on the rod; rivals with and without the demonstrations.
 LEARNING: Final[dict[str, Variant]] = {
@@ -123,10 +123,10 @@ SCHEDULES: Final[dict[str, Variant]] = {
     "uniform-nearest-taught-once": {**SGIM_D, **BASELINE, **ONCE, "social.repeats": 1},
     "map-elites-taught-once": {"algorithm": "map-elites-taught", "imitations": 1, **ONCE},
 }
-# Ten lessons as a person would give them, all of them early in a short life.
-SESSION: Final[Variant] = {"movements": 1000, "evaluate_at": (300, 500)}  # and at the end
+# Ten lessons as a person would give them. All come early in a short life.
+SESSION: Final[Variant] = {"movements": 1000, "evaluate_at": (300, 500)}  # a run is also evaluated at its end
 SHOWN: Final[dict[str, Variant]] = {"goals": {**SGIM_D, "teacher": "initial"}, "practice": TAUGHT}
-LONGER: Final[Variant] = {"inverse.rate": 2.0}  # movements of an arm take no time, so training may take more
+LONGER: Final[Variant] = {"inverse.rate": 2.0}  # training may take longer, because movements of an arm take no time
 
 # Learners that ask.
 IM: Final[Variant] = {"algorithm": "sgim-im"}
@@ -153,7 +153,7 @@ ASKING: Final[dict[str, Variant]] = {
     "sgim-im-toss": {**IM, **TOSS},
 }
 
-# Settings that no default was tuned on, each with its changes. A learner has a name of its own in each:
+# Settings on which no default was tuned, each with its changes. The name of a variant names its setting, too:
 # sgim-d@noise-twice.
 ROBOTS: Final[dict[str, Variant]] = {
     "as-it-is": {},
@@ -168,7 +168,7 @@ TEACHERS: Final[dict[str, Variant]] = {
     "shuffled": {"demonstrations": SHUFFLED},
 }
 PRACTICE: Final[Variant] = {"algorithm": "practice"}
-PROVED_MODEL: Final[Variant] = {"inverse": "model"}  # a model that answers once it predicts as well as `process`
+PROVED_MODEL: Final[Variant] = {"inverse": "model"}  # a model that answers as soon as it predicts as well as `process`
 BY_PROOF: Final[Variant] = {**SGIM_D, **PROVED_MODEL, "search": "gradient"}
 UNTAUGHT: Final[dict[str, Variant]] = {
     "random": {"algorithm": "random"},
@@ -189,7 +189,7 @@ EVERYWHERE: Final[Variant] = {"movements": 2000, "evaluate_at": (500,)}
 
 
 def _of_teacher(teacher: int, ending: str = "") -> dict[str, Variant]:
-    """Learners taught by demonstrator 1 or 2; with the ending "-letter" those of the paper's letter."""
+    """Learners taught by demonstrator 1 or 2; the ending "-letter" makes them learn by the paper's letter."""
     letter = {"sgim-d": LETTER, "imitation": INVERSE, "observation": INVERSE}
     return {
         f"{algorithm}{ending}-teacher-{teacher}": {
@@ -215,7 +215,7 @@ def _on_arm(arm: str) -> dict[str, Variant]:
 
 
 def _on_suite(learners: dict[str, Variant], tasks: Iterable[str] = SUITE) -> dict[str, Variant]:
-    """Each learner on all tasks except the rod, whose runs are longer, and the toss if it cannot have contexts."""
+    """Each learner on all tasks except the rod, whose runs are longer, and except the toss if it takes no context."""
     return {
         f"{name}.{task}": {**line, **TASKS[task].options, **SHORT}
         for task in tasks
@@ -266,7 +266,7 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
         "demonstrations-noise": {"algorithm": "imitation", "teacher.choose": "random"},
         **{name: {"algorithm": name} for name in ("isoline", "cma-me")},
         **{f"{name}-demonstrations": {"algorithm": f"{name}-taught"} for name in ("isoline", "cma-me")},
-        # With the setting that a search on tuning seeds found better than the default, see results/RIVALS.md.
+        # Rivals with the setting that a search on tuning seeds found better than the default; see results/RIVALS.md.
         "map-elites-tuned": {"algorithm": "map-elites", "cells": 10},
         "cma-me-tuned": {"algorithm": "cma-me", "sd": 0.05},
         "cma-mae-demonstrations-tuned": {"algorithm": "cma-mae-taught", "sd": 0.05},
@@ -312,7 +312,7 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
 }
 
 
-# Seeds of each page, which were used once, with frozen defaults.
+# Seeds of each page. They were used once, after the defaults were frozen.
 SEEDS: Final[dict[str, range]] = {
     **dict.fromkeys(("learners", "large-space", "letter", "ladder", "ladder-large", "baselines"), range(100, 120)),
     **dict.fromkeys(("teachers", "letter-teachers", "ablations", "teaching"), range(100, 110)),
@@ -333,10 +333,10 @@ def seeds_of(experiment: str, variant: str) -> range:
 
 
 def make_subsets(folder: Path, *, by_hand: bool = False) -> None:
-    """Write subsets of the shipped demonstrations, and ten lessons ``by_hand`` if wanted.
+    """Write subsets of the shipped demonstrations; if ``by_hand``, write ten lessons by hand, too.
 
-    The subsets: the first 13, 83 and 10 of 127; those in the right half of the plane; the 20 nearest to one corner; all
-    with permuted outcomes, so that recordings and outcomes do not match.
+    The subsets are the first 13, 83 and 10 of 127 demonstrations, those in the right half of the plane, the 20 nearest
+    to one corner, and all with permuted outcomes, so that recordings and outcomes do not match.
 
     Raises:
         OSError: a file cannot be written.

@@ -1,10 +1,10 @@
-"""What the library costs: this checkout alone, or beside another commit.
+"""Measure what the library costs: this checkout alone, or this checkout beside another commit.
 
-Each measurement runs in turns (here, there, here, there ...), each time in a new process. A ratio is one of medians.
-Times are processor time; other programs still lengthen it, because they empty the caches.
+Each measurement runs in turns (here, there, here, there ...), each time in a new process. Ratios are those of medians.
+Times are processor times; other programs still lengthen them, because they empty the caches.
 
-  learning  time of a learner for a movement, without its robot's; its ratio to the robot's; a checksum of all outcomes,
-            which says whether both commits learn alike
+  learning  a learner's time for a movement, without the robot's time; the ratio of both times; a checksum of all
+            outcomes, which shows whether both commits learn alike
   resume    a run on the fishing rod, and its replay after its end
   life      a long run on a planar arm of 7 joints: time, the largest memory of the process, the size of its folder
 
@@ -39,11 +39,11 @@ Measurement = Callable[[Path, int], Figures]
 
 
 def live(name: str, movements: int) -> Figures:
-    """Figures of a learner's life, by the library that this process imports.
+    """Figures of a learner's life with the library that this process imports.
 
     Args:
-        name: algorithm and robot, one of ``LIVES``; a number is the joints of a planar arm.
-        movements: length of the life.
+        name: algorithm and robot, one of ``LIVES``; a number means a planar arm with so many joints.
+        movements: number of movements in the life.
     """
     import sgimd_torch
     from sgimd_torch import Demonstration, FishingRod, PeriodicTeacher, PlanarArm, run, stream
@@ -96,7 +96,7 @@ def resume(library: Path, movements: int) -> Figures:
 
 
 def long_life(library: Path, movements: int) -> Figures:
-    """A run on an arm of 7 joints, whose physics hardly counts."""
+    """A run on an arm of 7 joints, whose physics takes hardly any time."""
     with TemporaryDirectory() as folder:
         words = ("--environment=planar-arm-7", f"--movements={movements}", f"--evaluate-at=[{movements}]")
         seconds, memory = command_line(library, folder, *words)
@@ -123,7 +123,7 @@ def environment(library: Path) -> dict[str, str]:
 
 
 def show(name: str, several: list[list[float]]) -> None:
-    """Print medians of each commit, and the ratio of ours to theirs."""
+    """Print the medians of each commit, and the ratio of the medians here to those there."""
     if name.endswith("checksum"):
         cells = ["equal" if len({value for values in several for value in values}) == 1 else "DIFFERENT"]
     else:
@@ -132,7 +132,7 @@ def show(name: str, several: list[list[float]]) -> None:
     print(f"{name:45}" + "".join(f"{cell:>12}" for cell in cells), flush=True)
 
 
-PARTS: dict[str, tuple[list[Measurement], int]] = {  # measurements of a library, and the movements of each
+PARTS: dict[str, tuple[list[Measurement], int]] = {  # measurements of a library, and their number of movements
     "learning": ([partial(measured, name) for name in LIVES], 2000),
     "resume": ([resume], 5000),
     "life": ([long_life], 100_000),
@@ -140,12 +140,12 @@ PARTS: dict[str, tuple[list[Measurement], int]] = {  # measurements of a library
 
 
 def main() -> int:
-    """Measure, and print a table."""
+    """Measure, print a table, and return the exit code 0."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--against", metavar="COMMIT", help="a commit of this repository to compare with")
     parser.add_argument("--only", nargs="+", choices=PARTS, default=list(PARTS), metavar="PART", help=", ".join(PARTS))
-    parser.add_argument("--rounds", type=PositiveInt, default=3, help="measurements of each figure (default: 3)")
-    parser.add_argument("--movements", type=PositiveInt, help="length of each life, in place of a part's own")
+    parser.add_argument("--rounds", type=PositiveInt, default=3, help="repetitions of each figure (default: 3)")
+    parser.add_argument("--movements", type=PositiveInt, help="length of each life (default: that of the part)")
     parser.add_argument("--child", choices=LIVES, help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.child:

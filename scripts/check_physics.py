@@ -1,7 +1,7 @@
 """Measure the fishing rod: is it stable, smooth and noisy enough, and where does its float fall?
 
 The script prints a line for each property with its bound; the exit code is 1 if a bound is not met. With --time-steps
-it prints only how far the landing moves, without noise, at other time steps than half a millisecond.
+it prints only how far the landing, without noise, is from that at time steps of half a millisecond.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from sgimd_torch.spaces import Array, stream
 
 SEED = 1
 BATCH = 500
-TIME_STEPS, FINEST = (0.01, 0.005, 0.002, 0.001), 0.0005  # s; the first is the model's own
+TIME_STEPS, FINEST = (0.01, 0.005, 0.002, 0.001), 0.0005  # s; the model itself uses the first
 
 
 def execute(rod: FishingRod, thetas: Array, name: str, start: int = 0) -> Array:
@@ -53,7 +53,7 @@ def at_time_step(step: float) -> FishingRod:
 
 
 def compare_time_steps(movements: int) -> None:
-    """Print distances between landings at coarser steps and at ``FINEST``: median, ninth decile, maximum."""
+    """Print distances from landings at coarser steps to landings at ``FINEST``: median, ninth decile, maximum."""
     draws = stream(SEED, "time steps")
     uniform = draws.random((movements, 25))
     gentle = np.clip(draws.normal(0.5, 0.1, (movements, 25)), 0, 1)
@@ -70,10 +70,10 @@ def compare_time_steps(movements: int) -> None:
 
 
 def main() -> int:
-    """Measure all properties and compare them with their bounds; the exit code."""
+    """Measure all properties, compare them with their bounds, and return the exit code."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--movements", type=PositiveInt, default=100_000, help="number of movements (default: 100000)")
-    parser.add_argument("--time-steps", action="store_true", help="compare time steps only; 200 movements are enough")
+    parser.add_argument("--time-steps", action="store_true", help="only compare time steps; 200 movements are enough")
     options = parser.parse_args()
     movements: int = options.movements
     if options.time_steps:
@@ -115,7 +115,7 @@ def main() -> int:
         (f"a step of sd .005 moves the landing by {smoothness:.4f} m (median)", "<= .03", smoothness <= 0.03),
         (f"noise sd {sd:.4f} m a dimension (mean)", ".03 to .075", 0.03 <= sd <= 0.075),
         (f"outcome_noise promises {rod.outcome_noise:.4f} m", "within 10 %", abs(rod.outcome_noise / sd - 1) <= 0.1),
-        (f"noisiest tenth {spread:.1f} times the quietest", ">= 5", spread >= 5),
+        (f"noisiest tenth scatters {spread:.1f} times the quietest", ">= 5", spread >= 5),
         (f"kurtosis of the pooled noise {kurtosis:.1f}", "> 4, a Gaussian has 3", kurtosis > 4),
         (f"densest tile at ({natural[0]:.2f}, {natural[1]:.2f}), {off:.2f} m from (0, .5)", "<= .25", off <= 0.25),
         (f"{100 * rare:.0f} % of benchmark tiles get < .1 % of random movements", ">= 33 %", rare >= 1 / 3),

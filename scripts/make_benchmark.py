@@ -1,8 +1,8 @@
 """Make the benchmark set: one goal in each tile that several learners reached together (section 5.2 of the paper).
 
-The script runs Random, SAGG-RIAC and SGIM-D on the fishing rod, each with several seeds; `sgimd benchmark` tiles what
-they reached together. The side of a tile is chosen so that they reached about 358 tiles, the paper's number. Each of
-these gets one random goal.
+The script runs Random, SAGG-RIAC and SGIM-D on the fishing rod, each with several seeds. `sgimd benchmark` cuts T into
+tiles. The side of a tile is chosen so that the learners together reached about 358 tiles, the paper's number. Each of
+these tiles gets one random goal.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from sgimd_torch.views import benchmark
 
 
 def live(learners: Iterable[tuple[str, int]], movements: int, processes: int, folder: Path) -> list[Path]:
-    """Run directories of ``learners``, pairs of algorithm and seed, in this order; the runs have no evaluations."""
+    """Carry out runs without evaluations; their directories, in the order of ``learners``, (algorithm, seed)."""
     configs = [
         Config(algorithm=algorithm, seed=seed, movements=movements, evaluate_at=(), out=folder)
         for algorithm, seed in learners
@@ -57,7 +57,7 @@ def main() -> None:
     parser.add_argument("--seed", type=NonNegativeInt, default=2000, help="first seed (default: %(default)s)")
     parser.add_argument("--runs", type=PositiveInt, default=4, help="runs of each learner (default: %(default)s)")
     parser.add_argument("--movements", type=PositiveInt, default=5000, help="length of a run (default: %(default)s)")
-    parser.add_argument("--tiles", type=PositiveInt, default=358, help="approximate number (default: %(default)s)")
+    parser.add_argument("--tiles", type=PositiveInt, default=358, help="wanted number of tiles (default: %(default)s)")
     parser.add_argument("--processes", type=PositiveInt, default=2, help="runs at a time (default: %(default)s)")
     options = parser.parse_args()
     learners = product(("random", "sagg-riac", "sgim-d"), range(options.seed, options.seed + options.runs))

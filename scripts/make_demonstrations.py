@@ -1,9 +1,9 @@
 """Make the shipped demonstrations of demonstrator 3: simulated kinesthetic recordings on the fishing rod.
 
-The paper's demonstrator 3 was a person who led the arm by hand. These recordings are *simulated* as the paper describes
-that person's: every joint moves monotonically from the start configuration to an end posture, all along one scaled
-curve. End postures follow one rule with the scatter of a hand, and are chosen so that landing points spread evenly over
-the plane. The speed varies smoothly, as with a hand, so no recording is exactly a motor primitive.
+The paper's demonstrator 3 was a person who led the arm by hand. These recordings are *simulated*, like those that the
+paper describes: every joint moves monotonically from the start configuration to an end posture, and all joints follow
+one scaled curve. End postures follow one rule with the scatter of a hand, and are chosen so that landing points spread
+evenly over the plane. The speed varies smoothly, as with a hand, so no recording is exactly a motor primitive.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from sgimd_torch.spaces import Array, Demonstration, stream
 RATE = 50  # Hz
 DURATIONS = (1.0, 1.4)  # s
 HAND = 0.04  # rad, standard deviation of the hand at end postures
-TREMOR = 0.4  # variation of the speed, relative to it
+TREMOR = 0.4  # variation of the speed, relative to the speed
 
 
 def end_posture(turn: float, stretch: float) -> Array:
@@ -50,7 +50,7 @@ def lead(end: Array, rng: np.random.Generator) -> tuple[Array, Array]:
 
 
 def farthest_points(points: Array, n: int) -> list[int]:
-    """Rows of ``n`` of the ``points``: first the nearest to the mean, then always the farthest from the chosen ones."""
+    """Rows of ``n`` of the ``points``: the first is nearest to the mean, each next one farthest from those chosen."""
     chosen = [int(np.linalg.norm(points - points.mean(axis=0), axis=1).argmin())]
     distances = np.full(len(points), np.inf)
     while len(chosen) < n:

@@ -2,8 +2,8 @@
 
 Goals: the script executes random movements, tiles T, and draws one goal in each tile that was reached twice.
 Demonstrations: a simulated teacher swims like a snake. A wave of torques travels along the body, forwards or backwards,
-and an offset steers. The hand shakes, so no recording is exactly a sinusoid. All start alike, without noise; of many
-recordings the script keeps some that spread evenly.
+and an offset steers. The hand shakes, so no recording is exactly a sinusoid. All recordings start alike, without noise.
+The script makes many recordings, and keeps some that spread evenly.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ SHAKE = 0.05  # standard deviation of the hand, relative to half the range of a 
 
 
 def wave(rng: np.random.Generator, times: Array) -> Array:
-    """Torques ``(n_times, 2)``: both joints alike, the second a quarter of a period before or after the first."""
+    """Torques ``(n_times, 2)``: one wave in both joints, in the second a quarter of a period earlier or later."""
     strength, frequency, steer = rng.uniform(0.2, 1.0), rng.uniform(0.3, 1.2), rng.uniform(-0.4, 0.4)
     lag, start = rng.choice([-0.25, 0.25]), rng.random()
     phases = frequency * times[:, None] + start + np.array([0.0, lag])
@@ -39,7 +39,7 @@ def wave(rng: np.random.Generator, times: Array) -> Array:
 
 
 def main() -> None:
-    """Write both files."""
+    """Write the goals and the demonstrations."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, default=DATA, help="folder of both files (default: the shipped ones)")
     parser.add_argument("--movements", type=PositiveInt, default=2500, help="random movements (default: %(default)s)")

@@ -1,9 +1,9 @@
 """Make the shipped demonstrations of demonstrators 1 and 2: robots that learnt alone, by SAGG-RIAC, and now teach.
 
 Section 5.3 of the paper. The script runs several SAGG-RIAC learners on the fishing rod and puts their memories
-together. Demonstrator 1 is naive: it shows random exemplars. Demonstrator 2 is careful: it shows one exemplar for each
-of some tiles that spread evenly; of several exemplars on a tile it takes the one that lands most reliably when executed
-again. Recordings are joint trajectories, as for demonstrator 3, so the learner has to find theta_d by itself.
+together. Demonstrator 1 is naive: it shows random exemplars. Demonstrator 2 is careful: it chooses tiles that spread
+evenly, and shows one exemplar on each tile, the one that lands most reliably if the robot executes the exemplars of the
+tile again. Recordings are joint trajectories, as for demonstrator 3, so the learner has to find theta_d by itself.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.environments.protocol import execute_many
 from sgimd_torch.spaces import Array, Demonstration, stream
 
-CANDIDATES = 10  # exemplars that demonstrator 2 compares on a tile, at most
-EXECUTIONS = 10  # executions of each exemplar
+CANDIDATES = 10  # largest number of exemplars that demonstrator 2 compares on a tile
+EXECUTIONS = 10  # number of executions of each exemplar
 
 
 def demonstrate(rod: FishingRod, theta: Array, outcome: Array) -> Demonstration:
@@ -45,7 +45,7 @@ def execute_again(rod: FishingRod, thetas: Array, rng: np.random.Generator) -> A
 
 
 def most_reliable(landed: Array) -> tuple[int, Array]:
-    """Column of ``landed`` ``(n_executions, n, 2)`` m that varies least, and its most typical landing."""
+    """Column of ``landed`` ``(n_executions, n, 2)`` m that varies least, and the column's most typical landing."""
     best = int(landed.var(axis=0).sum(axis=1).argmin())
     typical = np.linalg.norm(landed[:, best] - landed[:, best].mean(axis=0), axis=1).argmin()
     return best, landed[typical, best]
@@ -74,7 +74,7 @@ def main() -> None:
     """Run the learners, then choose the demonstrations of both demonstrators."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path_dw, default=SHIPPED.parent, help="folder of both files (default: shipped)")
-    parser.add_argument("--n", type=PositiveInt, default=127, help="demonstrations of each (default: %(default)s)")
+    parser.add_argument("--n", type=PositiveInt, default=127, help="demonstrations by each (default: %(default)s)")
     parser.add_argument("--runs", type=PositiveInt, default=4, help="SAGG-RIAC learners (default: %(default)s)")
     parser.add_argument("--movements", type=PositiveInt, default=5000, help="length of a run (default: %(default)s)")
     parser.add_argument("--seed", type=NonNegativeInt, default=4000, help="first seed (default: %(default)s)")

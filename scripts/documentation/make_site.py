@@ -1,6 +1,6 @@
 """Builds the documentation into site/: the pages of the repository and an API reference, by zensical.
 
-The pages lie there as in the repository, so one link serves both a code host and the site; `zensical.toml` lists them.
+Pages keep their places of the repository, so links work both on a code host and on the site; see `zensical.toml`.
 """
 
 import json
@@ -16,7 +16,7 @@ import sgimd_torch
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 COPIED = ("*.md", "LICENSE", "CITATION.cff", "docs/**/*", "results/**/*", "sgimd_torch/**/*.md", "sgimd_torch/**/*.xml")
-CHANGES = {  # what a code host reads, and what zensical reads
+CHANGES = {  # what a code host reads, and what zensical reads in its place
     r"\]\(((?:\.\./)*)(sgimd_torch/[\w/]+)\.py\)": r"](\1api/\2.md)",  # a source file has an API page
     r"\.ipynb\)": r".md)",
     r"^```(\w+) ([\w./-]+)$": r'```\1 title="\2"',
@@ -26,7 +26,7 @@ CHANGES = {  # what a code host reads, and what zensical reads
 
 
 def copy_pages(to: Path) -> None:
-    """The pages, with all that they link to."""
+    """Copy the pages, with all files that the pages link to."""
     for path in {path for pattern in COPIED for path in ROOT.glob(pattern) if path.is_file()}:
         place = to / path.relative_to(ROOT)
         place.parent.mkdir(parents=True, exist_ok=True)
@@ -65,7 +65,7 @@ def names() -> str:
 
 
 def build(site: Path) -> int:
-    """Make the site in the place of an earlier one; not 0 if the pages have a fault, such as a broken link."""
+    """Make the site, replacing an earlier one; the exit code is not 0 if pages have a fault, such as a broken link."""
     with TemporaryDirectory() as folder:
         shutil.copytree(HERE, folder, dirs_exist_ok=True)
         Path(folder, "sgimd_torch").symlink_to(ROOT / "sgimd_torch")

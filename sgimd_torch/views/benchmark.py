@@ -1,17 +1,17 @@
-"""Make goals of evaluation from runs: one random goal in each tile of T that they reached (section 5.2 of the paper).
+"""Make goals of evaluation from runs: one random goal in each tile of T that runs reached (section 5.2 of the paper).
 
-T is cut into tiles. A tile counts as reached if at least two movements of all runs landed in it. Use several learners,
-as goals made from a single one favour it, and seeds that no comparison uses.
+T is cut into tiles. A tile counts as reached if at least two movements of all runs landed in it. Use several learners:
+goals made from only one learner favour that learner. Use seeds that no comparison uses.
 
   sgimd sweep --environment mypackage.toss:make --vary algorithm=random,sagg-riac --seeds 2000-2003 --out pool
   sgimd benchmark pool --out goals.npz
   sgimd run --environment mypackage.toss:make --algorithm sagg-riac --benchmark goals.npz
 
-  sgimd benchmark pool --out goals.npz --tiles 100      fewer goals: faster evaluations
+  sgimd benchmark pool --out goals.npz --tiles 100      fewer goals, so evaluations are faster
   sgimd benchmark pool/random/seed-2000 more --out goals.npz
 
-The side of the tiles gives about --tiles goals: in the plane, a fortieth to a tenth of the sides of T. The file names
-the class of the environment; a run of another class refuses it.
+The side of a tile is chosen to make about --tiles goals. In the plane it is a fortieth to a tenth of the sides of T.
+The file names the class of the environment; a run of another class refuses the file.
 
 Exit code: 0 the file was written, 2 the request is wrong and nothing was written.
 """
@@ -31,10 +31,10 @@ from sgimd_torch.spaces import Box, check_count, stream
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Write the goals; the exit code, 0.
+    """Write the goals and return the exit code 0.
 
     Raises:
-        ValueError: there are no runs, runs of several environments, or no reached tile.
+        ValueError: there are no runs, the runs have several environments, or no tile was reached.
         OSError: a file cannot be read or written.
     """
     options = _options(argv)
@@ -55,12 +55,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     n, made = len(goals), f"{len(outcomes)} movements of {len(runs)} run{'s' * (len(runs) > 1)}"
     print(f"{n} goals, on tiles of {tile} reached by {made}: {options.out}")
     if n < options.tiles / 2:
-        say(f"only {n} goals, {options.tiles} were requested; longer runs give more")
+        say(f"only {n} goals were made, {options.tiles} were requested; longer runs give more")
     return 0
 
 
 def _reached_by(runs: Sequence[Run]) -> tuple[str, Box]:
-    """The class of the environment of all runs, and its T.
+    """The class of the environment that all runs share, and the T of this environment.
 
     Raises:
         ValueError: the runs have different environments.
@@ -71,7 +71,7 @@ def _reached_by(runs: Sequence[Run]) -> tuple[str, Box]:
         found.setdefault(f"{run.robot}, {space.low.tolist()} to {space.high.tolist()}", run)
     if len(found) > 1:
         apart = ", ".join(f"{run.path} is of {words}" for words, run in found.items())
-        raise ValueError(f"all runs must be of one environment with one T: {apart}; make a benchmark for each")
+        raise ValueError(f"all runs must be of one environment with one T: {apart}; make one file for each of them")
     return runs[0].robot, runs[0].spaces["outcomes"]
 
 
@@ -85,7 +85,7 @@ def parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="file of goals to write, .npz")
     parser.add_argument("--tiles", type=int, default=TILES, help="approximate number of goals (default: %(default)s)")
-    parser.add_argument("--seed", type=int, default=0, help="seed of the goals within tiles (default: %(default)s)")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the draw within tiles (default: %(default)s)")
     return parser
 
 

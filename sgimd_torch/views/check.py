@@ -1,16 +1,16 @@
 """Check an environment against every rule of its protocol. Each violation is named, with the likely cause.
 
-ENVIRONMENT is a word of the catalogue, or package.module:attribute: a class, or a function that returns an environment
-or a Task. Packages of the working directory are found. The check executes random movements and two corners of Pi:
+ENVIRONMENT is a name of the catalogue, or package.module:attribute for a class or a function that returns an
+environment or a Task, also in the working directory. The check executes random movements and two corners of Pi:
 
   contexts, policies, outcomes    are Boxes, and rest lies in outcomes
   observe, execute                return float64 arrays of the right shape, draw from their rng alone, and change no
                                   argument and no earlier result
   no state carries over           a repeated movement with an equal stream has the same outcome
-  outcome_noise                   is 0 if and only if outcomes never scatter, and right within a factor of ten
+  outcome_noise                   is 0 if and only if outcomes never scatter, else it is right within a factor of ten
   execute_many (optional)         each row equals execute to the last bit
   invalid movements               are refused with a ValueError
-  record (optional)               its outcome equals that of execute with an equal stream
+  trace (optional)                has the same outcome as execute with an equal stream
   a Task                          its goals lie in T, and its demonstrations can be translated
 
 Examples:
@@ -35,8 +35,8 @@ from sgimd_torch.runs.tasks import Task, benchmark_of, demonstrations_of
 from sgimd_torch.spaces import check_count, stream
 from sgimd_torch.views.demonstrations import check
 
-TRIED = 20  # random movements that measure the reached part of T
-NARROW = 0.03  # of the volume of T; if random movements span less, most goals may be out of reach
+TRIED = 20  # number of random movements that show which part of T is reached
+NARROW = 0.03  # share of the volume of T; if random movements span less, most goals may be out of reach
 
 
 def parser() -> argparse.ArgumentParser:
@@ -44,13 +44,13 @@ def parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="sgimd check", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("environment", metavar="ENVIRONMENT", help="fishing-rod, or mypackage.toss:make")
+    parser.add_argument("environment", metavar="ENVIRONMENT", help="name such as fishing-rod, or mypackage.toss:make")
     parser.add_argument("--movements", type=int, default=3, metavar="N", help="random movements (default: %(default)s)")
     return parser
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Print the findings; the exit code, 0.
+    """Print the findings and return the exit code 0.
 
     Raises:
         ValueError: there is no such environment, or it violates a rule.
@@ -70,7 +70,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         check_environment(task.environment, movements=options.movements)
         _check_picture(task)
         found = [f"{name} keeps every promise", *_goals(task), *_lessons(task)]
-    except SystemExit as end:  # exit(0) would look like success
+    except SystemExit as end:  # the exit(0) of a user would look like success
         raise ValueError(f"{name} calls exit({end}); raise an exception where a movement fails") from end
     print("\n".join(found))
     return 0
@@ -92,7 +92,7 @@ def _check_picture(task: Task) -> None:
     if not np.array_equal(drawn, outcome):
         raise ValueError(
             f"trace() of {name} ends at {drawn.tolist()}, execute() with an equal stream at "
-            f"{outcome.tolist()}; does it draw its noise in the same order?"
+            f"{outcome.tolist()}; do both draw their noise in the same order?"
         )
 
 
@@ -103,7 +103,7 @@ def _goals(task: Task) -> list[str]:
 
 
 def _narrow(robot: Environment) -> list[str]:
-    """A note if random movements end outside T, or span a small part of it."""
+    """A note if random movements end outside T, or span a small part of T."""
     space, rngs = robot.outcomes, [stream(k, "check") for k in range(TRIED)]
     contexts, thetas = [robot.observe(rng) for rng in rngs], [robot.policies.sample(rng) for rng in rngs]
     outcomes = execute_many(robot, contexts, thetas, rngs)
@@ -111,12 +111,12 @@ def _narrow(robot: Environment) -> list[str]:
     share = float(np.prod((high - low) / space.sides))
     spans = " x ".join(f"[{a:.3g}, {b:.3g}]" for a, b in zip(low, high, strict=True))
     if not space.contains(outcomes).any():
-        return [f"0 of {TRIED} random movements ended in T, they span {spans}; are T and outcomes in the same unit?"]
+        return [f"0 of {TRIED} random movements ended in T; they span {spans}. Are T and outcomes in the same unit?"]
     if share >= NARROW:
         return []
     return [
         f"{TRIED} random movements span only {100 * share:.2g} % of T, {spans}; if no movement gets much farther, make "
-        "T smaller: learners draw goals from all of it"
+        "T smaller, because learners draw goals from all of T"
     ]
 
 
@@ -131,6 +131,6 @@ def _lessons(task: Task) -> list[str]:
         amount = task.environment.outcomes.amount(float(apart))
         notes = [
             *notes,
-            f"executed, they land {amount} from their outcomes (median); are joints, units and times right?",
+            f"when executed, they land {amount} from recorded outcomes (median); are joints, units and times right?",
         ]
     return [f"  demonstrations: {len(shown)}", *(f"  {note}" for note in notes)]

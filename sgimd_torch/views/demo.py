@@ -1,8 +1,8 @@
 """Three learners learn to fish; a figure and a table show their results.
 
-Three runs with the same seed, two at a time. All move the same simulated arm with the same motor noise. random moves
-at random. sgim-d has curiosity and a teacher. practice-taught, the best of this library, executes all demonstrations
-once, then makes one movement for each goal. The command writes to --out (default: runs/demo):
+The three runs have the same seed, the same simulated arm and the same motor noise; two run at a time. random moves at
+random. sgim-d has curiosity and a teacher. practice-taught, the best learner of this library, executes all
+demonstrations once, then makes one movement for each goal. The command writes to --out (default: runs/demo):
 
   random/seed-000/ and so on   the record of each run (docs/runs.md explains the files)
   demo.png                     error against movements
@@ -43,7 +43,7 @@ LEARNERS: Final = {
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the learners, draw the figure, print the table; returns the exit code, 0.
+    """Run the learners, draw the figure, print the table, and return the exit code 0.
 
     Raises:
         ValueError: the request is wrong.
@@ -51,7 +51,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     _, rest = parser().parse_known_args(argv)
     configs = configs_of(rest)
-    with loading():  # after --help, and before the runs: it may not be installed
+    with loading():  # the extra may not be installed, so this comes before the runs
         from sgimd_torch.figures.save import save_figure
         from sgimd_torch.runs.build import build
         from sgimd_torch.views import table
@@ -84,7 +84,7 @@ def configs_of(rest: Sequence[str]) -> dict[str, Config]:
         rest: options of ``sgimd run`` for all learners.
 
     Raises:
-        ValueError: the demo decides an option itself, or has nothing to draw with it.
+        ValueError: an option is one that the demo decides, or it leaves nothing to draw.
     """
     given = {word.partition("=")[0].lstrip("-") for word in rest}
     for name in ("algorithm", "name", "environment"):
@@ -94,7 +94,7 @@ def configs_of(rest: Sequence[str]) -> dict[str, Config]:
     configs = {algorithm: parse([*words, f"--algorithm={algorithm}"])[0] for algorithm in LEARNERS}
     if not configs["sgim-d"].evaluations:
         raise ValueError("--evaluate-at [] leaves nothing to draw; choose some movements, or omit it")
-    # Measuring the noise takes longer than all the rest.
+    # The noise is measured only at the end, because that takes longer than all the rest.
     return {name: replace(config, floor_at=(config.movements,)) for name, config in configs.items()}
 
 

@@ -1,13 +1,14 @@
 """Check demonstrations on a robot, or import them from other formats.
 
-  check    prints a line for each recording: its outcome as recorded (says) and on the simulated robot (lands), the
-           distance between them (apart) and to the movement that the robot plays (misfit), and limits that it leaves
+  check    prints a line for each recording: the recorded outcome (says), the outcome on the simulated robot (lands),
+           the distance between both (apart), the distance from the recorded movement to the movement that the robot
+           plays (misfit), and the limits that the recording exceeds (remarks)
   import   converts recordings in CSV or in a LeRobot dataset (v3) to a file for sgimd run --demonstrations
 
-SOURCE is an .npz file of save_demonstrations; a CSV file, or a folder with one for each recording; or the folder of a
-LeRobot dataset. CSV and LeRobot need the names of the columns. A column may be a vector, as in LeRobot:
-observation.state is the whole vector, observation.state[0:6] some of its entries. The last row of a recording holds
-the outcome, the first row the context.
+SOURCE is an .npz file of save_demonstrations, a CSV file, a folder with a CSV file for each recording, or the folder of
+a LeRobot dataset. CSV and LeRobot need the names of the columns. A column may be a vector, as in LeRobot:
+observation.state is the whole vector, and observation.state[0:6] is its first six entries. The outcome is in the last
+row of a recording, the context is in the first row.
 
 Examples:
   sgimd demonstrations check shown.npz --task fishing-rod
@@ -43,13 +44,13 @@ HEADS: Final = ("recording", "lasts (s)", "samples", "says", "lands", "apart", "
 
 @dataclass(frozen=True, eq=False)
 class Checked:
-    """A recording on a robot.
+    """A recording, checked on a robot.
 
     Attributes:
         shown: the recording.
         lands: ``(outcome_dim,)`` outcome on the robot, None if there is none.
-        misfit: distance to the movement that the robot plays, NaN if unknown; see `misfit_of`.
-        remarks: a sentence for each limit that the recording leaves.
+        misfit: distance from the recording to the movement that the robot plays, NaN if unknown; see `misfit_of`.
+        remarks: a sentence for each limit that the recording exceeds.
         refused: reason for a missing outcome, "" if there is one.
     """
 
@@ -61,7 +62,7 @@ class Checked:
 
     @property
     def apart(self) -> float:
-        """Distance between the outcomes on the robot and in the recording; NaN without the former."""
+        """Distance between the outcomes on the robot and in the recording; NaN if the robot has none."""
         return float("nan") if self.lands is None else float(np.linalg.norm(self.lands - self.shown.outcome))
 
 
@@ -73,35 +74,35 @@ def parser() -> argparse.ArgumentParser:
         source.add_argument(
             f"--{option}", type=_names, default=(), metavar="COLUMN,COLUMN", help=f"columns of the {about}"
         )
-    source.add_argument("--time", metavar="COLUMN", help="column of seconds (default: time; LeRobot: timestamp)")
+    source.add_argument("--time", metavar="COLUMN", help="column of seconds (default: time; in LeRobot timestamp)")
     source.add_argument(
         "--recording",
         metavar="COLUMN",
-        help="column that divides a table into recordings (default: none; LeRobot: episode_index)",
+        help="column that divides a table into recordings (default: none; in LeRobot episode_index)",
     )
-    source.add_argument("--degrees", action="store_true", help="convert joints from degrees")
+    source.add_argument("--degrees", action="store_true", help="convert joints from degrees to radians")
     shown: dict[str, Any] = {"description": __doc__, "formatter_class": argparse.RawDescriptionHelpFormatter}
     parser = argparse.ArgumentParser(prog="sgimd demonstrations", **shown)
     commands = parser.add_subparsers(dest="command", required=True, metavar="check|import")
-    checked = commands.add_parser("check", help="execute them on a robot", parents=[source], **shown)
+    checked = commands.add_parser("check", help="execute recordings on a robot", parents=[source], **shown)
     checked.add_argument(
         "--task",
         required=True,
         metavar="ENVIRONMENT",
-        help="robot, a word or module:attribute, see --environment of sgimd run",
+        help="robot: a name or module:attribute, as for --environment of sgimd run",
     )
     imported = commands.add_parser(
-        "import", help="convert them to a file for --demonstrations", parents=[source], **shown
+        "import", help="convert recordings to a file for --demonstrations", parents=[source], **shown
     )
     imported.add_argument("--out", type=Path, required=True, metavar="FILE.npz", help="file to write")
     return parser
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Check or import demonstrations; returns 0.
+    """Check or import demonstrations, and return the exit code 0.
 
     Raises:
-        ValueError: the source cannot be read, or the robot cannot use all of it.
+        ValueError: the source cannot be read, or the robot cannot use some recordings.
         OSError: a file cannot be read or written.
     """
     options = parser().parse_args(argv)
@@ -137,7 +138,7 @@ def read(options: argparse.Namespace) -> list[Demonstration]:
     """Read the recordings of a source of any format.
 
     Raises:
-        ValueError: the source is damaged, or columns are not named.
+        ValueError: the source is damaged, or the names of its columns are missing.
         OSError: there is no such source.
     """
     source: Path = options.source
@@ -158,7 +159,7 @@ def read(options: argparse.Namespace) -> list[Demonstration]:
     )
     if not is_dataset:
         return read_csv(source, columns)
-    from sgimd_torch.demonstrations.lerobot import read_lerobot  # loads pyarrow
+    from sgimd_torch.demonstrations.lerobot import read_lerobot  # this loads pyarrow
 
     return read_lerobot(source, columns)
 
@@ -169,7 +170,7 @@ def check(task: Task, shown: Demonstration, row: int) -> Checked:
     remarks = beyond_limits(robot, shown)
     try:
         if shown.outcome.shape != (robot.outcomes.dim,):
-            raise ValueError(f"its outcome has {shown.outcome.size} numbers, the robot's has {robot.outcomes.dim}")
+            raise ValueError(f"its outcome has {shown.outcome.size} numbers, an outcome in T has {robot.outcomes.dim}")
         context = robot.contexts.check("its context", shown.context)
         theta = correspondence_of(task)(shown.times, shown.trajectory)
         theta = robot.policies.check("theta_d of the correspondence", theta)

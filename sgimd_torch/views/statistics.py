@@ -18,12 +18,12 @@ from sgimd_torch.spaces import Array
 Key = TypeVar("Key", bound=Hashable)
 LEVEL = 0.95
 RESAMPLES = 9999
-LEAST_SEEDS: Final = 5  # fewer seeds give points, without interval and verdict
-SEED: Final = 2014  # of the bootstrap; each number draws from its own default_rng(SEED)
+LEAST_SEEDS: Final = 5  # smallest number of seeds with an interval and a verdict; fewer give points
+SEED: Final = 2014  # seed of the bootstrap; each number draws from its own default_rng(SEED)
 
 
 class Interval(NamedTuple):
-    """A statistic and its interval from ``low`` to ``high``, 95 % by default; the ends are NaN for few seeds."""
+    """A statistic and its interval from ``low`` to ``high``, 95 % by default; if seeds are few, both ends are NaN."""
 
     value: float
     low: float
@@ -36,20 +36,20 @@ def rng() -> np.random.Generator:
 
 
 def show(found: Interval, form: str = ".2f", unit: str = "") -> str:
-    """``0.48 [0.45, 0.52] m``; few seeds have no brackets. A minus is a hyphen, so that programs can read it."""
+    """A text such as ``0.48 [0.45, 0.52] m``. Few seeds have no brackets; the minus is a hyphen, for programs."""
     between = "" if np.isnan(found.low) else f" [{found.low:{form}}, {found.high:{form}}]"
     return f"{found.value:{form}}{between}{f' {unit}' if unit else ''}"
 
 
 def metres(found: Interval, form: str = "+.4f") -> str:
-    """A difference in metres with its sign: ``−0.0103 [−0.0162, −0.0074] m``."""
+    """A text for a difference in metres with its sign: ``−0.0103 [−0.0162, −0.0074] m``."""
     return show(found, form, "m").replace("-", "−")
 
 
 def interquartile_mean(values: Array) -> Array:
     """Mean of the middle half of ``(..., n_seeds)`` values: a quarter, rounded down, is cut at either end.
 
-    2 or 3 values are not cut; of 10, the middle 6 count.
+    If there are 2 or 3 values, none is cut; of 10 values the middle 6 count.
     """
     means: Array = stats.trim_mean(values, 0.25, axis=-1)
     return means
@@ -64,15 +64,15 @@ def interval(
 ) -> Interval:
     """Percentile bootstrap: the middle 95 % of the statistic over 9999 draws of seeds with replacement.
 
-    The bootstrap is stratified: each sample draws its own seeds, as many as it has. For normal errors the interval
-    holds the true interquartile mean in 94 % of cases with 10 or 20 seeds, but in 90 % with 5, where it is too narrow.
-    A sample of fewer than ``LEAST_SEEDS`` seeds gives a `point`.
+    The bootstrap is stratified: each sample draws its own seeds, as many as it has. If errors are normal, the interval
+    holds the true interquartile mean in 94 % of cases with 10 or 20 seeds. With 5 seeds it is too narrow: 90 %.
+    If a sample has fewer than ``LEAST_SEEDS`` seeds, the result is a `point`.
 
     Args:
-        statistic: (arrays ``(..., n_seeds, *rest)``, one for each sample) -> ``(...)``.
+        statistic: function of arrays ``(..., n_seeds, *rest)``, one for each sample; it returns ``(...)``.
         samples: arrays ``(n_seeds, *rest)``.
         rng: stream of the bootstrap.
-        paired: whether all samples have the same seeds in the same order; then seeds are drawn jointly.
+        paired: whether all samples have the same seeds in the same order; if so, seeds are drawn jointly.
         level: confidence level; see `holm`.
 
     Raises:
@@ -122,16 +122,16 @@ def point(value: float) -> Interval:
 
 
 def over_seeds(values: Array) -> Interval | None:
-    """Interquartile mean of ``(n_seeds,)``, from ``LEAST_SEEDS`` on with an interval; None if a value is missing."""
+    """Interquartile mean of ``(n_seeds,)`` values; the interval needs ``LEAST_SEEDS``. None if a value is missing."""
     if not len(values) or not np.isfinite(values).all():
         return None
     return point(float(values[0])) if len(values) == 1 else iqm_interval(values, rng=rng())
 
 
 def improvement(ours: Array, theirs: Array) -> Array:
-    """Probability of improvement: share of pairs in which ours ``(..., n)`` err less than theirs ``(..., m)``.
+    """Probability of improvement: share of pairs of our ``(..., n)`` and their ``(..., m)`` errors where ours is less.
 
-    A tie counts half. It is the Mann-Whitney statistic over n m; see Agarwal et al. (2021).
+    A tie counts half. This share is the Mann-Whitney statistic over n m; see Agarwal et al. (2021).
     """
     x, y = np.asarray(ours)[..., :, None], np.asarray(theirs)[..., None, :]
     shares: Array = np.mean((x < y) + 0.5 * (x == y), axis=(-2, -1))
@@ -142,9 +142,9 @@ def improvement_interval(ours: Array, theirs: Array, *, level: float = LEVEL) ->
     """``improvement`` of ours ``(n,)`` over theirs ``(m,)``, with a score interval, which stays wide for few seeds.
 
     Wilson's interval for this statistic holds all probabilities that the data do not reject (Newcombe 2006, Statistics
-    in Medicine 25:559, method 5). If all of ours lie below all of theirs, it is [.80, 1] with ten seeds and [.90, 1]
-    with twenty; a bootstrap would give [1, 1] even with two. For normal errors it holds the truth in 95 to 98 % of
-    cases, with 5, 10 or 20 seeds. Fewer than ``LEAST_SEEDS`` on a side give a `point`.
+    in Medicine 25:559, method 5). If all our errors lie below all of theirs, it is [.80, 1] with ten seeds and [.90, 1]
+    with twenty; a bootstrap would give [1, 1] even with two. If errors are normal, the interval holds the truth in 95
+    to 98 % of cases, with 5, 10 or 20 seeds. If a side has fewer than ``LEAST_SEEDS``, the result is a `point`.
 
     Raises:
         ValueError: a side has fewer than 2 seeds, or an error is not finite.
@@ -172,11 +172,11 @@ def holm(claims: Iterable[Key], rejects: Callable[[Key, float], bool]) -> set[Ke
     """The claims that stand jointly: the probability that any of them is wrong is at most 5 %.
 
     Holm's method (1979) by intervals: all claims are tested at Bonferroni's level for their number. Those that stand
-    are set aside, and the others are tested again at the level for the number left.
+    are set aside, and the remaining claims are tested again at the level for their own number.
 
     Args:
         claims: all claims that were considered, even hopeless ones.
-        rejects: (claim, level) -> whether an interval of this confidence decides the claim.
+        rejects: function of a claim and a level; true if an interval of this confidence decides the claim.
     """
     left = list(dict.fromkeys(claims))
     standing: set[Key] = set()
@@ -191,7 +191,7 @@ def holm(claims: Iterable[Key], rejects: Callable[[Key, float], bool]) -> set[Ke
 
 
 def common_differences(ours: Mapping[int, float], theirs: Mapping[int, float]) -> Array:
-    """``(n_seeds,)`` ours - theirs, for each common seed, in order; the motor noise of a seed cancels.
+    """``(n_seeds,)`` differences ours - theirs for the common seeds, in order; the motor noise of a seed cancels.
 
     Args:
         ours, theirs: errors (m) by seed.

@@ -1,14 +1,14 @@
 """Test a learner on many robots, against two references: random movements, and uniform goals.
 
 A uniform goal gets one movement: the nearest exemplar plus noise. Both references infer movements by the nearest
-neighbour. Options of sgimd run choose the learner; --vary, as in sgimd sweep, compares several. Each task has a table,
-as in sgimd table, in its own unit; the last column is the error minus that of random movements. This library chose
-its defaults on half of the tasks; the other tasks are marked "new".
+neighbour. Options of sgimd run choose the learner; --vary, as in sgimd sweep, compares several learners. Each task has
+a table like that of sgimd table, in the unit of the task; its last column is the error minus the error of random
+movements. This library chose its defaults on half of the tasks; the other tasks are marked "new".
 
   sgimd suite                                             the default learner on the tasks without physics
   sgimd suite --seeds 0-9 --movements 2000 --out study    runs go to study/TASK/NAME/seed-000
   sgimd suite --vary inverse=linear,process --seeds 0-4   compare two inverse models
-  sgimd suite --tasks all                                 also fishing rod and swimmer (extra gym): minutes a run
+  sgimd suite --tasks all                                 also fishing rod and swimmer (extra gym), minutes a run
   sgimd suite --tasks toss crawler --algorithm sagg-riac --budget 4
 
 Repeat the command after Ctrl-C or a power cut, or with more seeds: finished runs are kept.
@@ -35,8 +35,8 @@ class Suited:
 
     Args:
         options: options of a run that choose the task.
-        new: whether it was never used to choose a default.
-        quick: whether it needs no physics.
+        new: whether the task was never used to choose a default.
+        quick: whether the task needs no physics.
     """
 
     options: Mapping[str, Any] = field(default_factory=dict)
@@ -77,15 +77,15 @@ DEFAULTS: Final = {
     "out": "runs/suite",
 }
 OWN: Final = ("environment", "benchmark", "demonstrations", "name")  # options that a task decides
-SHARED: Final = ("movements", "evaluate_at", "evaluated_by", "repeats", "floor_at", "out")  # by learner and references
+SHARED: Final = ("movements", "evaluate_at", "evaluated_by", "repeats", "floor_at", "out")  # options of all
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Carry out unfinished runs and print a table for each task; the exit code, 1 if runs failed."""
+    """Carry out unfinished runs, print a table for each task, and return the exit code: 1 if runs failed, else 0."""
     options, rest = _options(argv)
     configs, flags = runs_of(options, rest)
     code = carry_out(configs, options, flags, configs[0].out.parent)
-    from sgimd_torch.views import table  # slow: it imports scipy's statistics
+    from sgimd_torch.views import table  # scipy's statistics are slow to import
 
     for place in [] if options.dry_run else dict.fromkeys(config.out for config in configs if finished(config)):
         print(f"\n{titled(place.name)}")
@@ -101,7 +101,7 @@ def runs_of(options: argparse.Namespace, rest: Sequence[str]) -> tuple[list[Conf
         rest: options of ``sgimd run``.
 
     Raises:
-        ValueError: a task decides this option, or it cannot be varied.
+        ValueError: an option is decided by each task, or cannot be varied.
     """
     given = {word.partition("=")[0].lstrip("-").replace("_", "-") for word in [*rest, *options.vary]}
     for name in OWN:
@@ -147,7 +147,7 @@ def parser() -> argparse.ArgumentParser:
         default=["quick"],
         choices=[*TASKS, "quick", "all"],
         metavar="TASK",
-        help="names of tasks, quick for those without physics, or all (default: quick)",
+        help="names of tasks, or quick for all tasks without physics, or all (default: quick)",
     )
     add_vary(parser)
     add_options(parser, seeds="0")

@@ -1,18 +1,18 @@
 """A table of the results of runs: error, noise floor and time of each variant, over its seeds.
 
-RUNS is a folder of variants, OUT, a folder of one variant, OUT/NAME, or one run, OUT/NAME/seed-000. Variants are
-compared after the last number of movements at which all finished runs were evaluated, or after --at. The worst variant
-comes first. Runs without an evaluation there are left out, and named below the table.
+RUNS is a folder of variants (OUT), of one variant (OUT/NAME), or of one run (OUT/NAME/seed-000). Variants are compared
+after the last number of movements at which all finished runs were evaluated, or after --at. The worst variant comes
+first. Runs that were not evaluated after this number are left out, and named below the table.
 
 Errors and noise floors are means over seeds, in the unit of T. With 5 seeds or more, ± is their standard deviation.
-"by linear" is the error with the inverse model LocallyLinear in all variants. Times are milliseconds per movement.
+In the column "by linear" the inverse model LocallyLinear answers for all variants. Times are milliseconds per movement.
 
---baseline adds a column: error minus that of the baseline, the interquartile mean over the common seeds, paired; with 5
-seeds or more, its 95 % bootstrap interval in brackets. Below 0 is better than the baseline.
+--baseline adds a column: the error minus the error of the baseline, as interquartile mean of the differences at common
+seeds. With 5 seeds or more, its 95 % bootstrap interval is in brackets. A number below 0 is better than the baseline.
 
   sgimd table runs
   sgimd table study --at 2000                      before all runs are finished
-  sgimd table study --baseline goals=interest-map  minus the errors of one variant
+  sgimd table study --baseline goals=interest-map  differences from one variant
 
 Exit code: 0 a table was printed, 2 there is nothing to show.
 """
@@ -48,7 +48,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Print the table, the worst variant first; the exit code, 0.
+    """Print the table, the worst variant first, and return the exit code 0.
 
     Raises:
         ValueError: there is nothing to show, or a run is damaged.

@@ -22,7 +22,7 @@ from sgimd_torch.runs.read import Run, find_runs, read_run
 from sgimd_torch.spaces import Array
 from sgimd_torch.views.statistics import LEAST_SEEDS, Interval, common_differences, over_seeds
 
-EARLY: Final = 1000  # movements, for an error besides the last one
+EARLY: Final = 1000  # number of movements at which tables show a first error
 USUAL: Final = "sgim-d"  # the default baseline
 
 
@@ -35,13 +35,13 @@ def read(place: Path) -> dict[str, list[Run]]:
     runs: dict[str, list[Run]] = {}
     found = [(name, path) for name, paths in find_runs(place).items() for path in paths]
     for name, path in tqdm(found, "reading", unit="", delay=1.0, disable=None):
-        run = replace(read_run(path), thetas=np.empty((0, 0)))  # they take memory, and no view shows them
+        run = replace(read_run(path), thetas=np.empty((0, 0)))  # no view shows thetas
         runs.setdefault(name, []).append(run)
     return runs
 
 
 def best_first(variants: Iterable[Variant]) -> list[Variant]:
-    """Variants by last error; those without one come last."""
+    """Variants in the order of their last errors; variants without an error come last."""
     return sorted(variants, key=lambda v: (v.last_error.value if v.last_error else np.inf, v.name))
 
 
@@ -55,13 +55,13 @@ def unit_of(variants: Sequence[Variant]) -> Callable[[str], str]:
 class Variant:
     """The runs of one variant, one for each seed.
 
-    Errors count the finished runs, at the evaluations common to them; if no run is finished, all evaluated runs.
+    Errors are those of finished runs (of all evaluated runs if none is finished), at evaluations that all these have.
 
     Args:
         name: name of the variant's folder.
         runs: runs of the variant, at least one.
-        at: number of movements at which variants are compared, counting all runs evaluated there; None for the last
-            common evaluation.
+        at: number of movements at which variants are compared; every run that was evaluated there counts. None for the
+            last common evaluation.
     """
 
     def __init__(self, name: str, runs: Sequence[Run], at: int | None = None) -> None:
@@ -79,7 +79,7 @@ class Variant:
         self.last = at or (int(self.evaluated[-1]) if len(self.evaluated) else 0)  # number of movements
 
     def values(self, movements: int, column: str = "mean_error", answer: str = "own") -> Array:
-        """``(n_seeds,)`` values of a column after so many movements; NaN for none."""
+        """``(n_seeds,)`` values of a column after so many movements; NaN if there is none."""
         return np.array([run.at(movements, column, answer) for run in self.used], dtype=np.float64)
 
     def at(self, movements: int, column: str = "mean_error", answer: str = "own") -> Interval | None:
@@ -88,12 +88,12 @@ class Variant:
 
     @property
     def few(self) -> bool:
-        """Whether it has too few seeds for intervals."""
+        """Whether the variant has too few seeds for intervals."""
         return len(self.used) < LEAST_SEEDS
 
     @cached_property
     def errors(self) -> Array:
-        """``(n_seeds, n)`` m, at ``evaluated``."""
+        """``(n_seeds, n)`` m, errors at ``evaluated``."""
         return self._over_time("mean_error")
 
     @cached_property
@@ -114,7 +114,7 @@ class Variant:
 
     @cached_property
     def landed(self) -> Array:
-        """``(n, outcome_dim)`` m, outcomes of the movements of all its runs."""
+        """``(n, outcome_dim)`` m, outcomes of all movements in all runs."""
         outcomes = np.concatenate([run.outcomes for run in self.runs])
         return outcomes[np.isfinite(outcomes).all(axis=1)]
 
@@ -126,20 +126,20 @@ class Variant:
 
     @cached_property
     def misses(self) -> tuple[Array, Array]:
-        """Goals ``(n, outcome_dim)`` of the last evaluation, and ``(n,)`` errors, means over seeds with equal goals."""
+        """Goals ``(n, outcome_dim)`` of the last evaluation, and ``(n,)`` errors, means over seeds with these goals."""
         goals = self.typical.benchmark
         errors = [run.missed_by(self.last)[0] for run in self.used if np.array_equal(run.benchmark, goals)]
         return goals, np.mean(errors, axis=0)
 
     @property
     def typical(self) -> Run:
-        """The run with the median last error, the better of two; maps of one run show this run."""
+        """The run with the median last error, or the better one of two in the middle; maps of one run show it."""
         if not self.last:
             return max(self.runs, key=lambda run: len(run.index))
         return sorted(self.used, key=lambda run: run.at(self.last))[(len(self.used) - 1) // 2]
 
     def seconds(self, part: str) -> float:
-        """Mean over its runs of the seconds spent on "physics", "learner" or "evaluation"."""
+        """Seconds spent on a part, "physics", "learner" or "evaluation": the mean over runs."""
         return float(np.mean([run.summary[f"seconds_{part}"] for run in self.used or self.runs]))
 
     def _over_time(self, column: str) -> Array:
@@ -163,14 +163,14 @@ class Comparison:
 
     @property
     def verdict(self) -> str:
-        """A word for the position of the interval relative to 0; with few seeds their number instead."""
+        """Words for the position of the interval relative to 0; if seeds are few, words that say so."""
         if len(self.seeds) < LEAST_SEEDS:
             return f"fewer than {LEAST_SEEDS} common seeds"
         return "better" if self.found.high < 0 else "worse" if self.found.low > 0 else "not told apart"
 
 
 def baseline_of(variants: Sequence[Variant], name: str | None = None) -> Variant | None:
-    """The variant called ``name``; without a name SGIM-D, else the first with errors; None if there is none.
+    """The variant ``name``. Without a name: SGIM-D if it has errors, else the first variant with errors, else None.
 
     Raises:
         ValueError: no variant with errors has this name.
@@ -179,12 +179,12 @@ def baseline_of(variants: Sequence[Variant], name: str | None = None) -> Variant
     if name is None:
         return evaluated.get(USUAL) or next(iter(evaluated.values()), None)
     if name not in evaluated:
-        raise unknown("--baseline, a variant with errors to compare,", name, sorted(evaluated))
+        raise unknown("--baseline (a variant with errors)", name, sorted(evaluated))
     return evaluated[name]
 
 
 def compare(variants: Sequence[Variant], baseline: Variant | None) -> list[Comparison]:
-    """The comparisons of all variants that share seeds and the number of movements with the baseline."""
+    """Comparisons with the baseline, of all variants that have common seeds and the same last number of movements."""
     if baseline is None:
         return []
     theirs = _last_errors(baseline)

@@ -1,7 +1,7 @@
 """Films of the fishing rod: the arm casts, the line swings, the float lands near its goal.
 
-Section 4 of Nguyen & Oudeyer (2014). A film shows a movement that ``FishingRod.trace`` has simulated, in real time.
-Line and float are drawn too thick, to be visible. ``fishing_rod.xml`` defines light, shadow and reflection.
+Section 4 of Nguyen & Oudeyer (2014). A film shows in real time a movement that ``FishingRod.trace`` has simulated.
+Line and float are drawn thicker than they are, to be visible. ``fishing_rod.xml`` defines light, shadow, reflection.
     with Camera(rod.model) as camera: write_film(Path("film.mp4"), shoot(camera, [Shot(recording, goal)]))
 
 Needs the extra ``film`` and OpenGL: without a display, set MUJOCO_GL=egl before the first import of mujoco.
@@ -24,7 +24,7 @@ from sgimd_torch.environments.rod_physics import RodTrace
 from sgimd_torch.spaces import Array
 from sgimd_torch.views.film.reel import HEIGHT, WIDTH, Shot
 
-MOST_PAST: Final = 250  # past landings that are drawn; drawing them doubles the time of a frame
+MOST_PAST: Final = 250  # largest number of past landings drawn; they double the time of a frame
 
 _Colour = tuple[float, float, float, float]
 _INK, _FLOAT, _GOAL, _PATH = (0.06, 0.06, 0.08, 1), (0.92, 0.24, 0.02, 1), (0.94, 0.89, 0.26, 1), (0.6, 0.28, 0.12, 1)
@@ -32,13 +32,13 @@ _PAST, _RING = (0.92, 0.96, 1, 0.7), (0.85, 0.93, 0.97, 0.45)
 
 
 class Camera:
-    """Draws shots of the rod without a window; a context manager, and a `Painter`.
+    """A `Painter` and context manager that draws shots of the rod without a window.
 
     Args:
         model: MuJoCo model of the rod; it is not changed.
 
     Raises:
-        ImportError: there is no OpenGL, or not the kind that MUJOCO_GL names.
+        ImportError: there is no OpenGL, or no OpenGL of the kind that MUJOCO_GL names.
     """
 
     def __init__(self, model: mujoco.MjModel) -> None:
@@ -64,7 +64,7 @@ class Camera:
         self._renderer.close()
 
     def frame(self, shot: Shot, time: float) -> Image.Image:
-        """The scene at ``time`` (s), after the landing that of the landing.
+        """The scene at ``time`` (s). A time after the landing gives the scene at the landing.
 
         It shows arm, line, float and the float's path. On the water it shows the goal, past landings, and circles with
         radii of 0.5 m and 1 m around the arm.
@@ -92,7 +92,7 @@ class Camera:
 
     @staticmethod
     def note(shot: Shot, time: float) -> str:
-        """ "line let out" once it is."""
+        """The words "line let out" from the moment when the line is let out, "" before."""
         let_out = _trace(shot).let_out
         return "line let out" if let_out is not None and time > let_out else ""
 
@@ -108,14 +108,14 @@ def _circle(centre: Array, radius: float) -> Array:
 
 
 def _draw_chain(scene: mujoco.MjvScene, points: Sequence[Array] | Array, radius: float, colour: _Colour) -> None:
-    """Join points by rods of a ``radius`` (m); 0 draws lines, which is faster."""
-    kind, width = (mujoco.mjtGeom.mjGEOM_CAPSULE, radius) if radius else (mujoco.mjtGeom.mjGEOM_LINE, 2)  # 2 pixels
+    """Join points by rods of a ``radius`` (m); a radius of 0 draws lines, which is faster."""
+    kind, width = (mujoco.mjtGeom.mjGEOM_CAPSULE, radius) if radius else (mujoco.mjtGeom.mjGEOM_LINE, 2)  # pixels
     for start, stop in pairwise(points):
         mujoco.mjv_connector(_draw(scene, kind, (width, 0, 0), start, colour), kind, width, start, stop)
 
 
 def _draw(scene: mujoco.MjvScene, kind: int, size: Sequence[float], place: Array, colour: _Colour) -> Any:
-    """Add a geom to the scene; ``size`` (m) as MuJoCo defines it for this ``kind``."""
+    """Add a geom to the scene; MuJoCo defines the meaning of ``size`` (m) for each ``kind``."""
     geom = scene.geoms[scene.ngeom]
     mujoco.mjv_initGeom(geom, kind, np.array(size), place, np.eye(3).ravel(), np.array(colour, np.float32))
     scene.ngeom += 1

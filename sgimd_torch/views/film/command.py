@@ -1,8 +1,8 @@
 """Film what a run has learnt: the robot executes the movements that the run infers for chosen goals.
 
 The memory is rebuilt from the record. The inverse model of the run infers a movement for each goal, and the robot
-executes it once, with noise, in the middle of C. The yellow ring is the goal, dots are past outcomes, and a red cross
-is the outcome. A panel shows the goals of the benchmark, coloured by error, and the curve of the mean error.
+executes this movement once, with noise, in the middle of C. The yellow ring is the goal, dots are past outcomes, and
+a red cross is the outcome. A panel shows benchmark goals, coloured by error, and the curve of the mean error.
 
 The fishing rod is drawn by MuJoCo, with circles at 0.5 m and 1 m around its base. If the float is still in the air
 after the movement, the line is let out and the float falls; the caption says so. Planar arms, and your own
@@ -44,7 +44,7 @@ EXAMPLES = """examples:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Make the film; the exit code, 0.
+    """Make the film and return the exit code 0.
 
     Raises:
         ValueError, OSError: the request is wrong.
@@ -79,7 +79,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _parts(run: Run, *, trust: bool) -> RunParts:
-    """The parts of the run. For the rod this imports MuJoCo, which chooses then how to draw, and may fail."""
+    """The parts of the run. For the rod this imports MuJoCo, which then chooses how to draw; the import may fail."""
     if sys.platform == "linux":
         os.environ.setdefault("MUJOCO_GL", "egl")  # works without a display
     try:
@@ -101,9 +101,9 @@ def _painter(robot: Any, shots: Sequence[Shot]) -> AbstractContextManager[Painte
 
 
 def _cast(run: Run, parts: RunParts, goals: Array, stages: Sequence[int]) -> list[Shot]:
-    """The shots: at each stage, the movement inferred for each goal, with the same motor noise at all stages.
+    """The shots: the movement inferred for each goal at each stage, with the same motor noise at all stages.
 
-    The panel beside them has the errors of the benchmark goals in the same context, and the curve of the mean error
+    The panel beside a shot has the errors of the benchmark goals in the same context, and the curve of the mean error
     over the stages; a film of one stage shows the curve of the run's evaluations.
     """
     picture = parts.task.picture
@@ -135,7 +135,7 @@ def _cast(run: Run, parts: RunParts, goals: Array, stages: Sequence[int]) -> lis
 
 
 def remember(run: Run, parts: RunParts, start: int, stop: int) -> None:
-    """Repeat what the learner remembered in movements ``start`` to ``stop``, in order, and train its forward model."""
+    """Add to the memory what the learner remembered in movements ``start`` to ``stop``; train its forward model."""
     memory, correspondence = parts.learner.memory, parts.learner.correspondence
     by_observation = isinstance(parts.learner.social, Remember)  # other learners remember only their own movements
     for row in range(start, min(stop, len(run.index))):
@@ -153,11 +153,11 @@ def _stages(run: Run, options: argparse.Namespace) -> list[int]:
     """The numbers of movements after which to film."""
     lived = len(run.index)
     if not lived:
-        raise ValueError(f"{run.path} has no movements yet; continue it with --resume")
+        raise ValueError(f"{run.path} has no movements yet; continue the run with --resume")
     if options.after is None:
         return [lived]
     if not 1 <= min(options.after) <= max(options.after) <= lived:
-        raise ValueError(f"--after must be from 1 to {lived}, the movements of {run.path}, got {options.after}")
+        raise ValueError(f"--after must be from 1 to {lived}, the length of {run.path}, got {options.after}")
     return sorted(set(options.after))
 
 
@@ -170,7 +170,7 @@ def parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("run", type=Path, help="directory of a run: OUT/NAME/seed-003")
-    goals = "points of T (default: six of the benchmark, or two with --after)"
+    goals = "points of T (default: six goals of the benchmark, or two if --after is given)"
     parser.add_argument("--goals", type=numbers, nargs="+", metavar="X,Y", help=goals)
     after = "numbers of movements after which to film all goals (default: all movements)"
     parser.add_argument("--after", type=int, nargs="+", metavar="N", help=after)
@@ -193,5 +193,5 @@ def _options(argv: Sequence[str] | None) -> argparse.Namespace:
 
 
 def numbers(text: str) -> list[float]:
-    """A goal of the command line, such as "0.3,0.6"; argparse shows the name of this function if it fails."""
+    """A goal of the command line, such as "0.3,0.6"; argparse shows this function's name if a goal is wrong."""
     return [float(word) for word in text.split(",")]

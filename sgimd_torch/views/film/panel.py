@@ -1,4 +1,4 @@
-"""The panel beside a film: a map of the benchmark goals by error, and the curve of the mean error.
+"""The panel beside a film: a map of the benchmark goals, coloured by error, and the curve of the mean error.
 
     picture = panel(space, goals, errors, 500, (movements, mean_errors), colour)
 The map shows the first two dimensions of T. Needs the extra ``film``.
@@ -33,7 +33,7 @@ def panel(space: Box, goals: Array, errors: Array, now: int, curve: tuple[Array,
         goals: ``(n, outcome_dim)`` goals of the benchmark.
         errors: ``(n,)`` errors of these goals, in the unit of T.
         now: number of movements of the learner.
-        curve: ``(m,)`` numbers of movements and ``(m,)`` mean errors after them; drawn up to ``now``.
+        curve: ``(m,)`` numbers of movements and ``(m,)`` mean errors after them; the line ends at ``now``.
         colour: colour of the curve.
     """
     shown, near = limits(goals, space), rounded(float(np.ptp(goals, axis=0).max() or 1.0) / 50)

@@ -1,6 +1,6 @@
 """The parts of every film: shots, frames, captions, and the file.
 
-``camera.py`` draws the rod in MuJoCo, ``sketch.py`` robots in the plane, ``panel.py`` the map and curve beside them.
+``camera.py`` draws the rod; ``sketch.py`` draws robots in the plane; ``panel.py`` draws map and curve beside the robot.
     write_film(Path("film.mp4"), shoot(camera, [Shot(recording, goal)]))
 
 Needs the extra ``film``.
@@ -27,9 +27,9 @@ from sgimd_torch.spaces import Array
 
 Frame = NDArray[np.uint8]  # (height, width, 3)
 
-WIDTH: Final = 640  # pixels, of the picture of the robot
-HEIGHT: Final = 480
-PAUSE: Final = 0.8  # s, for which the end of a movement is shown
+WIDTH: Final = 640  # pixels, width of the picture of the robot
+HEIGHT: Final = 480  # pixels
+PAUSE: Final = 0.8  # s, time during which the end of a movement is shown
 RATES: Final = {".mp4": 25.0, ".webp": 12.5}
 """Frames per second of each kind of film: .mp4 for every player, .webp for a page in every browser."""
 
@@ -69,7 +69,7 @@ class Shot:
         return list(np.arange(0.0, self.recording.landed + PAUSE, 1 / rate).tolist())
 
     def caption(self, time: float, note: str = "") -> str:
-        """The text below the picture at ``time`` (s): the goal, and a ``note`` or, at the end, the outcome."""
+        """The text below the picture at ``time`` (s): the goal and a ``note``; at the end, the goal and the outcome."""
         goal = f"goal {_place(self.goal)}"
         if time >= self.recording.landed:
             return f"{goal}, reached {_place(self.recording.outcome)}: missed by {self.missed:.2g} {self.unit}".rstrip()
@@ -80,7 +80,7 @@ class Painter(Protocol):
     """Draws the frames of shots."""
 
     def frame(self, shot: Shot, time: float) -> Image.Image:
-        """The scene at ``time`` (s); after the end of the movement, its end."""
+        """The scene at ``time`` (s). A time after the end of the movement gives the scene at the end."""
         ...
 
     def note(self, shot: Shot, time: float) -> str:
@@ -89,7 +89,7 @@ class Painter(Protocol):
 
 
 def shoot(painter: Painter, shots: Iterable[Shot], rate: float = RATES[".mp4"]) -> Iterator[Frame]:
-    """The frames of a film, ``rate`` per second: each shot's movement, then its end for a moment."""
+    """The frames of a film, ``rate`` per second: each shot's movement, then its end during ``PAUSE``."""
     for shot in shots:
         for time in shot.moments(rate):
             frame = captioned(painter.frame(shot, time), shot.title, shot.caption(time, painter.note(shot, time)))
@@ -109,7 +109,7 @@ def captioned(image: Image.Image, title: str, caption: str) -> Frame:
 
 
 def write_film(path: Path, frames: Iterable[Frame]) -> None:
-    """Write a film, whole or not at all: H.264 in an mp4 file, or an animated webp picture.
+    """Write a film as H.264 in an mp4 file or as an animated webp picture; if this fails, ``path`` is unchanged.
 
     Args:
         path: file with an ending in ``RATES``.
@@ -120,14 +120,14 @@ def write_film(path: Path, frames: Iterable[Frame]) -> None:
     """
     frames, kind = iter(frames), path.suffix
     with replacing(path) as partial:
-        partial.touch()  # fails before the first frame is drawn if the folder is not writable
+        partial.touch()  # a folder that is not writable is refused before the first frame is drawn
         first = next(frames)
         size = f"{first.shape[1]}x{first.shape[0]}"
         given = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", size, "-r", str(RATES[kind]), "-i", "-"]
         command = [get_ffmpeg_exe(), "-v", "error", *given, *_CODECS[kind], "-y", str(partial)]
         with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as encoder:
             assert encoder.stdin is not None
-            with suppress(BrokenPipeError):  # the encoder failed, and says why below
+            with suppress(BrokenPipeError):  # the encoder failed; its message is read below
                 for frame in chain([first], frames):
                     encoder.stdin.write(frame.tobytes())
             _, said = encoder.communicate()

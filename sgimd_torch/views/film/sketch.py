@@ -2,7 +2,7 @@
 
     write_film(Path("film.mp4"), shoot(Sketchbook(arm.outcomes, shots), shots))
 The goal is a ring, past outcomes are dots, the outcome is a cross, the end of the chain leaves a path. The first two
-dimensions of an outcome are x and y of the picture; with only one, y is 0.
+dimensions of an outcome are x and y of the picture; if an outcome has only one dimension, y is 0.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from sgimd_torch.spaces import Array, Box
 from sgimd_torch.views.film.panel import blank, pixels
 from sgimd_torch.views.film.reel import HEIGHT, WIDTH, Shot
 
-MARGINS: Final = (0.06, 0.11)  # shares of width and height of the picture
+MARGINS: Final = (0.06, 0.11)  # margins as shares of the width and the height of the picture
 _PAPER, _FRAME, _LINK = "#f7f5f0", "#c9c4b8", "#2b3a4a"
 _PATH, _END, _PAST = "#e08a55", "#d1341f", "#9db4c8"
 
 
 class Sketchbook:
-    """Draws shots whose movements are ``Sketch``es; a `Painter`.
+    """A `Painter` of shots whose movements are ``Sketch``es.
 
     Args:
         space: T, drawn as a frame.
-        shots: all shots of the film; the scale of the pictures fits them, not all of T.
+        shots: all shots of the film; the scale fits the shots, so parts of T may lie outside.
     """
 
     def __init__(self, space: Box, shots: Sequence[Shot]) -> None:
@@ -45,7 +45,7 @@ class Sketchbook:
         self._ax = self._figure.add_axes((0, 0, 1, 1))
 
     def frame(self, shot: Shot, time: float) -> Image.Image:
-        """The robot at ``time`` (s); after the end of the movement, its end and the outcome."""
+        """The robot at ``time`` (s). A time after the end of the movement gives its end and the outcome."""
         sketch, chains, ax = shot.recording, _chains(shot), self._ax
         assert isinstance(sketch, Sketch)
         chain = chains[: min(round(time / sketch.step), len(chains) - 1) + 1]

@@ -24,10 +24,10 @@ EXAMPLES = """examples:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Write the page and print its path; the exit code, 0.
+    """Write the page, print its path, and return the exit code 0.
 
     Raises:
-        ValueError: there are no runs, or one is damaged.
+        ValueError: there are no runs, or a run is damaged.
         OSError: a file cannot be read or written.
     """
     options = parser().parse_args(argv)

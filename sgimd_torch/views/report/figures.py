@@ -26,9 +26,9 @@ from sgimd_torch.spaces import Array, Box
 from sgimd_torch.views.variants import Variant
 
 P = ParamSpec("P")
-TILES: Final = 50  # largest number along the longer side of a map
-GOALS: Final = 100  # latest goals drawn on an interest map
-MOST_CURVES: Final = 8  # in one figure
+TILES: Final = 50  # largest number of tiles along the longer side of a map
+GOALS: Final = 100  # number of the latest goals that an interest map shows
+MOST_CURVES: Final = 8  # largest number of curves in one figure
 WIDE: Final = 4.3  # inches, width of the axes of a map, without colour bar
 MARGIN: Final = 1.2  # inches, height above and below the axes
 STYLE: Final[Any] = {
@@ -40,12 +40,12 @@ STYLE: Final[Any] = {
     "lines.linewidth": 2,
     "legend.fontsize": 10,
 }
-# For further variants of an algorithm: colours of Okabe & Ito and P. Tol that no algorithm of the paper has.
+# Colours for further variants of an algorithm, by Okabe & Ito and P. Tol; no algorithm of the paper has them.
 _FURTHER: Final = ("#e69f00", "#56b4e9", "#000000", "#882255", "#999933", "#aa4499", "#44aa99", "#661100")
 
 
 def png(draw: Callable[Concatenate[Figure, P], None]) -> Callable[P, str]:
-    """Turn a function that draws into one that returns a png as a data address, with pixels for dense screens."""
+    """Turn a function that draws into a function that returns a png, sharp on dense screens, as a data address."""
 
     @wraps(draw)
     def address(*args: P.args, **kwargs: P.kwargs) -> str:
@@ -60,9 +60,9 @@ def png(draw: Callable[Concatenate[Figure, P], None]) -> Callable[P, str]:
 
 
 def colours_of(variants: Sequence[Variant]) -> dict[str, str]:
-    """A colour for each variant, by name: the algorithm's for its first variant, further colours for the others.
+    """A colour for each name: the first variant of an algorithm has the algorithm's colour, others have further ones.
 
-    The first is the variant named like the algorithm, else the first by name, so colours do not depend on results.
+    The first variant is the one named like the algorithm, or else the first by name, whatever the results are.
     """
     ordered = sorted(variants, key=lambda variant: (variant.name != variant.algorithm, variant.name))
     firsts = {variant.algorithm: variant.name for variant in reversed(ordered)}
@@ -75,7 +75,7 @@ def colours_of(variants: Sequence[Variant]) -> dict[str, str]:
 def error_curves(figure: Figure, variants: Sequence[Variant], colours: Mapping[str, str]) -> None:
     """Error against movements: interquartile means over seeds, with intervals, or with points if seeds are few.
 
-    A single variant also shows the curve of each seed, thin, and its noise floor.
+    If there is only one variant, a thin line for each seed and the noise floor are drawn, too.
     """
     if len(variants) > 1:
         figure.set_size_inches(6.8, 4.5)
@@ -111,7 +111,7 @@ def figure_of_curves(variants: Sequence[Variant]) -> Figure:
 
 
 def planes_of(variants: Sequence[Variant]) -> dict[str, Box]:
-    """The part of T that maps show, by environment: the landing points of all its variants."""
+    """The part of T that maps show, by environment; it holds the landing points of all variants there."""
     found: dict[str, list[Array]] = {}
     for variant in variants:
         if len(variant.landed):
@@ -126,7 +126,7 @@ def planes_of(variants: Sequence[Variant]) -> dict[str, Box]:
 
 @png
 def landing(figure: Figure, variant: Variant, plane: Box) -> None:
-    """Landing points and demonstrated outcomes on a part of T; points outside are marked at its edge."""
+    """Landing points and demonstrated outcomes on a part of T; points outside this part are marked at its edge."""
     panels, shown = sections(plane), variant.demonstrated
     for ax, section in zip(_panels(figure, panels), panels, strict=True):
         sides = section.box.sides
@@ -161,14 +161,14 @@ def regions(figure: Figure, run: Run) -> None:
 
 
 def _panels(figure: Figure, shown: Sequence[Section]) -> list[Axes]:
-    """Axes below each other, one for each section, in its shape."""
+    """Axes below each other, one for each section, with the shape of the section."""
     heights = [section.height(WIDE) for section in shown]
     figure.set_size_inches(6, sum(heights) + MARGIN * len(shown))
     return list(figure.subplots(len(shown), 1, squeeze=False, height_ratios=heights).flat)
 
 
 def _plain(name: str) -> str:
-    """A name as a label of matplotlib: no formula, not hidden, not too long."""
+    """A label of matplotlib for a name; it is no formula, not hidden, and not too long."""
     short = name if len(name) <= 32 else f"{name[:30]}…"
     return f"{' ' * short.startswith('_')}{short}".replace("$", r"\$")
 

@@ -1,6 +1,6 @@
 """The page of a report: ``template.html.j2`` filled with figures and numbers of each variant, as one file.
 
-html = page(Path("runs"), variants)    # best_first of variants.py; text from runs is escaped
+html = page(Path("runs"), variants)    # variants come from best_first; text from runs is escaped
 """
 
 from __future__ import annotations
