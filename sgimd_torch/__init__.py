@@ -1,6 +1,6 @@
 """SGIM-D: robot learning by curiosity and demonstration (Nguyen & Oudeyer, Autonomous Robots 36(3), 2014).
 
-Where each part of the paper lives:
+Modules for each section of the paper:
 
     2.1    contexts, policies, outcomes, episodes          spaces, environments.protocol
     3      the learner and the five algorithms             learner, algorithms, session
@@ -14,13 +14,13 @@ Where each part of the paper lives:
     5.3    demonstrations and teachers                     demonstrations, teachers
     -      practice, our default learner                   algorithms.practice, goals.within_reach, explore
     -      asking teachers: SGIM-IM, SGIM-ACTS             asking
-    -      our addition: a forward model                   forward_model
-    -      robots of gymnasium, and ours as its            environments.from_gymnasium, environments.to_gymnasium
-    -      rivals of other schools                         rivals
+    -      a forward model, our addition                   forward_model
+    -      robots of gymnasium; our robots in gymnasium    environments.from_gymnasium, environments.to_gymnasium
+    -      other algorithms to compare with                rivals
 
-What each kind of part is given and must do stands in ``parts``. A life is kept by ``record``. ``runs`` makes runs on
-disk, ``views`` shows them, with ``board`` (TensorBoard) and ``figures``; their command is ``sgimd``. Names that this
-package offers are listed in ``__init__.pyi`` and loaded when they are used.
+``parts`` says what each kind of part is given and must do. ``record`` keeps all events in the life of a learner.
+``runs`` makes runs on disk; ``views``, ``board`` (TensorBoard) and ``figures`` show them. The command ``sgimd`` calls
+these folders. ``__init__.pyi`` lists the public names of this package. A name is loaded when it is first used.
 """
 
 import lazy_loader

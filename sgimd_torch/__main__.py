@@ -1,4 +1,4 @@
-"""The command ``sgimd``, also ``python -m sgimd_torch``; the module of a command is loaded when it is called."""
+"""The program ``sgimd``, also ``python -m sgimd_torch``; it loads only the module of the command that is called."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ examples:
   sgimd run --algorithm sgim-d --seed 3              one run of 5000 movements, into runs/sgim-d/seed-003
   sgimd run --algorithm sgim-d --seed 3 --resume     go on with this run after Ctrl-C or a power cut
   sgimd check mypackage.toss:make                    find the mistakes in a robot of your own
-  sgimd run --environment mypackage.toss:make        one run on it
-  sgimd benchmark pool --out goals.npz               make goals for evaluation where the runs in pool have been
+  sgimd run --environment mypackage.toss:make        one run on this robot
+  sgimd benchmark pool --out goals.npz               make goals for evaluation in places that runs in pool reached
   sgimd demonstrations check shown.npz --task fishing-rod
   sgimd sweep --vary goals=interest-map,uniform --seeds 0-9 --out study
-  sgimd table study                                  print the error of each variant, over its seeds
+  sgimd table study                                  print the mean error of each variant over its seeds
   sgimd report study                                 write curves, maps and tables to one page
 
 sgimd COMMAND --help explains a command; sgimd --version prints the version."""
 
 
 def main() -> int:
-    """Run the command that the first word names, and return its exit code."""
-    for library in ("OMP", "OPENBLAS", "MKL"):  # for small matrices several threads are slower
+    """Run the command that the first argument names, and return the exit code."""
+    for library in ("OMP", "OPENBLAS", "MKL"):  # several threads would be slower for small matrices
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")
     return command(_call)
 
@@ -50,7 +50,7 @@ def _call(words: Sequence[str]) -> int:
         print(f"sgimd_torch {__version__}")
         return 0
     if name not in WORDS["command"]:
-        raise unknown("command", name, WORDS["command"], "; sgimd --help explains them")
+        raise unknown("command", name, WORDS["command"], "; sgimd --help explains the commands")
     try:
         with loading():
             module = importlib.import_module(f"sgimd_torch.{WORDS['command'][name]}")

@@ -1,4 +1,4 @@
-"""Files on disk: writers write them whole or not at all, readers refuse damaged ones by name.
+"""Functions that write a file whole or not at all, and functions that refuse to read a damaged file.
 
 Every function that replaces a file uses this module.
     write_text(folder / "report.html", page)
@@ -29,9 +29,9 @@ _UNREADABLE: Final = (
 
 @contextmanager
 def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """A file next to ``path`` for the block to write; it replaces ``path`` when the block ends.
+    """Path of a temporary file next to ``path``. The block writes this file, which replaces ``path`` at the end.
 
-    ``path`` holds the old file or the whole new one, even after a power cut. An error removes the file next to it.
+    Even after a power cut, ``path`` holds the old file or the whole new one. An error removes the temporary file.
 
     Raises:
         OSError: ``path`` is a directory, or cannot be written.
@@ -68,11 +68,11 @@ def write_npz(path: str | os.PathLike[str], arrays: Mapping[str, Any]) -> None:
 
 
 def read_npz(path: str | os.PathLike[str], kind: str, writer: str, names: Sequence[str]) -> list[Stored]:
-    """Read arrays by their ``names``, read-only; no code in the file is executed.
+    """Read the arrays with these ``names``, which become read-only. No code in the file is executed.
 
     Args:
         path: npz file.
-        kind, writer: words for error messages: the kind of the file, and the command that writes such files.
+        kind, writer: kind of the file, and command that writes such files, for error messages.
         names: names of the arrays.
 
     Raises:
@@ -92,7 +92,7 @@ def read_npz(path: str | os.PathLike[str], kind: str, writer: str, names: Sequen
                 found = {name: stored[name] for name in names if name in stored}
             for array in found.values():
                 array.flags.writeable = False
-        except _UNREADABLE as error:  # numpy's own message advises to allow pickle
+        except _UNREADABLE as error:  # numpy's own message would advise to allow pickle
             raise refused("it is damaged, or holds more than numbers") from error
     if missing := [name for name in names if name not in found]:
         raise refused(f"it lacks {', '.join(missing)}")
@@ -108,7 +108,7 @@ def make_folder(path: Path) -> None:
     """Make a folder and its missing parents.
 
     Raises:
-        OSError: a file is in its place, or it may not be made.
+        OSError: there is a file at ``path``, or the folder may not be made.
     """
     try:
         path.mkdir(parents=True, exist_ok=True)

@@ -1,9 +1,9 @@
-"""The main loop: a learner in an environment, movement by movement; a record is replayed first.
+"""The main loop: a learner moves in an environment. If there is a record, it is replayed first.
 
 Algorithm 1 of Nguyen & Oudeyer (2014).
     for episode in run(learner, environment, seed, movements=5000, teacher=teacher): ...
-Movement i draws its noise from stream i. So the noise does not depend on the movements before, and a replay, which
-executes nothing, does not change the noise of the movements after it.
+Movement i draws its noise from stream i. So its noise does not depend on earlier movements, whether they were executed
+or only replayed.
 """
 
 from __future__ import annotations
@@ -47,42 +47,42 @@ def run(
     record: Record | None = None,
     failures: int = FAILURES,
 ) -> Iterator[Episode]:
-    """Let ``learner`` make movements until it has made ``movements``; rests and failed movements count.
+    """Let ``learner`` move until it has made this number of ``movements``; rests and failed movements count.
 
     A movement fails if ``environment`` raises, or returns anything but one finite outcome. The learner remembers
-    nothing of it and ends its attempt; the next movement has the next stream.
+    nothing of the failed movement and ends its attempt; the next movement has the next stream.
 
-    A context is observed when an attempt begins, and stays until it ends. Movements after a demonstration are made in
-    the context of the demonstration.
+    A context is observed when an attempt begins, and stays until the attempt ends. Movements after a demonstration are
+    made in the context of the demonstration.
 
     Args:
         learner: learner of this environment. The caller may stop iterating at any time and use the learner again. If
             Ctrl-C has broken off a movement, call ``learner.interrupt()`` first.
-        environment: robot and world, which are observed and executed.
+        environment: robot and world, which observes contexts and executes movements.
         seed: number from which the environment's random streams come.
         movements: number of movements in all; those that ``learner`` has made before count.
         teacher: teacher who may demonstrate before each movement; None for none.
-        teachers: teachers by name, for a learner that asks. One that fails, shows a demonstration that this robot
-            cannot use or raises TimeoutError counts as one without a reply, with a `RuntimeWarning`.
-        execute: function that replaces the environment's, see ``live``.
-        record: record to write. Its events are replayed first: nothing is executed, and no one of ``teachers`` is
-            asked. Learner and teacher must be freshly built.
+        teachers: teachers by name, for a learner that asks. If a teacher fails, raises TimeoutError or shows a
+            demonstration that this robot cannot use, the learner gets no reply, and there is a `RuntimeWarning`.
+        execute: function that executes movements; None for ``live(environment, seed)``.
+        record: record to write. Its events are replayed first; the replay executes nothing and asks no teacher of
+            ``teachers``. Learner and teacher must be freshly built.
         failures: number of failed movements in a row that ends the run, at least 1.
 
     Yields:
-        Every episode, after the learner was told its outcome.
+        Every episode, after the learner was told the outcome.
 
     Raises (when iterated):
         ValueError: ``movements`` is not above the number that the learner has made, or the learner asks a teacher of
             unknown name.
-        NoOutcomeError: ``failures`` movements in a row have failed. They count; another `run` may go on after them.
+        NoOutcomeError: ``failures`` movements in a row have failed. They count; another `run` may go on.
     """
     check_count("failures", failures, 1)
     if not isinstance(learner, Learner):
-        raise ValueError(f"learner must be a Learner, got a {type(learner).__name__}; sagg_riac(environment, seed)?")
+        raise ValueError(f"learner must be a Learner, got a {type(learner).__name__}; try sagg_riac(environment, seed)")
     check_instance(environment)
     if teacher is not None and not isinstance(teacher, Teacher):
-        raise ValueError(f"teacher must be a Teacher, got a {type(teacher).__name__}; PeriodicTeacher(shown, rng)?")
+        raise ValueError(f"teacher must be a Teacher, got a {type(teacher).__name__}; try PeriodicTeacher(shown, rng)")
     made = learner.movements
     if check_count("movements", movements, 1) <= made:
         raise ValueError(
@@ -92,7 +92,7 @@ def run(
     before = BeforeMovement()
     with ExitStack() as until_the_end:
         if record is not None:
-            from sgimd_torch.record.replay import replay  # most programs keep no record
+            from sgimd_torch.record.replay import replay  # loaded here, as most programs keep no record
 
             before = yield from replay(learner, record.events(), teacher=teacher)
             learner.listeners.append(record.add)
@@ -124,7 +124,7 @@ def run(
 
 
 def _offered(learner: Learner, teacher: Teacher | None, index: int, before: BeforeMovement) -> BeforeMovement:
-    """Let the teacher offer a demonstration, unless the learner has one that it has not yet used."""
+    """Let the teacher offer a demonstration, unless the learner has not yet used the last one."""
     if teacher is None or learner.lesson_waits:
         return before
     offered = teacher.offer(index, learner.memory)
@@ -135,7 +135,7 @@ def _offered(learner: Learner, teacher: Teacher | None, index: int, before: Befo
 
 
 def _observed(learner: Learner, environment: Environment, index: int, seed: int) -> Array:
-    """The context of the next movement: a new one if an attempt is to begin."""
+    """The context of the next movement: the context of the current attempt, or a new one if an attempt is to begin."""
     if not learner.idle:
         return learner.context
     return _tried("context", environment.contexts.dim, environment.observe, stream(seed, "context", index))
@@ -148,7 +148,7 @@ def _asked(
     teachers: Mapping[str, Demonstrator],
     before: BeforeMovement,
 ) -> BeforeMovement:
-    """Let the learner ask one of the ``teachers`` for a demonstration, and show it the reply."""
+    """Let the learner ask one of the ``teachers`` for a demonstration, and show the learner the reply."""
     request = learner.request(context)
     if request is None:
         return before
@@ -182,13 +182,13 @@ def reason_of(error: BaseException) -> str:
 def _answer(
     learner: Learner, environment: Environment, context: Array, request: Request, teachers: Mapping[str, Demonstrator]
 ) -> tuple[Demonstration | None, str]:
-    """The demonstration that replies to a request, or None without one that is new and usable; and ``Episode.reply``.
+    """The demonstration that replies to a request (None: there is no new and usable one), and ``Episode.reply``.
 
-    The attempt stays in its own context. A demonstration from any other context in C is accepted as a hint.
+    The attempt keeps its context. A demonstration in another context of C is accepted, too, as a hint.
     """
     name = request.teacher
     if name not in teachers:
-        raise ValueError(f"the learner asks {name!r}, but teachers are {', '.join(teachers)}; are they its own?")
+        raise ValueError(f"the learner asks {name!r}, but teachers are {', '.join(teachers)}; are they its teachers?")
     try:
         shown = teachers[name].demonstrate(context.copy(), request.goal, learner.memory)
         if shown is None:
@@ -206,10 +206,10 @@ def _answer(
 
 
 def live(environment: Environment, seed: int) -> Execute:
-    """Execute in ``environment``, movement i with the noise of stream i."""
+    """The function that executes movements in ``environment``; movement i draws its noise from stream i."""
 
     def execute(index: int, context: Array, theta: Array) -> Array:
-        # Copies, so that an environment may write into them.
+        # The environment gets copies, so it may write into them.
         return environment.execute(context.copy(), theta.copy(), stream(seed, "environment", index))
 
     return execute

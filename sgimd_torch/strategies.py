@@ -52,11 +52,12 @@ class GoalBabbling(Strategy):
             simplex of 26 movements a goal would take about 60 movements, and a learner with the rod could try only a
             hundred goals.
         tolerance: distance, in the unit of outcomes, at which a goal counts as reached; None for the outcome noise, but
-            at least .02.
-        global_range: least and greatest probability of a global movement instead of a movement of the search.
-        give_up: competence, from -1 to 0, below which a goal is given up after a movement without progress; -1 never
-            gives up. Deviation: the paper spends the whole budget on every goal. In a task space far larger than the
-            reachable part, nearly all goals are hopeless, and movements for them are lost.
+            at least .02. It matters only with a budget above 1.
+        global_range: least and greatest probability of a movement by the explorer instead of the search; it rises with
+            the distance of the goal from all reached outcomes.
+        give_up: competence (0: reached, -1: worst) below which a goal is given up after a movement without progress; -1
+            for never. It matters only with a budget above 1. Deviation: the paper spends the whole budget on each goal.
+            If the task space is far larger than the reachable part, nearly all movements are lost in this way.
 
     Raises:
         ValueError: a number is out of its range, or a part is of another kind.

@@ -58,14 +58,14 @@ COMMANDS = {
     "run --inverse gaussian": "unknown inverse 'gaussian'; known are linear",
     "run --teacher periodical": "unknown teacher 'periodical'; did you mean periodic?",
     "run --environment toss.Toss": "unknown environment 'toss.Toss'; .*; is it toss:Toss?",
-    "run --environment toss.py:Toss": "named without .py and with dots: toss:Toss",
+    "run --environment toss.py:Toss": "without .py and with dots, toss:Toss",
     "run --environment toss:Tos": "toss has no Tos; did you mean Toss?",
     "run --environment tos:make": "environment tos:make: the module tos cannot be imported: ModuleNotFoundError: No ",
     "run --environment broken:make": "No module named 'nothing_of_that_name'; is it installed, or in ",
     "run --environment toss:number": "toss:number must be a class or a function, got a int",
     "run --environment toss:Half": "Half has no contexts, rest, .* execute; an environment has contexts, policies, ",
     "run --goals toss:Toss": "Toss must derive from Goals of sgimd_torch.parts",
-    "run --algorithm toss:shown": "algorithm toss:shown cannot be called as others of its kind are: too many",
+    "run --algorithm toss:shown": "algorithm toss:shown cannot be called with the arguments of its kind: too many",
     "run --search nelder": r"unknown search 'nelder'; did you mean nelder-mead\? Known are nelder-mead, .*package",
     "run --environment toss:Toss --algorithm sgim-d": "Toss has no demonstrations, .* --algorithm practice",
     "run --algorithm random --environment toss:Toss --environment.noise 1": "environment toss:Toss has no such option",
@@ -195,7 +195,7 @@ class Silent(s.PlanarArm):
 
 
 CALLS = {
-    "no inverse": (lambda: learner(inverse=None), "Inverse must be given as its constructor, got a NoneType"),
+    "no inverse": (lambda: learner(inverse=None), "Inverse must be a class or a function, got a NoneType"),
     "a budget of nothing": (lambda: learner(budget=0), "budget must be a whole number >= 1, got 0"),
     "a generator for a seed": (lambda: s.sagg_riac(ARM, stream(0, "a")), "seed must be a whole number >= 0"),
     "a class for an environment": (lambda: s.sagg_riac(s.PlanarArm, 0), r"got the class PlanarArm .* PlanarArm\(\)"),
@@ -208,7 +208,7 @@ CALLS = {
     "a builder": (lambda: next(s.run(s.sagg_riac, ARM, 0, movements=3)), "learner must be a Learner, got a function"),
     "a list for a teacher": (
         lambda: next(s.run(learner(), ARM, 0, movements=3, teacher=[SHOWN])),
-        "teacher must be a Teacher, got a list; PeriodicTeacher",
+        "teacher must be a Teacher, got a list; try PeriodicTeacher",
     ),
     "failures that are none": (
         lambda: next(s.run(learner(), ARM, 0, movements=3, failures=1.5)),

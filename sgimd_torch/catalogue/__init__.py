@@ -1,9 +1,9 @@
-"""The table of words: every name that the command line knows, and the place of what it names.
+"""The catalogue: every name that the command line knows, with the place of its class, function or module.
 
-    load_word("goals", "grid")                    # ProgressGrid; imported now
-    load_word("goals", "mypackage.goals:Curious") # one of your own
-To remove a feature, delete its folder and its lines of this table. The help text of a word is the first line of the
-docstring at its place. Its options are the signature there (`sgimd_torch.catalogue.options`).
+    load_word("goals", "grid")                    # ProgressGrid, which is imported now
+    load_word("goals", "mypackage.goals:Curious") # a class of your own
+To remove a feature, delete its folder and its lines of this table. The help text of a name is the first line of the
+docstring at its place. The options are keywords of the signature there (`sgimd_torch.catalogue.options`).
 """
 
 from __future__ import annotations
@@ -139,14 +139,14 @@ WORDS: Final[dict[str, dict[str, str]]] = {
         "demo": "views.demo",
     },
 }
-# Default teacher of each algorithm that is taught; "teachers" are asked. Other algorithms learn alone.
+# Default teacher of each taught algorithm; "teachers": the algorithm asks teachers. Other algorithms learn alone.
 TAUGHT_BY: Final = {
     **dict.fromkeys(("observation", "imitation", "sgim-d"), "periodic"),
     **dict.fromkeys((word for word in WORDS["algorithm"] if word.endswith("-taught")), "periodic"),
     "practice-taught": "at-once",
     **dict.fromkeys((word for word, at in WORDS["algorithm"].items() if at.startswith("asking.")), "teachers"),
 }
-# Extras of the package that a command needs.
+# The extra of the package that each of these commands needs.
 EXTRAS: Final = {
     **dict.fromkeys(("demonstrations", "suite", "demo"), "plot"),
     **{name: name for name in ("report", "teach", "film")},
@@ -155,10 +155,10 @@ _PACKAGE: Final = Path(__file__).parents[1]
 
 
 def place_of(kind: str, word: str) -> str:
-    """Place of the thing that ``word`` names, as ``package.module:attribute``.
+    """Place of the class, function or module that ``word`` names, as ``package.module:attribute``.
 
     Raises:
-        ValueError: the word is neither in the table nor a place.
+        ValueError: the name is neither in the catalogue nor a place.
     """
     if word in WORDS[kind]:
         return f"{_PACKAGE.name}.{WORDS[kind][word]}"
@@ -168,10 +168,10 @@ def place_of(kind: str, word: str) -> str:
 
 
 def load_word(kind: str, word: str) -> Callable[..., Any]:
-    """The thing that ``word`` names.
+    """The class or function that ``word`` names.
 
     Raises:
-        ValueError: the word is not in the table, or the thing cannot be loaded or called.
+        ValueError: the name is not in the catalogue, or its class or function cannot be loaded or called.
     """
     made: Callable[..., Any] = load(place_of(kind, word), f"{kind} {word}" if ":" in word else "")
     if not callable(made):
@@ -181,7 +181,7 @@ def load_word(kind: str, word: str) -> Callable[..., Any]:
 
 @cache
 def about(kind: str, word: str) -> str:
-    """Help text of a word of the table: the first line of a docstring, read without importing its module."""
+    """Help text of a name of the catalogue: the first line of its docstring, read without importing the module."""
     module, _, name = WORDS[kind][word].partition(":")
     path = _PACKAGE / module.replace(".", "/")
     tree = ast.parse((path / "__init__.py" if path.is_dir() else path.with_suffix(".py")).read_text(encoding="utf-8"))
@@ -195,30 +195,30 @@ def about(kind: str, word: str) -> str:
 
 
 def named(made: Callable[..., Any]) -> tuple[str, str] | None:
-    """Kind and word of a thing in the table; None for anything else."""
+    """Kind and name of a class or function of the catalogue; None for any other."""
     place = f"{function_of(made).__module__}:{function_of(made).__qualname__}"
     places = ((kind, word, f"{_PACKAGE.name}.{at}") for kind, words in WORDS.items() for word, at in words.items())
     return next(((kind, word) for kind, word, at in places if at == place), None)
 
 
 def function_of(made: Callable[..., Any]) -> Callable[..., Any]:
-    """The function or class itself, without keywords that a ``partial`` fixes."""
+    """The function or class inside of any ``partial``."""
     return function_of(made.func) if isinstance(made, partial) else made
 
 
 def called(what: str, make: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
-    """Result of a call of ``make``, which may be a user's own.
+    """Result of a call of ``make``, which may be code of a user.
 
     Raises:
-        ValueError: it takes other arguments than others of its kind, or it ends the program.
+        ValueError: ``make`` takes other arguments, or it ends the program.
     """
     try:
         inspect.signature(make).bind(*arguments, **options)
     except TypeError as error:
-        raise ValueError(f"{what} cannot be called as others of its kind are: {error}") from error
+        raise ValueError(f"{what} cannot be called with the arguments of its kind: {error}") from error
     try:
         return make(*arguments, **options)
-    except SystemExit as end:  # the command would end, and look successful
+    except SystemExit as end:  # SystemExit would end the command, which would look successful
         raise ValueError(f"{what} cannot be made: it calls exit({end})") from end
 
 
@@ -226,13 +226,13 @@ def load(place: str, what: str = "") -> Any:
     """The attribute at ``package.module:attribute``; the working directory is searched, too.
 
     Raises:
-        ValueError: there is no such module or attribute, or the module cannot be imported; its error is shown.
+        ValueError: there is no such module or attribute, or the module cannot be imported; the message says why.
     """
     module, _, attribute = place.partition(":")
     what = what or place
     if module.endswith(".py"):
         raise ValueError(
-            f"{what}: a module is named without .py and with dots: {module[:-3].replace('/', '.')}:{attribute}"
+            f"{what}: write the module without .py and with dots, {module[:-3].replace('/', '.')}:{attribute}"
         )
     here = os.getcwd()
     if here not in sys.path:
@@ -241,8 +241,8 @@ def load(place: str, what: str = "") -> Any:
         found: Any = importlib.import_module(module)
     except (Exception, SystemExit) as error:  # a user's module may raise anything
         if isinstance(error, ImportError) and module.startswith(_PACKAGE.name):
-            brings_torch = "; pip install 'sgimd-torch[forward]' brings it" if error.name == "torch" else ""
-            raise ValueError(f"{error}{brings_torch}") from error  # modules that need another extra name it
+            brings_torch = "; pip install 'sgimd-torch[forward]' installs it" if error.name == "torch" else ""
+            raise ValueError(f"{error}{brings_torch}") from error  # the message of a module names any other extra
         where = f"; is it installed, or in {here}?" if isinstance(error, ImportError) else ""
         raise ValueError(
             f"{what}: the module {module} cannot be imported: {type(error).__name__}: {error}{where}"
@@ -256,8 +256,7 @@ def load(place: str, what: str = "") -> Any:
 
 
 def unknown(what: str, word: str, known: Collection[str], also: str = "") -> ValueError:
-    """The error for an unknown ``word``: it names the nearest of the ``known`` words, then all of them, then
-    ``also``."""
+    """The error for an unknown ``word``; the message has the nearest ``known`` name, all known names, and ``also``."""
     near = did_you_mean(word, known)
     return ValueError(f"unknown {what} {word!r}{f'{near} Known' if near else '; known'} are {', '.join(known)}{also}")
 
@@ -277,5 +276,5 @@ def _meant(word: str) -> str:
             f"; {word} is a model file: write a class that loads it (docs/own-robot.md), and give package.module:Class"
         )
     if os.path.isfile(f"{word.replace('.', '/')}.py"):
-        return f"; {word} is a module here: name what is in it, {word}:NAME"
-    return f"; is it {module}:{name}?" if dot else ", and package.module:attribute for one of your own"
+        return f"; {word} is a module here; write {word}:NAME for a class or function in it"
+    return f"; is it {module}:{name}?" if dot else ", or, for code of your own, package.module:attribute"

@@ -1,4 +1,4 @@
-"""Building parts from constructors, which may be a user's own: ``Goals.of(make, problem)`` explains each mistake."""
+"""Building parts from constructors: ``Goals.of(make, problem)`` explains each mistake in a user's constructor."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ class Built(ABC):  # noqa: B024
         kind = cls.__name__
         if isinstance(make, str):
             module, _, name = place_of(kind.lower(), make).partition(":")
-            raise ValueError(f"{kind} must be given as its constructor, got {make!r}; from {module} import {name}")
+            raise ValueError(f"{kind} must be a class or a function, got {make!r}; from {module} import {name}")
         if isinstance(make, cls) or not callable(make):
             finished = "finished " if isinstance(make, cls) else ""
-            raise ValueError(f"{kind} must be given as its constructor, got a {finished}{type(make).__name__}")
+            raise ValueError(f"{kind} must be a class or a function, got a {finished}{type(make).__name__}")
         found = function_of(make)
         if isinstance(found, type) and not issubclass(found, cls):
             raise ValueError(f"{found.__name__} must derive from {kind} of sgimd_torch.parts")
         if isinstance(found, ABCMeta) and found.__abstractmethods__:
             missing = ", ".join(sorted(found.__abstractmethods__))
-            raise ValueError(f"{found.__name__} has no {missing}, which {kind} demands; see sgimd_torch.parts")
+            raise ValueError(f"{found.__name__} has no {missing}, which every {kind} must have; see sgimd_torch.parts")
         made: Any = called(f"{kind} {found.__name__}", make, *given)
         if not isinstance(made, cls):
-            raise ValueError(f"{found.__name__} must give a thing of class {kind}, gave a {type(made).__name__}")
+            raise ValueError(f"{found.__name__} must return an object of {kind}, returned a {type(made).__name__}")
         return made

@@ -1,7 +1,7 @@
-"""Options of a part: those keywords of a class or a function that have a simple type and a default.
+"""Options of a part: the keywords of a class or a function that have a simple type and a default.
 
     options_of(InterestMap)["window"]                   # Option(kind=int, default=24)
-    help_of(InterestMap)["window"]                      # from the docstring, "number of recent competences ..."
+    help_of(InterestMap)["window"]                      # "number of recent competences ...", from the docstring
 The signature gives name, type and default; the docstring gives the help; the body checks the bounds.
 """
 
@@ -16,7 +16,7 @@ from typing import Any, Final, NamedTuple, TypeVar, cast
 
 F = TypeVar("F", bound=Callable[..., Any])
 _SIMPLE: Final = (int, float, bool, str, type(None), ...)
-_TARGETS: Final[dict[Callable[..., Any], Callable[..., Any]]] = {}  # by function decorated with `hands_on`
+_TARGETS: Final[dict[Callable[..., Any], Callable[..., Any]]] = {}  # target of each function decorated with `hands_on`
 _NAMED: Final = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
 
 
@@ -28,7 +28,7 @@ class Option(NamedTuple):
 
 
 def options_of(make: Callable[..., Any]) -> dict[str, Option]:
-    """Keywords of ``make`` of simple types: numbers, words, true or false, tuples of these, or None."""
+    """Keywords of ``make`` that have a default and a simple type: number, text, bool, tuple of these, or None."""
     found = {name: Option(_simple(each), each.default) for name, each in parameters_of(make).items()}
     return {name: each for name, each in found.items() if each.kind is not None and each.default is not _EMPTY}
 
@@ -40,7 +40,7 @@ def parameters_of(make: Callable[..., Any]) -> dict[str, inspect.Parameter]:
 
 def help_of(make: Callable[..., Any]) -> dict[str, str]:
     """Description of each parameter in the docstring, as one line."""
-    import docstring_parser  # only help needs it
+    import docstring_parser  # a module that only help needs
 
     while isinstance(make, partial):
         make = make.func
@@ -54,12 +54,12 @@ def help_of(make: Callable[..., Any]) -> dict[str, str]:
 
 
 def hands_on(target: Callable[..., Any], *names: str, **changed: Any) -> Callable[[F], F]:
-    """Decorator for a function with ``**keywords`` for ``target``: its signature gets the keywords of ``target``.
+    """Decorator that lists the keywords of ``target`` in the signature of a function which passes ``**keywords`` to it.
 
     Args:
         target: function or class with the keywords and their defaults.
-        names: keywords to take over; none given for all.
-        changed: defaults that replace those of ``target``, by keyword.
+        names: keywords to list; if no name is given, all are listed.
+        changed: new defaults, by keyword, instead of the defaults of ``target``.
     """
 
     def decorate(function: F) -> F:

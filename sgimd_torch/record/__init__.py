@@ -1,6 +1,6 @@
-"""The record of a life: one SQLite file of all events, which detects every change made to it afterwards.
+"""The record of a learner's life: one SQLite file of all events. Reading it detects every later change to the file.
 
-    with Record.make(path, dims, settings) as record: record.add(event); record.commit()  # the only writer
+    with Record.make(path, dims, settings) as record: record.add(event); record.commit()  # one writer
     with Record(path) as record: list(record.events()); record.rows("evaluations")  # any number of readers
 
 Tables (``docs/runs.md`` explains each column):
@@ -12,8 +12,8 @@ Tables (``docs/runs.md`` explains each column):
     predictions, refreshes           rows of a forward model
     seals            the number of rows of each table, and the seal of its last row
 
-Every row ends in a seal: a checksum of the row, of all rows before it, of its table and of the run. Reading a row that
-was changed, lost, doubled, moved or taken from another run therefore raises an error.
+Every row ends in a seal: a checksum of the row, of all rows before it, of its table and of the run. So reading raises
+an error if a row was changed, lost, doubled, moved or taken from another run.
 """
 
 from __future__ import annotations
@@ -54,16 +54,16 @@ from sgimd_torch.spaces import Demonstration
 
 __all__ = ["DERIVED", "Dims", "InUseError", "Record", "RunError", "layout"]
 
-_PATIENCE: Final = 60.0  # s, the longest that a commit waits for readers
-_AT_ONCE: Final = 4096  # rows read by one query
+_PATIENCE: Final = 60.0  # s, longest time that a commit waits for readers
+_AT_ONCE: Final = 4096  # number of rows that one query reads
 
 
 class Record:
-    """An existing record, open for reading, or also for writing; a context manager.
+    """An existing record, open for reading and, on request, for writing; a context manager.
 
     Args:
         path: the file.
-        write: whether to write, too. Until it is closed no other process can write; others may read.
+        write: whether to open it for writing, too. Until this record is closed, other processes can only read it.
 
     Attributes:
         about: settings, versions and so on, by name; see ``settle``.
@@ -71,15 +71,15 @@ class Record:
         failed: whether a write has failed; nothing is written after that.
 
     Raises:
-        RunError: there is no record at ``path``, its header is damaged, or another process writes it.
+        RunError: there is no record at ``path``, its header is damaged, or another process is writing it.
     """
 
     def __init__(self, path: str | os.PathLike[str], *, write: bool = False) -> None:
         self.path = Path(path)
         self._waiting: dict[str, list[Row]] = {}
-        self._seals: dict[str, tuple[int, int]] = {}  # by table: number of rows, seal of the last
+        self._seals: dict[str, tuple[int, int]] = {}  # by table: number of rows, seal of the last row
         self._written: dict[str, tuple[int, int]] = {}
-        self._version: Any = None  # of the file at the last lock, which a writer changes
+        self._version: Any = None  # version of the file at the last lock; each writer changes it
         self._movements = 0
         self._shown: dict[bytes, int] = {}
         self.failed = False
@@ -97,7 +97,7 @@ class Record:
         """A new record, open for writing; ``about`` holds values that json can express.
 
         Raises:
-            OSError: it cannot be written.
+            OSError: the file cannot be written.
         """
         path, told = Path(path), {"run": os.urandom(8).hex(), "dims": dims, **about}
         try:
@@ -131,15 +131,14 @@ class Record:
 
     @property
     def movements(self) -> int:
-        """Number of movements in it, rests included, committed or not."""
+        """Number of recorded movements, rests and uncommitted movements included."""
         return self._movements
 
     def rows(self, table: str) -> Iterator[Row]:
         """The rows of a table, in order, without their seals.
 
         Raises:
-            RunError: a row differs from what was written, or rows are missing or added; the rows before it were
-                yielded.
+            RunError: a row was changed, or rows are missing or added; the rows before the error were yielded.
         """
         if self._waiting:
             self._write()
@@ -190,7 +189,7 @@ class Record:
         self._write()
 
     def settle(self, **about: Any) -> None:
-        """Add or replace entries of ``about``, values that json can express."""
+        """Add or replace entries of ``about``; json must be able to express their values."""
         self.about |= about
         self.replace_rows("about", about_rows(self.about))
 
@@ -207,7 +206,7 @@ class Record:
             self._lock()
 
     def check(self) -> dict[str, str]:
-        """The damage of each damaged table, as a sentence; {} if there is none."""
+        """A sentence on each damaged table, by name of the table; {} if no table is damaged."""
         wrong = {}
         for table in layout(self.dims):
             try:
@@ -221,10 +220,10 @@ class Record:
         """Replace the file by one with the events before the first damaged row, and close this record.
 
         Returns:
-            The new record, open for writing, without ``DERIVED`` tables: a replay makes them again.
+            The new record, open for writing, with empty ``DERIVED`` tables, which a replay fills again.
 
         Raises:
-            OSError: it cannot be written.
+            OSError: the file cannot be written.
         """
         about = {name: value for name, value in self.about.items() if name not in ("run", "dims")}
         shown = list[Demonstration]()
@@ -241,7 +240,7 @@ class Record:
         return Record(self.path, write=True)
 
     def _demonstration(self, shown: Demonstration) -> int:
-        """The row number of a demonstration; a new one is appended."""
+        """The row number of a demonstration; if the demonstration is new, it is appended."""
         row = demonstration_row(shown, self.dims)
         if not self._shown:
             self._shown = {row_bytes(each): k for k, each in enumerate(self.rows("demonstrations"))}
@@ -287,7 +286,7 @@ class Record:
         self._movements = 0 if last is None else movements_after(*last)
 
     def _lock(self) -> None:
-        """Lock out other writers until this one is closed; readers may enter."""
+        """Lock out other writers until this record is closed; readers may enter."""
         before = self._version
         self._connection.execute("BEGIN IMMEDIATE")
         self._version = self._connection.execute("PRAGMA data_version").fetchone()
@@ -297,7 +296,7 @@ class Record:
 
     @contextmanager
     def _told(self, *, writing: bool = False) -> Iterator[None]:
-        """Turn errors of SQLite, and of unexpected values in the file, into ours, with the path."""
+        """Turn errors of SQLite or from unexpected values in the file into RunError or OSError, with the path."""
         if self.failed:
             raise OSError(f"{self.path} could not be written; all rows since the last commit are lost")
         try:
@@ -315,21 +314,21 @@ class Record:
             raise RunError(f"{self.path} cannot be read as a record: {error}; {HINT}") from error
 
     def _fail(self, writing: bool) -> None:
-        """After a failed write stop writing: rows are missing, and none may follow them."""
+        """Stop writing after a failed write, as no row may follow the missing ones."""
         if writing:
             self.failed = True
             self._connection.close()
 
 
 def _connect(path: Path, write: bool) -> sqlite3.Connection:
-    # Nothing here may open the file: closing it again would give up the locks that this process holds on it.
+    # No code here may open the file: closing it would release all locks that this process has on the file.
     if not path.is_file():
         raise RunError(f"there is no record {path}")
     if not path.stat().st_size:
         raise RunError(f"{path} is still empty")
     try:
-        # Readers write, too: they clean up after a killed writer. SQLite falls back to reading a read-only file.
-        # One thread opens a run that is taught by hand, another one continues it; never two at a time.
+        # Readers need mode=rw, too, to clean up after a killed writer. SQLite opens a read-only file for reading alone.
+        # If a run is taught by hand, one thread opens the record and another uses it later, never both at a time.
         place, patience = f"{path.resolve().as_uri()}?mode=rw", 0.5 if write else 10.0
         return sqlite3.connect(place, uri=True, isolation_level=None, timeout=patience, check_same_thread=False)
     except (sqlite3.Error, OSError) as error:

@@ -14,7 +14,7 @@ import numpy as np
 from sgimd_torch.learner.events import Event, Kind
 from sgimd_torch.spaces import Array, Demonstration
 
-DERIVED: Final = ("goals", "evaluations", "errors", "regions", "predictions", "refreshes")  # a replay makes these again
+DERIVED: Final = ("goals", "evaluations", "errors", "regions", "predictions", "refreshes")  # tables that a replay fills
 SEALS: Final = ["name TEXT", "n_rows INTEGER", "seal INTEGER"]  # columns of the table ``seals``
 HINT: Final = "was it damaged or edited?"
 
@@ -37,7 +37,7 @@ _IN_CONTEXT: Final = (*_COUNTED, Kind.ASKED, Kind.INTERRUPTED)
 
 
 def layout(dims: Dims) -> dict[str, list[str]]:
-    """The columns of every table, as SQL declares them. SQLite allows at most 2,000 in a table."""
+    """The columns of every table, as SQL declares them. SQLite allows at most 2,000 columns in a table."""
     c, p, t = dims
     context, theta, goal, outcome = (
         _vector(name, dim) for name, dim in (("context", c), ("theta", p), ("goal", t), ("outcome", t))
@@ -76,7 +76,7 @@ def event_row(event: Event, movement: int, lesson: int | None, dims: Dims) -> Ro
 
 
 def event_reader(dims: Dims, shown: Sequence[Demonstration]) -> Callable[[Row], Event]:
-    """A function from such a row to its event; ``shown`` are the demonstrations by row number."""
+    """A function that turns a row of ``events`` into an event; ``shown`` has the demonstrations by row number."""
     every = (*dims, dims[2])
     parts = [slice(*ends) for ends in pairwise(accumulate(every, initial=3))]
 
@@ -105,7 +105,7 @@ def demonstration_row(shown: Demonstration, dims: Dims) -> Row:
 
 
 def read_demonstration(row: Row, dims: Dims) -> Demonstration:
-    """The demonstration of such a row."""
+    """The demonstration in a row of the table ``demonstrations``."""
     *vectors, n_joints, times, trajectory = row
     context, outcome = _array(tuple(vectors[: dims[0]])), _array(tuple(vectors[dims[0] :]))
     assert context is not None
@@ -127,7 +127,7 @@ def about_rows(about: Mapping[str, Any]) -> list[Row]:
 
 
 def row_bytes(row: Sequence[Any]) -> bytes:
-    """A row as bytes, for its seal; floats in binary take a fifth of the time of text."""
+    """A row as bytes, for its seal. Binary floats take a fifth of the time that text would take."""
     return marshal.dumps(tuple(row), 2)
 
 
@@ -144,13 +144,13 @@ def _vector(name: str, dim: int) -> list[str]:
 
 
 def _cells(values: Array | None, dim: int) -> list[Any]:
-    """The cells of a vector; NULL for None, or with a NaN in it. -0.0 becomes 0.0, as in SQLite."""
+    """The cells of a vector; all are NULL if it is None or has a NaN. -0.0 becomes 0.0, as in SQLite."""
     numbers = None if values is None else np.asarray(values, dtype=np.float64) + 0.0
     return [None] * dim if numbers is None or np.isnan(numbers).any() else numbers.tolist()
 
 
 def _array(cells: Row) -> Array | None:
-    """The vector in these cells, None if one is NULL."""
+    """The vector in these cells, None if a cell is NULL."""
     return None if None in cells else np.array(cells, dtype=np.float64)
 
 

@@ -1,4 +1,4 @@
-"""Save the life of a learner, and live through it again: ``save_life(learner, path)``, ``load_life(learner, path)``."""
+"""Save the life of a learner, and let a new one repeat it: ``save_life(learner, path)``, ``load_life(new, path)``."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from sgimd_torch.spaces import Move
 def save_life(learner: Learner, path: str | os.PathLike[str]) -> None:
     """Write the life of a learner to a record: contexts, movements, rests, outcomes and lessons, in SQLite.
 
-    A movement that was asked for and not told yet is left out: after `load_life`, ask for it again.
+    A movement whose outcome was not told yet is left out: after `load_life`, ask for this movement again.
 
     Raises:
         OSError: ``path`` is a directory, or cannot be written.
@@ -35,21 +35,20 @@ def load_life(
     teacher: Teacher | None = None,
     after: Callable[[Move | None], object] | None = None,
 ) -> None:
-    """Live through a saved life again, or through the life of a run; then go on as if it had never stopped.
+    """Let a learner repeat a saved life or the life of a run; it can then go on as if the life had never stopped.
 
     Args:
-        learner: learner freshly built, of the same parts.
+        learner: learner, freshly built from the same parts.
         path: file that `save_life` wrote, or the ``run.sqlite`` of a run.
-        teacher: teacher freshly built, too, if one draws lessons at random: it is asked before each movement, as in
-            `run`, so that it goes on in the same way. None for the lessons of the file alone.
-        after: function called after each movement, with None after a rest, as your loop does to refresh a forward
-            model.
+        teacher: teacher, freshly built, too, if a teacher draws lessons at random: it is asked before each movement, as
+            in `run`, so that its draws go on in the same way. None to take all lessons from the file.
+        after: function to call with each movement (None: a rest), such as the refresh of a forward model in your loop.
 
     Raises:
-        ReplayError: this learner would have moved otherwise, or its memory comes out otherwise. It has then lived a
-            part of that life; build another one.
-        RuntimeError: it has lived already.
-        RunError: no record, damaged, or of another robot.
+        ReplayError: this learner makes another movement, or ends with another memory. It has then lived a part of
+            that life; build a new learner.
+        RuntimeError: the learner has lived already.
+        RunError: there is no record at ``path``, or the record is damaged or of another robot.
     """
     if any(learner.events()) or not learner.idle:
         raise RuntimeError("load_life() needs a learner freshly built; this one has lived already")
@@ -61,9 +60,9 @@ def load_life(
             raise RunError(f"{path} has dims {record.dims} of context, theta, outcome, got {dims}; another robot?")
         begun, exemplars = record.about.get("begun", 0), record.about.get("exemplars")
         if begun != learner.begun:
-            raise ReplayError(f"{path} began with {begun} exemplars in memory, this learner with {learner.begun}")
+            raise ReplayError(f"{path} began with {begun} exemplars in memory, this learner began with {learner.begun}")
         for episode in replay(learner, record.events(), teacher=teacher):
             if after is not None:
                 after(episode.move)
     if exemplars not in (None, len(learner.memory)):
-        raise ReplayError(f"{path} ended with another memory; were exemplars added to one of them by hand?")
+        raise ReplayError(f"{path} ended with another memory; were exemplars added to either by hand?")

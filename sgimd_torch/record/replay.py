@@ -1,7 +1,7 @@
-"""Replay: a learner freshly built from equal parts becomes equal to the recorded one by repeating its events.
+"""Replay: a learner freshly built from equal parts repeats recorded events, and so equals the recorded learner.
 
-It draws the same random numbers again, so goals, searches and memory are equal, even in the middle of an attempt. So
-events are all that `sgimd_torch.record` has to keep.
+The learner draws the same random numbers again, so goals, searches and memory are equal, even in the middle of an
+attempt. So `sgimd_torch.record` has to keep nothing but events.
     for episode in replay(learner, record.events(), teacher=teacher): ...
 """
 
@@ -21,7 +21,7 @@ _HINT: Final = "was it recorded by another version, on another processor or with
 
 
 class ReplayError(RuntimeError):
-    """The learner does not repeat its record; library version, processor or configuration differ."""
+    """The learner does not repeat its record, because library version, processor or configuration differ."""
 
 
 def replay(
@@ -34,7 +34,7 @@ def replay(
         events: events of the record.
         teacher: teacher, freshly built; its ``offer`` is called before each movement, so that its random draws continue
             as in the recorded run. Demonstrations without ``who`` were not offered, and are taken from the record. None
-            to take all from the record.
+            to take all demonstrations from the record.
 
     Yields:
         Episodes, as `run` has yielded them.
@@ -43,14 +43,14 @@ def replay(
         Demonstration, request and reply after the last episode.
 
     Raises (when iterated):
-        ReplayError: the learner proposes another movement than the recorded one, or the teacher another demonstration.
+        ReplayError: the learner proposes another movement than the recorded one, or the teacher offers another one.
     """
     offered: Demonstration | None = None
     asked_at = -1  # index of the movement before which the teacher was asked last
     before = BeforeMovement()
     for event in events:
         index = learner.movements
-        # Between two runs the caller may show something, or begin or end an attempt; no teacher is asked before it.
+        # Between two runs the caller may show something, or begin or end an attempt; no teacher is asked before that.
         between = event.kind in (Kind.SHOWN, Kind.ASKED, Kind.INTERRUPTED) and event.who is None and event.theta is None
         if teacher is not None and asked_at < index and not between:
             asked_at, offered = index, teacher.offer(index, learner.memory)
@@ -59,8 +59,8 @@ def replay(
                 if event.who == TEACHER and teacher is not None:
                     _check_lesson(index, event.lesson, offered)
                 if learner.social is None and not learner.waits_for_answer:
-                    found = f"before movement {index} it asked for a demonstration, the learner now does not"
-                    raise ReplayError(f"{found}; is it built in the same way, with the same seed?")
+                    found = f"before movement {index} the learner asked for a demonstration, now it does not"
+                    raise ReplayError(f"{found}; is it built in the same way and with the same seed?")
                 assert event.lesson is not None
                 learner.watch(event.lesson, who=event.who)
                 if not between:
@@ -75,7 +75,7 @@ def replay(
                         learner.go_on_alone(event.reply or "")
             case Kind.INTERRUPTED if between:
                 learner.interrupt()
-                asked_at = -1  # the run that went on asked its teacher once more
+                asked_at = -1  # the resumed run asked its teacher once more
             case Kind.FAILED if event.theta is None:
                 learner.fail(event.reply or "")
                 yield Episode(
@@ -91,7 +91,7 @@ def replay(
                     _check_repeats(index, "goal", event.goal, None if move is None else move.goal)
                 if event.kind == Kind.INTERRUPTED:
                     learner.interrupt()
-                    asked_at = -1  # the run that went on asked its teacher once more
+                    asked_at = -1  # the resumed run asked its teacher once more
                     continue
                 failed = (event.reply or "") if event.kind == Kind.FAILED else ""
                 if event.kind == Kind.FAILED:
@@ -104,7 +104,7 @@ def replay(
 
 
 def _check_repeats(index: int, name: str, recorded: Array | None, now: Array | None) -> None:
-    """Refuse a learner that proposes another vector than the recorded one; None is a rest."""
+    """Refuse a learner that proposes another vector than the recorded one; None means a rest."""
     if recorded is None or now is None:
         if recorded is now:
             return

@@ -136,7 +136,7 @@ def test_a_request_that_waits_for_its_answer_is_saved_too(tmp_path):
     assert np.array_equal(robot.ask(NO_CONTEXT).theta, again.ask(NO_CONTEXT).theta)
     robot.tell([0.1, 0.2])
     save_life(robot, tmp_path / "life.sqlite")
-    with pytest.raises(ReplayError, match="before movement 0 it asked for a demonstration, the learner now does not"):
+    with pytest.raises(ReplayError, match="before movement 0 the learner asked for a demonstration, now it does not"):
         load_life(sagg_riac(ARM, seed), tmp_path / "life.sqlite")
 
 
@@ -183,7 +183,9 @@ def test_without_answers_it_moves_in_every_movement_also_when_nobody_hears_its_r
 
 
 def test_a_teacher_whom_nobody_knows_is_refused_by_name():
-    with pytest.raises(ValueError, match=r"the learner asks '(low|high)', but teachers are other; are they its own"):
+    with pytest.raises(
+        ValueError, match=r"the learner asks '(low|high)', but teachers are other; are they its teachers"
+    ):
         live(acts(), {"other": Silent()})
 
 

@@ -305,7 +305,7 @@ def test_a_life_that_started_from_a_memory_is_loaded_by_one_that_starts_from_the
     again = sagg_riac(ARM, 0, memory=exemplars(30))
     load_life(again, tmp_path / "life.sqlite")
     assert np.array_equal(step(again).theta, step(whole).theta)
-    with pytest.raises(ReplayError, match="began with 30 exemplars in memory, this learner with 0"):
+    with pytest.raises(ReplayError, match="began with 30 exemplars in memory, this learner began with 0"):
         load_life(sagg_riac(ARM, 0), tmp_path / "life.sqlite")
 
 

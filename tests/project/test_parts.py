@@ -126,12 +126,12 @@ class Alien:
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (Halfway, "Halfway has no add, which Goals demands"),
-        (partial(Goals), "Goals has no add, sample, which Goals demands"),
-        ("grid", "given as its constructor, got 'grid'; from sgimd_torch.goals.progress_grid import ProgressGrid"),
+        (Halfway, "Halfway has no add, which every Goals must have"),
+        (partial(Goals), "Goals has no add, sample, which every Goals must have"),
+        ("grid", "must be a class or a function, got 'grid'; from sgimd_torch.goals.progress_grid import ProgressGrid"),
         ("gird", "unknown goals 'gird'; did you mean grid?"),
-        (UniformGoals(problem()), "given as its constructor, got a finished UniformGoals"),
-        (Unasked, "Goals Unasked cannot be called as others of its kind are: too many positional arguments"),
+        (UniformGoals(problem()), "must be a class or a function, got a finished UniformGoals"),
+        (Unasked, "Goals Unasked cannot be called with the arguments of its kind: too many positional arguments"),
         (NelderMead, "NelderMead must derive from Goals"),
         (Alien, "Alien must derive from Goals"),
     ],
@@ -143,5 +143,5 @@ def test_what_is_no_constructor_of_its_kind_is_refused_when_it_is_built(make, me
 
 @pytest.mark.parametrize("kind", [*KINDS.values(), parts.Teacher])
 def test_the_base_class_of_each_kind_demands_something(kind, given):
-    with pytest.raises(ValueError, match=f"{kind.__name__} has no .*, which {kind.__name__} demands"):
+    with pytest.raises(ValueError, match=f"{kind.__name__} has no .*, which every {kind.__name__} must have"):
         kind.of(kind, given)

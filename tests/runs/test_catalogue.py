@@ -229,7 +229,7 @@ def test_an_entry_that_is_not_installed_names_its_extra(monkeypatch):
 
 def test_a_word_that_is_no_word_says_what_would_have_been_right(toss):
     for kind, word, meant in (
-        ("goals", "toss", "toss is a module here: name what is in it, toss:NAME"),
+        ("goals", "toss", "toss is a module here; write toss:NAME for a class or function in it"),
         ("environment", "toss.Toss", "is it toss:Toss?"),
         ("environment", "arm.xml", "arm.xml is a model file: write a class that loads it"),
         ("environment", "planar-arm", "did you mean planar-arm-7?"),
