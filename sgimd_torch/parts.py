@@ -112,8 +112,8 @@ class Trained(ABC):
     """Object that parts share and that is trained while the learner moves, such as a forward model."""
 
     @abstractmethod
-    def refresh(self, memory: Memory, goal: Array | None = None) -> Any:
-        """Learn from the newest exemplar in ``memory``, a movement for ``goal`` ``(outcome_dim,)``."""
+    def refresh(self, memory: Memory) -> Any:
+        """Learn from the newest exemplars in ``memory``."""
 
     @abstractmethod
     def listener(self, life: Any) -> Any:

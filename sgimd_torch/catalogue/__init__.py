@@ -241,8 +241,7 @@ def load(place: str, what: str = "") -> Any:
         found: Any = importlib.import_module(module)
     except (Exception, SystemExit) as error:  # a user's module may raise anything
         if isinstance(error, ImportError) and module.startswith(_PACKAGE.name):
-            brings_torch = "; pip install 'sgimd-torch[forward]' installs it" if error.name == "torch" else ""
-            raise ValueError(f"{error}{brings_torch}") from error  # the message of a module names any other extra
+            raise ValueError(str(error)) from error  # it names the extra that installs what is missing
         where = f"; is it installed, or in {here}?" if isinstance(error, ImportError) else ""
         raise ValueError(
             f"{what}: the module {module} cannot be imported: {type(error).__name__}: {error}{where}"

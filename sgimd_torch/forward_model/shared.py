@@ -13,7 +13,6 @@ from sgimd_torch.forward_model.listener import ModelListener
 from sgimd_torch.forward_model.model import ForwardModel, Refresh
 from sgimd_torch.memory import Memory
 from sgimd_torch.parts import Inverse, Problem, Trained
-from sgimd_torch.spaces import Array
 
 
 class SharedModel(Trained):
@@ -27,8 +26,8 @@ class SharedModel(Trained):
     def __init__(self, problem: Problem, **options: Any) -> None:
         self.model = ForwardModel(*problem.dims, seed=problem.seed, **options)
 
-    def refresh(self, memory: Memory, goal: Array | None = None) -> Refresh | None:
-        """Result of `ForwardModel.refresh`; the ``goal`` does not matter."""
+    def refresh(self, memory: Memory) -> Refresh | None:
+        """Result of `ForwardModel.refresh`."""
         return self.model.refresh(memory)
 
     def listener(self, life: Any) -> ModelListener:

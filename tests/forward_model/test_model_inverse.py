@@ -168,7 +168,7 @@ def test_a_loop_that_trains_what_a_learner_shares_teaches_its_inverse():
     learner = sagg_riac(ARM, 0, inverse=ModelInverse)
     for episode in run(learner, ARM, 0, movements=60):
         for each in learner.problem.trained:
-            each.refresh(learner.memory, episode.move.goal)
+            each.refresh(learner.memory)
     assert learner.inverse.model.trained
 
 

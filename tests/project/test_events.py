@@ -26,7 +26,7 @@ assert main() in (0, None)
 SAYS = """
 import sys
 files = {each.__file__ for name, each in sys.modules.items() if name.partition(".")[0] == "sgimd_torch"}
-print("sqlite3" in sys.modules, *files)
+print("sqlite3" in sys.modules, *files, sep="|")
 """
 
 
@@ -34,7 +34,7 @@ def loaded_by(program, folder):
     """Whether SQLite was loaded by a program that ran in ``folder``, and how many lines of each file of ours."""
     words = [sys.executable, "-c", program + SAYS]
     said = subprocess.run(words, capture_output=True, text=True, check=True, cwd=folder).stdout
-    sqlite, *files = said.splitlines()[-1].split()
+    sqlite, *files = said.splitlines()[-1].split("|")
     return sqlite == "True", {
         str(Path(each).relative_to(PACKAGE)): len(Path(each).read_text().splitlines()) for each in files
     }

@@ -162,7 +162,7 @@ INTERPRETER = """#!/usr/bin/env bash
 case "$1 $2" in
 "-m venv") rm -rf "$4" && mkdir -p "$4/bin" && cp "$0" "$4/bin/python" && echo "venv" >>"$NOTES" ;;
 "-m pip") sleep 0.3 && echo "${@: -3:1}" >>"$NOTES" && exit "${PIP_FAILS:-0}" ;;
-*) exec PYTHON "$@" ;;
+*) exec "PYTHON" "$@" ;;
 esac
 """
 

@@ -145,8 +145,7 @@ def remember(run: Run, parts: RunParts, start: int, stop: int) -> None:
         if np.isfinite(run.outcomes[row]).all():
             memory.add(run.contexts[row], run.thetas[row], run.outcomes[row])
         for model in parts.learner.problem.trained:
-            goal = run.goals[row]
-            model.refresh(memory, goal if np.isfinite(goal).all() else None)
+            model.refresh(memory)
 
 
 def _stages(run: Run, options: argparse.Namespace) -> list[int]:
