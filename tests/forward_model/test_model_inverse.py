@@ -166,7 +166,7 @@ def test_all_parts_share_the_model_that_the_first_has_made(memory):
 
 def test_a_loop_that_trains_what_a_learner_shares_teaches_its_inverse():
     learner = sagg_riac(ARM, 0, inverse=ModelInverse)
-    for episode in run(learner, ARM, 0, movements=60):
+    for _ in run(learner, ARM, 0, movements=60):
         for each in learner.problem.trained:
             each.refresh(learner.memory)
     assert learner.inverse.model.trained
