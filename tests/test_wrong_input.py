@@ -47,7 +47,7 @@ COMMANDS = {
     "runn": "unknown command 'runn'; did you mean run?",
     "run --algorithm sgimd": r"unknown algorithm 'sgimd'; did you mean sgim-d\? Known are",
     "run sgim-d": "'sgim-d' belongs to no option",
-    "run --resume yes": "'yes' belongs to no option; .* --resume, --accept-loss take none",
+    "run --resume yes": "'yes' belongs to no option; .* --resume, --accept-loss take no value",
     "run --movements 1e3": "--movements must be a whole number, got 1e3",
     "run --movements": "--movements needs a value",
     "run --seed -3": "seed must be at least 0, got -3",

@@ -1,1 +1,1 @@
-"""A run as a thing on disk: options, parts, run directory, log, replay."""
+"""Runs on disk: options, parts, run directory, log and replay."""

@@ -1,4 +1,4 @@
-"""The composition root: builds the parts of a run from a ``Config``.
+"""The function ``build``, which builds all parts of a run from its ``Config``.
 
 parts = build(Config(seed=3)); for episode in run(parts.learner, parts.environment, 3, teacher=parts.teacher, ...): ...
 """
@@ -31,7 +31,7 @@ class RunParts:
         learner: learner, freshly built.
         teacher: teacher who demonstrates without being asked; None for none.
         teachers: teachers who are asked, by name.
-        answers: inverse models for evaluations, by word; the run's own comes first.
+        answers: inverse models for evaluations, by name; the run's own inverse model comes first.
         benchmark: goals of evaluations.
         data: checksums of the files that were read.
         notes: messages for the user.
@@ -118,8 +118,7 @@ def task_of(config: Config) -> Task:
 
 
 def has_demonstrations(config: Config) -> bool:
-    """Whether the task has demonstrations. The next `task_of` returns this task, as some robots can connect only
-    once."""
+    """Whether the task has demonstrations. The next `task_of` returns this task: some robots can connect only once."""
     task = _LOOKED_AT[_place(config)] = task_of(config)
     return task.demonstrations is not None
 

@@ -1,10 +1,10 @@
-"""Run one learner, evaluate it now and then, and write everything to one run directory, OUT/NAME/seed-003.
+"""Run one learner, evaluate it now and then, and write everything into one folder, such as OUT/NAME/seed-003.
 
 Examples:
   sgimd run --algorithm sgim-d --seed 3
   sgimd run --algorithm sgim-d --seed 3 --resume              go on after Ctrl-C, or with more --movements
   sgimd run --algorithm sagg-riac --goals grid --goals.window 12 --name grid --movements 2000
-  sgimd run --environment mypackage.toss:make                 on a robot of your own
+  sgimd run --environment mypackage.toss:make                 a run on your own robot
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ from sgimd_torch.runs.process import Stopping, loading
 
 ALONE: Final = "practice"  # the default learner of a robot without demonstrations
 _PARTS: Final = [kind for kind in WORDS if kind not in ("algorithm", "command")]
-_PLACES: Final = {"progress": "goals.progress", "choose": "teacher.choose"}  # options for parts of other parts
+_PLACES: Final = {"progress": "goals.progress", "choose": "teacher.choose"}  # options that choose parts of other parts
 _WIDTH: Final = 120
 _TYPES: Final = {  # names of types in help, longest first
     "tuple[float, float]": "two numbers with a comma between",
     "tuple[int, ...]": "whole numbers with commas",
-    "tuple[str, ...]": "words with commas",
+    "tuple[str, ...]": "names with commas",
     "pathlib.Path": "a path",
     "float": "a number",
     "int": "a whole number",
@@ -43,13 +43,13 @@ _TYPES: Final = {  # names of types in help, longest first
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """The command ``sgimd run``; returns 0 when the run has finished, and raises as ``carry_out`` does."""
+    """The command ``sgimd run``; returns 0 when the run has finished, or raises the errors of ``carry_out``."""
     argv = sys.argv[1:] if argv is None else argv
     config, flags = parse(argv, __doc__)
     program = ["sgimd"] if Path(sys.argv[0]).name == "sgimd" else [sys.executable, "-m", "sgimd_torch"]
     again = [*program, "run", *argv, *([] if flags["resume"] else ["--resume"])]
     with loading():
-        from sgimd_torch.runs.build import build  # after --help
+        from sgimd_torch.runs.build import build  # imported here so that --help is fast
         from sgimd_torch.runs.run import carry_out
     parts = build(config)
     with Stopping() as stopping:
@@ -60,7 +60,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def parse(argv: Sequence[str], description: str | None = None) -> tuple[Config, dict[str, bool]]:
     """The run that a command line describes, and its flags.
 
-    The choices of parts are read first, because they determine the options.
+    The chosen parts are read first, because they determine which options there are.
 
     Raises:
         SystemExit: code 2, with a message on stderr, for a wrong command line; code 0 after ``--help``.
@@ -97,7 +97,7 @@ def _read(argv: Sequence[str]) -> tuple[dict[str, str], set[str]]:
         if word in ("-h", "--help"):
             asked.add("help")
         elif not word.startswith("--"):
-            flags = f"; --{', --'.join(map(dashed, FLAGS))} take none"
+            flags = f"; --{', --'.join(map(dashed, FLAGS))} take no value"
             raise ValueError(f"{word!r} belongs to no option; an option begins with -- and takes one value{flags}")
         elif name in FLAGS:
             if equals:
@@ -124,7 +124,7 @@ def _suited(given: Mapping[str, str]) -> str:
 
 
 def _values(given: Mapping[str, str], parts: Mapping[str, Part]) -> dict[str, Any]:
-    """The typed values, converted to the types of the options; words of parts and unknown options stay text.
+    """The typed values, converted to the types of the options; names of parts and values of unknown options stay text.
 
     Raises:
         ValueError: a value is of another type.
@@ -164,7 +164,7 @@ def _value(text: str, kind: Any) -> Any:
 
 
 def _wanted(kind: Any) -> str:
-    """Name of a type, for somebody who types its values."""
+    """Name of a type, for somebody who types a value of this type."""
     text = inspect.formatannotation(kind)
     for python, plain in _TYPES.items():
         text = text.replace(python, plain)
@@ -172,7 +172,7 @@ def _wanted(kind: Any) -> str:
 
 
 def overview(description: str | None) -> str:
-    """Text of ``sgimd run --help``: options and flags of every run, and words for its parts."""
+    """Text of ``sgimd run --help``: options and flags of every run, and names of parts."""
     about_run = help_of(Config)
     shown = {name: typed(getattr(Config, name)) for name in RUN}
     run = {name: about_run[name] + f" ({text})" * (text != "null") for name, text in shown.items()} | FLAGS
@@ -182,12 +182,12 @@ def overview(description: str | None) -> str:
         "",
         *(description or "").splitlines(),
         "",
-        "options of every run, with defaults in brackets (no brackets: the default is null, no value):",
+        "options of every run, with the default in brackets (no brackets: the default is null, which means no value):",
         *(_line(f"--{dashed(name)}", text) for name, text in run.items()),
-        "words for --algorithm:",
+        "names for --algorithm:",
         *(_line(word, about("algorithm", word)) for word in WORDS["algorithm"] if word not in rivals),
-        _line("extra rivals", ", ".join(rivals)),
-        "words for the parts of a run; for a part of your own, type package.module:attribute:",
+        _line("for comparison", f"{', '.join(rivals)}; these need the extra rivals"),
+        "names for the parts of a run; for a part of your own, type package.module:attribute:",
         *(_line(f"--{_PLACES.get(kind, kind)}", ", ".join(words)) for kind, words in WORDS.items() if kind in _PARTS),
         "",
         "Parts have options, too, such as --goals.window 12. To see them, name the algorithm or a part before --help:",
@@ -199,14 +199,17 @@ def overview(description: str | None) -> str:
 def help_on(parts: Mapping[str, Part]) -> str:
     """Text of ``sgimd run --goals grid --help``: options of the chosen parts."""
     lines = [
-        "usage: sgimd run [--OPTION VALUE ...] [--resume]; sgimd run --help shows the options of every run",
-        "C, Pi and T are the spaces of contexts, movement parameters (theta) and outcomes; goals are points of T.",
+        "This screen has the options of the chosen parts; "
+        "sgimd run --help has the options of every run, such as --seed.",
+        "usage: sgimd run [--OPTION VALUE ...] [--resume]",
+        "C: contexts, which the robot sees and cannot choose. Pi: movement parameters, theta.",
+        "T: outcomes; a goal is a point of T. The paper: Nguyen & Oudeyer (2014).",
     ]
     for part in parts.values():
         described = help_of(part.make)
         what = [about(part.kind, part.word)] if part.word in WORDS[part.kind] else []
         leads_to = [f"--{part.full(each)}={parts[part.full(each)].word}" for each in part.choices]
-        what += [f"its parts: {' '.join(leads_to)}"] if leads_to else []
+        what += [f"default or chosen parts, each of which can be replaced: {' '.join(leads_to)}"] if leads_to else []
         lines += ["", textwrap.fill(f"--{part.name or part.kind} {part.word}: {'; '.join(what)}", _WIDTH)]
         for name, option in part.options.items():
             said = described.get(name, "").replace("``", "").replace("None", "null")

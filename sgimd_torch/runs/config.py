@@ -3,7 +3,7 @@
 Defaults are those of the library, so a run with one changed option is an ablation.
     config = Config(algorithm="sagg-riac", parts={"goals": "grid", "goals.window": 12}); config["search.noise"]
 Options of a part are the keywords of its signature (`sgimd_torch.catalogue.options`). A keyword whose default is in the
-catalogue is a choice of another part.
+catalogue chooses another part.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ from typing import Any, Final, Self
 from sgimd_torch.catalogue import ROD, TAUGHT_BY, WORDS, did_you_mean, load_word, named, place_of
 from sgimd_torch.catalogue.options import Option, options_of, parameters_of
 
-OWN: Final = "own"  # the inverse model of the run itself
+OWN: Final = "own"  # name of the run's own inverse model
 FILES: Final = ("benchmark", "demonstrations")  # options that name a file
 THREADS: Final = "environment.threads"
-PLACE: Final = ("seed", "out", "name", "board", THREADS)  # they do not change the learner
-EVALUATES: Final = ("evaluated_by", "repeats", "floor_at", "benchmark_crc32")  # equal in all evaluations of a run
+PLACE: Final = ("seed", "out", "name", "board", THREADS)  # seed, place, display and speed of a run
+EVALUATES: Final = ("evaluated_by", "repeats", "floor_at", "benchmark_crc32")  # equal options of all evaluations
 MAY_CHANGE: Final = (
     *("movements", "out", "name", "board", "failures", "evaluate_at"),
     *(*FILES, *EVALUATES, THREADS),
 )
-"""Options that may change when a run is resumed: they only affect its length, place or display. Files are compared by
-their recorded checksums; the benchmark may be another one."""
-ALGORITHM: Final = ""  # the name of this part; its options have no prefix
+"""Options that may change when a run is resumed, as they do not affect the learner. Files are compared by their
+checksums: the demonstrations must be equal, the benchmark may be another one."""
+ALGORITHM: Final = ""  # name of the part "algorithm" of a run: its options have no prefix
 
 
 @dataclass(frozen=True)
@@ -39,21 +39,22 @@ class Config:
     """One run.
 
     Args:
-        algorithm: learner, see below; for a robot without demonstrations the default is practice.
-        seed: number from which all random streams come; one seed gives one run.
+        algorithm: learner, see below; the default is practice for a robot without demonstrations.
+        seed: random seed; two runs with equal options and an equal seed are equal.
         movements: number of movements, rests included.
-        teachers: words of teachers for an algorithm that asks; null for one teacher with all demonstrations.
-        out: folder for runs; this run goes to OUT/NAME/seed-003.
-        name: name of the variant, NAME in the path of the run; null for the name of the algorithm.
-        board: true writes curves and pictures for TensorBoard into the run's folder.
-        evaluate_at: numbers of movements after which to evaluate, besides the end; null for 250, 500 and every 1000; []
-            for no evaluation.
-        evaluated_by: inverse models for evaluations: own for the run's, then words of --inverse.
-        repeats: number of extra executions of each evaluation movement, to measure the noise; 0 for none.
-        floor_at: evaluations, by number of movements, that measure the noise, in four times the time; null for all.
-        benchmark: file of goals for evaluations; null for the environment's own goals.
-        demonstrations: file of recorded demonstrations; null for the environment's own.
-        failures: number of failed movements in a row that stops the run; null for ten.
+        teachers: names of teachers for an algorithm that asks; null: one teacher with all demonstrations.
+        out: folder for runs; a run with seed 3 goes to OUT/NAME/seed-003.
+        name: name of the variant, NAME in the path of the run; null: the name of the algorithm.
+        board: true to write curves and pictures for TensorBoard into the run's folder.
+        evaluate_at: numbers of movements after which to evaluate, besides the end; null: 250, 500 and every 1000; []:
+            never, not even at the end.
+        evaluated_by: inverse models to evaluate: first own, which is the run's, then names for --inverse.
+        repeats: number of extra executions of each evaluation movement, to measure the noise; 0: no measurement.
+        floor_at: numbers of movements at which the evaluation also measures the noise, which takes four times as long;
+            null: every evaluation.
+        benchmark: file of goals for evaluations; null: the environment's own goals.
+        demonstrations: file of recorded demonstrations; null: the environment's own demonstrations.
+        failures: number of failed movements in a row that stops the run; null: 10.
         parts: parts and their options by name, such as "goals" or "goals.window"; defaults may be left out.
 
     Raises:
@@ -95,7 +96,7 @@ class Config:
         for name in ("evaluated_by", "teachers"):
             words = getattr(self, name)
             if words is not None and (not words or len({*words}) < len(words)):
-                raise ValueError(f"{name} must name at least one, and each once, got {','.join(words)}")
+                raise ValueError(f"{name} must have at least one name, and each only once, got {','.join(words)}")
         if self.evaluated_by[0] != OWN:
             raise ValueError(f"evaluated_by must begin with {OWN}, got {','.join(self.evaluated_by)}")
         for kind, words in (("inverse", self.evaluated_by[1:]), ("teachers", self.teachers or ())):
@@ -127,8 +128,7 @@ class Config:
 
     @property
     def teaching(self) -> str:
-        """How the learner is taught: by "teachers" that it asks, by a "teacher" who shows something, or "" for
-        alone."""
+        """How the learner is taught: by "teachers" (it asks them), by a "teacher" (who is not asked), or "" (alone)."""
         return teaching(self.algorithm, dict(self.parts), asks=self.teachers is not None)
 
     @cached_property
@@ -153,7 +153,7 @@ class Config:
 
     @classmethod
     def from_settings(cls, settings: Mapping[str, Any]) -> Self:
-        """The run with these ``settings``; missing ones have their defaults.
+        """The run with these ``settings``; missing settings have their defaults.
 
         Raises:
             ValueError: a value is out of its range, or an option does not exist.
@@ -190,9 +190,9 @@ class Config:
         return sorted({movements for movements in wanted if movements < self.movements} | {self.movements})
 
     def _refused(self, name: str) -> ValueError:
-        """The error for a name that this run does not have; it names the parts that have it."""
+        """The error for an option that this run does not have; the message names parts that have it."""
         owner, _, last = name.rpartition(".")
-        if owner not in self.chosen:  # its part does not belong to this run, either
+        if owner not in self.chosen:  # the part with this option does not belong to this run, either
             head = owner.partition(".")[0]
             owner, last = ALGORITHM, head if any(_with(kind, head) for kind in WORDS) else last
         part, having = self.chosen[owner], []
@@ -208,7 +208,7 @@ RUN: Final = tuple(each.name for each in fields(Config) if each.name != "parts")
 """Options of every run."""
 FLAGS: Final = {
     "resume": "flag: go on with a stopped or killed run, or lengthen a finished one.",
-    "accept_loss": "flag, with --resume: go on even if the record has lost movements; a copy of it is kept.",
+    "accept_loss": "flag, with --resume: go on from the damage in a damaged record; a copy of the file is kept.",
 }
 
 
@@ -218,10 +218,10 @@ class Part:
 
     Args:
         name: name of the part in the run, such as "goals" or "goals.progress".
-        kind: kind of the catalogue.
-        word: word of the chosen part.
-        standard: word of the default.
-        make: constructor, with the keywords that its word fixes.
+        kind: kind of the part, such as "goals" or "progress".
+        word: name of the chosen part in the catalogue.
+        standard: name of the default part in the catalogue.
+        make: constructor, with the keywords that the name in the catalogue fixes.
         options: keywords that a run can set.
         choices: keywords that choose other parts, with the kind and the default of each.
     """
@@ -248,9 +248,9 @@ def part_of(name: str, kind: str, word: str, default: Callable[..., Any] | str =
 
     Args:
         name: name of the part in the run.
-        kind: kind of the catalogue.
-        word: word of that kind, or package.module:attribute; "" for the default.
-        default: word of the default, or the default of the keyword that chooses this part, which may fix options.
+        kind: kind of the part.
+        word: name in the catalogue, or package.module:attribute; "": the default part.
+        default: name of the default part, or its constructor, which may fix options.
 
     Raises:
         ValueError: there is no such part, or a package that it needs is not installed.
@@ -258,13 +258,13 @@ def part_of(name: str, kind: str, word: str, default: Callable[..., Any] | str =
     found = named(default) if callable(default) else None
     standard = found[1] if found else default if isinstance(default, str) else ""
     word = word or standard
-    return (_read if ":" in word else _READ)(name, kind, word, standard, default)  # a user's file may change
+    return (_read if ":" in word else _READ)(name, kind, word, standard, default)  # no cache for a user's file
 
 
 def _read(name: str, kind: str, word: str, standard: str, default: Callable[..., Any] | str) -> Part:
     own = callable(default) and word == standard
     make = default if callable(default) and own else load_word(kind, word)
-    fixed = make.keywords if isinstance(make, partial) and not own else {}  # fixed by its word
+    fixed = make.keywords if isinstance(make, partial) and not own else {}  # keywords that its name fixes
     free = {each: known.default for each, known in parameters_of(make).items() if each not in fixed}
     options = {each: known for each, known in options_of(make).items() if each in free}
     leads_to = {each: (named(value), value) for each, value in free.items() if each not in options and callable(value)}
@@ -276,8 +276,7 @@ _READ: Final = cache(_read)
 
 
 def teaching(algorithm: str, given: Mapping[str, Any], *, asks: bool) -> str:
-    """How a learner is taught, by the catalogue; for a user's own learner, by the teacher or teachers that were
-    given."""
+    """How a learner is taught: as the catalogue says, or, for a user's own learner, by whoever was given."""
     if ":" in algorithm:
         return "teachers" if asks else "teacher" if "teacher" in given else ""
     by = TAUGHT_BY.get(algorithm, "")
@@ -288,9 +287,9 @@ def chosen(algorithm: str, given: Mapping[str, Any], *, asks: bool = False) -> d
     """Parts of a run by name: environment, algorithm, and the parts that these choose.
 
     Args:
-        algorithm: word of the learner.
+        algorithm: name of the learner.
         given: choices by name; other names are ignored.
-        asks: true if the run has teachers to ask.
+        asks: whether the run has teachers to ask.
 
     Raises:
         ValueError: see ``part_of``.
@@ -310,7 +309,7 @@ def chosen(algorithm: str, given: Mapping[str, Any], *, asks: bool = False) -> d
 
 
 def _with(kind: str, name: str) -> list[str]:
-    """Words of a kind whose parts have an option, or a choice, of this name."""
+    """Names of the parts of a kind that have an option or a choice with this ``name``."""
     found = []
     for word in WORDS.get(kind, {}) if kind != "command" else ():
         with suppress(ValueError):  # parts that are not installed are left out
@@ -321,15 +320,14 @@ def _with(kind: str, name: str) -> list[str]:
 
 
 def code_of(settings: Mapping[str, Any]) -> list[str]:
-    """Places ``package.module:attribute`` of a user's code that ``settings`` name."""
+    """Places ``package.module:attribute`` in ``settings`` that are a user's own code."""
     values = [value for name, value in settings.items() if name not in (*PLACE, *FILES)]
     words = [word for value in values for word in (value if isinstance(value, list) else [value])]
     return sorted({w for w in words if isinstance(w, str) and ":" in w and not w.startswith("sgimd_torch.")})
 
 
 def words(config: Config) -> list[str]:
-    """Command line of ``sgimd run`` for a run: ``--dashed-name=value`` for each option that differs from its
-    default."""
+    """Arguments of ``sgimd run`` for a run: ``--dashed-name=value`` for the algorithm and each changed option."""
     standard = {each.name: each.default for each in fields(Config)}
     own = [
         (name, getattr(config, name)) for name in RUN if getattr(config, name) != standard[name] or name == "algorithm"
@@ -348,7 +346,7 @@ def plain(value: Any) -> Any:
 
 
 def typed(value: Any) -> str:
-    """Value of an option as it is typed."""
+    """Value of an option as a user types it."""
     if isinstance(value, tuple):
         return ",".join(map(typed, value)) or "[]"
     return json.dumps(value) if value is None or isinstance(value, bool) else str(value)

@@ -1,4 +1,4 @@
-"""Opens the record of a run: refuses another run, and keeps what is undamaged.
+"""Open the record of a run: refuse a record of another run, and keep the undamaged part.
 
 record, notes = open_run(build(config), resume=True, accept_loss=False)
 A run is the file ``run.sqlite`` in OUT/NAME/seed-003; ``docs/runs.md`` explains its tables.
@@ -23,7 +23,7 @@ from sgimd_torch.runs.config import EVALUATES, MAY_CHANGE, Config, code_of, word
 
 FILE: Final = "run.sqlite"
 LIBRARIES: Final = ("numpy", "scipy", "faiss-cpu", "mujoco")
-FORWARD: Final = ("torch", "lightning", "safetensors")  # used by a forward model
+FORWARD: Final = ("torch", "lightning", "safetensors")  # libraries of a forward model
 EVALUATED: Final = ("evaluations", "errors", "regions")  # tables that each evaluation adds to
 OF_MODEL: Final = ("predictions", "refreshes")  # tables that a forward model adds to
 
@@ -33,13 +33,13 @@ def open_run(parts: RunParts, *, resume: bool, accept_loss: bool = False) -> tup
 
     Args:
         parts: parts of the run; its configuration has the directory.
-        resume: whether to continue an existing run; False refuses it.
+        resume: whether to continue an existing run; if False, an existing run is an error.
         accept_loss: whether to continue a damaged run; a copy is kept, and everything from the damage on is repeated.
 
     Raises:
-        RunError: there is a run and ``resume`` is False; it has other settings, or more movements; it is damaged and
-            the loss is not accepted; the file is no record; another process writes it.
-        OSError: it cannot be written.
+        RunError: there is a run and ``resume`` is False; the run has other settings, or more movements; it is damaged
+            and the loss is not accepted; the file is no record; another process is writing it.
+        OSError: the file cannot be written.
     """
     config, robot = parts.config, parts.environment
     spaces = {"contexts": robot.contexts, "policies": robot.policies, "outcomes": robot.outcomes}
@@ -56,7 +56,7 @@ def open_run(parts: RunParts, *, resume: bool, accept_loss: bool = False) -> tup
     make_folder(config.directory)
     if not holds_run(path):
         if resume:
-            notes.append(f"{path.parent} holds no run yet: it starts from the beginning")
+            notes.append(f"{path.parent} holds no run yet: the run starts from the beginning")
         record = Record.make(path, dims, about)
     elif resume:
         record = _reopened(path, about, dims, config, accept_loss, notes)
@@ -76,13 +76,13 @@ def _reopened(
 ) -> Record:
     """The record at ``path``, open for writing, undamaged, without the tables that the replay fills again.
 
-    ``about`` describes the run now; the versions of its earlier parts are added. Messages are added to ``notes``.
+    ``about`` describes the run now, and gets the versions of earlier parts of the run. ``notes`` gets messages.
     """
     record = Record(path, write=True)
     try:
         differ = _refuse_other(record, about, dims)
         if damage := record.check():
-            record.close()  # a copy made while it is open would give up its lock
+            record.close()  # copying an open record would release its lock
             record = _salvaged(path, "; ".join(damage.values()), accept_loss, notes)
         if record.movements > config.movements:
             raise RunError(f"{path} has {record.movements} movements already, {config.movements} were requested")
@@ -98,21 +98,21 @@ def _reopened(
 
 
 def _salvaged(path: Path, damage: str, accept_loss: bool, notes: list[str]) -> Record:
-    """The damaged record at ``path``, cut before the damage and open for writing; a copy of it is kept."""
+    """The damaged record at ``path``, cut before the damage and open for writing; a copy of the old file is kept."""
     if not accept_loss:
         raise RunError(
-            f"{damage} Restore it from a backup, or repeat what is damaged with --resume --accept-loss; a copy is kept"
+            f"{damage} Restore the record, or repeat its damaged part with --resume --accept-loss, which keeps a copy"
         )
     copy = next(place for k in count() if not (place := path.with_name(f"run.lost-{k}.sqlite")).exists())
     shutil.copy2(path, copy)
     record = Record(path, write=True).rewrite()
-    notes.append(f"{damage} It is kept as {copy}")
+    notes.append(f"{damage} The damaged record is kept as {copy}")
     notes.append(f"{record.movements} movements of {path} are kept, everything else is repeated")
     return record
 
 
 def _forget_evaluations(record: Record, config: Config, *, anew: bool, notes: list[str]) -> None:
-    """Drop evaluations that were not requested, and those after the first gap; with ``anew``, all of them."""
+    """Drop evaluations that are not requested, and all after the first missing one; with ``anew``, drop all."""
     made = list(dict.fromkeys(movements for movements, *_ in record.rows("evaluations")))
     wanted = [movements for movements in made if movements in config.evaluations and not anew]
     pairs = takewhile(lambda pair: pair[0] == pair[1], zip(wanted, config.evaluations, strict=False))
@@ -124,16 +124,16 @@ def _forget_evaluations(record: Record, config: Config, *, anew: bool, notes: li
 
 
 def _refuse_other(record: Record, about: dict[str, Any], dims: Dims) -> set[str]:
-    """Refuse a record of another run; the names of the settings that differ and are allowed to."""
+    """Refuse a record of another run; return the names of the settings that differ and are allowed to differ."""
     if "settings" not in record.about:
-        raise RunError(f"{record.path} is a life that Learner.save wrote, not a run; choose another --out")
+        raise RunError(f"{record.path} is a life that save_life wrote, not a run; choose another --out")
     before, now = ({**each["settings"], **each["files"]} for each in (record.about, about))
     differ = [name for name in dict.fromkeys((*now, *before)) if before.get(name) != now.get(name)]
     if changed := [name for name in differ if name not in MAY_CHANGE]:
         raise RunError(
             f"{record.path.parent} belongs to another configuration: "
             f"{'; '.join(f'{name} was {before.get(name)}, now {now.get(name)}' for name in changed)}. "
-            "Resume it with its own, or give the new variant another --name or --out"
+            "Resume it with its own settings, or give the new variant another --name or --out"
         )
     if record.dims != dims:
         was = f"dims {record.dims} of context, theta and outcome, the robot now has {dims}"
@@ -142,7 +142,7 @@ def _refuse_other(record: Record, about: dict[str, Any], dims: Dims) -> set[str]
 
 
 def _with_earlier(old: dict[str, Any], now: dict[str, Any], notes: list[str]) -> dict[str, Any]:
-    """The versions ``now``, and under "before" those of earlier parts of the run where they differ."""
+    """The versions ``now``, and under "before" the different versions of earlier parts of the run."""
     earlier = old.pop("before", [])
     differ = [name for name, version in now.items() if old.get(name) != version]
     if differ:
@@ -153,7 +153,7 @@ def _with_earlier(old: dict[str, Any], now: dict[str, Any], notes: list[str]) ->
 
 
 def sources(config: Config) -> dict[str, str]:
-    """For each part that is the user's own code, its file and checksum, such as "toss.py, crc32 8f0a1b2c"."""
+    """File and checksum of each part that is the user's own code, such as "toss.py, crc32 8f0a1b2c"."""
     found = {}
     for word in code_of(config.settings):
         spec = importlib.util.find_spec(word.partition(":")[0])

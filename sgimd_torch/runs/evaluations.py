@@ -21,17 +21,17 @@ from sgimd_torch.record import Record
 from sgimd_torch.runs.config import OWN, Config
 
 ByInverse = Mapping[str, Evaluation]
-"""The evaluation of each inverse model, by its word, the run's own first."""
+"""The evaluation of each inverse model, by name, the run's own inverse model first."""
 
 
 @dataclass
 class Evaluations:
-    """All evaluations of a run, by number of movements before them.
+    """All evaluations of a run, by the number of movements before each one.
 
     Args:
         config, environment, benchmark, learner: parts of the run.
-        inverses: inverse models to evaluate, by word, the run's own first; they read the learner's memory.
-        record: record of the run; it does not hold the movements of an evaluation.
+        inverses: inverse models to evaluate, by name, the run's own first; all of them read the learner's memory.
+        record: record of the run; movements of an evaluation are not recorded.
     """
 
     config: Config
@@ -52,13 +52,13 @@ class Evaluations:
 
     @property
     def last(self) -> Evaluation | None:
-        """The last evaluation of the run's own inverse model, None before the first."""
+        """The last evaluation of the run's own inverse model, None if there is none."""
         return self._found[max(self._found)][OWN] if self._found else None
 
     def after(self, movements: int) -> ByInverse | None:
-        """The evaluation recorded after so many movements, else a new one of the learner as it is now.
+        """The recorded evaluation after this number of movements, else a new evaluation of the present learner.
 
-        None while memory is empty: the observing learner remembers nothing before its first demonstration.
+        The result is None while memory is empty: the observing learner remembers nothing before a demonstration.
         """
         if movements not in self._found and len(self.learner.memory):
             self._found[movements] = self._evaluate(movements)
@@ -68,7 +68,7 @@ class Evaluations:
     def _evaluate(self, movements: int) -> ByInverse:
         """Evaluate with streams that the run does not use.
 
-        The noise is the same for all inverse models, goal by goal; its floor is measured for the run's own.
+        At each goal the noise is the same for all inverse models. The noise floor is measured for the run's own model.
         """
         config, (own, *others) = self.config, self.inverses
         repeats = config.repeats if config.floor_at is None or movements in config.floor_at else 0

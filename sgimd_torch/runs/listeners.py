@@ -1,4 +1,4 @@
-"""Listeners of a run, which are told its movements and evaluations; and a clock for its parts."""
+"""Listeners, which are told the movements and evaluations of a run, and a clock for the parts of a run."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from sgimd_torch.spaces import Episode
 
 
 class Listener(Protocol):
-    """Listener of a run. A resumed run tells it everything again, from its record.
+    """Listener of a run. A resumed run first tells its listeners everything that is in the record.
 
     A listener overrides the methods that it needs.
     """
@@ -22,7 +22,7 @@ class Listener(Protocol):
         return
 
     def evaluated(self, movements: int, found: Mapping[str, Evaluation]) -> None:
-        """The learner was evaluated after this number of movements; ``found`` is by word of the inverse model."""
+        """The learner was evaluated after this number of movements; ``found`` is by name of the inverse model."""
         return
 
     def begin(self) -> None:
@@ -43,7 +43,7 @@ class Listener(Protocol):
 
 
 class Seconds:
-    """Seconds spent so far, by part of the run. A resumed run adds to ``before``, except for replayed parts."""
+    """Seconds spent so far, by part of the run. Physics and evaluation, which are not replayed, begin at ``before``."""
 
     def __init__(self, before: Mapping[str, float]) -> None:
         self._spent = {part: before.get(f"seconds_{part}", 0.0) for part in ("physics", "evaluation")} | {
@@ -60,7 +60,7 @@ class Seconds:
             self._spend(part, begun)
 
     def of_physics(self, execute: Callable[..., Any]) -> Callable[..., Any]:
-        """``execute``, timed as physics; its time does not count as the learner's."""
+        """``execute``, timed as physics; this time does not count as the learner's."""
 
         def timed(*arguments: Any) -> Any:
             begun = time.perf_counter()
@@ -73,7 +73,7 @@ class Seconds:
         return timed
 
     def of_learner(self, episodes: Iterator[Episode]) -> Iterator[Episode]:
-        """``episodes``, timed as the learner's: asking, telling, watching and the teacher's choice."""
+        """``episodes``, timed as part of the learner: asking, telling, watching and the teacher's choice."""
         while True:
             begun = time.perf_counter()
             episode = next(episodes, None)

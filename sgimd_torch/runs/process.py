@@ -35,15 +35,15 @@ class Failed(RuntimeError):
 
 
 def command(main: Callable[[Sequence[str]], int], argv: Sequence[str] | None = None) -> int:
-    """Run ``main`` on the words of the command line; handle signals, exceptions and closed standard streams.
+    """Run ``main`` with the arguments of the command line; handle signals, exceptions and closed standard streams.
 
     Returns:
-        The exit code; 2, a wrong request, for a ``ValueError``, an error of a file and a missing package.
+        The exit code. It is 2, a wrong request, after a ``ValueError``, an error of a file or a missing package.
     """
-    sys.stdout, sys.stderr = sys.stdout or _sink(), sys.stderr or _sink()  # Python's is None if it was closed
+    sys.stdout, sys.stderr = sys.stdout or _sink(), sys.stderr or _sink()  # a closed stream is None
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")  # for names that the locale cannot write
+            stream.reconfigure(errors="backslashreplace")  # the locale may lack signs of a name
     code, lost = 0, None
     with _on_signals(_stop):
         try:
@@ -64,15 +64,15 @@ def command(main: Callable[[Sequence[str]], int], argv: Sequence[str] | None = N
             code = 2
             if error.filename is not None:
                 say(f"error: {error.filename} cannot be read or written: {error.strerror}")
-            elif error.errno is None:  # ours, with a complete message
+            elif error.errno is None:  # an error of this library, with a complete message
                 say(f"error: {error}")
-            else:  # from stdout, or from the disk
+            else:  # an error of stdout or of the disk
                 lost = error
     for stream in (sys.stdout, sys.stderr):
         try:
             stream.flush()
         except OSError as error:
-            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())  # else the interpreter complains when it exits
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())  # the interpreter would complain at exit
             lost = error if stream is sys.stdout else lost
     if lost is not None:
         if isinstance(lost, BrokenPipeError):
@@ -87,13 +87,13 @@ def _sink() -> TextIO:
 
 
 def loading() -> AbstractContextManager[None]:
-    """A block that imports libraries; a signal in it ends the process, as imports cannot be interrupted cleanly."""
+    """A block for imports. A signal during the block ends the process, as imports cannot be interrupted cleanly."""
     return _on_signals(_end)
 
 
 @contextmanager
 def _on_signals(handler: Callable[[int, FrameType | None], object]) -> Iterator[None]:
-    """In this block ``handler`` gets SIGINT and SIGTERM; only the main thread may set it, other threads do nothing."""
+    """A block in which ``handler`` gets SIGINT and SIGTERM. In another thread than the main one nothing changes."""
     heard = SIGNALS if threading.current_thread() is threading.main_thread() else ()
     before = {signum: signal.signal(signum, handler) for signum in heard}
     try:
@@ -112,10 +112,10 @@ def _stop(signum: int, frame: FrameType | None) -> None:
 
 
 class Stopping:
-    """In this block the first SIGINT or SIGTERM is only noted; the second raises ``Stopped``. A context manager.
+    """A context manager. In its block the first SIGINT or SIGTERM is only noted; the second one raises ``Stopped``.
 
     Attributes:
-        heard: number of the first signal, 0 before it.
+        heard: number of the first signal; 0 if there was none.
     """
 
     def __init__(self) -> None:
@@ -133,17 +133,17 @@ class Stopping:
         if self.heard:
             raise Stopped(signum)
         self.heard = signum
-        with suppress(OSError):  # without say(): the signal may have interrupted a print
+        with suppress(OSError):  # say() could print into a print that the signal has interrupted
             os.write(2, b"\nstopping after this movement; Ctrl-C once more stops at once\n")
 
 
 class Progress:
-    """A progress bar on a terminal, a plain line now and then elsewhere; a context manager.
+    """A context manager: a progress bar on a terminal; elsewhere, a plain line now and then.
 
     Args:
         title: name of the work in progress.
         total: number of movements in all; the attribute may be changed later.
-        done: number of movements made earlier; they do not count for the speed.
+        done: number of movements made earlier; these do not count for the speed.
         every: seconds between two plain lines.
     """
 
@@ -159,8 +159,8 @@ class Progress:
         self._bar.close()
 
     def begin(self, title: str, total: int, done: int = 0) -> None:
-        """Begin another part, with its own speed."""
-        from tqdm import tqdm  # after --help
+        """Begin another part of the work; its speed is measured anew."""
+        from tqdm import tqdm  # imported here so that --help is fast
 
         if self._bar is not None:
             self._bar.close()

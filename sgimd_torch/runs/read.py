@@ -1,4 +1,4 @@
-"""Read runs: the whole record of a run as arrays, the only source of figures, reports and tables.
+"""Read the whole record of a run as arrays. Figures, reports and tables use nothing else.
 
 run = read_run("runs/sgim-d/seed-003"); run.outcomes, run.evaluation["mean_error"]    # docs/runs.md explains the tables
 """
@@ -34,20 +34,20 @@ class Run:
         path: directory of the run.
         config: options by name.
         versions, files, words: entries of the table ``about``, see docs/runs.md.
-        robot: class of the environment.
+        robot: name of the environment's class.
         spaces: "contexts", "policies" and "outcomes".
-        summary: "movements", how many "failed", whether it is "finished", and seconds.
+        summary: number of "movements", number that "failed", whether it is "finished", seconds.
         index: ``(n,)`` numbers of the movements.
-        origin: ``(n,)`` proposer of each movement, such as "local"; "" at rest.
-        demonstration: ``(n,)`` row in ``demonstrations`` of the one shown just before each movement, -1 for none.
-        contexts, thetas, goals, outcomes: ``(n, dim)``, NaN for none; a failed movement has a theta and no outcome.
-        answers: columns of the evaluations of each inverse model, by its word.
-        errors: columns of all goals at all evaluations.
+        origin: ``(n,)`` proposer of each movement, such as "local"; "" for a rest.
+        demonstration: ``(n,)`` row, in ``demonstrations``, of the demonstration just before each movement; -1: none.
+        contexts, thetas, goals, outcomes: ``(n, dim)``, NaN: none; a failed movement has a theta and no outcome.
+        answers: columns of the evaluations of each inverse model, by name.
+        errors: columns of the errors at all goals in all evaluations.
         benchmark: ``(n_goals, outcome_dim)`` goals of evaluation.
         demonstrations: each demonstration that was shown, once.
         regions: columns of the goal model's regions at all evaluations, None for a goal model without regions.
-        predictions, refreshes: columns of a forward model, None without one.
-        requests: columns of the requests to teachers, None without any: ``index`` of the next movement, ``teacher``,
+        predictions, refreshes: columns of a forward model, None for a run without a forward model.
+        requests: columns of the requests to teachers (None: no requests): ``index`` of the next movement, ``teacher``,
             ``strategy``, ``reply``, ``shown`` (row of the demonstration, -1 for none), ``wanted_0`` ... (in C x T).
     """
 
@@ -81,7 +81,7 @@ class Run:
         return self.answers[OWN]
 
     def at(self, movements: int, column: str = "mean_error", answer: str = OWN) -> float:
-        """One number of an evaluation, NaN if there is none."""
+        """One number of an evaluation, NaN if there is no such evaluation."""
         evaluation = self.answers.get(answer)
         if evaluation is None:
             return float("nan")
@@ -95,7 +95,7 @@ class Run:
         return self.errors["error"][now], np.array(contexts).T.reshape(int(now.sum()), -1)
 
     def chosen_goals(self) -> Array:
-        """``(n, outcome_dim)`` goals that the learner chose, in order, once each even if pursued by several movements.
+        """``(n, outcome_dim)`` goals that the learner chose, in order; a goal of several movements is listed once.
 
         Goals of imitation are left out, as the teacher chose them.
         """
@@ -119,17 +119,17 @@ def read_run(path: str | os.PathLike[str]) -> Run:
     with Record(path / FILE) as record:
         about = record.about
         if "settings" not in about:
-            raise RunError(f"{path / FILE} is a life that Learner.save wrote, not a run")
+            raise RunError(f"{path / FILE} is a life that save_life wrote, not a run")
         settings = about["settings"]
         seed = re.fullmatch(r"seed-(\d+)", path.resolve().name)
         if seed is not None and int(seed[1]) != settings["seed"]:
-            raise RunError(f"{path} holds a run of seed {settings['seed']}; was it copied from another one?")
+            raise RunError(f"{path} holds a run of seed {settings['seed']}; was it copied from another run?")
         shown = record.demonstrations()
         arrays, requests, failed = _lived(record)
         found: dict[str, Columns] = {table: _columns(record, table) for table in DERIVED}
         n = record.movements
     evaluated = found["evaluations"]["movements"]
-    nothing = not shown and not np.isfinite(arrays["outcomes"]).any()  # in memory, so that no evaluation is possible
+    nothing = not shown and not np.isfinite(arrays["outcomes"]).any()  # an empty memory, which cannot be evaluated
     finished = n == settings["movements"] and (settings["evaluate_at"] == [] or n in evaluated or nothing)
     return Run(
         path=path,
@@ -157,7 +157,7 @@ def _if_any(columns: Columns) -> Columns | None:
 
 
 def _lived(record: Record) -> tuple[dict[str, Any], Columns | None, int]:
-    """Movements as arrays; requests, None if there were none; number of failed movements."""
+    """Movements as arrays, requests (None: there were none), and the number of failed movements."""
     c, p, t = record.dims
     origins, shown, cells, requests = list[str](), array("q"), array("d"), list[dict[str, Any]]()
     last, failed = -1, 0
@@ -189,7 +189,7 @@ def _columns(record: Record, table: str) -> Columns:
     return {name: np.array([row[k] for row in rows], dtype=_KINDS[kind]) for k, (name, kind) in enumerate(declared)}
 
 
-_KINDS: Final = {"TEXT": np.str_, "INTEGER": np.int64, "REAL": np.float64}  # NULL is NaN
+_KINDS: Final = {"TEXT": np.str_, "INTEGER": np.int64, "REAL": np.float64}  # NULL becomes NaN
 
 
 def config_of(run: Run, *, trust: bool = False) -> Config:
@@ -197,10 +197,10 @@ def config_of(run: Run, *, trust: bool = False) -> Config:
 
     Args:
         run: result of ``read_run``.
-        trust: whether the user's code that its settings name, ``package.module:attribute``, may be executed.
+        trust: whether to execute the user's code that the settings name, ``package.module:attribute``.
 
     Raises:
-        RunError: its settings name such code and are not trusted, or do not describe a run of this version.
+        RunError: the settings name such code without ``trust``, or do not describe a run of this version.
     """
     code = [] if trust else code_of(run.config)
     if code:
@@ -214,7 +214,7 @@ def config_of(run: Run, *, trust: bool = False) -> Config:
 
 
 def find_runs(place: str | os.PathLike[str]) -> dict[str, list[Path]]:
-    """Run directories by name of their variant, seeds in order.
+    """Run directories by name of the variant, in the order of their seeds.
 
     Args:
         place: directory of a run, folder of a variant, or folder of variants.
@@ -241,7 +241,7 @@ def finished(config: Config) -> bool:
         return bool(run.summary["finished"] and same) and all(
             config[name] is None or run.files.get(f"{name}_crc32") in (None, checksum(config[name])) for name in FILES
         )
-    except (ValueError, OSError):  # another version, or unreadable: resuming the run gives the reason
+    except (ValueError, OSError):  # a run of another version or unreadable; --resume gives the reason
         return False
 
 
@@ -255,7 +255,7 @@ def movements_on_disk(path: Path) -> int:
 
 
 def _by_answer(columns: Columns) -> dict[str, Columns]:
-    """The evaluations of each inverse model, by its word; the run's own is always there."""
+    """The evaluations of each inverse model, by name; the run's own inverse model is always among them."""
     words = columns["answer"]
     return {
         word: {name: values[words == word] for name, values in columns.items() if name != "answer"}

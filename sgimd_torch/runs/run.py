@@ -1,4 +1,4 @@
-"""One run: replay its record, make new movements, evaluate now and then; everything else is a listener.
+"""One run: replay its record, make new movements, evaluate now and then. Listeners do everything else.
 
 print(carry_out(build(Config(seed=3)), stopping, resume=False, accept_loss=False, again="sgimd run --seed 3 --resume"))
 """
@@ -24,8 +24,8 @@ from sgimd_torch.runs.process import Failed, Progress, Stopped, Stopping, say
 from sgimd_torch.session import NoOutcomeError, live, reason_of, run
 from sgimd_torch.spaces import Episode
 
-TOLD: Final = 3  # failed movements with a message each; later ones get one if they fail in a new way
-COMMIT_EVERY: Final = 1.0  # s between two commits; a killed run loses the movements since the last one
+TOLD: Final = 3  # first failures, with a message each; a later failure has a message only if it is of a new kind
+COMMIT_EVERY: Final = 1.0  # s between two commits; a killed run loses the movements since the last commit
 
 
 def carry_out(parts: RunParts, stopping: Stopping, *, resume: bool, accept_loss: bool, again: str) -> str:
@@ -34,13 +34,13 @@ def carry_out(parts: RunParts, stopping: Stopping, *, resume: bool, accept_loss:
     Args:
         parts: parts of the run.
         stopping: object that knows whether a signal has come.
-        resume: true to go on with the run in the directory.
+        resume: true to go on with the run in the folder.
         accept_loss: true to go on even if the record has damaged movements.
         again: command that resumes the run, for messages.
 
     Raises:
         ValueError, OSError: the run cannot begin.
-        Failed: the run failed under way.
+        Failed: the run failed after its beginning.
         Stopped: a signal stopped the run.
     """
     with Life(parts, resume=resume, accept_loss=accept_loss) as life:
@@ -53,7 +53,7 @@ def carry_out(parts: RunParts, stopping: Stopping, *, resume: bool, accept_loss:
             raise RunError(str(error)) from error
         except OSError as error:
             raise Failed(f"{life.record.path} cannot be written: {reason_of(error)}; to go on: {again}") from error
-        except (Exception, SystemExit) as error:  # raised by a part, or by too many failed movements
+        except (Exception, SystemExit) as error:  # an error of a part, or too many failed movements
             raised = error.__cause__ if isinstance(error, NoOutcomeError) and error.__cause__ else error
             if not isinstance(raised, SimulationError):
                 say("".join(traceback.format_exception(raised)).rstrip())
@@ -63,7 +63,7 @@ def carry_out(parts: RunParts, stopping: Stopping, *, resume: bool, accept_loss:
 
 
 class Life:
-    """A run under way. Each movement is recorded first, then the listeners are told, then the learner may be evaluated.
+    """A run under way. Each movement is recorded, then told to the listeners; then there may be an evaluation.
 
     It is a context manager. Leaving it writes the last movements to the disk, except after Ctrl-C.
 
@@ -71,8 +71,8 @@ class Life:
         parts, resume, accept_loss: arguments of ``carry_out``.
 
     Attributes:
-        record: record of the run, written from the end of the replay on.
-        movements, recorded, failed: numbers of movements made so far, recorded before, and failed.
+        record: record of the run; new movements are written to it after the replay.
+        movements, recorded, failed: number of movements so far, number recorded earlier, and number that failed.
 
     Raises:
         RunError, OSError: see ``open_run``.
@@ -88,7 +88,7 @@ class Life:
         self.evaluations = Evaluations(*judged, self.record)
         self.listeners: list[Listener] = [each.listener(self) for each in parts.learner.problem.trained]
         if parts.config.board:
-            from sgimd_torch.board.listener import BoardListener  # most runs have no board
+            from sgimd_torch.board.listener import BoardListener  # loaded here, as most runs have no board
 
             board = BoardListener(parts.config.directory, parts, self.seconds.summary, self._curves)
             self.listeners.append(board)
@@ -101,7 +101,7 @@ class Life:
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         broken_off = kind is not None and issubclass(kind, KeyboardInterrupt)
-        with suppress(*([] if kind is None else [OSError])):  # on a full disk, the first error is raised
+        with suppress(*([] if kind is None else [OSError])):  # a full disk: the first error is raised
             self.close(keep=not broken_off)
 
     def close(self, *, keep: bool = True) -> None:
@@ -134,7 +134,7 @@ class Life:
         return f"{self.parts.config.directory}: {self.movements} movements{failed}, {found}"
 
     def go_on(self, stopping: Stopping) -> None:
-        """Make all movements, or stop after the one during which ``stopping`` has heard a signal."""
+        """Make all movements, or stop after the movement during which ``stopping`` has heard a signal."""
         total, title = self.parts.config.movements, self.parts.config.title
         unit = self.parts.environment.outcomes.amount
         with Progress("replaying" if self.recorded else title, self.recorded or total) as progress:

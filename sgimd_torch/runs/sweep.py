@@ -61,7 +61,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Carry out all unfinished runs; the exit code, 1 if runs failed."""
+    """Carry out all unfinished runs; return the exit code, which is 1 if runs failed."""
     options, rest = parser().parse_known_args(argv)
     variants, flags = variants_of(options.vary, rest)
     configs = [replace(variant, seed=seed) for seed in options.seeds for variant in variants]
@@ -69,7 +69,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def carry_out(whole: Sequence[Config], options: argparse.Namespace, flags: Sequence[str], out: Path) -> int:
-    """Carry out the unfinished runs of a study, or list them; the exit code, 1 if runs failed.
+    """Carry out the unfinished runs of a study, or list them; return the exit code, which is 1 if runs failed.
 
     Args:
         whole: all runs of the study.
@@ -89,9 +89,9 @@ def carry_out(whole: Sequence[Config], options: argparse.Namespace, flags: Seque
     if options.dry_run or not left:
         return 0
     with loading():
-        from sgimd_torch.runs.build import build  # after --help
+        from sgimd_torch.runs.build import build  # imported here so that --help is fast
     for config in {each.directory.parent: each for each in left}.values():
-        build(config)  # refuses wrong options before any run starts
+        build(config)  # wrong options raise an error before any run starts
     with engine_of(options, left) as submit:
         make_folder(out)
         failures = sweep(left, submit, flags=flags)
@@ -106,7 +106,7 @@ def add_vary(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="OPTION=VALUE,VALUE",
-        help="option of sgimd run and its values; brackets make a list one value: floor-at=[1000],[1000,5000]",
+        help="option of sgimd run and its values; a list in brackets is one value, as in floor-at=[1000],[1000,5000]",
     )
 
 
@@ -116,9 +116,9 @@ def add_options(parser: argparse.ArgumentParser, *, seeds: str | None, default: 
     Args:
         parser: parser to extend.
         seeds: seeds if --seeds is not given, or None.
-        default: words for these seeds in the help text.
+        default: description of these seeds in the help text.
     """
-    parser.add_argument("--seeds", type=_seeds, default=seeds, help=f"5, 0-19 or 0,3,7-9 (default: {default})")
+    parser.add_argument("--seeds", type=_seeds, default=seeds, help=f"seeds: 5, 0-19 or 0,3,7-9 (default: {default})")
     parser.add_argument("--processes", type=_count, help="number of runs at a time (default: one for each core)")
     parser.add_argument("--dry-run", action="store_true", help="list unfinished runs without starting them")
 
@@ -136,17 +136,17 @@ def add_engines(parser: argparse.ArgumentParser) -> None:
         "--engine",
         choices=("local", "ray"),
         default="local",
-        help="local: processes of this machine; ray: tasks of a Ray cluster, needs extra ray (default: %(default)s)",
+        help="local: processes of this machine; ray: tasks of a Ray cluster (extra ray) (default: %(default)s)",
     )
     parser.add_argument(
         "--address",
         metavar="HOST:PORT",
-        help="Ray cluster that this machine belongs to, or auto (default: start one here)",
+        help="address of the Ray cluster of this machine; auto: search for it (default: start a cluster here)",
     )
 
 
 def engine_of(options: argparse.Namespace, configs: Sequence[Config]) -> AbstractContextManager[Submit]:
-    """The engine that parsed options of ``add_options`` and ``add_engines`` choose for these runs, not yet started.
+    """The engine that the parsed ``options`` choose for these runs; it is not started yet.
 
     Raises:
         ValueError: the options contradict each other.
@@ -167,7 +167,7 @@ def engine_of(options: argparse.Namespace, configs: Sequence[Config]) -> Abstrac
                 raise ValueError(f"--engine ray sends only files of the working directory; copy {path} there")
     try:
         with loading():
-            from sgimd_torch.runs.engines.on_ray import on_ray  # slow to import
+            from sgimd_torch.runs.engines.on_ray import on_ray  # a slow import
     except ModuleNotFoundError as error:
         hint = "pip install 'sgimd-torch[ray]' installs it"
         raise ImportError(f"--engine ray needs {error.name}, which is not installed; {hint}") from error
@@ -177,9 +177,9 @@ def engine_of(options: argparse.Namespace, configs: Sequence[Config]) -> Abstrac
 
 
 class Shard(NamedTuple):
-    """Part ``k`` of ``n`` of a list, counted from 1; a part is consecutive, so it has nearly all variants.
+    """Part ``k`` (from 1) of ``n`` parts of a list. Runs of a part follow each other, so it has nearly all variants.
 
-    It depends on the list alone, not on which runs are finished. Sizes differ by at most 1.
+    A part depends on the list alone, not on which runs are finished. The sizes of parts differ by at most 1.
     """
 
     k: int
@@ -190,7 +190,7 @@ class Shard(NamedTuple):
         return whole[(self.k - 1) * len(whole) // self.n : self.k * len(whole) // self.n]
 
     def note(self, whole: Sequence[Item]) -> str:
-        """Words for a message; "" for the whole list."""
+        """Text for a message; "" for the whole list."""
         return f", shard {self.k}/{self.n} of {len(whole)} runs" if self.n > 1 else ""
 
 
@@ -210,7 +210,7 @@ def variants_of(varied: Sequence[str], options: Sequence[str]) -> tuple[list[Con
     for word in varied:
         name, _, listed = word.removeprefix("--").partition("=")
         option = dashed(name)
-        choices = re.split(r",(?![^[]*\])", listed)  # except at commas in brackets
+        choices = re.split(r",(?![^[]*\])", listed)  # commas in brackets separate nothing
         if not all([option, *choices]):
             raise ValueError(f"--vary must be like goals=interest-map,uniform, got {word!r}")
         if option in [*values, *given]:

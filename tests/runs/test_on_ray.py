@@ -77,7 +77,7 @@ def test_a_python_that_ray_cannot_start_is_refused(monkeypatch):
     [
         ("nonsense", "no Ray cluster answers at nonsense: .*--address is host:port"),
         ("127.0.0.1:99999", "no Ray cluster answers at 127.0.0.1:99999"),
-        ("127.0.0.1:1", "no Ray cluster answers at 127.0.0.1:1: .*is it running"),
+        ("127.0.0.1:1", "no Ray cluster answers at 127.0.0.1:1: .*is the cluster running"),
     ],
 )
 def test_an_address_that_cannot_be_used_is_refused(address, message):

@@ -95,7 +95,7 @@ def test_what_is_no_run_is_refused(tmp_path, run):
         (tmp_path, "holds no run;"),
         (tmp_path / "nowhere", "holds no run;"),
         (tmp_path / "csv", "holds no run;"),
-        (tmp_path / "old", r"is a life that Learner\.save wrote"),
+        (tmp_path / "old", r"is a life that save_life wrote"),
     ):
         with pytest.raises(RunError, match=message):
             read_run(path)

@@ -200,7 +200,7 @@ def test_what_is_damaged_is_made_again_only_if_the_loss_is_accepted(
     before = files_of(copy)
     assert go(tmp_path, "--resume") == 2
     message = capsys.readouterr().err
-    assert "Restore it" in message
+    assert "Restore the record" in message
     assert "--accept-loss" in message
     assert files_of(copy) == before
     assert go(tmp_path, "--resume", "--accept-loss") == 0

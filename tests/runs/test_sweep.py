@@ -171,7 +171,7 @@ def test_two_runs_with_one_directory_are_refused(tmp_path):
         (1, "error: earlier\nerror: the arm broke", Failed, "the arm broke"),
         (1, "a traceback\nMemoryError", Failed, "MemoryError"),
         (3, "", Failed, "it printed nothing"),
-        (-9, "error: earlier", Failed, "stopped by SIGKILL; the same command continues it"),
+        (-9, "error: earlier", Failed, "stopped by SIGKILL; the same command continues the run"),
     ],
 )
 def test_a_run_that_ends_badly_is_told_by_its_last_words(tmp_path, code, said, error, words):
@@ -206,7 +206,7 @@ def test_a_run_that_is_killed_is_named_and_goes_on_next_time(odd, begun, tmp_pat
     options = ["--seeds", "0-1", "--processes", 1]
     said = said_by(begun(SWEEP, *options, at_20="dies"), 1)
     assert "0 runs ended well, 2 failed" in said
-    assert "random seed 0 failed: stopped by SIGKILL; the same command continues it" in said
+    assert "random seed 0 failed: stopped by SIGKILL; the same command continues the run" in said
     assert re.search(r"random seed 1 failed: \S*seed-001/run.sqlite cannot be read as a record", said)
     assert f"Full log: {tmp_path / 'random/seed-001.log'}" in said
     assert foreign.read_text() == "not a run"

@@ -1,1 +1,1 @@
-"""Engines carry out a list of runs, in processes of this machine or on a cluster; both share ``loop``."""
+"""Engines carry out a list of runs, in processes of this machine or on a cluster; both kinds share ``loop``."""

@@ -26,10 +26,8 @@ from sgimd_torch.runs.config import Config, words
 from sgimd_torch.runs.process import Failed, Progress, say
 from sgimd_torch.runs.read import movements_on_disk
 
-REFRESH: Final = 1.0  # s between two looks at the movements on disk; the end of a run shows at once
-PATIENCE: Final = (
-    20.0  # s that stopped runs have to save their movements; then they are killed, and lose a second at most
-)
+REFRESH: Final = 1.0  # s between two looks at the movements on disk; the end of a run is shown at once
+PATIENCE: Final = 20.0  # s for stopped runs to save their movements; a run killed then loses a second at most
 
 Submit = Callable[[Config, Sequence[str]], Future[None]]
 """(config, flags of ``sgimd run``) -> a future that ends with the run, which is started or resumed. The future raises
@@ -49,10 +47,10 @@ def sweep(
         configs: the runs, each with its own directory.
         submit: submission function of an engine.
         flags: flags of ``sgimd run`` for all runs, besides --resume.
-        on_end: function to call in this thread with each run that ended well; its ValueError or OSError is a failure.
+        on_end: function to call in this thread with each run that ended well; its ValueError or OSError means failure.
 
     Returns:
-        The failures, a sentence each: name of the run, last line of its log, path of the log.
+        A sentence for each failure: name of the run, last line of its log, path of the log.
 
     Raises:
         ValueError: two runs have the same directory.
@@ -76,7 +74,7 @@ def sweep(
                             on_end(config)
                     except (Failed, ValueError, OSError) as error:
                         failures[config] = f"{config.title} failed: {error}"
-                        progress.total -= config.movements - done[config]  # the rest is not made
+                        progress.total -= config.movements - done[config]  # other movements are not made
                 done |= {config: _on_disk(config) for future, config in pending.items() if future.running()}
                 ended = f"{len(configs) - len(pending) - len(failures)} of {len(configs)} runs"
                 progress.show(sum(done.values()), ended + (f", {len(failures)} failed" if failures else ""))
@@ -90,7 +88,7 @@ def sweep(
 def local(processes: int) -> Iterator[Submit]:
     """An engine: at most ``processes`` processes of this machine at a time."""
     running, stopped = set[subprocess.Popen[bytes]](), False
-    starting = Lock()  # so that no run starts after all were stopped
+    starting = Lock()  # a lock: no run starts after all were stopped
 
     def carry_out(config: Config, flags: Sequence[str]) -> None:
         make_folder(config.directory.parent)
@@ -100,14 +98,14 @@ def local(processes: int) -> Iterator[Submit]:
             with starting:
                 if stopped:
                     return
-                # In its own process group: only this process gets Ctrl-C, and passes it on.
+                # The run has its own process group: Ctrl-C reaches only this process, which passes it on.
                 process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log, stderr=log, process_group=0)
                 running.add(process)
             code = process.wait()
         running.discard(process)
         check_end(config, code, log_of(config).read_bytes()[before:])
 
-    # Each thread waits for one process. A pool of processes would fail for all runs if one of them were killed.
+    # Each thread waits for one process. A pool of processes would fail for all runs if one process were killed.
     pool = ThreadPoolExecutor(processes)
     try:
         yield lambda config, flags: pool.submit(carry_out, config, flags)
@@ -151,7 +149,7 @@ def check_end(config: Config, code: int, said: bytes) -> None:
         return
     _, mark, last = ("\n" + said.decode(errors="replace").rstrip()).rpartition("\nerror: ")
     if code < 0:
-        last = f"stopped by {signal.Signals(-code).name}; the same command continues it"
+        last = f"stopped by {signal.Signals(-code).name}; the same command continues the run"
     elif not mark:
         last = last.rpartition("\n")[2] or "it printed nothing"
     raise (ValueError if code == 2 else Failed)(f"{last}\nFull log: {log_of(config)}")

@@ -22,7 +22,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
 
-os.environ["RAY_USAGE_STATS_ENABLED"] = "0"  # read when Ray is imported
+os.environ["RAY_USAGE_STATS_ENABLED"] = "0"  # Ray reads this when it is imported
 
 import ray
 from ray.exceptions import RayError
@@ -33,8 +33,8 @@ from sgimd_torch.runs.directory import FILE
 from sgimd_torch.runs.engines.loop import Submit, check_end, log_of, run_words
 from sgimd_torch.runs.process import SIGNALS, Failed
 
-CONNECT_WITHIN: Final = 10.0  # s
-STORE: Final = 100 * 2**20  # bytes of Ray's object store; its default is a third of the memory
+CONNECT_WITHIN: Final = 10.0  # s, longest wait for the cluster
+STORE: Final = 100 * 2**20  # bytes of Ray's object store, by default a third of the memory
 # A process must not outlive its killed task: prctl(PR_SET_PDEATHSIG, SIGKILL).
 PROGRAM: Final = (
     ("-c", "import ctypes, runpy; ctypes.CDLL(None).prctl(1, 9); runpy.run_module('sgimd_torch', run_name='__main__')")
@@ -44,7 +44,7 @@ PROGRAM: Final = (
 
 
 Ended = tuple[int, bytes, bytes | None]
-"""The result of a task: exit code and output of its process, and the record of the run, None if there is none."""
+"""The result of a task: exit code and output of its process, and the record of the run (None: there is none)."""
 
 
 @contextmanager
@@ -58,7 +58,7 @@ def on_ray(address: str | None, processes: int = 1, *, ships: bool = False, out:
         out: folder that is not sent; files that .gitignore names are not sent, either.
 
     Raises:
-        ValueError: the cluster cannot be used; or ``ships``, and the path of Python has a space: Ray would hang.
+        ValueError: the cluster cannot be used; or ``ships`` is true and a space in the path of Python would stop Ray.
     """
     options: dict[str, Any] = {}
     if ships:
@@ -72,7 +72,7 @@ def on_ray(address: str | None, processes: int = 1, *, ships: bool = False, out:
     try:
         _connect(address, processes, options)
     finally:
-        for signum, handler in heard.items():  # Ray installs its own
+        for signum, handler in heard.items():  # Ray has installed its own handlers
             signal.signal(signum, handler)
     # Ray repeats a task only if its node or its worker process dies. A run that fails ends its task.
     task: Any = ray.remote(num_cpus=1, max_retries=-1)(carry_out)
@@ -105,7 +105,7 @@ def on_ray(address: str | None, processes: int = 1, *, ships: bool = False, out:
     try:
         yield submit
     finally:
-        ray.shutdown()  # it kills tasks, too
+        ray.shutdown()  # shutdown kills tasks, too
 
 
 def carry_out(words: Sequence[str], record: str, files: Mapping[str, bytes]) -> Ended:
@@ -158,11 +158,9 @@ def _connect(address: str | None, processes: int, options: Mapping[str, Any]) ->
     elif address != "auto":
         host, _, port = address.rpartition(":")
         try:
-            socket.create_connection(
-                (host, int(port)), CONNECT_WITHIN
-            ).close()  # Ray itself would try for minutes, then abort
+            socket.create_connection((host, int(port)), CONNECT_WITHIN).close()  # Ray would try for minutes
         except (OSError, OverflowError, ValueError) as error:
-            hint = "--address is host:port of its head, or auto, on a node of it; is it running?"
+            hint = "--address is host:port of its head, or auto on one of its nodes; is the cluster running?"
             raise ValueError(f"no Ray cluster answers at {address}: {error}; {hint}") from error
     try:
         ray.init(address or "local", log_to_driver=False, configure_logging=False, **options)

@@ -1,6 +1,6 @@
-"""Tasks: an environment with benchmark goals, demonstrations and their correspondence.
+"""Task: an environment with benchmark goals, demonstrations and a correspondence for them.
 
-The tasks of the catalogue are in ``rods.py`` and ``robots.py``. Your own function may return an environment or a Task:
+The catalogue has the tasks of ``rods.py``, ``robots.py`` and ``toys.py``. A function of yours may return one, too:
     def make(): return Task(Toss(), benchmark=my_goals, demonstrations=Path("shown.npz"), correspondence=translate)
 """
 
@@ -20,14 +20,14 @@ from sgimd_torch.files import checksum
 from sgimd_torch.learner import Correspondence
 from sgimd_torch.spaces import Array, Demonstration
 
-MOST_GOALS: Final = 500  # goals made for a task that has none
-FASTER: Final = 3.0  # a recording this many times faster than the shortest movement has wrong times
-TOO_FAR: Final = 0.25  # of a joint's range; a larger misfit means that the robot cannot play the recording
+MOST_GOALS: Final = 500  # largest number of goals made for a task without goals
+FASTER: Final = 3.0  # times are wrong if a recording is so many times faster than the shortest movement
+TOO_FAR: Final = 0.25  # fraction of a joint's range; if the misfit is larger, the robot cannot play the recording
 
 
 @runtime_checkable
 class Drawn(Protocol):
-    """Optional for an environment: movements that can be filmed."""
+    """An environment whose movements can be filmed (optional)."""
 
     def trace(self, context: Array, theta: Array, rng: np.random.Generator) -> Trace:
         """The movement; its outcome equals that of ``execute`` with an equal stream."""
@@ -36,10 +36,10 @@ class Drawn(Protocol):
 
 @runtime_checkable
 class Translating(Protocol):
-    """Optional for an environment: demonstrations that can be translated."""
+    """An environment that can translate demonstrations (optional)."""
 
     def correspondence(self, times: Array, trajectory: Array) -> Array:
-        """``(theta_dim,)`` theta_d of a recording, eq. (6): ``(n_times,)`` s, ``(n_times, n_joints)``."""
+        """``(theta_dim,)`` theta_d, eq. (6); ``times (n_times,)`` in s, ``trajectory (n_times, n_joints)``."""
         ...
 
 
@@ -49,9 +49,9 @@ class Task:
 
     Args:
         environment: robot and world.
-        benchmark: goals of evaluation, a file or a function that makes them; None for goals all over T.
-        demonstrations: demonstrations of a teacher, a file or a function that makes them; None for no teacher.
-        correspondence: (times, trajectory) -> theta_d, eq. (6); None for that of a `Translating` environment.
+        benchmark: goals of evaluation, a file or a function that makes them; None: goals all over T.
+        demonstrations: demonstrations of a teacher, a file or a function that makes them; None: no teacher.
+        correspondence: function (times, trajectory) -> theta_d, eq. (6); None: that of a `Translating` environment.
 
     Raises:
         ValueError: a class was given instead of an environment.
@@ -80,14 +80,14 @@ def goals_all_over(environment: Environment) -> Benchmark:
         steps = (np.arange(per_side) + 0.5) / per_side
         points = np.stack(np.meshgrid(*[steps] * box.dim), axis=-1).reshape(-1, box.dim)
     else:
-        from scipy.stats import qmc  # slower to import than this whole library
+        from scipy.stats import qmc  # an import slower than this whole library
 
         points = qmc.Sobol(box.dim, scramble=False).random_base2(int(np.log2(MOST_GOALS)))[1:]
     return Benchmark(type(environment).__name__, box.low + points * box.sides, float(box.sides.max()) / per_side)
 
 
 def benchmark_of(task: Task, file: Path | None) -> tuple[Benchmark, list[str], str | None]:
-    """Goals of evaluation, messages about them, and the checksum of their file, None without a file.
+    """Goals of evaluation, messages about them, and the checksum of their file (None: no file).
 
     Args:
         task: task of the run; its goals are used if ``file`` is None.
@@ -114,7 +114,7 @@ def benchmark_of(task: Task, file: Path | None) -> tuple[Benchmark, list[str], s
 
 
 def demonstrations_of(task: Task, file: Path | None) -> tuple[Sequence[Demonstration], list[str], str | None]:
-    """Demonstrations of a teacher, messages about them, and the checksum of their file, None without a file.
+    """Demonstrations of a teacher, messages about them, and the checksum of their file (None: no file).
 
     Args:
         task: task of the run; its demonstrations are used if ``file`` is None.
@@ -133,7 +133,7 @@ def demonstrations_of(task: Task, file: Path | None) -> tuple[Sequence[Demonstra
     shown: Sequence[Demonstration]
     crc32: str | None = None
     if isinstance(source, Path):
-        from sgimd_torch.demonstrations import load_demonstrations  # most learners read none
+        from sgimd_torch.demonstrations import load_demonstrations  # loaded here, as most learners read none
         from sgimd_torch.demonstrations.fit import misfit_of
 
         crc32 = checksum(source)

@@ -1,4 +1,4 @@
-"""Other robots as tasks; their benchmark goals and demonstrations are made here, equal for every seed."""
+"""Other robots as tasks. Their benchmark goals and demonstrations are made here and are equal for every seed."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ planar_arm_50 = partial(planar_arm, n_joints=50)
 
 
 def swimmer() -> Task:
-    """gymnasium's Swimmer-v5: three links, two motors, which demonstrations give torques."""
+    """gymnasium's Swimmer-v5: three links and two motors; a demonstration is a sequence of torques."""
     from sgimd_torch.environments.swimmer import Swimmer  # gymnasium is loaded only when it is needed
 
     return Task(Swimmer(), DATA / "swimmer_benchmark.npz", DATA / "swimmer_demonstrations.npz")
@@ -53,7 +53,7 @@ def arm_benchmark(arm: PlanarArm) -> Benchmark:
 
 def arm_demonstrations(arm: PlanarArm) -> list[Demonstration]:
     """Movements from rest to postures with equal joint angles; their ends spread evenly over the reachable disc."""
-    shares = (np.arange(SHOWN) + 0.5) / SHOWN  # of the disc's area, along a sunflower spiral
+    shares = (np.arange(SHOWN) + 0.5) / SHOWN  # shares of the disc's area, along a sunflower spiral
     turns = np.pi * (3 - np.sqrt(5)) * np.arange(SHOWN)
     ends = np.sqrt(shares)[:, None] * np.stack([np.cos(turns), np.sin(turns)], axis=1)
     return [_led_to(arm, end) for end in ends]

@@ -25,15 +25,15 @@ def fishing_rod(*, task_space: float = 1.0, threads: int = 1, **physics: Any) ->
 
     Goals come from a square of half side ``task_space`` m.
 
-    Demonstrations and goals of evaluation are always those of the paper's rod, without wind: with ``max_wind`` above 0
-    they belong to the context 0.
+    Demonstrations and goals of evaluation are always those of the paper's rod, without wind. If ``max_wind`` is above
+    0, they belong to the context 0.
 
     Args:
         task_space: half side (m) of the square of goals; 100 in the paper's large-space experiment.
         threads: number of threads of an evaluation; results do not depend on it.
 
     Raises:
-        ValueError: a number out of its range.
+        ValueError: a number is out of its range.
     """
     if not 0 < task_space <= LARGEST:
         raise ValueError(
@@ -50,11 +50,11 @@ def fishing_rod(*, task_space: float = 1.0, threads: int = 1, **physics: Any) ->
 
 
 rod_wind = partial(fishing_rod, max_wind=0.05)
-"""Rod in a side wind, up to a quarter of the float's weight: a context."""
+"""Rod in a side wind of up to a quarter of the float's weight; the wind is the context."""
 rod_yaw = partial(fishing_rod, max_yaw=0.5)
-"""Rod with its base turned by up to half a radian: a context."""
+"""Rod with its base turned by up to half a radian; the angle is the context."""
 rod_long = partial(fishing_rod, line=1.5)
-"""Rod with a line half as long again, taught with the shorter one."""
+"""Rod with a line 1.5 times as long as the line of the rod in its demonstrations."""
 
 
 def _in_context_zero(context_dim: int) -> list[Demonstration]:

@@ -1,4 +1,4 @@
-"""Toy robots as tasks: goals and demonstrations are made here, equal for every seed."""
+"""Toy robots as tasks. Their goals and demonstrations are made here and are equal for every seed."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ REACHING: Final = 20_000  # uniform movements that find the outcomes a toy can r
 
 
 def toy(robot: Toy, side: float, *, taught: bool = False) -> Task:
-    """A toy robot; its goals lie on tiles of ``side``, in the unit of T. ``taught``: it has a teacher, too."""
+    """A toy robot. Its goals lie on tiles of this ``side``, in the unit of T. If it is ``taught``, it has a teacher."""
     shown = partial(toy_demonstrations, robot) if taught else None
     return Task(robot, partial(toy_benchmark, robot, side), shown, last_row if taught else None)
 
 
 def toss() -> Task:
-    """A ball thrown in the wind, which is the context."""
+    """A ball thrown in the wind; the wind is the context."""
     return toy(toys.toss(), 0.4, taught=True)
 
 
@@ -44,7 +44,7 @@ def spatial_arm() -> Task:
 
 
 def puck() -> Task:
-    """A puck that has to be hit; where it lies is the context."""
+    """A puck that has to be hit; the place of the puck is the context."""
     return toy(objects.puck(), 0.1)
 
 
@@ -68,7 +68,7 @@ def last_row(times: Array, trajectory: Array) -> Array:
 
 
 def toy_demonstrations(robot: Toy) -> list[Demonstration]:
-    """Movements in contexts all over C, to different outcomes of uniform movements; equal in every run."""
+    """Uniform movements with different outcomes, in contexts all over C; equal in every run."""
     rng = stream(0, "demonstrations by a toy")
     thetas = robot.policies.low + robot.policies.sides * rng.random((REACHING, robot.policies.dim))
     found = []
