@@ -77,12 +77,12 @@ class StrategicInterest(StrategicGoals):
     strategy has more progress there than the cheapest strategy, the difference is divided by the cost, too.
 
     The papers draw in proportion to progress, and try new strategies by chance. Here progress can be
-    negative, so interest is an exponential. If a strategy has few attempts in a region, it has the progress of its
-    nearest attempts, so that no choice is spent on a random strategy.
+    negative, so interest is an exponential. If a strategy has few attempts in a region, its progress is estimated from
+    its nearest attempts. So strategies need not be tried at random.
 
     Args:
         problem: problem to learn.
-        make: constructor of the map of regions, which also has the measure of progress.
+        make: constructor of the map of regions; it also sets the map's measure of progress.
     """
 
     def __init__(self, problem: Problem, *, make: Callable[[Problem], InterestMap] = BY_STRATEGY) -> None:

@@ -16,15 +16,14 @@ from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, stream
 
 _FIRST, _GROWTH = 16, 1.5  # exemplars at the first look for a plateau, and the growth factor from look to look
-_GUESSES: Final = 50  # number of candidate maps, each through few exemplars
+_GUESSES: Final = 50  # number of candidate maps, each from as few exemplars as determine it
 _GUESSED_ON: Final = 300  # number of exemplars, drawn from all, that the candidates are compared on
 _REFINED: Final = 5  # number of fits of the best map by least squares
-_NEAR, _WITHIN = 2.0, 4.0  # distances, in standard deviations of the noise, of most points of a plateau and of all
+_NEAR, _WITHIN = 2.0, 4.0  # sd of the noise within which nearly all and all points of a plateau lie
 _ROUNDING: Final = 1e-9  # noise of an environment without noise, relative to the spread of outcomes
-_LEAST, _SHARE = 16, 0.1  # least number of exemplars on a plateau, and their least share of all
-_DENSE: Final = (
-    0.9  # least share of the points within 4 sd of a plateau that lie within 2 sd; about half if there is no plateau
-)
+_LEAST, _SHARE = 16, 0.1  # a plateau must hold so many exemplars, and such a share of all
+# Of the points within 4 sd of a plateau, at least this share must lie within 2 sd. Without a plateau, about half do.
+_DENSE: Final = 0.9
 
 
 class Effects:

@@ -100,7 +100,7 @@ class ModelInverse(ThroughModel):
 
 
 class ModelAlone(ModelInverse):
-    """Locally linear model while learning; in evaluations a forward model, without a test (extra forward).
+    """Locally linear model while learning; forward model in evaluations, tested or not (extra forward).
 
     Args:
         problem: problem to learn.

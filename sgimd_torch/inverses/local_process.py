@@ -23,11 +23,11 @@ from sgimd_torch.spaces import Array, Estimate, stream
 _FIRST, _GROWTH = 16, 1.5  # number of exemplars at the first fit, and its growth factor from fit to fit
 _FITTED: Final = 300  # number of exemplars, drawn from all, to which lengths are fitted
 _GROUPS, _GROUP = 8, 60  # number of groups of neighbours that determine the kernel, and of exemplars in each
-_NEAR: Final = 20  # number of outcomes near the goal, to which the process is fitted, and which give its surprise
-_LEARNT: Final = 100  # number of exemplars to which the process is fitted
+_NEAR: Final = 20  # exemplars with outcomes nearest to the goal, on which the surprise of the process is measured
+_LEARNT: Final = 100  # exemplars to which the process is fitted, the `_NEAR` ones among them
 _STARTS, _STEPS = 3, 4  # number of exemplars where steps begin, and of steps from each
 _DAMPINGS: Final = np.array([1e-3, 0.1, 1.0, 10.0])
-_FAR: Final = 1e3  # distance from 0 in spreads; farther out, rounding of squares hides differences of inputs
+_FAR: Final = 1e3  # inputs more spreads from 0 are shifted to 0 first: rounding would hide their differences
 _CLEARLY: Final = 0.8  # error, relative to that of the nearest exemplar, below which a candidate is clearly better
 
 

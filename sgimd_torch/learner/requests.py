@@ -13,12 +13,12 @@ class Demonstrator(Built):
     """Teacher who is asked for a demonstration of a goal. Built from ``(demonstrations, rng)`` and options.
 
     Attributes:
-        takes: number of movements for which the learner rests until a reply has come.
+        takes: duration of a reply, in movements, for which the learner rests.
     """
 
     takes: int = 0
 
     @abstractmethod
     def demonstrate(self, context: Array, goal: Array, memory: Memory) -> Demonstration | None:
-        """A demonstration of ``goal`` ``(outcome_dim,)`` in ``context`` ``(context_dim,)``, or None. A replay asks
-        again, so random draws may depend on the seed and on the arguments only."""
+        """A demonstration of ``goal`` ``(outcome_dim,)`` in ``context`` ``(context_dim,)``, or None. A replayed
+        run repeats the request and needs an equal reply, so random draws must depend only on seed and arguments."""
