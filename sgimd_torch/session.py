@@ -61,7 +61,7 @@ def run(
         environment: robot and world, which observes contexts and executes movements.
         seed: number from which the environment's random streams come.
         movements: number of movements in all; those that ``learner`` has made before count.
-        teacher: teacher who may demonstrate before each movement; None for none.
+        teacher: teacher who may demonstrate before each movement; None: no teacher.
         teachers: teachers by name, for a learner that asks. If a teacher fails, raises TimeoutError or shows a
             demonstration that this robot cannot use, the learner gets no reply, and there is a `RuntimeWarning`.
         execute: function that executes movements; None for ``live(environment, seed)``.

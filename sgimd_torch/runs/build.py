@@ -29,7 +29,7 @@ class RunParts:
         config: settings of the run.
         task: robot with its goals and demonstrations.
         learner: learner, freshly built.
-        teacher: teacher who demonstrates without being asked; None for none.
+        teacher: teacher who demonstrates without being asked; None: no teacher.
         teachers: teachers who are asked, by name.
         answers: inverse models for evaluations, by name; the run's own inverse model comes first.
         benchmark: goals of evaluations.
