@@ -68,12 +68,14 @@ def test_without_a_room_the_rest_imports_runs_and_passes_its_own_tests(room, tmp
     assert "30 movements, mean error" in go("-m", "sgimd_torch", "run", "--algorithm", "sgim-d", *short)
     go("-m", "sgimd_torch", "run", "--help")
 
+    telling = [word for word in words if len(word) > 4]  # "all" and "slow" stand everywhere
+
     def concerns(path):
         text = path.read_text(encoding="utf-8")
-        return any(name in text for name in (f"sgimd_torch.{room}", "experiments/", *words))
+        return any(name in text for name in (f"sgimd_torch.{room}", "experiments/", *telling))
 
     tests = [
         str(path) for name in KEPT for path in (tmp_path / "tests" / name).rglob("test_*.py") if not concerns(path)
     ]
     assert len(tests) > 15
-    assert "passed" in go("-m", "pytest", "-q", "-p", "no:cacheprovider", "-m", "not slow", *tests)
+    assert "passed" in go("-m", "pytest", "-p", "no:cacheprovider", "-m", "not slow", *tests)
