@@ -1,7 +1,6 @@
 """Plain English: a description makes sense alone, and one word has one meaning (the table is in CONTRIBUTING.md).
 
-``pytest tests/project/test_english.py -k environments`` tests one place, a folder or a file beside the folders. Places
-in ``WAITING`` are expected to fail: whoever has treated one takes it out.
+``pytest tests/project/test_english.py -k environments`` tests one place, a folder or a file beside the folders.
 """
 
 import ast
@@ -14,7 +13,6 @@ import pytest
 from sgimd_torch.catalogue import WORDS, about
 
 ROOT = Path(__file__).parents[2]
-WAITING = ""
 # First words that continue an earlier text, such as the name of the parameter; _ stands for a space.
 CONTINUING = """
     the_same that which what who whom whose whoever whatever why when where how as such see also
@@ -67,9 +65,7 @@ def helps(tree: ast.AST):
                 yield value.value
 
 
-@pytest.mark.parametrize(
-    "place", [pytest.param(each, marks=[pytest.mark.xfail] * (each in WAITING.split())) for each in PLACES]
-)
+@pytest.mark.parametrize("place", PLACES)
 def test_descriptions_make_sense_alone_and_words_have_one_meaning(place):
     bad = []
     for path in PLACES[place]:
