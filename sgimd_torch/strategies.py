@@ -151,8 +151,9 @@ class GoalBabbling(Strategy):
         """Probability of global exploration: the farther the goal from all reached outcomes, the higher."""
         if len(self.memory) == 0:
             return 1.0
-        if self.explore.share is not None:
-            return self.explore.share
+        share = self.explore.share  # looks for effects, so it is asked once
+        if share is not None:
+            return share
         # Deviation: the paper's probability is -J itself. Here it stays off 0 and 1, so both regimes stay possible.
         return float(np.clip(-self.competence(context, goal), *self.global_range))
 
