@@ -234,6 +234,13 @@ class Move:
         _own(self, "theta", "goal")
 
 
+class Failure(NamedTuple):
+    """A movement without an outcome, the ``reason`` why it has none, and the exception behind the reason."""
+
+    reason: str
+    cause: BaseException | None = None
+
+
 class Estimate(NamedTuple):
     """The answer of an inverse model to a goal: ``theta`` ``(theta_dim,)``, and the exemplars behind it, ``thetas``
     ``(k, theta_dim)`` with their ``outcomes`` ``(k, outcome_dim)``. ``context`` ``(context_dim,)`` belongs to the goal.
