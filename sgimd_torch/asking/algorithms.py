@@ -115,7 +115,7 @@ def sgim_im(
         environment: robot and world; nothing is executed here.
         seed: number from which all random streams of the learner come.
         correspondence: function from times and trajectory to theta_d, eq. (6).
-        teachers: mapping from one name to one teacher.
+        teachers: mapping from names to teachers, with one entry.
         options: options of `sgim_acts`.
 
     Raises:

@@ -113,7 +113,7 @@ class GaussianPrimitive(Primitive):
         weights = self._weights((times - times[0]) / span)
         low, sides = self.joints.low, self.joints.sides
         scaled = (trajectory - low) / sides
-        # If the knots of a joint lie in [0, 1], least squares without bounds is exact up to rounding; lsq_linear is not.
+        # If the knots of a joint lie in [0, 1], least squares without bounds is exact to rounding; lsq_linear is not.
         knots = np.linalg.lstsq(weights, scaled, rcond=None)[0]
         for joint in np.flatnonzero((np.abs(knots - 0.5) > 0.5 + 1e-9).any(axis=0)):
             knots[:, joint] = lsq_linear(weights, scaled[:, joint], bounds=(0.0, 1.0), method="trf", tol=1e-12).x

@@ -56,7 +56,7 @@ def puck(*, noise: float = 0.005) -> Toy:
 
 
 def fetch(*, noise: float = 0.005) -> Toy:
-    """An arm closes its hand in one posture and opens it in another; it carries a ball within .15 m of the closing hand.
+    """An arm closes its hand in one posture, opens it in another, and carries a ball within .15 m of the closing hand.
 
     theta: angles of the four joints where the hand closes, then where it opens. Outcome: final place of the ball (m).
     """

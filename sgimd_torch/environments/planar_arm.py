@@ -49,7 +49,7 @@ class PlanarArm:
         self.rest = self.outcomes.check("rest, where the straight arm ends,", [1.0, 0.0], "T has 2 dimensions")
         self.rest.flags.writeable = False
         self.noise = noise
-        self._limits = np.array([np.pi] + [2 * np.pi / n_joints] * (n_joints - 1))  # rad; a circle is just possible
+        self._limits = np.array([np.pi] + [2 * np.pi / n_joints] * (n_joints - 1))  # rad; just enough to form a circle
         self.outcome_noise = self._mean_outcome_noise()
 
     def observe(self, rng: np.random.Generator) -> Array:

@@ -140,7 +140,7 @@ class Caster:
         return RodTrace(outcome, landed, let_out, self.timestep, *kept, push, self._gravity)
 
     def _settle(self, posture: Array) -> tuple[Array, Array]:
-        """``home``, c_org with the arm in ``posture`` and the line hanging still; ``hanging``, the state of its float."""
+        """``home``, c_org with the arm in ``posture`` and the line hanging still; ``hanging``, the float's state."""
         data = mujoco.MjData(self.model)
         data.qpos[:6] = posture
         data.qpos[6] = -(posture[1] + posture[2] + posture[4])  # opposite to the rod's pitch, so the line hangs plumb
